@@ -1,0 +1,71 @@
+"""The one place that knows numba: the decorator of every kernel, its cache folder, and the warm-up.
+
+It holds no kernel of its own. Kernels compile when first called, never at import; `warm_up` calls them beforehand.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+
+def cache_folder() -> Path:
+    """Folder of compiled kernels: that of `NUMBA_CACHE_DIR`, else the user's cache, else a temporary one."""
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    if chosen:
+        return Path(chosen)
+    base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or str(Path.home() / ".cache")
+    folder = Path(base) / "commission" / "kernels"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        # A service user without a home still runs; it compiles anew after each reboot.
+        folder = Path(tempfile.gettempdir()) / f"commission-kernels-{os.getuid()}"
+        folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+# numba reads the variable when it is imported, so it is set before that and nowhere else.
+os.environ["NUMBA_CACHE_DIR"] = str(cache_folder())
+
+import numba  # noqa: E402
+
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+
+
+def compiled(kernel: Kernel) -> Kernel:
+    """Compile a pure function over scalars and arrays on its first call.
+
+    It runs without the interpreter lock, is cached on disk, and keeps IEEE arithmetic (no `fastmath`: live, replay and
+    simulation must agree to the last bit, and NaN marks a missing echo).
+    """
+    return numba.njit(nogil=True, cache=True)(kernel)  # type: ignore[no-any-return]
+
+
+def compiled_parallel(kernel: Kernel) -> Kernel:
+    """Like `compiled`, with `prange` over all cores: always a function of its own beside the serial one."""
+    return numba.njit(nogil=True, cache=True, parallel=True)(kernel)  # type: ignore[no-any-return]
+
+
+parallel_range = numba.prange
+
+
+def warm_up(
+    steps: Sequence[tuple[str, Callable[[], None]]], progress: Callable[[float, str], None] | None = None
+) -> None:
+    """Compile (or load from the cache) all kernels in the given order.
+
+    Parameters
+    ----------
+    steps : name shown to the user and function that calls a module's kernels once on tiny inputs.
+    progress : called with the fraction done [0..1] and the name of the step that starts; may raise to cancel.
+    """
+    for done, (name, step) in enumerate(steps):
+        if progress is not None:
+            progress(done / len(steps), name)
+        step()
+    if progress is not None:
+        progress(1.0, "compiled")

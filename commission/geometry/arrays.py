@@ -1,0 +1,40 @@
+"""Checked, read-only arrays for the frozen values of the project. Not a numerics module: it only guards shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+
+
+def frozen(values: ArrayLike, shape: Sequence[int | None], name: str, *, finite: bool = True) -> FloatArray:
+    """Return a read-only float64 copy of `values` after checking its shape.
+
+    Parameters
+    ----------
+    values : anything that numpy turns into an array.
+    shape : expected length of each axis; None accepts any length.
+    name : how the array is called in the message.
+    finite : whether NaN and infinity are errors.
+
+    Raises
+    ------
+    ValueError
+        says the shape (or the non-finite element) found and what is expected.
+    """
+    array = np.array(values, dtype=np.float64)
+    expected = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+    if array.size == 0 and shape and shape[0] is None:
+        array = array.reshape((0, *(n or 0 for n in shape[1:])))
+    if array.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, array.shape, strict=True)):
+        raise ValueError(f"{name} has shape {array.shape}; expected {expected}")
+    if finite and not np.isfinite(array).all():
+        index = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        raise ValueError(f"{name}{list(index)} is {array[index]}; expected finite numbers")
+    array.setflags(write=False)
+    return array
