@@ -54,7 +54,8 @@ parallel_range = numba.prange
 
 
 def warm_up(
-    steps: Sequence[tuple[str, Callable[[], None]]], progress: Callable[[float, str], None] | None = None
+    steps: Sequence[tuple[str, Callable[[], None]]],
+    progress: Callable[[float, str], None] | None = None,
 ) -> None:
     """Compile (or load from the cache) all kernels in the given order.
 

@@ -1,0 +1,72 @@
+"""What the localizer says after each scan: belief, mode, and what became of every detection. Values only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.geometry.arrays import FloatArray, IntArray
+
+
+class Mode(IntEnum):
+    """State of the uncertainty supervisor (Sobreira et al. 2016, Algorithm 4)."""
+
+    OPERATIONAL = 0
+    FAIL = 1
+
+
+class Status(IntEnum):
+    """What became of a detection."""
+
+    INLIER = 0
+    OUTLIER_DETECTOR = 1
+    OUTLIER_ASSOCIATION = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Belief:
+    """A Gaussian over the pose of base in map."""
+
+    stamp_ns: int
+    """Time that the belief is about [ns]."""
+    mean: FloatArray
+    """(3,) `T_map_base`: x [m], y [m], theta [rad]."""
+    covariance: FloatArray
+    """(3, 3) of x [m], y [m], theta [rad]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Estimate:
+    """One cycle: one scan processed."""
+
+    stamp_ns: int
+    """Time of the scan [ns]."""
+    prior: Belief
+    """After *predict*, before any detection of this scan; validation ellipses come from it."""
+    posterior: Belief
+    """The filter's own state after *correct*; it goes on in fail mode."""
+    output: Belief
+    """What the vehicle is given: the posterior, or in fail mode the last one from before (withheld)."""
+    mode: Mode
+    """State of the supervisor after this scan."""
+    detections: FloatArray
+    """(N, 2) range [m] and bearing [rad] of each detection and rejected cluster, scanner frame."""
+    beams: IntArray
+    """(N,) beams of each cluster; 0 where the sensor itself detected."""
+    points_map: FloatArray
+    """(N, 2) the detections seen from the posterior [m], map frame."""
+    status: NDArray[np.int8]
+    """(N,) a `Status` each."""
+    reflector: IntArray
+    """(N,) index into the reflector map of the associated (or, for an outlier, most likely) reflector; -1: none."""
+    d2: FloatArray
+    """(N,) squared Mahalanobis distance to that reflector (NIS, 2 degrees of freedom); NaN: none."""
+    gate: float
+    """Largest squared Mahalanobis distance of an inlier (chi-square, 2 degrees of freedom)."""
+
+    def count(self, status: Status) -> int:
+        """Return the number of detections of one status."""
+        return int(np.count_nonzero(self.status == status))

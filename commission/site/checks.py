@@ -1,0 +1,47 @@
+"""Range checks shared by the values of a site, and the hint of a field. Each check says what was found and expected."""
+
+from __future__ import annotations
+
+import ast
+import functools
+import inspect
+import itertools
+import math
+import textwrap
+
+
+def at_least(value: float, limit: float, name: str, unit: str = "") -> None:
+    """Raise ValueError unless `value` is finite and >= `limit`."""
+    if not (math.isfinite(value) and value >= limit):
+        raise ValueError(f"{name} is {value:g}; expected {limit:g}{unit and ' ' + unit} or more")
+
+
+def above(value: float, limit: float, name: str, unit: str = "") -> None:
+    """Raise ValueError unless `value` is finite and > `limit`."""
+    if not (math.isfinite(value) and value > limit):
+        raise ValueError(f"{name} is {value:g}; expected more than {limit:g}{unit and ' ' + unit}")
+
+
+def between(value: float, limits: tuple[float, float], name: str, unit: str = "") -> None:
+    """Raise ValueError unless limits[0] <= `value` <= limits[1]."""
+    low, high = limits
+    if not (low <= value <= high):
+        raise ValueError(f"{name} is {value:g}; expected {low:g} to {high:g}{unit and ' ' + unit}")
+
+
+@functools.cache
+def field_hints(cls: type) -> dict[str, str]:
+    """Docstring under each field of a dataclass, by the field's name: help of commands and widgets, written once."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(cls)))
+    body = next(node for node in tree.body if isinstance(node, ast.ClassDef)).body
+    hints: dict[str, str] = {}
+    for statement, following in itertools.pairwise(body):
+        if (
+            isinstance(statement, ast.AnnAssign)
+            and isinstance(statement.target, ast.Name)
+            and isinstance(following, ast.Expr)
+            and isinstance(following.value, ast.Constant)
+            and isinstance(following.value.value, str)
+        ):
+            hints[statement.target.id] = " ".join(following.value.value.split())
+    return hints

@@ -1,0 +1,49 @@
+"""The floor map: which cells of the hall are walls, free or unknown. Not its file formats, not its rays."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.geometry.arrays import FloatArray, frozen
+from commission.geometry.occupancy import OccupancyGrid
+
+UNKNOWN = -1
+FREE = 0
+OCCUPIED = 100
+"""Values of a cell, as in ROS nav_msgs/OccupancyGrid."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FloorMap:
+    """A grid of cells. The laser stops at occupied cells only; unknown ones let it pass."""
+
+    cells: NDArray[np.int8]
+    """(H, W) UNKNOWN, FREE or OCCUPIED; row 0 is the lowest y of the grid's own frame."""
+    resolution: float
+    """Edge of a cell [m]."""
+    origin: FloatArray = field(default_factory=lambda: frozen([0.0, 0.0, 0.0], (3,), "origin"))
+    """(3,) pose of the lower-left corner of cell (0, 0) in the map frame [m, m, rad]."""
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.resolution) and self.resolution > 0.0):
+            raise ValueError(f"resolution is {self.resolution:g}; expected metres per cell > 0")
+        if self.cells.ndim != 2 or 0 in self.cells.shape:
+            raise ValueError(f"cells have shape {self.cells.shape}; expected rows x columns, each 1 or more")
+        object.__setattr__(self, "origin", frozen(self.origin, (3,), "origin"))
+        cells = np.ascontiguousarray(self.cells, dtype=np.int8)
+        cells.setflags(write=False)
+        object.__setattr__(self, "cells", cells)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height of the grid [m], along its own axes."""
+        rows, columns = self.cells.shape
+        return columns * self.resolution, rows * self.resolution
+
+    def occupancy(self) -> OccupancyGrid:
+        """Return the occupied cells as a grid for rays and distances."""
+        return OccupancyGrid(self.cells == OCCUPIED, self.resolution, self.origin)

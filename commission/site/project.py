@@ -1,0 +1,50 @@
+"""The project: one frozen aggregate of what the engineer edits. An edit returns a new project; files are elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from commission.errors import ProjectError, UsageError
+from commission.site.disturbances import Disturbances
+from commission.site.floor_map import FloorMap
+from commission.site.parameters import Parameters
+from commission.site.reflectors import ReflectorMap
+from commission.site.routes import Route
+from commission.site.scanner import Scanner
+from commission.site.vehicle import DifferentialVehicle, Vehicle
+
+
+@dataclass(frozen=True, slots=True)
+class Project:
+    """A site, the vehicle that drives in it and the tunables of its localizer."""
+
+    name: str = "Unnamed"
+    """Shown in the title of the page."""
+    floor_map: FloorMap | None = None
+    """Walls and free floor; a site without one is an open field."""
+    reflectors: ReflectorMap = field(default_factory=ReflectorMap)
+    """The reflector map."""
+    routes: tuple[Route, ...] = ()
+    """Planned routes; names are unique."""
+    vehicle: Vehicle = field(default_factory=DifferentialVehicle)
+    """Wheels and outline."""
+    scanner: Scanner = field(default_factory=Scanner)
+    """The laser scanner."""
+    parameters: Parameters = field(default_factory=Parameters)
+    """Tunables of the localizer."""
+    disturbances: Disturbances = field(default_factory=Disturbances)
+    """What a virtual drive suffers."""
+
+    def __post_init__(self) -> None:
+        names = [route.name for route in self.routes]
+        for name in names:
+            if names.count(name) > 1:
+                raise ProjectError(f"route name {name!r} is used twice; expected unique names")
+
+    def route(self, name: str) -> Route:
+        """Return the route of that name; raises UsageError that lists the names there are."""
+        for route in self.routes:
+            if route.name == name:
+                return route
+        known = ", ".join(repr(route.name) for route in self.routes) or "none"
+        raise UsageError(f"no route is called {name!r}; the project has: {known}")

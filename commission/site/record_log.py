@@ -1,0 +1,164 @@
+"""A finished recording or virtual drive as columns, for the compiled whole run and for seeking. Not a file format."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.site.records import (
+    ORDER_WITHIN_A_STAMP,
+    Detections,
+    Odometry,
+    Record,
+    ReferencePose,
+    Scan,
+)
+
+
+def _stamps(records: list[Record]) -> IntArray:
+    return np.array([record.stamp_ns for record in records], dtype=np.int64)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScanLog:
+    """Scans of one scanner; all have the same beams."""
+
+    stamps_ns: IntArray
+    """(K,) time of each scan [ns], ascending."""
+    ranges: NDArray[np.float32]
+    """(K, B) distance along each beam [m]; NaN where nothing came back."""
+    angle_min: float
+    """Bearing of the first beam [rad], scanner frame."""
+    angle_increment: float
+    """Bearing step from beam to beam [rad]."""
+    intensities: NDArray[np.float32] | None = None
+    """(K, B) strength of each echo, or None."""
+    reflector: NDArray[np.bool_] | None = None
+    """(K, B) reflector flag of each beam, or None."""
+
+    def scan(self, index: int) -> Scan:
+        """Return one scan (views, no copies)."""
+        return Scan(
+            int(self.stamps_ns[index]),
+            self.ranges[index],
+            self.angle_min,
+            self.angle_increment,
+            None if self.intensities is None else self.intensities[index],
+            None if self.reflector is None else self.reflector[index],
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordLog:
+    """All records of one drive, by kind, each kind in ascending order of its stamps."""
+
+    odometry_stamps_ns: IntArray
+    """(M,) [ns]."""
+    displacements: FloatArray
+    """(M, 3) motion since the row before, in the base frame of the row before [m, m, rad]."""
+    scans: ScanLog | None = None
+    """Scans, or None."""
+    detection_stamps_ns: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    """(D,) time of each scan whose detections the sensor reported [ns]."""
+    detection_offsets: IntArray = field(default_factory=lambda: np.zeros(1, np.int64))
+    """(D + 1,) rows of `range_bearing` of scan i: offsets[i] to offsets[i + 1]."""
+    range_bearing: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
+    """(n, 2) range [m] and bearing [rad] of each detection, scanner frame."""
+    reference_stamps_ns: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    """(R,) [ns]."""
+    reference_poses: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+    """(R, 3) `T_map_base` [m, m, rad]."""
+    order: NDArray[np.int64] = field(init=False, repr=False)
+    """(E, 2) every record in order of delivery: rank of its kind in ORDER_WITHIN_A_STAMP, index within its kind."""
+    stamps_ns: IntArray = field(init=False, repr=False)
+    """(E,) stamp of every record in order of delivery [ns]."""
+
+    def __post_init__(self) -> None:
+        scan_stamps = np.empty(0, np.int64) if self.scans is None else self.scans.stamps_ns
+        columns = (
+            self.odometry_stamps_ns,
+            self.reference_stamps_ns,
+            self.detection_stamps_ns,
+            scan_stamps,
+        )
+        stamps = np.concatenate(columns)
+        kinds = np.concatenate([np.full(len(column), rank, np.int64) for rank, column in enumerate(columns)])
+        indices = np.concatenate([np.arange(len(column), dtype=np.int64) for column in columns])
+        order = np.lexsort((indices, kinds, stamps))
+        object.__setattr__(self, "order", np.stack([kinds[order], indices[order]], axis=1))
+        object.__setattr__(self, "stamps_ns", stamps[order])
+
+    @staticmethod
+    def collect(records: Iterable[Record]) -> RecordLog:
+        """Gather records of any source. Scans must have the same beams (ValueError says which one differs)."""
+        kinds: dict[type, list[Record]] = {kind: [] for kind in ORDER_WITHIN_A_STAMP}
+        for record in records:
+            kinds[type(record)].append(record)
+        odometry = [r for r in kinds[Odometry] if isinstance(r, Odometry)]
+        detections = [r for r in kinds[Detections] if isinstance(r, Detections)]
+        references = [r for r in kinds[ReferencePose] if isinstance(r, ReferencePose)]
+        counts = [len(r.range_bearing) for r in detections]
+        return RecordLog(
+            _stamps(kinds[Odometry]),
+            np.array([r.displacement for r in odometry]).reshape(-1, 3),
+            _scan_log([r for r in kinds[Scan] if isinstance(r, Scan)]),
+            _stamps(kinds[Detections]),
+            np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.int64),
+            np.concatenate([r.range_bearing for r in detections]) if detections else np.empty((0, 2)),
+            _stamps(kinds[ReferencePose]),
+            np.array([r.pose for r in references]).reshape(-1, 3),
+        )
+
+    def __len__(self) -> int:
+        """Return the number of records."""
+        return len(self.order)
+
+    def record(self, position: int) -> Record:
+        """Return the record at a position of the order of delivery."""
+        kind, index = self.order[position]
+        stamp = int(self.stamps_ns[position])
+        if kind == ORDER_WITHIN_A_STAMP[Odometry]:
+            return Odometry(stamp, self.displacements[index])
+        if kind == ORDER_WITHIN_A_STAMP[ReferencePose]:
+            return ReferencePose(stamp, self.reference_poses[index])
+        if kind == ORDER_WITHIN_A_STAMP[Detections]:
+            rows = slice(self.detection_offsets[index], self.detection_offsets[index + 1])
+            return Detections(stamp, self.range_bearing[rows])
+        if self.scans is None:
+            raise IndexError(f"record {position} is a scan of a log without scans")
+        return self.scans.scan(int(index))
+
+    def records(self) -> Iterator[Record]:
+        """Deliver every record in order of stamps; within a stamp motion comes first."""
+        return (self.record(position) for position in range(len(self)))
+
+
+def _scan_log(scans: list[Scan]) -> ScanLog | None:
+    """Stack scans, or say which one does not fit the first."""
+    if not scans:
+        return None
+    first = scans[0]
+    for index, scan in enumerate(scans):
+        same = (
+            scan.ranges.shape == first.ranges.shape
+            and scan.angle_min == first.angle_min
+            and scan.angle_increment == first.angle_increment
+            and (scan.intensities is None) == (first.intensities is None)
+            and (scan.reflector is None) == (first.reflector is None)
+        )
+        if not same:
+            raise ValueError(f"scan {index} has other beams than scan 0; expected one scanner per recording")
+    intensities = [scan.intensities for scan in scans if scan.intensities is not None]
+    reflector = [scan.reflector for scan in scans if scan.reflector is not None]
+    return ScanLog(
+        np.array([scan.stamp_ns for scan in scans], dtype=np.int64),
+        np.stack([scan.ranges for scan in scans]),
+        first.angle_min,
+        first.angle_increment,
+        np.stack(intensities) if intensities else None,
+        np.stack(reflector) if reflector else None,
+    )

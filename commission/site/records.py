@@ -1,0 +1,91 @@
+"""The one event type of simulation, replay and live: what a vehicle reports, in the order of its stamps.
+
+Records carry measurements only; nothing here says where they come from or what is done with them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.geometry.arrays import FloatArray, frozen
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Motion since the previous odometry record."""
+
+    stamp_ns: int
+    """Time of the end of the motion [ns]."""
+    displacement: FloatArray
+    """(3,) pose of base now in base at the previous record: dx [m], dy [m], dtheta [rad]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self,
+            "displacement",
+            frozen(self.displacement, (3,), "odometry displacement"),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Scan:
+    """One turn of the laser scanner."""
+
+    stamp_ns: int
+    """Time of the scan [ns]."""
+    ranges: NDArray[np.float32]
+    """(B,) distance along each beam [m], scanner frame; NaN where nothing came back."""
+    angle_min: float
+    """Bearing of the first beam [rad], scanner frame."""
+    angle_increment: float
+    """Bearing step from beam to beam [rad], positive counter-clockwise."""
+    intensities: NDArray[np.float32] | None = None
+    """(B,) strength of each echo [sensor's own unit], or None."""
+    reflector: NDArray[np.bool_] | None = None
+    """(B,) whether the sensor says that the beam met a reflector, or None."""
+
+    @property
+    def bearings(self) -> FloatArray:
+        """(B,) bearing of each beam [rad], scanner frame."""
+        return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True)
+class Detections:
+    """Reflectors that the sensor itself has detected in one scan; empty when it saw none."""
+
+    stamp_ns: int
+    """Time of the scan [ns]."""
+    range_bearing: FloatArray
+    """(N, 2) range [m] and bearing [rad] of each reflector's center, scanner frame."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "range_bearing", frozen(self.range_bearing, (None, 2), "detections"))
+
+
+@dataclass(frozen=True, slots=True)
+class ReferencePose:
+    """Ground truth, or the pose that a second system reports. The localizer never reads it."""
+
+    stamp_ns: int
+    """Time of the pose [ns]."""
+    pose: FloatArray
+    """(3,) `T_map_base`: x [m], y [m], theta [rad]; theta is NaN when the second system does not know it."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pose", frozen(self.pose, (3,), "reference pose", finite=False))
+
+
+Record: TypeAlias = Odometry | Scan | Detections | ReferencePose
+
+ORDER_WITHIN_A_STAMP: dict[type, int] = {
+    Odometry: 0,
+    ReferencePose: 1,
+    Detections: 2,
+    Scan: 3,
+}
+"""Records of one stamp are delivered in this order: motion first, then what was seen after it."""

@@ -1,0 +1,84 @@
+"""Planned routes: splines with a direction and a speed. Not how a vehicle follows them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+
+from commission.errors import ProjectError
+from commission.geometry.arrays import FloatArray, frozen
+from commission.geometry.splines import Spline
+
+
+class Direction(StrEnum):
+    """Whether the vehicle's front or its rear goes ahead."""
+
+    FORWARD = "forward"
+    REVERSE = "reverse"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Segment:
+    """One curve of a route, driven without a stop."""
+
+    control_points: FloatArray
+    """(N, 2) control points of the curve [m], map frame."""
+    direction: Direction = Direction.FORWARD
+    """`forward` or `reverse`."""
+    degree: int = 3
+    """Degree of the B-spline."""
+    knots: FloatArray | None = None
+    """(N + degree + 1,) knots, clamped; none: uniform in [0, 1]."""
+    weights: FloatArray | None = None
+    """(N,) positive weights (NURBS); none: all 1."""
+    speed: float | None = None
+    """Speed on this segment [m/s]; none: the route's."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(
+            self,
+            "control_points",
+            frozen(self.control_points, (None, 2), "control_points"),
+        )
+        for name in ("knots", "weights"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(getattr(self, name), (None,), name))
+        if self.speed is not None and not (math.isfinite(self.speed) and self.speed > 0.0):
+            raise ValueError(f"speed is {self.speed:g}; expected more than 0 m/s")
+        self.spline()
+
+    def spline(self) -> Spline:
+        """Return the curve; raises ValueError when degree, knots, weights and points do not fit each other."""
+        return Spline(self.degree, self.control_points, self.knots, self.weights)
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """Segments driven one after the other; where the direction changes the vehicle stops."""
+
+    name: str
+    """Name, unique within the project."""
+    segments: tuple[Segment, ...]
+    """The curves; each starts where the one before ends."""
+    speed: float = 0.5
+    """Speed [m/s] of segments that name none."""
+
+    def __post_init__(self) -> None:
+        if not self.name:
+            raise ValueError("a route's name is empty; expected text")
+        if not self.segments:
+            raise ValueError(f"route {self.name!r} has no segments; expected 1 or more")
+        if not (math.isfinite(self.speed) and self.speed > 0.0):
+            raise ValueError(f"speed of route {self.name!r} is {self.speed:g}; expected more than 0 m/s")
+        for index, (before, after) in enumerate(zip(self.segments, self.segments[1:], strict=False)):
+            gap = math.dist(before.control_points[-1], after.control_points[0])
+            if gap > 0.01:
+                raise ProjectError(
+                    f"route {self.name!r}: segment {index + 2} starts {gap * 1000:.0f} mm from the end of segment "
+                    f"{index + 1}; expected at most 10 mm"
+                )
+
+    def speed_of(self, segment: Segment) -> float:
+        """Return the speed on a segment [m/s]."""
+        return self.speed if segment.speed is None else segment.speed
