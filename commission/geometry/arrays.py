@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,3 +40,13 @@ def frozen(values: ArrayLike, shape: Sequence[int | None], name: str, *, finite:
         raise ValueError(f"{name}{list(index)} is {array[index]}; expected finite numbers")
     array.setflags(write=False)
     return array
+
+
+def equal_fields(first: Any, second: object) -> bool:
+    """Whether two dataclass values are of one type and equal field by field, arrays element by element."""
+    if type(first) is not type(second):
+        return False
+    pairs = ((getattr(first, f.name), getattr(second, f.name)) for f in fields(first) if f.compare)
+    return all(
+        np.array_equal(a, b) if isinstance(a, np.ndarray) or isinstance(b, np.ndarray) else a == b for a, b in pairs
+    )

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.geometry.arrays import FloatArray, frozen
+from commission.geometry.arrays import FloatArray, equal_fields, frozen
 from commission.geometry.occupancy import OccupancyGrid
 
 UNKNOWN = -1
@@ -37,6 +37,10 @@ class FloorMap:
         cells = np.ascontiguousarray(self.cells, dtype=np.int8)
         cells.setflags(write=False)
         object.__setattr__(self, "cells", cells)
+
+    def __eq__(self, other: object) -> bool:
+        """Equal when every field is, arrays element by element."""
+        return equal_fields(self, other)
 
     @property
     def size(self) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from commission.errors import ProjectError
-from commission.geometry.arrays import FloatArray, frozen
+from commission.geometry.arrays import FloatArray, equal_fields, frozen
 from commission.geometry.splines import Spline
 
 
@@ -47,6 +47,10 @@ class Segment:
         if self.speed is not None and not (math.isfinite(self.speed) and self.speed > 0.0):
             raise ValueError(f"speed is {self.speed:g}; expected more than 0 m/s")
         self.spline()
+
+    def __eq__(self, other: object) -> bool:
+        """Equal when every field is, arrays element by element."""
+        return equal_fields(self, other)
 
     def spline(self) -> Spline:
         """Return the curve; raises ValueError when degree, knots, weights and points do not fit each other."""

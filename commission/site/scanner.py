@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-from commission.geometry.arrays import FloatArray, frozen
+from commission.geometry.arrays import FloatArray, equal_fields, frozen
 from commission.site.checks import above, at_least, between
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Scanner:
     """A 2D laser scanner on the vehicle."""
 
@@ -49,6 +49,10 @@ class Scanner:
         at_least(self.bearing_sigma_deg, 0.0, "scanner.bearing_sigma_deg", "deg")
         at_least(self.beam_width_deg, 0.0, "scanner.beam_width_deg", "deg")
         above(self.reflector_range, 0.0, "scanner.reflector_range", "m")
+
+    def __eq__(self, other: object) -> bool:
+        """Equal when every field is, arrays element by element."""
+        return equal_fields(self, other)
 
     @property
     def angle_min(self) -> float:
