@@ -1,0 +1,242 @@
+"""How good a run was: errors against reference poses, consistency of the filter, and what the supervisor said.
+
+It judges arrays of a finished run and runs nothing itself. An error is estimate minus reference, map frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.geometry.angles import difference, wrap
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray
+from commission.localization.estimate import Mode
+
+LONGEST_GAP_NS = 1_000_000_000
+"""Reference poses farther apart than this are never joined by a line [ns]."""
+SINGULAR = 1e-12
+"""Determinant of a correlation matrix below which the covariance claims to know something exactly."""
+
+
+def reference_gap_ns(reference_stamps_ns: IntArray) -> int:
+    """Longest interval between two reference poses across which a pose is interpolated.
+
+    It is one and a half times the median interval, so that one missing pose already is a gap, and at most one second.
+
+    Parameters
+    ----------
+    reference_stamps_ns : (R,) array [ns], ascending.
+
+    Returns
+    -------
+    gap : [ns]; 0 for fewer than two poses.
+    """
+    if len(reference_stamps_ns) < 2:
+        return 0
+    return min(round(1.5 * float(np.median(np.diff(reference_stamps_ns)))), LONGEST_GAP_NS)
+
+
+def reference_at(
+    stamps_ns: IntArray,
+    reference_stamps_ns: IntArray,
+    reference_poses: FloatArray,
+    max_gap_ns: int | None = None,
+) -> FloatArray:
+    """Reference pose at given times: linear in x and y, along the shorter turn in heading, never extrapolated.
+
+    A time has a pose when a reference pose has exactly that stamp, or when the two around it are at most `max_gap_ns`
+    apart. Elsewhere the row is NaN. A heading is NaN where one of the headings that it depends on is.
+
+    Parameters
+    ----------
+    stamps_ns : (K,) array [ns].
+    reference_stamps_ns : (R,) array [ns], ascending; of equal stamps the last one counts.
+    reference_poses : (R, 3) array [m, m, rad], map frame; NaN where unknown.
+    max_gap_ns : [ns]; that of `reference_gap_ns` when None.
+
+    Returns
+    -------
+    poses : (K, 3) array [m, m, rad], map frame.
+    """
+    poses = np.full((len(stamps_ns), 3), np.nan)
+    if len(reference_stamps_ns) == 0:
+        return poses
+    gap = reference_gap_ns(reference_stamps_ns) if max_gap_ns is None else max_gap_ns
+    before = np.searchsorted(reference_stamps_ns, stamps_ns, side="right") - 1
+    exact = (before >= 0) & (reference_stamps_ns[np.maximum(before, 0)] == stamps_ns)
+    poses[exact] = reference_poses[before[exact]]
+
+    between = np.flatnonzero(~exact & (before >= 0) & (before < len(reference_stamps_ns) - 1))
+    first = before[between]
+    interval = reference_stamps_ns[first + 1] - reference_stamps_ns[first]
+    between, first, interval = (column[interval <= gap] for column in (between, first, interval))
+    share = (stamps_ns[between] - reference_stamps_ns[first]) / interval
+    start, end = reference_poses[first], reference_poses[first + 1]
+    poses[between, :2] = start[:, :2] + share[:, np.newaxis] * (end[:, :2] - start[:, :2])
+    poses[between, 2] = start[:, 2] + share * difference(end[:, 2], start[:, 2])
+    poses[:, 2] = wrap(poses[:, 2])
+    return poses
+
+
+def pose_errors(means: FloatArray, references: FloatArray) -> FloatArray:
+    """Estimate minus reference.
+
+    Parameters
+    ----------
+    means : (K, 3) array [m, m, rad], estimated poses, map frame.
+    references : (K, 3) array [m, m, rad], map frame; NaN where unknown.
+
+    Returns
+    -------
+    errors : (K, 3) array [m, m, rad], map frame, heading wrapped; NaN where unknown.
+    """
+    errors = means - references
+    errors[:, 2] = difference(means[:, 2], references[:, 2])
+    return errors
+
+
+def nees(errors: FloatArray, covariances: FloatArray) -> FloatArray:
+    """Normalized estimation error squared e^T P^-1 e (Bar-Shalom et al. 2001, section 5.4).
+
+    Parameters
+    ----------
+    errors : (K, n) array; angles wrapped; NaN where unknown.
+    covariances : (K, n, n) array.
+
+    Returns
+    -------
+    nees : (K,) array; NaN where the error is unknown, infinite where the covariance is singular: the filter claims to
+        know exactly what it does not.
+    """
+    known = np.isfinite(errors).all(axis=1)
+    sigmas = np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
+    result = np.where(known, np.inf, np.nan)
+    rows = np.flatnonzero(known & (sigmas > 0.0).all(axis=1))
+    # Scaled to correlations, metres and radians are comparable and the determinant tells a singular matrix.
+    scaled = errors[rows] / sigmas[rows]
+    correlations = covariances[rows] / (sigmas[rows][:, :, np.newaxis] * sigmas[rows][:, np.newaxis, :])
+    regular = np.linalg.det(correlations) > SINGULAR
+    rows, scaled, correlations = rows[regular], scaled[regular], correlations[regular]
+    solved = np.linalg.solve(correlations, scaled[..., np.newaxis])[..., 0]
+    result[rows] = np.sum(scaled * solved, axis=1)
+    return result
+
+
+def largest_jump(errors: FloatArray) -> float:
+    """Largest change of the position error from one cycle to the next.
+
+    The motion itself is not a jump: only what the estimate moves and the vehicle does not. Cycles without a reference
+    are not bridged.
+
+    Parameters
+    ----------
+    errors : (K, 3) array [m, m, rad], as `pose_errors` gives.
+
+    Returns
+    -------
+    jump : [m]; NaN when no two consecutive cycles have a reference.
+    """
+    steps = np.hypot(*np.diff(errors[:, :2], axis=0).T)
+    known = steps[np.isfinite(steps)]
+    return float(known.max()) if len(known) else float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorStatistics:
+    """Errors of one run against its reference, over the cycles that have one."""
+
+    compared: int
+    """Cycles that have a reference pose."""
+    position_rmse: float
+    """Root mean square of the distance to the reference [m]."""
+    position_median: float
+    """Median of that distance [m]."""
+    position_p95: float
+    """95th percentile of that distance [m]."""
+    position_max: float
+    """Largest such distance [m]."""
+    heading_rmse: float
+    """Root mean square of the heading error [rad]; NaN when the reference has no heading."""
+    anees: float
+    """Mean NEES of x, y and heading, divided by 3; 1 is consistent. NaN when the reference has no heading."""
+    anees_position: float
+    """Mean NEES of x and y, divided by 2; 1 is consistent."""
+    largest_jump: float
+    """Largest change of the position error between two consecutive cycles [m]; NaN when there are no two."""
+    wrong_while_operational: int
+    """Cycles whose position error exceeds the alarm limit while the mode is `operational`: the dangerous ones."""
+
+
+def error_statistics(
+    errors: FloatArray, covariances: FloatArray, operational: BoolArray, position_limit: float
+) -> ErrorStatistics | None:
+    """Judge a run by its errors.
+
+    Parameters
+    ----------
+    errors : (K, 3) array [m, m, rad], as `pose_errors` gives; NaN where unknown.
+    covariances : (K, 3, 3) array of the estimates.
+    operational : (K,) whether the mode after each cycle is `operational`.
+    position_limit : alarm limit of the supervisor, Err_p [m].
+
+    Returns
+    -------
+    statistics : None when no cycle has a reference pose.
+    """
+    distance = np.hypot(errors[:, 0], errors[:, 1])
+    known = np.isfinite(distance)
+    if not known.any():
+        return None
+    distances = distance[known]
+    headings = errors[known, 2]
+    pose_nees = nees(errors, covariances)
+    position_nees = nees(errors[:, :2], covariances[:, :2, :2])
+    return ErrorStatistics(
+        compared=len(distances),
+        position_rmse=float(np.sqrt(np.mean(distances**2))),
+        position_median=float(np.median(distances)),
+        position_p95=float(np.quantile(distances, 0.95)),
+        position_max=float(distances.max()),
+        heading_rmse=float(np.sqrt(_mean_of_known(headings**2))),
+        anees=_mean_of_known(pose_nees) / 3.0,
+        anees_position=_mean_of_known(position_nees) / 2.0,
+        largest_jump=largest_jump(errors),
+        wrong_while_operational=int(np.count_nonzero(operational[known] & (distances > position_limit))),
+    )
+
+
+def _mean_of_known(values: FloatArray) -> float:
+    """Mean of what is not NaN; NaN when nothing is known."""
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+@dataclass(frozen=True, slots=True)
+class FailEpisode:
+    """One stretch of cycles in fail mode."""
+
+    start_ns: int
+    """Stamp of the first cycle in fail mode [ns]."""
+    end_ns: int
+    """Stamp of the first operational cycle after it; of the run's last cycle when it did not recover [ns]."""
+    recovered: bool
+    """Whether the run became operational again."""
+
+
+def fail_episodes(stamps_ns: IntArray, modes: NDArray[np.integer]) -> tuple[FailEpisode, ...]:
+    """Stretches of a run in fail mode, in order.
+
+    Parameters
+    ----------
+    stamps_ns : (K,) stamp of each cycle [ns].
+    modes : (K,) `Mode` after each cycle.
+    """
+    failing = np.concatenate([[False], modes == Mode.FAIL, [False]])
+    edges = np.flatnonzero(failing[1:] != failing[:-1])
+    count = len(stamps_ns)
+    return tuple(
+        FailEpisode(int(stamps_ns[first]), int(stamps_ns[min(after, count - 1)]), bool(after < count))
+        for first, after in edges.reshape(-1, 2)
+    )
