@@ -1,3 +1,8 @@
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
 import commission
@@ -34,3 +39,25 @@ def test_an_error_of_the_tree_becomes_one_line_and_exit_code_two(monkeypatch, ca
     monkeypatch.setitem(cli.COMMANDS, "broken", broken)
     assert run(["broken"]) == 2
     assert capsys.readouterr().err == "commission: hall.yaml: resolution: is 0; expected metres per pixel > 0\n"
+
+
+def test_installed_command_runs_outside_the_checkout_and_has_its_folders(tmp_path):
+    python = Path(sys.executable)
+    command = python.with_name("commission")
+    if not command.is_file():
+        reason = f"commission is not installed in {python.parent}: `bash tests/run` installs it"
+        if os.environ.get("CI"):
+            pytest.fail(reason)
+        pytest.skip(reason)
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    finished = subprocess.run(
+        [command, "version"], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60, check=True
+    )
+    assert finished.stdout == f"commission {commission.__version__}\n"
+    question = "from commission.io.bundled import bundled_folder as f; print(f('maps')); print(f('web_assets'))"
+    finished = subprocess.run(
+        [python, "-c", question], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60, check=True
+    )
+    for line in finished.stdout.split():
+        assert "_data" in line
+        assert any(Path(line).iterdir())
