@@ -1,6 +1,8 @@
-"""The order of the rooms: what no import shows."""
+"""The order of the rooms: the import contract of pyproject.toml, and what no import shows."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -31,6 +33,15 @@ def calls_that_open_files(source: str) -> list[str]:
 def modules_below_io() -> list[Path]:
     """All modules of the rooms that know no file."""
     return [path for room in BELOW_IO for path in sorted((REPOSITORY / "commission" / room).rglob("*.py"))]
+
+
+def test_every_module_imports_only_from_the_layers_below_its_own():
+    command = "import sys; from importlinter.cli import lint_imports_command; sys.exit(lint_imports_command())"
+    finished = subprocess.run(
+        [sys.executable, "-c", command], cwd=REPOSITORY, capture_output=True, text=True, timeout=120, check=False
+    )
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    assert "3 kept, 0 broken" in finished.stdout
 
 
 @pytest.mark.parametrize("module", modules_below_io(), ids=lambda path: str(path.relative_to(REPOSITORY)))
