@@ -44,7 +44,7 @@ def frozen(values: ArrayLike, shape: Sequence[int | None], name: str, *, finite:
 
 def equal_fields(first: Any, second: object) -> bool:
     """Whether two dataclass values are of one type and equal field by field, arrays element by element."""
-    if type(first) is not type(second):
+    if first.__class__ is not second.__class__:
         return False
     pairs = ((getattr(first, f.name), getattr(second, f.name)) for f in fields(first) if f.compare)
     return all(
