@@ -1,13 +1,15 @@
-import os
 import subprocess
 import sys
-from pathlib import Path
+from dataclasses import dataclass
 
 import pytest
 
 import commission
 from commission import cli
-from commission.errors import FileFormatError
+from commission.cli import parsing
+from commission.errors import FileFormatError, UsageError
+
+COMMANDS = tuple(cli.COMMANDS)
 
 
 def run(arguments):
@@ -16,48 +18,145 @@ def run(arguments):
     return finished.value.code
 
 
+def complaint(capsys):
+    """The one line on stderr."""
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1, lines
+    assert lines[0].startswith("commission: ")
+    assert "unexpected" not in lines[0]
+    return lines[0]
+
+
 def test_version_is_printed_and_the_command_succeeds(capsys):
     assert run(["version"]) == 0
     assert capsys.readouterr().out == f"commission {commission.__version__}\n"
 
 
-@pytest.mark.parametrize("arguments", [["no-such-command"], ["version", "--no-such-option"], []])
-def test_bad_arguments_exit_with_two_and_say_something_on_stderr(arguments, capsys):
-    assert run(arguments) == 2
-    assert capsys.readouterr().err
-
-
 def test_help_succeeds_and_names_the_commands(capsys):
     assert run(["--help"]) == 0
-    assert "version" in capsys.readouterr().out
+    shown = capsys.readouterr().out
+    assert all(name in shown for name in COMMANDS)
 
 
-def test_an_error_of_the_tree_becomes_one_line_and_exit_code_two(monkeypatch, capsys):
-    def broken() -> None:
-        raise FileFormatError("hall.yaml", "resolution", "is\n0", "metres per pixel > 0")
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_explains_itself_and_each_of_its_options(name, capsys):
+    assert run([name, "--help"]) == 0
+    shown = capsys.readouterr()
+    assert f"usage: commission {name}" in shown.out
+    assert shown.err == ""
 
-    monkeypatch.setitem(cli.COMMANDS, "broken", broken)
+
+def test_help_does_not_wait_for_slow_packages():
+    script = (
+        "import sys\nfrom commission import cli\n"
+        "try:\n    cli.main(['--help'])\nexcept SystemExit:\n    pass\n"
+        "slow = {'numpy', 'scipy', 'numba', 'viser', 'trimesh', 'PIL'} & set(sys.modules)\n"
+        "sys.exit(' '.join(sorted(slow)) or 0)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
+    assert done.stderr == ""
+    assert done.returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "Expected one of"),
+        (["no-such-command"], "no-such-command"),
+        (["version", "--no-such-option"], "--no-such-option"),
+        (["serve"], "PATH"),
+        (["serve", "hall", "--port", "http"], "--port"),
+        (["serve", "hall", "--port", "70000"], "--port is 70000; expected 0 to 65535"),
+        (["demo", "--site", "moon"], "no bundled site is called 'moon'; there are:"),
+    ],
+)
+def test_a_bad_command_line_exits_with_two_and_one_line_that_says_what_is_wrong(arguments, said, capsys):
+    assert run(arguments) == 2
+    assert said in complaint(capsys)
+
+
+@dataclass(frozen=True)
+class _Broken:
+    """Raise what the test wants."""
+
+    def run(self):
+        raise _Broken.error
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (
+            FileFormatError("hall.yaml", "resolution", "is\n0", "metres per pixel > 0"),
+            "commission: hall.yaml: resolution: is 0; expected metres per pixel > 0\n",
+        ),
+        (PermissionError(13, "Permission denied", "/out"), "commission: /out: Permission denied\n"),
+        (
+            KeyError("x"),
+            "commission: unexpected KeyError: 'x' (set COMMISSION_TRACEBACK=1 to see where)\n",
+        ),
+    ],
+)
+def test_an_error_becomes_one_line_and_exit_code_two(error, said, monkeypatch, capsys):
+    monkeypatch.delenv(cli.SHOW_TRACEBACK, raising=False)
+    monkeypatch.setattr(_Broken, "error", error, raising=False)
+    monkeypatch.setitem(cli.COMMANDS, "broken", _Broken)
     assert run(["broken"]) == 2
-    assert capsys.readouterr().err == "commission: hall.yaml: resolution: is 0; expected metres per pixel > 0\n"
+    assert capsys.readouterr().err == said
 
 
-def test_installed_command_runs_outside_the_checkout_and_has_its_folders(tmp_path):
-    python = Path(sys.executable)
-    command = python.with_name("commission")
-    if not command.is_file():
-        reason = f"commission is not installed in {python.parent}: `bash tests/run` installs it"
-        if os.environ.get("CI"):
-            pytest.fail(reason)
-        pytest.skip(reason)
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    finished = subprocess.run(
-        [command, "version"], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60, check=True
+def test_an_unexpected_error_shows_its_origin_when_asked(monkeypatch):
+    monkeypatch.setenv(cli.SHOW_TRACEBACK, "1")
+    monkeypatch.setattr(_Broken, "error", KeyError("x"), raising=False)
+    monkeypatch.setitem(cli.COMMANDS, "broken", _Broken)
+    with pytest.raises(KeyError):
+        cli.main(["broken"])
+
+
+def test_an_interrupted_command_exits_as_a_shell_expects(monkeypatch):
+    monkeypatch.setattr(_Broken, "error", KeyboardInterrupt(), raising=False)
+    monkeypatch.setitem(cli.COMMANDS, "broken", _Broken)
+    assert run(["broken"]) == 130
+
+
+def test_the_module_and_the_command_are_the_same():
+    done = subprocess.run(
+        [sys.executable, "-m", "commission", "serve", "hall", "--port", "-1"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
-    assert finished.stdout == f"commission {commission.__version__}\n"
-    question = "from commission.io.bundled import bundled_folder as f; print(f('maps')); print(f('web_assets'))"
-    finished = subprocess.run(
-        [python, "-c", question], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60, check=True
-    )
-    for line in finished.stdout.split():
-        assert "_data" in line
-        assert any(Path(line).iterdir())
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr == "commission: --port is -1; expected 0 to 65535\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "pose", "sigmas"),
+    [
+        ("-1,2,0.5", (-1.0, 2.0, 0.5), None),
+        ("1e1, -2 ,3.5,0.01,0.02,0.03", (10.0, -2.0, 3.5), (0.01, 0.02, 0.03)),
+    ],
+)
+def test_an_initial_pose_has_three_or_six_numbers(text, pose, sigmas):
+    assert parsing.initial_pose(text) == parsing.InitialPose(pose, sigmas)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "expected numbers"),
+        ("here", "expected numbers"),
+        ("1,2", "has 2 numbers"),
+        ("1,2,3,4", "has 4 numbers"),
+        ("1,2,nan", "not finite"),
+        ("1,2,inf", "not finite"),
+        ("1,2,3,0.1,0,0.1", "not positive"),
+        ("1,2,3,0.1,-1,0.1", "not positive"),
+        ("1;2;3", "expected numbers"),
+    ],
+)
+def test_a_malformed_initial_pose_is_shown_with_the_form_expected(text, said):
+    with pytest.raises(UsageError, match=said):
+        parsing.initial_pose(text)

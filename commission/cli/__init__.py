@@ -1,0 +1,59 @@
+"""The command `commission`: parses arguments, calls the layers below, turns an error into one line and exit code 2.
+
+Each command is a frozen value with a `run`; tyro makes its options and their help from the strings under its fields.
+Nothing is computed in this room, and a command imports what it needs only when it runs, so that help is immediate.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from commission.cli import page, parsing
+from commission.cli.parsing import Command
+from commission.cli.versions import Version
+from commission.errors import CommissionError
+
+EXIT_ERROR = 2
+EXIT_INTERRUPTED = 130
+SHOW_TRACEBACK = "COMMISSION_TRACEBACK"
+
+COMMANDS: dict[str, type[Command]] = {
+    "demo": page.Demo,
+    "serve": page.Serve,
+    "version": Version,
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> NoReturn:
+    """Run one command and exit: 0 when it is done, 2 with one line on stderr when it cannot be.
+
+    Parameters
+    ----------
+    arguments : command and its options; those of the process when None.
+    """
+    try:
+        parsing.parse(COMMANDS, arguments).run()
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.exit(EXIT_INTERRUPTED)
+    except BrokenPipeError:
+        # Whoever read the output (`| head`) has gone; flushing again at exit would complain a second time.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except CommissionError as error:
+        _fail(str(error))
+    except OSError as error:
+        _fail(f"{error.filename}: {error.strerror}" if error.filename else str(error))
+    except Exception as error:
+        if os.environ.get(SHOW_TRACEBACK):
+            raise
+        _fail(f"unexpected {type(error).__name__}: {error} (set {SHOW_TRACEBACK}=1 to see where)")
+    sys.exit(0)
+
+
+def _fail(message: str) -> NoReturn:
+    """Say on one line why the command could not be done, and exit."""
+    sys.stderr.write(f"commission: {' '.join(message.split())}\n")
+    sys.exit(EXIT_ERROR)

@@ -1,0 +1,113 @@
+"""Where a run starts: the belief that the localizer is given before the first record."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from commission.errors import UsageError
+from commission.geometry.angles import wrap
+from commission.geometry.arrays import frozen
+from commission.localization.estimate import Belief
+from commission.site.project import Project
+from commission.site.record_log import RecordLog
+from commission.site.routes import Direction, Route
+
+DEFAULT_SIGMAS = (0.02, 0.02, 0.01)
+"""1-sigma of a start pose that comes without one: x [m], y [m], theta [rad]: well inside the alarm limits."""
+NEAR_THE_START_NS = 1_000_000_000
+"""A reference pose this long after the first record is still taken for the start pose [ns]."""
+
+
+class StartOrigin(StrEnum):
+    """Who says where the run starts."""
+
+    GIVEN = "as given"
+    REFERENCE = "first reference pose"
+    ROUTE = "start of the first route"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """The belief before the first record, and where it comes from."""
+
+    belief: Belief
+    """Stamped with the first record."""
+    origin: StartOrigin
+    """Who says so."""
+
+
+def start_of(
+    project: Project,
+    log: RecordLog,
+    pose: ArrayLike | None = None,
+    sigmas: Sequence[float] | None = None,
+) -> Start:
+    """Return the belief to start a run with.
+
+    It is, in this order: the pose given; the first reference pose, if it has a heading and comes within a second of the
+    first record; the start of the project's first route.
+
+    Parameters
+    ----------
+    project : the site.
+    log : the recording; not empty.
+    pose : (3,) array [m, m, rad], map frame, or None.
+    sigmas : (3,) 1-sigma of x [m], y [m] and theta [rad]; `DEFAULT_SIGMAS` when None.
+
+    Raises
+    ------
+    UsageError
+        nothing says where the run starts, or the recording is empty.
+    """
+    if len(log) == 0:
+        raise UsageError("the recording holds no record; expected odometry and scans or detections")
+    first_ns = int(log.stamps_ns[0])
+    if pose is not None:
+        return Start(belief_at(first_ns, pose, sigmas), StartOrigin.GIVEN)
+    known = np.flatnonzero(
+        np.isfinite(log.reference_poses).all(axis=1) & (log.reference_stamps_ns - first_ns <= NEAR_THE_START_NS)
+    )
+    if len(known) > 0:
+        return Start(belief_at(first_ns, log.reference_poses[known[0]], sigmas), StartOrigin.REFERENCE)
+    if project.routes:
+        return Start(belief_at(first_ns, route_start(project.routes[0]), sigmas), StartOrigin.ROUTE)
+    raise UsageError(
+        "nothing says where the recording starts: no reference pose within its first second, no route in the project; "
+        "expected an initial pose X,Y,THETA in metres and radians"
+    )
+
+
+def belief_at(stamp_ns: int, pose: ArrayLike, sigmas: Sequence[float] | None = None) -> Belief:
+    """Return a belief whose x, y and theta are independent.
+
+    Parameters
+    ----------
+    stamp_ns : time [ns].
+    pose : (3,) array [m, m, rad], map frame.
+    sigmas : (3,) 1-sigma [m, m, rad]; `DEFAULT_SIGMAS` when None.
+    """
+    mean = np.array(pose, dtype=np.float64)
+    mean[2] = wrap(mean[2])
+    variances = np.square(DEFAULT_SIGMAS if sigmas is None else sigmas)
+    return Belief(
+        stamp_ns, frozen(mean, (3,), "initial pose"), frozen(np.diag(variances), (3, 3), "initial covariance")
+    )
+
+
+def route_start(route: Route) -> tuple[float, float, float]:
+    """Pose of base at the start of a route, x [m], y [m], theta [rad]; a reverse segment starts facing backward.
+
+    A clamped curve starts at its first control point, towards the next one that is somewhere else.
+    """
+    segment = route.segments[0]
+    x, y = segment.control_points[0]
+    ahead = segment.control_points - segment.control_points[0]
+    distinct = np.flatnonzero(np.hypot(ahead[:, 0], ahead[:, 1]) > 0.0)
+    heading = math.atan2(ahead[distinct[0], 1], ahead[distinct[0], 0]) if len(distinct) else 0.0
+    return float(x), float(y), heading + (math.pi if segment.direction is Direction.REVERSE else 0.0)
