@@ -11,7 +11,7 @@ import hmac
 import ipaddress
 import socket
 import threading
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -166,7 +166,7 @@ def _bound(host: str, family: socket.AddressFamily, address: tuple[Any, ...]) ->
 
 
 @contextmanager
-def _viser_listens_on(listening: socket.socket, gate: Gate) -> Iterator[None]:
+def _viser_listens_on(listening: socket.socket, gate: Gate) -> Generator[None]:
     """While this lasts, a new viser server listens on the given socket behind the gate.
 
     viser has no setting for either. It takes `serve` from the websockets package when its thread starts, that is
