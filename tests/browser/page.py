@@ -1,0 +1,180 @@
+"""The page as a person uses it: looked at and clicked in a real browser.
+
+What is known here of viser's page (names of its windows' variables, classes of its widgets) is known nowhere else in
+the tests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
+
+import viser
+from playwright.sync_api import Browser, BrowserContext, Locator, Page
+
+CHROMIUM = Path("/usr/bin/chromium")
+FLAGS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-gpu",
+    "--enable-unsafe-swiftshader",
+)
+WIDE = (1600, 900)
+SMALL = (1280, 720)
+
+_HIDE_TOAST = ".mantine-Notifications-root{display:none !important}"
+"""Without a graphics card viser warns, in a box that covers the floor."""
+
+_PIXEL_OF = """([x, y, z]) => {
+  const viewer = window.__viserMutable;
+  const point = viewer.camera.position.clone().set(x, y, z);
+  point.applyMatrix4(viewer.nodeRefFromName[''].matrixWorld).project(viewer.camera);
+  const box = viewer.canvas.getBoundingClientRect();
+  return [box.left + (point.x + 1) / 2 * box.width, box.top + (1 - point.y) / 2 * box.height];
+}"""
+
+_FRAME = "window.__viserTestpoints?.rendererInfo?.render?.frame ?? -1"
+
+Button = Literal["left", "middle", "right"]
+
+
+class OpenPage:
+    """One browser window with the page in it.
+
+    Parameters
+    ----------
+    browser : the running chromium.
+    server : the server whose page is opened; None when the window shows something else.
+    size : width and height of the window [pixels].
+    """
+
+    def __init__(self, browser: Browser, server: viser.ViserServer, size: tuple[int, int] = WIDE) -> None:
+        self.server = server
+        self._context: BrowserContext = browser.new_context(viewport={"width": size[0], "height": size[1]})
+        self.page: Page = self._context.new_page()
+        self.page.set_default_timeout(15_000)
+        self.errors: list[str] = []
+        """What the browser complained about."""
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+
+    @property
+    def address(self) -> str:
+        """Where the page is, with the slash at its end."""
+        return f"http://127.0.0.1:{self.server.get_port()}/"
+
+    def open(self, query: str = "", nodes: Sequence[str] = ()) -> viser.ClientHandle:
+        """Open the page and wait until it is connected, has these scene nodes and has drawn them."""
+        before = set(self.server.get_clients())
+        self.page.goto(self.address + query)
+        client = self.wait_for_client(before)
+        self.wait_until_drawn(nodes)
+        return client
+
+    def wait_for_client(self, before: set[int]) -> viser.ClientHandle:
+        """The client that is connected now and was not before; viser numbers them anew at each connection."""
+        for _ in range(300):
+            clients = self.server.get_clients()
+            new = sorted(set(clients) - before)
+            if new:
+                return clients[new[-1]]
+            self.page.wait_for_timeout(50)
+        raise TimeoutError("no browser connected within 15 s")
+
+    def wait_until_drawn(self, nodes: Sequence[str] = ()) -> None:
+        """Wait for these scene nodes and for a frame that is drawn after they came."""
+        self.page.add_style_tag(content=_HIDE_TOAST)
+        for name in ("", *nodes):
+            self.page.wait_for_function("name => name in window.__viserMutable.nodeRefFromName", arg=name)
+        frame = self.page.evaluate(_FRAME)
+        self.page.evaluate("window.__viserMutable.requestRender()")
+        self.page.wait_for_function(f"frame => ({_FRAME}) > frame", arg=frame)
+        # The floor fades in after each connection.
+        self.page.wait_for_function(
+            "() => { let element = window.__viserMutable.canvas;"
+            " for (; element; element = element.parentElement)"
+            "   if (getComputedStyle(element).opacity < 1) return false;"
+            " return true; }"
+        )
+
+    def pixel_of(self, point_map: Sequence[float]) -> tuple[float, float]:
+        """Where a point of the scene is seen, from the window's upper left corner [pixels]."""
+        x, y = self.page.evaluate(_PIXEL_OF, [*point_map, 0.0][:3])
+        return float(x), float(y)
+
+    def click_at(self, point_map: Sequence[float], button: Button = "left", modifier: str | None = None) -> None:
+        """Click on a point of the scene, perhaps while a key ("Shift", "Control") is held."""
+        if modifier is not None:
+            self.page.keyboard.down(modifier)
+        self.page.mouse.click(*self.pixel_of(point_map), button=button)
+        if modifier is not None:
+            self.page.keyboard.up(modifier)
+
+    def drag(self, start_map: Sequence[float], end_map: Sequence[float], button: Button = "left") -> None:
+        """Drag from one point of the scene to another, in steps as a hand does."""
+        end = self.pixel_of(end_map)
+        self.page.mouse.move(*self.pixel_of(start_map))
+        self.page.mouse.down(button=button)
+        self.page.mouse.move(*end, steps=10)
+        self.page.wait_for_timeout(100)  # the last place travels to the server at most every 50 ms
+        self.page.mouse.up(button=button)
+
+    def press(self, name: str) -> None:
+        """Press the button of this name."""
+        self.page.get_by_role("button", name=name, exact=True).click()
+
+    def open_tab(self, name: str) -> None:
+        """Bring this tab of a panel to the front."""
+        self.page.get_by_role("tab", name=name, exact=True).click()
+
+    def row(self, label: str) -> Locator:
+        """The row of widgets behind this label."""
+        return self.page.locator("label", has_text=label).locator("xpath=ancestor::*[contains(@class,'Flex-root')][1]")
+
+    def fill(self, label: str, text: str) -> None:
+        """Type into the input of this label and leave it."""
+        field = self.row(label).locator("input").last
+        field.fill(text)
+        field.press("Tab")
+
+    def choose(self, label: str, option: str) -> None:
+        """Choose from the drop-down list of this label."""
+        self.row(label).locator("input").first.click()
+        self.page.get_by_role("option", name=option, exact=True).click()
+
+    def tick(self, label: str) -> None:
+        """Change the check box of this label."""
+        self.row(label).locator("input[type=checkbox]").click()
+
+    def slide(self, label: str, fraction: float) -> None:
+        """Click on the slider's track; keys on its thumb would turn the camera too."""
+        track = self.row(label).locator(".mantine-Slider-track")
+        box = track.bounding_box()
+        assert box is not None, f"the slider {label} is not visible"
+        self.page.mouse.click(box["x"] + fraction * box["width"], box["y"] + box["height"] / 2)
+
+    def value_of(self, label: str) -> str:
+        """What the input of this label shows."""
+        return self.row(label).locator("input").last.input_value()
+
+    def text(self) -> str:
+        """All text that can be read on the page."""
+        return self.page.locator("body").inner_text()
+
+    def wait_for_text(self, text: str) -> None:
+        """Wait until this can be read on the page."""
+        self.page.get_by_text(text).first.wait_for(state="visible")
+
+    def screenshot(self, path: Path) -> None:
+        """Keep a picture of the window."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self.page.screenshot(path=path)
+
+    def close(self) -> None:
+        """Close the window and forget its cookies."""
+        self._context.close()
