@@ -1,0 +1,199 @@
+"""Floor maps in the format of ROS `map_server`: a YAML file that describes a PGM or PNG image, read and written.
+
+Semantics are those of ROS 1 `image_loader.cpp` and Nav2 `map_io.cpp`: occupancy is p = (255 - v) / 255 of a pixel's
+gray value v, or v / 255 when negated; p > occupied_thresh is occupied, p < free_thresh is free, the rest is unknown.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import struct
+import warnings
+import zlib
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from commission.errors import FileFormatError
+from commission.io.atomic import write_bytes, write_text
+from commission.io.conversion import convert
+from commission.io.reading import check_size, inside
+from commission.io.yaml_document import YamlDocument, read_yaml
+from commission.site.checks import above, between
+from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
+
+CELL_LIMIT = 64_000_000
+"""Cells of a map: 400 x 400 m at 0.05 m. Known from the image's header, before its pixels are unpacked."""
+FILE_LIMIT = 512_000_000
+"""Bytes of an image: a text PGM needs up to 6 bytes for each cell."""
+
+_GRAY = {FREE: 254, OCCUPIED: 0, UNKNOWN: 205}
+"""Gray values that ROS `map_saver` writes."""
+_ROWS_AT_ONCE = 256
+
+
+class MapMode(StrEnum):
+    """How gray values become cells."""
+
+    TRINARY = "trinary"
+    SCALE = "scale"
+    RAW = "raw"
+
+
+@dataclass(frozen=True, slots=True)
+class MapDescription:
+    """Content of a `map_server` YAML file."""
+
+    image: str
+    """Image file (PGM or PNG), relative to this file."""
+    resolution: float
+    """Edge of a pixel [m]."""
+    origin: tuple[float, float, float]
+    """Pose of the lower-left corner of the lower-left pixel in the map frame [m, m, rad]."""
+    negate: bool | int = 0
+    """1: white is occupied; 0: black is occupied."""
+    occupied_thresh: float = 0.65
+    """Occupancy above which a cell is occupied [0..1]."""
+    free_thresh: float = 0.196
+    """Occupancy below which a cell is free [0..1]."""
+    mode: MapMode = MapMode.TRINARY
+    """`trinary`, `scale` (transparent pixels are unknown) or `raw` (gray value = occupancy in percent)."""
+
+    def __post_init__(self) -> None:
+        if not self.image:
+            raise ValueError("image is empty; expected the name of a PGM or PNG file")
+        above(self.resolution, 0.0, "resolution", "metres per pixel")
+        for axis, value in zip("xy", self.origin[:2], strict=True):
+            between(value, (-1e7, 1e7), f"origin {axis}", "m")
+        between(self.origin[2], (-2.0 * math.pi, 2.0 * math.pi), "origin yaw", "rad")
+        between(self.negate, (0, 1), "negate")
+        between(self.occupied_thresh, (0.0, 1.0), "occupied_thresh")
+        between(self.free_thresh, (0.0, 1.0), "free_thresh")
+        if self.free_thresh > self.occupied_thresh:
+            raise ValueError(f"free_thresh is {self.free_thresh:g}; expected at most occupied_thresh")
+
+
+def read_floor_map(path: Path, folder: Path | None = None) -> FloorMap:
+    """Read a `map_server` map.
+
+    Parameters
+    ----------
+    path : the YAML file.
+    folder : folder that the image must lie in; the YAML file's own when None.
+
+    Returns
+    -------
+    floor_map : cells are occupied, free or unknown; what `scale` and `raw` maps hold between the thresholds is unknown.
+
+    Raises
+    ------
+    FileFormatError
+        names file, key, what was found and what is expected.
+    """
+    document = read_yaml(path)
+    description = convert(document, MapDescription, ignore_unknown=True)
+    image_path = inside(folder or path.parent, description.image, path, document.place(("image",)))
+    if not image_path.is_file():
+        beside = sorted(p.name for p in path.parent.iterdir() if p.suffix.lower() in {".pgm", ".png"})
+        remedy = f"an existing image; beside it there are: {', '.join(beside[:5])}" if beside else "an existing image"
+        raise document.error(("image",), f"{description.image!r} does not exist", remedy)
+    cells = _read_cells(image_path, description)
+    try:
+        return FloorMap(np.flipud(cells), description.resolution, np.array(description.origin))
+    except ValueError as error:
+        raise _from_value_error(document, error) from error
+
+
+def write_floor_map(floor_map: FloorMap, path: Path) -> None:
+    """Write a map as YAML beside a PNG of the same name; the image first, so that no YAML names a missing one.
+
+    Parameters
+    ----------
+    floor_map : what to write; reading it again gives an equal one.
+    path : the YAML file.
+    """
+    gray = np.full(floor_map.cells.shape, _GRAY[UNKNOWN], dtype=np.uint8)
+    gray[floor_map.cells == FREE] = _GRAY[FREE]
+    gray[floor_map.cells == OCCUPIED] = _GRAY[OCCUPIED]
+    image = io.BytesIO()
+    Image.fromarray(np.flipud(gray)).save(image, format="PNG", optimize=True)
+    image_path = path.with_suffix(".png")
+    write_bytes(image_path, image.getvalue())
+    x, y, yaw = (repr(float(v)) for v in floor_map.origin)
+    write_text(
+        path,
+        f"image: {image_path.name}\n"
+        f"resolution: {float(floor_map.resolution)!r}  # metres per pixel\n"
+        f"origin: [{x}, {y}, {yaw}]  # x [m], y [m], yaw [rad] of the lower-left corner\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\nmode: trinary\n",
+    )
+
+
+def _from_value_error(document: YamlDocument, error: ValueError) -> FileFormatError:
+    problem, _, remedy = str(error).partition("; expected ")
+    return document.error((), problem, remedy)
+
+
+def _read_cells(path: Path, description: MapDescription) -> NDArray[np.int8]:
+    """(H, W) cells of an image, top row first."""
+    check_size(path, FILE_LIMIT)
+    try:
+        with warnings.catch_warnings():
+            # Pillow warns about images that it thinks large; the limit that counts is CELL_LIMIT.
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(path, formats=("PNG", "PPM")) as image:
+                width, height = image.size
+                if not 0 < width * height <= CELL_LIMIT:
+                    found = f"has {width} x {height} pixels"
+                    raise FileFormatError(path, "", found, f"1 to {CELL_LIMIT} pixels")
+                return _classify(image, description)
+    except FileFormatError:
+        raise
+    except Image.DecompressionBombError as error:
+        raise FileFormatError(path, "", "is too large", f"1 to {CELL_LIMIT} pixels") from error
+    except (OSError, ValueError, SyntaxError, EOFError, OverflowError, struct.error, zlib.error, IndexError) as error:
+        # What Pillow raises for garbage and for files that end early depends on format and place.
+        raise FileFormatError(path, "", f"is no readable image ({error})", "a complete PGM or PNG") from error
+
+
+def _classify(image: Image.Image, description: MapDescription) -> NDArray[np.int8]:
+    """Turn pixels into cells, some rows at a time: no copy of the whole image in floating point."""
+    opaque: NDArray[np.bool_] | None = None
+    if image.mode in ("P", "1", "PA") or "transparency" in image.info:
+        image = image.convert("RGBA" if "transparency" in image.info or image.mode == "PA" else "RGB")
+    if image.mode == "F":
+        raise ValueError("gray values are floating-point numbers")
+    pixels = np.asarray(image)
+    full_scale = 65535.0 if pixels.dtype != np.uint8 else 255.0
+    if image.mode in ("LA", "RGBA"):
+        opaque = pixels[..., -1] == 255
+        pixels = pixels[..., :-1]
+    cells = np.empty(pixels.shape[:2], dtype=np.int8)
+    for start in range(0, len(cells), _ROWS_AT_ONCE):
+        rows = slice(start, start + _ROWS_AT_ONCE)
+        gray = pixels[rows] if pixels.ndim == 2 else pixels[rows].mean(axis=2)
+        cells[rows] = _cells_of(gray.astype(np.float64) / full_scale, description)
+        if opaque is not None and description.mode is MapMode.SCALE:
+            cells[rows][~opaque[rows]] = UNKNOWN
+    return cells
+
+
+def _cells_of(brightness: NDArray[np.float64], description: MapDescription) -> NDArray[np.int8]:
+    """Cells of gray values in [0, 1]."""
+    occupancy = brightness if description.negate else 1.0 - brightness
+    beyond = np.zeros(occupancy.shape, dtype=np.bool_)
+    if description.mode is MapMode.RAW:
+        # A raw pixel is the cell's occupancy in percent; more than 100 (205, 255) is how ROS stores unknown.
+        percent = np.rint((1.0 - occupancy if description.negate else brightness) * 255.0)
+        beyond = percent > OCCUPIED
+        occupancy = percent / 100.0
+    cells = np.full(occupancy.shape, UNKNOWN, dtype=np.int8)
+    cells[occupancy > description.occupied_thresh] = OCCUPIED
+    cells[occupancy < description.free_thresh] = FREE
+    cells[beyond] = UNKNOWN
+    return cells

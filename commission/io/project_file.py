@@ -1,0 +1,217 @@
+"""The project folder: `project.yaml` and the files that it refers to, read, checked and written.
+
+It converts between files and `site.Project`; it does not watch for changes and keeps no journal.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from commission.errors import FileFormatError, ProjectError, UsageError
+from commission.io.atomic import write_text
+from commission.io.conversion import convert, convert_setting, keys_of
+from commission.io.map_server import read_floor_map, write_floor_map
+from commission.io.project_text import project_text
+from commission.io.reading import inside
+from commission.io.reflector_tables import read_reflectors, write_reflectors
+from commission.io.yaml_document import YamlDocument, read_yaml, scalar
+from commission.site.disturbances import Disturbances
+from commission.site.floor_map import FloorMap
+from commission.site.parameters import Parameters
+from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
+from commission.site.routes import Route
+from commission.site.scanner import Scanner
+from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
+
+SCHEMA = 1
+"""Version of the format that this program writes and reads."""
+FILE_NAME = "project.yaml"
+
+VEHICLES: dict[str, type[Vehicle]] = {
+    kind.kind: kind for kind in (DifferentialVehicle, TricycleVehicle, OmnidirectionalVehicle)
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ProjectDocument:
+    """Keys of `project.yaml`."""
+
+    schema: int
+    """Version of this format."""
+    name: str = "Unnamed"
+    """Shown in the title of the page."""
+    floor_map: str | None = None
+    """`map_server` YAML file, relative to this folder; none: an open field."""
+    reflectors: str | None = None
+    """Reflector table (CSV), relative to this folder; none: no reflectors yet."""
+    vehicle: dict[str, Any] | None = None
+    """Wheels and outline; `kind` says which vehicle."""
+    scanner: Scanner = field(default_factory=Scanner)
+    """The laser scanner."""
+    routes: tuple[Route, ...] = ()
+    """Planned routes."""
+    parameters: Parameters = field(default_factory=Parameters)
+    """Tunables of the localizer."""
+    disturbances: Disturbances = field(default_factory=Disturbances)
+    """What a virtual drive suffers."""
+
+
+def project_file(path: Path) -> Path:
+    """Path of the `project.yaml` that `path` (the folder or the file itself) stands for."""
+    return path / FILE_NAME if path.is_dir() else path
+
+
+def load_project(path: Path) -> Project:
+    """Read a project.
+
+    Parameters
+    ----------
+    path : folder that holds a `project.yaml`, or that file.
+
+    Raises
+    ------
+    FileFormatError
+        one line that names file, line, key, what was found and what is expected.
+    """
+    yaml_path = project_file(path)
+    document, keys = _read_document(yaml_path)
+    try:
+        return Project(
+            keys.name,
+            _floor_map(document, keys.floor_map),
+            _reflectors(document, keys.reflectors),
+            keys.routes,
+            _vehicle(document, keys.vehicle),
+            keys.scanner,
+            keys.parameters,
+            keys.disturbances,
+        )
+    except ProjectError as error:
+        problem, _, remedy = str(error).partition("; expected ")
+        raise FileFormatError(yaml_path, "", problem, remedy) from error
+
+
+def save_project(project: Project, folder: Path) -> None:
+    """Write a project; a file whose content is still the same is not touched.
+
+    Parameters
+    ----------
+    project : what to write; loading it again gives an equal one.
+    folder : made when missing. The names of map and reflector table in a `project.yaml` that is there are kept.
+
+    Raises
+    ------
+    FileFormatError
+        a file cannot be written. Each file is replaced whole or not at all, `project.yaml` last.
+    """
+    yaml_path = folder / FILE_NAME
+    map_name, table_name = _names_in(yaml_path)
+    if project.floor_map is not None and not _holds_map(folder / map_name, folder, project.floor_map):
+        write_floor_map(project.floor_map, folder / map_name)
+    if not _holds_table(folder / table_name, project.reflectors):
+        write_reflectors(project.reflectors, folder / table_name)
+    text = project_text(project, SCHEMA, map_name if project.floor_map is not None else None, table_name)
+    write_text(yaml_path, text)
+
+
+def apply_settings(parameters: Parameters, settings: Sequence[str]) -> Parameters:
+    """Change tunables as `--set group.key=value` does.
+
+    Parameters
+    ----------
+    parameters : where to start.
+    settings : texts like `association.gate_probability=0.95`, applied in order.
+
+    Raises
+    ------
+    UsageError
+        unknown group or key (lists the known ones) or a value that the key refuses.
+    """
+    for setting in settings:
+        parameters = _apply_setting(parameters, setting)
+    return parameters
+
+
+def _apply_setting(parameters: Parameters, setting: str) -> Parameters:
+    name, equals, text = (part.strip() for part in setting.partition("="))
+    group, _, key = name.partition(".")
+    if not equals or not key:
+        raise UsageError(
+            f"setting {setting!r} is no group.key=value; expected for example observation.range_sigma=0.02"
+        )
+    if group not in keys_of(Parameters):
+        raise UsageError(f"{name}: no group is called {group!r}; expected one of: {', '.join(keys_of(Parameters))}")
+    values = getattr(parameters, group)
+    if key not in keys_of(type(values)):
+        known = ", ".join(f"{group}.{known}" for known in keys_of(type(values)))
+        raise UsageError(f"{name} is no parameter; expected one of: {known}")
+    try:
+        value = convert_setting(name, scalar(text), type(values), key)
+        return dataclasses.replace(parameters, **{group: dataclasses.replace(values, **{key: value})})
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+
+
+def _read_document(yaml_path: Path) -> tuple[YamlDocument, ProjectDocument]:
+    document = read_yaml(yaml_path)
+    value = document.value
+    if not isinstance(value, dict) or "schema" not in value:
+        raise document.error(("schema",), "is missing", f"a mapping that begins with `schema: {SCHEMA}`")
+    if value["schema"] != SCHEMA or isinstance(value["schema"], bool):
+        raise document.error(("schema",), f"is {value['schema']!r}", f"{SCHEMA}, the version this program knows")
+    return document, convert(document, ProjectDocument)
+
+
+def _vehicle(document: YamlDocument, keys: dict[str, Any] | None) -> Vehicle:
+    if keys is None:
+        return DifferentialVehicle()
+    kind = keys.get("kind", DifferentialVehicle.kind)
+    if not isinstance(kind, str) or kind not in VEHICLES:
+        raise document.error(("vehicle", "kind"), f"is {kind!r}", f"one of: {', '.join(VEHICLES)}")
+    without_kind = {key: value for key, value in keys.items() if key != "kind"}
+    rest = dataclasses.replace(document, value={**document.value, "vehicle": without_kind})
+    return convert(rest, VEHICLES[kind], ("vehicle",))
+
+
+def _floor_map(document: YamlDocument, name: str | None) -> FloorMap | None:
+    if name is None:
+        return None
+    folder = document.path.parent
+    return read_floor_map(inside(folder, name, document.path, document.place(("floor_map",))), folder)
+
+
+def _reflectors(document: YamlDocument, name: str | None) -> ReflectorMap:
+    if name is None:
+        return ReflectorMap()
+    return read_reflectors(inside(document.path.parent, name, document.path, document.place(("reflectors",))))
+
+
+def _names_in(yaml_path: Path) -> tuple[str, str]:
+    """Names of map and table in the project that is already there; the usual ones when it is absent or broken."""
+    try:
+        document, keys = _read_document(yaml_path)
+        for key, name in (("floor_map", keys.floor_map), ("reflectors", keys.reflectors)):
+            if name is not None:
+                inside(yaml_path.parent, name, yaml_path, document.place((key,)))
+    except FileFormatError:
+        return "map.yaml", "reflectors.csv"
+    return keys.floor_map or "map.yaml", keys.reflectors or "reflectors.csv"
+
+
+def _holds_map(path: Path, folder: Path, floor_map: FloorMap) -> bool:
+    try:
+        return read_floor_map(path, folder) == floor_map
+    except FileFormatError:
+        return False
+
+
+def _holds_table(path: Path, reflectors: ReflectorMap) -> bool:
+    try:
+        return read_reflectors(path) == reflectors
+    except FileFormatError:
+        return False

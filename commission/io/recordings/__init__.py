@@ -1,0 +1,1 @@
+"""Recordings of drives: every format is read into the same records, chosen by what the file is."""

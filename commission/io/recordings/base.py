@@ -1,0 +1,64 @@
+"""What every reader of recordings offers, and how one is chosen for a path. The formats are modules beside this one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Protocol
+
+from commission.errors import FileFormatError
+from commission.io.reading import cannot_read
+from commission.io.recordings.csv_folder import CsvFolder
+from commission.site.record_log import RecordLog
+from commission.site.records import Record
+
+
+class Recording(Protocol):
+    """A recording on disk; opening one reads little more than its headers."""
+
+    @property
+    def path(self) -> Path:
+        """Where it is."""
+        ...
+
+    def records(self) -> Iterator[Record]:
+        """Deliver every record in order of stamps, in memory that does not grow with the recording's length.
+
+        Raises FileFormatError, on the way, at the first thing that is wrong.
+        """
+        ...
+
+    def load(self) -> RecordLog:
+        """Read everything into columns, several times as fast as record by record; raises FileFormatError."""
+        ...
+
+
+_FORMATS: tuple[tuple[Callable[[Path], bool], Callable[[Path], Recording]], ...] = ((CsvFolder.recognizes, CsvFolder),)
+
+
+def open_recording(path: Path) -> Recording:
+    """Open a recording, whatever its format is.
+
+    Parameters
+    ----------
+    path : file or folder.
+
+    Raises
+    ------
+    FileFormatError
+        it does not exist, is of no known format, or lacks a part that its format requires.
+    """
+    try:
+        if not path.exists():
+            raise FileFormatError(path, "", "does not exist", "a recording")
+        for recognizes, reader in _FORMATS:
+            if recognizes(path):
+                return reader(path)
+    except (OSError, ValueError) as error:
+        raise cannot_read(path, error) from error
+    raise FileFormatError(path, "", "is no recording", "a folder with odometry.csv")
+
+
+def load_log(path: Path) -> RecordLog:
+    """Read a whole recording into columns; see `open_recording`."""
+    return open_recording(path).load()

@@ -1,0 +1,203 @@
+"""A recording as a folder of tables: what an engineer can make from any log. The reading side.
+
+`odometry.csv`, and where they exist `detections.csv`, `scans.npz` and `reference.csv`. A pause in any of them is no
+error: vehicles stand still and scanners are unplugged.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from commission.errors import FileFormatError
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.io.csv_table import Block, read_table
+from commission.io.recordings.scan_archive import ScanArchive
+from commission.site.record_log import RecordLog
+from commission.site.records import (
+    ORDER_WITHIN_A_STAMP,
+    Detections,
+    Odometry,
+    Record,
+    ReferencePose,
+    Scan,
+)
+
+ODOMETRY = "odometry.csv"
+DETECTIONS = "detections.csv"
+SCANS = "scans.npz"
+REFERENCE = "reference.csv"
+
+ODOMETRY_COLUMNS = ("stamp_ns", "dx", "dy", "dtheta")
+DETECTION_COLUMNS = ("stamp_ns", "range", "bearing")
+REFERENCE_COLUMNS = ("stamp_ns", "x", "y", "theta")
+
+_ROWS_STREAMED = 1024
+_ROWS_LOADED = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class _Rows:
+    """Some rows of one table: stamps [ns] and the numbers beside them."""
+
+    stamps_ns: IntArray
+    values: FloatArray
+
+
+class CsvFolder:
+    """A recording in a folder of tables."""
+
+    def __init__(self, path: Path) -> None:
+        """Open a folder; raises FileFormatError when it has no odometry or its scans are no archive."""
+        self.path = path
+        if not (path / ODOMETRY).is_file():
+            raise FileFormatError(path / ODOMETRY, "", "does not exist", "the recording's odometry")
+        self._scans = ScanArchive(path / SCANS) if (path / SCANS).exists() else None
+
+    @staticmethod
+    def recognizes(path: Path) -> bool:
+        """Whether a path is such a folder, complete or not."""
+        return path.is_dir() and any((path / name).exists() for name in (ODOMETRY, DETECTIONS, SCANS, REFERENCE))
+
+    def records(self) -> Iterator[Record]:
+        """Deliver every record in order of stamps; within a stamp motion comes first.
+
+        Raises
+        ------
+        FileFormatError
+            at the first row that is wrong; names file, line, column, what was found and what is expected.
+        """
+        streams = (self._odometry(), self._reference(), self._detections(), self._scan_records())
+        return heapq.merge(*streams, key=lambda record: (record.stamp_ns, ORDER_WITHIN_A_STAMP[type(record)]))
+
+    def load(self) -> RecordLog:
+        """Read everything into columns; raises FileFormatError like `records`."""
+        odometry = _joined(self._odometry_rows(_ROWS_LOADED), 3)
+        reference = _joined(self._reference_rows(_ROWS_LOADED), 3)
+        detections = _joined(self._detection_rows(_ROWS_LOADED), 2)
+        starts = np.flatnonzero(np.diff(detections.stamps_ns, prepend=detections.stamps_ns[:1] - 1))
+        seen = np.isfinite(detections.values[:, 0])
+        offsets = np.concatenate([[0], np.cumsum(seen)]).astype(np.int64)
+        return RecordLog(
+            odometry.stamps_ns,
+            odometry.values,
+            None if self._scans is None else self._scans.load(),
+            detections.stamps_ns[starts],
+            np.append(offsets[starts], offsets[-1]),
+            detections.values[seen],
+            reference.stamps_ns,
+            reference.values,
+        )
+
+    def _odometry(self) -> Iterator[Record]:
+        for rows in self._odometry_rows(_ROWS_STREAMED):
+            for stamp, values in zip(rows.stamps_ns.tolist(), rows.values, strict=True):
+                yield Odometry(stamp, values)
+
+    def _reference(self) -> Iterator[Record]:
+        for rows in self._reference_rows(_ROWS_STREAMED):
+            for stamp, values in zip(rows.stamps_ns.tolist(), rows.values, strict=True):
+                yield ReferencePose(stamp, values)
+
+    def _detections(self) -> Iterator[Record]:
+        stamp: int | None = None
+        seen: list[FloatArray] = []
+        for rows in self._detection_rows(_ROWS_STREAMED):
+            for row_stamp, values in zip(rows.stamps_ns.tolist(), rows.values, strict=True):
+                if stamp is not None and row_stamp != stamp:
+                    yield Detections(stamp, np.array(seen).reshape(-1, 2))
+                    seen = []
+                stamp = row_stamp
+                if np.isfinite(values[0]):
+                    seen.append(values)
+        if stamp is not None:
+            yield Detections(stamp, np.array(seen).reshape(-1, 2))
+
+    def _scan_records(self) -> Iterator[Record]:
+        if self._scans is None:
+            return
+        for block in self._scans.blocks():
+            for index in range(len(block.stamps_ns)):
+                scan: Scan = block.scan(index)
+                yield scan
+
+    def _odometry_rows(self, rows_at_once: int) -> Iterator[_Rows]:
+        last: int | None = None
+        for block in _table(self.path / ODOMETRY, ODOMETRY_COLUMNS, rows_at_once):
+            stamps = _ascending(block, last, "later than the row before")
+            last = int(stamps[-1])
+            columns = [block.numbers("dx", "m"), block.numbers("dy", "m"), block.numbers("dtheta", "rad")]
+            yield _Rows(stamps, np.stack(columns, axis=1))
+        if last is None:
+            raise FileFormatError(self.path / ODOMETRY, "", "has no rows", "at least one row of odometry")
+
+    def _reference_rows(self, rows_at_once: int) -> Iterator[_Rows]:
+        if not (self.path / REFERENCE).exists():
+            return
+        last: int | None = None
+        for block in _table(self.path / REFERENCE, REFERENCE_COLUMNS, rows_at_once):
+            stamps = _ascending(block, last, "later than the row before")
+            last = int(stamps[-1])
+            theta = block.numbers("theta", "rad", empty=np.nan)
+            yield _Rows(stamps, np.stack([block.numbers("x", "m"), block.numbers("y", "m"), theta], axis=1))
+
+    def _detection_rows(self, rows_at_once: int) -> Iterator[_Rows]:
+        if not (self.path / DETECTIONS).exists():
+            return
+        last: int | None = None
+        last_empty = False
+        for block in _table(self.path / DETECTIONS, DETECTION_COLUMNS, rows_at_once):
+            stamps = _ascending(block, last, "the stamp of the row before, or a later one", repeated=True)
+            values = np.stack(
+                [block.numbers(c, u, empty=np.nan) for c, u in (("range", "m"), ("bearing", "rad"))], axis=1
+            )
+            empty = np.isnan(values[:, 0])
+            _check_detections(block, values, empty)
+            previous_stamps = np.concatenate([stamps[:1] - 1 if last is None else [last], stamps[:-1]])
+            previous_empty = np.concatenate([[last_empty], empty[:-1]])
+            mixed = np.flatnonzero((stamps == previous_stamps) & (empty | previous_empty))
+            if len(mixed):
+                found = "an empty row and another row have one stamp"
+                raise block.error(int(mixed[0]), "range", found, "one empty row for a scan that saw no reflector")
+            last, last_empty = int(stamps[-1]), bool(empty[-1])
+            yield _Rows(stamps, values)
+
+
+def _table(path: Path, columns: tuple[str, ...], rows_at_once: int) -> Iterator[Block]:
+    # Other columns are passed over: a recording is often exported from a table that holds more.
+    return read_table(path, columns, ignore_unknown=True, rows_at_once=rows_at_once)
+
+
+def _ascending(block: Block, last: int | None, expected: str, *, repeated: bool = False) -> IntArray:
+    """Stamps of a block; an error where one is earlier than (or, unless `repeated`, equal to) the one before."""
+    stamps = block.stamps()
+    before = np.concatenate([stamps[:1] - 1 if last is None else [last], stamps[:-1]])
+    wrong = np.flatnonzero(stamps < before if repeated else stamps <= before)
+    if len(wrong):
+        row = int(wrong[0])
+        raise block.error(row, "stamp_ns", f"is {stamps[row]} after {before[row]}", expected)
+    return stamps
+
+
+def _check_detections(block: Block, values: FloatArray, empty: np.ndarray) -> None:
+    half = np.flatnonzero(empty != np.isnan(values[:, 1]))
+    if len(half):
+        row = int(half[0])
+        column = "range" if empty[row] else "bearing"
+        raise block.error(row, column, "is empty", "range and bearing, or neither for a scan that saw no reflector")
+    negative = np.flatnonzero(values[:, 0] < 0.0)
+    if len(negative):
+        row = int(negative[0])
+        raise block.error(row, "range", f"is {values[row, 0]:g}", "0 m or more")
+
+
+def _joined(blocks: Iterator[_Rows], width: int) -> _Rows:
+    parts = list(blocks)
+    return _Rows(
+        np.concatenate([np.empty(0, np.int64), *(part.stamps_ns for part in parts)]),
+        np.concatenate([np.empty((0, width)), *(part.values for part in parts)]),
+    )

@@ -1,0 +1,164 @@
+"""The writing side of a CSV folder: any source's records become a recording. Memory does not grow with its length."""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Iterable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from commission.errors import FileFormatError
+from commission.io.recordings.csv_folder import (
+    DETECTION_COLUMNS,
+    DETECTIONS,
+    ODOMETRY,
+    ODOMETRY_COLUMNS,
+    REFERENCE,
+    REFERENCE_COLUMNS,
+    SCANS,
+)
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+
+
+def write_recording(folder: Path, records: Iterable[Record]) -> None:
+    """Write a recording as a CSV folder.
+
+    Parameters
+    ----------
+    folder : made when missing; the recording in it is replaced once the new one is complete.
+    records : in the order of their stamps; a source's error passes through and leaves the folder as it was.
+
+    Raises
+    ------
+    FileFormatError
+        the folder cannot be written, or a scan has other beams than the first one.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".recording.", dir=folder) as scratch:
+            names = _write_all(Path(scratch), records, folder)
+            for name in (DETECTIONS, SCANS, REFERENCE, ODOMETRY):
+                if name in names:
+                    (Path(scratch) / name).replace(folder / name)
+                else:
+                    (folder / name).unlink(missing_ok=True)
+    except OSError as error:
+        found = f"cannot be written ({error.strerror or error})"
+        raise FileFormatError(folder, "", found, "a writable place with free space") from error
+
+
+def _write_all(scratch: Path, records: Iterable[Record], folder: Path) -> set[str]:
+    """Write all files into a scratch folder; returns the names of those that hold something."""
+    with ExitStack() as stack:
+        tables = {
+            kind: stack.enter_context((scratch / name).open("w", encoding="utf-8", newline="\n"))
+            for kind, name in ((Odometry, ODOMETRY), (Detections, DETECTIONS), (ReferencePose, REFERENCE))
+        }
+        for kind, columns in (
+            (Odometry, ODOMETRY_COLUMNS),
+            (Detections, DETECTION_COLUMNS),
+            (ReferencePose, REFERENCE_COLUMNS),
+        ):
+            tables[kind].write(",".join(columns) + "\n")
+        scans = _ScanWriter(scratch, folder, stack)
+        names = {ODOMETRY}
+        for record in records:
+            if isinstance(record, Scan):
+                scans.add(record)
+                names.add(SCANS)
+            else:
+                tables[type(record)].write(_rows(record))
+                names.add({Odometry: ODOMETRY, Detections: DETECTIONS, ReferencePose: REFERENCE}[type(record)])
+        for table in tables.values():
+            table.flush()
+            os.fsync(table.fileno())
+        scans.finish()
+    return names
+
+
+def _rows(record: Odometry | Detections | ReferencePose) -> str:
+    """Lines of a record; `repr` of a number reads back as the same number."""
+    if isinstance(record, Detections):
+        if len(record.range_bearing) == 0:
+            return f"{record.stamp_ns},,\n"
+        return "".join(f"{record.stamp_ns},{r!r},{b!r}\n" for r, b in record.range_bearing.tolist())
+    values = record.displacement if isinstance(record, Odometry) else record.pose
+    return ",".join([str(record.stamp_ns), *("" if math.isnan(v) else repr(v) for v in values.tolist())]) + "\n"
+
+
+class _ScanWriter:
+    """Collect the rows of each array in a plain file; pack them when their number, which comes first, is known."""
+
+    def __init__(self, scratch: Path, folder: Path, stack: ExitStack) -> None:
+        self.scratch = scratch
+        self.folder = folder
+        self.stack = stack
+        self.files: dict[str, IO[bytes]] = {}
+        self.first: Scan | None = None
+        self.count = 0
+
+    def add(self, scan: Scan) -> None:
+        """Append one scan."""
+        rows: dict[str, NDArray[Any] | None] = {
+            "stamp_ns": np.array([scan.stamp_ns], dtype="<i8"),
+            "ranges": np.asarray(scan.ranges, dtype="<f4"),
+            "intensities": None if scan.intensities is None else np.asarray(scan.intensities, dtype="<f4"),
+            "reflector": None if scan.reflector is None else np.asarray(scan.reflector, dtype=np.bool_),
+        }
+        present = {name: row for name, row in rows.items() if row is not None}
+        if self.first is None:
+            self.first = scan
+            for name in present:
+                self.files[name] = self.stack.enter_context((self.scratch / f"{name}.raw").open("w+b"))
+        self._check(scan, present)
+        for name, row in present.items():
+            self.files[name].write(row.tobytes())
+        self.count += 1
+
+    def _check(self, scan: Scan, present: dict[str, NDArray[Any]]) -> None:
+        first = self.first
+        same = (
+            first is not None
+            and present.keys() == self.files.keys()
+            and scan.angle_min == first.angle_min
+            and scan.angle_increment == first.angle_increment
+            and all(len(row) == len(first.ranges) for name, row in present.items() if name != "stamp_ns")
+        )
+        if not same:
+            found = f"scan {self.count + 1} has other beams or arrays than the first"
+            raise FileFormatError(self.folder / SCANS, "", found, "one scanner per recording")
+
+    def finish(self) -> None:
+        """Pack what was added into `scans.npz`."""
+        if self.first is None:
+            return
+        shapes = {name: (self.count, len(self.first.ranges)) for name in self.files} | {"stamp_ns": (self.count,)}
+        types = {"stamp_ns": "<i8", "ranges": "<f4", "intensities": "<f4", "reflector": "|b1"}
+        with (self.scratch / SCANS).open("wb") as target:
+            with zipfile.ZipFile(target, "w", allowZip64=True) as archive:
+                for name, value in (
+                    ("angle_min", self.first.angle_min),
+                    ("angle_increment", self.first.angle_increment),
+                ):
+                    with archive.open(f"{name}.npy", "w") as member:
+                        npy.write_array(member, np.array(value, dtype="<f8"))
+                for name, source in self.files.items():
+                    info = zipfile.ZipInfo(f"{name}.npy")
+                    # Flags shrink to almost nothing; noisy ranges would only cost time.
+                    info.compress_type = zipfile.ZIP_DEFLATED if name == "reflector" else zipfile.ZIP_STORED
+                    with archive.open(info, "w", force_zip64=True) as member:
+                        header = {"descr": types[name], "fortran_order": False, "shape": shapes[name]}
+                        npy.write_array_header_1_0(member, header)
+                        source.seek(0)
+                        shutil.copyfileobj(source, member, 1 << 20)
+            target.flush()
+            os.fsync(target.fileno())

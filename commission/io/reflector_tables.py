@@ -1,0 +1,98 @@
+"""The table `reflectors.csv`: one reflector a row, as an engineer keeps it in a spreadsheet. Read and written."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from pathlib import Path
+
+from commission.errors import FileFormatError
+from commission.io.atomic import write_text
+from commission.io.csv_table import Block, read_table, shortened
+from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
+
+REQUIRED = ("id", "x", "y", "radius")
+OPTIONAL = ("kind", "heading", "height", "sigma", "layer", "note")
+SIZE_LIMIT = 64_000_000
+"""Bytes of a reflector table: about 1,000,000 reflectors."""
+
+_UNITS = {"x": "m", "y": "m", "radius": "m", "heading": "rad", "height": "m", "sigma": "m"}
+_TEXTS = ("kind", "layer", "note")
+_DEFAULTS: Mapping[str, float] = {"heading": 0.0, "height": 0.2, "sigma": 0.0}
+
+
+def read_reflectors(path: Path) -> ReflectorMap:
+    """Read a reflector table.
+
+    Parameters
+    ----------
+    path : CSV file with the columns id, x, y, radius and, if wanted, kind, heading, height, sigma, layer, note
+        [m, rad, map frame], in any order.
+
+    Returns
+    -------
+    reflectors : in the order of the file; a table without rows gives an empty map.
+
+    Raises
+    ------
+    FileFormatError
+        names line and column, what was found and what is expected.
+    """
+    reflectors: list[Reflector] = []
+    lines: dict[str, int] = {}
+    for block in read_table(path, REQUIRED, OPTIONAL, size_limit=SIZE_LIMIT):
+        numbers = {
+            name: block.numbers(name, unit, empty=_DEFAULTS.get(name)).tolist()
+            for name, unit in _UNITS.items()
+            if name in block.columns
+        }
+        for row in range(len(block)):
+            reflector = _reflector(block, row, {name: values[row] for name, values in numbers.items()})
+            if reflector.id in lines:
+                found = f"{shortened(reflector.id)} is used twice (first on line {lines[reflector.id]})"
+                raise block.error(row, "id", found, "unique ids")
+            lines[reflector.id] = block.lines[row]
+            reflectors.append(reflector)
+    return ReflectorMap(tuple(reflectors))
+
+
+def write_reflectors(reflectors: ReflectorMap, path: Path) -> None:
+    """Write a reflector table; optional columns are left out while all of their values are the usual ones."""
+    usual = Reflector("usual", 0.0, 0.0)
+    optional = [
+        name for name in OPTIONAL if any(getattr(r, name) != getattr(usual, name) for r in reflectors.reflectors)
+    ]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([*REQUIRED, *optional])
+    for reflector in reflectors.reflectors:
+        cells = [_written(path, reflector, name) for name in (*REQUIRED, *optional)]
+        writer.writerow(cells)
+    write_text(path, text.getvalue())
+
+
+def _written(path: Path, reflector: Reflector, name: str) -> str:
+    """Cell that reads back as the same value."""
+    value = getattr(reflector, name)
+    if isinstance(value, float | int):
+        return repr(float(value))
+    text = str(value)
+    if text != text.strip() or any(character < " " for character in text) or (name == "id" and text.startswith("#")):
+        found = f"{name} {shortened(text)} of reflector {shortened(reflector.id)} cannot stand in a table"
+        remedy = "text without line breaks, without spaces at its ends and, as an id, without # in front"
+        raise FileFormatError(path, "", found, remedy)
+    return text
+
+
+def _reflector(block: Block, row: int, numbers: Mapping[str, float]) -> Reflector:
+    texts = {name: block.columns[name][row] for name in _TEXTS if name in block.columns}
+    kind = texts.pop("kind", "") or ReflectorKind.CYLINDER
+    if kind not in list(ReflectorKind):
+        raise block.error(row, "kind", f"is {shortened(kind)}", f"one of: {', '.join(ReflectorKind)}")
+    try:
+        return Reflector(block.columns["id"][row], kind=ReflectorKind(kind), **numbers, **texts)  # type: ignore[arg-type]
+    except ValueError as error:
+        problem, _, remedy = str(error).partition("; expected ")
+        column, _, found = problem.partition(" ")
+        raise block.error(row, column, found, remedy) from error

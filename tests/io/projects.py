@@ -1,0 +1,127 @@
+"""Random valid projects for property tests."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from commission.site.disturbances import CoveredPeriod, Disturbances, ShinyObject, TiltedStretch
+from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
+from commission.site.parameters import (
+    AssociationParameters,
+    DetectorParameters,
+    ObservationParameters,
+    OdometryParameters,
+    Parameters,
+    SupervisorParameters,
+)
+from commission.site.project import Project
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.routes import Direction, Route, Segment
+from commission.site.scanner import Scanner
+from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
+
+METRES = st.floats(-1e4, 1e4)
+POSITIVE = st.floats(1e-6, 1e3)
+NAME = st.text(st.characters(blacklist_categories=("Cs",)), min_size=1, max_size=12)
+POINT = st.tuples(METRES, METRES)
+OUTLINE = st.lists(POINT, min_size=3, max_size=9).map(tuple)
+
+
+def vehicles() -> st.SearchStrategy[Vehicle]:
+    return st.one_of(
+        st.builds(DifferentialVehicle, wheel_separation=POSITIVE, outline=OUTLINE),
+        st.builds(TricycleVehicle, wheelbase=POSITIVE, max_steering_deg=st.floats(1.0, 90.0), outline=OUTLINE),
+        st.builds(
+            OmnidirectionalVehicle,
+            wheel_angles_deg=st.lists(st.integers(0, 359).map(float), min_size=3, max_size=6, unique=True).map(tuple),
+            wheel_radius=POSITIVE,
+            center_distance=POSITIVE,
+            outline=OUTLINE,
+        ),
+    )
+
+
+def scanners() -> st.SearchStrategy[Scanner]:
+    return st.builds(
+        Scanner,
+        mounting=st.tuples(METRES, METRES, st.floats(-math.pi, math.pi)).map(np.array),
+        field_of_view_deg=st.tuples(st.floats(-180.0, -1.0), st.floats(1.0, 180.0)),
+        resolution_deg=st.floats(0.05, 2.0),
+        rate=st.floats(1.0, 100.0),
+        range_sigma=st.floats(0.0, 0.1),
+    )
+
+
+@st.composite
+def segments(draw: st.DrawFn) -> Segment:
+    degree = draw(st.integers(1, 4))
+    points = draw(st.lists(POINT, min_size=degree + 1, max_size=degree + 4, unique=True))
+    weights = draw(st.none() | st.lists(st.floats(0.1, 10.0), min_size=len(points), max_size=len(points)))
+    knots = None
+    if draw(st.booleans()):
+        inner = np.linspace(0.0, 1.0, len(points) - degree + 1)[1:-1] ** 1.5
+        knots = np.concatenate([np.zeros(degree + 1), inner, np.ones(degree + 1)])
+    return Segment(
+        np.array(points),
+        draw(st.sampled_from(Direction)),
+        degree,
+        knots,
+        None if weights is None else np.array(weights),
+        draw(st.none() | POSITIVE),
+    )
+
+
+def parameters() -> st.SearchStrategy[Parameters]:
+    sigma = st.floats(0.0, 1.0)
+    return st.builds(
+        Parameters,
+        observation=st.builds(ObservationParameters, range_sigma=POSITIVE, bearing_sigma=POSITIVE),
+        odometry=st.builds(OdometryParameters, forward_per_sqrt_m=sigma, heading_per_sqrt_s=sigma),
+        detector=st.builds(
+            DetectorParameters,
+            enabled=st.booleans(),
+            min_model_error=st.integers(0, 9),
+            center=st.sampled_from(["circle", "central_beam"]),
+        ),
+        association=st.builds(AssociationParameters, gate_probability=st.floats(0.01, 0.99)),
+        supervisor=st.builds(SupervisorParameters, position_limit=POSITIVE, recovery_ratio=st.floats(1.0, 9.0)),
+    )
+
+
+def disturbances() -> st.SearchStrategy[Disturbances]:
+    return st.builds(
+        Disturbances,
+        people=st.integers(0, 99),
+        shiny_objects=st.lists(st.builds(ShinyObject, x=METRES, y=METRES), max_size=2).map(tuple),
+        tilted_stretches=st.lists(st.builds(TiltedStretch, x=METRES, y=METRES, radius=POSITIVE), max_size=2).map(tuple),
+        covered=st.lists(st.builds(CoveredPeriod, start=POSITIVE, duration=POSITIVE), max_size=2).map(tuple),
+        dropped_scans=st.floats(0.0, 1.0),
+    )
+
+
+def floor_maps() -> st.SearchStrategy[FloorMap]:
+    cells = hnp.arrays(np.int8, (4, 5), elements=st.sampled_from([FREE, OCCUPIED, UNKNOWN]))
+    origin = st.tuples(METRES, METRES, st.floats(-3.0, 3.0)).map(np.array)
+    return st.builds(FloorMap, cells=cells, resolution=st.floats(1e-3, 1.0), origin=origin)
+
+
+def projects() -> st.SearchStrategy[Project]:
+    route = st.builds(Route, name=NAME, segments=segments().map(lambda s: (s,)), speed=POSITIVE)
+    reflectors = st.lists(st.builds(Reflector, id=st.integers(0, 99).map(str), x=METRES, y=METRES), max_size=3)
+    return st.builds(
+        Project,
+        name=st.text(st.characters(blacklist_categories=("Cs",)), max_size=12),
+        floor_map=st.none() | floor_maps(),
+        reflectors=reflectors.filter(lambda rs: len({r.id for r in rs}) == len(rs)).map(
+            lambda rs: ReflectorMap(tuple(rs))
+        ),
+        routes=st.lists(route, max_size=3, unique_by=lambda r: r.name).map(tuple),
+        vehicle=vehicles(),
+        scanner=scanners(),
+        parameters=parameters(),
+        disturbances=disturbances(),
+    )

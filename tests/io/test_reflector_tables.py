@@ -1,0 +1,94 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from commission.errors import CommissionError, FileFormatError
+from commission.io.reflector_tables import read_reflectors, write_reflectors
+from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
+
+COORDINATE = st.floats(-1e6, 1e6)
+TEXT = st.text(st.characters(blacklist_categories=("C", "Z")), max_size=8)
+ID = TEXT.filter(lambda text: text and not text.startswith("#"))
+
+
+def reflectors() -> st.SearchStrategy[ReflectorMap]:
+    one = st.builds(
+        Reflector,
+        id=ID,
+        x=COORDINATE,
+        y=COORDINATE,
+        radius=st.floats(0.001, 1.0),
+        kind=st.sampled_from(ReflectorKind),
+        heading=st.floats(-4.0, 4.0),
+        height=st.floats(0.0, 3.0),
+        sigma=st.floats(0.0, 0.1),
+        layer=TEXT,
+        note=TEXT,
+    )
+    return st.lists(one, max_size=5, unique_by=lambda r: r.id).map(lambda rows: ReflectorMap(tuple(rows)))
+
+
+@given(table=reflectors())
+def test_table_that_is_written_and_read_again_is_equal(
+    tmp_path_factory: pytest.TempPathFactory, table: ReflectorMap
+) -> None:
+    path = tmp_path_factory.mktemp("table") / "reflectors.csv"
+    write_reflectors(table, path)
+    assert read_reflectors(path) == table
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "id,x,y,radius\nA,1.5,-2,0.04\n",
+        "\ufeffid;x;y;radius\r\n\r\nA;1,5;-2,0;0,04\r\n",
+        "# surveyed in May\nRadius, Y ,x,ID\n0.04,-2,1.5,A\n\n",
+        'id,x,y,radius,kind,note\n"A",1.5,-2,4e-2,,\n',
+    ],
+    ids=["plain", "European spreadsheet", "other order", "quoted"],
+)
+def test_table_is_read_as_spreadsheets_save_it(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "reflectors.csv"
+    path.write_bytes(text.encode())
+    assert read_reflectors(path) == ReflectorMap((Reflector("A", 1.5, -2.0, 0.04),))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "is empty; expected a table with the columns id, x, y, radius"),
+        ("id,x,y\nA,1,2\n", "line 1: the header 'id,x,y' has no column radius"),
+        ("id,x,y,radius,color\n", "line 1: column 'color' is unknown; expected one of: id, x, y, radius, kind"),
+        ("id,x,y,radius,x\n", "line 1: column x is there 2 times; expected each column once"),
+        ("id,x,y,radius\nA,1,2,0.04\nB,one,2,0.04\n", "line 3, column x: is 'one'; expected a number [m]"),
+        ("id,x,y,radius\nA,nan,2,0.04\n", "line 2, column x: is nan; expected a finite number [m]"),
+        ("id,x,y,radius\nA,1,,0.04\n", "line 2, column y: is empty; expected a number [m]"),
+        ("id,x,y,radius\nA,1,2,0.04\nA,3,4,0.04\n", "line 3, column id: 'A' is used twice (first on line 2)"),
+        ("id,x,y,radius\nA,1,2,0\n", "line 2, column radius: is 0; expected more than 0 and at most 1 m"),
+        ("id,x,y,radius\n,1,2,0.1\n", "line 2, column id: is empty; expected a name"),
+        ("id,x,y,radius\nA,1,2\n", "line 2: has 3 cells; expected 4 cells"),
+        ("id,x,y,radius,kind\nA,1,2,0.1,round\n", "column kind: is 'round'; expected one of: cylinder, flat"),
+        ('id,x,y,radius\n"A,1,2,0.1\n', "line 2: is no row of a table"),
+        ("id,x,y,radius\nA,1_0,2,0.1\n", "line 2, column x: is '1_0'; expected a number [m]"),
+    ],
+)
+def test_wrong_table_is_one_line_with_line_and_column(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "reflectors.csv"
+    path.write_text(text)
+    with pytest.raises(FileFormatError) as caught:
+        read_reflectors(path)
+    assert message in str(caught.value)
+
+
+@given(data=st.binary(max_size=200))
+def test_garbage_is_one_line_or_a_table(tmp_path_factory: pytest.TempPathFactory, data: bytes) -> None:
+    path = tmp_path_factory.mktemp("table") / "reflectors.csv"
+    path.write_bytes(b"id,x,y,radius\n" + data)
+    try:
+        read_reflectors(path)
+    except CommissionError as error:
+        assert "\n" not in str(error)
