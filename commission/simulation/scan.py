@@ -1,0 +1,120 @@
+"""The virtual scanner: a project's walls, reflectors and disturbances prepared for `scan_kernels`, and its noise.
+
+It knows nothing of drives or stamps; people come in as circles.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.geometry.arrays import BoolArray, FloatArray
+from commission.geometry.occupancy import OccupancyGrid
+from commission.geometry.raycast import RayCaster
+from commission.geometry.se2 import compose
+from commission.simulation.scan_kernels import Beams, Hall, Moment, cast_scan
+from commission.site.disturbances import Disturbances
+from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
+from commission.site.scanner import Scanner
+
+GLINT_BEAMS = (1, 8)
+"""Fewest and most neighboring beams of a glint: bare metal, a safety vest, the edge of a foil."""
+
+Echoes = tuple[NDArray[np.float32], BoolArray]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VirtualScanner:
+    """A scanner in a hall, ready to scan from any pose."""
+
+    scanner: Scanner
+    """Field of view, noise and mounting."""
+    disturbances: Disturbances
+    """Glints and uneven floor."""
+    hall: Hall
+    """Walls, reflectors and shiny objects."""
+    beams: Beams
+    """The scanner's numbers."""
+
+    @staticmethod
+    def of(project: Project) -> VirtualScanner:
+        """Prepare walls and reflectors; a project without a floor map is an open field."""
+        floor = project.floor_map
+        grid = OccupancyGrid(np.zeros((1, 1), np.bool_), 1.0, np.zeros(3)) if floor is None else floor.occupancy()
+        wall_depth = 0.0 if floor is None else 0.5 * floor.resolution
+        hall = _hall(RayCaster(grid), project.reflectors, project.disturbances, wall_depth)
+        return VirtualScanner(project.scanner, project.disturbances, hall, _beams(project.scanner))
+
+    def scan(self, T_map_base: FloatArray, circles: FloatArray, rng: np.random.Generator) -> Echoes:
+        """One scan, taken at one instant.
+
+        Parameters
+        ----------
+        T_map_base : (3,) true pose of the vehicle [m, m, rad].
+        circles : (K, 3) x, y and radius of legs and other moving things [m], map frame.
+        rng : draws the noise of each beam, then the glints; the number of draws depends on neither pose nor hall.
+
+        Returns
+        -------
+        ranges : (B,) float32 [m], NaN where nothing came back.
+        reflector : (B,) whether the scanner flags the beam as a reflector.
+        """
+        count = self.scanner.beam_count
+        ranges, flags = np.empty(count, np.float32), np.empty(count, np.bool_)
+        noise = rng.standard_normal((count, 2))
+        T_map_scanner = compose(T_map_base, self.scanner.mounting)
+        moment = Moment(T_map_scanner, self.range_limit(T_map_base), circles, noise)
+        cast_scan(self.hall, self.beams, moment, ranges, flags)
+        self._glint(ranges, flags, rng)
+        return ranges, flags
+
+    def range_limit(self, T_map_base: FloatArray) -> float:
+        """Range at which the beams meet the floor at this place [m]; infinity on even floor."""
+        x, y = float(T_map_base[0]), float(T_map_base[1])
+        here = (t for t in self.disturbances.tilted_stretches if math.hypot(x - t.x, y - t.y) <= t.radius)
+        return min((stretch.range_limit for stretch in here), default=math.inf)
+
+    def _glint(self, ranges: NDArray[np.float32], flags: BoolArray, rng: np.random.Generator) -> None:
+        """Flag a few neighboring beams at random places, at whatever they met."""
+        for _ in range(int(rng.poisson(self.disturbances.glints_per_scan))):
+            first = int(rng.integers(len(ranges)))
+            beams = slice(first, first + int(rng.integers(GLINT_BEAMS[0], GLINT_BEAMS[1] + 1)))
+            flags[beams] |= ranges[beams] <= self.scanner.reflector_range
+
+
+def _beams(scanner: Scanner) -> Beams:
+    """Numbers of the scanner for the kernel."""
+    return Beams(
+        scanner.angle_min,
+        scanner.angle_increment,
+        0.5 * math.radians(scanner.beam_width_deg),
+        math.radians(scanner.bearing_sigma_deg),
+        scanner.range_sigma,
+        scanner.range[0],
+        scanner.range[1],
+        scanner.reflector_range,
+    )
+
+
+def _hall(caster: RayCaster, reflectors: ReflectorMap, disturbances: Disturbances, wall_depth: float) -> Hall:
+    """Walls, then reflectors and shiny objects as the kernel's columns."""
+    shiny = disturbances.shiny_objects
+    return Hall(
+        caster.tables,
+        np.concatenate([reflectors.centers, np.array([(s.x, s.y) for s in shiny]).reshape(-1, 2)]),
+        np.concatenate([reflectors.radii, np.array([s.radius for s in shiny])]),
+        np.concatenate([reflectors.headings, np.zeros(len(shiny))]),
+        np.concatenate([reflectors.is_flat, np.zeros(len(shiny), np.bool_)]),
+        wall_depth,
+    )
+
+
+def warm_up() -> None:
+    """Compile the scan kernel on a scanner of three beams in an open field."""
+    scanner = Scanner(field_of_view_deg=(-1.0, 1.0), resolution_deg=1.0)
+    virtual = VirtualScanner.of(Project(scanner=scanner))
+    virtual.scan(np.zeros(3), np.array([[1.0, 0.0, 0.1]]), np.random.default_rng(0))

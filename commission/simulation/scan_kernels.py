@@ -1,0 +1,198 @@
+"""One scan, compiled: beams against walls, reflectors, shiny objects and legs, kept by the nearest echo of each beam.
+
+Objects are visited by the interval of beams that can meet them, so their number hardly matters. The scan is taken at
+one instant; a real scanner turns while the vehicle moves (1 cm at 0.5 m/s and 50 turns a second).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.compiled import compiled
+from commission.geometry.angles import TURN, wrap_scalar
+from commission.geometry.arrays import BoolArray, FloatArray
+from commission.geometry.raycast import RayTables, cast_ray
+
+FLAT_COSINE = math.cos(math.radians(65.0))
+"""Cosine of the angle of incidence beyond which a flat reflector returns no more than a wall does."""
+LIT_SHARE = 0.2
+"""Share of a beam (or, if narrower, of the object) that must meet for a flag: less returns too weak an echo."""
+BEARING_MARGIN = 5.0
+"""Sigmas of bearing noise by which the interval of beams of an object is widened before each beam is checked."""
+
+
+class Beams(NamedTuple):
+    """What the kernel has to know of the scanner."""
+
+    angle_min: float
+    """Bearing of the first beam [rad]."""
+    increment: float
+    """Bearing step [rad]."""
+    half_width: float
+    """Half of a beam's divergence [rad]."""
+    bearing_sigma: float
+    """[rad]."""
+    range_sigma: float
+    """[m]."""
+    nearest: float
+    """Smallest range measured [m]."""
+    farthest: float
+    """Largest range measured [m]."""
+    reflector_range: float
+    """Range up to which reflectors are told from other things [m]."""
+
+
+class Hall(NamedTuple):
+    """What stands still: walls, and everything that raises a reflector flag."""
+
+    tables: RayTables
+    """Walls."""
+    centers: FloatArray
+    """(N, 2) reflectors and shiny objects [m], map frame."""
+    radii: FloatArray
+    """(N,) radius, or half the width of a flat plate [m]."""
+    headings: FloatArray
+    """(N,) direction that a flat plate faces [rad], map frame."""
+    flat: BoolArray
+    """(N,) plate instead of cylinder."""
+    wall_depth: float
+    """How far behind the surface of a wall's cell a reflector mounted on it may be drawn [m]."""
+
+
+class Moment(NamedTuple):
+    """What differs from scan to scan."""
+
+    pose: FloatArray
+    """(3,) `T_map_scanner` [m, m, rad]."""
+    range_limit: float
+    """Range at which every beam meets the floor [m]; infinity on even floor."""
+    circles: FloatArray
+    """(K, 3) x, y and radius of legs and other moving things [m], map frame."""
+    noise: FloatArray
+    """(B, 2) standard normal draws for bearing and range of each beam."""
+
+
+class Echoes(NamedTuple):
+    """What each beam has met so far."""
+
+    bearings: FloatArray
+    """(B,) true bearing of each beam [rad], scanner frame."""
+    distances: FloatArray
+    """(B,) true range [m]."""
+    flags: BoolArray
+    """(B,) met a reflective object."""
+
+
+@compiled
+def cast_scan(hall: Hall, beams: Beams, moment: Moment, ranges: NDArray[np.float32], flags: BoolArray) -> None:
+    """Fill `ranges` (B,) and `flags` (B,) with one scan."""
+    count = len(ranges)
+    x, y, heading = moment.pose[0], moment.pose[1], moment.pose[2]
+    reach = min(beams.farthest + 4.0 * beams.range_sigma, moment.range_limit)
+    echoes = Echoes(np.empty(count), np.empty(count), flags)
+    for i in range(count):
+        bearing = beams.angle_min + i * beams.increment + beams.bearing_sigma * moment.noise[i, 0]
+        c, s = math.cos(heading + bearing), math.sin(heading + bearing)
+        echoes.bearings[i] = bearing
+        echoes.distances[i] = cast_ray(hall.tables, x, y, c, s, reach)[0]
+        flags[i] = False
+    for k in range(len(moment.circles)):
+        _meet_circle(beams, moment, k, echoes)
+    for k in range(len(hall.radii)):
+        _meet_reflective(hall, beams, moment, k, echoes)
+    for i in range(count):
+        distance = echoes.distances[i]
+        if distance >= moment.range_limit:
+            distance, flags[i] = moment.range_limit, False
+        if distance > beams.reflector_range:
+            flags[i] = False
+        measured = distance + beams.range_sigma * moment.noise[i, 1]
+        if not beams.nearest <= measured <= beams.farthest:
+            measured, flags[i] = math.nan, False
+        ranges[i] = measured
+
+
+@compiled
+def _first_beam(beams: Beams, bearing: float, count: int) -> tuple[int, int]:
+    """Index of the beam nearest to a bearing, and beams per full turn (both unclipped)."""
+    offset = wrap_scalar(bearing - beams.angle_min - 0.5 * count * beams.increment) + 0.5 * count * beams.increment
+    return round(offset / beams.increment), round(TURN / beams.increment)
+
+
+@compiled
+def _meet_circle(beams: Beams, moment: Moment, index: int, echoes: Echoes) -> None:
+    """Shorten every beam whose middle meets a dull circle."""
+    radius = moment.circles[index, 2]
+    dx, dy = moment.circles[index, 0] - moment.pose[0], moment.circles[index, 1] - moment.pose[1]
+    distance = math.hypot(dx, dy)
+    if distance <= radius or distance - radius > beams.farthest:
+        return
+    bearing = wrap_scalar(math.atan2(dy, dx) - moment.pose[2])
+    half = math.asin(radius / distance)
+    middle, turn = _first_beam(beams, bearing, len(echoes.flags))
+    reach = int((half + BEARING_MARGIN * beams.bearing_sigma) / beams.increment) + 1
+    for k in range(middle - reach, middle + reach + 1):
+        i = k % turn
+        if i >= len(echoes.flags):
+            continue
+        off = wrap_scalar(echoes.bearings[i] - bearing)
+        if abs(off) <= half:
+            across = distance * math.sin(off)
+            echo = distance * math.cos(off) - math.sqrt(max(radius * radius - across * across, 0.0))
+            echoes.distances[i] = min(echoes.distances[i], echo)
+
+
+@compiled
+def _meet_reflective(hall: Hall, beams: Beams, moment: Moment, index: int, echoes: Echoes) -> None:
+    """Flag every beam of which a part meets a reflective object before its middle meets anything else.
+
+    Retroreflecting tape outshines what the rest of the beam meets, so the echo is that of the lit part of the object:
+    its middle gives the range. Counts of equation 3 or up to two more follow (beams no wider than their step).
+    """
+    radius = hall.radii[index]
+    dx, dy = hall.centers[index, 0] - moment.pose[0], hall.centers[index, 1] - moment.pose[1]
+    distance = math.hypot(dx, dy)
+    if distance <= radius or distance - radius > min(beams.farthest, beams.reflector_range):
+        return
+    toward = math.atan2(dy, dx)
+    high = math.asin(radius / distance)
+    low, facing = -high, 0.0
+    if hall.flat[index]:
+        facing = wrap_scalar(hall.headings[index] - toward)
+        if -math.cos(facing) < FLAT_COSINE:
+            return
+        low, high = _plate_edges(distance, radius, facing)
+    bearing = wrap_scalar(toward - moment.pose[2])
+    middle, turn = _first_beam(beams, bearing, len(echoes.flags))
+    widest = max(-low, high) + beams.half_width + BEARING_MARGIN * beams.bearing_sigma
+    reach = int(widest / beams.increment) + 1
+    for k in range(middle - reach, middle + reach + 1):
+        i = k % turn
+        if i >= len(echoes.flags):
+            continue
+        off = wrap_scalar(echoes.bearings[i] - bearing)
+        upper, lower = min(off + beams.half_width, high), max(off - beams.half_width, low)
+        if upper - lower < LIT_SHARE * min(2.0 * beams.half_width, high - low):
+            continue
+        lit = 0.5 * (upper + lower)
+        if hall.flat[index]:
+            echo = distance * math.cos(facing) / math.cos(facing - lit)
+        else:
+            across = distance * math.sin(lit)
+            echo = distance * math.cos(lit) - math.sqrt(max(radius * radius - across * across, 0.0))
+        if echo < echoes.distances[i] + hall.wall_depth:
+            echoes.distances[i], echoes.flags[i] = echo, True
+
+
+@compiled
+def _plate_edges(distance: float, half_width: float, facing: float) -> tuple[float, float]:
+    """Bearings of a plate's two ends, relative to that of its center [rad], lower first."""
+    # The plate stands at a right angle to `facing`, which is measured from the line of sight.
+    along, across = -half_width * math.sin(facing), half_width * math.cos(facing)
+    one = math.atan2(across, distance + along)
+    other = math.atan2(-across, distance - along)
+    return min(one, other), max(one, other)
