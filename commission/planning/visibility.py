@@ -1,0 +1,323 @@
+"""Which reflectors the scanner sees from where: range, field of view, incidence, occlusion by the map.
+
+Every answer is that of the exact ray between scanner and reflector; shadow maps (`shadow_kernels`) only make most of
+the rays unnecessary. What the sight is worth for localization is in `dilution`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from commission.compiled import compiled
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray
+from commission.geometry.occupancy import OccupancyGrid
+from commission.geometry.raycast import RayCaster
+from commission.geometry.se2 import compose
+from commission.planning import shadow_kernels
+from commission.planning.shadow_kernels import BitMask, Targets
+from commission.site.checks import at_least, between
+from commission.site.project import Project
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.scanner import Scanner
+
+# Points are handled in squares of this edge [m]: reflectors out of sight of a whole square are skipped at once.
+BUCKET = 4.0
+# Bearings this far outside the field of view still count [rad]: the last beam of a scan is rounded too.
+BEARING_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True, slots=True)
+class VisibilityOptions:
+    """What it takes for a reflector to count as visible, beyond a free line of sight."""
+
+    min_beams: int = 1
+    """Beams that a reflector must get for certain, so that it passes the detector filter (equation 3) [beams]."""
+    max_incidence_deg: float = 60.0
+    """Largest angle between a flat reflector's normal and the ray at which it still reflects [deg]."""
+
+    def __post_init__(self) -> None:
+        at_least(self.min_beams, 1, "visibility.min_beams", "beams")
+        between(self.max_incidence_deg, (0.0, 89.0), "visibility.max_incidence_deg", "deg")
+
+
+class VisibleReflectors(NamedTuple):
+    """Which reflectors are seen from each of N poses, as lists laid end to end."""
+
+    offsets: IntArray
+    """(N + 1,) the reflectors of pose n are `indices[offsets[n]:offsets[n + 1]]`."""
+    indices: IntArray
+    """(total,) indices into the reflector map, ascending for each pose."""
+
+    def of(self, pose: int) -> IntArray:
+        """Indices of the reflectors that one pose sees."""
+        return self.indices[self.offsets[pose] : self.offsets[pose + 1]]
+
+    def counts(self) -> IntArray:
+        """Return the number of visible reflectors of each pose: (N,) array."""
+        return np.diff(self.offsets)
+
+
+def promised_range(radius: float, resolution: float, min_beams: int, beam_width: float = 0.0) -> float:
+    """Range up to which a reflector gets at least `min_beams` beams wherever it stands between two of them.
+
+    Parameters
+    ----------
+    radius : of the reflector [m].
+    resolution : step between neighboring beams [rad].
+    min_beams : number of beams, at least 1.
+    beam_width : divergence of a beam [rad]; it widens the angle in which a reflector is met. With 0 this is
+        equation 3 of Sobreira et al. 2016 as printed, floor(2 asin(radius / r) / resolution) >= min_beams.
+
+    Returns
+    -------
+    range : largest distance to the reflector's center [m]; inf when the beam width alone is enough.
+    """
+    half_angle = 0.5 * (min_beams * resolution - beam_width)
+    if half_angle <= 0.0:
+        return math.inf
+    return radius / math.sin(min(half_angle, 0.5 * math.pi))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VisibilityModel:
+    """Reflectors, scanner and walls, prepared so that lines of sight cost one comparison each.
+
+    Memory: 8 bytes per reflector and bin of direction (16 MB for 500 reflectors at 30 m and cells of 0.05 m), besides
+    the four bytes per cell of the ray caster; a mask of N points adds 8 bytes per point for every 64 reflectors.
+    """
+
+    reflectors: ReflectorMap
+    """The M reflectors."""
+    scanner: Scanner
+    """The scanner whose field of view, mounting and ranges apply."""
+    options: VisibilityOptions
+    """What counts as visible."""
+    caster: RayCaster
+    """The walls."""
+    targets: Targets = field(repr=False)
+    """The reflectors with their shadow maps, for kernels; nobody writes into them."""
+
+    def visible(self, points: ArrayLike) -> BitMask:
+        """Reflectors seen by a scanner that looks all around.
+
+        Parameters
+        ----------
+        points : (N, 2) array [m], map frame: positions of the scanner.
+
+        Returns
+        -------
+        mask : (N, ceil(M / 64)) uint64 array; bit m % 64 of word m // 64 is set when reflector m is seen.
+        """
+        xy = np.ascontiguousarray(np.asarray(points, dtype=np.float64).reshape(-1, 2))
+        mask = np.zeros((len(xy), mask_words(len(self.reflectors))), dtype=np.uint64)
+        if len(xy) and len(self.reflectors):
+            order, starts = buckets(xy)
+            shadow_kernels.visible_mask(self.caster.tables, self.targets, xy, order, starts, mask)
+        return mask
+
+    def visible_from_poses(self, poses: ArrayLike) -> VisibleReflectors:
+        """Reflectors inside the field of view from poses of the vehicle.
+
+        Parameters
+        ----------
+        poses : (N, 3) array `T_map_base` [m, m, rad]; the scanner's mounting is added here.
+
+        Returns
+        -------
+        visible : the reflectors of each pose.
+        """
+        T_map_scanner = compose(np.asarray(poses, dtype=np.float64).reshape(-1, 3), self.scanner.mounting)
+        mask = self.visible(T_map_scanner[:, :2])
+        first, width = field_of_view(self.scanner)
+        offsets = np.zeros(len(mask) + 1, dtype=np.int64)
+        # Two passes over the bits: the first counts, so that the second writes into an array of the right size.
+        _list_visible(mask, T_map_scanner, self.targets.centers, first, width, offsets, np.empty(0, dtype=np.int64))
+        np.cumsum(offsets, out=offsets)
+        indices = np.empty(offsets[-1], dtype=np.int64)
+        _list_visible(mask, T_map_scanner, self.targets.centers, first, width, offsets, indices)
+        return VisibleReflectors(offsets, indices)
+
+    def with_reflector(self, index: int, reflector: Reflector) -> VisibilityModel:
+        """Return the model after one reflector was moved or changed; only its own shadow map is made anew."""
+        changed = list(self.reflectors.reflectors)
+        changed[index] = reflector
+        reflectors = ReflectorMap(tuple(changed))
+        if self.bins_for(reflector) > self.targets.clear.shape[1]:
+            return build_visibility(reflectors, self.scanner, self.caster, self.options)
+        targets = copied(self.targets)
+        replace_target(targets, index, reflector, self)
+        return replace(self, reflectors=reflectors, targets=targets)
+
+    def bins_for(self, reflector: Reflector) -> int:
+        """Bins of direction that a reflector needs; one that is seen from farther away needs more."""
+        return _bins(_limits(reflector, self.scanner, self.options)[1], self.caster.grid.resolution)
+
+
+def visibility_model(project: Project, options: VisibilityOptions | None = None) -> VisibilityModel:
+    """Prepare the reflectors and walls of a project; a project without a floor map is an open field.
+
+    Parameters
+    ----------
+    project : its reflectors, scanner and floor map are read.
+    options : what counts as visible; the defaults when None.
+    """
+    if project.floor_map is None:
+        grid = OccupancyGrid(np.zeros((1, 1), dtype=np.bool_), 1.0)
+    else:
+        grid = project.floor_map.occupancy()
+    return build_visibility(project.reflectors, project.scanner, RayCaster(grid), options or VisibilityOptions())
+
+
+def build_visibility(
+    reflectors: ReflectorMap, scanner: Scanner, caster: RayCaster, options: VisibilityOptions
+) -> VisibilityModel:
+    """Prepare reflectors, one shadow map each.
+
+    Parameters
+    ----------
+    reflectors : M reflectors.
+    scanner : its ranges and resolution limit the range of sight.
+    caster : the walls.
+    options : what counts as visible.
+    """
+    count = len(reflectors)
+    limits = np.array([_limits(r, scanner, options) for r in reflectors.reflectors]).reshape(-1, 3)
+    bins = _bins(float(limits[:, 1].max(initial=1.0)), caster.grid.resolution)
+    normals = np.stack((np.cos(reflectors.headings), np.sin(reflectors.headings)), axis=-1)
+    targets = Targets(
+        centers=np.array(reflectors.centers),
+        radii=np.array(reflectors.radii),
+        normals=np.where(reflectors.is_flat[:, np.newaxis], normals, 0.0),
+        nearest=np.ascontiguousarray(limits[:, 0]),
+        farthest=np.ascontiguousarray(limits[:, 1]),
+        promised=np.ascontiguousarray(limits[:, 2]),
+        cosine_limit=math.cos(math.radians(options.max_incidence_deg)),
+        clear=np.empty((count, bins), dtype=np.float32),
+        hidden=np.empty((count, bins), dtype=np.float32),
+    )
+    shadow_kernels.cast_shadows(caster.tables, targets)
+    return VisibilityModel(reflectors, scanner, options, caster, targets)
+
+
+def copied(targets: Targets) -> Targets:
+    """Targets with arrays of their own, to be written into."""
+    return Targets(
+        centers=targets.centers.copy(),
+        radii=targets.radii.copy(),
+        normals=targets.normals.copy(),
+        nearest=targets.nearest.copy(),
+        farthest=targets.farthest.copy(),
+        promised=targets.promised.copy(),
+        cosine_limit=targets.cosine_limit,
+        clear=targets.clear.copy(),
+        hidden=targets.hidden.copy(),
+    )
+
+
+def replace_target(targets: Targets, index: int, reflector: Reflector, model: VisibilityModel) -> None:
+    """Write one reflector and its shadow map into `targets`, in place; it must need no more bins than there are."""
+    nearest, farthest, promised = _limits(reflector, model.scanner, model.options)
+    is_flat = reflector.kind == "flat"
+    targets.centers[index] = reflector.x, reflector.y
+    targets.radii[index] = reflector.radius
+    targets.normals[index] = (math.cos(reflector.heading), math.sin(reflector.heading)) if is_flat else (0.0, 0.0)
+    targets.nearest[index], targets.farthest[index], targets.promised[index] = nearest, farthest, promised
+    shadow_kernels.cast_shadow(
+        model.caster.tables,
+        reflector.x,
+        reflector.y,
+        reflector.radius,
+        farthest,
+        targets.clear[index],
+        targets.hidden[index],
+    )
+
+
+def field_of_view(scanner: Scanner) -> tuple[float, float]:
+    """First bearing and width [rad], scanner frame, widened by a rounding tolerance; a full turn sees everything."""
+    if scanner.is_full_turn:
+        return -math.pi, 2.0 * math.pi
+    first, last = (math.radians(bearing) for bearing in scanner.field_of_view_deg)
+    return first - BEARING_TOLERANCE, last - first + 2.0 * BEARING_TOLERANCE
+
+
+def mask_words(reflectors: int) -> int:
+    """Length of the second axis of a mask: words of 64 reflectors, at least one."""
+    return max(1, -(-reflectors // 64))
+
+
+def unpack(mask: BitMask, reflectors: int) -> BoolArray:
+    """Mask as a (N, M) boolean array, for small numbers of points."""
+    index = np.arange(reflectors)
+    return (mask[:, index >> 6] >> (index & 63).astype(np.uint64)) & np.uint64(1) == 1
+
+
+def buckets(points: FloatArray) -> tuple[IntArray, IntArray]:
+    """Group points (N, 2) by squares of the plane: their indices bucket by bucket, and where each bucket starts."""
+    cells = np.floor((points - points.min(axis=0)) / BUCKET).astype(np.int64)
+    keys = cells[:, 1] * (cells[:, 0].max() + 1) + cells[:, 0]
+    order = np.argsort(keys, kind="stable")
+    changes = np.flatnonzero(np.diff(keys[order])) + 1
+    return order, np.concatenate(([0], changes, [len(points)])).astype(np.int64)
+
+
+def _limits(reflector: Reflector, scanner: Scanner, options: VisibilityOptions) -> tuple[float, float, float]:
+    """Nearest, farthest and promised distance between scanner and center [m]."""
+    # A scanner measures to the surface, which a cylinder has one radius before its center and a plate at its center.
+    is_flat = reflector.kind == "flat"
+    depth = 0.0 if is_flat else reflector.radius
+    promised = promised_range(
+        reflector.radius,
+        scanner.angle_increment,
+        options.min_beams,
+        math.radians(scanner.beam_width_deg),
+    )
+    farthest = min(scanner.range[1], scanner.reflector_range) + depth
+    return scanner.range[0] + depth, min(farthest, promised), promised
+
+
+def _bins(farthest: float, cell: float) -> int:
+    """Bins of direction, so that even the widest one (on a diagonal) is narrower than a cell at that range."""
+    needed = 4.0 * math.sqrt(2.0) * farthest / (0.95 * cell)
+    return 1024 * max(1, math.ceil(needed / 1024))
+
+
+@compiled
+def in_field_of_view(bearing: float, first: float, width: float) -> bool:
+    """Whether a bearing [rad], of any turn, lies within `width` counterclockwise of `first`."""
+    offset = bearing - first
+    return offset - 2.0 * math.pi * math.floor(offset / (2.0 * math.pi)) <= width
+
+
+@compiled
+def _list_visible(  # noqa: PLR0917 - two passes share one loop
+    mask: BitMask, poses: FloatArray, centers: FloatArray, first: float, width: float, offsets: IntArray, out: IntArray
+) -> None:
+    """Count into `offsets` when `out` is empty, otherwise write the indices that fit between the offsets."""
+    counting = len(out) == 0
+    for n in range(len(poses)):
+        found = 0
+        for m in range(len(centers)):
+            if (mask[n, m >> 6] >> np.uint64(m & 63)) & np.uint64(1) == 0:
+                continue
+            bearing = math.atan2(centers[m, 1] - poses[n, 1], centers[m, 0] - poses[n, 0]) - poses[n, 2]
+            if in_field_of_view(bearing, first, width):
+                if not counting:
+                    out[offsets[n] + found] = m
+                found += 1
+        if counting:
+            offsets[n + 1] = found
+
+
+def warm_up() -> None:
+    """Compile the kernels of this module and of `shadow_kernels`."""
+    grid = OccupancyGrid(np.eye(3, dtype=np.bool_), 1.0)
+    reflectors = ReflectorMap((Reflector("1", 2.5, 0.5), Reflector("2", 0.5, 2.5)))
+    model = build_visibility(reflectors, Scanner(), RayCaster(grid), VisibilityOptions())
+    model.visible_from_poses([[1.5, 0.5, 0.0]])
+    model.with_reflector(0, reflectors.reflectors[0])
