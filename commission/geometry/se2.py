@@ -174,11 +174,25 @@ def exp_scalars(vx: float, vy: float, w: float) -> tuple[float, float, float]:
     return along * vx - across * vy, across * vx + along * vy, wrap_scalar(w)
 
 
+@compiled
+def log_scalars(x: float, y: float, t: float) -> tuple[float, float, float]:
+    """Twist that reaches a pose in one second: `log` for kernels."""
+    w = wrap_scalar(t)
+    half = 0.5 * w
+    if abs(w) < SMALL_ANGLE:
+        w2 = w * w
+        cotangent = 1.0 - w2 / 12.0 * (1.0 + w2 / 60.0)
+    else:
+        cotangent = half / math.tan(half)
+    return cotangent * x + half * y, cotangent * y - half * x, w
+
+
 def warm_up() -> None:
     """Compile the kernels of this module."""
     compose_scalars(0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
     inverse_scalars(1.0, 0.0, 0.0)
     exp_scalars(1.0, 0.0, 0.1)
+    log_scalars(1.0, 0.0, 0.1)
 
 
 def _poses(poses: ArrayLike) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Kinds of vehicle: their wheels and outline as plain values. Kinematics live in `localization.odometry`."""
+"""Kinds of vehicle: their wheels and outline as plain values. Kinematics live in `localization.kinematics`."""
 
 from __future__ import annotations
 

@@ -83,6 +83,7 @@ def test_kernels_agree_with_array_functions(a: Pose, b: Pose) -> None:
     assert_same_pose(np.array(se2.compose_scalars(*a, *b)), se2.compose(a, b))
     assert_same_pose(np.array(se2.inverse_scalars(*a)), se2.inverse(a))
     assert_same_pose(np.array(se2.exp_scalars(*a)), se2.exp(a))
+    np.testing.assert_allclose(se2.log_scalars(*a), se2.log(a), rtol=1e-12, atol=1e-9)
 
 
 def test_poses_and_points_broadcast() -> None:

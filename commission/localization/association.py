@@ -1,0 +1,227 @@
+"""Associate: which reflector a detection belongs to, and the association filter (Sobreira et al. 2016, Algorithm 3).
+
+The likelihood of line 4 lacks the power -1/2 on det(2 pi S): as printed it would favor uncertain reflectors. The
+search looks only at reflectors near the detection and yet returns what a search over all of them would.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.compiled import compiled
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.geometry.gaussian import chi_square_gate
+from commission.localization.estimate import Status
+from commission.localization.kalman import innovation, squared_distance
+from commission.localization.observation import SMALLEST_RANGE, ObservationModel, expect, scanner_offset
+from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.reflector_index import ReflectorIndex, cell_range
+from commission.site.parameters import AssociationParameters
+
+INLIER = int(Status.INLIER)
+OUTLIER_ASSOCIATION = int(Status.OUTLIER_ASSOCIATION)
+NOBODY = -1
+
+
+class Gate(NamedTuple):
+    """Association filter, for kernels."""
+
+    enabled: bool
+    d2: float
+    """Largest squared Mahalanobis distance of an inlier."""
+
+
+class Viewpoint(NamedTuple):
+    """What is common to all detections of a scan: scanner's place and bounds of its uncertainty."""
+
+    offset_x: float
+    offset_y: float
+    position_sigma: float
+    """Largest 1-sigma of the scanner's position in any direction [m]."""
+    heading_sigma: float
+
+
+class Likeliest(NamedTuple):
+    """The most likely of the reflectors that were searched."""
+
+    entry: int
+    """Position in the index; NOBODY when none was near."""
+    d2: float
+    cost: float
+    """-2 ln(likelihood), up to a constant: d2 + ln(det S / det R)."""
+
+
+def gate_of(parameters: AssociationParameters) -> Gate:
+    """Return the gate for two degrees of freedom, range and bearing."""
+    return Gate(bool(parameters.enabled), chi_square_gate(parameters.gate_probability, 2))
+
+
+@compiled
+def viewpoint(belief: PoseGaussian, model: ObservationModel) -> Viewpoint:
+    """Return the scanner's place and the largest 1-sigma of its position and heading."""
+    offset_x, offset_y = scanner_offset(belief.theta, model)
+    # The scanner moves by (-offset_y, offset_x) per radian of heading.
+    xx = belief.xx - 2.0 * offset_y * belief.xt + offset_y * offset_y * belief.tt
+    xy = belief.xy + offset_x * belief.xt - offset_y * belief.yt - offset_x * offset_y * belief.tt
+    yy = belief.yy + 2.0 * offset_x * belief.yt + offset_x * offset_x * belief.tt
+    half_difference = 0.5 * (xx - yy)
+    largest = 0.5 * (xx + yy) + math.sqrt(half_difference * half_difference + xy * xy)
+    return Viewpoint(offset_x, offset_y, math.sqrt(max(largest, 0.0)), math.sqrt(max(belief.tt, 0.0)))
+
+
+@compiled
+def search_radius(
+    d2: float, measured_range: float, view: Viewpoint, model: ObservationModel, largest_variance: float
+) -> float:
+    """Distance on the floor, from a detection, within which every reflector of Mahalanobis distance <= d2 lies [m].
+
+    Each innovation is at most sqrt(d2) of its own sigma. The sigma of the range is bounded by that of the scanner's
+    position; the sigma of the bearing too, seen from the nearest range that the first bound leaves.
+    """
+    range_variance = view.position_sigma * view.position_sigma + model.range_variance + largest_variance
+    depth = math.sqrt(d2 * range_variance)
+    nearest = measured_range - depth
+    chord2 = 4.0
+    if nearest > SMALLEST_RANGE:
+        bearing_sigma = view.position_sigma / nearest + view.heading_sigma
+        bearing_variance = bearing_sigma * bearing_sigma + model.bearing_variance
+        bearing_variance += largest_variance / (nearest * nearest)
+        # (2 sin(b / 2))^2 <= b^2, and <= 4 for any turn.
+        chord2 = min(4.0, d2 * bearing_variance)
+    distance = abs(measured_range)
+    # The margin covers the rounding of everything above.
+    return math.sqrt(depth * depth + distance * (distance + depth) * chord2) * (1.0 + 1e-9) + 1e-9
+
+
+@compiled
+def likeliest_within(  # noqa: PLR0917 - a measurement, number by number
+    radius: float,
+    belief: PoseGaussian,
+    measured_range: float,
+    measured_bearing: float,
+    view: Viewpoint,
+    model: ObservationModel,
+    index: ReflectorIndex,
+) -> Likeliest:
+    """Most likely reflector among those at most `radius` [m] from the detection; of equals the first in the map."""
+    direction = belief.theta + model.mount_theta + measured_bearing
+    px = belief.x + view.offset_x + measured_range * math.cos(direction)
+    py = belief.y + view.offset_y + measured_range * math.sin(direction)
+    first_row, last_row = cell_range(py - radius - index.origin_y, py + radius - index.origin_y, index.cell, index.rows)
+    first_column, last_column = cell_range(
+        px - radius - index.origin_x, px + radius - index.origin_x, index.cell, index.columns
+    )
+    noise = model.range_variance * model.bearing_variance
+    best, best_d2, best_cost = NOBODY, math.nan, math.inf
+    if last_column < first_column:
+        return Likeliest(best, best_d2, best_cost)
+    for row in range(first_row, last_row + 1):
+        start = index.offsets[row * index.columns + first_column]
+        for entry in range(start, index.offsets[row * index.columns + last_column + 1]):
+            dx, dy = index.x[entry] - px, index.y[entry] - py
+            if dx * dx + dy * dy > radius * radius:
+                continue
+            expected = expect(
+                belief.x,
+                belief.y,
+                belief.theta,
+                view.offset_x,
+                view.offset_y,
+                index.x[entry],
+                index.y[entry],
+                model.mount_theta,
+            )
+            v = innovation(belief, expected, measured_range, measured_bearing, index.variance[entry], model)
+            d2 = squared_distance(v)
+            cost = d2 + math.log(v.s_rr * v.schur / noise)
+            if cost < best_cost or (cost == best_cost and index.ids[entry] < index.ids[best]):
+                best, best_d2, best_cost = entry, d2, cost
+    return Likeliest(best, best_d2, best_cost)
+
+
+@compiled
+def likeliest(  # noqa: PLR0917 - a measurement, number by number
+    belief: PoseGaussian,
+    measured_range: float,
+    measured_bearing: float,
+    view: Viewpoint,
+    model: ObservationModel,
+    index: ReflectorIndex,
+    gate: Gate,
+) -> Likeliest:
+    """Most likely reflector of the whole map (line 4), found near the detection.
+
+    First those that may be inside the gate. A reflector outside the gate may still be more likely than one inside,
+    when its det S is smaller; since S >= R, it must then lie within d2 <= cost of the best so far: if that reaches
+    farther than the first search, search again. Equal to a search over all reflectors whenever the result is inside
+    the gate, or the filter is disabled. Otherwise the detection is an outlier, and the result is the most likely of
+    those near it, for the engineer to see.
+    """
+    bound = gate.d2
+    searched = -1.0
+    best = Likeliest(NOBODY, math.nan, math.inf)
+    while True:
+        radius = search_radius(bound, measured_range, view, model, index.largest_variance)
+        if radius <= searched:
+            return best
+        best = likeliest_within(radius, belief, measured_range, measured_bearing, view, model, index)
+        searched = radius
+        if best.entry == NOBODY:
+            if gate.enabled or len(index.x) == 0 or not bound < math.inf:
+                return best
+            bound = bound * 16.0
+        elif gate.enabled and best.d2 > gate.d2:
+            return best
+        else:
+            bound = best.cost
+
+
+@compiled
+def associate(  # noqa: PLR0917 - outputs are written into the arrays of the whole run
+    belief: PoseGaussian,
+    first: int,
+    last: int,
+    detections: FloatArray,
+    model: ObservationModel,
+    index: ReflectorIndex,
+    gate: Gate,
+    status: NDArray[np.int8],
+    entries: IntArray,
+    d2: FloatArray,
+) -> None:
+    """Associate the detections `first` to `last` (excluded) of one scan, all at the predicted belief.
+
+    Parameters
+    ----------
+    detections : (n, 2) measured range and bearing.
+    status : (n,) in: INLIER or OUTLIER_DETECTOR, the latter is left alone; out: a `Status`.
+    entries : (n,) out: position in the index, or NOBODY; d2 : (n,) out: NaN for nobody.
+
+    Notes
+    -----
+    A reflector is one cluster in a scan. Where two inliers claim the same one, the paper uses both; here the nearer
+    one in the Mahalanobis sense stays and the other becomes an outlier of the association filter, because one of them
+    is a false reflector beside the true one. With the filter disabled both stay, as in the paper.
+    """
+    view = viewpoint(belief, model)
+    for i in range(first, last):
+        entries[i] = NOBODY
+        d2[i] = math.nan
+        if status[i] != INLIER:
+            continue
+        best = likeliest(belief, detections[i, 0] - model.range_bias, detections[i, 1], view, model, index, gate)
+        entries[i] = best.entry
+        d2[i] = best.d2
+        if best.entry == NOBODY or (gate.enabled and not best.d2 <= gate.d2):
+            status[i] = OUTLIER_ASSOCIATION
+            continue
+        if not gate.enabled:
+            continue
+        for other in range(first, i):
+            if status[other] == INLIER and entries[other] == best.entry:
+                status[i if d2[other] <= best.d2 else other] = OUTLIER_ASSOCIATION
+                break

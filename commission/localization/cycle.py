@@ -1,0 +1,77 @@
+"""One cycle of the localizer: the scan's stamp is reached, its detections are associated, corrected and supervised.
+
+The one implementation of the cycle. `Localizer.feed` calls it per scan and `whole_run` in a compiled loop, so that live,
+replay and simulation agree to the last bit.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.compiled import compiled
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.localization.association import INLIER, NOBODY, associate
+from commission.localization.kalman import correct
+from commission.localization.odometry import Motion, reach
+from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.setup import FilterModel
+from commission.localization.supervisor import supervise
+
+
+class Cycle(NamedTuple):
+    """State after a scan, and the belief just before its detections were used."""
+
+    prior: PoseGaussian
+    posterior: PoseGaussian
+    motion: Motion
+    mode: int
+
+
+@compiled
+def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the whole run
+    belief: PoseGaussian,
+    motion: Motion,
+    mode: int,
+    stamp_ns: int,
+    first: int,
+    last: int,
+    detections: FloatArray,
+    model: FilterModel,
+    status: NDArray[np.int8],
+    reflectors: IntArray,
+    d2: FloatArray,
+) -> Cycle:
+    """Process the detections `first` to `last` (excluded) of a scan (Algorithms 1, 3 and 4).
+
+    Parameters
+    ----------
+    belief, motion, mode : state after everything before this scan.
+    detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
+    status : (n,) in: INLIER or OUTLIER_DETECTOR; out: a `Status`.
+    reflectors : (n,) out: index into the reflector map, or -1.
+    d2 : (n,) out: squared Mahalanobis distance at the prior, NaN for none.
+    """
+    prior, motion = reach(belief, motion, stamp_ns, model.odometry)
+    associate(
+        prior, first, last, detections, model.observation, model.index, model.gate, status, reflectors, d2
+    )
+    posterior = prior
+    for i in range(first, last):
+        entry = reflectors[i]
+        if entry == NOBODY:
+            continue
+        if status[i] == INLIER:
+            posterior = correct(
+                posterior,
+                detections[i, 0] - model.observation.range_bias,
+                detections[i, 1],
+                model.index.x[entry],
+                model.index.y[entry],
+                model.index.variance[entry],
+                model.observation,
+            )
+        reflectors[i] = model.index.ids[entry]
+    return Cycle(prior, posterior, motion, supervise(mode, posterior, model.limits))

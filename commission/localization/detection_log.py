@@ -1,0 +1,183 @@
+"""The detections of a whole recording as columns: extracted once, kept by the caller, replayed with any gate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.compiled import compiled, compiled_parallel, parallel_range
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray
+from commission.localization.detector import (
+    INLIER,
+    Beams,
+    DetectorModel,
+    beams_of,
+    count_clusters,
+    detect_clusters,
+    reflective_beams,
+)
+from commission.localization.setup import LocalizerSetup
+from commission.site.record_log import RecordLog, ScanLog
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DetectionLog:
+    """What was detected in each scan of a drive, before any association."""
+
+    stamps_ns: IntArray
+    """(K,) time of each scan [ns], ascending."""
+    offsets: IntArray
+    """(K + 1,) rows of scan k: offsets[k] to offsets[k + 1]."""
+    range_bearing: FloatArray
+    """(n, 2) range [m] and bearing [rad] of each detection and rejected cluster, scanner frame."""
+    beams: IntArray
+    """(n,) width of each cluster [beams]; 0 where the sensor itself detected."""
+    status: NDArray[np.int8]
+    """(n,) `Status.INLIER`, or `Status.OUTLIER_DETECTOR` for a rejected cluster."""
+
+    def __len__(self) -> int:
+        """Return the number of scans."""
+        return len(self.stamps_ns)
+
+
+def extract_detections(log: RecordLog, setup: LocalizerSetup, *, parallel: bool = False) -> DetectionLog:
+    """All detections of a drive that the localizer would use, in order of delivery.
+
+    Depends on the log, the reflectors' radii, the scanner and `parameters.detector`; not on any other parameter.
+
+    Parameters
+    ----------
+    log : where the sensor has reported detections of its own, scans from then on are not detected from.
+    setup : reflector map, scanner and parameters.
+    parallel : whether to use all cores; the result is the same.
+    """
+    own = _sensor_detections(log)
+    scans = log.scans
+    if scans is None:
+        return own
+    if not len(own):
+        return detect_log(scans, setup, parallel=parallel)
+    # Of equal stamps the sensor's own detections are delivered first.
+    before = int(np.searchsorted(scans.stamps_ns, own.stamps_ns[0], side="left"))
+    if before == 0:
+        return own
+    early = ScanLog(
+        scans.stamps_ns[:before],
+        scans.ranges[:before],
+        scans.angle_min,
+        scans.angle_increment,
+        None if scans.intensities is None else scans.intensities[:before],
+        None if scans.reflector is None else scans.reflector[:before],
+    )
+    return _joined(detect_log(early, setup, parallel=parallel), own)
+
+
+def detect_log(scans: ScanLog, setup: LocalizerSetup, *, parallel: bool = False) -> DetectionLog:
+    """Detect the reflectors in every scan of a log: the same as `detector.detect`, scan by scan.
+
+    Parameters
+    ----------
+    scans : with reflector flags, else intensities.
+    setup : reflector map, scanner and parameters.
+    parallel : whether to use all cores; the result is the same.
+    """
+    ranges = np.ascontiguousarray(scans.ranges, dtype=np.float32).view()
+    ranges.setflags(write=False)
+    threshold = setup.parameters.detector.intensity_threshold
+    flags = reflective_beams(ranges, scans.intensities, scans.reflector, threshold)
+    beams = beams_of(ranges.shape[1], scans.angle_min, scans.angle_increment)
+    count, fill = (_count_parallel, _fill_parallel) if parallel else (_count, _fill)
+    offsets = np.concatenate(([0], np.cumsum(count(ranges, flags, beams, setup.detector))))
+    total = int(offsets[-1])
+    range_bearing = np.empty((total, 2))
+    widths = np.empty(total, dtype=np.int64)
+    status = np.empty(total, dtype=np.int8)
+    fill(ranges, flags, beams, setup.detector, offsets, range_bearing, widths, status)
+    return _log(np.asarray(scans.stamps_ns), offsets, range_bearing, widths, status)
+
+
+def _sensor_detections(log: RecordLog) -> DetectionLog:
+    """Return the detections that the sensor itself reported."""
+    count = len(log.range_bearing)
+    status = np.full(count, INLIER, dtype=np.int8)
+    beams = np.zeros(count, dtype=np.int64)
+    return _log(log.detection_stamps_ns, log.detection_offsets, log.range_bearing, beams, status)
+
+
+def _joined(first: DetectionLog, second: DetectionLog) -> DetectionLog:
+    """Return one log after the other."""
+    return _log(
+        np.concatenate((first.stamps_ns, second.stamps_ns)),
+        np.concatenate((first.offsets, second.offsets[1:] + first.offsets[-1])),
+        np.concatenate((first.range_bearing, second.range_bearing)),
+        np.concatenate((first.beams, second.beams)),
+        np.concatenate((first.status, second.status)),
+    )
+
+
+def _log(
+    stamps_ns: IntArray, offsets: IntArray, range_bearing: FloatArray, beams: IntArray, status: NDArray[np.int8]
+) -> DetectionLog:
+    """Return a log of read-only contiguous arrays: to the compiler a writable one is another type."""
+    columns = (
+        np.ascontiguousarray(stamps_ns, dtype=np.int64).view(),
+        np.ascontiguousarray(offsets, dtype=np.int64).view(),
+        np.ascontiguousarray(range_bearing, dtype=np.float64).view(),
+        np.ascontiguousarray(beams, dtype=np.int64).view(),
+        np.ascontiguousarray(status, dtype=np.int8).view(),
+    )
+    for column in columns:
+        column.setflags(write=False)
+    return DetectionLog(*columns)
+
+
+@compiled
+def _count(ranges: NDArray[np.float32], flags: BoolArray, beams: Beams, model: DetectorModel) -> IntArray:
+    """(K,) clusters in each scan."""
+    counts = np.empty(len(ranges), dtype=np.int64)
+    for k in range(len(ranges)):
+        counts[k] = count_clusters(ranges[k], flags[k], beams, model)
+    return counts
+
+
+@compiled_parallel
+def _count_parallel(ranges: NDArray[np.float32], flags: BoolArray, beams: Beams, model: DetectorModel) -> IntArray:
+    """`_count` on all cores."""
+    counts = np.empty(len(ranges), dtype=np.int64)
+    for k in parallel_range(len(ranges)):
+        counts[k] = count_clusters(ranges[k], flags[k], beams, model)
+    return counts
+
+
+@compiled
+def _fill(  # noqa: PLR0917 - the columns of the log
+    ranges: NDArray[np.float32],
+    flags: BoolArray,
+    beams: Beams,
+    model: DetectorModel,
+    offsets: IntArray,
+    range_bearing: FloatArray,
+    widths: IntArray,
+    status: NDArray[np.int8],
+) -> None:
+    """Write the clusters of every scan to its rows."""
+    for k in range(len(ranges)):
+        detect_clusters(ranges[k], flags[k], beams, model, offsets[k], range_bearing, widths, status)
+
+
+@compiled_parallel
+def _fill_parallel(  # noqa: PLR0917 - the columns of the log
+    ranges: NDArray[np.float32],
+    flags: BoolArray,
+    beams: Beams,
+    model: DetectorModel,
+    offsets: IntArray,
+    range_bearing: FloatArray,
+    widths: IntArray,
+    status: NDArray[np.int8],
+) -> None:
+    """`_fill` on all cores."""
+    for k in parallel_range(len(ranges)):
+        detect_clusters(ranges[k], flags[k], beams, model, offsets[k], range_bearing, widths, status)

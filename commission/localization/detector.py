@@ -1,0 +1,272 @@
+"""Detect: from a scan to reflectors (Sobreira et al. 2016, Algorithm 2 and equation 3). Knows no pose.
+
+A cluster is a run of neighboring reflective beams whose ranges do not jump. One missing beam inside a run (no echo, or
+an echo at the same range without the flag) is bridged, since scanners drop single flags; it counts as a beam, because
+equation 3 speaks of width. Two missing beams, or one that sees something nearer or farther, end the cluster.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.compiled import compiled
+from commission.geometry.angles import TURN, wrap_scalar
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray
+from commission.localization.estimate import Status
+from commission.localization.reflector_center import central_beam, circle_fit, plate
+from commission.site.parameters import DetectorParameters
+from commission.site.records import Scan
+from commission.site.reflectors import ReflectorMap
+from commission.site.scanner import Scanner
+
+INLIER = int(Status.INLIER)
+OUTLIER_DETECTOR = int(Status.OUTLIER_DETECTOR)
+
+
+class DetectorModel(NamedTuple):
+    """Classes of reflectors and tolerances, for kernels."""
+
+    radii: FloatArray
+    """(C,) radius of each class of reflectors in the map [m]; half the width of a plate."""
+    flat: BoolArray
+    """(C,) whether the class is of flat plates."""
+    enabled: bool
+    fewer: int
+    """MinModelError: beams that may be missing. It bounds a signed error, so the window is [-fewer, more]."""
+    more: int
+    """MaxModelError: beams that may be too many."""
+    range_jump: float
+    circle: bool
+    """Whether the center is a fitted circle rather than the paper's central beam."""
+    range_sigma: float
+    """1-sigma noise of a beam's range [m]."""
+
+
+class Beams(NamedTuple):
+    """Bearings of the beams of a scan."""
+
+    count: int
+    """Beams to read; a scan that repeats its first beam at the end is cut."""
+    angle_min: float
+    increment: float
+    full_turn: bool
+    """Whether the last beam is the first one's neighbor."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DetectedReflectors:
+    """Clusters of one scan, those that the detector filter rejects included."""
+
+    range_bearing: FloatArray
+    """(N, 2) range [m] and bearing [rad] of each center, scanner frame."""
+    beams: IntArray
+    """(N,) width of each cluster [beams]."""
+    status: NDArray[np.int8]
+    """(N,) `Status.INLIER`, or `Status.OUTLIER_DETECTOR` where the detector filter rejects the cluster."""
+
+
+def detector_model(reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorParameters) -> DetectorModel:
+    """Return the distinct radii and kinds of a map, and the detector's tolerances."""
+    flat_of = reflectors.is_flat
+    classes = sorted({(float(radius), bool(flat)) for radius, flat in zip(reflectors.radii, flat_of, strict=True)})
+    radii = np.array([radius for radius, _ in classes], dtype=np.float64)
+    flat = np.array([is_flat for _, is_flat in classes], dtype=np.bool_)
+    radii.setflags(write=False)
+    flat.setflags(write=False)
+    return DetectorModel(
+        radii,
+        flat,
+        bool(parameters.enabled),
+        int(parameters.min_model_error),
+        int(parameters.max_model_error),
+        float(parameters.range_jump),
+        parameters.center == "circle",
+        max(float(scanner.range_sigma), 1e-3),
+    )
+
+
+def beams_of(count: int, angle_min: float, increment: float) -> Beams:
+    """Return the bearings of a scan for the kernels; raises ValueError when the beams do not advance."""
+    if not (math.isfinite(angle_min) and math.isfinite(increment) and increment != 0.0):
+        raise ValueError(f"scan starts at {angle_min} rad with steps of {increment} rad; expected a finite step, not 0")
+    step = abs(increment)
+    once = min(count, math.floor(TURN / step + 0.5))
+    return Beams(once, float(angle_min), float(increment), once * step > TURN - 0.5 * step)
+
+
+def reflective_beams(
+    ranges: NDArray[np.float32],
+    intensities: NDArray[np.float32] | None,
+    reflector: NDArray[np.bool_] | None,
+    threshold: float,
+) -> NDArray[np.bool_]:
+    """Which beams met something reflective: the scanner's flag, else echoes at least as strong as the threshold."""
+    if reflector is not None:
+        flags = np.ascontiguousarray(reflector, dtype=np.bool_).view()
+    elif intensities is not None:
+        flags = np.asarray(intensities) >= threshold
+    else:
+        flags = np.zeros(ranges.shape, dtype=np.bool_)
+    flags.setflags(write=False)
+    return flags
+
+
+def detect(scan: Scan, model: DetectorModel, parameters: DetectorParameters) -> DetectedReflectors:
+    """Detect the reflectors in one scan.
+
+    Parameters
+    ----------
+    scan : with reflector flags, else intensities; with neither, nothing is detected.
+    model : of the reflector map, by `detector_model`.
+    parameters : the same as in `model`; its intensity threshold is used here.
+
+    Returns
+    -------
+    detected : every cluster, in the order of its beams.
+    """
+    ranges = np.ascontiguousarray(scan.ranges, dtype=np.float32).view()
+    ranges.setflags(write=False)
+    flags = reflective_beams(ranges, scan.intensities, scan.reflector, parameters.intensity_threshold)
+    beams = beams_of(len(ranges), scan.angle_min, scan.angle_increment)
+    count = count_clusters(ranges, flags, beams, model)
+    range_bearing = np.empty((count, 2))
+    widths = np.empty(count, dtype=np.int64)
+    status = np.empty(count, dtype=np.int8)
+    detect_clusters(ranges, flags, beams, model, 0, range_bearing, widths, status)
+    return DetectedReflectors(range_bearing, widths, status)
+
+
+@compiled
+def expected_beams(distance: float, radius: float, increment: float) -> int:
+    """Beams that a reflector of a radius intercepts at a distance (equation 3)."""
+    return math.floor(2.0 * math.asin(min(1.0, radius / max(distance, radius))) / abs(increment))
+
+
+@compiled
+def _lit(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beam: int) -> bool:
+    """Whether a beam is reflective and has a range."""
+    return flags[beam] and ranges[beam] > 0.0 and ranges[beam] < math.inf
+
+
+@compiled
+def _next_cluster(  # noqa: PLR0917 - a scan and a position in it
+    ranges: NDArray[np.float32], flags: NDArray[np.bool_], count: int, position: int, end: int, jump: float
+) -> tuple[int, int]:
+    """First and last beam of the cluster at or after a position; first = end when none. Beams count on past a turn."""
+    first = position
+    while first < end and not _lit(ranges, flags, first if first < count else first - count):
+        first += 1
+    last = first
+    while last + 1 < end:
+        here = ranges[last if last < count else last - count]
+        beam = last + 1 if last + 1 < count else last + 1 - count
+        if _lit(ranges, flags, beam):
+            if not abs(ranges[beam] - here) <= jump:
+                break
+            last += 1
+            continue
+        if last + 2 >= end or abs(ranges[beam] - here) > jump:
+            break
+        after = last + 2 if last + 2 < count else last + 2 - count
+        if not (_lit(ranges, flags, after) and abs(ranges[after] - here) <= jump):
+            break
+        last += 2
+    return first, last
+
+
+@compiled
+def _start_of_turn(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams) -> int:
+    """First beam after two dark ones, so that no cluster lies across the start of a full turn."""
+    if not beams.full_turn:
+        return 0
+    dark = 0
+    for position in range(beams.count - 2, 2 * beams.count):
+        beam = position if position < beams.count else position - beams.count
+        if dark >= 2 and position >= beams.count:
+            return beam
+        dark = 0 if _lit(ranges, flags, beam) else dark + 1
+    return 0
+
+
+@compiled
+def count_clusters(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, model: DetectorModel) -> int:
+    """Count the clusters in a scan, to reserve space for them."""
+    position = _start_of_turn(ranges, flags, beams)
+    end = position + beams.count if beams.full_turn else beams.count
+    found = 0
+    while position < end:
+        first, last = _next_cluster(ranges, flags, beams.count, position, end, model.range_jump)
+        if first < end:
+            found += 1
+        position = last + 1
+    return found
+
+
+@compiled
+def detect_clusters(  # noqa: PLR0917 - outputs are written into the arrays of the whole run
+    ranges: NDArray[np.float32],
+    flags: NDArray[np.bool_],
+    beams: Beams,
+    model: DetectorModel,
+    row: int,
+    range_bearing: FloatArray,
+    widths: IntArray,
+    status: NDArray[np.int8],
+) -> int:
+    """Write center, width and status of each cluster of a scan from `row` on; return the row after the last."""
+    position = _start_of_turn(ranges, flags, beams)
+    end = position + beams.count if beams.full_turn else beams.count
+    while position < end:
+        first, last = _next_cluster(ranges, flags, beams.count, position, end, model.range_jump)
+        if first < end:
+            distance, bearing, passed = _judge(ranges, flags, beams, first, last, model)
+            range_bearing[row, 0] = distance
+            range_bearing[row, 1] = wrap_scalar(bearing)
+            widths[row] = last - first + 1
+            status[row] = INLIER if passed or not model.enabled else OUTLIER_DETECTOR
+            row += 1
+        position = last + 1
+    return row
+
+
+@compiled
+def _judge(  # noqa: PLR0917 - a scan and a cluster in it
+    ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, first: int, last: int, model: DetectorModel
+) -> tuple[float, float, bool]:
+    """Center of a cluster as the class of reflectors that fits best, and whether it passes the detector filter.
+
+    A plate seen obliquely shows fewer beams than equation 3 says: for plates the window has no lower bound. Without
+    any reflector in the map, every cluster is a post of no radius that fails.
+    """
+    distance, bearing, passed = math.nan, math.nan, False
+    least = math.inf
+    for kind in range(len(model.radii)):
+        radius = model.radii[kind]
+        if model.flat[kind]:
+            r, b = plate(ranges, flags, beams.count, first, last, beams.angle_min, beams.increment)
+        elif model.circle:
+            r, b = circle_fit(
+                ranges,
+                flags,
+                beams.count,
+                first,
+                last,
+                beams.angle_min,
+                beams.increment,
+                radius,
+                model.range_sigma,
+            )
+        else:
+            r, b = central_beam(ranges, flags, beams.count, first, last, beams.angle_min, beams.increment, radius)
+        error = last - first + 1 - expected_beams(r, radius, beams.increment)
+        fits = error <= model.more and (error >= -model.fewer or model.flat[kind])
+        if (fits and not passed) or (fits == passed and abs(error) < least):
+            distance, bearing, passed, least = r, b, fits, abs(error)
+    if least == math.inf:
+        distance, bearing = plate(ranges, flags, beams.count, first, last, beams.angle_min, beams.increment)
+    return distance, bearing, passed

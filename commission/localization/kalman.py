@@ -1,0 +1,148 @@
+"""Correct: the belief takes in one associated detection (Algorithm 1, lines 14 to 17). EKF, two by two.
+
+Algorithm 1 as printed corrects every detection from the one prediction, so that only the last would count. Here each
+correction starts from the freshest state and linearizes there; association alone is done at the prediction (line 10).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from commission.compiled import compiled
+from commission.geometry.angles import wrap_scalar
+from commission.localization.observation import SMALLEST_RANGE, Expected, ObservationModel, expect, scanner_offset
+from commission.localization.pose_gaussian import PoseGaussian
+
+
+class Innovation(NamedTuple):
+    """Difference of a detection from what was expected, its covariance factored for solving, and P H^T.
+
+    S = [[s_rr, w s_rr], [w s_rr, w^2 s_rr + schur]]: one step of elimination, nothing is inverted.
+    """
+
+    range: float
+    bearing: float
+    s_rr: float
+    w: float
+    schur: float
+    range_noise: float
+    bearing_noise: float
+    range_px: float
+    """Covariance of expected range and x."""
+    range_py: float
+    range_pt: float
+    bearing_px: float
+    bearing_py: float
+    bearing_pt: float
+
+
+@compiled
+def innovation(  # noqa: PLR0917 - a measurement, number by number
+    belief: PoseGaussian,
+    expected: Expected,
+    measured_range: float,
+    measured_bearing: float,
+    surveyed_variance: float,
+    model: ObservationModel,
+) -> Innovation:
+    """Innovation of a detection against one reflector, with S of Algorithm 1 line 8.
+
+    Parameters
+    ----------
+    expected : observation of the reflector expected from the mean of `belief`.
+    measured_range, measured_bearing : range bias already taken off [m], [rad].
+    surveyed_variance : of the reflector's place, each axis [m^2]; adds to R.
+    """
+    e = expected
+    nearest = max(e.range, SMALLEST_RANGE)
+    range_noise = model.range_variance + surveyed_variance
+    bearing_noise = model.bearing_variance + surveyed_variance / (nearest * nearest)
+    range_px = belief.xx * e.range_x + belief.xy * e.range_y + belief.xt * e.range_theta
+    range_py = belief.xy * e.range_x + belief.yy * e.range_y + belief.yt * e.range_theta
+    range_pt = belief.xt * e.range_x + belief.yt * e.range_y + belief.tt * e.range_theta
+    bearing_px = belief.xx * e.bearing_x + belief.xy * e.bearing_y + belief.xt * e.bearing_theta
+    bearing_py = belief.xy * e.bearing_x + belief.yy * e.bearing_y + belief.yt * e.bearing_theta
+    bearing_pt = belief.xt * e.bearing_x + belief.yt * e.bearing_y + belief.tt * e.bearing_theta
+    s_rr = e.range_x * range_px + e.range_y * range_py + e.range_theta * range_pt + range_noise
+    s_rb = e.bearing_x * range_px + e.bearing_y * range_py + e.bearing_theta * range_pt
+    s_bb = e.bearing_x * bearing_px + e.bearing_y * bearing_py + e.bearing_theta * bearing_pt + bearing_noise
+    w = s_rb / s_rr
+    return Innovation(
+        measured_range - e.range,
+        wrap_scalar(measured_bearing - e.bearing),
+        s_rr,
+        w,
+        # S - R is positive semi-definite, so the Schur complement is at least that of R; rounding may not say so.
+        max(s_bb - w * s_rb, bearing_noise),
+        range_noise,
+        bearing_noise,
+        range_px,
+        range_py,
+        range_pt,
+        bearing_px,
+        bearing_py,
+        bearing_pt,
+    )
+
+
+@compiled
+def squared_distance(given: Innovation) -> float:
+    """Squared Mahalanobis distance of an innovation (NIS, 2 degrees of freedom)."""
+    rest = given.bearing - given.w * given.range
+    return given.range * given.range / given.s_rr + rest * rest / given.schur
+
+
+@compiled
+def correct(  # noqa: PLR0917 - a measurement and a reflector, number by number
+    belief: PoseGaussian,
+    measured_range: float,
+    measured_bearing: float,
+    reflector_x: float,
+    reflector_y: float,
+    surveyed_variance: float,
+    model: ObservationModel,
+) -> PoseGaussian:
+    """Correct a belief by one detection of one reflector, linearized at that belief; Joseph form."""
+    offset_x, offset_y = scanner_offset(belief.theta, model)
+    e = expect(belief.x, belief.y, belief.theta, offset_x, offset_y, reflector_x, reflector_y, model.mount_theta)
+    v = innovation(belief, e, measured_range, measured_bearing, surveyed_variance, model)
+    # Gain K = P H^T S^-1, a row per state, solved with the factors of S.
+    xb, yb = _second(v.range_px, v.bearing_px, v), _second(v.range_py, v.bearing_py, v)
+    tb = _second(v.range_pt, v.bearing_pt, v)
+    xr, yr, tr = v.range_px / v.s_rr - v.w * xb, v.range_py / v.s_rr - v.w * yb, v.range_pt / v.s_rr - v.w * tb
+    # A = I - K H.
+    a00 = 1.0 - xr * e.range_x - xb * e.bearing_x
+    a01 = -xr * e.range_y - xb * e.bearing_y
+    a02 = -xr * e.range_theta - xb * e.bearing_theta
+    a10 = -yr * e.range_x - yb * e.bearing_x
+    a11 = 1.0 - yr * e.range_y - yb * e.bearing_y
+    a12 = -yr * e.range_theta - yb * e.bearing_theta
+    a20 = -tr * e.range_x - tb * e.bearing_x
+    a21 = -tr * e.range_y - tb * e.bearing_y
+    a22 = 1.0 - tr * e.range_theta - tb * e.bearing_theta
+    # M = A P, then A P A^T + K R K^T: the upper triangle alone, which is the one symmetrization.
+    p = belief
+    m00, m01 = a00 * p.xx + a01 * p.xy + a02 * p.xt, a00 * p.xy + a01 * p.yy + a02 * p.yt
+    m02 = a00 * p.xt + a01 * p.yt + a02 * p.tt
+    m10, m11 = a10 * p.xx + a11 * p.xy + a12 * p.xt, a10 * p.xy + a11 * p.yy + a12 * p.yt
+    m12 = a10 * p.xt + a11 * p.yt + a12 * p.tt
+    m20, m21 = a20 * p.xx + a21 * p.xy + a22 * p.xt, a20 * p.xy + a21 * p.yy + a22 * p.yt
+    m22 = a20 * p.xt + a21 * p.yt + a22 * p.tt
+    rr, bb = v.range_noise, v.bearing_noise
+    return PoseGaussian(
+        p.x + xr * v.range + xb * v.bearing,
+        p.y + yr * v.range + yb * v.bearing,
+        wrap_scalar(p.theta + tr * v.range + tb * v.bearing),
+        m00 * a00 + m01 * a01 + m02 * a02 + rr * xr * xr + bb * xb * xb,
+        m00 * a10 + m01 * a11 + m02 * a12 + rr * xr * yr + bb * xb * yb,
+        m00 * a20 + m01 * a21 + m02 * a22 + rr * xr * tr + bb * xb * tb,
+        m10 * a10 + m11 * a11 + m12 * a12 + rr * yr * yr + bb * yb * yb,
+        m10 * a20 + m11 * a21 + m12 * a22 + rr * yr * tr + bb * yb * tb,
+        m20 * a20 + m21 * a21 + m22 * a22 + rr * tr * tr + bb * tb * tb,
+    )
+
+
+@compiled
+def _second(range_p: float, bearing_p: float, given: Innovation) -> float:
+    """Second element of S^-1 applied to [range_p, bearing_p]."""
+    return (bearing_p - given.w * range_p) / given.schur

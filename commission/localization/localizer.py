@@ -1,0 +1,140 @@
+"""The localizer as a vehicle runs it: fed record by record, the only mutable class of this package.
+
+Every step is a kernel that the compiled whole run calls too; nothing is computed here.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from commission.errors import SourceError
+from commission.geometry.arrays import IntArray
+from commission.localization.cycle import process_scan
+from commission.localization.detector import DetectedReflectors, detect
+from commission.localization.estimate import Belief, Estimate, Mode, Status
+from commission.localization.observation import project_detections
+from commission.localization.odometry import AT_REST, advance
+from commission.localization.pose_gaussian import from_belief, to_belief
+from commission.localization.setup import LocalizerSetup
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+
+
+class Localizer:
+    """Tracks the pose of a vehicle from its odometry and the reflectors it sees.
+
+    Parameters
+    ----------
+    setup : reflector map, scanner and parameters; `replace_setup` changes them between two records.
+    initial : belief before the first record.
+    """
+
+    def __init__(self, setup: LocalizerSetup, initial: Belief) -> None:
+        self._setup = setup
+        self._pose = from_belief(initial)
+        self._belief_ns = initial.stamp_ns
+        self._motion = AT_REST
+        self._mode = Mode.OPERATIONAL
+        self._output = to_belief(self._pose, initial.stamp_ns)
+        self._newest_ns: int | None = None
+        self._sensor_detects = False
+
+    @property
+    def setup(self) -> LocalizerSetup:
+        """What the next record is processed with."""
+        return self._setup
+
+    @property
+    def belief(self) -> Belief:
+        """The filter's own state after the newest record; it goes on in fail mode."""
+        return to_belief(self._pose, self._belief_ns)
+
+    @property
+    def mode(self) -> Mode:
+        """State of the supervisor after the newest scan."""
+        return self._mode
+
+    def replace_setup(self, setup: LocalizerSetup) -> None:
+        """Use other parameters (or another map) from the next record on; belief and mode stay."""
+        self._setup = setup
+
+    def feed(self, record: Record) -> Estimate | None:
+        """Take in one record.
+
+        Parameters
+        ----------
+        record : its stamp is not before that of any record so far.
+
+        Returns
+        -------
+        estimate : for a scan, and for detections of the sensor itself. None for odometry, for a reference pose (which
+            is never used), and for a scan of a sensor that has ever sent detections of its own: those win.
+
+        Raises
+        ------
+        SourceError
+            when the record is older than one before it.
+        """
+        if self._newest_ns is not None and record.stamp_ns < self._newest_ns:
+            raise SourceError(
+                f"{type(record).__name__} has stamp {record.stamp_ns} ns, {self._newest_ns - record.stamp_ns} ns "
+                "before the record that came before it; expected ascending stamps"
+            )
+        self._newest_ns = record.stamp_ns
+        match record:
+            case Odometry():
+                self._advance(record)
+                return None
+            case ReferencePose():
+                return None
+            case Detections():
+                self._sensor_detects = True
+                count = len(record.range_bearing)
+                status = np.full(count, Status.INLIER, dtype=np.int8)
+                seen = DetectedReflectors(record.range_bearing, np.zeros(count, dtype=np.int64), status)
+                return self._process(record.stamp_ns, seen)
+            case Scan():
+                if self._sensor_detects:
+                    return None
+                detected = detect(record, self._setup.detector, self._setup.parameters.detector)
+                return self._process(record.stamp_ns, detected)
+
+    def _advance(self, record: Odometry) -> None:
+        """Predict over the motion of an odometry record."""
+        dx, dy, dtheta = (float(value) for value in record.displacement)
+        noise = self._setup.filter.odometry
+        self._pose, self._motion = advance(self._pose, self._motion, record.stamp_ns, dx, dy, dtheta, noise)
+        self._belief_ns = record.stamp_ns
+
+    def _process(self, stamp_ns: int, seen: DetectedReflectors) -> Estimate:
+        """Predict to the scan's stamp, associate, correct, supervise."""
+        model = self._setup.filter
+        detections = seen.range_bearing.view()
+        detections.setflags(write=False)
+        count = len(detections)
+        status = seen.status.copy()
+        reflector: IntArray = np.empty(count, dtype=np.int64)
+        d2 = np.empty(count)
+        cycle = process_scan(
+            self._pose, self._motion, int(self._mode), stamp_ns, 0, count, detections, model, status, reflector, d2
+        )
+        self._pose, self._motion, self._mode = cycle.posterior, cycle.motion, Mode(cycle.mode)
+        self._belief_ns = stamp_ns
+        posterior = to_belief(cycle.posterior, stamp_ns)
+        if self._mode is Mode.OPERATIONAL:
+            self._output = posterior
+        offsets = np.array((0, count), dtype=np.int64)
+        points = project_detections(posterior.mean[np.newaxis], offsets, detections, model.observation)
+        return Estimate(
+            stamp_ns,
+            to_belief(cycle.prior, stamp_ns),
+            posterior,
+            self._output,
+            self._mode,
+            detections,
+            seen.beams,
+            points,
+            status,
+            reflector,
+            d2,
+            model.gate.d2,
+        )

@@ -1,0 +1,202 @@
+"""What the scanner should see of a reflector: h of equation 2, its Jacobian, and the uncertainty of both.
+
+Ranges and bearings are those of reflector centers in the scanner frame. No association and no correction in here.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from commission.compiled import compiled
+from commission.geometry import se2
+from commission.geometry.angles import wrap, wrap_scalar
+from commission.geometry.arrays import FloatArray
+from commission.localization.estimate import Belief
+from commission.site.parameters import ObservationParameters
+from commission.site.scanner import Scanner
+
+SMALLEST_RANGE = 1e-3
+"""Ranges are not linearized below this [m]: a reflector's center is never nearer than its radius."""
+
+
+class ObservationModel(NamedTuple):
+    """Scanner mounting and R of equation 2, for kernels."""
+
+    mount_x: float
+    mount_y: float
+    mount_theta: float
+    range_variance: float
+    bearing_variance: float
+    range_bias: float
+
+
+class Expected(NamedTuple):
+    """Expected observation and the two rows of its Jacobian with respect to x, y, theta of base in map."""
+
+    range: float
+    bearing: float
+    range_x: float
+    range_y: float
+    range_theta: float
+    bearing_x: float
+    bearing_y: float
+    bearing_theta: float
+
+
+def observation_model(scanner: Scanner, parameters: ObservationParameters) -> ObservationModel:
+    """Return the scalars that the kernels need."""
+    x, y, theta = (float(value) for value in scanner.mounting)
+    return ObservationModel(
+        x, y, theta, parameters.range_sigma**2, parameters.bearing_sigma**2, float(parameters.range_bias)
+    )
+
+
+@compiled
+def scanner_offset(theta: float, model: ObservationModel) -> tuple[float, float]:
+    """Scanner's place seen from base, map axes [m]."""
+    c, s = math.cos(theta), math.sin(theta)
+    return c * model.mount_x - s * model.mount_y, s * model.mount_x + c * model.mount_y
+
+
+@compiled
+def expect(  # noqa: PLR0917 - a pose and a point, number by number
+    x: float, y: float, theta: float, offset_x: float, offset_y: float, target_x: float, target_y: float, mount: float
+) -> Expected:
+    """Range and bearing of a point seen by the scanner, with the Jacobian (Algorithm 1, line 7).
+
+    Parameters
+    ----------
+    x, y, theta : pose of base in map; offset_x, offset_y : `scanner_offset` of it.
+    target_x, target_y : point [m], map frame.
+    mount : heading of the scanner in the base frame [rad].
+    """
+    dx, dy = target_x - (x + offset_x), target_y - (y + offset_y)
+    distance = math.sqrt(dx * dx + dy * dy)
+    bearing = wrap_scalar(math.atan2(dy, dx) - theta - mount)
+    inverse = 1.0 / max(distance, SMALLEST_RANGE)
+    ux, uy = dx * inverse, dy * inverse
+    # The scanner moves by (-offset_y, offset_x) per radian.
+    return Expected(
+        distance,
+        bearing,
+        -ux,
+        -uy,
+        ux * offset_y - uy * offset_x,
+        uy * inverse,
+        -ux * inverse,
+        -(uy * offset_y + ux * offset_x) * inverse - 1.0,
+    )
+
+
+def range_bearing(T_map_base: ArrayLike, mounting: ArrayLike, points_map: ArrayLike) -> FloatArray:
+    """Expected range and bearing of points in the scanner frame (equation 2 without its noise).
+
+    Parameters
+    ----------
+    T_map_base : (3,) array [m, m, rad].
+    mounting : (3,) `T_base_scanner` [m, m, rad].
+    points_map : (N, 2) array [m], map frame.
+
+    Returns
+    -------
+    range_bearing : (N, 2) array [m, rad], bearings in [-pi, pi).
+    """
+    sx, sy, heading = se2.compose(T_map_base, mounting)
+    delta = np.asarray(points_map, dtype=np.float64).reshape(-1, 2) - (sx, sy)
+    bearing = wrap(np.arctan2(delta[:, 1], delta[:, 0]) - heading)
+    return np.stack((np.hypot(delta[:, 0], delta[:, 1]), bearing), axis=1)
+
+
+def jacobians(T_map_base: ArrayLike, mounting: ArrayLike, points_map: ArrayLike) -> FloatArray:
+    """Jacobian of `range_bearing` with respect to `T_map_base`.
+
+    Returns
+    -------
+    H : (N, 2, 3) array: rows range, bearing; columns x, y, theta. Finite for a point at the scanner itself.
+    """
+    pose = np.asarray(T_map_base, dtype=np.float64)
+    scanner = se2.compose(pose, mounting)[:2]
+    ox, oy = scanner - pose[:2]
+    delta = np.asarray(points_map, dtype=np.float64).reshape(-1, 2) - scanner
+    inverse = 1.0 / np.maximum(np.hypot(delta[:, 0], delta[:, 1]), SMALLEST_RANGE)
+    ux, uy = delta[:, 0] * inverse, delta[:, 1] * inverse
+    along = np.stack((-ux, -uy, ux * oy - uy * ox), axis=1)
+    across = np.stack((uy * inverse, -ux * inverse, -(uy * oy + ux * ox) * inverse - 1.0), axis=1)
+    return np.stack((along, across), axis=1)
+
+
+def innovation_covariances(
+    belief: Belief, model: ObservationModel, centers: ArrayLike, sigmas: ArrayLike = 0.0
+) -> FloatArray:
+    """Covariance of each reflector's expected observation (S of Algorithm 1, line 8).
+
+    Parameters
+    ----------
+    belief : pose of base before the scan.
+    model : scanner mounting and R.
+    centers : (N, 2) reflector centers [m], map frame.
+    sigmas : (N,) or one: 1-sigma uncertainty of the surveyed centers, each axis [m].
+
+    Returns
+    -------
+    S : (N, 2, 2) array of range [m] and bearing [rad].
+    """
+    mounting = (model.mount_x, model.mount_y, model.mount_theta)
+    H = jacobians(belief.mean, mounting, centers)
+    distance = np.maximum(range_bearing(belief.mean, mounting, centers)[:, 0], SMALLEST_RANGE)
+    surveyed = np.square(np.broadcast_to(np.asarray(sigmas, dtype=np.float64), distance.shape))
+    S = H @ belief.covariance @ np.swapaxes(H, 1, 2)
+    S[:, 0, 0] += model.range_variance + surveyed
+    S[:, 1, 1] += model.bearing_variance + surveyed / np.square(distance)
+    return S
+
+
+def validation_ellipses(
+    belief: Belief, model: ObservationModel, centers: ArrayLike, sigmas: ArrayLike = 0.0
+) -> FloatArray:
+    """Uncertainty of each expected observation laid on the floor around its reflector (blue in the paper's Fig. 12).
+
+    Parameters
+    ----------
+    belief, model, centers, sigmas : as in `innovation_covariances`.
+
+    Returns
+    -------
+    covariances : (N, 2, 2) array [m^2], map axes. A detection lies inside the gate when it falls inside the ellipse of
+        `sqrt(gate)` sigmas around the reflector, up to the curvature of polar coordinates.
+    """
+    S = innovation_covariances(belief, model, centers, sigmas)
+    scanner = se2.compose(belief.mean, (model.mount_x, model.mount_y, model.mount_theta))[:2]
+    delta = np.asarray(centers, dtype=np.float64).reshape(-1, 2) - scanner
+    distance = np.maximum(np.hypot(delta[:, 0], delta[:, 1]), SMALLEST_RANGE)
+    ux, uy = delta[:, 0] / distance, delta[:, 1] / distance
+    # Columns: a metre of range, a radian of bearing.
+    spread = np.stack((np.stack((ux, -delta[:, 1]), axis=1), np.stack((uy, delta[:, 0]), axis=1)), axis=1)
+    return spread @ S @ np.swapaxes(spread, 1, 2)
+
+
+@compiled
+def project_detections(
+    means: FloatArray, offsets: FloatArray, detections: FloatArray, model: ObservationModel
+) -> FloatArray:
+    """Detections of many scans seen from the poses of base: (n, 2) array [m], map frame.
+
+    Parameters
+    ----------
+    means : (K, 3) poses of base in map; offsets : (K + 1,) rows of `detections` that belong to each.
+    detections : (n, 2) range [m] and bearing [rad], scanner frame, as measured; the range bias is taken off.
+    """
+    points = np.empty((len(detections), 2))
+    for k in range(len(means)):
+        x, y, theta = means[k, 0], means[k, 1], means[k, 2]
+        offset_x, offset_y = scanner_offset(theta, model)
+        for i in range(offsets[k], offsets[k + 1]):
+            distance = detections[i, 0] - model.range_bias
+            direction = theta + model.mount_theta + detections[i, 1]
+            points[i, 0] = x + offset_x + distance * math.cos(direction)
+            points[i, 1] = y + offset_y + distance * math.sin(direction)
+    return points

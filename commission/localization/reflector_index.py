@@ -1,0 +1,71 @@
+"""The reflector map sorted into square cells, so that a search around a point costs the same in any map.
+
+Reflectors of one cell, and cells of one row, lie side by side: a search reads one slice per row it touches.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from commission.compiled import compiled
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.site.reflectors import ReflectorMap
+
+SMALLEST_CELL = 1.0
+"""Edge of a cell [m]: wider than a usual gate, so that a search touches one to four cells."""
+
+
+class ReflectorIndex(NamedTuple):
+    """Reflectors in the order of their cells, row by row."""
+
+    x: FloatArray
+    """(N,) centers [m], map frame."""
+    y: FloatArray
+    variance: FloatArray
+    """(N,) variance of the surveyed place, each axis [m^2]."""
+    ids: IntArray
+    """(N,) index of each in the reflector map."""
+    offsets: IntArray
+    """(rows * columns + 1,) first entry of each cell."""
+    origin_x: float
+    origin_y: float
+    cell: float
+    """Edge of a cell [m]."""
+    rows: int
+    columns: int
+    largest_variance: float
+
+
+def build_index(reflectors: ReflectorMap) -> ReflectorIndex:
+    """Sort a reflector map into cells. Cells grow with the hall, so that there are at most a few per reflector."""
+    centers = np.asarray(reflectors.centers)
+    sigmas = np.array([reflector.sigma for reflector in reflectors.reflectors], dtype=np.float64)
+    low = centers.min(axis=0) if len(centers) else np.zeros(2)
+    extent = centers.max(axis=0) - low if len(centers) else np.zeros(2)
+    most_cells = 4 * len(centers) + 1024
+    cell = max(SMALLEST_CELL, math.sqrt(extent[0] * extent[1] / most_cells), float(extent.max()) / most_cells)
+    columns, rows = (int(n) + 1 for n in extent // cell)
+    cells = ((centers - low) // cell).astype(np.int64)
+    keys = cells[:, 1] * columns + cells[:, 0]
+    order = np.argsort(keys, kind="stable")
+    offsets = np.searchsorted(keys[order], np.arange(rows * columns + 1)).astype(np.int64)
+    arrays = (centers[order, 0], centers[order, 1], np.square(sigmas[order]), order.astype(np.int64), offsets)
+    # Read-only and contiguous always: an array that may be written is another type to the compiler.
+    x, y, variance, ids, offsets = (np.ascontiguousarray(array) for array in arrays)
+    for array in (x, y, variance, ids, offsets):
+        array.setflags(write=False)
+    largest = float(variance.max()) if len(variance) else 0.0
+    return ReflectorIndex(x, y, variance, ids, offsets, float(low[0]), float(low[1]), cell, rows, columns, largest)
+
+
+@compiled
+def cell_range(low: float, high: float, cell: float, count: int) -> tuple[int, int]:
+    """First and last of `count` cells that the interval [low, high] touches; last < first when none."""
+    first, last = low / cell, high / cell
+    if first >= count or last < 0.0:
+        return 0, -1
+    # Compared as floats before the conversion: infinity has no integer. NaN takes every cell.
+    return int(first) if first > 0.0 else 0, int(last) if last < count else count - 1

@@ -1,0 +1,73 @@
+"""All that the localizer is given and does not change by itself, and the same as scalars and tables for its kernels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from commission.geometry.arrays import FloatArray
+from commission.geometry.gaussian import ellipse_points
+from commission.localization.association import Gate, gate_of
+from commission.localization.detector import DetectorModel, detector_model
+from commission.localization.estimate import Belief
+from commission.localization.observation import ObservationModel, observation_model, validation_ellipses
+from commission.localization.odometry import OdometryNoise, odometry_noise
+from commission.localization.reflector_index import ReflectorIndex, build_index
+from commission.localization.supervisor import SupervisorLimits, supervisor_limits
+from commission.site.parameters import Parameters
+from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
+from commission.site.scanner import Scanner
+
+
+class FilterModel(NamedTuple):
+    """What the steps of the filter read."""
+
+    odometry: OdometryNoise
+    observation: ObservationModel
+    index: ReflectorIndex
+    gate: Gate
+    limits: SupervisorLimits
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LocalizerSetup:
+    """Reflector map, scanner and parameters of a localizer; kernels read `filter` and `detector`."""
+
+    reflectors: ReflectorMap
+    """The reflector map M_B."""
+    scanner: Scanner
+    """Mounting and resolution of the scanner."""
+    parameters: Parameters
+    """Tunables of every stage."""
+    filter: FilterModel = field(init=False, repr=False)
+    """Scalars and tables of the filter."""
+    detector: DetectorModel = field(init=False, repr=False)
+    """Scalars and tables of the detector."""
+
+    def __post_init__(self) -> None:
+        model = FilterModel(
+            odometry_noise(self.parameters.odometry),
+            observation_model(self.scanner, self.parameters.observation),
+            build_index(self.reflectors),
+            gate_of(self.parameters.association),
+            supervisor_limits(self.parameters.supervisor),
+        )
+        object.__setattr__(self, "filter", model)
+        detector = detector_model(self.reflectors, self.scanner, self.parameters.detector)
+        object.__setattr__(self, "detector", detector)
+
+    @staticmethod
+    def of(project: Project) -> LocalizerSetup:
+        """Return the setup of a project."""
+        return LocalizerSetup(project.reflectors, project.scanner, project.parameters)
+
+    def validation_ellipses(self, belief: Belief) -> FloatArray:
+        """(N, 2, 2) 1-sigma region [m^2] on the floor in which each reflector is expected to be detected."""
+        sigmas = [reflector.sigma for reflector in self.reflectors.reflectors]
+        return validation_ellipses(belief, self.filter.observation, self.reflectors.centers, sigmas)
+
+    def validation_outlines(self, belief: Belief, n: int = 48) -> FloatArray:
+        """(N, n, 2) outline [m] of the validation gate around each reflector, map frame (the paper's Fig. 12)."""
+        scale = self.filter.gate.d2**0.5
+        return ellipse_points(self.reflectors.centers, self.validation_ellipses(belief), scale, n)

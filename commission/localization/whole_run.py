@@ -1,0 +1,255 @@
+"""The localizer over a whole recording in one compiled loop, through the same steps as `Localizer.feed`.
+
+Detections are extracted beforehand (`detection_log`), so that a moved gate replays the filter alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.compiled import compiled
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.localization.cycle import process_scan
+from commission.localization.detection_log import DetectionLog, extract_detections
+from commission.localization.estimate import Belief, Estimate, Mode, Status
+from commission.localization.observation import ObservationModel, project_detections
+from commission.localization.odometry import AT_REST, Motion, advance
+from commission.localization.pose_gaussian import PoseGaussian, from_belief, to_belief
+from commission.localization.setup import FilterModel, LocalizerSetup
+from commission.site.record_log import RecordLog
+
+
+class Columns(NamedTuple):
+    """Where the loop writes: a row per cycle, then a row per detection."""
+
+    prior_means: FloatArray
+    prior_covariances: FloatArray
+    means: FloatArray
+    covariances: FloatArray
+    modes: NDArray[np.int8]
+    status: NDArray[np.int8]
+    reflectors: IntArray
+    d2: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RunArrays:
+    """A whole run as columns: K cycles (one per scan) with n detections in total. All arrays are read-only."""
+
+    initial: Belief
+    """Belief before the first record."""
+    detected: DetectionLog
+    """Stamps of the cycles, rows of their detections, and the detections as measured."""
+    gate: float
+    """Largest squared Mahalanobis distance of an inlier (chi-square, 2 degrees of freedom)."""
+    observation: ObservationModel
+    """Scanner mounting and range bias of the run."""
+    prior_means: FloatArray
+    """(K, 3) `T_map_base` after *predict* [m, m, rad]."""
+    prior_covariances: FloatArray
+    """(K, 3, 3) after *predict*."""
+    means: FloatArray
+    """(K, 3) `T_map_base` after *correct*: the filter's own state [m, m, rad]."""
+    covariances: FloatArray
+    """(K, 3, 3) after *correct*."""
+    modes: NDArray[np.int8]
+    """(K,) a `Mode` each."""
+    status: NDArray[np.int8]
+    """(n,) a `Status` each."""
+    reflector: IntArray
+    """(n,) index into the reflector map; -1: none."""
+    d2: FloatArray
+    """(n,) squared Mahalanobis distance to that reflector; NaN: none."""
+    final: Belief
+    """Belief after the last record, odometry included."""
+
+    def __len__(self) -> int:
+        """Return the number of cycles."""
+        return len(self.detected)
+
+    @property
+    def stamps_ns(self) -> IntArray:
+        """(K,) time of each scan [ns]."""
+        return self.detected.stamps_ns
+
+    @property
+    def offsets(self) -> IntArray:
+        """(K + 1,) detections of cycle k: offsets[k] to offsets[k + 1]."""
+        return self.detected.offsets
+
+    @property
+    def range_bearing(self) -> FloatArray:
+        """(n, 2) range [m] and bearing [rad] of each detection, scanner frame."""
+        return self.detected.range_bearing
+
+    @property
+    def beams(self) -> IntArray:
+        """(n,) width of each cluster [beams]; 0 where the sensor itself detected."""
+        return self.detected.beams
+
+    def counts(self, status: Status) -> IntArray:
+        """(K,) detections of one status in each cycle."""
+        return self._sums((self.status == status).astype(np.int64))
+
+    def nis_sums(self) -> FloatArray:
+        """(K,) sum of the squared Mahalanobis distances of each cycle's inliers; 2 degrees of freedom each."""
+        return self._sums(np.where(self.status == Status.INLIER, self.d2, 0.0))
+
+    def output_cycles(self) -> IntArray:
+        """(K,) cycle whose posterior the vehicle is given: the last operational one; -1: the initial belief."""
+        cycles = np.where(self.modes == Mode.OPERATIONAL, np.arange(len(self)), -1)
+        return np.maximum.accumulate(cycles)
+
+    def points_map(self) -> FloatArray:
+        """(n, 2) every detection seen from the posterior of its cycle [m], map frame."""
+        return project_detections(self.means, self.offsets, self.range_bearing, self.observation)
+
+    def estimate(self, cycle: int) -> Estimate:
+        """Return one cycle as `Localizer.feed` gives it, to the last bit."""
+        stamp_ns = int(self.stamps_ns[cycle])
+        rows = slice(int(self.offsets[cycle]), int(self.offsets[cycle + 1]))
+        detections = self.range_bearing[rows]
+        offsets = np.array((0, len(detections)), dtype=np.int64)
+        points = project_detections(self.means[cycle : cycle + 1], offsets, detections, self.observation)
+        given = int(self.output_cycles()[cycle])
+        return Estimate(
+            stamp_ns,
+            Belief(stamp_ns, self.prior_means[cycle], self.prior_covariances[cycle]),
+            self._posterior(cycle),
+            self.initial if given < 0 else self._posterior(given),
+            Mode(int(self.modes[cycle])),
+            detections,
+            self.beams[rows],
+            points,
+            self.status[rows],
+            self.reflector[rows],
+            self.d2[rows],
+            self.gate,
+        )
+
+    def _posterior(self, cycle: int) -> Belief:
+        return Belief(int(self.stamps_ns[cycle]), self.means[cycle], self.covariances[cycle])
+
+    def _sums(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
+        """(K,) sum of a value per detection over each cycle."""
+        totals = np.concatenate((np.zeros(1, values.dtype), np.cumsum(values)))
+        return totals[self.offsets[1:]] - totals[self.offsets[:-1]]
+
+
+def run(
+    log: RecordLog,
+    setup: LocalizerSetup,
+    initial: Belief,
+    *,
+    detected: DetectionLog | None = None,
+) -> RunArrays:
+    """Localize over a whole recording.
+
+    Parameters
+    ----------
+    log : all records of a drive.
+    setup : reflector map, scanner and parameters.
+    initial : belief before the first record.
+    detected : result of `extract_detections` for the same log and detector parameters; None extracts it now.
+
+    Returns
+    -------
+    arrays : every cycle and every detection, equal to the last bit to feeding the records to a `Localizer`.
+    """
+    if detected is None:
+        detected = extract_detections(log, setup)
+    cycles, total = len(detected), len(detected.range_bearing)
+    columns = Columns(
+        np.empty((cycles, 3)),
+        np.empty((cycles, 3, 3)),
+        np.empty((cycles, 3)),
+        np.empty((cycles, 3, 3)),
+        np.empty(cycles, dtype=np.int8),
+        detected.status.copy(),
+        np.empty(total, dtype=np.int64),
+        np.empty(total),
+    )
+    stamps, displacements = np.ascontiguousarray(log.odometry_stamps_ns), np.ascontiguousarray(log.displacements)
+    stamps, displacements = stamps.view(), displacements.view()
+    stamps.setflags(write=False)
+    displacements.setflags(write=False)
+    start = from_belief(initial)
+    final = _run(
+        stamps,
+        displacements,
+        detected.stamps_ns,
+        detected.offsets,
+        detected.range_bearing,
+        setup.filter,
+        start,
+        AT_REST,
+        columns,
+    )
+    for column in columns:
+        column.setflags(write=False)
+    newest = [int(column[-1]) for column in (log.odometry_stamps_ns, detected.stamps_ns) if len(column)]
+    return RunArrays(
+        to_belief(start, initial.stamp_ns),
+        detected,
+        setup.filter.gate.d2,
+        setup.filter.observation,
+        *columns,
+        to_belief(final, max(newest, default=initial.stamp_ns)),
+    )
+
+
+@compiled
+def _run(  # noqa: PLR0917 - the columns of the log
+    odometry_stamps: IntArray,
+    displacements: FloatArray,
+    scan_stamps: IntArray,
+    offsets: IntArray,
+    detections: FloatArray,
+    model: FilterModel,
+    belief: PoseGaussian,
+    motion: Motion,
+    columns: Columns,
+) -> PoseGaussian:
+    """Deliver odometry and scans in the order of their stamps, odometry first; return the belief after the last."""
+    mode = 0
+    rows = 0
+    for k in range(len(scan_stamps)):
+        while rows < len(odometry_stamps) and odometry_stamps[rows] <= scan_stamps[k]:
+            dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
+            belief, motion = advance(belief, motion, odometry_stamps[rows], dx, dy, dtheta, model.odometry)
+            rows += 1
+        cycle = process_scan(
+            belief,
+            motion,
+            mode,
+            scan_stamps[k],
+            offsets[k],
+            offsets[k + 1],
+            detections,
+            model,
+            columns.status,
+            columns.reflectors,
+            columns.d2,
+        )
+        belief, motion, mode = cycle.posterior, cycle.motion, cycle.mode
+        _store(cycle.prior, k, columns.prior_means, columns.prior_covariances)
+        _store(belief, k, columns.means, columns.covariances)
+        columns.modes[k] = mode
+    while rows < len(odometry_stamps):
+        dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
+        belief, motion = advance(belief, motion, odometry_stamps[rows], dx, dy, dtheta, model.odometry)
+        rows += 1
+    return belief
+
+
+@compiled
+def _store(belief: PoseGaussian, row: int, means: FloatArray, covariances: FloatArray) -> None:
+    """Write a belief to its row."""
+    means[row, 0], means[row, 1], means[row, 2] = belief.x, belief.y, belief.theta
+    covariances[row, 0, 0], covariances[row, 0, 1], covariances[row, 0, 2] = belief.xx, belief.xy, belief.xt
+    covariances[row, 1, 0], covariances[row, 1, 1], covariances[row, 1, 2] = belief.xy, belief.yy, belief.yt
+    covariances[row, 2, 0], covariances[row, 2, 1], covariances[row, 2, 2] = belief.xt, belief.yt, belief.tt
