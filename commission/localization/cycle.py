@@ -1,7 +1,7 @@
 """One cycle of the localizer: the scan's stamp is reached, its detections are associated, corrected and supervised.
 
-The one implementation of the cycle. `Localizer.feed` calls it per scan and `whole_run` in a compiled loop, so that live,
-replay and simulation agree to the last bit.
+The one implementation of the cycle: `Localizer.feed` calls it per scan and `whole_run` in a compiled loop, so that
+live, replay and simulation agree to the last bit.
 """
 
 from __future__ import annotations
@@ -55,12 +55,10 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     d2 : (n,) out: squared Mahalanobis distance at the prior, NaN for none.
     """
     prior, motion = reach(belief, motion, stamp_ns, model.odometry)
-    associate(
-        prior, first, last, detections, model.observation, model.index, model.gate, status, reflectors, d2
-    )
+    associate(prior, first, last, detections, model.observation, model.reflectors, model.gate, status, reflectors, d2)
     posterior = prior
     for i in range(first, last):
-        entry = reflectors[i]
+        entry = int(reflectors[i])
         if entry == NOBODY:
             continue
         if status[i] == INLIER:
@@ -68,10 +66,10 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
                 posterior,
                 detections[i, 0] - model.observation.range_bias,
                 detections[i, 1],
-                model.index.x[entry],
-                model.index.y[entry],
-                model.index.variance[entry],
+                model.reflectors.x[entry],
+                model.reflectors.y[entry],
+                model.reflectors.variance[entry],
                 model.observation,
             )
-        reflectors[i] = model.index.ids[entry]
+        reflectors[i] = model.reflectors.ids[entry]
     return Cycle(prior, posterior, motion, supervise(mode, posterior, model.limits))

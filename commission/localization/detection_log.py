@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commission.compiled import compiled, compiled_parallel, parallel_range
-from commission.geometry.arrays import BoolArray, FloatArray, IntArray
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.localization.detector import (
     INLIER,
     Beams,
@@ -83,8 +83,7 @@ def detect_log(scans: ScanLog, setup: LocalizerSetup, *, parallel: bool = False)
     setup : reflector map, scanner and parameters.
     parallel : whether to use all cores; the result is the same.
     """
-    ranges = np.ascontiguousarray(scans.ranges, dtype=np.float32).view()
-    ranges.setflags(write=False)
+    ranges = read_only(np.asarray(scans.ranges, dtype=np.float32))
     threshold = setup.parameters.detector.intensity_threshold
     flags = reflective_beams(ranges, scans.intensities, scans.reflector, threshold)
     beams = beams_of(ranges.shape[1], scans.angle_min, scans.angle_increment)
@@ -120,17 +119,14 @@ def _joined(first: DetectionLog, second: DetectionLog) -> DetectionLog:
 def _log(
     stamps_ns: IntArray, offsets: IntArray, range_bearing: FloatArray, beams: IntArray, status: NDArray[np.int8]
 ) -> DetectionLog:
-    """Return a log of read-only contiguous arrays: to the compiler a writable one is another type."""
-    columns = (
-        np.ascontiguousarray(stamps_ns, dtype=np.int64).view(),
-        np.ascontiguousarray(offsets, dtype=np.int64).view(),
-        np.ascontiguousarray(range_bearing, dtype=np.float64).view(),
-        np.ascontiguousarray(beams, dtype=np.int64).view(),
-        np.ascontiguousarray(status, dtype=np.int8).view(),
+    """Return a log of read-only arrays."""
+    return DetectionLog(
+        read_only(np.asarray(stamps_ns, dtype=np.int64)),
+        read_only(np.asarray(offsets, dtype=np.int64)),
+        read_only(np.asarray(range_bearing, dtype=np.float64)),
+        read_only(beams),
+        read_only(status),
     )
-    for column in columns:
-        column.setflags(write=False)
-    return DetectionLog(*columns)
 
 
 @compiled
@@ -164,7 +160,7 @@ def _fill(  # noqa: PLR0917 - the columns of the log
 ) -> None:
     """Write the clusters of every scan to its rows."""
     for k in range(len(ranges)):
-        detect_clusters(ranges[k], flags[k], beams, model, offsets[k], range_bearing, widths, status)
+        detect_clusters(ranges[k], flags[k], beams, model, int(offsets[k]), range_bearing, widths, status)
 
 
 @compiled_parallel
@@ -180,4 +176,4 @@ def _fill_parallel(  # noqa: PLR0917 - the columns of the log
 ) -> None:
     """`_fill` on all cores."""
     for k in parallel_range(len(ranges)):
-        detect_clusters(ranges[k], flags[k], beams, model, offsets[k], range_bearing, widths, status)
+        detect_clusters(ranges[k], flags[k], beams, model, int(offsets[k]), range_bearing, widths, status)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled
 from commission.geometry.angles import TURN, wrap_scalar
-from commission.geometry.arrays import BoolArray, FloatArray, IntArray
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.localization.estimate import Status
 from commission.localization.reflector_center import central_beam, circle_fit, plate
 from commission.site.parameters import DetectorParameters
@@ -50,7 +50,7 @@ class DetectorModel(NamedTuple):
 class Beams(NamedTuple):
     """Bearings of the beams of a scan."""
 
-    count: int
+    used: int
     """Beams to read; a scan that repeats its first beam at the end is cut."""
     angle_min: float
     increment: float
@@ -76,11 +76,9 @@ def detector_model(reflectors: ReflectorMap, scanner: Scanner, parameters: Detec
     classes = sorted({(float(radius), bool(flat)) for radius, flat in zip(reflectors.radii, flat_of, strict=True)})
     radii = np.array([radius for radius, _ in classes], dtype=np.float64)
     flat = np.array([is_flat for _, is_flat in classes], dtype=np.bool_)
-    radii.setflags(write=False)
-    flat.setflags(write=False)
     return DetectorModel(
-        radii,
-        flat,
+        read_only(radii),
+        read_only(flat),
         bool(parameters.enabled),
         int(parameters.min_model_error),
         int(parameters.max_model_error),
@@ -107,13 +105,10 @@ def reflective_beams(
 ) -> NDArray[np.bool_]:
     """Which beams met something reflective: the scanner's flag, else echoes at least as strong as the threshold."""
     if reflector is not None:
-        flags = np.ascontiguousarray(reflector, dtype=np.bool_).view()
-    elif intensities is not None:
-        flags = np.asarray(intensities) >= threshold
-    else:
-        flags = np.zeros(ranges.shape, dtype=np.bool_)
-    flags.setflags(write=False)
-    return flags
+        return read_only(np.asarray(reflector, dtype=np.bool_))
+    if intensities is not None:
+        return read_only(np.asarray(intensities) >= threshold)
+    return read_only(np.zeros(ranges.shape, dtype=np.bool_))
 
 
 def detect(scan: Scan, model: DetectorModel, parameters: DetectorParameters) -> DetectedReflectors:
@@ -129,8 +124,7 @@ def detect(scan: Scan, model: DetectorModel, parameters: DetectorParameters) -> 
     -------
     detected : every cluster, in the order of its beams.
     """
-    ranges = np.ascontiguousarray(scan.ranges, dtype=np.float32).view()
-    ranges.setflags(write=False)
+    ranges = read_only(np.asarray(scan.ranges, dtype=np.float32))
     flags = reflective_beams(ranges, scan.intensities, scan.reflector, parameters.intensity_threshold)
     beams = beams_of(len(ranges), scan.angle_min, scan.angle_increment)
     count = count_clusters(ranges, flags, beams, model)
@@ -185,9 +179,9 @@ def _start_of_turn(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams:
     if not beams.full_turn:
         return 0
     dark = 0
-    for position in range(beams.count - 2, 2 * beams.count):
-        beam = position if position < beams.count else position - beams.count
-        if dark >= 2 and position >= beams.count:
+    for position in range(beams.used - 2, 2 * beams.used):
+        beam = position if position < beams.used else position - beams.used
+        if dark >= 2 and position >= beams.used:
             return beam
         dark = 0 if _lit(ranges, flags, beam) else dark + 1
     return 0
@@ -197,10 +191,10 @@ def _start_of_turn(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams:
 def count_clusters(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, model: DetectorModel) -> int:
     """Count the clusters in a scan, to reserve space for them."""
     position = _start_of_turn(ranges, flags, beams)
-    end = position + beams.count if beams.full_turn else beams.count
+    end = position + beams.used if beams.full_turn else beams.used
     found = 0
     while position < end:
-        first, last = _next_cluster(ranges, flags, beams.count, position, end, model.range_jump)
+        first, last = _next_cluster(ranges, flags, beams.used, position, end, model.range_jump)
         if first < end:
             found += 1
         position = last + 1
@@ -220,9 +214,9 @@ def detect_clusters(  # noqa: PLR0917 - outputs are written into the arrays of t
 ) -> int:
     """Write center, width and status of each cluster of a scan from `row` on; return the row after the last."""
     position = _start_of_turn(ranges, flags, beams)
-    end = position + beams.count if beams.full_turn else beams.count
+    end = position + beams.used if beams.full_turn else beams.used
     while position < end:
-        first, last = _next_cluster(ranges, flags, beams.count, position, end, model.range_jump)
+        first, last = _next_cluster(ranges, flags, beams.used, position, end, model.range_jump)
         if first < end:
             distance, bearing, passed = _judge(ranges, flags, beams, first, last, model)
             range_bearing[row, 0] = distance
@@ -248,12 +242,12 @@ def _judge(  # noqa: PLR0917 - a scan and a cluster in it
     for kind in range(len(model.radii)):
         radius = model.radii[kind]
         if model.flat[kind]:
-            r, b = plate(ranges, flags, beams.count, first, last, beams.angle_min, beams.increment)
+            r, b = plate(ranges, flags, beams.used, first, last, beams.angle_min, beams.increment)
         elif model.circle:
             r, b = circle_fit(
                 ranges,
                 flags,
-                beams.count,
+                beams.used,
                 first,
                 last,
                 beams.angle_min,
@@ -262,11 +256,11 @@ def _judge(  # noqa: PLR0917 - a scan and a cluster in it
                 model.range_sigma,
             )
         else:
-            r, b = central_beam(ranges, flags, beams.count, first, last, beams.angle_min, beams.increment, radius)
+            r, b = central_beam(ranges, flags, beams.used, first, last, beams.angle_min, beams.increment, radius)
         error = last - first + 1 - expected_beams(r, radius, beams.increment)
         fits = error <= model.more and (error >= -model.fewer or model.flat[kind])
         if (fits and not passed) or (fits == passed and abs(error) < least):
             distance, bearing, passed, least = r, b, fits, abs(error)
     if least == math.inf:
-        distance, bearing = plate(ranges, flags, beams.count, first, last, beams.angle_min, beams.increment)
+        distance, bearing = plate(ranges, flags, beams.used, first, last, beams.angle_min, beams.increment)
     return distance, bearing, passed

@@ -74,7 +74,7 @@ def body_twist(vehicle: Vehicle, wheels: ArrayLike) -> FloatArray:
         case OmnidirectionalVehicle():
             given = frozen(wheels, (len(vehicle.wheel_angles_deg),), "wheels")
             # Dixon et al. 2010, equation 5: the pseudoinverse, by least squares rather than by inverting A^T A.
-            return np.linalg.lstsq(_omnidirectional_matrix(vehicle), given, rcond=None)[0]
+            return np.asarray(np.linalg.lstsq(_omnidirectional_matrix(vehicle), given, rcond=None)[0], dtype=np.float64)
 
 
 def displacement(vehicle: Vehicle, wheels: ArrayLike, seconds: float) -> FloatArray:

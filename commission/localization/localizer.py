@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from commission.errors import SourceError
-from commission.geometry.arrays import IntArray
+from commission.geometry.arrays import IntArray, read_only
 from commission.localization.cycle import process_scan
 from commission.localization.detector import DetectedReflectors, detect
 from commission.localization.estimate import Belief, Estimate, Mode, Status
@@ -16,7 +16,21 @@ from commission.localization.observation import project_detections
 from commission.localization.odometry import AT_REST, advance
 from commission.localization.pose_gaussian import from_belief, to_belief
 from commission.localization.setup import LocalizerSetup
+from commission.site.parameters import Parameters
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.scanner import Scanner
+
+
+def warm_up() -> None:
+    """Compile every kernel that a live localizer needs, by feeding it one record of each kind."""
+    setup = LocalizerSetup(ReflectorMap((Reflector("A", 2.0, 0.0),)), Scanner(), Parameters())
+    localizer = Localizer(setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3)))
+    localizer.feed(Odometry(0, np.zeros(3)))
+    localizer.feed(Odometry(1, np.zeros(3)))
+    flags = np.array([False, False, True, False])
+    localizer.feed(Scan(2, np.full(4, 1.96, dtype=np.float32), -0.02, 0.01, None, flags))
+    localizer.feed(Detections(3, np.array([[2.0, 0.0]])))
 
 
 class Localizer:
@@ -108,8 +122,7 @@ class Localizer:
     def _process(self, stamp_ns: int, seen: DetectedReflectors) -> Estimate:
         """Predict to the scan's stamp, associate, correct, supervise."""
         model = self._setup.filter
-        detections = seen.range_bearing.view()
-        detections.setflags(write=False)
+        detections = read_only(seen.range_bearing)
         count = len(detections)
         status = seen.status.copy()
         reflector: IntArray = np.empty(count, dtype=np.int64)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from commission.compiled import compiled
 from commission.geometry import se2
 from commission.geometry.angles import wrap, wrap_scalar
-from commission.geometry.arrays import FloatArray
+from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.estimate import Belief
 from commission.site.parameters import ObservationParameters
 from commission.site.scanner import Scanner
@@ -179,18 +179,31 @@ def validation_ellipses(
     return spread @ S @ np.swapaxes(spread, 1, 2)
 
 
-@compiled
 def project_detections(
-    means: FloatArray, offsets: FloatArray, detections: FloatArray, model: ObservationModel
+    means: FloatArray, offsets: IntArray, detections: FloatArray, model: ObservationModel
 ) -> FloatArray:
-    """Detections of many scans seen from the poses of base: (n, 2) array [m], map frame.
+    """Detections of many scans seen from the poses of base.
 
     Parameters
     ----------
-    means : (K, 3) poses of base in map; offsets : (K + 1,) rows of `detections` that belong to each.
+    means : (K, 3) poses of base in map [m, m, rad].
+    offsets : (K + 1,) rows of `detections` that belong to each.
     detections : (n, 2) range [m] and bearing [rad], scanner frame, as measured; the range bias is taken off.
+
+    Returns
+    -------
+    points_map : (n, 2) array [m], map frame.
     """
     points = np.empty((len(detections), 2))
+    _project(read_only(means), read_only(offsets), read_only(detections), model, points)
+    return points
+
+
+@compiled
+def _project(
+    means: FloatArray, offsets: IntArray, detections: FloatArray, model: ObservationModel, points: FloatArray
+) -> None:
+    """`project_detections` into `points`."""
     for k in range(len(means)):
         x, y, theta = means[k, 0], means[k, 1], means[k, 2]
         offset_x, offset_y = scanner_offset(theta, model)
@@ -199,4 +212,3 @@ def project_detections(
             direction = theta + model.mount_theta + detections[i, 1]
             points[i, 0] = x + offset_x + distance * math.cos(direction)
             points[i, 1] = y + offset_y + distance * math.sin(direction)
-    return points

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from commission.compiled import compiled
-from commission.geometry.arrays import FloatArray, IntArray
+from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.site.reflectors import ReflectorMap
 
 SMALLEST_CELL = 1.0
@@ -52,13 +52,19 @@ def build_index(reflectors: ReflectorMap) -> ReflectorIndex:
     keys = cells[:, 1] * columns + cells[:, 0]
     order = np.argsort(keys, kind="stable")
     offsets = np.searchsorted(keys[order], np.arange(rows * columns + 1)).astype(np.int64)
-    arrays = (centers[order, 0], centers[order, 1], np.square(sigmas[order]), order.astype(np.int64), offsets)
-    # Read-only and contiguous always: an array that may be written is another type to the compiler.
-    x, y, variance, ids, offsets = (np.ascontiguousarray(array) for array in arrays)
-    for array in (x, y, variance, ids, offsets):
-        array.setflags(write=False)
-    largest = float(variance.max()) if len(variance) else 0.0
-    return ReflectorIndex(x, y, variance, ids, offsets, float(low[0]), float(low[1]), cell, rows, columns, largest)
+    return ReflectorIndex(
+        read_only(centers[order, 0]),
+        read_only(centers[order, 1]),
+        read_only(np.square(sigmas[order])),
+        read_only(order.astype(np.int64)),
+        read_only(offsets),
+        float(low[0]),
+        float(low[1]),
+        cell,
+        rows,
+        columns,
+        float(np.square(sigmas).max(initial=0.0)),
+    )
 
 
 @compiled

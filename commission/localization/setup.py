@@ -25,7 +25,7 @@ class FilterModel(NamedTuple):
 
     odometry: OdometryNoise
     observation: ObservationModel
-    index: ReflectorIndex
+    reflectors: ReflectorIndex
     gate: Gate
     limits: SupervisorLimits
 

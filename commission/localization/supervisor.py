@@ -1,4 +1,4 @@
-"""Uncertainty supervisor (Sobreira et al. 2016, Algorithm 4): may the vehicle drive on this belief?
+"""Uncertainty supervisor (Sobreira et al. 2016, Algorithm 4): says whether the vehicle may drive on this belief.
 
 In fail mode the *output* is withheld while the filter goes on with its own state; were the state withheld too, as a
 literal reading of lines 18 and 19 has it, the covariance could never shrink again and the mode never recover.

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commission.compiled import compiled
-from commission.geometry.arrays import FloatArray, IntArray
+from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.cycle import process_scan
 from commission.localization.detection_log import DetectionLog, extract_detections
 from commission.localization.estimate import Belief, Estimate, Mode, Status
@@ -20,7 +20,10 @@ from commission.localization.observation import ObservationModel, project_detect
 from commission.localization.odometry import AT_REST, Motion, advance
 from commission.localization.pose_gaussian import PoseGaussian, from_belief, to_belief
 from commission.localization.setup import FilterModel, LocalizerSetup
-from commission.site.record_log import RecordLog
+from commission.site.parameters import Parameters
+from commission.site.record_log import RecordLog, ScanLog
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.scanner import Scanner
 
 
 class Columns(NamedTuple):
@@ -93,15 +96,17 @@ class RunArrays:
 
     def counts(self, status: Status) -> IntArray:
         """(K,) detections of one status in each cycle."""
-        return self._sums((self.status == status).astype(np.int64))
+        totals = np.concatenate(([0], np.cumsum(self.status == status, dtype=np.int64)))
+        return totals[self.offsets[1:]] - totals[self.offsets[:-1]]
 
     def nis_sums(self) -> FloatArray:
         """(K,) sum of the squared Mahalanobis distances of each cycle's inliers; 2 degrees of freedom each."""
-        return self._sums(np.where(self.status == Status.INLIER, self.d2, 0.0))
+        totals = np.concatenate(([0.0], np.cumsum(np.where(self.status == Status.INLIER, self.d2, 0.0))))
+        return totals[self.offsets[1:]] - totals[self.offsets[:-1]]
 
     def output_cycles(self) -> IntArray:
         """(K,) cycle whose posterior the vehicle is given: the last operational one; -1: the initial belief."""
-        cycles = np.where(self.modes == Mode.OPERATIONAL, np.arange(len(self)), -1)
+        cycles = np.where(self.modes == Mode.OPERATIONAL, np.arange(len(self), dtype=np.int64), -1)
         return np.maximum.accumulate(cycles)
 
     def points_map(self) -> FloatArray:
@@ -133,11 +138,6 @@ class RunArrays:
 
     def _posterior(self, cycle: int) -> Belief:
         return Belief(int(self.stamps_ns[cycle]), self.means[cycle], self.covariances[cycle])
-
-    def _sums(self, values: NDArray[np.generic]) -> NDArray[np.generic]:
-        """(K,) sum of a value per detection over each cycle."""
-        totals = np.concatenate((np.zeros(1, values.dtype), np.cumsum(values)))
-        return totals[self.offsets[1:]] - totals[self.offsets[:-1]]
 
 
 def run(
@@ -173,14 +173,10 @@ def run(
         np.empty(total, dtype=np.int64),
         np.empty(total),
     )
-    stamps, displacements = np.ascontiguousarray(log.odometry_stamps_ns), np.ascontiguousarray(log.displacements)
-    stamps, displacements = stamps.view(), displacements.view()
-    stamps.setflags(write=False)
-    displacements.setflags(write=False)
     start = from_belief(initial)
     final = _run(
-        stamps,
-        displacements,
+        read_only(log.odometry_stamps_ns),
+        read_only(log.displacements),
         detected.stamps_ns,
         detected.offsets,
         detected.range_bearing,
@@ -200,6 +196,15 @@ def run(
         *columns,
         to_belief(final, max(newest, default=initial.stamp_ns)),
     )
+
+
+def warm_up() -> None:
+    """Compile the loop and the detection of whole logs (the serial one), by running over one scan."""
+    setup = LocalizerSetup(ReflectorMap((Reflector("A", 2.0, 0.0),)), Scanner(), Parameters())
+    ranges = np.full((1, 4), 1.96, dtype=np.float32)
+    scans = ScanLog(np.array([2]), ranges, -0.02, 0.01, None, np.array([[False, False, True, False]]))
+    log = RecordLog(np.array([0, 1]), np.zeros((2, 3)), scans)
+    run(log, setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3))).points_map()
 
 
 @compiled

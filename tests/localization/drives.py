@@ -52,7 +52,9 @@ def random_map(rng: np.random.Generator, count: int, side: float = 20.0, **more:
     return ReflectorMap(tuple(Reflector(f"R{i}", float(x), float(y), **more) for i, (x, y) in enumerate(places)))
 
 
-def odometry_error(rng: np.random.Generator, displacement: FloatArray, seconds: float, setup: LocalizerSetup) -> FloatArray:
+def odometry_error(
+    rng: np.random.Generator, displacement: FloatArray, seconds: float, setup: LocalizerSetup
+) -> FloatArray:
     """Motion that happened when `displacement` was measured, drawn as the filter's noise model says (halfway)."""
     noise = setup.filter.odometry
     chord = math.hypot(displacement[0], displacement[1])
@@ -96,7 +98,15 @@ def random_drive(setup: LocalizerSetup, rng: np.random.Generator, plan: Plan) ->
     return Drive(records, Belief(0, start, covariance), np.array(truth))
 
 
-def _scan(records, truth, stamp, pose, setup, rng, plan) -> None:
+def _scan(  # noqa: PLR0917
+    records: list[Record],
+    truth: list[FloatArray],
+    stamp: int,
+    pose: FloatArray,
+    setup: LocalizerSetup,
+    rng: np.random.Generator,
+    plan: Plan,
+) -> None:
     records.append(ReferencePose(stamp, pose))
     index = len(truth)
     truth.append(pose)

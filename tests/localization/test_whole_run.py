@@ -1,0 +1,106 @@
+"""The compiled whole run is the live localizer, to the last bit, whatever the rates and kinds of records."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from commission.localization.detection_log import extract_detections
+from commission.localization.estimate import Belief, Estimate, Status
+from commission.localization.localizer import Localizer
+from commission.localization.setup import LocalizerSetup
+from commission.localization.whole_run import run
+from commission.site.parameters import AssociationParameters, Parameters
+from commission.site.record_log import RecordLog
+from commission.site.scanner import Scanner
+from tests.localization.drives import Plan, random_drive, random_map
+
+PLANS = {
+    "equal stamps": Plan(),
+    "scans between odometry": Plan(scan_offset_ns=7_000_000),
+    "scans faster than odometry": Plan(odometry_ns=100_000_000, scan_ns=30_000_000),
+    "rates that never meet": Plan(odometry_ns=17_000_001, scan_ns=41_000_003, scan_offset_ns=5),
+    "raw scans": Plan(scans=30, beams=1440),
+    "raw scans between odometry": Plan(scans=30, beams=720, scan_offset_ns=3_000_000),
+    "the sensor starts to detect": Plan(scans=30, beams=720, both_after=10),
+}
+
+
+def setup_of(rng: np.random.Generator, parameters: Parameters | None = None) -> LocalizerSetup:
+    scanner = Scanner(mounting=np.array([0.3, 0.1, 0.2]))
+    return LocalizerSetup(random_map(rng, 12), scanner, parameters or Parameters())
+
+
+def bits(value: object) -> bytes | list[bytes]:
+    """Bytes of a value, so that NaN equals NaN and -0.0 does not equal 0.0."""
+    if isinstance(value, Belief):
+        return [bits(getattr(value, field.name)) for field in dataclasses.fields(value)]
+    return np.asarray(value).tobytes()
+
+
+def assert_same_estimate(a: Estimate, b: Estimate) -> None:
+    for field in dataclasses.fields(Estimate):
+        assert bits(getattr(a, field.name)) == bits(getattr(b, field.name)), f"{field.name} at {a.stamp_ns} ns"
+
+
+@pytest.mark.parametrize("plan", PLANS.values(), ids=PLANS.keys())
+@pytest.mark.parametrize("filtered", [True, False], ids=["filtered", "unfiltered"])
+def test_whole_run_equals_live_localizer_to_the_last_bit(plan: Plan, filtered: bool) -> None:
+    rng = np.random.default_rng(3)
+    setup = setup_of(rng, Parameters(association=AssociationParameters(enabled=filtered)))
+    drive = random_drive(setup, rng, plan)
+    arrays = run(drive.log, setup, drive.initial)
+    localizer = Localizer(setup, drive.initial)
+    estimates = [estimate for estimate in map(localizer.feed, drive.log.records()) if estimate is not None]
+    assert len(estimates) == len(arrays) > 0
+    for cycle, estimate in enumerate(estimates):
+        assert_same_estimate(estimate, arrays.estimate(cycle))
+    assert bits(localizer.belief) == bits(arrays.final)
+
+
+def test_moved_gate_replays_the_filter_over_kept_detections() -> None:
+    rng = np.random.default_rng(4)
+    setup = setup_of(rng)
+    drive = random_drive(setup, rng, Plan(scans=30, beams=1440, clutter=3.0))
+    detected = extract_detections(drive.log, setup)
+    narrow = dataclasses.replace(setup, parameters=Parameters(association=AssociationParameters(gate_probability=0.1)))
+    kept, fresh = run(drive.log, narrow, drive.initial, detected=detected), run(drive.log, narrow, drive.initial)
+    assert kept.means.tobytes() == fresh.means.tobytes()
+    before = run(drive.log, setup, drive.initial, detected=detected)
+    assert kept.counts(Status.INLIER).sum() < before.counts(Status.INLIER).sum()
+
+
+def test_extraction_on_all_cores_gives_the_same_detections() -> None:
+    rng = np.random.default_rng(5)
+    setup = setup_of(rng)
+    log = random_drive(setup, rng, Plan(scans=30, beams=1440, clutter=3.0)).log
+    serial, parallel = extract_detections(log, setup), extract_detections(log, setup, parallel=True)
+    for field in dataclasses.fields(serial):
+        assert bits(getattr(serial, field.name)) == bits(getattr(parallel, field.name)), field.name
+
+
+def test_summaries_count_what_the_estimates_hold() -> None:
+    rng = np.random.default_rng(6)
+    setup = setup_of(rng)
+    drive = random_drive(setup, rng, Plan(clutter=3.0))
+    arrays = run(drive.log, setup, drive.initial)
+    estimates = [arrays.estimate(k) for k in range(len(arrays))]
+    for status in Status:
+        assert arrays.counts(status).tolist() == [estimate.count(status) for estimate in estimates]
+    nis = [float(estimate.d2[estimate.status == Status.INLIER].sum()) for estimate in estimates]
+    # A difference of running sums of about 1e3: 1e-12 of it is lost.
+    np.testing.assert_allclose(arrays.nis_sums(), nis, atol=1e-9)
+    np.testing.assert_array_equal(arrays.points_map(), np.concatenate([e.points_map for e in estimates]))
+
+
+def test_log_without_scans_or_records_gives_no_cycles() -> None:
+    setup = setup_of(np.random.default_rng(7))
+    initial = Belief(5, np.array([1.0, 2.0, 0.5]), np.eye(3))
+    empty = run(RecordLog(np.empty(0, np.int64), np.empty((0, 3))), setup, initial)
+    assert len(empty) == 0
+    assert empty.final.stamp_ns == 5
+    moved = run(RecordLog(np.array([0, 10]), np.array([[0.0, 0, 0], [1.0, 0, 0]])), setup, initial)
+    assert len(moved) == 0
+    np.testing.assert_allclose(moved.final.mean[:2], [1.0 + np.cos(0.5), 2.0 + np.sin(0.5)])
