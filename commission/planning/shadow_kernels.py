@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
-from commission.geometry.raycast import RayTables, cast_ray
+from commission.geometry.ray_kernels import RayTables, cast_ray
 
 # Ranges of a shadow map are rounded to float32 (7 digits: 0.01 mm at 100 m); this much is left to the exact test.
 ROUNDING = 1e-4

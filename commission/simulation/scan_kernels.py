@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from commission.compiled import compiled
 from commission.geometry.angles import TURN, wrap_scalar
 from commission.geometry.arrays import BoolArray, FloatArray
-from commission.geometry.raycast import RayTables, cast_ray
+from commission.geometry.ray_kernels import RayTables, cast_ray
 
 FLAT_COSINE = math.cos(math.radians(65.0))
 """Cosine of the angle of incidence beyond which a flat reflector returns no more than a wall does."""

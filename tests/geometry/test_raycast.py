@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from commission.geometry import raycast
 from commission.geometry.occupancy import OccupancyGrid
-from commission.geometry.raycast import RayCaster, cast_ray, free_squares
+from commission.geometry.ray_kernels import cast_ray, free_squares
+from commission.geometry.raycast import RayCaster
 from commission.geometry.se2 import transform_points
 
 Hit = tuple[float, int, int]
@@ -188,11 +189,15 @@ def test_range_ends_on_the_wall_wherever_the_grid_is_placed(
 def test_batches_keep_their_shape_and_parallel_gives_the_same_bits() -> None:
     caster = RayCaster(OccupancyGrid(random_map(9), 0.1, np.array([3.0, -2.0, 0.4])))
     rng = np.random.default_rng(4)
-    rays = rng.uniform([2, -3, -3], [6, 3, 3], (20, 11, 3))
+    rays = rng.uniform([1, -4, -3], [7, 4, 3], (20, 11, 3))
     ranges = caster.cast(rays, 4.0)
     assert ranges.shape == (20, 11)
     assert np.isfinite(ranges).any()
     np.testing.assert_array_equal(caster.cast_parallel(rays, 4.0), ranges)
+    one_by_one = [cast_ray(caster.tables, x, y, math.cos(h), math.sin(h), 4.0)[0] for x, y, h in rays.reshape(-1, 3)]
+    np.testing.assert_array_equal(ranges.reshape(-1), one_by_one)
+    many = np.tile(rays.reshape(-1, 3), (10, 1))
+    np.testing.assert_array_equal(caster.cast_parallel(many, 4.0), np.tile(ranges.reshape(-1), 10))
     assert caster.cast(np.zeros((0, 3)), 4.0).shape == (0,)
     assert caster.cast([0.0, 0.0, 0.0], 1.0).shape == ()
 
