@@ -15,11 +15,12 @@ from commission.errors import ProjectError
 from commission.geometry.angles import wrap
 from commission.geometry.arrays import FloatArray, IntArray, frozen
 from commission.geometry.se2 import compose, exp
+from commission.localization.kinematics import body_twist, wheel_speeds
 from commission.simulation.follower import drives_of, follow_leg, way_of
 from commission.simulation.path import CREEP, Leg, MotionLimits, legs_of
 from commission.site.parameters import OdometryParameters
 from commission.site.routes import Route
-from commission.site.vehicle import Vehicle
+from commission.site.vehicle import TricycleVehicle, Vehicle
 
 PAUSE_AT_STOP = 0.5
 """Rest between two legs [s]."""
@@ -137,7 +138,7 @@ def _patience(leg: Leg, period: float) -> int:
 
 def measure(
     motion: Motion,
-    vehicle: Vehicle,  # noqa: ARG001 - the wheels that can slip
+    vehicle: Vehicle,
     noise: OdometryParameters,
     slips_per_100_m: float,
     rng: np.random.Generator,
@@ -159,11 +160,11 @@ def measure(
     displacements : (M, 3) array [m, m, rad] in the base frame at the stamp before; the first row is zero.
     """
     period = 1e-9 * motion.period_ns
-    reported = _with_slips(motion, slips_per_100_m, rng) * period
+    reported = _with_slips(motion, vehicle, slips_per_100_m, rng) * period
     moves = motion.twists * period
     distance = np.hypot(moves[:, 0], moves[:, 1])
     turn = np.abs(moves[:, 2])
-    direction = np.divide(moves[:, :2], distance[:, np.newaxis], out=np.zeros((len(moves), 2)), where=moves[:, :1] != 0)
+    direction = moves[:, :2] / np.where(distance > 0.0, distance, 1.0)[:, np.newaxis]
     draws = rng.standard_normal((len(moves), 4))
     along = noise.forward_per_sqrt_m * np.sqrt(distance) * draws[:, 0]
     across = noise.lateral_per_sqrt_m * np.sqrt(distance) * draws[:, 1]
@@ -182,7 +183,7 @@ def measure(
     return displacements
 
 
-def _with_slips(motion: Motion, per_100_m: float, rng: np.random.Generator) -> FloatArray:
+def _with_slips(motion: Motion, vehicle: Vehicle, per_100_m: float, rng: np.random.Generator) -> FloatArray:
     """(M, 3) twists that the wheels report; where one slips it reports a motion that did not happen."""
     reported = np.array(motion.twists)
     period = 1e-9 * motion.period_ns
@@ -192,5 +193,11 @@ def _with_slips(motion: Motion, per_100_m: float, rng: np.random.Generator) -> F
         first = int(np.searchsorted(travelled, place))
         steps = max(1, round(rng.uniform(*SLIP_DURATION) / period))
         excess = 1.0 + rng.uniform(*SLIP_EXCESS)
-        reported[first : first + steps] *= excess
+        choice = rng.uniform()
+        for row in range(first, min(first + steps, len(reported))):
+            wheels = np.array(wheel_speeds(vehicle, motion.twists[row]))
+            # The second number of a tricycle is its steering angle, which does not slip.
+            driven = 1 if isinstance(vehicle, TricycleVehicle) else len(wheels)
+            wheels[int(choice * driven)] *= excess
+            reported[row] = body_twist(vehicle, wheels)
     return reported
