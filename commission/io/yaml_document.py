@@ -142,14 +142,17 @@ class _Builder:
         self.found.lines.setdefault(key_path, event.start_mark.line + 1)
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
             raise self.error(event, key_path, "uses an anchor or alias (& or *)", "every value written out")
-        if getattr(event, "tag", None) not in (None, "!"):
-            raise self.error(event, key_path, f"has the tag {event.tag!r}", "plain values without tags")
+        tag = getattr(event, "tag", None)
+        if tag not in (None, "!"):
+            raise self.error(event, key_path, f"has the tag {tag!r}", "plain values without tags")
         if len(key_path) > DEPTH_LIMIT:
             raise self.error(event, (), "is nested too deeply", f"at most {DEPTH_LIMIT} levels")
         if isinstance(event, yaml.MappingStartEvent):
             return self.mapping(key_path)
         if isinstance(event, yaml.SequenceStartEvent):
             return self.sequence(key_path)
+        if not isinstance(event, yaml.ScalarEvent):
+            raise self.error(event, key_path, "is no value", "text, a number, a list or a mapping")
         # The style of an unquoted scalar is None in the Python parser and empty in the C parser.
         value = event.value if event.style else scalar(event.value)
         if isinstance(value, float) and not math.isfinite(value):
