@@ -151,8 +151,8 @@ def _explained(document: YamlDocument, key_path: KeyPath, cls: type, message: st
         )
     if text.startswith("Invalid enum value"):
         options = typing.get_type_hints(_owner(cls, steps[:-1]) or cls).get(str(steps[-1]))
-        is_words = isinstance(options, type) and issubclass(options, StrEnum)
-        remedy = f"one of: {', '.join(word.value for word in options)}" if is_words else "a known word"
+        words = list(options) if isinstance(options, type) and issubclass(options, StrEnum) else []
+        remedy = f"one of: {', '.join(words)}"
         return document.error((*key_path, *steps), text[len("Invalid enum ") :], _with_hint(remedy, cls, steps))
     problem, _, remedy = text.partition("; expected ")
     owner = _owner(cls, steps)

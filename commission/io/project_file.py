@@ -79,6 +79,8 @@ def load_project(path: Path) -> Project:
         one line that names file, line, key, what was found and what is expected.
     """
     yaml_path = project_file(path)
+    if not yaml_path.is_file():
+        raise FileFormatError(yaml_path, "", "does not exist", f"a project: a folder with a {FILE_NAME}")
     document, keys = _read_document(yaml_path)
     try:
         return Project(
