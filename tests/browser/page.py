@@ -34,10 +34,23 @@ _HIDE_TOAST = ".mantine-Notifications-root{display:none !important}"
 _PIXEL_OF = """([x, y, z]) => {
   const viewer = window.__viserMutable;
   const point = viewer.camera.position.clone().set(x, y, z);
+  viewer.camera.updateMatrixWorld();
   point.applyMatrix4(viewer.nodeRefFromName[''].matrixWorld).project(viewer.camera);
   const box = viewer.canvas.getBoundingClientRect();
   return [box.left + (point.x + 1) / 2 * box.width, box.top + (1 - point.y) / 2 * box.height];
 }"""
+
+_IS_SETTLED = """() => {
+  const viewer = window.__viserMutable, box = viewer.canvas.getBoundingClientRect();
+  const names = Object.keys(viewer.nodeRefFromName), camera = viewer.camera;
+  const now = [box.left, box.top, box.width, box.height, names.length, camera.fov,
+               ...camera.position.toArray(), ...viewer.nodeRefFromName[''].matrixWorld.elements].join();
+  if (window.__layout?.now !== now) window.__layout = {now, since: performance.now()};
+  for (let element = viewer.canvas; element; element = element.parentElement)
+    if (getComputedStyle(element).opacity < 1) return false;
+  return performance.now() - window.__layout.since > 400;
+}"""
+"""Panels, styles and the camera's place arrive one by one, and the floor fades in: a click in between misses."""
 
 _FRAME = "window.__viserTestpoints?.rendererInfo?.render?.frame ?? -1"
 
@@ -58,7 +71,7 @@ class OpenPage:
         self.server = server
         self._context: BrowserContext = browser.new_context(viewport={"width": size[0], "height": size[1]})
         self.page: Page = self._context.new_page()
-        self.page.set_default_timeout(15_000)
+        self.page.set_default_timeout(60_000)  # without a graphics card, on a busy machine: 2 frames a second
         self.errors: list[str] = []
         """What the browser complained about."""
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
@@ -78,29 +91,23 @@ class OpenPage:
 
     def wait_for_client(self, before: set[int]) -> viser.ClientHandle:
         """The client that is connected now and was not before; viser numbers them anew at each connection."""
-        for _ in range(300):
+        for _ in range(1200):
             clients = self.server.get_clients()
             new = sorted(set(clients) - before)
             if new:
                 return clients[new[-1]]
             self.page.wait_for_timeout(50)
-        raise TimeoutError("no browser connected within 15 s")
+        raise TimeoutError("no browser connected within a minute")
 
     def wait_until_drawn(self, nodes: Sequence[str] = ()) -> None:
         """Wait for these scene nodes and for a frame that is drawn after they came."""
         self.page.add_style_tag(content=_HIDE_TOAST)
         for name in ("", *nodes):
             self.page.wait_for_function("name => name in window.__viserMutable.nodeRefFromName", arg=name)
+        self.page.wait_for_function(_IS_SETTLED, polling=50)
         frame = self.page.evaluate(_FRAME)
         self.page.evaluate("window.__viserMutable.requestRender()")
         self.page.wait_for_function(f"frame => ({_FRAME}) > frame", arg=frame)
-        # The floor fades in after each connection.
-        self.page.wait_for_function(
-            "() => { let element = window.__viserMutable.canvas;"
-            " for (; element; element = element.parentElement)"
-            "   if (getComputedStyle(element).opacity < 1) return false;"
-            " return true; }"
-        )
 
     def pixel_of(self, point_map: Sequence[float]) -> tuple[float, float]:
         """Where a point of the scene is seen, from the window's upper left corner [pixels]."""

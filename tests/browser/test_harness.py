@@ -41,12 +41,12 @@ def server() -> Iterator[viser.ViserServer]:
 
 def seen(queue: SimpleQueue[object], window: OpenPage) -> object:
     """Next thing that the server was told, while the browser goes on."""
-    for _ in range(200):
+    for _ in range(800):
         try:
             return queue.get_nowait()
         except Empty:
             window.page.wait_for_timeout(25)
-    raise TimeoutError("the server was told nothing within 5 s")
+    raise TimeoutError("the server was told nothing within 20 s")
 
 
 @pytest.mark.parametrize("size", [WIDE, SMALL])
