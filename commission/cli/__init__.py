@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from commission.cli import page, parsing
+from commission.cli import localizing, page, parsing, simulating
 from commission.cli.parsing import Command
 from commission.cli.versions import Version
 from commission.errors import CommissionError
@@ -23,6 +23,8 @@ SHOW_TRACEBACK = "COMMISSION_TRACEBACK"
 COMMANDS: dict[str, type[Command]] = {
     "demo": page.Demo,
     "serve": page.Serve,
+    "simulate": simulating.Simulate,
+    "localize": localizing.Localize,
     "version": Version,
 }
 

@@ -98,7 +98,7 @@ def random_drive(setup: LocalizerSetup, rng: np.random.Generator, plan: Plan) ->
     return Drive(records, Belief(0, start, covariance), np.array(truth))
 
 
-def _scan(  # noqa: PLR0917
+def _scan(
     records: list[Record],
     truth: list[FloatArray],
     stamp: int,

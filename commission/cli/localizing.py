@@ -1,0 +1,98 @@
+"""The command `localize`: a recording through the localizer, its estimates and a summary into a folder."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+from commission.cli.parsing import initial_pose
+
+if TYPE_CHECKING:
+    from commission.studies.replay import ReplayResult
+    from commission.studies.start import Start
+
+
+@dataclass(frozen=True, kw_only=True)
+class Localize:
+    """Run the localizer over a recording; writes estimates.csv, detections.csv and summary.json."""
+
+    project: Positional[Path]
+    """Folder of the project (holds project.yaml)."""
+    recording: Positional[Path]
+    """Recording: a CSV folder (odometry.csv with detections.csv or scans.npz)."""
+    out: Annotated[Path, arg(metavar="DIR")]
+    """Folder for the results; made when it does not exist."""
+    initial_pose: Annotated[str | None, arg(metavar="X,Y,THETA[,SX,SY,STHETA]")] = None
+    """Pose of base at the first record and its 1-sigma, map frame [m, m, rad]. None: the first reference pose, else the
+    start of the project's first route, with 1-sigma 0.02 m and 0.01 rad."""
+    set: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="GROUP.KEY=VALUE")] = ()
+    """A parameter of the localizer in place of the project's, in SI units and radians."""
+
+    def run(self) -> None:
+        """Localize, write, and tell in a few lines how it went."""
+        given = None if self.initial_pose is None else initial_pose(self.initial_pose)
+
+        from commission.io.project_file import apply_settings, load_project
+        from commission.io.recordings.base import load_log
+        from commission.io.results import write_results
+        from commission.localization import whole_run
+        from commission.studies.replay import judge, localize, summary
+        from commission.studies.start import start_of
+
+        project = load_project(self.project)
+        project = dataclasses.replace(project, parameters=apply_settings(project.parameters, self.set))
+        log = load_log(self.recording)
+        start = start_of(project, log, given and given.pose, given and given.sigmas)
+
+        whole_run.warm_up()
+        started = time.perf_counter()
+        arrays = localize(project, log, start.belief)
+        microseconds_per_cycle = (time.perf_counter() - started) * 1e6 / len(arrays)
+        result = judge(project, log, arrays)
+
+        ids = [reflector.id for reflector in project.reflectors.reflectors]
+        write_results(self.out, result.run, ids, summary(result, microseconds_per_cycle))
+        limit = project.parameters.supervisor.position_limit
+        sys.stdout.write("\n".join([*_report(result, start, limit), f"Written to   {self.out}"]) + "\n")
+
+
+def _report(result: ReplayResult, start: Start, position_limit: float) -> list[str]:
+    """Lines that tell a person how the run went; millimetres and degrees as is the habit."""
+    from commission.localization.estimate import Status
+
+    x, y, theta = start.belief.mean
+    lines = [
+        f"Recording    {result.cycles} cycles in {result.duration:.1f} s",
+        f"Start        x {x:.3f} m, y {y:.3f} m, heading {math.degrees(theta):.1f} deg ({start.origin.value})",
+        f"Detections   {result.count(Status.INLIER)} inliers, "
+        f"{result.count(Status.OUTLIER_DETECTOR)} outliers of the detector, "
+        f"{result.count(Status.OUTLIER_ASSOCIATION)} of the association; mean NIS {result.nis_mean:.2f}",
+        f"Supervisor   operational {100.0 * result.operational_fraction:.1f} %; fail episodes: {len(result.episodes)}"
+        + "".join(_longest(result)),
+    ]
+    errors = result.statistics
+    if errors is None:
+        return [*lines, "Reference    none: errors are unknown"]
+    heading = "" if math.isnan(errors.heading_rmse) else f"; heading {math.degrees(errors.heading_rmse):.2f} deg RMS"
+    consistency = "" if math.isnan(errors.anees) else f"{errors.anees:.2f}, of the "
+    return [
+        *lines,
+        f"Error        position {errors.position_rmse * 1e3:.1f} mm RMS, {errors.position_median * 1e3:.1f} median, "
+        f"{errors.position_p95 * 1e3:.1f} at 95 %, {errors.position_max * 1e3:.1f} at most{heading}",
+        f"Consistency  ANEES {consistency}position {errors.anees_position:.2f} (1 is consistent, more is too sure)",
+        f"Danger       {errors.wrong_while_operational} of {errors.compared} cycles operational with an error "
+        f"beyond {position_limit * 1e3:.0f} mm",
+    ]
+
+
+def _longest(result: ReplayResult) -> list[str]:
+    """How long the longest fail episode is, if there is one."""
+    lengths = [(episode.end_ns - episode.start_ns) * 1e-9 for episode in result.episodes]
+    return [f", the longest {max(lengths):.1f} s"] if lengths else []

@@ -1,0 +1,112 @@
+"""The command `simulate`: a virtual drive, written as the recording of a real vehicle would be."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+from commission.errors import UsageError
+
+if TYPE_CHECKING:
+    from commission.site.disturbances import CoveredPeriod, Disturbances
+    from commission.site.project import Project
+    from commission.site.records import Record
+
+COVER_FORM = "START,DURATION (seconds)"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulate:
+    """Drive a virtual AGV along a route and write what it reports as a recording, ground truth included."""
+
+    project: Positional[Path]
+    """Folder of the project (holds project.yaml)."""
+    out: Annotated[Path, arg(metavar="DIR")]
+    """Folder for the recording; made when it does not exist."""
+    route: Annotated[str | None, arg(metavar="NAME")] = None
+    """Route to drive. None: the project's first."""
+    seed: int = 1
+    """Seed of every random number, 0 or more: the same seed gives the same recording, bit by bit."""
+    faults: bool = True
+    """Whether the project's disturbances act: people, shiny objects, glints, tilted floor, lost scans, wheel slips."""
+    people: Annotated[int | None, arg(metavar="N")] = None
+    """People walking about. None: as many as the project says."""
+    cover: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="START,DURATION")] = ()
+    """A time during which all reflectors are covered: start and length [s]."""
+
+    def run(self) -> None:
+        """Simulate, write, and tell in two lines what was written."""
+        if self.seed < 0:
+            raise UsageError(f"--seed is {self.seed}; expected 0 or more")
+
+        from commission.io.project_file import load_project
+        from commission.io.recordings.csv_writer import write_recording
+        from commission.simulation.scenario import records
+
+        project = load_project(self.project)
+        route = self._route(project)
+        project = dataclasses.replace(project, disturbances=self._disturbances(project))
+        tally = _Tally()
+        write_recording(self.out, tally.count(records(project, route, self.seed)))
+
+        seconds = tally.last_ns * 1e-9
+        sys.stdout.write(f"Drive        route {route!r}, {seconds:.1f} s, {tally.scans} scans, seed {self.seed}\n")
+        sys.stdout.write(f"Written to   {self.out}\n")
+
+    def _route(self, project: Project) -> str:
+        """Name of the route to drive; raises UsageError when there is none."""
+        if self.route is not None:
+            return project.route(self.route).name
+        if not project.routes:
+            raise UsageError("the project has no route; expected one to drive along")
+        return project.routes[0].name
+
+    def _disturbances(self, project: Project) -> Disturbances:
+        """Return what the drive suffers; raises UsageError for a number out of range."""
+        from commission.site.disturbances import Disturbances
+
+        disturbances = project.disturbances if self.faults else Disturbances()
+        covered = (*disturbances.covered, *(_covered_period(text) for text in self.cover))
+        people = disturbances.people if self.people is None else self.people
+        try:
+            return dataclasses.replace(disturbances, people=people, covered=covered)
+        except ValueError as error:
+            raise UsageError(str(error)) from None
+
+
+@dataclass
+class _Tally:
+    """What has passed on its way from the simulation to the file: a whole drive is never held in memory."""
+
+    scans: int = 0
+    """Scans so far."""
+    last_ns: int = 0
+    """Stamp of the last record [ns]; a drive begins at 0."""
+
+    def count(self, records: Iterable[Record]) -> Iterator[Record]:
+        """Pass records on and count them."""
+        from commission.site.records import Scan
+
+        for record in records:
+            self.scans += isinstance(record, Scan)
+            self.last_ns = record.stamp_ns
+            yield record
+
+
+def _covered_period(text: str) -> CoveredPeriod:
+    """Read `START,DURATION`; raises UsageError that shows the text and the form expected."""
+    from commission.site.disturbances import CoveredPeriod
+
+    words = text.split(",")
+    if len(words) != 2:
+        raise UsageError(f"--cover is {text!r}; expected {COVER_FORM}")
+    try:
+        return CoveredPeriod(float(words[0]), float(words[1]))
+    except ValueError as error:
+        raise UsageError(f"--cover is {text!r}: {error}; expected {COVER_FORM}") from None

@@ -1,0 +1,194 @@
+import csv
+import json
+import random
+
+import pytest
+
+KEYS = [
+    *("cycles", "duration_s", "inliers", "outliers_detector", "outliers_association", "operational_fraction"),
+    *("fail_episodes", "nis_mean", "microseconds_per_cycle"),
+]
+KEYS_WITH_REFERENCE = [
+    *("position_rmse_m", "position_median_m", "position_p95_m", "position_max_m", "heading_rmse_rad"),
+    *("anees", "anees_position", "wrong_while_operational"),
+]
+ESTIMATES = "stamp_ns,x,y,theta,var_x,cov_xy,cov_xtheta,var_y,cov_ytheta,var_theta,mode,inliers,outliers"
+DETECTIONS = "stamp_ns,range,bearing,x,y,status,reflector_id,d2"
+
+
+def rows(path):
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_results_are_those_of_the_recording(commission, project, recording, tmp_path):
+    out = tmp_path / "deep" / "result"
+    code, told, err = commission("localize", project, recording, "--out", out)
+    assert (code, err) == (0, "")
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert list(summary) == KEYS + KEYS_WITH_REFERENCE
+    assert summary["cycles"] == 61
+    assert summary["duration_s"] == pytest.approx(12.0)
+    assert summary["inliers"] + summary["outliers_association"] == 61 * 5
+    assert summary["operational_fraction"] == 1.0
+    assert summary["fail_episodes"] == summary["wrong_while_operational"] == 0
+    # Five reflectors at 2 cm and 4 mrad locate to about 1 cm.
+    assert summary["position_rmse_m"] < 0.02
+    assert summary["microseconds_per_cycle"] > 0.0
+    assert "61 cycles in 12.0 s" in told
+    assert "first reference pose" in told
+    assert "mm RMS" in told
+
+    assert (out / "estimates.csv").read_text(encoding="utf-8").splitlines()[0] == ESTIMATES
+    estimates = rows(out / "estimates.csv")
+    assert len(estimates) == 61
+    assert {row["mode"] for row in estimates} == {"operational"}
+    assert float(estimates[-1]["x"]) == pytest.approx(6.0, abs=0.05)
+    assert (out / "detections.csv").read_text(encoding="utf-8").splitlines()[0] == DETECTIONS
+    detections = rows(out / "detections.csv")
+    assert len(detections) == 61 * 5
+    inliers = [row for row in detections if row["status"] == "inlier"]
+    assert len(inliers) == summary["inliers"]
+    assert {row["reflector_id"] for row in inliers} == {"R0", "R1", "R2", "R3", "R4"}
+    assert sum(float(row["d2"]) for row in inliers) / len(inliers) == pytest.approx(summary["nis_mean"], rel=1e-6)
+
+
+def test_without_a_reference_the_errors_are_left_out_and_the_route_says_where_it_starts(
+    commission, project, recording, tmp_path
+):
+    (recording / "reference.csv").unlink()
+    code, told, _ = commission("localize", project, recording, "--out", tmp_path / "out")
+    assert code == 0
+    assert "start of the first route" in told
+    assert "errors are unknown" in told
+    assert list(json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))) == KEYS
+
+
+@pytest.mark.parametrize("form", [["--initial-pose", "-0.1,0.1,-0.01"], ["--initial-pose=-0.1,0.1,-0.01,0.2,0.2,0.1"]])
+def test_an_initial_pose_may_begin_with_a_minus(form, commission, project, recording, tmp_path):
+    code, told, err = commission("localize", project, recording, "--out", tmp_path / "out", *form)
+    assert (code, err) == (0, "")
+    assert "x -0.100 m, y 0.100 m, heading -0.6 deg (as given)" in told
+
+
+def test_settings_are_repeatable_and_the_last_one_counts(commission, project, recording, tmp_path):
+    settings = ["association.gate_probability=0.001", "association.gate_probability=0.9", "observation.range_bias=-0.0"]
+    words = [word for setting in settings for word in ("--set", setting)]
+    assert commission("localize", project, recording, "--out", tmp_path / "out", *words)[0] == 0
+    inliers = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["inliers"]
+    # A gate of 90 % passes about 90 %: 275 of 305, within six standard deviations.
+    assert 245 <= inliers <= 305
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--set", "association.gate_probability"], "association.gate_probability"),
+        (["--set", "association.gate_probability=2"], "association.gate_probability is 2"),
+        (["--set", "association.gate_probability=much"], "association.gate_probability"),
+        (["--set", "association.no_such=1"], "association.gate_probability"),
+        (["--set", "no_such.gate=1"], "association"),
+        (["--set", "=1"], "'=1'"),
+        (["--set", "observation.range_sigma=-0.1"], "observation.range_sigma is -0.1"),
+        (["--set", "observation.range_sigma=nan"], "observation.range_sigma is 'nan'"),
+        (["--initial-pose", "1,2"], "has 2 numbers"),
+        (["--initial-pose", "-1,x,2"], "'-1,x,2'"),
+        (["--speed", "3"], "--speed"),
+    ],
+)
+def test_a_bad_option_is_refused_by_name(words, said, refused, project, recording, tmp_path):
+    assert said in refused("localize", project, recording, "--out", tmp_path / "out", *words)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "said"),
+    [
+        ("hall/project.yaml", None, "project.yaml"),
+        ("hall/project.yaml", "", "schema"),
+        ("hall/project.yaml", "schema: 2\n", "schema"),
+        ("hall/project.yaml", "schema: 1\nscaner: {}\n", "scaner"),
+        ("hall/project.yaml", "schema: 1\nreflectors: ../../etc/passwd\n", "reflectors"),
+        ("hall/project.yaml", "schema: [1\n", "project.yaml"),
+        ("hall/project.yaml", "schema: 1\nfloor_map: none.yaml\n", "none.yaml"),
+        ("hall/reflectors.csv", "id,x,radius\nA,1,0.1\n", "y"),
+        ("hall/reflectors.csv", "id,x,y,radius\nA,nan,1,0.1\n", "x"),
+        ("hall/reflectors.csv", "id,x,y,radius\nA,1,1,0.1\nA,2,2,0.1\n", "'A'"),
+        ("hall/reflectors.csv", "id,x,y,radius\nA,left,1,0.1\n", "left"),
+        ("drive/odometry.csv", None, "odometry.csv"),
+        ("drive/odometry.csv", "", "odometry.csv"),
+        ("drive/odometry.csv", "stamp_ns,dx,dy,dtheta\n", "odometry.csv"),
+        ("drive/odometry.csv", "stamp_ns,dx,dtheta\n0,0,0\n", "dy"),
+        ("drive/odometry.csv", "stamp_ns,dx,dy,dtheta\n5,0,0,0\n3,0,0,0\n", "stamp_ns"),
+        ("drive/odometry.csv", "stamp_ns,dx,dy,dtheta\n0,0,0,nan\n", "dtheta"),
+        ("drive/detections.csv", "stamp_ns,range,bearing\n0,1,\n", "detections.csv"),
+        ("drive/detections.csv", "stamp_ns,range,bearing\n5,1,0\n4,1,0\n", "detections.csv"),
+        ("drive/scans.npz", "PK", "scans.npz"),
+        ("drive/reference.csv", "stamp_ns,x\n0,1\n", "reference.csv"),
+    ],
+)
+def test_a_broken_file_is_refused_by_name(file, text, said, refused, project, recording, tmp_path):
+    path = tmp_path / file
+    if text is None:
+        path.unlink()
+    else:
+        path.write_text(text, encoding="utf-8")
+    assert said in refused("localize", project, recording, "--out", tmp_path / "out")
+
+
+@pytest.mark.parametrize("which", ["project", "recording"])
+def test_a_path_that_does_not_exist_is_refused_by_name(which, refused, project, recording, tmp_path):
+    paths = {"project": project, "recording": recording} | {which: tmp_path / "nowhere"}
+    assert "nowhere" in refused("localize", paths["project"], paths["recording"], "--out", tmp_path / "out")
+
+
+def test_results_that_cannot_be_written_are_refused(refused, project, recording, tmp_path):
+    (tmp_path / "out").write_text("a file", encoding="utf-8")
+    assert "out" in refused("localize", project, recording, "--out", tmp_path / "out")
+
+
+def test_a_recording_of_odometry_alone_says_that_nothing_was_seen(refused, project, recording, tmp_path):
+    (recording / "detections.csv").unlink()
+    assert "no scan" in refused("localize", project, recording, "--out", tmp_path / "out")
+
+
+def test_a_recording_of_one_row_each_gives_one_cycle(commission, project, recording, tmp_path):
+    for name in ("odometry", "detections", "reference"):
+        path = recording / f"{name}.csv"
+        path.write_text("\n".join(path.read_text(encoding="utf-8").splitlines()[:2]) + "\n", encoding="utf-8")
+    assert commission("localize", project, recording, "--out", tmp_path / "out")[0] == 0
+    assert json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["cycles"] == 1
+
+
+def mutated(content, rng):
+    """Bytes of a file after a mishap: cut off, overwritten, repeated, emptied of its line ends."""
+    position, length = rng.randrange(len(content)), rng.randrange(1, 30)
+    cut = content[:position], content[position + length :]
+    return rng.choice(
+        [
+            content[:position],
+            cut[0] + rng.randbytes(length) + cut[1],
+            cut[0]
+            + rng.choice([b"nan", b"1e999", b"-", b",,", b";", b"\n", b'"', b"\x00", b"[", b"{", b": &a *a"])
+            + cut[1],
+            cut[0] + cut[1],
+            content + content[position : position + 200],
+            cut[0] + str(rng.choice([-1, 2**63, 10**40, 1e-300])).encode() + cut[1],
+        ]
+    )
+
+
+@pytest.mark.parametrize(
+    "file",
+    ["hall/project.yaml", "hall/reflectors.csv", "drive/odometry.csv", "drive/detections.csv", "drive/reference.csv"],
+)
+def test_whatever_happens_to_a_file_the_command_ends_well_or_with_one_line(
+    file, commission, project, recording, tmp_path
+):
+    path = tmp_path / file
+    content = path.read_bytes()
+    for seed in range(40):
+        path.write_bytes(mutated(content, random.Random(f"{file} {seed}")))
+        code, _, err = commission("localize", project, recording, "--out", tmp_path / "out")
+        assert (code, err.count("\n")) in ((0, 0), (2, 1)), (seed, err)
+        assert "commission: unexpected" not in err, (seed, err)
