@@ -115,7 +115,7 @@ def laboratory() -> Project:
             range=(0.05, 30.0),
             reflector_range=20.0,
         ),
-        parameters=Parameters(observation=ObservationParameters(range_sigma=0.012, bearing_sigma=0.003)),
+        parameters=Parameters(observation=ObservationParameters(range_sigma=0.0075, bearing_sigma=0.0015)),
     )
 
 
@@ -167,7 +167,7 @@ def shop_floor() -> Project:
         ),
         vehicle=DifferentialVehicle(0.45, ((0.5, 0.3), (-0.4, 0.3), (-0.4, -0.3), (0.5, -0.3)), 0.35),
         scanner=Scanner(mounting=np.array([0.42, 0.0, 0.0]), resolution_deg=0.25, reflector_range=15.0),
-        parameters=Parameters(observation=ObservationParameters(range_sigma=0.012, bearing_sigma=0.003)),
+        parameters=Parameters(observation=ObservationParameters(range_sigma=0.008, bearing_sigma=0.0016)),
         disturbances=Disturbances(
             people=50,
             walking_speed=0.8,
@@ -185,7 +185,6 @@ def shop_floor() -> Project:
                 TiltedStretch(7.5, 6.6, 0.7),
                 TiltedStretch(20.2, 3.0, 0.6),
             ),
-            slips_per_100_m=1.0,
         ),
     )
 
