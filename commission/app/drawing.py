@@ -1,0 +1,50 @@
+"""From points of the floor to arrays that the scene takes: float32, with a height. Nothing here knows viser."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.geometry.arrays import FloatArray
+
+Points = NDArray[np.float32]
+
+NO_POINTS: Points = np.empty((0, 3), np.float32)
+# An empty array of segments makes the browser drop the buffer's size; one of zero length, far below, draws nothing.
+NO_SEGMENTS: Points = np.full((1, 2, 3), -1000.0, np.float32)
+
+
+def lift(points: FloatArray, height: float) -> Points:
+    """Return (N, 2) points [m] as (N, 3) at a height [m]."""
+    lifted = np.full((len(points), 3), height, np.float32)
+    lifted[:, :2] = points
+    return lifted
+
+
+def outline_segments(outlines: FloatArray, height: float) -> Points:
+    """Return the (N * n, 2, 3) segments of N closed outlines given as (N, n, 2) points [m]."""
+    if len(outlines) == 0:
+        return NO_SEGMENTS
+    closed = np.stack([outlines, np.roll(outlines, -1, axis=1)], axis=2).reshape(-1, 2, 2)
+    return lift(closed.reshape(-1, 2), height).reshape(-1, 2, 3)
+
+
+def polyline_segments(points: FloatArray, height: float) -> Points:
+    """Return the (N - 1, 2, 3) segments of one open line through (N, 2) points [m]."""
+    if len(points) < 2:
+        return NO_SEGMENTS
+    lifted = lift(points, height)
+    return np.stack([lifted[:-1], lifted[1:]], axis=1)
+
+
+def thinned(points: FloatArray, at_most: int) -> FloatArray:
+    """Return about every k-th of (N, ...) points so that at most `at_most` remain; the last one always does."""
+    if len(points) <= at_most:
+        return points
+    step = -(-len(points) // (at_most - 1))
+    return np.concatenate([points[:-1:step], points[-1:]])
+
+
+def yaw_quaternion(theta: float) -> tuple[float, float, float, float]:
+    """Return the (w, x, y, z) rotation about the vertical by theta [rad]."""
+    return float(np.cos(0.5 * theta)), 0.0, 0.0, float(np.sin(0.5 * theta))

@@ -1,0 +1,117 @@
+"""Opens the page for a project and keeps it open: the one function behind `serve` and `demo`."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import webbrowser
+from collections.abc import Callable
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+import viser
+
+from commission import compiled
+from commission.app.actions import Recording, Source, VirtualDrive
+from commission.app.drives import prepare
+from commission.app.history import episodes
+from commission.app.page import Page
+from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
+from commission.app.server import start_server
+from commission.app.session import Drive
+from commission.app.store import AppState
+from commission.io.project_file import load_project, save_project
+from commission.localization import whole_run
+from commission.localization.estimate import Mode
+from commission.localization.setup import LocalizerSetup
+from commission.simulation import scenario
+from commission.site.project import Project
+
+log = logging.getLogger(__name__)
+
+
+def serve(
+    project: Path,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8080,
+    token: str | None = None,
+    open_browser: bool = True,
+    recording: Path | None = None,
+    demo: bool = False,
+) -> None:
+    """Serve the page until the program is interrupted.
+
+    Parameters
+    ----------
+    project : folder of the project.
+    host, port, token : where, and what a browser must bring; see `start_server`.
+    open_browser : whether to open the page in this computer's browser.
+    recording : what to play; none: choose on the page.
+    demo : whether the project is a bundled one, which is never written to; its first route is driven at once.
+
+    Raises
+    ------
+    CommissionError
+        the project cannot be read, or the page cannot be served as asked.
+    """
+    loaded = load_project(project)
+    server = start_server(host, port, token)
+    runtime = open_page(server, loaded, folder=None if demo else project, source=first_source(loaded, recording, demo))
+    address = f"http://{host}:{server.get_port()}/" + (f"?token={quote(token)}" if token else "")
+    log.info("page at %s", address)
+    if open_browser:
+        webbrowser.open(address)
+    try:
+        threading.Event().wait()
+    finally:
+        runtime.stop()
+        server.stop()
+
+
+def first_source(project: Project, recording: Path | None, demo: bool) -> Source | None:
+    """Return what drives when the page opens."""
+    if recording is not None:
+        return Recording(recording)
+    return VirtualDrive(project.routes[0].name) if demo and project.routes else None
+
+
+def open_page(
+    server: viser.ViserServer, project: Project, *, folder: Path | None = None, source: Source | None = None
+) -> Runtime:
+    """Fill a server with the page of a project and start its owner thread; returns at once.
+
+    Parameters
+    ----------
+    server : a started server without content.
+    project : what to show.
+    folder : where it is saved to; none: nowhere unless a folder is named.
+    source : what drives at once; none: nothing yet.
+    """
+    state = AppState(project, project, folder=folder, source=source, repeat=folder is None)
+    runtime = Runtime(state, Work(prepare, predicted_episodes, save_project, compile_kernels))
+    page = Page(server, runtime.post, state)
+
+    @server.on_client_connect
+    def _(client: viser.ClientHandle) -> None:
+        runtime.post(BrowserCame(client.client_id))
+
+    @server.on_client_disconnect
+    def _(client: viser.ClientHandle) -> None:
+        runtime.post(BrowserLeft(client.client_id))
+
+    runtime.start(page)
+    return runtime
+
+
+def predicted_episodes(drive: Drive, setup: LocalizerSetup) -> tuple[tuple[float, float], ...]:
+    """Fail episodes [s] of the whole drive with these parameters."""
+    run = whole_run.run(drive.log, setup, drive.initial)
+    times = (run.stamps_ns - drive.log.stamps_ns[0]) * 1e-9
+    return episodes(times, np.asarray(run.modes) == Mode.FAIL)
+
+
+def compile_kernels(progress: Callable[[float, str], None]) -> None:
+    """Compile every kernel that the page needs, the first needed first."""
+    compiled.warm_up((("simulation", scenario.warm_up), ("localizer", whole_run.warm_up)), progress)

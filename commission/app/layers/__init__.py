@@ -1,0 +1,1 @@
+"""What is drawn on the floor, one file per thing. Layers draw frozen views; they decide nothing."""

@@ -1,0 +1,65 @@
+"""What every layer has: a name, entries in the legend, nodes in the shared scene and in a browser's own."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from viser import SceneApi, SceneNodeHandle
+
+from commission.app.store import AppState
+from commission.app.theme import Legend
+from commission.app.view import RunView
+from commission.site.project import Project
+
+
+class Layer(Protocol):
+    """One drawn thing that can be switched off."""
+
+    name: str
+    """Shown beside its switch; unique."""
+    legend: tuple[Legend, ...]
+    """Its entries in the legend."""
+
+    def show_site(self, project: Project) -> None:
+        """Draw what depends on the project alone."""
+
+    def draw(self, run: RunView, state: AppState) -> None:
+        """Draw what changes with each scan."""
+
+    def draw_slowly(self, run: RunView, state: AppState) -> None:
+        """Draw what may lag some scans behind: whatever grows with the drive."""
+
+    def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:
+        """Add what only one browser's view needs; the caller removes it when the view changes."""
+        ...
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the layer's nodes in the shared scene, to show or hide."""
+        ...
+
+
+class BaseLayer:
+    """A layer that draws nothing: each one overrides what it needs."""
+
+    name = ""
+    legend: tuple[Legend, ...] = ()
+
+    def __init__(self, scene: SceneApi) -> None:
+        self.scene = scene
+
+    def show_site(self, project: Project) -> None:
+        """Draw what depends on the project alone."""
+
+    def draw(self, run: RunView, state: AppState) -> None:
+        """Draw what changes with each scan."""
+
+    def draw_slowly(self, run: RunView, state: AppState) -> None:
+        """Draw what may lag some scans behind."""
+
+    def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:  # noqa: ARG002 - a default
+        """Add what only one browser's view needs."""
+        return ()
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the layer's nodes in the shared scene."""
+        return ()

@@ -1,0 +1,61 @@
+"""Detections of the newest scan: inliers yellow, outliers red, with one shape for each of the two filters."""
+
+from __future__ import annotations
+
+from viser import SceneApi, SceneNodeHandle
+
+from commission.app import theme
+from commission.app.drawing import NO_POINTS, lift
+from commission.app.extent import extent_of
+from commission.app.layers.base import BaseLayer
+from commission.app.store import AppState
+from commission.app.view import RunView
+from commission.localization.estimate import Status
+from commission.site.project import Project
+
+STYLES = {
+    Status.INLIER: (theme.INLIER, "circle", "inlier"),
+    Status.OUTLIER_ASSOCIATION: (theme.OUTLIER_ASSOCIATION, "square", "outlier: outside every gate"),
+    Status.OUTLIER_DETECTOR: (theme.OUTLIER_DETECTOR, "diamond", "outlier: too few or many beams"),
+}
+MARKS = {"circle": theme.Mark.DOT, "square": theme.Mark.SQUARE, "diamond": theme.Mark.DIAMOND}
+
+
+class DetectionLayer(BaseLayer):
+    """Detections of the newest scan."""
+
+    name = "Detections"
+    legend = tuple(theme.Legend(text, color, MARKS[shape]) for color, shape, text in STYLES.values())
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._clouds = {
+            status: scene.add_point_cloud(
+                f"/run/detections/{status.name.lower()}",
+                NO_POINTS,
+                color,
+                point_size=0.08,
+                point_shape=shape,
+                point_shading="flat",
+                precision="float32",
+            )
+            for status, (color, shape, _) in STYLES.items()
+        }
+
+    def show_site(self, project: Project) -> None:
+        """Adapt the size of marks to the site's."""
+        for cloud in self._clouds.values():
+            cloud.point_size = 0.9 * extent_of(project).mark_size()
+
+    def draw(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+        """Draw every detection where it is seen from the estimated pose."""
+        for status, cloud in self._clouds.items():
+            if run.estimate is None:
+                cloud.points = NO_POINTS
+            else:
+                chosen = run.estimate.points_map[run.estimate.status == status]
+                cloud.points = lift(chosen, theme.Height.DETECTION)
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the marks of every status."""
+        return tuple(self._clouds.values())

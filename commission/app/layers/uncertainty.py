@@ -1,0 +1,48 @@
+"""The covariance of the estimated pose: an ellipse of 2-sigma for the position, two rays for the heading."""
+
+from __future__ import annotations
+
+import numpy as np
+from viser import SceneApi, SceneNodeHandle
+
+from commission.app import theme
+from commission.app.drawing import NO_SEGMENTS, lift, outline_segments
+from commission.app.layers.base import BaseLayer
+from commission.app.store import AppState
+from commission.app.view import RunView
+from commission.geometry.gaussian import ellipse_points
+
+SIGMAS = 2.0
+RAY = 0.8
+
+
+class UncertaintyLayer(BaseLayer):
+    """Pose covariance."""
+
+    name = "Pose covariance"
+    legend = (theme.Legend("2σ of the estimated pose", theme.POSE, theme.Mark.RING),)
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._lines = scene.add_line_segments(
+            "/run/pose", NO_SEGMENTS, theme.POSE, thickness=2.0, thickness_units="screen"
+        )
+
+    def draw(self, run: RunView, state: AppState) -> None:
+        """Draw ellipse and rays."""
+        center, covariance = run.pose[:2], run.covariance
+        ellipse = ellipse_points(center[np.newaxis], covariance[np.newaxis, :2, :2], SIGMAS * state.magnify)
+        spread = min(SIGMAS * state.magnify * float(np.sqrt(covariance[2, 2])), np.pi)
+        headings = run.pose[2] + np.array([-spread, spread])
+        ends = center + RAY * np.stack([np.cos(headings), np.sin(headings)], axis=1)
+        rays = np.stack([np.broadcast_to(center, (2, 2)), ends], axis=1)
+        self._lines.points = np.concatenate(
+            [
+                outline_segments(ellipse, theme.Height.POSE),
+                lift(rays.reshape(-1, 2), theme.Height.POSE).reshape(-1, 2, 3),
+            ]
+        )
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the lines."""
+        return (self._lines,)

@@ -1,0 +1,178 @@
+"""The page put together: layers on the floor, panels around it, cameras. It draws frozen views and posts actions.
+
+Everything here is called by the owner thread, except the callbacks of widgets, which only post.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import viser
+
+from commission.app import theme
+from commission.app.actions import View
+from commission.app.cameras import Cameras
+from commission.app.extent import extent_of
+from commission.app.layers.accumulated import AccumulatedLayer
+from commission.app.layers.base import Layer
+from commission.app.layers.detections import DetectionLayer
+from commission.app.layers.floor import FloorLayer
+from commission.app.layers.gates import GateLayer
+from commission.app.layers.grid import GridLayer
+from commission.app.layers.reflectors import ReflectorLayer, ReflectorNameLayer
+from commission.app.layers.routes import RouteLayer
+from commission.app.layers.scan import ScanLayer
+from commission.app.layers.trails import ReferenceLayer, TrailLayer
+from commission.app.layers.uncertainty import UncertaintyLayer
+from commission.app.layers.vehicle import VehicleLayer
+from commission.app.layers.walls import WallLayer
+from commission.app.panels.base import Panel, Post
+from commission.app.panels.layers_panel import LayersPanel, LegendPanel
+from commission.app.panels.now_panel import NowPanel
+from commission.app.panels.plots import Plots
+from commission.app.panels.problems_panel import ProblemsPanel
+from commission.app.panels.run_panel import RunPanel
+from commission.app.panels.site_panel import SitePanel
+from commission.app.panels.time_line import TimeLine
+from commission.app.panels.top_bar import TopBar
+from commission.app.panels.tune_panel import TunePanel
+from commission.app.store import AppState
+from commission.app.view import PageView
+
+LAYERS = (
+    FloorLayer,
+    GridLayer,
+    RouteLayer,
+    ReflectorLayer,
+    ReflectorNameLayer,
+    GateLayer,
+    ScanLayer,
+    DetectionLayer,
+    AccumulatedLayer,
+    VehicleLayer,
+    UncertaintyLayer,
+    TrailLayer,
+    ReferenceLayer,
+    WallLayer,
+)
+TOLD_FOR_S = 6.0
+
+
+class Page:
+    """What the browsers show.
+
+    Parameters
+    ----------
+    server : a started server without content.
+    post : takes the actions of widgets.
+    state : what the widgets begin with; its project is drawn by `show_site`.
+    """
+
+    def __init__(self, server: viser.ViserServer, post: Post, state: AppState) -> None:
+        self._server = server
+        self._hidden: frozenset[str] = frozenset()
+        with server.atomic():
+            server.gui.configure_theme(
+                dark_mode=True, show_logo=False, show_share_button=False, brand_color=theme.BRAND
+            )
+            server.scene.world_axes.visible = False
+            server.scene.set_background_image(np.full((2, 2, 3), theme.BACKGROUND, np.uint8), format="png")
+            self._layers: tuple[Layer, ...] = tuple(make(server.scene) for make in LAYERS)
+            self._panels = self._build_panels(post, state)
+            self._cameras = Cameras(server, self._layers, extent_of(state.project))
+
+    def _build_panels(self, post: Post, state: AppState) -> tuple[Panel, ...]:
+        """Make every panel and dock it: steps on the left, what is now on the right, time below."""
+        gui = self._server.gui
+        top = TopBar(gui, post, state)
+        left = gui.add_panel()
+        with left.add_tab("Site"):
+            site = SitePanel(gui, state.project)
+        with left.add_tab("Run"):
+            run = RunPanel(gui, post, state)
+        with left.add_tab("Tune"):
+            tune = TunePanel(gui, post, state)
+        left.dock_left()
+        left.set_width(theme.LEFT_PX)
+        now = gui.add_panel()
+        with now.add_tab("Now"):
+            numbers = NowPanel(gui)
+        now.dock_right()
+        now.set_width(theme.RIGHT_PX)
+        below = gui.add_panel()
+        with below.add_tab("Legend"):
+            legend = LegendPanel(gui, post, self._layers)
+        with below.add_tab("Layers"):
+            switches = LayersPanel(gui, post, self._layers, state)
+        with below.add_tab("Problems"):
+            problems = ProblemsPanel(gui, post)
+        below.dock_below(now)
+        bottom = gui.add_panel()
+        with bottom.add_tab("Time"):
+            time_line = TimeLine(gui, post, state.speed)
+            plots = Plots(gui)
+        bottom.float(x=0, y=-1, width=1000, height=theme.BOTTOM_PX)
+        return top, site, run, tune, numbers, legend, switches, problems, time_line, plots
+
+    def show_site(self, state: AppState) -> None:
+        """Draw the project."""
+        with self._server.atomic():
+            for layer in self._layers:
+                layer.show_site(state.project)
+        self._hide(state.hidden, every_layer=True)
+        self._cameras.refurnish(state.hidden)
+
+    def draw(self, view: PageView, *, slowly: bool) -> None:
+        """Draw a view.
+
+        Parameters
+        ----------
+        view : the newest one.
+        slowly : whether also to draw what may lag behind.
+        """
+        with self._server.atomic():
+            if view.run is not None:
+                for layer in self._layers:
+                    layer.draw(view.run, view.state)
+                    if slowly:
+                        layer.draw_slowly(view.run, view.state)
+            for panel in self._panels:
+                panel.draw(view)
+                if slowly:
+                    panel.draw_slowly(view)
+        self._hide(view.state.hidden)
+        if view.run is not None:
+            self._cameras.follow(view.run)
+
+    def _hide(self, hidden: frozenset[str], *, every_layer: bool = False) -> None:
+        """Show and hide layers where that changed."""
+        changed = {layer.name for layer in self._layers} if every_layer else hidden ^ self._hidden
+        self._hidden = hidden
+        for layer in self._layers:
+            if layer.name in changed:
+                for node in layer.nodes():
+                    node.visible = layer.name not in hidden
+                self._cameras.show_layer(layer.name, visible=layer.name not in hidden)
+
+    def tell(self, text: str, *, failed: bool) -> None:
+        """Notify every browser."""
+        for client in self._server.get_clients().values():
+            client.add_notification(
+                "Problem" if failed else "Done",
+                text,
+                color="red" if failed else "green",
+                auto_close_seconds=TOLD_FOR_S,
+            )
+
+    def show_view(self, client_id: int, view: View) -> None:
+        """Change what one browser looks at."""
+        self._cameras.show(client_id, view)
+
+    def connected(self, client_id: int) -> None:
+        """Set up a new browser's own view."""
+        client = self._server.get_clients().get(client_id)
+        if client is not None:
+            self._cameras.connected(client)
+
+    def disconnected(self, client_id: int) -> None:
+        """Forget a browser."""
+        self._cameras.disconnected(client_id)

@@ -1,0 +1,101 @@
+"""The bar at the top: which project, saved or not, undo and redo, the supervisor's badge, the view."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from viser import GuiApi, GuiEvent
+
+from commission.app import actions, theme
+from commission.app.panels.base import BasePanel, Post, escaped, posting
+from commission.app.store import AppState
+from commission.app.view import PageView, RunView
+from commission.localization.estimate import Mode
+from commission.site.parameters import SupervisorParameters
+
+
+def badge_text(run: RunView | None, limits: SupervisorParameters) -> tuple[str, str, str]:
+    """Return the badge's word, what stands beside it, and its color."""
+    if run is None or run.estimate is None:
+        return "NO RUN", "", theme.IDLE_COLOR
+    x, y, heading = run.series.two_sigma[-1]
+    beside = (
+        f"2σ {max(x, y) * 1000:.0f} / {limits.position_limit * 1000:.0f} mm"
+        f" &nbsp; {math.degrees(heading):.2f} / {math.degrees(limits.heading_limit):.1f} °"
+    )
+    if run.mode is Mode.FAIL:
+        lived = [episode for episode in run.episodes if episode[0] <= run.time]
+        since = f" {run.time - lived[-1][0]:.0f} s" if lived else ""
+        return f"FAIL{since}", beside, theme.FAIL_COLOR
+    return "OPERATIONAL", beside, theme.OPERATIONAL_COLOR
+
+
+def title(state: AppState) -> str:
+    """Return the left end of the bar."""
+    if state.is_changed:
+        saved = "changed, not saved"
+    elif state.saved_at:
+        saved = f"saved {escaped(state.saved_at)}"
+    else:
+        saved = "bundled project" if state.folder is None else "as on disk"
+    return (
+        "<div class='c-top' style='display:flex;align-items:center;padding:0 14px;gap:14px;font-size:13px;"
+        "white-space:nowrap;overflow:hidden'>"
+        f"<b>Commission</b><span style='opacity:.85'>{escaped(state.project.name)}</span>"
+        f"<span style='opacity:.55'>{saved}</span></div>"
+    )
+
+
+class TopBar(BasePanel):
+    """The main panel, turned into a bar by the page's style."""
+
+    def __init__(self, gui: GuiApi, post: Post, state: AppState) -> None:
+        self._title = gui.add_html(theme.STYLE + title(state))
+        self._badge = gui.add_html("")
+        self._shown: tuple[str, ...] = ()
+        buttons = (
+            ("Undo", "Take back the last change (Ctrl+Z)", actions.Undo(), "Z", "cmd/ctrl"),
+            ("Redo", "Make it again (Ctrl+Y)", actions.Redo(), "Y", "cmd/ctrl"),
+            ("Save", "Write project.yaml (Ctrl+Shift+S)", actions.Save(), "S", "cmd/ctrl+shift"),
+        )
+        self._buttons = {}
+        for label, hint, action, key, modifier in buttons:
+            button = gui.add_button(label, hint=hint, color="dark")
+            button.on_click(posting(post, lambda _event, action=action: action))
+            self._buttons[label] = button
+            command = gui.add_command(label, hotkey=key, modifier=modifier)
+            command.on_trigger(lambda _event, action=action: post(action))
+        view = gui.add_button_group("", tuple(v.value for v in actions.View))
+
+        def show(event: GuiEvent[Any]) -> None:
+            if event.client is not None:
+                post(actions.SetView(event.client.client_id, actions.View(event.target.value)))
+
+        view.on_click(show)
+
+    def draw(self, view: PageView) -> None:
+        """Show the supervisor's state, and what can be undone."""
+        word, beside, color = badge_text(view.run, view.state.project.parameters.supervisor)
+        head = title(view.state)
+        shown = (word, beside, color, head)
+        if shown == self._shown:
+            return
+        if not self._shown or head != self._shown[-1]:
+            self._title.content = theme.STYLE + head
+        self._shown = shown
+        self._badge.content = (
+            "<div style='position:fixed;z-index:50;top:6px;left:50%;transform:translateX(-50%);display:flex;"
+            "align-items:center;gap:12px;pointer-events:none;white-space:nowrap'>"
+            f"<span class='c-badge' style='background:{color};color:#fff;font-weight:700;font-size:15px;"
+            f"letter-spacing:.1em;padding:3px 20px;border-radius:3px'>{word}</span>"
+            f"<span style='font-size:12px;opacity:.8;font-variant-numeric:tabular-nums'>{beside}</span></div>"
+        )
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Enable what can be done."""
+        state = view.state
+        wanted = {"Undo": bool(state.undo), "Redo": bool(state.redo), "Save": state.is_changed}
+        for label, enabled in wanted.items():
+            if self._buttons[label].disabled is enabled:
+                self._buttons[label].disabled = not enabled

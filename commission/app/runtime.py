@@ -1,0 +1,303 @@
+"""The owner thread: drains actions, reduces them, runs what is due, publishes a frozen view. Knows no widget.
+
+Only this thread touches state, session and page. Callbacks, jobs and browsers reach it through one queue.
+"""
+
+from __future__ import annotations
+
+import itertools
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import Protocol, TypeAlias
+
+from commission.app import actions, reducer
+from commission.app.actions import Action, Source, View
+from commission.app.jobs import Job, JobReport, Jobs, JobState, Progress
+from commission.app.session import Drive, Session
+from commission.app.store import AppState
+from commission.app.view import PageView, RunView
+from commission.app.view import Progress as ShownProgress
+from commission.errors import CommissionError
+from commission.localization.setup import LocalizerSetup
+from commission.site.project import Project
+
+FRAME_S = 0.04
+"""Shortest time between two pictures: 25 Hz [s]."""
+SLOW_FRAME_S = 0.2
+"""The same for plots, trails and numbers [s]."""
+IDLE_S = 0.5
+
+PREPARE, PREDICT, COMPILE = "Preparing the drive", "Predicting the rest", "Compiling"
+
+
+@dataclass(frozen=True, slots=True)
+class BrowserCame:
+    """A browser connected."""
+
+    client: int
+    """Number of its connection."""
+
+
+@dataclass(frozen=True, slots=True)
+class BrowserLeft:
+    """A browser is gone."""
+
+    client: int
+    """Number of its connection."""
+
+
+Message: TypeAlias = Action | JobReport | BrowserCame | BrowserLeft
+
+
+class PageLike(Protocol):
+    """What the runtime draws on: the page, or a list in a test."""
+
+    def show_site(self, state: AppState) -> None:
+        """Draw the project."""
+
+    def draw(self, view: PageView, *, slowly: bool) -> None:
+        """Draw a view."""
+
+    def tell(self, text: str, *, failed: bool) -> None:
+        """Notify every browser."""
+
+    def show_view(self, client_id: int, view: View) -> None:
+        """Change what one browser looks at."""
+
+    def connected(self, client_id: int) -> None:
+        """Set up a browser."""
+
+    def disconnected(self, client_id: int) -> None:
+        """Forget a browser."""
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """What the runtime has done by others, in the background or on disk; tests put their own in."""
+
+    prepare: Callable[[Project, Source, Callable[[float], None]], Drive]
+    """From a source to a drive."""
+    predict: Callable[[Drive, LocalizerSetup], tuple[tuple[float, float], ...]]
+    """Fail episodes [s] of a whole run with these parameters."""
+    save: Callable[[Project, Path], None]
+    """Write a project into a folder."""
+    compile: Callable[[Callable[[float, str], None]], None]
+    """Compile all kernels."""
+
+
+class Runtime:
+    """State, session and the loop around them.
+
+    Parameters
+    ----------
+    state : what the page begins with.
+    work : background work and files.
+    clock : returns seconds; another one only in tests.
+    """
+
+    def __init__(self, state: AppState, work: Work, clock: Callable[[], float] = time.monotonic) -> None:
+        self.state = state
+        self.session: Session | None = None
+        self._work = work
+        self._clock = clock
+        self._queue: SimpleQueue[Message] = SimpleQueue()
+        self._jobs = Jobs(self._queue.put)
+        self._shown_jobs: dict[int, Job] = {}
+        self._page: PageLike | None = None
+        self._dirty = True
+        self._slow_dirty = True
+        self._drawn_at = self._drawn_slowly_at = self._ticked_at = clock()
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._loop, name="owner", daemon=True)
+
+    def post(self, message: Message) -> None:
+        """Hand something to the owner thread; returns at once, from any thread."""
+        self._queue.put(message)
+
+    def start(self, page: PageLike) -> None:
+        """Begin to own the page."""
+        self._page = page
+        self._jobs.start(COMPILE, self._work.compile)
+        if self.state.source is not None:
+            self.post(actions.ChooseSource(self.state.source))
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the loop and the background work."""
+        self._stopped.set()
+        self._jobs.close()
+        self._thread.join(timeout=2.0)
+
+    def _loop(self) -> None:
+        self._guarded(self._show_site)
+        while not self._stopped.is_set():
+            for message in self._drained():
+                self._guarded(lambda message=message: self.handle(message))
+            self._guarded(self.tick)
+
+    def _guarded(self, what: Callable[[], None]) -> None:
+        """Do something; whatever goes wrong is shown, and the page lives on."""
+        try:
+            what()
+        except Exception as error:
+            text = str(error) if isinstance(error, CommissionError | ValueError) else f"{type(error).__name__}: {error}"
+            self._apply(actions.Report(text))
+
+    def _drained(self) -> list[Message]:
+        """Wait until something is due and return what has arrived; of seeks in a row only the newest."""
+        messages: list[Message] = []
+        try:
+            messages.append(self._queue.get(timeout=self._time_left()))
+            while True:
+                messages.append(self._queue.get_nowait())
+        except Empty:
+            pass
+        return [
+            message
+            for message, following in itertools.zip_longest(messages, messages[1:])
+            if not (isinstance(message, actions.Seek) and isinstance(following, actions.Seek))
+        ]
+
+    def _time_left(self) -> float:
+        """Time until the next picture or slice of work is due [s]."""
+        if self.session is not None and self.session.seeking is not None:
+            return 0.001
+        due = self._drawn_at + FRAME_S if self._dirty or self._is_running() else self._drawn_at + IDLE_S
+        if self._slow_dirty:
+            due = min(due, self._drawn_slowly_at + SLOW_FRAME_S)
+        return min(max(due - self._clock(), 0.001), IDLE_S)
+
+    def _is_running(self) -> bool:
+        return self.state.playing and self.session is not None
+
+    def handle(self, message: Message) -> None:
+        """Do what one message says."""
+        page = self._page
+        if isinstance(message, JobReport):
+            self._hear(message)
+        elif isinstance(message, BrowserCame):
+            if page is not None:
+                page.connected(message.client)
+        elif isinstance(message, BrowserLeft):
+            if page is not None:
+                page.disconnected(message.client)
+        else:
+            self._apply(message)
+        self._dirty = self._slow_dirty = True
+
+    def _apply(self, action: Action) -> None:
+        """Reduce an action and carry out what follows."""
+        reduction = reducer.reduce(action, self.state)
+        self.state = reduction.state
+        if self.session is not None:
+            self.session.covered = self.state.covered
+        for effect in reduction.effects:
+            self._carry_out(effect)
+        self._dirty = self._slow_dirty = True
+
+    def _carry_out(self, effect: reducer.Effect) -> None:
+        """Do one thing that the reducer asks for."""
+        session, page = self.session, self._page
+        match effect:
+            case reducer.LoadSource(source):
+                project = self.state.project
+                self._jobs.start(PREPARE, lambda progress: self._work.prepare(project, source, progress))
+            case reducer.ApplyParameters():
+                if session is not None:
+                    session.set_setup(LocalizerSetup.of(self.state.project))
+                    self._predict()
+            case reducer.WriteProject(project, folder):
+                self._work.save(project, folder)
+                self.post(actions.ProjectSaved(project, folder, time.strftime("%H:%M")))
+            case reducer.MoveTo(seconds, afresh):
+                if session is not None:
+                    session.seek(seconds, afresh=afresh)
+            case reducer.ProcessOneScan():
+                if session is not None:
+                    session.step()
+            case reducer.Tell(text, failed):
+                if page is not None:
+                    page.tell(text, failed=failed)
+            case reducer.PlaceCamera(client, view):
+                if page is not None:
+                    page.show_view(client, view)
+
+    def _hear(self, report: JobReport) -> None:
+        """Follow a job; take its result or its error."""
+        job = report.job
+        if job.state in (JobState.WAITING, JobState.RUNNING):
+            self._shown_jobs[job.number] = job
+            return
+        self._shown_jobs.pop(job.number, None)
+        if job.state is JobState.FAILED:
+            self._apply(actions.Report(f"{job.name}: {job.error}"))
+        elif job.state is JobState.DONE and isinstance(report.result, Drive):
+            self._begin(report.result)
+        elif job.state is JobState.DONE and isinstance(report.result, tuple) and self.session is not None:
+            self.session.predicted = report.result
+
+    def _begin(self, drive: Drive) -> None:
+        """Run the localizer over a new drive, playing."""
+        self.session = Session(drive, LocalizerSetup.of(self.state.project))
+        self.session.covered = self.state.covered
+        self._apply(actions.Play(playing=True))
+        self._predict()
+
+    def _predict(self) -> None:
+        """Look ahead in the background: where the supervisor will stop the vehicle with these parameters."""
+        if self.session is None:
+            return
+        drive, setup = self.session.drive, self.session.setup
+
+        def work(progress: Progress) -> object:
+            progress(0.0)
+            return self._work.predict(drive, setup)
+
+        self._jobs.start(PREDICT, work)
+
+    def tick(self) -> None:
+        """Let the run go on for the time that has passed, and draw when a picture is due."""
+        now = self._clock()
+        elapsed, self._ticked_at = now - self._ticked_at, now
+        session = self.session
+        if session is not None and (self.state.playing or session.seeking is not None):
+            self._advance(session, elapsed)
+        if self._page is None:
+            return
+        slowly = self._slow_dirty and now - self._drawn_slowly_at >= SLOW_FRAME_S
+        if slowly or (self._dirty and now - self._drawn_at >= FRAME_S):
+            self._drawn_at = now
+            self._dirty = False
+            if slowly:
+                self._drawn_slowly_at, self._slow_dirty = now, False
+            self._page.draw(self.view(whole=slowly), slowly=slowly)
+
+    def _advance(self, session: Session, elapsed: float) -> None:
+        """Process what is due, and see to the end of the drive."""
+        # A long pause of this thread (a huge drawing) is not made up for: the clock stood still.
+        if session.advance(min(elapsed, 0.25) * self.state.speed):
+            self._dirty = True
+        self._slow_dirty = True
+        if session.at_end and session.seeking is None and self.state.playing:
+            if self.state.repeat:
+                session.seek(0.0, afresh=True)
+            else:
+                self._apply(actions.Play(playing=False))
+
+    def view(self, *, whole: bool = True) -> PageView:
+        """Return everything the page shows; `whole` with what is drawn slowly, too."""
+        run: RunView | None = None if self.session is None else self.session.view(whole=whole)
+        jobs = tuple(
+            ShownProgress(f"{job.name}{job.message and ': '}{job.message}", job.fraction)
+            for job in self._shown_jobs.values()
+            if job.state is JobState.RUNNING and job.name != PREDICT
+        )
+        return PageView(self.state, run, jobs)
+
+    def _show_site(self) -> None:
+        if self._page is not None:
+            self._page.show_site(self.state)

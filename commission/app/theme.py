@@ -1,0 +1,128 @@
+"""Colors and style of the page: one place for both the scene and the panels. The legend is made from it, too.
+
+The colors follow Sobreira et al. 2016, Fig. 12, as far as a dark page allows: the paper's dark blue reflectors are a
+lighter blue here, its dark scan points are grey, because both would vanish on a dark floor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TypeAlias
+
+Color: TypeAlias = tuple[int, int, int]
+
+BACKGROUND: Color = (16, 18, 21)
+UNKNOWN: Color = (24, 26, 30)
+FREE: Color = (37, 40, 45)
+WALL: Color = (150, 156, 165)
+GRID: Color = (50, 53, 59)
+GRID_METER: Color = (62, 66, 73)
+ROUTE: Color = (116, 128, 150)
+REFLECTOR: Color = (48, 108, 255)
+GATE: Color = (96, 176, 255)
+POSE: Color = (255, 82, 82)
+INLIER: Color = (255, 214, 10)
+OUTLIER_ASSOCIATION: Color = (255, 59, 48)
+OUTLIER_DETECTOR: Color = (196, 74, 60)
+SCAN: Color = (158, 166, 176)
+VEHICLE: Color = (236, 239, 244)
+TRAIL: Color = (64, 200, 150)
+REFERENCE: Color = (196, 140, 255)
+
+OPERATIONAL_COLOR = "#1c7c3c"
+FAIL_COLOR = "#c5221f"
+IDLE_COLOR = "#4a4f57"
+BRAND: Color = (60, 120, 200)
+
+
+class Height:
+    """Height above the floor at which flat things are drawn [m]: what matters more lies on top."""
+
+    FLOOR = 0.0
+    GRID = 0.005
+    ROUTE = 0.01
+    ACCUMULATED = 0.015
+    SCAN = 0.02
+    TRAIL = 0.025
+    REFLECTOR = 0.03
+    GATE = 0.035
+    DETECTION = 0.04
+    VEHICLE = 0.045
+    POSE = 0.05
+    LABEL = 0.06
+
+
+class Mark(StrEnum):
+    """How the legend draws an entry."""
+
+    LINE = "line"
+    DOT = "dot"
+    RING = "ring"
+    SQUARE = "square"
+    DIAMOND = "diamond"
+
+
+@dataclass(frozen=True, slots=True)
+class Legend:
+    """One entry of the legend."""
+
+    text: str
+    """What it is."""
+    color: Color
+    """Its color in the scene."""
+    mark: Mark
+    """Its shape in the scene."""
+
+
+def css(color: Color) -> str:
+    """Return a color as CSS writes it."""
+    return f"#{color[0]:02x}{color[1]:02x}{color[2]:02x}"
+
+
+TOP_BAR_PX = 44
+BOTTOM_PX = 248
+LEFT_PX = 290
+RIGHT_PX = 270
+
+# viser docks panels to the left and right only. The rules below turn its main panel into a bar at the top and the
+# floating panel of the time line into a strip at the bottom, and take their space from the floor. Where a rule does not
+# match (another viser), the panels float and everything still works.
+STYLE = f"""<style>
+:root{{--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px}}
+[data-dock-root]{{height:calc(100% - var(--c-top) - var(--c-bottom))!important;margin-top:var(--c-top);
+ overflow:visible!important}}
+[data-floating-window]:has(.c-bottom),[data-floating-window]:has(.c-top){{position:fixed!important;left:0!important;
+ right:0!important;width:100vw!important;max-width:none!important;border-radius:0!important;box-shadow:none!important}}
+[data-floating-window]:has(.c-bottom){{top:auto!important;bottom:0!important;height:var(--c-bottom)!important;
+ border-top:1px solid #3a3a3a}}
+[data-floating-window]:has(.c-top){{top:0!important;height:var(--c-top)!important;border-bottom:1px solid #3a3a3a}}
+[data-floating-window]:has(.c-bottom) :is([data-dock-strip],[data-dock-griphandle],[data-dock-resize])
+ {{display:none!important}}
+[data-floating-window]:has(.c-top) :is([data-dock-resize],[data-dock-minimize]){{display:none!important}}
+[data-floating-window]:has(.c-top) .mantine-Stack-root{{display:none!important}}
+[data-dock-unmergeable-header]{{position:fixed!important;top:0;right:0;height:var(--c-top)!important;width:130px;
+ background:none!important;pointer-events:none}}
+[data-dock-unmergeable-header] button{{display:none!important}}
+[data-dock-region-handle],[data-dock-leaf] [data-dock-griphandle]{{display:none!important}}
+div:has(>div>.c-top){{display:flex;align-items:center;height:var(--c-top);padding:0 140px 0 0!important;gap:6px}}
+div:has(>div>.c-top)>div{{padding:0!important;margin:0!important}}
+div:has(>div>.c-top)>:first-child{{flex:1}}
+div:has(>div>.c-top) button{{height:26px!important;padding:0 10px!important;font-size:12px!important}}
+div:has(>div>.c-bottom){{display:grid;grid-template-columns:repeat(24,minmax(0,1fr));align-items:center;
+ padding-top:2px!important}}
+div:has(>div>.c-bottom)>:nth-child(1){{display:none}}
+div:has(>div>.c-bottom)>:nth-child(2){{grid-column:span 5}}
+div:has(>div>.c-bottom)>:nth-child(3){{grid-column:span 2}}
+div:has(>div>.c-bottom)>:nth-child(4){{grid-column:span 3}}
+div:has(>div>.c-bottom)>:nth-child(5){{grid-column:span 14}}
+div:has(>div>.c-bottom)>:nth-child(6){{grid-column:span 24}}
+div:has(>div>.c-bottom)>:nth-child(n+7){{grid-column:span 4}}
+div:has(>div>.c-bottom)>:nth-child(-n+3) [style*="7.25em"]{{display:none}}
+div:has(>div>.c-bottom)>:nth-child(5) [style*="7.25em"]{{display:none}}
+.c-table{{width:100%;border-collapse:collapse;font-size:12px;font-variant-numeric:tabular-nums}}
+.c-table td{{padding:2px 0;vertical-align:top}}
+.c-table td:first-child{{opacity:.65;padding-right:10px;white-space:nowrap}}
+.c-table td:last-child{{text-align:right}}
+.c-note{{font-size:11.5px;opacity:.7;line-height:1.35}}
+</style>"""

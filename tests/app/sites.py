@@ -1,0 +1,30 @@
+"""Small sites for the tests of the page: a room with four reflectors, and a drive in it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from commission.site.floor_map import FREE, OCCUPIED, FloorMap
+from commission.site.project import Project
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.routes import Direction, Route, Segment
+from commission.site.scanner import Scanner
+from commission.site.vehicle import DifferentialVehicle
+
+
+def room(rate: float = 10.0, resolution_deg: float = 0.5) -> Project:
+    """Return a project of 12 x 8 m with four reflectors on its walls and one route there and back."""
+    cells = np.full((160, 240), FREE, np.int8)
+    cells[:3], cells[-3:], cells[:, :3], cells[:, -3:] = (OCCUPIED,) * 4
+    cells[70:84, 150:170] = OCCUPIED
+    places = ((0.25, 2.0), (0.25, 6.5), (11.75, 1.5), (11.75, 5.5))
+    there = Segment(np.array([[2.0, 2.0], [4.0, 2.0], [5.0, 2.5], [6.0, 3.0]]))
+    back = Segment(there.control_points[::-1].copy(), direction=Direction.REVERSE)
+    return Project(
+        name="Room",
+        floor_map=FloorMap(cells, 0.05),
+        reflectors=ReflectorMap(tuple(Reflector(f"R{i + 1}", x, y) for i, (x, y) in enumerate(places))),
+        routes=(Route("There and back", (there, back), speed=0.6),),
+        vehicle=DifferentialVehicle(),
+        scanner=Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=resolution_deg, rate=rate),
+    )
