@@ -27,7 +27,8 @@ MISSED = -1
 CHUNK = 1024
 # A tile of 8 x 8 bytes is one cache line, so neighbors in both directions are usually loaded together.
 TILE = 8
-# A direction component of zero becomes this: its borders then lie beyond any range, without dividing by zero.
+# Smallest size of a direction component; zero becomes this, smaller ones grow to it and keep their sign, which decides
+# on which side of its border a start lies. The next border is then beyond any range, without dividing by zero.
 TINY = 1e-300
 # Coordinates [cells] beyond this are not rays but mistakes (NaN and infinity included), and hit nothing.
 FARTHEST = 1e8
@@ -109,8 +110,10 @@ def _begin(
     dx, dy = c * dir_x + s * dir_y, c * dir_y - s * dir_x
     if not (abs(x) < FARTHEST and abs(y) < FARTHEST and abs(dx) < FARTHEST and abs(dy) < FARTHEST):
         return x, y, dx, dy, 0.0, 0.0, 0.0, -1, -1
-    dx = TINY if abs(dx) < TINY else dx
-    dy = TINY if abs(dy) < TINY else dy
+    if abs(dx) < TINY:
+        dx = -TINY if dx < 0.0 else TINY
+    if abs(dy) < TINY:
+        dy = -TINY if dy < 0.0 else TINY
     inverse_x, inverse_y = 1.0 / dx, 1.0 / dy
     t, row, column = 0.0, math.floor(y), math.floor(x)
     if row < 0 or row >= tables.rows or column < 0 or column >= tables.columns:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -25,7 +25,9 @@ def traverse(
 ) -> Hit:
     """Cell by cell (Amanatides, Woo 1987), horizontal border first on a tie; unit: cells."""
     rows, columns = occupied.shape
-    (x, y), (dx, dy) = start, direction
+    x, y = start
+    # 1 / d overflows for smaller components; growing them moves no border into range and keeps their side.
+    dx, dy = (math.copysign(max(abs(d), 1e-300), d) if d else 0.0 for d in direction)
     row, column, t = math.floor(y), math.floor(x), 0.0
     while t <= limit:
         if 0 <= row < rows and 0 <= column < columns and occupied[row, column]:
@@ -76,6 +78,9 @@ def test_rays_through_exact_corners_follow_traversal(
     assert_same_hit(caster, start, (slope[0] * scale, slope[1] * scale), limit)
 
 
+@settings(max_examples=400)
+@example(0, (0.0, 0.0), -2.225073858507e-311, 0.0, False)
+@example(0, (3.0, 3.0), -2.225073858507e-311, -5e-324, True)
 @given(st.integers(0, 20), GRID_POINTS, st.floats(-math.pi, math.pi), st.floats(-2e-15, 2e-15), st.booleans())
 def test_rays_within_rounding_of_an_axis_or_a_border_follow_traversal(
     seed: int, start: tuple[float, float], heading: float, nudge: float, upright: bool
