@@ -57,8 +57,7 @@ class Localize:
         microseconds_per_cycle = (time.perf_counter() - started) * 1e6 / len(arrays)
         result = judge(project, log, arrays)
 
-        ids = [reflector.id for reflector in project.reflectors.reflectors]
-        write_results(self.out, result.run, ids, summary(result, microseconds_per_cycle))
+        write_results(self.out, result.run, project.reflectors, summary(result, microseconds_per_cycle))
         limit = project.parameters.supervisor.position_limit
         sys.stdout.write("\n".join([*_report(result, start, limit), f"Written to   {self.out}"]) + "\n")
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from commission.io.atomic import atomic_file, write_text
 from commission.localization.estimate import Mode, Status
 from commission.localization.whole_run import RunArrays
+from commission.site.reflectors import ReflectorMap
 
 ESTIMATES = "estimates.csv"
 DETECTIONS = "detections.csv"
@@ -31,7 +32,7 @@ ROWS_AT_ONCE = 50_000
 
 
 def write_results(
-    folder: Path, run: RunArrays, reflector_ids: Sequence[str], summary: Mapping[str, int | float | None]
+    folder: Path, run: RunArrays, reflectors: ReflectorMap, summary: Mapping[str, int | float | None]
 ) -> None:
     """Write `estimates.csv`, `detections.csv` and `summary.json`; each is replaced whole or not at all.
 
@@ -39,7 +40,7 @@ def write_results(
     ----------
     folder : made when missing.
     run : the filter's own state after each scan goes into the estimates, in fail mode too; beside it the mode.
-    reflector_ids : (N,) names of the reflector map's entries.
+    reflectors : the map that the run was made with; its ids name the associated reflectors.
     summary : what the run came to, by key; the last file written, so that where it is the others are complete.
 
     Raises
@@ -48,7 +49,7 @@ def write_results(
         a file cannot be written.
     """
     _write_table(folder / ESTIMATES, ESTIMATE_COLUMNS, _estimate_rows(run))
-    _write_table(folder / DETECTIONS, DETECTION_COLUMNS, _detection_rows(run, reflector_ids))
+    _write_table(folder / DETECTIONS, DETECTION_COLUMNS, _detection_rows(run, reflectors))
     write_text(folder / SUMMARY, json.dumps(dict(summary), indent=2, allow_nan=False) + "\n")
 
 
@@ -66,11 +67,11 @@ def _estimate_rows(run: RunArrays) -> Iterator[Iterable[Any]]:
     return _blocks(columns)
 
 
-def _detection_rows(run: RunArrays, reflector_ids: Sequence[str]) -> Iterator[Iterable[Any]]:
+def _detection_rows(run: RunArrays, reflectors: ReflectorMap) -> Iterator[Iterable[Any]]:
     """Columns of some detections at a time; empty where there is no reflector, and so no distance to it."""
     points = run.points_map()
     # The name of nobody is the last one, which is where the index -1 leads.
-    names = np.array([*reflector_ids, ""], dtype=object)
+    names = np.array([*(reflector.id for reflector in reflectors.reflectors), ""], dtype=object)
     distances = run.d2.astype(object)
     distances[np.isnan(run.d2)] = ""
     columns = [
