@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from commission.errors import FileFormatError
@@ -39,9 +39,14 @@ def read_reflectors(path: Path) -> ReflectorMap:
     FileFormatError
         names line and column, what was found and what is expected.
     """
+    return reflectors_of(read_table(path, REQUIRED, OPTIONAL, size_limit=SIZE_LIMIT))
+
+
+def reflectors_of(blocks: Iterable[Block]) -> ReflectorMap:
+    """Reflectors from the rows of a table, wherever it comes from; raises FileFormatError as `read_reflectors` does."""
     reflectors: list[Reflector] = []
     lines: dict[str, int] = {}
-    for block in read_table(path, REQUIRED, OPTIONAL, size_limit=SIZE_LIMIT):
+    for block in blocks:
         numbers = {
             name: block.numbers(name, unit, empty=_DEFAULTS.get(name)).tolist()
             for name, unit in _UNITS.items()

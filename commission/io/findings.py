@@ -1,0 +1,61 @@
+"""What an import noticed and could live with: one line for each kind of trouble, however often the file repeats it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+Progress = Callable[[float, str], None]
+"""Takes the part done [0..1] and what is being done; may raise, which ends the work: that is how a job is cancelled."""
+
+SHOWN_LIMIT = 100
+"""Different findings that are told; a file that is wrong throughout says so in fewer."""
+
+
+def silent(fraction: float, message: str) -> None:
+    """Progress that nobody looks at."""
+
+
+class Findings:
+    """Collects findings while a file is read.
+
+    A finding is a place ("edge 'N1-N2'") and a problem ("maxSpeed is text"). The same problem at many places becomes
+    one line that names the first place and counts the others.
+    """
+
+    def __init__(self) -> None:
+        self._places: dict[str, tuple[str, int]] = {}
+        self._untold = 0
+
+    def add(self, where: str, problem: str) -> None:
+        """Note a problem; `where` may be empty when the file as a whole is meant."""
+        problem = " ".join(problem.split())
+        if problem in self._places:
+            first, count = self._places[problem]
+            self._places[problem] = (first, count + 1)
+        elif len(self._places) < SHOWN_LIMIT:
+            self._places[problem] = (" ".join(where.split()), 1)
+        else:
+            self._untold += 1
+
+    def lines(self) -> tuple[str, ...]:
+        """One line for each problem, in the order in which they were found."""
+        lines = [_line(problem, first, count) for problem, (first, count) in self._places.items()]
+        if self._untold:
+            lines.append(f"and {self._untold} more findings")
+        return tuple(lines)
+
+
+def shown(value: object) -> str:
+    """Value from a file as a message shows it: quoted, on one line, short."""
+    if isinstance(value, dict | list):
+        return "a mapping" if isinstance(value, dict) else "a list"
+    # repr of an integer of a million digits would itself be the attack.
+    text = "a huge number" if isinstance(value, int) and value.bit_length() > 200 else repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _line(problem: str, first: str, count: int) -> str:
+    if not first:
+        return problem
+    others = "" if count == 1 else f" and {count - 1} more place{'s' if count > 2 else ''}"
+    return f"{first}{others}: {problem}"

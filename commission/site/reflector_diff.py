@@ -1,0 +1,116 @@
+"""What a change of the reflector map adds, changes and removes: the preview of an import. No files here."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from commission.site.reflectors import Reflector, ReflectorMap
+
+SAME_PLACE = 0.05
+"""Distance [m] within which two reflectors of different id are taken for one: surveys agree to a few centimetres, and
+no two reflectors stand that close."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReflectorChange:
+    """One reflector that is there before and after, and differs."""
+
+    before: Reflector
+    """As it is now."""
+    after: Reflector
+    """As it would be."""
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the fields that differ."""
+        names = [field.name for field in dataclasses.fields(Reflector)]
+        return tuple(name for name in names if getattr(self.before, name) != getattr(self.after, name))
+
+    @property
+    def moved(self) -> float:
+        """Distance between the two places [m]."""
+        return math.hypot(self.after.x - self.before.x, self.after.y - self.before.y)
+
+
+@dataclass(frozen=True, slots=True)
+class ReflectorDiff:
+    """Difference between two reflector maps."""
+
+    added: tuple[Reflector, ...] = ()
+    """Reflectors that are only in the later map."""
+    changed: tuple[ReflectorChange, ...] = ()
+    """Reflectors that are in both and differ, by their id or by their place."""
+    removed: tuple[Reflector, ...] = ()
+    """Reflectors that are only in the earlier map."""
+    unchanged: int = 0
+    """Number of reflectors that are the same in both."""
+
+    def __bool__(self) -> bool:
+        """Whether there is any difference."""
+        return bool(self.added or self.changed or self.removed)
+
+
+def difference(before: ReflectorMap, after: ReflectorMap, same_place: float = SAME_PLACE) -> ReflectorDiff:
+    """Compare two reflector maps.
+
+    Parameters
+    ----------
+    before, after : the maps.
+    same_place : reflectors that share no id with the other map are still one reflector, renamed, when each is the
+        other's nearest and they are at most so far apart [m]; 0 compares by id alone.
+
+    Returns
+    -------
+    difference : added and changed in the order of `after`, removed in the order of `before`.
+    """
+    partners = _partners(before, after, same_place)
+    pairs = [(partners.get(reflector.id), reflector) for reflector in after.reflectors]
+    kept = {old.id for old in partners.values()}
+    changed = tuple(ReflectorChange(old, new) for old, new in pairs if old is not None and old != new)
+    return ReflectorDiff(
+        added=tuple(new for old, new in pairs if old is None),
+        changed=changed,
+        removed=tuple(old for old in before.reflectors if old.id not in kept),
+        unchanged=len(partners) - len(changed),
+    )
+
+
+def merged(before: ReflectorMap, diff: ReflectorDiff, *, remove: bool) -> ReflectorMap:
+    """Apply a difference to the map from which it starts, keeping that map's order; what is added comes last.
+
+    Parameters
+    ----------
+    before : the earlier map of `diff`.
+    diff : what to add, change and remove.
+    remove : whether reflectors that are absent from the later map go, or stay.
+
+    Raises
+    ------
+    ProjectError
+        two reflectors would have one id: one that stays, and one that was renamed or added.
+    """
+    gone = {reflector.id for reflector in diff.removed} if remove else set[str]()
+    changes = {change.before.id: change.after for change in diff.changed}
+    kept = [changes.get(reflector.id, reflector) for reflector in before.reflectors if reflector.id not in gone]
+    return ReflectorMap((*kept, *diff.added))
+
+
+def _partners(before: ReflectorMap, after: ReflectorMap, same_place: float) -> dict[str, Reflector]:
+    """Earlier reflector of each later one that has one, by the later one's id."""
+    by_id = {reflector.id: reflector for reflector in before.reflectors}
+    partners = {r.id: by_id[r.id] for r in after.reflectors if r.id in by_id}
+    old = [i for i, r in enumerate(before.reflectors) if r.id not in partners]
+    new = [i for i, r in enumerate(after.reflectors) if r.id not in partners]
+    if same_place > 0.0 and old and new:
+        old_tree, new_tree = cKDTree(before.centers[old]), cKDTree(after.centers[new])
+        distance, nearest_old = old_tree.query(after.centers[new])
+        _, nearest_new = new_tree.query(before.centers[old])
+        is_mutual = nearest_new[nearest_old] == np.arange(len(new))
+        for i in np.flatnonzero(is_mutual & (distance <= same_place)):
+            partners[after.reflectors[new[i]].id] = before.reflectors[old[int(nearest_old[i])]]
+    return partners

@@ -1,0 +1,59 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from commission.errors import ProjectError
+from commission.site.reflector_diff import ReflectorChange, ReflectorDiff, difference, merged
+from commission.site.reflectors import Reflector, ReflectorMap
+
+A, B, C = Reflector("A", 0.0, 0.0), Reflector("B", 5.0, 0.0), Reflector("C", 0.0, 5.0)
+ONE = st.builds(Reflector, id=st.sampled_from("ABCDEFG"), x=st.floats(0, 1), y=st.floats(0, 1))
+MAPS = st.lists(ONE, max_size=6, unique_by=lambda r: r.id).map(lambda rs: ReflectorMap(tuple(rs)))
+
+
+def test_added_changed_and_removed_reflectors_are_told_apart() -> None:
+    moved = replace(B, x=5.3, y=0.4)
+    new = Reflector("D", 9.0, 9.0)
+    diff = difference(ReflectorMap((A, B, C)), ReflectorMap((new, moved, A)))
+    assert diff == ReflectorDiff((new,), (ReflectorChange(B, moved),), (C,), 1)
+    assert diff.changed[0].fields == ("x", "y")
+    assert diff.changed[0].moved == pytest.approx(0.5)
+
+
+def test_reflector_that_only_changed_its_name_is_recognized_by_its_place() -> None:
+    renamed = Reflector("17", 5.01, 0.0)
+    diff = difference(ReflectorMap((A, B)), ReflectorMap((A, renamed)))
+    assert diff == ReflectorDiff((), (ReflectorChange(B, renamed),), (), 1)
+    assert "id" in diff.changed[0].fields
+    by_id = difference(ReflectorMap((A, B)), ReflectorMap((A, renamed)), same_place=0.0)
+    assert by_id == ReflectorDiff((renamed,), (), (B,), 1)
+
+
+@given(before=MAPS, after=MAPS)
+def test_every_reflector_is_counted_once_and_applying_the_difference_gives_the_later_map(
+    before: ReflectorMap, after: ReflectorMap
+) -> None:
+    diff = difference(before, after)
+    assert diff.unchanged + len(diff.changed) + len(diff.added) == len(after)
+    assert diff.unchanged + len(diff.changed) + len(diff.removed) == len(before)
+    assert bool(diff) == (set(before.reflectors) != set(after.reflectors))
+    result = merged(before, diff, remove=True)
+    assert set(result.reflectors) == set(after.reflectors)
+
+
+def test_reflectors_that_an_import_lacks_can_stay() -> None:
+    diff = difference(ReflectorMap((A, B)), ReflectorMap((C,)))
+    assert merged(ReflectorMap((A, B)), diff, remove=False).reflectors == (A, B, C)
+
+
+def test_name_that_would_be_used_twice_is_refused() -> None:
+    before = ReflectorMap((A, B))
+    # The import calls B's place A; the A that it lacks stays, unless it is removed.
+    diff = ReflectorDiff(changed=(ReflectorChange(B, replace(B, id="A")),), removed=(A,))
+    with pytest.raises(ProjectError, match="'A' is used twice"):
+        merged(before, diff, remove=False)
+    assert merged(before, diff, remove=True).reflectors == (replace(B, id="A"),)
