@@ -42,7 +42,7 @@ def compiled(kernel: Kernel) -> Kernel:
     It runs without the interpreter lock, is cached on disk, and keeps IEEE arithmetic (no `fastmath`: live, replay and
     simulation must agree to the last bit, and NaN marks a missing echo).
     """
-    return numba.njit(nogil=True, cache=True)(kernel)  # type: ignore[no-any-return]
+    return numba.njit(nogil=True, cache=True, error_model="numpy")(kernel)  # type: ignore[no-any-return]
 
 
 def compiled_parallel(kernel: Kernel) -> Kernel:

@@ -19,7 +19,7 @@ from commission.localization.estimate import Status
 from commission.localization.kalman import innovation, squared_distance
 from commission.localization.observation import SMALLEST_RANGE, ObservationModel, expect, scanner_offset
 from commission.localization.pose_gaussian import PoseGaussian
-from commission.localization.reflector_index import ReflectorIndex, cell_range
+from commission.localization.reflector_index import Cells, cell_range
 from commission.site.parameters import AssociationParameters
 
 INLIER = int(Status.INLIER)
@@ -43,16 +43,6 @@ class Viewpoint(NamedTuple):
     position_sigma: float
     """Largest 1-sigma of the scanner's position in any direction [m]."""
     heading_sigma: float
-
-
-class Likeliest(NamedTuple):
-    """The most likely of the reflectors that were searched."""
-
-    entry: int
-    """Position in the index; NOBODY when none was near."""
-    d2: float
-    cost: float
-    """-2 ln(likelihood), up to a constant: d2 + ln(det S / det R)."""
 
 
 def gate_of(parameters: AssociationParameters) -> Gate:
@@ -98,86 +88,73 @@ def search_radius(
 
 
 @compiled
-def likeliest_within(  # noqa: PLR0917 - a measurement, number by number
-    radius: float,
+def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     belief: PoseGaussian,
     measured_range: float,
     measured_bearing: float,
+    x: float,
+    y: float,
+    surveyed_variance: float,
     view: Viewpoint,
     model: ObservationModel,
-    index: ReflectorIndex,
-) -> Likeliest:
-    """Most likely reflector among those at most `radius` [m] from the detection; of equals the first in the map."""
-    direction = belief.theta + model.mount_theta + measured_bearing
-    px = belief.x + view.offset_x + measured_range * math.cos(direction)
-    py = belief.y + view.offset_y + measured_range * math.sin(direction)
-    first_row, last_row = cell_range(py - radius - index.origin_y, py + radius - index.origin_y, index.cell, index.rows)
-    first_column, last_column = cell_range(
-        px - radius - index.origin_x, px + radius - index.origin_x, index.cell, index.columns
-    )
-    noise = model.range_variance * model.bearing_variance
-    best, best_d2, best_cost = NOBODY, math.nan, math.inf
-    if last_column < first_column:
-        return Likeliest(best, best_d2, best_cost)
-    for row in range(first_row, last_row + 1):
-        start = index.offsets[row * index.columns + first_column]
-        for entry in range(start, index.offsets[row * index.columns + last_column + 1]):
-            dx, dy = index.x[entry] - px, index.y[entry] - py
-            if dx * dx + dy * dy > radius * radius:
-                continue
-            expected = expect(
-                belief.x,
-                belief.y,
-                belief.theta,
-                view.offset_x,
-                view.offset_y,
-                index.x[entry],
-                index.y[entry],
-                model.mount_theta,
-            )
-            v = innovation(belief, expected, measured_range, measured_bearing, index.variance[entry], model)
-            d2 = squared_distance(v)
-            cost = d2 + math.log(v.s_rr * v.schur / noise)
-            if cost < best_cost or (cost == best_cost and index.ids[entry] < index.ids[best]):
-                best, best_d2, best_cost = entry, d2, cost
-    return Likeliest(best, best_d2, best_cost)
+) -> tuple[float, float]:
+    """Squared Mahalanobis distance to one reflector, and -2 ln(likelihood) up to a constant: d2 + ln(det S / det R)."""
+    expected = expect(belief.x, belief.y, belief.theta, view.offset_x, view.offset_y, x, y, model.mount_theta)
+    v = innovation(belief, expected, measured_range, measured_bearing, surveyed_variance, model)
+    d2 = squared_distance(v)
+    return d2, d2 + math.log(v.s_rr * v.schur / (model.range_variance * model.bearing_variance))
 
 
 @compiled
-def likeliest(  # noqa: PLR0917 - a measurement, number by number
+def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     belief: PoseGaussian,
     measured_range: float,
     measured_bearing: float,
     view: Viewpoint,
     model: ObservationModel,
-    index: ReflectorIndex,
     gate: Gate,
-) -> Likeliest:
-    """Most likely reflector of the whole map (line 4), found near the detection.
+    cells: Cells,
+    places: FloatArray,
+    cell_offsets: IntArray,
+) -> tuple[int, float]:
+    """Most likely reflector of the whole map (line 4), found near the detection: its row in `places`, and d2.
 
     First those that may be inside the gate. A reflector outside the gate may still be more likely than one inside,
     when its det S is smaller; since S >= R, it must then lie within d2 <= cost of the best so far: if that reaches
     farther than the first search, search again. Equal to a search over all reflectors whenever the result is inside
-    the gate, or the filter is disabled. Otherwise the detection is an outlier, and the result is the most likely of
-    those near it, for the engineer to see.
+    the gate, or the filter is disabled; of equals it is the first in the map. Otherwise the detection is an outlier,
+    and the result is the most likely of those near it, for the engineer to see, or NOBODY and NaN.
     """
-    bound = gate.d2
-    searched = -1.0
-    best = Likeliest(NOBODY, math.nan, math.inf)
+    direction = belief.theta + model.mount_theta + measured_bearing
+    px = belief.x + view.offset_x + measured_range * math.cos(direction) - cells.origin_x
+    py = belief.y + view.offset_y + measured_range * math.sin(direction) - cells.origin_y
+    best, best_d2, best_cost = NOBODY, math.nan, math.inf
+    bound, searched = gate.d2, -1.0
     while True:
-        radius = search_radius(bound, measured_range, view, model, index.largest_variance)
+        radius = search_radius(bound, measured_range, view, model, cells.largest_variance)
         if radius <= searched:
-            return best
-        best = likeliest_within(radius, belief, measured_range, measured_bearing, view, model, index)
+            return best, best_d2
         searched = radius
-        if best.entry == NOBODY:
-            if gate.enabled or len(index.x) == 0 or not bound < math.inf:
-                return best
-            bound = bound * 16.0
-        elif gate.enabled and best.d2 > gate.d2:
-            return best
+        first_row, last_row = cell_range(py - radius, py + radius, cells.size, cells.rows)
+        first_column, last_column = cell_range(px - radius, px + radius, cells.size, cells.columns)
+        for row in range(first_row, last_row + 1 if last_column >= first_column else first_row):
+            start = cell_offsets[row * cells.columns + first_column]
+            for entry in range(start, cell_offsets[row * cells.columns + last_column + 1]):
+                x, y = places[entry, 0], places[entry, 1]
+                dx, dy = x - cells.origin_x - px, y - cells.origin_y - py
+                if dx * dx + dy * dy > radius * radius:
+                    continue
+                d2, cost = score(belief, measured_range, measured_bearing, x, y, places[entry, 2], view, model)
+                if cost < best_cost or (cost == best_cost and places[entry, 3] < places[best, 3]):
+                    best, best_d2, best_cost = entry, d2, cost
+        if best != NOBODY:
+            if gate.enabled and not best_d2 <= gate.d2:
+                return best, best_d2
+            bound = best_cost
+        elif gate.enabled or len(places) == 0 or not bound < math.inf:
+            return best, best_d2
         else:
-            bound = best.cost
+            bound *= 16.0
 
 
 @compiled
@@ -187,8 +164,10 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
     last: int,
     detections: FloatArray,
     model: ObservationModel,
-    index: ReflectorIndex,
     gate: Gate,
+    cells: Cells,
+    places: FloatArray,
+    cell_offsets: IntArray,
     status: NDArray[np.int8],
     entries: IntArray,
     d2: FloatArray,
@@ -198,8 +177,10 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
     Parameters
     ----------
     detections : (n, 2) measured range and bearing.
+    cells, places, cell_offsets : the map, see `ReflectorIndex`.
     status : (n,) in: INLIER or OUTLIER_DETECTOR, the latter is left alone; out: a `Status`.
-    entries : (n,) out: position in the index, or NOBODY; d2 : (n,) out: NaN for nobody.
+    entries : (n,) out: row of `places`, or NOBODY.
+    d2 : (n,) out: squared Mahalanobis distance, NaN for nobody.
 
     Notes
     -----
@@ -213,15 +194,16 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
         d2[i] = math.nan
         if status[i] != INLIER:
             continue
-        best = likeliest(belief, detections[i, 0] - model.range_bias, detections[i, 1], view, model, index, gate)
-        entries[i] = best.entry
-        d2[i] = best.d2
-        if best.entry == NOBODY or (gate.enabled and not best.d2 <= gate.d2):
+        measured = detections[i, 0] - model.range_bias
+        best, best_d2 = likeliest(belief, measured, detections[i, 1], view, model, gate, cells, places, cell_offsets)
+        entries[i] = best
+        d2[i] = best_d2
+        if best == NOBODY or (gate.enabled and not best_d2 <= gate.d2):
             status[i] = OUTLIER_ASSOCIATION
             continue
         if not gate.enabled:
             continue
         for other in range(first, i):
-            if status[other] == INLIER and entries[other] == best.entry:
-                status[i if d2[other] <= best.d2 else other] = OUTLIER_ASSOCIATION
+            if status[other] == INLIER and entries[other] == best:
+                status[i if d2[other] <= best_d2 else other] = OUTLIER_ASSOCIATION
                 break

@@ -40,6 +40,8 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     last: int,
     detections: FloatArray,
     model: FilterModel,
+    places: FloatArray,
+    cell_offsets: IntArray,
     status: NDArray[np.int8],
     reflectors: IntArray,
     d2: FloatArray,
@@ -50,12 +52,26 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     ----------
     belief, motion, mode : state after everything before this scan.
     detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
+    places, cell_offsets : the map, see `ReflectorIndex`.
     status : (n,) in: INLIER or OUTLIER_DETECTOR; out: a `Status`.
     reflectors : (n,) out: index into the reflector map, or -1.
     d2 : (n,) out: squared Mahalanobis distance at the prior, NaN for none.
     """
     prior, motion = reach(belief, motion, stamp_ns, model.odometry)
-    associate(prior, first, last, detections, model.observation, model.reflectors, model.gate, status, reflectors, d2)
+    associate(
+        prior,
+        first,
+        last,
+        detections,
+        model.observation,
+        model.gate,
+        model.cells,
+        places,
+        cell_offsets,
+        status,
+        reflectors,
+        d2,
+    )
     posterior = prior
     for i in range(first, last):
         entry = int(reflectors[i])
@@ -66,10 +82,10 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
                 posterior,
                 detections[i, 0] - model.observation.range_bias,
                 detections[i, 1],
-                model.reflectors.x[entry],
-                model.reflectors.y[entry],
-                model.reflectors.variance[entry],
+                places[entry, 0],
+                places[entry, 1],
+                places[entry, 2],
                 model.observation,
             )
-        reflectors[i] = model.reflectors.ids[entry]
+        reflectors[i] = int(places[entry, 3])
     return Cycle(prior, posterior, motion, supervise(mode, posterior, model.limits))

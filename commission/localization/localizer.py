@@ -128,7 +128,19 @@ class Localizer:
         reflector: IntArray = np.empty(count, dtype=np.int64)
         d2 = np.empty(count)
         cycle = process_scan(
-            self._pose, self._motion, int(self._mode), stamp_ns, 0, count, detections, model, status, reflector, d2
+            self._pose,
+            self._motion,
+            int(self._mode),
+            stamp_ns,
+            0,
+            count,
+            detections,
+            model,
+            self._setup.index.places,
+            self._setup.index.offsets,
+            status,
+            reflector,
+            d2,
         )
         self._pose, self._motion, self._mode = cycle.posterior, cycle.motion, Mode(cycle.mode)
         self._belief_ns = stamp_ns

@@ -18,25 +18,31 @@ SMALLEST_CELL = 1.0
 """Edge of a cell [m]: wider than a usual gate, so that a search touches one to four cells."""
 
 
-class ReflectorIndex(NamedTuple):
-    """Reflectors in the order of their cells, row by row."""
+class Cells(NamedTuple):
+    """The square cells over the map."""
 
-    x: FloatArray
-    """(N,) centers [m], map frame."""
-    y: FloatArray
-    variance: FloatArray
-    """(N,) variance of the surveyed place, each axis [m^2]."""
-    ids: IntArray
-    """(N,) index of each in the reflector map."""
-    offsets: IntArray
-    """(rows * columns + 1,) first entry of each cell."""
     origin_x: float
     origin_y: float
-    cell: float
+    size: float
     """Edge of a cell [m]."""
     rows: int
     columns: int
     largest_variance: float
+    """Of all surveyed places, each axis [m^2]."""
+
+
+class ReflectorIndex(NamedTuple):
+    """Reflectors in the order of their cells, row by row.
+
+    The arrays are handed to kernels one by one, not in this tuple: each array that a kernel takes out of a tuple costs
+    two atomic operations, which were two thirds of the filter's time.
+    """
+
+    cells: Cells
+    places: FloatArray
+    """(N, 4) x, y [m], map frame; variance of the surveyed place, each axis [m^2]; index in the reflector map."""
+    offsets: IntArray
+    """(rows * columns + 1,) first row of `places` of each cell."""
 
 
 def build_index(reflectors: ReflectorMap) -> ReflectorIndex:
@@ -52,18 +58,10 @@ def build_index(reflectors: ReflectorMap) -> ReflectorIndex:
     keys = cells[:, 1] * columns + cells[:, 0]
     order = np.argsort(keys, kind="stable")
     offsets = np.searchsorted(keys[order], np.arange(rows * columns + 1)).astype(np.int64)
+    places = np.column_stack((centers, np.square(sigmas), np.arange(len(centers))))[order]
+    largest = float(np.square(sigmas).max(initial=0.0))
     return ReflectorIndex(
-        read_only(centers[order, 0]),
-        read_only(centers[order, 1]),
-        read_only(np.square(sigmas[order])),
-        read_only(order.astype(np.int64)),
-        read_only(offsets),
-        float(low[0]),
-        float(low[1]),
-        cell,
-        rows,
-        columns,
-        float(np.square(sigmas).max(initial=0.0)),
+        Cells(float(low[0]), float(low[1]), cell, rows, columns, largest), read_only(places), read_only(offsets)
     )
 
 

@@ -1,4 +1,4 @@
-"""All that the localizer is given and does not change by itself, and the same as scalars and tables for its kernels."""
+"""All that the localizer is given and does not change by itself, and the same as scalars and arrays for its kernels."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from commission.localization.detector import DetectorModel, detector_model
 from commission.localization.estimate import Belief
 from commission.localization.observation import ObservationModel, observation_model, validation_ellipses
 from commission.localization.odometry import OdometryNoise, odometry_noise
-from commission.localization.reflector_index import ReflectorIndex, build_index
+from commission.localization.reflector_index import Cells, ReflectorIndex, build_index
 from commission.localization.supervisor import SupervisorLimits, supervisor_limits
 from commission.site.parameters import Parameters
 from commission.site.project import Project
@@ -21,11 +21,11 @@ from commission.site.scanner import Scanner
 
 
 class FilterModel(NamedTuple):
-    """What the steps of the filter read."""
+    """What the steps of the filter read, besides the arrays of the map."""
 
     odometry: OdometryNoise
     observation: ObservationModel
-    reflectors: ReflectorIndex
+    cells: Cells
     gate: Gate
     limits: SupervisorLimits
 
@@ -41,18 +41,22 @@ class LocalizerSetup:
     parameters: Parameters
     """Tunables of every stage."""
     filter: FilterModel = field(init=False, repr=False)
-    """Scalars and tables of the filter."""
+    """Scalars of the filter."""
+    index: ReflectorIndex = field(init=False, repr=False)
+    """The reflector map for the filter."""
     detector: DetectorModel = field(init=False, repr=False)
     """Scalars and tables of the detector."""
 
     def __post_init__(self) -> None:
+        index = build_index(self.reflectors)
         model = FilterModel(
             odometry_noise(self.parameters.odometry),
             observation_model(self.scanner, self.parameters.observation),
-            build_index(self.reflectors),
+            index.cells,
             gate_of(self.parameters.association),
             supervisor_limits(self.parameters.supervisor),
         )
+        object.__setattr__(self, "index", index)
         object.__setattr__(self, "filter", model)
         detector = detector_model(self.reflectors, self.scanner, self.parameters.detector)
         object.__setattr__(self, "detector", detector)

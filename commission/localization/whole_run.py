@@ -181,6 +181,8 @@ def run(
         detected.offsets,
         detected.range_bearing,
         setup.filter,
+        setup.index.places,
+        setup.index.offsets,
         start,
         AT_REST,
         columns,
@@ -215,11 +217,14 @@ def _run(  # noqa: PLR0917 - the columns of the log
     offsets: IntArray,
     detections: FloatArray,
     model: FilterModel,
+    places: FloatArray,
+    cell_offsets: IntArray,
     belief: PoseGaussian,
     motion: Motion,
     columns: Columns,
 ) -> PoseGaussian:
     """Deliver odometry and scans in the order of their stamps, odometry first; return the belief after the last."""
+    prior_means, prior_covariances, means, covariances, modes, status, reflectors, d2 = columns
     mode = 0
     rows = 0
     for k in range(len(scan_stamps)):
@@ -236,14 +241,16 @@ def _run(  # noqa: PLR0917 - the columns of the log
             offsets[k + 1],
             detections,
             model,
-            columns.status,
-            columns.reflectors,
-            columns.d2,
+            places,
+            cell_offsets,
+            status,
+            reflectors,
+            d2,
         )
         belief, motion, mode = cycle.posterior, cycle.motion, cycle.mode
-        _store(cycle.prior, k, columns.prior_means, columns.prior_covariances)
-        _store(belief, k, columns.means, columns.covariances)
-        columns.modes[k] = mode
+        _store(cycle.prior, k, prior_means, prior_covariances)
+        _store(belief, k, means, covariances)
+        modes[k] = mode
     while rows < len(odometry_stamps):
         dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
         belief, motion = advance(belief, motion, odometry_stamps[rows], dx, dy, dtheta, model.odometry)
