@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.compiled import compiled
+from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.gaussian import chi_square_gate
 from commission.localization.estimate import Status
@@ -50,7 +50,7 @@ def gate_of(parameters: AssociationParameters) -> Gate:
     return Gate(bool(parameters.enabled), chi_square_gate(parameters.gate_probability, 2))
 
 
-@compiled
+@compiled_inline
 def viewpoint(belief: PoseGaussian, model: ObservationModel) -> Viewpoint:
     """Return the scanner's place and the largest 1-sigma of its position and heading."""
     offset_x, offset_y = scanner_offset(belief.theta, model)
@@ -63,7 +63,7 @@ def viewpoint(belief: PoseGaussian, model: ObservationModel) -> Viewpoint:
     return Viewpoint(offset_x, offset_y, math.sqrt(max(largest, 0.0)), math.sqrt(max(belief.tt, 0.0)))
 
 
-@compiled
+@compiled_inline
 def search_radius(
     d2: float, measured_range: float, view: Viewpoint, model: ObservationModel, largest_variance: float
 ) -> float:
@@ -87,7 +87,7 @@ def search_radius(
     return math.sqrt(depth * depth + distance * (distance + depth) * chord2) * (1.0 + 1e-9) + 1e-9
 
 
-@compiled
+@compiled_inline
 def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     belief: PoseGaussian,
     measured_range: float,
@@ -105,7 +105,7 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     return d2, d2 + math.log(v.s_rr * v.schur / (model.range_variance * model.bearing_variance))
 
 
-@compiled
+@compiled_inline
 def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     belief: PoseGaussian,
     measured_range: float,
@@ -129,12 +129,9 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     px = belief.x + view.offset_x + measured_range * math.cos(direction) - cells.origin_x
     py = belief.y + view.offset_y + measured_range * math.sin(direction) - cells.origin_y
     best, best_d2, best_cost = NOBODY, math.nan, math.inf
-    bound, searched = gate.d2, -1.0
+    bound = gate.d2
     while True:
         radius = search_radius(bound, measured_range, view, model, cells.largest_variance)
-        if radius <= searched:
-            return best, best_d2
-        searched = radius
         first_row, last_row = cell_range(py - radius, py + radius, cells.size, cells.rows)
         first_column, last_column = cell_range(px - radius, px + radius, cells.size, cells.columns)
         for row in range(first_row, last_row + 1 if last_column >= first_column else first_row):
@@ -148,7 +145,7 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
                 if cost < best_cost or (cost == best_cost and places[entry, 3] < places[best, 3]):
                     best, best_d2, best_cost = entry, d2, cost
         if best != NOBODY:
-            if gate.enabled and not best_d2 <= gate.d2:
+            if best_cost <= bound or (gate.enabled and not best_d2 <= gate.d2):
                 return best, best_d2
             bound = best_cost
         elif gate.enabled or len(places) == 0 or not bound < math.inf:
@@ -157,7 +154,7 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
             bound *= 16.0
 
 
-@compiled
+@compiled_inline
 def associate(  # noqa: PLR0917 - outputs are written into the arrays of the whole run
     belief: PoseGaussian,
     first: int,

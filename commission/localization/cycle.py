@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.compiled import compiled
+from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.association import INLIER, NOBODY, associate
 from commission.localization.kalman import correct
@@ -30,7 +30,7 @@ class Cycle(NamedTuple):
     mode: int
 
 
-@compiled
+@compiled_inline
 def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the whole run
     belief: PoseGaussian,
     motion: Motion,

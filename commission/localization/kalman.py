@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from commission.compiled import compiled
+from commission.compiled import compiled_inline
 from commission.geometry.angles import wrap_scalar
-from commission.localization.observation import SMALLEST_RANGE, Expected, ObservationModel, expect, scanner_offset
+from commission.localization.observation import Expected, ObservationModel, expect, scanner_offset
 from commission.localization.pose_gaussian import PoseGaussian
 
 
@@ -36,7 +36,7 @@ class Innovation(NamedTuple):
     bearing_pt: float
 
 
-@compiled
+@compiled_inline
 def innovation(  # noqa: PLR0917 - a measurement, number by number
     belief: PoseGaussian,
     expected: Expected,
@@ -54,9 +54,8 @@ def innovation(  # noqa: PLR0917 - a measurement, number by number
     surveyed_variance : of the reflector's place, each axis [m^2]; adds to R.
     """
     e = expected
-    nearest = max(e.range, SMALLEST_RANGE)
     range_noise = model.range_variance + surveyed_variance
-    bearing_noise = model.bearing_variance + surveyed_variance / (nearest * nearest)
+    bearing_noise = model.bearing_variance + surveyed_variance * (e.bearing_x * e.bearing_x + e.bearing_y * e.bearing_y)
     range_px = belief.xx * e.range_x + belief.xy * e.range_y + belief.xt * e.range_theta
     range_py = belief.xy * e.range_x + belief.yy * e.range_y + belief.yt * e.range_theta
     range_pt = belief.xt * e.range_x + belief.yt * e.range_y + belief.tt * e.range_theta
@@ -85,14 +84,14 @@ def innovation(  # noqa: PLR0917 - a measurement, number by number
     )
 
 
-@compiled
+@compiled_inline
 def squared_distance(given: Innovation) -> float:
     """Squared Mahalanobis distance of an innovation (NIS, 2 degrees of freedom)."""
     rest = given.bearing - given.w * given.range
     return given.range * given.range / given.s_rr + rest * rest / given.schur
 
 
-@compiled
+@compiled_inline
 def correct(  # noqa: PLR0917 - a measurement and a reflector, number by number
     belief: PoseGaussian,
     measured_range: float,
@@ -142,7 +141,7 @@ def correct(  # noqa: PLR0917 - a measurement and a reflector, number by number
     )
 
 
-@compiled
+@compiled_inline
 def _second(range_p: float, bearing_p: float, given: Innovation) -> float:
     """Second element of S^-1 applied to [range_p, bearing_p]."""
     return (bearing_p - given.w * range_p) / given.schur

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from commission.compiled import compiled
+from commission.compiled import compiled, compiled_inline
 from commission.geometry import se2
 from commission.geometry.angles import wrap, wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray, read_only
@@ -55,14 +55,14 @@ def observation_model(scanner: Scanner, parameters: ObservationParameters) -> Ob
     )
 
 
-@compiled
+@compiled_inline
 def scanner_offset(theta: float, model: ObservationModel) -> tuple[float, float]:
     """Scanner's place seen from base, map axes [m]."""
     c, s = math.cos(theta), math.sin(theta)
     return c * model.mount_x - s * model.mount_y, s * model.mount_x + c * model.mount_y
 
 
-@compiled
+@compiled_inline
 def expect(  # noqa: PLR0917 - a pose and a point, number by number
     x: float, y: float, theta: float, offset_x: float, offset_y: float, target_x: float, target_y: float, mount: float
 ) -> Expected:

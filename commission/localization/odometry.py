@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from commission.compiled import compiled
+from commission.compiled import compiled_inline
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.se2 import compose_scalars, exp_scalars, inverse_scalars, log_scalars
 from commission.localization.pose_gaussian import PoseGaussian
@@ -62,7 +62,7 @@ def odometry_noise(parameters: OdometryParameters) -> OdometryNoise:
     )
 
 
-@compiled
+@compiled_inline
 def arc_length(dx: float, dy: float, dtheta: float) -> float:
     """Length of the arc [m] that leads to a displacement, from its chord and its turn."""
     half = 0.5 * wrap_scalar(dtheta)
@@ -74,7 +74,7 @@ def arc_length(dx: float, dy: float, dtheta: float) -> float:
     return chord * half / math.sin(half)
 
 
-@compiled
+@compiled_inline
 def predict(  # noqa: PLR0917 - a displacement, number by number
     belief: PoseGaussian, dx: float, dy: float, dtheta: float, seconds: float, noise: OdometryNoise
 ) -> PoseGaussian:
@@ -118,7 +118,7 @@ def predict(  # noqa: PLR0917 - a displacement, number by number
     return PoseGaussian(x, y, theta, xx, xy, xt, yy, yt, belief.tt + heading)
 
 
-@compiled
+@compiled_inline
 def advance(  # noqa: PLR0917 - one odometry record, number by number
     belief: PoseGaussian, motion: Motion, stamp_ns: int, dx: float, dy: float, dtheta: float, noise: OdometryNoise
 ) -> tuple[PoseGaussian, Motion]:
@@ -138,7 +138,7 @@ def advance(  # noqa: PLR0917 - one odometry record, number by number
     return moved, Motion(True, stamp_ns, stamp_ns, period_ns, dx, dy, dtheta, 0.0, 0.0, 0.0)
 
 
-@compiled
+@compiled_inline
 def reach(belief: PoseGaussian, motion: Motion, stamp_ns: int, noise: OdometryNoise) -> tuple[PoseGaussian, Motion]:
     """Extrapolate the belief to the stamp of a scan.
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from commission.compiled import compiled
+from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.site.reflectors import ReflectorMap
 
@@ -58,14 +58,14 @@ def build_index(reflectors: ReflectorMap) -> ReflectorIndex:
     keys = cells[:, 1] * columns + cells[:, 0]
     order = np.argsort(keys, kind="stable")
     offsets = np.searchsorted(keys[order], np.arange(rows * columns + 1)).astype(np.int64)
-    places = np.column_stack((centers, np.square(sigmas), np.arange(len(centers))))[order]
+    places = np.column_stack((centers, np.square(sigmas), np.arange(len(centers), dtype=np.float64)))[order]
     largest = float(np.square(sigmas).max(initial=0.0))
     return ReflectorIndex(
         Cells(float(low[0]), float(low[1]), cell, rows, columns, largest), read_only(places), read_only(offsets)
     )
 
 
-@compiled
+@compiled_inline
 def cell_range(low: float, high: float, cell: float, count: int) -> tuple[int, int]:
     """First and last of `count` cells that the interval [low, high] touches; last < first when none."""
     first, last = low / cell, high / cell

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from commission.compiled import compiled
+from commission.compiled import compiled_inline
 from commission.localization.estimate import Mode
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.site.parameters import SupervisorParameters
@@ -37,7 +37,7 @@ def supervisor_limits(parameters: SupervisorParameters) -> SupervisorLimits:
     )
 
 
-@compiled
+@compiled_inline
 def supervise(mode: int, belief: PoseGaussian, limits: SupervisorLimits) -> int:
     """Mode after a scan, from the mode before it and the belief after *correct*.
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.compiled import compiled
+from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.cycle import process_scan
 from commission.localization.detection_log import DetectionLog, extract_detections
@@ -258,7 +258,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
     return belief
 
 
-@compiled
+@compiled_inline
 def _store(belief: PoseGaussian, row: int, means: FloatArray, covariances: FloatArray) -> None:
     """Write a belief to its row."""
     means[row, 0], means[row, 1], means[row, 2] = belief.x, belief.y, belief.theta

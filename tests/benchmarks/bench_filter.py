@@ -1,8 +1,8 @@
 """Time of the filter per cycle against a loop over filterpy's EKF, and its independence of the map's size.
 
 Run: `python -m tests.benchmarks.bench_filter [CYCLES]` from the checkout. Both sides do the same work in one run:
-odometry prediction, association of five detections with the whole map, sequential correction. Only ratios count, and processor
-time is measured, so that a busy machine does not matter.
+odometry prediction, association of five detections with the whole map, sequential correction. Only ratios count, and
+processor time is measured, so that a busy machine matters less.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from commission.geometry.arrays import FloatArray
 from commission.localization import whole_run
-from commission.localization.detection_log import DetectionLog
+from commission.localization.detection_log import extract_detections
 from commission.localization.estimate import Belief
 from commission.localization.observation import jacobians, range_bearing
 from commission.localization.odometry import odometry_noise
@@ -70,7 +70,7 @@ def peer_seconds(log: RecordLog, setup: LocalizerSetup, initial: Belief, cycles:
     """Seconds and final mean of a loop over filterpy's EKF, its association written with numpy over the whole map."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        from filterpy.kalman import ExtendedKalmanFilter  # noqa: PLC0415 - slow to import, used here alone
+        from filterpy.kalman import ExtendedKalmanFilter
     model, noise, gate = setup.filter.observation, odometry_noise(setup.parameters.odometry), setup.filter.gate.d2
     centers, mounting = setup.reflectors.centers, setup.scanner.mounting
     R = np.diag([model.range_variance, model.bearing_variance])
@@ -91,7 +91,7 @@ def peer_seconds(log: RecordLog, setup: LocalizerSetup, initial: Belief, cycles:
         heading = noise.heading_per_m * distance + noise.heading_per_rad * abs(dt)
         along = noise.forward_per_m * distance
         ekf.Q = np.diag([along, along, heading])
-        ekf.x = ekf.x + [mx, my, dt]
+        ekf.x += [mx, my, dt]
         ekf.P = ekf.F @ ekf.P @ ekf.F.T + ekf.Q
         expected = range_bearing(ekf.x, mounting, centers)
         H = jacobians(ekf.x, mounting, centers)
@@ -118,21 +118,13 @@ def peer_seconds(log: RecordLog, setup: LocalizerSetup, initial: Belief, cycles:
 
 def project_seconds(log: RecordLog, setup: LocalizerSetup, initial: Belief) -> tuple[float, whole_run.RunArrays]:
     """Best of three: seconds of the filter over kept detections."""
-    count = len(log.range_bearing)
-    detected = DetectionLog(
-        log.detection_stamps_ns,
-        log.detection_offsets,
-        log.range_bearing,
-        np.zeros(count, dtype=np.int64),
-        np.zeros(count, dtype=np.int8),
-    )
-    detected = whole_run.extract_detections(log, setup) if count else detected
+    detected = extract_detections(log, setup)
     best, arrays = math.inf, None
     for _ in range(3):
         start = time.process_time()
         arrays = whole_run.run(log, setup, initial, detected=detected)
         best = min(best, time.process_time() - start)
-    assert arrays is not None  # noqa: S101
+    assert arrays is not None
     return best, arrays
 
 

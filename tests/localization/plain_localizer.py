@@ -1,0 +1,192 @@
+"""The localizer once more, plain and slow: numpy matrices straight from the paper, every reflector compared.
+
+It shares no code with the package but the values it reads; the tests compare the two. Detections come from the sensor.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.linalg import expm, logm
+from scipy.stats import chi2
+
+from commission.localization.estimate import Belief
+from commission.site.parameters import Parameters
+from commission.site.record_log import RecordLog
+from commission.site.reflectors import ReflectorMap
+from commission.site.scanner import Scanner
+
+Array = np.ndarray
+
+
+def matrix(pose: Array) -> Array:
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    return np.array([[c, -s, pose[0]], [s, c, pose[1]], [0.0, 0.0, 1.0]])
+
+
+def pose_of(T: Array) -> Array:
+    return np.array([T[0, 2], T[1, 2], math.atan2(T[1, 0], T[0, 0])])
+
+
+def turned(angle: float) -> float:
+    return math.atan2(math.sin(angle), math.cos(angle))
+
+
+def rotation(angle: float) -> Array:
+    return matrix(np.array([0.0, 0.0, angle]))[:2, :2]
+
+
+@dataclass
+class PlainLocalizer:
+    reflectors: ReflectorMap
+    scanner: Scanner
+    parameters: Parameters
+    initial: Belief
+    mean: Array = field(init=False)
+    cov: Array = field(init=False)
+    mode: str = "operational"
+
+    def __post_init__(self) -> None:
+        self.mean, self.cov = np.array(self.initial.mean), np.array(self.initial.covariance)
+        self.odometry_s: float | None = None
+        self.belief_s = self.period_s = 0.0
+        self.last_move, self.ahead = np.eye(3), np.eye(3)
+
+    def run(self, log: RecordLog) -> list[dict]:
+        events = [(stamp, 0, k) for k, stamp in enumerate(log.odometry_stamps_ns)]
+        events += [(stamp, 1, k) for k, stamp in enumerate(log.detection_stamps_ns)]
+        cycles = []
+        for stamp, kind, k in sorted(events):
+            if kind == 0:
+                self.odometry(stamp * 1e-9, log.displacements[k])
+            else:
+                rows = slice(log.detection_offsets[k], log.detection_offsets[k + 1])
+                cycles.append(self.scan(stamp * 1e-9, log.range_bearing[rows]))
+        return cycles
+
+    def odometry(self, now: float, displacement: Array) -> None:
+        if self.odometry_s is not None:
+            move = matrix(displacement)
+            self.predict(np.linalg.inv(self.ahead) @ move, now - self.belief_s)
+            self.period_s, self.last_move = now - self.odometry_s, move
+        self.odometry_s = self.belief_s = now
+        self.ahead = np.eye(3)
+
+    def extrapolate(self, now: float) -> None:
+        if self.odometry_s is None or now <= self.belief_s:
+            return
+        until, done = (min(t - self.odometry_s, self.period_s) for t in (now, self.belief_s))
+        step = np.eye(3)
+        if until > done:
+            step = expm((until - done) / self.period_s * np.real(logm(self.last_move)))
+        self.predict(step, now - self.belief_s)
+        self.ahead, self.belief_s = self.ahead @ step, now
+
+    def predict(self, move: Array, seconds: float) -> None:
+        p, before = self.parameters.odometry, self.mean
+        d = pose_of(move)
+        self.mean = pose_of(matrix(before) @ move)
+        chord = rotation(before[2]) @ d[:2]
+        perpendicular = np.array([-chord[1], chord[0]])
+        F = np.eye(3)
+        F[:2, 2] = perpendicular
+        length = np.linalg.norm(chord)
+        distance = length / np.sinc(d[2] / (2.0 * math.pi))
+        heading = (
+            p.heading_per_sqrt_m**2 * distance
+            + p.heading_per_sqrt_rad**2 * abs(d[2])
+            + p.heading_per_sqrt_s**2 * seconds
+        )
+        Q = np.zeros((3, 3))
+        if length > 0.0:
+            along, across = chord / length, perpendicular / length
+            Q[:2, :2] += p.forward_per_sqrt_m**2 * distance * np.outer(along, along)
+            Q[:2, :2] += p.lateral_per_sqrt_m**2 * distance * np.outer(across, across)
+        axis = rotation(before[2] + d[2] / 2.0)[:, 0]
+        Q[:2, :2] += p.forward_per_sqrt_s**2 * seconds * np.outer(axis, axis)
+        lever = np.array([*(perpendicular / 2.0), 1.0])
+        Q += heading * np.outer(lever, lever)
+        Q[:2, :2] += heading / 12.0 * np.outer(perpendicular, perpendicular)
+        self.cov = F @ self.cov @ F.T + Q
+
+    def h(self, mean: Array, place: Array) -> Array:
+        seen = np.linalg.inv(matrix(mean) @ matrix(self.scanner.mounting)) @ [*place, 1.0]
+        return np.array([math.hypot(seen[0], seen[1]), math.atan2(seen[1], seen[0])])
+
+    def jacobian(self, mean: Array, place: Array) -> Array:
+        """Central differences: independent of the analytic one, good to about 1e-10."""
+        H = np.empty((2, 3))
+        for i in range(3):
+            step = np.zeros(3)
+            step[i] = 1e-5
+            d = self.h(mean + step, place) - self.h(mean - step, place)
+            H[:, i] = d[0] / 2e-5, turned(d[1]) / 2e-5
+        return H
+
+    def noise(self, j: int, r: float) -> Array:
+        p, sigma = self.parameters.observation, self.reflectors.reflectors[j].sigma
+        return np.diag([p.range_sigma**2 + sigma**2, p.bearing_sigma**2 + (sigma / r) ** 2])
+
+    def innovation(self, mean: Array, cov: Array, z: Array, j: int) -> tuple[Array, Array, Array, Array]:
+        place = self.reflectors.centers[j]
+        expected, H = self.h(mean, place), self.jacobian(mean, place)
+        R = self.noise(j, expected[0])
+        return np.array([z[0] - expected[0], turned(z[1] - expected[1])]), H, H @ cov @ H.T + R, R
+
+    def scan(self, now: float, detections: Array) -> dict:
+        self.extrapolate(now)
+        p = self.parameters
+        prior = self.mean, self.cov
+        gate = chi2.ppf(p.association.gate_probability, 2)
+        measured = detections - [p.observation.range_bias, 0.0]
+        status, chosen, d2s = [], [], []
+        for z in measured:
+            best, best_d2, best_likelihood = -1, math.nan, -math.inf
+            for j in range(len(self.reflectors)):
+                v, _, S, _ = self.innovation(*prior, z, j)
+                d2 = float(v @ np.linalg.solve(S, v))
+                likelihood = -0.5 * d2 - 0.5 * np.linalg.slogdet(2.0 * math.pi * S)[1]
+                if likelihood > best_likelihood:
+                    best, best_d2, best_likelihood = j, d2, likelihood
+            inside = best >= 0 and (best_d2 <= gate or not p.association.enabled)
+            status.append("inlier" if inside else "outlier")
+            chosen.append(best)
+            d2s.append(best_d2)
+        if p.association.enabled:
+            for j in set(chosen):
+                claims = [i for i in range(len(chosen)) if chosen[i] == j and status[i] == "inlier"]
+                for i in claims:
+                    if i != min(claims, key=lambda k: (d2s[k], k)):
+                        status[i] = "outlier"
+        for z, j, kept in zip(measured, chosen, status, strict=True):
+            if kept == "inlier":
+                v, H, S, R = self.innovation(self.mean, self.cov, z, j)
+                K = self.cov @ H.T @ np.linalg.inv(S)
+                A = np.eye(3) - K @ H
+                self.mean = self.mean + K @ v
+                self.mean[2] = turned(self.mean[2])
+                self.cov = A @ self.cov @ A.T + K @ R @ K.T
+        self.supervise()
+        return {
+            "mean": self.mean.copy(),
+            "cov": self.cov.copy(),
+            "prior_mean": prior[0],
+            "prior_cov": prior[1],
+            "mode": self.mode,
+            "status": status,
+            "chosen": chosen,
+            "d2": d2s,
+        }
+
+    def supervise(self) -> None:
+        p = self.parameters.supervisor
+        spread = 2.0 * np.sqrt(np.diag(self.cov))
+        limits = np.array([p.position_limit, p.position_limit, p.heading_limit])
+        if self.mode == "operational" and (spread > limits).any():
+            self.mode = "fail"
+        elif self.mode == "fail" and (spread < limits / p.recovery_ratio).all():
+            self.mode = "operational"
+        if not p.enabled:
+            self.mode = "operational"

@@ -1,0 +1,225 @@
+"""The localizer against an independent plain one, against statistics, and against the whole hall being moved."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from commission.errors import SourceError
+from commission.geometry import se2
+from commission.geometry.angles import difference
+from commission.localization.estimate import Belief, Mode, Status
+from commission.localization.localizer import Localizer
+from commission.localization.setup import LocalizerSetup
+from commission.localization.whole_run import run
+from commission.site.parameters import (
+    AssociationParameters,
+    ObservationParameters,
+    OdometryParameters,
+    Parameters,
+    SupervisorParameters,
+)
+from commission.site.record_log import RecordLog
+from commission.site.records import Detections, Odometry, ReferencePose, Scan
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.scanner import Scanner
+from tests.localization.drives import Drive, Plan, random_drive, random_map
+from tests.localization.plain_localizer import PlainLocalizer
+
+MOUNTING = np.array([0.3, 0.1, 0.2])
+INITIAL = Belief(0, np.array([0.0, 0.0, 0.0]), np.diag([1e-4, 1e-4, 1e-4]))
+
+
+def one_reflector(parameters: Parameters | None = None) -> LocalizerSetup:
+    return LocalizerSetup(ReflectorMap((Reflector("A", 2.0, 0.0),)), Scanner(), parameters or Parameters())
+
+
+@pytest.mark.parametrize(
+    ("plan", "parameters"),
+    [
+        (Plan(scans=40, clutter=1.0), Parameters()),
+        (Plan(scans=40, scan_offset_ns=7_000_000), Parameters(observation=ObservationParameters(range_bias=0.03))),
+        (Plan(scans=40, odometry_ns=100_000_000, scan_ns=30_000_000), Parameters()),
+        (Plan(scans=40, clutter=1.0), Parameters(association=AssociationParameters(enabled=False))),
+        (Plan(scans=40, reach=3.0), Parameters(supervisor=SupervisorParameters(position_limit=0.03))),
+        (Plan(scans=40, clutter=5.0), Parameters(odometry=OdometryParameters(forward_per_sqrt_s=0.3))),
+    ],
+    ids=["clutter", "between odometry", "fast scans", "no association filter", "few in reach", "uncertain"],
+)
+def test_localizer_agrees_with_the_plain_one(plan: Plan, parameters: Parameters) -> None:
+    rng = np.random.default_rng(11)
+    setup = LocalizerSetup(random_map(rng, 12, sigma=0.01), Scanner(mounting=MOUNTING), parameters)
+    drive = random_drive(setup, rng, plan)
+    arrays = run(drive.log, setup, drive.initial)
+    plain = PlainLocalizer(setup.reflectors, setup.scanner, parameters, drive.initial).run(drive.log)
+    assert len(plain) == len(arrays)
+    # The plain one differentiates numerically: 1e-10 of relative error, which the gain passes on.
+    assert_close(arrays.means, np.array([cycle["mean"] for cycle in plain]), 1e-8)
+    np.testing.assert_allclose(arrays.covariances, [cycle["cov"] for cycle in plain], rtol=1e-6, atol=1e-12)
+    assert_close(arrays.prior_means, np.array([cycle["prior_mean"] for cycle in plain]), 1e-8)
+    np.testing.assert_allclose(arrays.prior_covariances, [cycle["prior_cov"] for cycle in plain], rtol=1e-6, atol=1e-12)
+    assert [Mode(mode).name.lower() for mode in arrays.modes] == [cycle["mode"] for cycle in plain]
+    kept = [status == "inlier" for cycle in plain for status in cycle["status"]]
+    inlier = arrays.status == Status.INLIER
+    assert inlier.tolist() == kept
+    chosen = np.array([j for cycle in plain for j in cycle["chosen"]])
+    d2 = np.array([value for cycle in plain for value in cycle["d2"]])
+    np.testing.assert_array_equal(arrays.reflector[inlier], chosen[inlier])
+    np.testing.assert_allclose(arrays.d2[inlier], d2[inlier], rtol=1e-5, atol=1e-6)
+
+
+def assert_close(means: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
+    np.testing.assert_allclose(means[:, :2], expected[:, :2], atol=tolerance, rtol=0)
+    np.testing.assert_allclose(difference(means[:, 2], expected[:, 2]), 0.0, atol=tolerance)
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [Plan(scans=100, clutter=0.0), Plan(scans=100, clutter=0.0, scan_offset_ns=9_000_000)],
+    ids=["equal stamps", "scans between odometry"],
+)
+def test_pose_errors_and_innovations_are_as_large_as_the_filter_says(plan: Plan) -> None:
+    # The gate is wide open, so that it cuts no tail off.
+    parameters = Parameters(association=AssociationParameters(gate_probability=0.9999))
+    nees, nis, count = 0.0, 0.0, 0
+    drives = 40
+    for seed in range(drives):
+        rng = np.random.default_rng(seed)
+        setup = LocalizerSetup(random_map(rng, 5), Scanner(mounting=MOUNTING), parameters)
+        drive = random_drive(setup, rng, plan)
+        arrays = run(drive.log, setup, drive.initial)
+        error = arrays.means[-1] - drive.truth[-1]
+        error[2] = math.remainder(error[2], 2.0 * math.pi)
+        nees += error @ np.linalg.solve(arrays.covariances[-1], error)
+        nis += arrays.nis_sums().sum()
+        count += arrays.counts(Status.INLIER).sum()
+    low, high = chi2.ppf([0.001, 0.999], 3 * drives)
+    assert low < nees < high
+    # Detections of one scan share the error of the prior, so the sum of NIS spreads more than a chi-square: 5 %.
+    assert nis / count == pytest.approx(2.0, rel=0.05)
+
+
+def moved(drive: Drive, setup: LocalizerSetup, T: np.ndarray) -> tuple[LocalizerSetup, Belief]:
+    """The same hall and initial belief, expressed in a map frame that is somewhere else."""
+    centers = se2.transform_points(T, setup.reflectors.centers)
+    reflectors = ReflectorMap(
+        tuple(
+            dataclasses.replace(reflector, x=float(x), y=float(y))
+            for reflector, (x, y) in zip(setup.reflectors.reflectors, centers, strict=True)
+        )
+    )
+    G = block(T)
+    initial = Belief(0, se2.compose(T, drive.initial.mean), G @ drive.initial.covariance @ G.T)
+    return LocalizerSetup(reflectors, setup.scanner, setup.parameters), initial
+
+
+def block(T: np.ndarray) -> np.ndarray:
+    c, s = math.cos(T[2]), math.sin(T[2])
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+@pytest.mark.parametrize("T", [(100.0, -50.0, 0.0), (0.0, 0.0, 2.5), (-30.0, 7.0, -3.1)])
+def test_nothing_changes_when_the_whole_hall_is_moved_or_turned(T: tuple[float, float, float]) -> None:
+    rng = np.random.default_rng(21)
+    setup = LocalizerSetup(random_map(rng, 12), Scanner(mounting=MOUNTING), Parameters())
+    drive = random_drive(setup, rng, Plan(clutter=1.0))
+    here = run(drive.log, setup, drive.initial)
+    pose = np.array(T)
+    there = run(drive.log, *moved(drive, setup, pose))
+    # Coordinates of 100 m round to 1e-14; 300 steps add up.
+    assert_close(there.means, se2.compose(pose, here.means), 1e-10)
+    np.testing.assert_allclose(there.covariances, block(pose) @ here.covariances @ block(pose).T, rtol=1e-7, atol=1e-14)
+    np.testing.assert_array_equal(there.status, here.status)
+    inlier = here.status == Status.INLIER
+    np.testing.assert_array_equal(there.reflector[inlier], here.reflector[inlier])
+
+
+def test_record_older_than_the_one_before_is_refused() -> None:
+    localizer = Localizer(one_reflector(), INITIAL)
+    localizer.feed(Odometry(10, np.zeros(3)))
+    with pytest.raises(SourceError, match="3 ns before the record that came before it; expected ascending stamps"):
+        localizer.feed(Detections(7, np.empty((0, 2))))
+
+
+def test_first_odometry_record_only_starts_the_clock() -> None:
+    localizer = Localizer(one_reflector(), INITIAL)
+    assert localizer.feed(Odometry(10, np.array([1.0, 0.0, 0.0]))) is None
+    np.testing.assert_array_equal(localizer.belief.mean, INITIAL.mean)
+    np.testing.assert_array_equal(localizer.belief.covariance, INITIAL.covariance)
+
+
+def test_reference_pose_is_never_used() -> None:
+    localizer = Localizer(one_reflector(), INITIAL)
+    assert localizer.feed(ReferencePose(0, np.array([9.0, 9.0, 1.0]))) is None
+    np.testing.assert_array_equal(localizer.belief.mean, INITIAL.mean)
+
+
+def test_detections_of_the_sensor_win_over_its_scans() -> None:
+    localizer = Localizer(one_reflector(), INITIAL)
+    scan = Scan(0, np.full(3, 1.96, np.float32), -0.01, 0.01, None, np.array([True, True, True]))
+    assert localizer.feed(scan) is not None
+    assert localizer.feed(Detections(1, np.array([[2.0, 0.0]]))) is not None
+    assert localizer.feed(dataclasses.replace(scan, stamp_ns=2)) is None
+
+
+def test_output_is_withheld_in_fail_mode_while_the_filter_goes_on() -> None:
+    parameters = Parameters(odometry=OdometryParameters(forward_per_sqrt_s=0.05, heading_per_sqrt_s=0.0))
+    localizer = Localizer(one_reflector(parameters), INITIAL)
+    seen = np.array([[2.0, 0.0]])
+    outputs, modes = [], []
+    for k in range(60):
+        localizer.feed(Odometry(k * 100_000_000, np.zeros(3)))
+        covered = 10 <= k < 40
+        estimate = localizer.feed(Detections(k * 100_000_000, seen[:0] if covered else seen))
+        assert estimate is not None
+        outputs.append(estimate.output)
+        modes.append(estimate.mode)
+        assert estimate.posterior.stamp_ns == k * 100_000_000
+    assert modes[9] is Mode.OPERATIONAL
+    first = modes.index(Mode.FAIL)
+    # 2-sigma of x: 0.1 m after one second without reflectors.
+    assert 10 < first <= 21
+    assert modes[39] is Mode.FAIL
+    assert outputs[39] is outputs[first - 1]
+    assert modes[-1] is Mode.OPERATIONAL
+    assert outputs[-1].stamp_ns == 59 * 100_000_000
+
+
+def test_changed_parameters_act_on_the_next_scan_and_keep_the_state() -> None:
+    localizer = Localizer(one_reflector(), INITIAL)
+    localizer.feed(Odometry(0, np.zeros(3)))
+    before = localizer.belief
+    localizer.replace_setup(one_reflector(Parameters(association=AssociationParameters(gate_probability=0.5))))
+    np.testing.assert_array_equal(localizer.belief.covariance, before.covariance)
+    estimate = localizer.feed(Detections(0, np.array([[2.0, 0.0]])))
+    assert estimate is not None
+    assert estimate.gate == pytest.approx(2.0 * math.log(2.0))
+
+
+def test_scan_between_odometry_is_met_where_the_vehicle_is_then() -> None:
+    localizer = Localizer(one_reflector(), INITIAL)
+    step = np.array([0.1, 0.0, 0.0])
+    localizer.feed(Odometry(0, np.zeros(3)))
+    localizer.feed(Odometry(100, step))
+    nothing = np.empty((0, 2))
+    halfway = localizer.feed(Detections(150, nothing))
+    late = localizer.feed(Detections(990, nothing))
+    assert halfway is not None
+    assert late is not None
+    assert halfway.prior.mean[0] == pytest.approx(0.15)
+    assert late.prior.mean[0] == pytest.approx(0.2), "extrapolated by one odometry period at most"
+    localizer.feed(Odometry(1000, 9.0 * step))
+    assert localizer.belief.mean[0] == pytest.approx(1.0)
+
+
+def test_map_without_reflectors_makes_every_detection_an_outlier() -> None:
+    setup = LocalizerSetup(ReflectorMap(), Scanner(), Parameters())
+    log = RecordLog.collect([Odometry(0, np.zeros(3)), Detections(0, np.array([[2.0, 0.0]]))])
+    arrays = run(log, setup, INITIAL)
+    assert arrays.status.tolist() == [Status.OUTLIER_ASSOCIATION]
+    assert arrays.reflector.tolist() == [-1]
+    assert np.isnan(arrays.d2).all()
