@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
+import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from commission.errors import UsageError
 
@@ -21,8 +26,8 @@ class _Page:
     """Address to listen on; any other than this computer's own needs --token."""
     port: int = DEFAULT_PORT
     """TCP port; 0 takes a free one and prints it."""
-    token: str = ""
-    """Secret word that a browser must send; empty: none is asked for."""
+    token: Annotated[str | None, arg(metavar="TEXT")] = None
+    """Secret that a browser must bring, at least when --host is not this computer's own. None: none is asked for."""
     open: bool = True
     """Whether to open the page in this computer's browser."""
 
@@ -32,22 +37,40 @@ class _Page:
             raise UsageError(f"--port is {self.port}; expected 0 to {LAST_PORT}")
         from commission.app.launch import serve
 
-        serve(
-            project,
-            host=self.host,
-            port=self.port,
-            token=self.token or None,
-            open_browser=self.open,
-            recording=recording,
-            demo=demo,
-        )
+        # Ctrl-C is how the page is meant to be closed.
+        with _told_on_stdout(), contextlib.suppress(KeyboardInterrupt):
+            serve(
+                project,
+                host=self.host,
+                port=self.port,
+                token=self.token,
+                open_browser=self.open,
+                recording=recording,
+                demo=demo,
+            )
+
+
+@contextlib.contextmanager
+def _told_on_stdout() -> Iterator[None]:
+    """Let what the page logs for the user, its address above all, appear on stdout."""
+    handler = logging.StreamHandler(sys.stdout)
+    handler.setFormatter(logging.Formatter("%(message)s"))
+    logger = logging.getLogger("commission")
+    before = logger.level
+    logger.addHandler(handler)
+    logger.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        logger.removeHandler(handler)
+        logger.setLevel(before)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Demo(_Page):
     """Open the page with a bundled site in which a virtual AGV is driving."""
 
-    site: str = "laboratory"
+    site: Annotated[str, arg(metavar="NAME")] = "laboratory"
     """Bundled site: laboratory, shop_floor or warehouse."""
 
     def run(self) -> None:
@@ -66,9 +89,13 @@ class Serve(_Page):
 
     project: Positional[Path]
     """Folder of the project (holds project.yaml)."""
-    recording: Path | None = None
+    recording: Annotated[Path | None, arg(metavar="PATH")] = None
     """Recording to play: a CSV folder. None: choose it on the page, or drive a virtual AGV."""
 
     def run(self) -> None:
-        """Serve the project."""
+        """Serve the project; a recording that is none is an error now, not only on the page."""
+        if self.recording is not None:
+            from commission.io.recordings.base import open_recording
+
+            open_recording(self.recording)
         self.serve(self.project, self.recording)
