@@ -16,6 +16,8 @@ from commission.compiled import compiled
 GRAZING = 0.9
 """Beams that pass the axis at more than this share of the radius do not shape the fit: there the surface falls away so
 steeply that the echo is a mixture, and one beam's noise moves the center by several times as much."""
+MEAN_DEPTH = math.pi / 4.0
+"""Mean distance, in radii, from the lit half of a circle to the line through its center across the beam."""
 ITERATIONS = 3
 """Gauss-Newton steps; the third moves a center by less than a micrometre."""
 
@@ -99,7 +101,7 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it and the reflector
     mean = _mean_range(ranges, flags, count, first, last)
     step_cos, step_sin = math.cos(increment), math.sin(increment)
     start_cos, start_sin = math.cos(0.5 * increment * (last - first)), -math.sin(0.5 * increment * (last - first))
-    along, across = mean + 0.8 * radius, 0.0
+    along, across = mean + MEAN_DEPTH * radius, 0.0
     for _ in range(ITERATIONS):
         lateral_sigma = along * increment
         weight = 12.0 * range_sigma * range_sigma / (lateral_sigma * lateral_sigma)
@@ -123,8 +125,9 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it and the reflector
                 used += 1
             c, s = c * step_cos - s * step_sin, s * step_cos + c * step_sin
         if used == 0:
-            # Every beam grazes (a far reflector between two beams): they touch it about where its axis is.
-            return mean, middle
+            # The middle of every beam grazes or misses (a far reflector between two wide beams); what came back is from
+            # the part of each beam that was on it.
+            return mean + MEAN_DEPTH * radius, middle
         determinant = n_aa * n_cc - n_ac * n_ac
         # A cluster that is no reflector must not throw the center behind the scanner.
         along = max(along + (n_cc * g_a - n_ac * g_c) / determinant, 0.5 * mean)
