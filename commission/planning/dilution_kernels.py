@@ -20,6 +20,9 @@ from commission.planning.visibility import in_field_of_view
 # it would be for the best direction. Sums of double precision are off by some 1e-15.
 SINGULAR = 1e-12
 
+FULL_TURN = 2.0 * math.pi
+"""Width of a field of view that needs no test."""
+
 SINGLE, WORST, BEST = 0, 1, 2
 """How figures of several headings become one: there is one heading only, the worst of each, the best of each."""
 
@@ -76,51 +79,51 @@ def lowest_bit(word: np.uint64) -> int:
 
 
 @compiled
-def add_reflector(  # noqa: PLR0917 - one reflector, number by number
+def reflector_information(  # noqa: PLR0917 - one reflector, number by number
     dx: float,
     dy: float,
     lever_x: float,
     lever_y: float,
-    survey_variance: float,
-    model: FixModel,
-    information: FloatArray,
-) -> None:
-    """Add what range and bearing of a reflector at (dx, dy) from the scanner say about the pose, map axes.
+    range_variance: float,
+    bearing_variance: float,
+) -> tuple[float, float, float, float, float, float]:
+    """What range and bearing of a reflector at (dx, dy) from the scanner say about the pose, map axes.
 
-    The scanner stands at (lever_x, lever_y) from the point whose position is asked for. `information` holds the upper
-    triangle row by row: xx, xy, xt, yy, yt, tt. The survey error of the reflector's place adds to both noises.
+    The scanner stands at (lever_x, lever_y) from the point whose position is asked for. The numbers are the upper
+    triangle of the information row by row: xx, xy, xt, yy, yt, tt. A scanner on the reflector itself learns nothing.
     """
-    r = math.hypot(dx, dy)
+    r = math.sqrt(dx * dx + dy * dy)
     if r < 1e-9:
-        return
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     ux, uy = dx / r, dy / r
     # Rows of the Jacobian: range and bearing by x, y and heading. The lever moves the scanner when the heading turns.
     range_t = ux * lever_y - uy * lever_x
     bearing_x, bearing_y = uy / r, -ux / r
     bearing_t = -1.0 - bearing_x * lever_y + bearing_y * lever_x
-    range_weight = 1.0 / (model.range_variance + survey_variance)
-    bearing_weight = 1.0 / (model.bearing_variance + survey_variance / (r * r))
-    information[0] += range_weight * ux * ux + bearing_weight * bearing_x * bearing_x
-    information[1] += range_weight * ux * uy + bearing_weight * bearing_x * bearing_y
-    information[2] += -range_weight * ux * range_t + bearing_weight * bearing_x * bearing_t
-    information[3] += range_weight * uy * uy + bearing_weight * bearing_y * bearing_y
-    information[4] += -range_weight * uy * range_t + bearing_weight * bearing_y * bearing_t
-    information[5] += range_weight * range_t * range_t + bearing_weight * bearing_t * bearing_t
+    range_weight, bearing_weight = 1.0 / range_variance, 1.0 / bearing_variance
+    return (
+        range_weight * ux * ux + bearing_weight * bearing_x * bearing_x,
+        range_weight * ux * uy + bearing_weight * bearing_x * bearing_y,
+        -range_weight * ux * range_t + bearing_weight * bearing_x * bearing_t,
+        range_weight * uy * uy + bearing_weight * bearing_y * bearing_y,
+        -range_weight * uy * range_t + bearing_weight * bearing_y * bearing_t,
+        range_weight * range_t * range_t + bearing_weight * bearing_t * bearing_t,
+    )
 
 
 @compiled
-def position_covariance(information: FloatArray) -> tuple[bool, float, float, float]:
+def position_covariance(  # noqa: PLR0917 - a symmetric matrix, number by number
+    i_xx: float, i_xy: float, i_xt: float, i_yy: float, i_yt: float, i_tt: float
+) -> tuple[bool, float, float, float]:
     """Covariance xx, xy, yy of the position, the heading being estimated with it; whether there is one comes first.
 
     It is the inverse of the Schur complement of the heading, whose eigenvalues do not depend on the choice of axes.
     """
-    i_xx, i_xy, i_xt = information[0], information[1], information[2]
-    i_yy, i_yt, i_tt = information[3], information[4], information[5]
     if not i_tt > 0.0:
         return False, math.inf, 0.0, math.inf
     s_xx, s_xy, s_yy = i_xx - i_xt * i_xt / i_tt, i_xy - i_xt * i_yt / i_tt, i_yy - i_yt * i_yt / i_tt
-    half_sum = 0.5 * (s_xx + s_yy)
-    largest = half_sum + math.hypot(0.5 * (s_xx - s_yy), s_xy)
+    half_difference = 0.5 * (s_xx - s_yy)
+    largest = 0.5 * (s_xx + s_yy) + math.sqrt(half_difference * half_difference + s_xy * s_xy)
     determinant = s_xx * s_yy - s_xy * s_xy
     if determinant <= SINGULAR * (i_xx + i_yy) * largest:
         return False, math.inf, 0.0, math.inf
@@ -128,47 +131,54 @@ def position_covariance(information: FloatArray) -> tuple[bool, float, float, fl
 
 
 @compiled
-def heading_variance(information: FloatArray, p_xx: float, p_xy: float, p_yy: float) -> float:
+def heading_variance(  # noqa: PLR0917 - parts of two matrices, number by number
+    i_xt: float, i_yt: float, i_tt: float, p_xx: float, p_xy: float, p_yy: float
+) -> float:
     """Variance of the heading [rad^2], given the covariance of the position."""
-    b_x, b_y, i_tt = information[2], information[4], information[5]
-    return (1.0 + (b_x * b_x * p_xx + 2.0 * b_x * b_y * p_xy + b_y * b_y * p_yy) / i_tt) / i_tt
+    return (1.0 + (i_xt * i_xt * p_xx + 2.0 * i_xt * i_yt * p_xy + i_yt * i_yt * p_yy) / i_tt) / i_tt
 
 
 @compiled
-def start_information(model: FixModel, information: FloatArray) -> None:
-    """Set the information to that of the prior."""
-    information[:] = 0.0
-    information[0] = information[3] = model.prior_position
-    information[5] = model.prior_heading
+def fix_at_heading(  # noqa: PLR0917 - one point and heading
+    seen: int, parts: FloatArray, turns: FloatArray, free: FloatArray, heading: float, model: FixModel, one: FloatArray
+) -> int:
+    """Fill `one` with the figures of one heading, variances in place of sigmas; return the number of reflectors.
 
-
-@compiled
-def write_figures(count: int, information: FloatArray, odds: FloatArray, model: FixModel, figures: FloatArray) -> None:
-    """Fill the figures of one point and heading; `odds` holds expected, P(none), P(one), P(two) visible."""
-    figures[:PROMISING] = math.inf
-    figures[PROMISING] = odds[0]
+    `parts` holds the information of each reflector seen all around, `turns` its bearing from the map's x-axis, `free`
+    the probability that nobody stands before it.
+    """
+    i_xx, i_xy, i_xt = model.prior_position, 0.0, 0.0
+    i_yy, i_yt, i_tt = model.prior_position, 0.0, model.prior_heading
+    expected, none, single, pair = 0.0, 1.0, 0.0, 0.0
+    count = 0
+    for k in range(seen):
+        if model.width < FULL_TURN and not in_field_of_view(turns[k] - heading, model.first, model.width):
+            continue
+        count += 1
+        i_xx += parts[k, 0]
+        i_xy += parts[k, 1]
+        i_xt += parts[k, 2]
+        i_yy += parts[k, 3]
+        i_yt += parts[k, 4]
+        i_tt += parts[k, 5]
+        # Recursion of the Poisson binomial distribution: probabilities of none, one and two so far.
+        p = free[k]
+        expected += p
+        pair += p * (single - pair)
+        single += p * (none - single)
+        none *= 1.0 - p
+    one[:PROMISING] = math.inf
+    one[PROMISING] = expected
     # Rounding can leave a probability a hair outside.
-    figures[PROMISING + 1] = min(max(1.0 - odds[1] - odds[2], 0.0), 1.0)
-    figures[PROMISING + 2] = min(max(1.0 - odds[1] - odds[2] - odds[3], 0.0), 1.0)
-    regular, p_xx, p_xy, p_yy = position_covariance(information)
-    if count < model.fewest or not regular:
-        return
-    longest = 0.5 * (p_xx + p_yy) + math.hypot(0.5 * (p_xx - p_yy), p_xy)
-    heading_sigma = math.sqrt(heading_variance(information, p_xx, p_xy, p_yy))
-    figures[0], figures[1] = math.sqrt(longest), heading_sigma
-    figures[2], figures[3] = (
-        math.sqrt(p_xx + p_yy) / model.position_noise,
-        heading_sigma / math.sqrt(model.bearing_variance),
-    )
-
-
-@compiled
-def add_odds(probability: float, odds: FloatArray) -> None:
-    """Add one reflector that is seen with a probability: recursion of the Poisson binomial distribution."""
-    odds[0] += probability
-    odds[3] += probability * (odds[2] - odds[3])
-    odds[2] += probability * (odds[1] - odds[2])
-    odds[1] *= 1.0 - probability
+    one[PROMISING + 1] = min(max(1.0 - none - single, 0.0), 1.0)
+    one[PROMISING + 2] = min(max(1.0 - none - single - pair, 0.0), 1.0)
+    regular, p_xx, p_xy, p_yy = position_covariance(i_xx, i_xy, i_xt, i_yy, i_yt, i_tt)
+    if count >= model.fewest and regular:
+        half_difference = 0.5 * (p_xx - p_yy)
+        one[0] = 0.5 * (p_xx + p_yy) + math.sqrt(half_difference * half_difference + p_xy * p_xy)
+        one[1] = heading_variance(i_xt, i_yt, i_tt, p_xx, p_xy, p_yy)
+        one[2] = p_xx + p_yy
+    return count
 
 
 @compiled
@@ -198,8 +208,11 @@ def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
     figures : (N, FIGURES) array.
     """
     many = max(1, len(centers))
-    parts, bearings, free = np.empty((many, 6)), np.empty(many), np.empty(many)
-    information, odds, one = np.empty(6), np.empty(4), np.empty(FIGURES)
+    parts, turns, free = np.empty((many, 6)), np.zeros(many), np.ones(many)
+    one, best = np.empty(FIGURES), np.empty(FIGURES)
+    headings, free_per_m, narrow = model.headings, model.free_per_m, model.width < FULL_TURN
+    lever_x, lever_y = model.lever_x, model.lever_y
+    range_variance, bearing_variance = model.range_variance, model.bearing_variance
     for n in rows:
         seen = 0
         for word_index in range(mask.shape[1]):
@@ -208,31 +221,32 @@ def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
                 m = 64 * word_index + lowest_bit(word)
                 word &= word - np.uint64(1)
                 dx, dy = centers[m, 0] - points[n, 0], centers[m, 1] - points[n, 1]
-                parts[seen, :] = 0.0
-                add_reflector(dx, dy, model.lever_x, model.lever_y, float(survey_sigmas[m]) ** 2, model, parts[seen])
-                bearings[seen] = math.atan2(dy, dx)
-                free[seen] = 1.0 if model.free_per_m == 1.0 else model.free_per_m ** math.hypot(dx, dy)
+                squared, survey = max(dx * dx + dy * dy, 1e-18), float(survey_sigmas[m]) ** 2
+                # The survey error of the reflector's place adds to the noise of the range, and of the bearing.
+                information = reflector_information(
+                    dx, dy, lever_x, lever_y, range_variance + survey, bearing_variance + survey / squared
+                )
+                parts[seen, 0], parts[seen, 1], parts[seen, 2] = information[0], information[1], information[2]
+                parts[seen, 3], parts[seen, 4], parts[seen, 5] = information[3], information[4], information[5]
+                if narrow:
+                    turns[seen] = math.atan2(dy, dx)
+                if free_per_m < 1.0:
+                    free[seen] = free_per_m ** math.sqrt(squared)
                 seen += 1
-        for h in range(len(model.headings)):
-            start_information(model, information)
-            odds[:] = 0.0
-            odds[1] = 1.0
-            count = 0
-            for k in range(seen):
-                if in_field_of_view(bearings[k] - model.headings[h], model.first, model.width):
-                    count += 1
-                    for i in range(6):
-                        information[i] += parts[k, i]
-                    add_odds(free[k], odds)
-            write_figures(count, information, odds, model, one)
-            if h == 0:
-                counts[n] = count
-                figures[n] = one
-                continue
-            counts[n] = min(counts[n], count) if model.combine == WORST else max(counts[n], count)
+        count = fix_at_heading(seen, parts, turns, free, headings[0], model, best)
+        for h in range(1, len(headings)):
+            other = fix_at_heading(seen, parts, turns, free, headings[h], model, one)
+            count = min(count, other) if model.combine == WORST else max(count, other)
             for i in range(FIGURES):
-                take_larger = (i < PROMISING) == (model.combine == WORST)
-                figures[n, i] = max(figures[n, i], one[i]) if take_larger else min(figures[n, i], one[i])
+                takes_larger = (i < PROMISING) == (model.combine == WORST)
+                best[i] = max(best[i], one[i]) if takes_larger else min(best[i], one[i])
+        counts[n] = count
+        # Roots and quotients keep the order, so they can wait until the heading is chosen.
+        figures[n, 0], figures[n, 1] = math.sqrt(best[0]), math.sqrt(best[1])
+        figures[n, 2] = math.sqrt(best[2]) / model.position_noise
+        figures[n, 3] = figures[n, 1] / math.sqrt(bearing_variance)
+        for i in range(PROMISING, FIGURES):
+            figures[n, i] = best[i]
 
 
 @compiled
@@ -247,21 +261,34 @@ def fill_covariances(  # noqa: PLR0917 - arrays in, arrays out
     covariances: FloatArray,
 ) -> None:
     """Fill (N, 3, 3) covariances of base poses from the reflectors listed for each; inf on the diagonal if singular."""
-    information = np.empty(6)
     for n in range(len(T_map_scanner)):
-        start_information(model, information)
+        i_xx, i_xy, i_xt = model.prior_position, 0.0, 0.0
+        i_yy, i_yt, i_tt = model.prior_position, 0.0, model.prior_heading
         for m in indices[offsets[n] : offsets[n + 1]]:
             dx, dy = centers[m, 0] - T_map_scanner[n, 0], centers[m, 1] - T_map_scanner[n, 1]
-            add_reflector(dx, dy, levers[n, 0], levers[n, 1], float(survey_sigmas[m]) ** 2, model, information)
-        regular, p_xx, p_xy, p_yy = position_covariance(information)
+            squared, survey = max(dx * dx + dy * dy, 1e-18), float(survey_sigmas[m]) ** 2
+            information = reflector_information(
+                dx,
+                dy,
+                levers[n, 0],
+                levers[n, 1],
+                model.range_variance + survey,
+                model.bearing_variance + survey / squared,
+            )
+            i_xx += information[0]
+            i_xy += information[1]
+            i_xt += information[2]
+            i_yy += information[3]
+            i_yt += information[4]
+            i_tt += information[5]
+        regular, p_xx, p_xy, p_yy = position_covariance(i_xx, i_xy, i_xt, i_yy, i_yt, i_tt)
         covariances[n] = 0.0
         if offsets[n + 1] - offsets[n] < model.fewest or not regular:
             covariances[n, 0, 0] = covariances[n, 1, 1] = covariances[n, 2, 2] = math.inf
             continue
-        i_xt, i_yt, i_tt = information[2], information[4], information[5]
         p_xt, p_yt = -(p_xx * i_xt + p_xy * i_yt) / i_tt, -(p_xy * i_xt + p_yy * i_yt) / i_tt
         covariances[n, 0, 0], covariances[n, 1, 1] = p_xx, p_yy
         covariances[n, 0, 1] = covariances[n, 1, 0] = p_xy
         covariances[n, 0, 2] = covariances[n, 2, 0] = p_xt
         covariances[n, 1, 2] = covariances[n, 2, 1] = p_yt
-        covariances[n, 2, 2] = heading_variance(information, p_xx, p_xy, p_yy)
+        covariances[n, 2, 2] = heading_variance(i_xt, i_yt, i_tt, p_xx, p_xy, p_yy)

@@ -205,31 +205,45 @@ def cast_shadows(tables: RayTables, targets: Targets) -> None:
 
 
 @compiled
-def is_seen(tables: RayTables, targets: Targets, m: int, x: float, y: float) -> bool:
-    """Whether a scanner at (x, y) [m, map frame] that looks all around sees reflector m."""
-    dx, dy = x - targets.centers[m, 0], y - targets.centers[m, 1]
-    squared = dx * dx + dy * dy
-    if squared > targets.farthest[m] ** 2 or squared < targets.nearest[m] ** 2:
-        return False
-    facing_x, facing_y = targets.normals[m, 0], targets.normals[m, 1]
-    if facing_x != 0.0 or facing_y != 0.0:
-        along = dx * facing_x + dy * facing_y
-        # Seen at an angle a plate is narrower by the cosine, so it gets its beams up to a shorter range.
-        if along <= 0.0 or along * along < targets.cosine_limit**2 * squared or squared > targets.promised[m] * along:
-            return False
-    if squared <= targets.radii[m] ** 2:
-        return True
-    bins = targets.clear.shape[1]
-    where = direction_bin(dx, dy, bins)
-    k = int(where)
-    if EDGE < where - k < 1.0 - EDGE:
-        if squared <= targets.clear[m, k]:
-            return True
-        if squared >= targets.hidden[m, k]:
-            return False
-    distance = math.sqrt(squared)
-    hit = cast_ray(tables, x, y, -dx / distance, -dy / distance, distance - targets.radii[m])
-    return hit[1] < 0
+def see_points(  # noqa: PLR0917 - one reflector, many points
+    tables: RayTables, targets: Targets, m: int, points: FloatArray, members: IntArray, seen: BoolArray
+) -> None:
+    """Fill `seen`: whether a scanner that looks all around sees reflector m from each of the chosen points.
+
+    What belongs to the reflector is fetched once: fetched for every point it would cost ten times the comparison.
+    """
+    x, y, radius = targets.centers[m, 0], targets.centers[m, 1], targets.radii[m]
+    nearest, farthest = targets.nearest[m] ** 2, targets.farthest[m] ** 2
+    facing_x, facing_y, promised = targets.normals[m, 0], targets.normals[m, 1], targets.promised[m]
+    cosine_squared, is_plate = targets.cosine_limit**2, facing_x != 0.0 or facing_y != 0.0
+    clear, hidden = targets.clear[m], targets.hidden[m]
+    bins = len(clear)
+    for i in range(len(members)):
+        point_x, point_y = points[members[i], 0], points[members[i], 1]
+        dx, dy = point_x - x, point_y - y
+        squared = dx * dx + dy * dy
+        seen[i] = False
+        if squared > farthest or squared < nearest:
+            continue
+        if is_plate:
+            along = dx * facing_x + dy * facing_y
+            # Seen at an angle a plate is narrower by the cosine, so it gets its beams up to a shorter range.
+            if along <= 0.0 or along * along < cosine_squared * squared or squared > promised * along:
+                continue
+        if squared <= radius * radius:
+            seen[i] = True
+            continue
+        where = direction_bin(dx, dy, bins)
+        k = int(where)
+        if EDGE < where - k < 1.0 - EDGE:
+            if squared <= clear[k]:
+                seen[i] = True
+                continue
+            if squared >= hidden[k]:
+                continue
+        distance = math.sqrt(squared)
+        hit = cast_ray(tables, point_x, point_y, -dx / distance, -dy / distance, distance - radius)
+        seen[i] = hit[1] < 0
 
 
 @compiled
@@ -268,6 +282,7 @@ def visible_mask(  # noqa: PLR0917 - points grouped by buckets
     starts : (B + 1,) where each bucket begins in `order`.
     mask : (N, ceil(M / 64)) array, zero on entry.
     """
+    seen = np.empty(len(order), dtype=np.bool_)
     for b in range(len(starts) - 1):
         members = order[starts[b] : starts[b + 1]]
         low_x, high_x, low_y, high_y = math.inf, -math.inf, math.inf, -math.inf
@@ -278,11 +293,8 @@ def visible_mask(  # noqa: PLR0917 - points grouped by buckets
         for m in range(len(targets.radii)):
             if in_shadow(targets, m, 0.5 * (low_x + high_x), 0.5 * (low_y + high_y), spread):
                 continue
+            see_points(tables, targets, m, points, members, seen)
             word, bit = m >> 6, np.uint64(1) << np.uint64(m & 63)
-            for n in members:
-                if is_seen(tables, targets, m, points[n, 0], points[n, 1]):
-                    mask[n, word] |= bit
-
-
-def warm_up() -> None:
-    """Compile the kernels of this module; `visibility.warm_up` calls them on a tiny hall."""
+            for i in range(len(members)):
+                if seen[i]:
+                    mask[members[i], word] |= bit

@@ -284,7 +284,7 @@ def _limits(reflector: Reflector, scanner: Scanner, options: VisibilityOptions) 
 def _bins(farthest: float, cell: float) -> int:
     """Bins of direction, so that even the widest one (on a diagonal) is narrower than a cell at that range."""
     needed = 4.0 * math.sqrt(2.0) * farthest / (0.95 * cell)
-    return 1024 * max(1, math.ceil(needed / 1024))
+    return 64 * max(1, math.ceil(needed / 64))
 
 
 @compiled

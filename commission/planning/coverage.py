@@ -1,0 +1,332 @@
+"""Visibility and dilution over a lattice on the floor: computed as a whole, or kept while single reflectors move.
+
+Both give the same numbers to the last bit. Coloring, files and summaries are elsewhere.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.compiled import compiled
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray
+from commission.geometry.raycast import RayTables
+from commission.planning import dilution, visibility
+from commission.planning.dilution import Fixes, FixOptions, as_fixes, fix_model, survey_sigmas
+from commission.planning.dilution_kernels import FIGURES, FixModel, fill_fixes
+from commission.planning.shadow_kernels import BitMask, Targets, see_points
+from commission.planning.visibility import VisibilityModel, build_visibility, copied, mask_words, replace_target
+from commission.site.checks import above
+from commission.site.project import Project
+from commission.site.reflectors import Reflector, ReflectorMap
+
+POINTS_PER_TILE = 1 << 17
+"""A tile is a band of whole rows; its mask and its grouping take about 40 bytes per point and 8 more for every 64
+reflectors: some 14 MB with 500 reflectors, however large the floor."""
+MARGIN = 5.0
+"""Floor around reflectors and routes where there is no map [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Lattice:
+    """Points on the floor, row by row from the lowest y."""
+
+    x: float
+    """First column, map frame [m]."""
+    y: float
+    """First row, map frame [m]."""
+    spacing: float
+    """Distance between neighbors [m]."""
+    rows: int
+    """Number of rows."""
+    columns: int
+    """Number of columns."""
+
+    def __post_init__(self) -> None:
+        above(self.spacing, 0.0, "lattice.spacing", "m")
+        if self.rows < 1 or self.columns < 1:
+            raise ValueError(f"lattice has {self.rows} x {self.columns} points; expected 1 or more each way")
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return self.rows * self.columns
+
+    def points(self) -> FloatArray:
+        """All points: (rows * columns, 2) array [m], map frame."""
+        grid_y, grid_x = np.mgrid[: self.rows, : self.columns].astype(np.float64)
+        return np.stack((self.x + self.spacing * grid_x, self.y + self.spacing * grid_y), axis=-1).reshape(-1, 2)
+
+    def index_near(self, x: float, y: float) -> int | None:
+        """Index of the point nearest to a place [m, map frame]; None beside the lattice."""
+        column, row = round((x - self.x) / self.spacing), round((y - self.y) / self.spacing)
+        if not (0 <= row < self.rows and 0 <= column < self.columns):
+            return None
+        return row * self.columns + column
+
+
+class Window(NamedTuple):
+    """Rows and columns of a lattice, the last ones not included."""
+
+    first_row: int
+    last_row: int
+    first_column: int
+    last_column: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Coverage:
+    """Figures of a fix at every point of a lattice."""
+
+    lattice: Lattice
+    """The points."""
+    options: FixOptions
+    """What was asked for."""
+    fixes: Fixes = field(repr=False)
+    """One of each figure per point; as images: `image`."""
+    floor: BoolArray = field(repr=False)
+    """(N,) whether a point is on the floor and not in a wall."""
+
+    def image(self, figure: str) -> NDArray[np.generic]:
+        """One figure as a (rows, columns) array; row 0 is the lowest y."""
+        return getattr(self.fixes, figure).reshape(self.lattice.rows, self.lattice.columns)
+
+
+def lattice_of(project: Project, spacing: float = 0.25) -> Lattice:
+    """Lattice over the floor map, or over reflectors and routes where there is none.
+
+    Parameters
+    ----------
+    project : site.
+    spacing : distance between neighbors [m]; the points are the centers of squares of that size.
+    """
+    above(spacing, 0.0, "spacing", "m")
+    if project.floor_map is not None:
+        x_min, y_min, x_max, y_max = project.floor_map.occupancy().bounds()
+    else:
+        control_points = [segment.control_points for route in project.routes for segment in route.segments]
+        places = np.concatenate([project.reflectors.centers, *control_points, np.empty((0, 2))])
+        places = places if len(places) else np.zeros((1, 2))
+        (x_min, y_min), (x_max, y_max) = places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
+    # A hair less, so that a floor of a whole number of squares gets no extra row by rounding.
+    columns = max(1, math.ceil((x_max - x_min) / spacing - 1e-9))
+    rows = max(1, math.ceil((y_max - y_min) / spacing - 1e-9))
+    return Lattice(float(x_min) + 0.5 * spacing, float(y_min) + 0.5 * spacing, spacing, rows, columns)
+
+
+def coverage(
+    model: VisibilityModel,
+    lattice: Lattice,
+    options: FixOptions,
+    progress: Callable[[float, str], None] | None = None,
+) -> Coverage:
+    """Visibility and dilution at every point of a lattice.
+
+    Memory: 75 bytes per point of the lattice for points and figures, and one tile (`POINTS_PER_TILE`); time is linear
+    in the area.
+
+    Parameters
+    ----------
+    model : reflectors, scanner and walls.
+    lattice : positions of the base for a given heading, of the scanner otherwise.
+    options : measurement model and headings.
+    progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
+    """
+    points, counts, figures = lattice.points(), np.empty(len(lattice), np.int32), np.empty((len(lattice), FIGURES))
+    kernel_model = fix_model(model.scanner, options)
+    floor = ~model.caster.grid.is_occupied(points)
+    scanner_points = points + np.array([kernel_model.lever_x, kernel_model.lever_y])
+    for tile in tiles(lattice):
+        if progress is not None:
+            progress(tile.start / len(lattice), "coverage")
+        mask = model.visible(scanner_points[tile])
+        _fill(model, kernel_model, scanner_points[tile], mask, counts[tile], figures[tile])
+    if progress is not None:
+        progress(1.0, "coverage")
+    return Coverage(lattice, options, as_fixes(counts, figures), floor)
+
+
+def tiles(lattice: Lattice) -> list[slice]:
+    """Bands of whole rows, as slices of the points."""
+    step = max(1, POINTS_PER_TILE // lattice.columns) * lattice.columns
+    return [slice(start, min(start + step, len(lattice))) for start in range(0, len(lattice), step)]
+
+
+class LiveCoverage:
+    """Coverage that follows reflectors while they are dragged.
+
+    It changes in place, unlike the frozen values around it: to copy a floor's figures takes longer than to update
+    them. It keeps which reflectors each point sees (8 bytes per point for every 64 reflectors), and sums a changed
+    point anew from those bits; nothing is subtracted, so nothing drifts.
+    """
+
+    def __init__(
+        self,
+        model: VisibilityModel,
+        lattice: Lattice,
+        options: FixOptions,
+        progress: Callable[[float, str], None] | None = None,
+    ) -> None:
+        self._lattice, self._options = lattice, options
+        self._model = replace(model, targets=copied(model.targets))
+        self._kernel_model = fix_model(model.scanner, options)
+        points = lattice.points()
+        self._scanner_points = points + np.array([self._kernel_model.lever_x, self._kernel_model.lever_y])
+        self._mask = np.zeros((len(lattice), mask_words(len(model.reflectors))), dtype=np.uint64)
+        counts, figures = np.empty(len(lattice), np.int32), np.empty((len(lattice), FIGURES))
+        self._counts, self._figures = counts, figures
+        self._changed = np.empty(len(lattice), dtype=np.int64)
+        self._coverage = Coverage(lattice, options, as_fixes(counts, figures), ~model.caster.grid.is_occupied(points))
+        self._fill_all(progress)
+
+    @property
+    def coverage(self) -> Coverage:
+        """The current figures; the arrays change with the next `move`."""
+        return self._coverage
+
+    @property
+    def reflectors(self) -> ReflectorMap:
+        """The current reflectors."""
+        return self._model.reflectors
+
+    def sees(self, reflector: int) -> BoolArray:
+        """Whether each point sees a reflector, all around: (N,) array."""
+        return (self._mask[:, reflector >> 6] >> np.uint64(reflector & 63)) & np.uint64(1) == 1
+
+    def move(self, index: int, reflector: Reflector) -> list[Window]:
+        """Put a reflector elsewhere, or change it.
+
+        Parameters
+        ----------
+        index : of the reflector in the map.
+        reflector : its new value.
+
+        Returns
+        -------
+        windows : parts of the lattice outside which nothing changed: around the old and around the new place.
+        """
+        changed = list(self._model.reflectors.reflectors)
+        changed[index] = reflector
+        reflectors = ReflectorMap(tuple(changed))
+        if self._model.bins_for(reflector) > self._model.targets.clear.shape[1]:
+            before = self._model
+            self._model = build_visibility(reflectors, before.scanner, before.caster, before.options)
+            self._fill_all(None)
+            return [Window(0, self._lattice.rows, 0, self._lattice.columns)]
+        targets = self._model.targets
+        windows = [self._window_around(index)]
+        replace_target(targets, index, reflector, self._model)
+        self._model = replace(self._model, reflectors=reflectors)
+        windows.append(self._window_around(index))
+        count = _change_bits(
+            self._model.caster.tables,
+            targets,
+            index,
+            np.array(windows),
+            self._lattice.columns,
+            self._scanner_points,
+            self._mask,
+            self._changed,
+        )
+        fill_fixes(
+            targets.centers,
+            survey_sigmas(self._model),
+            self._scanner_points,
+            self._changed[:count],
+            self._mask,
+            self._kernel_model,
+            self._counts,
+            self._figures,
+        )
+        return windows
+
+    def _fill_all(self, progress: Callable[[float, str], None] | None) -> None:
+        """Compute every point anew."""
+        for tile in tiles(self._lattice):
+            if progress is not None:
+                progress(tile.start / len(self._lattice), "coverage")
+            points, model = self._scanner_points[tile], self._model
+            self._mask[tile] = model.visible(points)
+            _fill(model, self._kernel_model, points, self._mask[tile], self._counts[tile], self._figures[tile])
+
+    def _window_around(self, index: int) -> Window:
+        """Part of the lattice within reach of a reflector."""
+        lattice, targets = self._lattice, self._model.targets
+        reach = targets.farthest[index] / lattice.spacing + 1.0
+        column = (targets.centers[index, 0] - self._scanner_points[0, 0]) / lattice.spacing
+        row = (targets.centers[index, 1] - self._scanner_points[0, 1]) / lattice.spacing
+        return Window(
+            min(max(0, math.floor(row - reach)), lattice.rows),
+            max(0, min(lattice.rows, math.ceil(row + reach) + 1)),
+            min(max(0, math.floor(column - reach)), lattice.columns),
+            max(0, min(lattice.columns, math.ceil(column + reach) + 1)),
+        )
+
+
+def _fill(  # noqa: PLR0917 - what goes in, what comes out
+    model: VisibilityModel,
+    kernel_model: FixModel,
+    points: FloatArray,
+    mask: BitMask,
+    counts: NDArray[np.int32],
+    figures: FloatArray,
+) -> None:
+    """Fill the figures of all the points given."""
+    every = np.arange(len(points))
+    fill_fixes(model.targets.centers, survey_sigmas(model), points, every, mask, kernel_model, counts, figures)
+
+
+@compiled
+def _change_bits(  # noqa: PLR0917 - arrays in, arrays out
+    tables: RayTables,
+    targets: Targets,
+    m: int,
+    windows: IntArray,
+    columns: int,
+    points: FloatArray,
+    mask: BitMask,
+    changed: IntArray,
+) -> int:
+    """Set the bits of reflector m anew; list the points that saw it or see it now, each once.
+
+    `windows` holds the window around the old place and that around the new one.
+    """
+    word, bit = m >> 6, np.uint64(1) << np.uint64(m & 63)
+    old, new = windows[0], windows[1]
+    width = max(0, new[3] - new[2])
+    members = np.empty(max(0, new[1] - new[0]) * width, dtype=np.int64)
+    seen = np.empty(len(members), dtype=np.bool_)
+    for i in range(len(members)):
+        members[i] = (new[0] + i // width) * columns + new[2] + i % width
+    see_points(tables, targets, m, points, members, seen)
+    count = 0
+    for i in range(len(members)):
+        n = members[i]
+        saw = mask[n, word] & bit != 0
+        if seen[i] != saw:
+            mask[n, word] ^= bit
+        if seen[i] or saw:
+            changed[count] = n
+            count += 1
+    for row in range(old[0], old[1]):
+        for column in range(old[2], old[3]):
+            n = row * columns + column
+            done = new[0] <= row < new[1] and new[2] <= column < new[3]
+            if not done and mask[n, word] & bit != 0:
+                mask[n, word] ^= bit
+                changed[count] = n
+                count += 1
+    return count
+
+
+def warm_up() -> None:
+    """Compile the kernels of this module and of `dilution`."""
+    dilution.warm_up()
+    project = Project(reflectors=ReflectorMap((Reflector("1", 2.0, 0.0),)))
+    model = visibility.visibility_model(project)
+    live = LiveCoverage(model, Lattice(0.0, 0.0, 1.0, 2, 2), FixOptions())
+    live.move(0, Reflector("1", 1.0, 0.0))
