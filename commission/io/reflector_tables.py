@@ -52,8 +52,10 @@ def reflectors_of(blocks: Iterable[Block]) -> ReflectorMap:
             for name, unit in _UNITS.items()
             if name in block.columns
         }
+        texts = {name: block.texts(name) for name in ("id", *_TEXTS) if name in block.columns}
         for row in range(len(block)):
-            reflector = _reflector(block, row, {name: values[row] for name, values in numbers.items()})
+            cells = {name: values[row] for name, values in texts.items()}
+            reflector = _reflector(block, row, cells, {name: values[row] for name, values in numbers.items()})
             if reflector.id in lines:
                 found = f"{shortened(reflector.id)} is used twice (first on line {lines[reflector.id]})"
                 raise block.error(row, "id", found, "unique ids")
@@ -90,13 +92,12 @@ def _written(path: Path, reflector: Reflector, name: str) -> str:
     return text
 
 
-def _reflector(block: Block, row: int, numbers: Mapping[str, float]) -> Reflector:
-    texts = {name: block.columns[name][row] for name in _TEXTS if name in block.columns}
+def _reflector(block: Block, row: int, texts: dict[str, str], numbers: Mapping[str, float]) -> Reflector:
     kind = texts.pop("kind", "") or ReflectorKind.CYLINDER
     if kind not in list(ReflectorKind):
         raise block.error(row, "kind", f"is {shortened(kind)}", f"one of: {', '.join(ReflectorKind)}")
     try:
-        return Reflector(block.columns["id"][row], kind=ReflectorKind(kind), **numbers, **texts)  # type: ignore[arg-type]
+        return Reflector(kind=ReflectorKind(kind), **numbers, **texts)  # type: ignore[arg-type]
     except ValueError as error:
         problem, _, remedy = str(error).partition("; expected ")
         column, _, found = problem.partition(" ")

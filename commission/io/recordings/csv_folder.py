@@ -36,8 +36,9 @@ ODOMETRY_COLUMNS = ("stamp_ns", "dx", "dy", "dtheta")
 DETECTION_COLUMNS = ("stamp_ns", "range", "bearing")
 REFERENCE_COLUMNS = ("stamp_ns", "x", "y", "theta")
 
-_ROWS_STREAMED = 1024
-_ROWS_LOADED = 100_000
+_STREAMED = 100_000
+_LOADED = 8_000_000
+"""Bytes of a table read at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,9 +77,9 @@ class CsvFolder:
 
     def load(self) -> RecordLog:
         """Read everything into columns; raises FileFormatError like `records`."""
-        odometry = _joined(self._odometry_rows(_ROWS_LOADED), 3)
-        reference = _joined(self._reference_rows(_ROWS_LOADED), 3)
-        detections = _joined(self._detection_rows(_ROWS_LOADED), 2)
+        odometry = _joined(self._odometry_rows(_LOADED), 3)
+        reference = _joined(self._reference_rows(_LOADED), 3)
+        detections = _joined(self._detection_rows(_LOADED), 2)
         starts = np.flatnonzero(np.diff(detections.stamps_ns, prepend=detections.stamps_ns[:1] - 1))
         seen = np.isfinite(detections.values[:, 0])
         offsets = np.concatenate([[0], np.cumsum(seen)]).astype(np.int64)
@@ -94,19 +95,19 @@ class CsvFolder:
         )
 
     def _odometry(self) -> Iterator[Record]:
-        for rows in self._odometry_rows(_ROWS_STREAMED):
+        for rows in self._odometry_rows(_STREAMED):
             for stamp, values in zip(rows.stamps_ns.tolist(), rows.values, strict=True):
                 yield Odometry(stamp, values)
 
     def _reference(self) -> Iterator[Record]:
-        for rows in self._reference_rows(_ROWS_STREAMED):
+        for rows in self._reference_rows(_STREAMED):
             for stamp, values in zip(rows.stamps_ns.tolist(), rows.values, strict=True):
                 yield ReferencePose(stamp, values)
 
     def _detections(self) -> Iterator[Record]:
         stamp: int | None = None
         seen: list[FloatArray] = []
-        for rows in self._detection_rows(_ROWS_STREAMED):
+        for rows in self._detection_rows(_STREAMED):
             for row_stamp, values in zip(rows.stamps_ns.tolist(), rows.values, strict=True):
                 if stamp is not None and row_stamp != stamp:
                     yield Detections(stamp, np.array(seen).reshape(-1, 2))
@@ -125,9 +126,9 @@ class CsvFolder:
                 scan: Scan = block.scan(index)
                 yield scan
 
-    def _odometry_rows(self, rows_at_once: int) -> Iterator[_Rows]:
+    def _odometry_rows(self, bytes_at_once: int) -> Iterator[_Rows]:
         last: int | None = None
-        for block in _table(self.path / ODOMETRY, ODOMETRY_COLUMNS, rows_at_once):
+        for block in _table(self.path / ODOMETRY, ODOMETRY_COLUMNS, bytes_at_once):
             stamps = _ascending(block, last, "later than the row before")
             last = int(stamps[-1])
             columns = [block.numbers("dx", "m"), block.numbers("dy", "m"), block.numbers("dtheta", "rad")]
@@ -135,22 +136,22 @@ class CsvFolder:
         if last is None:
             raise FileFormatError(self.path / ODOMETRY, "", "has no rows", "at least one row of odometry")
 
-    def _reference_rows(self, rows_at_once: int) -> Iterator[_Rows]:
+    def _reference_rows(self, bytes_at_once: int) -> Iterator[_Rows]:
         if not (self.path / REFERENCE).exists():
             return
         last: int | None = None
-        for block in _table(self.path / REFERENCE, REFERENCE_COLUMNS, rows_at_once):
+        for block in _table(self.path / REFERENCE, REFERENCE_COLUMNS, bytes_at_once):
             stamps = _ascending(block, last, "later than the row before")
             last = int(stamps[-1])
             theta = block.numbers("theta", "rad", empty=np.nan)
             yield _Rows(stamps, np.stack([block.numbers("x", "m"), block.numbers("y", "m"), theta], axis=1))
 
-    def _detection_rows(self, rows_at_once: int) -> Iterator[_Rows]:
+    def _detection_rows(self, bytes_at_once: int) -> Iterator[_Rows]:
         if not (self.path / DETECTIONS).exists():
             return
         last: int | None = None
         last_empty = False
-        for block in _table(self.path / DETECTIONS, DETECTION_COLUMNS, rows_at_once):
+        for block in _table(self.path / DETECTIONS, DETECTION_COLUMNS, bytes_at_once):
             stamps = _ascending(block, last, "the stamp of the row before, or a later one", repeated=True)
             values = np.stack(
                 [block.numbers(c, u, empty=np.nan) for c, u in (("range", "m"), ("bearing", "rad"))], axis=1
@@ -167,9 +168,9 @@ class CsvFolder:
             yield _Rows(stamps, values)
 
 
-def _table(path: Path, columns: tuple[str, ...], rows_at_once: int) -> Iterator[Block]:
+def _table(path: Path, columns: tuple[str, ...], bytes_at_once: int) -> Iterator[Block]:
     # Other columns are passed over: a recording is often exported from a table that holds more.
-    return read_table(path, columns, ignore_unknown=True, rows_at_once=rows_at_once)
+    return read_table(path, columns, ignore_unknown=True, bytes_at_once=bytes_at_once)
 
 
 def _ascending(block: Block, last: int | None, expected: str, *, repeated: bool = False) -> IntArray:
