@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import sys
-from collections.abc import Iterator
+from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -51,7 +51,7 @@ class _Page:
 
 
 @contextlib.contextmanager
-def _told_on_stdout() -> Iterator[None]:
+def _told_on_stdout() -> Generator[None]:
     """Let what the page logs for the user, its address above all, appear on stdout."""
     handler = logging.StreamHandler(sys.stdout)
     handler.setFormatter(logging.Formatter("%(message)s"))
