@@ -17,8 +17,8 @@ from commission.geometry.arrays import FloatArray, IntArray, frozen
 from commission.geometry.se2 import compose, exp
 from commission.localization.kinematics import body_twist, wheel_speeds
 from commission.simulation.follower import drives_of, follow_leg, way_of
-from commission.simulation.path import CREEP, Leg, MotionLimits, legs_of
 from commission.site.parameters import OdometryParameters
+from commission.site.path import CREEP, Leg, MotionLimits, legs_of
 from commission.site.routes import Route
 from commission.site.vehicle import TricycleVehicle, Vehicle
 

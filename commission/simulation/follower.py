@@ -15,7 +15,7 @@ from commission.compiled import compiled
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray, frozen
 from commission.geometry.se2 import compose_scalars, exp_scalars
-from commission.simulation.path import CREEP, Leg, MotionLimits
+from commission.site.path import CREEP, Leg, MotionLimits
 from commission.site.vehicle import OmnidirectionalVehicle, TricycleVehicle, Vehicle
 
 DIFFERENTIAL, TRICYCLE, OMNIDIRECTIONAL = 0, 1, 2

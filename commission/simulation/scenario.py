@@ -14,9 +14,9 @@ import numpy as np
 from commission.geometry.arrays import FloatArray, IntArray, frozen
 from commission.simulation import follower, scan
 from commission.simulation.drive import DriveOptions, Motion, drive, measure
-from commission.simulation.path import legs_of
 from commission.simulation.people import Crowd, WalkableFloor
 from commission.simulation.scan import VirtualScanner
+from commission.site.path import legs_of
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.records import Odometry, Record, ReferencePose, Scan

@@ -11,8 +11,8 @@ from commission.errors import ProjectError
 from commission.geometry.angles import difference
 from commission.geometry.se2 import exp, log, relative
 from commission.simulation.drive import DriveOptions, Motion, drive, measure
-from commission.simulation.path import KINK, MotionLimits, legs_of
 from commission.site.parameters import OdometryParameters
+from commission.site.path import KINK, MotionLimits, legs_of
 from commission.site.routes import Direction, Route, Segment
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
 from tests.simulation.halls import out_and_back

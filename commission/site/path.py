@@ -1,6 +1,6 @@
-"""A route as the follower sees it: legs between two stops, sampled densely, each with its speed over the way.
+"""A route as something to drive: legs between two stops, sampled densely, each with its speed over the way.
 
-Only geometry and speed limits; the control law is in `follower`, the vehicle's errors are in `drive`.
+Only geometry and speed limits: prediction and simulation plan the same legs. How a vehicle follows them is not here.
 """
 
 from __future__ import annotations
