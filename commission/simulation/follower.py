@@ -104,6 +104,36 @@ def way_of(leg: Leg) -> Way:
     return Way(leg.points, leg.step, leg.travel_headings, leg.curvatures, leg.speeds, sign)
 
 
+class Place(NamedTuple):
+    """Where the vehicle is relative to the way."""
+
+    sample: int
+    """Nearest sample."""
+    s: float
+    """Arc length [m]."""
+    across: float
+    """Distance to the way, left of the direction of travel is positive [m]."""
+    turned: float
+    """Heading error [rad]."""
+
+
+class Actuators(NamedTuple):
+    """What the vehicle does at one moment."""
+
+    speed: float
+    """Along the way [m/s]."""
+    yaw_rate: float
+    """[rad/s]."""
+    steering: float
+    """Of a tricycle [rad]."""
+    integral: float
+    """Of the error across, over the way [m^2]."""
+    turning: bool
+    """Still turns on the spot before it sets off."""
+    steered: bool
+    """Has its wheel where the way begins; a tricycle steers at rest first, as a driver does."""
+
+
 @compiled
 def follow_leg(drives: Drives, way: Way, start: FloatArray, poses: FloatArray, twists: FloatArray) -> int:
     """Drive one leg from rest to rest.
@@ -120,39 +150,47 @@ def follow_leg(drives: Drives, way: Way, start: FloatArray, poses: FloatArray, t
     steps : rows written; K when the end was not reached in time.
     """
     x, y, theta = start[0], start[1], start[2]
-    speed = steering = integral = yaw_rate = 0.0
-    index, _, _, turned = _errors(way, 0, x, y, theta)
-    turning = drives.kind != TRICYCLE and abs(turned) > TURN_ON_SPOT
-    # At rest a tricycle steers its wheel first, as a driver does.
-    steered = drives.kind != TRICYCLE
+    place = _place(way, 0, x, y, theta)
+    on_spot = drives.kind != TRICYCLE
+    state = Actuators(0.0, 0.0, 0.0, 0.0, on_spot and abs(place.turned) > TURN_ON_SPOT, on_spot)
     for k in range(len(poses)):
-        index, s, across, turned = _errors(way, index, x, y, theta)
-        if way.step * (len(way.points) - 1) - s <= END:
+        place = _place(way, place.sample, x, y, theta)
+        if way.step * (len(way.points) - 1) - place.s <= END:
             return k
-        turning = turning and abs(turned) > TURNED
-        moving = steered and not turning
-        speed = min(max(_speed_at(way, s), CREEP), speed + drives.acceleration * drives.period) if moving else 0.0
-        integral = min(max(integral + across * speed * drives.period, -MAX_INTEGRAL), MAX_INTEGRAL)
-        curvature = way.curvatures[index] - KP * across - KD * math.sin(turned) - KI * integral
-        vx, vy = way.sign * speed, 0.0
-        wanted_yaw_rate = speed * curvature
-        if turning:
-            wanted_yaw_rate = -2.0 * turned
-        elif drives.kind == OMNIDIRECTIONAL:
-            vx, vy = _slide(way.sign, speed, across, turned)
-            wanted_yaw_rate = speed * way.curvatures[index] - OMNI_HEADING_GAIN * turned
-        if drives.kind == TRICYCLE:
-            wanted = math.atan(drives.wheelbase * way.sign * curvature)
-            steering = _towards(steering, wanted, drives.steering_rate * drives.period, drives.max_steering)
-            steered = steered or abs(steering - wanted) < STEERED or abs(steering) >= drives.max_steering
-            yaw_rate = vx * math.tan(steering) / drives.wheelbase
-        else:
-            yaw_rate = _towards(yaw_rate, wanted_yaw_rate, drives.yaw_acceleration * drives.period, drives.yaw_rate)
-        dx, dy, dtheta = exp_scalars(vx * drives.period, vy * drives.period, yaw_rate * drives.period)
+        state, vx, vy = _control(drives, way, place, state)
+        dx, dy, dtheta = exp_scalars(vx * drives.period, vy * drives.period, state.yaw_rate * drives.period)
         x, y, theta = compose_scalars(x, y, theta, dx, dy, dtheta)
         poses[k, 0], poses[k, 1], poses[k, 2] = x, y, theta
-        twists[k, 0], twists[k, 1], twists[k, 2] = vx, vy, yaw_rate
+        twists[k, 0], twists[k, 1], twists[k, 2] = vx, vy, state.yaw_rate
     return len(poses)
+
+
+@compiled
+def _control(drives: Drives, way: Way, place: Place, state: Actuators) -> tuple[Actuators, float, float]:
+    """One control step: actuators after it, and the velocity of base in its own frame [m/s]."""
+    turning = state.turning and abs(place.turned) > TURNED
+    speed = 0.0
+    if state.steered and not turning:
+        speed = min(max(_speed_at(way, place.s), CREEP), state.speed + drives.acceleration * drives.period)
+    integral = state.integral + place.across * speed * drives.period
+    integral = min(max(integral, -MAX_INTEGRAL), MAX_INTEGRAL)
+    bend = way.curvatures[place.sample]
+    curvature = bend - KP * place.across - KD * math.sin(place.turned) - KI * integral
+    vx, vy = way.sign * speed, 0.0
+    if drives.kind == TRICYCLE:
+        wanted = math.atan(drives.wheelbase * way.sign * curvature)
+        steering = _towards(state.steering, wanted, drives.steering_rate * drives.period, drives.max_steering)
+        steered = state.steered or abs(steering - wanted) < STEERED or abs(steering) >= drives.max_steering
+        yaw_rate = vx * math.tan(steering) / drives.wheelbase
+        return Actuators(speed, yaw_rate, steering, integral, False, steered), vx, vy
+    wanted = speed * curvature
+    if turning:
+        wanted = -2.0 * place.turned
+    elif drives.kind == OMNIDIRECTIONAL:
+        vx, vy = _slide(way.sign, speed, place.across, place.turned)
+        wanted = speed * bend - OMNI_HEADING_GAIN * place.turned
+    yaw_rate = _towards(state.yaw_rate, wanted, drives.yaw_acceleration * drives.period, drives.yaw_rate)
+    return Actuators(speed, yaw_rate, 0.0, integral, turning, True), vx, vy
 
 
 @compiled
@@ -164,15 +202,16 @@ def _slide(sign: float, speed: float, across: float, turned: float) -> tuple[flo
 
 
 @compiled
-def _errors(way: Way, index: int, x: float, y: float, theta: float) -> tuple[int, float, float, float]:
-    """Nearest sample ahead, arc length [m], error across (left of travel is positive) [m], heading error [rad]."""
+def _place(way: Way, index: int, x: float, y: float, theta: float) -> Place:
+    """Find the nearest sample from `index` on, and the errors there."""
     while index + 1 < len(way.points) and _squared(way, index + 1, x, y) <= _squared(way, index, x, y):
         index += 1
     heading = way.headings[index]
     c, s = math.cos(heading), math.sin(heading)
     dx, dy = x - way.points[index, 0], y - way.points[index, 1]
     facing = 0.0 if way.sign > 0.0 else math.pi
-    return index, index * way.step + c * dx + s * dy, c * dy - s * dx, wrap_scalar(theta + facing - heading)
+    turned = wrap_scalar(theta + facing - heading)
+    return Place(index, index * way.step + c * dx + s * dy, c * dy - s * dx, turned)
 
 
 @compiled

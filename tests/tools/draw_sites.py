@@ -277,7 +277,7 @@ def warehouse() -> Project:
             range=(0.05, 40.0),
             reflector_range=25.0,
         ),
-        parameters=Parameters(observation=ObservationParameters(range_sigma=0.015, bearing_sigma=0.003)),
+        parameters=Parameters(observation=ObservationParameters(range_sigma=0.01, bearing_sigma=0.0016)),
         disturbances=Disturbances(people=12, glints_per_scan=0.1),
     )
 
