@@ -93,9 +93,9 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it and the reflector
 ) -> tuple[float, float]:
     """Center by least squares: a circle of known radius through the ranges, its bearing held by the cluster's edges.
 
-    The edges alone tell the bearing to the width of a beam step, evenly distributed, so with a variance of 1/12 of its
-    square; the ranges refine it as far as their noise allows. That prior keeps clusters of one or two beams well
-    posed. Solved in axes along and across the middle bearing by Gauss-Newton.
+    The middle of the two edges alone tells the bearing evenly to within f or 1 - f of half a beam step, where f is the
+    width's fraction of a step: on average a variance of 1/24 of its square. The ranges refine it as far as their noise
+    allows. That prior keeps clusters of one or two beams well posed. Gauss-Newton along and across the middle bearing.
     """
     middle = angle_min + 0.5 * increment * (first + last)
     mean = _mean_range(ranges, flags, count, first, last)
@@ -104,7 +104,7 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it and the reflector
     along, across = mean + MEAN_DEPTH * radius, 0.0
     for _ in range(ITERATIONS):
         lateral_sigma = along * increment
-        weight = 12.0 * range_sigma * range_sigma / (lateral_sigma * lateral_sigma)
+        weight = 24.0 * range_sigma * range_sigma / (lateral_sigma * lateral_sigma)
         n_aa, n_ac, n_cc = 0.0, 0.0, weight
         g_a, g_c = 0.0, -weight * across
         used = 0
