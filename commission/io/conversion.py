@@ -163,7 +163,7 @@ def _explained(document: YamlDocument, key_path: KeyPath, cls: type, message: st
             steps = (*steps, named[0])
     if steps:
         # The place already names the key: `scanner.rate: is 0` instead of `scanner.rate: scanner.rate is 0`.
-        problem = re.sub(rf"^(\w+\.)?{re.escape(str(steps[-1]))} (?=is |has )", "", problem)
+        problem = re.sub(rf"^(\w+\.)?{re.escape(str(steps[-1]))} (?=is |has |reach )", "", problem)
     return document.error((*key_path, *steps), problem, _with_hint(remedy, cls, steps))
 
 

@@ -20,7 +20,7 @@ from commission.site.checks import field_hints
 from commission.site.project import Project
 
 _PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_./ ()-]*")
-_UNIT = re.compile(r"\[([^\]]+)\]")
+_UNIT = re.compile(r"\[([^\],]+)\]")
 _WIDTH = 110
 """A list that fits on a line of this width is written on one."""
 

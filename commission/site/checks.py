@@ -9,6 +9,9 @@ import itertools
 import math
 import textwrap
 
+FARTHEST = 1e7
+"""Largest coordinate [m]: any national grid fits, and no square of it overflows."""
+
 
 def at_least(value: float, limit: float, name: str, unit: str = "") -> None:
     """Raise ValueError unless `value` is finite and >= `limit`."""

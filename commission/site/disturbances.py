@@ -79,8 +79,8 @@ class Disturbances:
     """Times at which all reflectors are covered."""
 
     def __post_init__(self) -> None:
-        at_least(self.people, 0, "disturbances.people")
-        at_least(self.walking_speed, 0.0, "disturbances.walking_speed", "m/s")
-        at_least(self.glints_per_scan, 0.0, "disturbances.glints_per_scan")
+        between(self.people, (0, 10_000), "disturbances.people")
+        between(self.walking_speed, (0.0, 10.0), "disturbances.walking_speed", "m/s")
+        between(self.glints_per_scan, (0.0, 1000.0), "disturbances.glints_per_scan")
         between(self.dropped_scans, (0.0, 1.0), "disturbances.dropped_scans")
-        at_least(self.slips_per_100_m, 0.0, "disturbances.slips_per_100_m")
+        between(self.slips_per_100_m, (0.0, 1000.0), "disturbances.slips_per_100_m")

@@ -10,6 +10,7 @@ import numpy as np
 
 from commission.errors import ProjectError
 from commission.geometry.arrays import FloatArray, frozen
+from commission.site.checks import FARTHEST
 
 
 class ReflectorKind(StrEnum):
@@ -50,6 +51,11 @@ class Reflector:
         for name in ("x", "y", "heading", "height"):
             if not math.isfinite(getattr(self, name)):
                 raise ValueError(f"{name} is {getattr(self, name)}; expected a finite number")
+        if max(abs(self.x), abs(self.y)) > FARTHEST:
+            name = "x" if abs(self.x) > FARTHEST else "y"
+            raise ValueError(
+                f"{name} is {getattr(self, name):g}; expected at most {FARTHEST:g} m from the map's origin"
+            )
         if not 0.0 < self.radius <= 1.0:
             raise ValueError(f"radius is {self.radius:g}; expected more than 0 and at most 1 m")
         if not (math.isfinite(self.sigma) and self.sigma >= 0.0):

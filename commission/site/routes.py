@@ -6,9 +6,17 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from commission.errors import ProjectError
 from commission.geometry.arrays import FloatArray, equal_fields, frozen
 from commission.geometry.splines import Spline
+from commission.site.checks import FARTHEST, between
+
+SPEEDS = (0.001, 100.0)
+"""Slowest and fastest planned speed [m/s]: a slower route would never end in a virtual drive."""
+WEIGHTS = (1e-6, 1e6)
+"""Smallest and largest weight of a control point [1]: beyond, a curve loses its digits."""
 
 
 class Direction(StrEnum):
@@ -41,11 +49,17 @@ class Segment:
             "control_points",
             frozen(self.control_points, (None, 2), "control_points"),
         )
+        if self.control_points.size and np.abs(self.control_points).max() > FARTHEST:
+            found = np.abs(self.control_points).max()
+            raise ValueError(f"control_points reach {found:g} m; expected at most {FARTHEST:g} m from the map's origin")
         for name in ("knots", "weights"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(getattr(self, name), (None,), name))
-        if self.speed is not None and not (math.isfinite(self.speed) and self.speed > 0.0):
-            raise ValueError(f"speed is {self.speed:g}; expected more than 0 m/s")
+        if self.weights is not None and self.weights.size:
+            between(float(self.weights.min()), WEIGHTS, "weights: smallest")
+            between(float(self.weights.max()), WEIGHTS, "weights: largest")
+        if self.speed is not None:
+            between(self.speed, SPEEDS, "speed", "m/s")
         self.spline()
 
     def __eq__(self, other: object) -> bool:
@@ -73,8 +87,7 @@ class Route:
             raise ValueError("a route's name is empty; expected text")
         if not self.segments:
             raise ValueError(f"route {self.name!r} has no segments; expected 1 or more")
-        if not (math.isfinite(self.speed) and self.speed > 0.0):
-            raise ValueError(f"speed of route {self.name!r} is {self.speed:g}; expected more than 0 m/s")
+        between(self.speed, SPEEDS, f"speed of route {self.name!r}", "m/s")
         for index, (before, after) in enumerate(zip(self.segments, self.segments[1:], strict=False)):
             gap = math.dist(before.control_points[-1], after.control_points[0])
             if gap > 0.01:

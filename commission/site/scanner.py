@@ -8,6 +8,9 @@ from dataclasses import dataclass, field
 from commission.geometry.arrays import FloatArray, equal_fields, frozen
 from commission.site.checks import above, at_least, between
 
+LONGEST_RANGE = 10_000.0
+"""No laser scanner measures farther [m]."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scanner:
@@ -43,8 +46,11 @@ class Scanner:
         between(self.rate, (0.1, 1000.0), "scanner.rate", "scans per second")
         nearest, farthest = self.range
         at_least(nearest, 0.0, "scanner.range[0]", "m")
-        if not (math.isfinite(farthest) and farthest > nearest):
-            raise ValueError(f"scanner.range is [{nearest:g}, {farthest:g}]; expected smallest < largest range [m]")
+        if not nearest < farthest <= LONGEST_RANGE:
+            raise ValueError(
+                f"scanner.range is [{nearest:g}, {farthest:g}]; "
+                f"expected smallest < largest range, at most {LONGEST_RANGE:g} m"
+            )
         at_least(self.range_sigma, 0.0, "scanner.range_sigma", "m")
         at_least(self.bearing_sigma_deg, 0.0, "scanner.bearing_sigma_deg", "deg")
         at_least(self.beam_width_deg, 0.0, "scanner.beam_width_deg", "deg")

@@ -25,6 +25,7 @@ from commission.site.scanner import Scanner
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
 
 METRES = st.floats(-1e4, 1e4)
+SPEED = st.floats(0.001, 100.0)
 POSITIVE = st.floats(1e-6, 1e3)
 NAME = st.text(st.characters(blacklist_categories=("Cs",)), min_size=1, max_size=12)
 POINT = st.tuples(METRES, METRES)
@@ -71,7 +72,7 @@ def segments(draw: st.DrawFn) -> Segment:
         degree,
         knots,
         None if weights is None else np.array(weights),
-        draw(st.none() | POSITIVE),
+        draw(st.none() | SPEED),
     )
 
 
@@ -110,7 +111,7 @@ def floor_maps() -> st.SearchStrategy[FloorMap]:
 
 
 def projects() -> st.SearchStrategy[Project]:
-    route = st.builds(Route, name=NAME, segments=segments().map(lambda s: (s,)), speed=POSITIVE)
+    route = st.builds(Route, name=NAME, segments=segments().map(lambda s: (s,)), speed=SPEED)
     reflectors = st.lists(st.builds(Reflector, id=st.integers(0, 99).map(str), x=METRES, y=METRES), max_size=3)
     return st.builds(
         Project,
