@@ -23,23 +23,20 @@ class Findings:
     """
 
     def __init__(self) -> None:
-        self._places: dict[str, tuple[str, int]] = {}
+        self._places: dict[str, dict[str, None]] = {}
         self._untold = 0
 
     def add(self, where: str, problem: str) -> None:
         """Note a problem; `where` may be empty when the file as a whole is meant."""
         problem = " ".join(problem.split())
-        if problem in self._places:
-            first, count = self._places[problem]
-            self._places[problem] = (first, count + 1)
-        elif len(self._places) < SHOWN_LIMIT:
-            self._places[problem] = (" ".join(where.split()), 1)
+        if problem in self._places or len(self._places) < SHOWN_LIMIT:
+            self._places.setdefault(problem, {})[" ".join(where.split())] = None
         else:
             self._untold += 1
 
     def lines(self) -> tuple[str, ...]:
         """One line for each problem, in the order in which they were found."""
-        lines = [_line(problem, first, count) for problem, (first, count) in self._places.items()]
+        lines = [_line(problem, list(places)) for problem, places in self._places.items()]
         if self._untold:
             lines.append(f"and {self._untold} more findings")
         return tuple(lines)
@@ -54,8 +51,8 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _line(problem: str, first: str, count: int) -> str:
-    if not first:
+def _line(problem: str, places: list[str]) -> str:
+    if not places[0]:
         return problem
-    others = "" if count == 1 else f" and {count - 1} more place{'s' if count > 2 else ''}"
-    return f"{first}{others}: {problem}"
+    others = len(places) - 1
+    return f"{places[0]}{f' and {others} more' if others else ''}: {problem}"

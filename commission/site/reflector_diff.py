@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from commission.site.reflectors import Reflector, ReflectorMap
 
@@ -107,9 +107,9 @@ def _partners(before: ReflectorMap, after: ReflectorMap, same_place: float) -> d
     old = [i for i, r in enumerate(before.reflectors) if r.id not in partners]
     new = [i for i, r in enumerate(after.reflectors) if r.id not in partners]
     if same_place > 0.0 and old and new:
-        old_tree, new_tree = cKDTree(before.centers[old]), cKDTree(after.centers[new])
-        distance, nearest_old = old_tree.query(after.centers[new])
-        _, nearest_new = new_tree.query(before.centers[old])
+        old_tree, new_tree = KDTree(before.centers[old]), KDTree(after.centers[new])
+        distance, nearest_old = map(np.asarray, old_tree.query(after.centers[new]))
+        nearest_new = np.asarray(new_tree.query(before.centers[old])[1])
         is_mutual = nearest_new[nearest_old] == np.arange(len(new))
         for i in np.flatnonzero(is_mutual & (distance <= same_place)):
             partners[after.reflectors[new[i]].id] = before.reflectors[old[int(nearest_old[i])]]

@@ -1,0 +1,237 @@
+"""Layouts in the Layout Interchange Format of VDMA (LIF 1.0, JSON): read into routes and stations, with a lint.
+
+A layout is a graph and a project has routes: edges that can only be driven one after the other become one route, and
+so do edges called NAME/1, NAME/2, ..., as `lif_writer` calls them.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from commission.errors import UsageError
+from commission.io.edges import (
+    CORNER,
+    Angles,
+    Edge,
+    RouteImport,
+    Station,
+    angles_of,
+    curve,
+    directed,
+    follows,
+    note_corners,
+    route_of,
+    turn,
+    unique,
+)
+from commission.io.findings import Findings, shown
+from commission.io.json_document import Fields, read_json
+from commission.site.routes import Route
+
+_NUMBERED = re.compile(r"(?P<name>.+)/(?P<number>[1-9][0-9]{0,5})", re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """What all layouts of a file hold, before routes are made of it."""
+
+    nodes: dict[str, tuple[float, float]]
+    edges: list[tuple[Fields, Fields]]
+    stations: list[Fields]
+    orientation: Angles
+    theta: Angles
+
+
+def read_lif(path: Path, *, vehicle_type: str | None = None, layout: str | None = None) -> RouteImport:
+    """Read routes and stations.
+
+    Parameters
+    ----------
+    path : LIF file.
+    vehicle_type : vehicle type whose edges are read; the one with the most edges when None.
+    layout : identifier of the layout that is read; all of them when None.
+
+    Returns
+    -------
+    imported : routes, stations, and what the lint found. Elements that cannot be used are passed over and named.
+
+    Raises
+    ------
+    FileFormatError
+        the file is no JSON or has no list of layouts.
+    UsageError
+        the file has no such vehicle type or layout; names those that it has.
+    """
+    found = Findings()
+    root = read_json(path, found)
+    root.require_list("layouts")
+    layouts = list(root.mappings("layouts", "layout", "layoutId"))
+    names = tuple(fields.text("layoutId") for fields in layouts)
+    chosen = _chosen(layouts, names, layout, found)
+    content = _content(chosen, found)
+    counts = Counter(part.text("vehicleTypeId") for _, part in content.edges)
+    kind = _vehicle_type(counts, vehicle_type, found)
+    edges = [
+        edge
+        for fields, part in content.edges
+        if part.text("vehicleTypeId") == kind
+        for edge in _edge(fields, part, content)
+    ]
+    routes = _routes(edges, found)
+    stations = tuple(station for fields in content.stations for station in _station(fields, content))
+    return RouteImport(routes, found.lines(), stations, tuple(counts), names)
+
+
+def _chosen(layouts: list[Fields], names: tuple[str, ...], layout: str | None, found: Findings) -> list[Fields]:
+    if layout is not None:
+        if layout not in names:
+            raise UsageError(f"no layout is called {layout!r}; the file has: {', '.join(map(repr, names)) or 'none'}")
+        return [fields for fields, name in zip(layouts, names, strict=True) if name == layout]
+    if len(layouts) > 1:
+        found.add("", f"{len(layouts)} layouts ({', '.join(map(shown, names[:5]))}) are laid over one another")
+    return layouts
+
+
+def _content(layouts: list[Fields], found: Findings) -> _Layout:
+    """Collect nodes, edges and stations; the same identifier twice is noted, the first counts."""
+    nodes: dict[str, tuple[float, float]] = {}
+    edges: list[tuple[Fields, Fields]] = []
+    stations: list[Fields] = []
+    poses: list[Fields] = []
+    for layout in layouts:
+        if "stations" not in layout.values:
+            found.add(layout.where, "stations is missing; LIF demands the key, if only with an empty list")
+        for node in layout.mappings("nodes", "node", "nodeId"):
+            poses.extend(node.mappings("vehicleTypeNodeProperties"))
+            _add_node(node, nodes)
+        for edge in layout.mappings("edges", "edge", "edgeId"):
+            parts = list(edge.mappings("vehicleTypeEdgeProperties"))
+            if not parts:
+                found.add(edge.where, "no vehicle type may drive it; it is left out")
+            edges.extend((edge, replace(part, where=edge.where)) for part in parts)
+        stations.extend(layout.mappings("stations", "station", "stationId"))
+    positions = [p for station in stations if (p := station.mapping("stationPosition")) is not None]
+    orientation = angles_of((part for _, part in edges), "vehicleOrientation")
+    return _Layout(nodes, edges, stations, orientation, angles_of([*poses, *positions], "theta"))
+
+
+def _add_node(node: Fields, nodes: dict[str, tuple[float, float]]) -> None:
+    name = node.text("nodeId")
+    position = node.mapping("nodePosition")
+    x, y = (position.number("x"), position.number("y")) if position is not None else (None, None)
+    if not name or x is None or y is None:
+        node.found.add(node.where, "has no name or no place; it is left out")
+    elif name in nodes:
+        node.found.add(node.where, "nodeId is used twice; the first counts")
+    else:
+        nodes[name] = (x, y)
+
+
+def _vehicle_type(counts: Counter[str], wanted: str | None, found: Findings) -> str:
+    if wanted is not None:
+        if wanted not in counts:
+            known = ", ".join(map(repr, counts)) or "none"
+            raise UsageError(f"no vehicle type is called {wanted!r}; the file has: {known}")
+        return wanted
+    if len(counts) > 1:
+        kind = counts.most_common(1)[0][0]
+        others = ", ".join(shown(name) for name in counts if name != kind)
+        found.add("", f"routes are those of vehicle type {shown(kind)}; the file also has {others}")
+    return counts.most_common(1)[0][0] if counts else ""
+
+
+def _edge(fields: Fields, part: Fields, content: _Layout) -> Iterator[Edge]:
+    """Yield the edge, or nothing after noting why."""
+    start, end = fields.text("startNodeId"), fields.text("endNodeId")
+    for node in (start, end):
+        if node not in content.nodes:
+            part.found.add(part.where, f"node {shown(node)} does not exist or has no place")
+    segment = curve(part, (content.nodes.get(start), content.nodes.get(end)))
+    if segment is None:
+        return
+    segment = directed(segment, part, content.orientation)
+    speed = part.number("maxSpeed", least=0.0)
+    if speed == 0.0:
+        part.found.add(part.where, "maxSpeed is 0; it is passed over")
+    yield Edge(fields.text("edgeId") or f"{start}-{end}", start, end, replace(segment, speed=speed or None))
+
+
+def _station(fields: Fields, content: _Layout) -> Iterator[Station]:
+    """Yield the station, or nothing after noting why."""
+    values = fields.values.get("interactionNodeIds")
+    nodes = tuple(node for node in values if isinstance(node, str)) if isinstance(values, list) else ()
+    for node in nodes:
+        if node not in content.nodes:
+            fields.found.add(fields.where, f"node {shown(node)} does not exist or has no place")
+    position = fields.mapping("stationPosition")
+    x, y = (position.number("x"), position.number("y")) if position is not None else (None, None)
+    theta = content.theta.of(position) if position is not None else None
+    if x is None or y is None:
+        x, y = next((content.nodes[node] for node in nodes if node in content.nodes), (None, None))
+    if x is None or y is None:
+        fields.found.add(fields.where, "has no place; it is left out")
+        return
+    yield Station(fields.text("stationId"), fields.text("stationName"), nodes, x, y, theta)
+
+
+def _routes(edges: list[Edge], found: Findings) -> tuple[Route, ...]:
+    """Join edges into routes."""
+    taken: set[str] = set()
+    routes: list[Route] = []
+    named, rest = _numbered(edges)
+    for wanted, chain in [*named, *_chains(rest)]:
+        name = unique(wanted, taken)
+        note_corners(name, chain, found)
+        routes.append(route_of(name, chain))
+    return tuple(routes)
+
+
+def _numbered(edges: list[Edge]) -> tuple[list[tuple[str, list[Edge]]], list[Edge]]:
+    """Edges called NAME/1, NAME/2, ... that follow one another, by NAME; and the others."""
+    groups: dict[str, dict[int, Edge]] = {}
+    for edge in edges:
+        if match := _NUMBERED.fullmatch(edge.id):
+            groups.setdefault(match["name"], {}).setdefault(int(match["number"]), edge)
+    chains: list[tuple[str, list[Edge]]] = []
+    used: set[int] = set()
+    for name, group in groups.items():
+        chain = [group[number] for number in range(1, len(group) + 1) if number in group]
+        pairs = itertools.pairwise(chain)
+        if len(chain) == len(group) and all(a.end == b.start and follows(a, b) for a, b in pairs):
+            chains.append((name, chain))
+            used.update(id(edge) for edge in chain)
+    return chains, [edge for edge in edges if id(edge) not in used]
+
+
+def _chains(edges: list[Edge]) -> Iterator[tuple[str, list[Edge]]]:
+    """Longest chains in which each edge has one successor and that one no other predecessor, ways back not counted."""
+    leaving: dict[str, list[Edge]] = {}
+    arriving: dict[str, list[Edge]] = {}
+    for edge in edges:
+        leaving.setdefault(edge.start, []).append(edge)
+        arriving.setdefault(edge.end, []).append(edge)
+    following: dict[int, Edge] = {}
+    for edge in edges:
+        onward = [e for e in leaving.get(edge.end, ()) if e.end != edge.start]
+        if len(onward) != 1:
+            continue
+        rivals = [e for e in arriving[edge.end] if e.start != onward[0].end]
+        if len(rivals) == 1 and follows(edge, onward[0]) and turn(edge.segment, onward[0].segment) <= CORNER:
+            following[id(edge)] = onward[0]
+    # A ring has no beginning: after the chains that have one, it is begun at the first of its edges.
+    heads = {id(edge) for edge in edges} - {id(edge) for edge in following.values()}
+    done: set[int] = set()
+    for edge in [*(e for e in edges if id(e) in heads), *(e for e in edges if id(e) not in heads)]:
+        chain: list[Edge] = []
+        step: Edge | None = edge
+        while step is not None and id(step) not in done:
+            done.add(id(step))
+            chain.append(step)
+            step = following.get(id(step))
+        if chain:
+            yield (chain[0].id if len(chain) == 1 else f"{chain[0].start} to {chain[-1].end}"), chain
