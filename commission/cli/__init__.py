@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from commission.cli import localizing, page, parsing, simulating
+from commission.cli import covering, localizing, page, parsing, simulating
 from commission.cli.parsing import Command
 from commission.cli.versions import Version
 from commission.errors import CommissionError
@@ -25,6 +25,7 @@ COMMANDS: dict[str, type[Command]] = {
     "serve": page.Serve,
     "simulate": simulating.Simulate,
     "localize": localizing.Localize,
+    "coverage": covering.Coverage,
     "version": Version,
 }
 

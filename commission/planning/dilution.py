@@ -113,6 +113,7 @@ def odometry_prior(parameters: OdometryParameters, distance: float, speed: float
     distance : driven since then [m].
     speed : of the vehicle [m/s], greater than 0.
     """
+    above(distance, 0.0, "distance on odometry", "m")
     above(speed, 0.0, "speed", "m/s")
     seconds = distance / speed
     forward = parameters.forward_per_sqrt_m**2 * distance + parameters.forward_per_sqrt_s**2 * seconds

@@ -1,0 +1,102 @@
+"""The command `coverage`: visibility and dilution over the floor into a folder."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from tyro.conf import Positional, arg
+
+from commission.errors import UsageError
+
+if TYPE_CHECKING:
+    from commission.planning.dilution import FixOptions
+    from commission.site.project import Project
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coverage:
+    """Compute what the scanner sees over the floor; writes coverage.npz, .csv, .png and summary.json."""
+
+    project: Positional[Path]
+    """Folder of the project (holds project.yaml)."""
+    out: Annotated[Path, arg(metavar="DIR")]
+    """Folder for the results; made when it does not exist."""
+    spacing: float = 0.25
+    """Distance between neighboring points of the floor [m]."""
+    heading: Literal["all-round", "worst", "best"] | float = "all-round"
+    """Heading of the vehicle [deg]; or the worst or best of 16; or all-round, as if the scanner saw a full turn. Points
+    are positions of base for a heading, of the scanner otherwise."""
+    measurement: Literal["range-bearing", "bearing-only", "range-bearing-prior"] = "range-bearing"
+    """What is measured of a reflector; bearing-only is triangulation, prior adds what odometry says."""
+    odometry: float = 1.0
+    """Distance driven on odometry since the last fix [m]; read with range-bearing-prior only."""
+    blocked_per_m: float = 0.0
+    """Probability per metre of ray that a person blocks it [1/m]."""
+    min_beams: int = 1
+    """Beams that a reflector must get for certain to count as visible [beams]."""
+    max_incidence: float = 60.0
+    """Largest angle between a flat reflector's normal and the ray [deg]."""
+
+    def run(self) -> None:
+        """Compute, write, and tell in a few lines what was found."""
+        from commission.io.coverage_files import write_coverage
+        from commission.io.project_file import load_project
+        from commission.planning.visibility import VisibilityOptions
+        from commission.studies.coverage import coverage_of, drivable, summary
+
+        project = load_project(self.project)
+        try:
+            options = self._options(project)
+            visibility = VisibilityOptions(self.min_beams, self.max_incidence)
+            found = coverage_of(project, options, spacing=self.spacing, visibility=visibility)
+        except ValueError as error:
+            raise UsageError(str(error)) from None
+        entries = summary(project, found)
+        write_coverage(self.out, found, drivable(project, found), entries)
+        sys.stdout.write("\n".join([*_report(entries), f"Written to   {self.out}"]) + "\n")
+
+    def _options(self, project: Project) -> FixOptions:
+        """Options of the fix; the noise is what the project's localizer assumes."""
+        from commission.planning.dilution import Heading, Measurement, fix_options, odometry_prior
+
+        parameters = project.parameters
+        speed = project.routes[0].speed if project.routes else 0.5
+        position, heading = odometry_prior(parameters.odometry, self.odometry, speed)
+        return fix_options(
+            parameters.observation,
+            measurement=Measurement(self.measurement),
+            heading=Heading(self.heading) if isinstance(self.heading, str) else Heading.GIVEN,
+            given_heading=0.0 if isinstance(self.heading, str) else math.radians(self.heading),
+            blocked_per_m=self.blocked_per_m,
+            prior_position_sigma=position,
+            prior_heading_sigma=heading,
+        )
+
+
+def _report(entries: dict[str, int | float | None]) -> list[str]:
+    """Lines for a person; millimetres and degrees as is the habit."""
+
+    def share(key: str) -> str:
+        value = entries[key]
+        return "unknown" if value is None else f"{100.0 * value:.1f} %"
+
+    def scaled(key: str, factor: float, form: str) -> str:
+        value = entries[key]
+        return "none" if value is None else form.format(factor * value)
+
+    degrees = math.degrees(1.0)
+    return [
+        f"Floor        {entries['area_m2']:.0f} m2 in {entries['points']} points; {entries['reflectors']} reflectors",
+        f"Visible      1 or more on {share('share_1_visible')}, 2 on {share('share_2_visible')}, "
+        f"3 on {share('share_3_visible')}",
+        f"One fix      possible on {share('share_with_fix')}; two sigma within the supervisor's limits on "
+        f"{share('share_within_limits')}",
+        f"1-sigma      position {scaled('position_sigma_median_m', 1e3, '{:.1f} mm')} median, "
+        f"{scaled('position_sigma_p95_m', 1e3, '{:.1f} mm')} at 95 % of the floor; heading "
+        f"{scaled('heading_sigma_median_rad', degrees, '{:.2f} deg')} and "
+        f"{scaled('heading_sigma_p95_rad', degrees, '{:.2f} deg')}",
+    ]

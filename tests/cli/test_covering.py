@@ -1,0 +1,60 @@
+"""The command `coverage`."""
+
+import json
+
+import numpy as np
+import pytest
+
+
+def summary(folder):
+    return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+
+
+def test_coverage_writes_its_files_and_tells_what_it_found(commission, project, tmp_path):
+    code, told, err = commission("coverage", project, "--out", tmp_path / "out", "--spacing", "0.5")
+    assert (code, err) == (0, "")
+    assert "5 reflectors" in told
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        *("coverage.csv", "coverage.npz", "coverage.png", "summary.json")
+    ]
+    entries = summary(tmp_path / "out")
+    assert entries["spacing_m"] == 0.5
+    assert 0.5 < entries["share_with_fix"] <= 1.0
+
+
+def test_triangulation_is_worse_than_ranges_and_a_prior_is_better(commission, project, tmp_path):
+    for name in ("range-bearing", "bearing-only", "range-bearing-prior"):
+        assert commission("coverage", project, "--out", tmp_path / name, "--measurement", name)[0] == 0
+    names = ("bearing-only", "range-bearing", "range-bearing-prior")
+    triangulated, ranged, prepared = (summary(tmp_path / name)["position_sigma_median_m"] for name in names)
+    assert triangulated > ranged > prepared
+
+
+@pytest.mark.parametrize("heading", ["worst", "best", "90"])
+def test_headings_are_words_or_degrees(commission, project, tmp_path, heading):
+    # The project's scanner sees a full turn, so every heading sees the same; only base and scanner are 0.2 m apart.
+    assert commission("coverage", project, "--out", tmp_path / "out", "--heading", heading)[0] == 0
+    assert commission("coverage", project, "--out", tmp_path / "all")[0] == 0
+    with np.load(tmp_path / "out" / "coverage.npz") as one, np.load(tmp_path / "all" / "coverage.npz") as other:
+        same = np.array_equal(one["position_sigma_m"], other["position_sigma_m"])
+    assert same == (heading != "90")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--spacing", "0"), "spacing is 0"),
+        (("--heading", "north"), "heading"),
+        (("--blocked-per-m", "2"), "blocked_per_m"),
+        (("--min-beams", "0"), "min_beams"),
+        (("--odometry", "-1"), "odometry"),
+        (("--measurement", "guess"), "measurement"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_what_cannot_be_computed_is_one_line_and_exit_code_2(commission, project, tmp_path, words, said):
+    code, told, err = commission("coverage", project, "--out", tmp_path / "out", *words)
+    assert (code, told) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
