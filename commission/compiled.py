@@ -5,6 +5,7 @@ It holds no kernel of its own. Kernels compile when first called, never at impor
 
 from __future__ import annotations
 
+import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Sequence
@@ -12,18 +13,34 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 
+def sources_digest(package: Path) -> str:
+    """Digest of every module that holds kernels.
+
+    numba compiles a kernel anew when its own file changes, but not when a kernel that it calls has changed in another
+    file: it would go on with the old one, after an edit or an update. So each state of the sources has its own folder.
+    """
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob("*.py")):
+        content = path.read_bytes()
+        if b"commission.compiled" in content:
+            digest.update(path.relative_to(package).as_posix().encode() + b"\0" + content)
+    return digest.hexdigest()[:16]
+
+
 def cache_folder() -> Path:
-    """Folder of compiled kernels: that of `NUMBA_CACHE_DIR`, else the user's cache, else a temporary one."""
+    """Folder of compiled kernels: in that of `NUMBA_CACHE_DIR`, else in the user's cache, else in a temporary one."""
+    state = sources_digest(Path(__file__).resolve().parent)
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     if chosen:
-        return Path(chosen)
+        # A child process inherits what was set below.
+        return Path(chosen) if Path(chosen).name == state else Path(chosen) / state
     base = os.environ.get("XDG_CACHE_HOME") or os.environ.get("LOCALAPPDATA") or str(Path.home() / ".cache")
-    folder = Path(base) / "commission" / "kernels"
+    folder = Path(base) / "commission" / "kernels" / state
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
         # A service user without a home still runs; it compiles anew after each reboot.
-        folder = Path(tempfile.gettempdir()) / f"commission-kernels-{os.getuid()}"
+        folder = Path(tempfile.gettempdir()) / f"commission-kernels-{os.getuid()}" / state
         folder.mkdir(parents=True, exist_ok=True)
     return folder
 
