@@ -15,12 +15,14 @@ import viser
 from commission import compiled
 from commission.app.actions import Recording, Source, VirtualDrive
 from commission.app.drives import prepare
+from commission.app.extent import extent_of
 from commission.app.history import episodes
+from commission.app.layers.accumulated import AccumulatedLayer
 from commission.app.page import Page
 from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
 from commission.app.server import start_server
 from commission.app.session import Drive
-from commission.app.store import AppState
+from commission.app.store import MAGNIFICATIONS, AppState
 from commission.io.project_file import load_project, save_project
 from commission.localization import whole_run
 from commission.localization.estimate import Mode
@@ -29,6 +31,9 @@ from commission.simulation import scenario
 from commission.site.project import Project
 
 log = logging.getLogger(__name__)
+
+SEEN_SHARE = 0.02
+"""Size of a validation area, as a share of the site's, from which it is seen."""
 
 
 def serve(
@@ -89,7 +94,15 @@ def open_page(
     folder : where it is saved to; none: nowhere unless a folder is named.
     source : what drives at once; none: nothing yet.
     """
-    state = AppState(project, project, folder=folder, source=source, repeat=folder is None)
+    state = AppState(
+        project,
+        project,
+        folder=folder,
+        source=source,
+        repeat=folder is None,
+        hidden=frozenset({AccumulatedLayer.name}),
+        magnify=seen_magnification(project),
+    )
     runtime = Runtime(state, Work(prepare, predicted_episodes, save_project, compile_kernels))
     page = Page(server, runtime.post, state)
 
@@ -103,6 +116,13 @@ def open_page(
 
     runtime.start(page)
     return runtime
+
+
+def seen_magnification(project: Project) -> float:
+    """Return the factor at which validation areas can be seen when the whole site is in view."""
+    wanted = SEEN_SHARE * min(extent_of(project).size)
+    factor = wanted / (2.45 * project.parameters.observation.range_sigma)
+    return max(m for m in MAGNIFICATIONS if m <= max(factor, MAGNIFICATIONS[0]))
 
 
 def predicted_episodes(drive: Drive, setup: LocalizerSetup) -> tuple[tuple[float, float], ...]:

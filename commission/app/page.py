@@ -74,6 +74,7 @@ class Page:
             server.gui.configure_theme(
                 dark_mode=True, show_logo=False, show_share_button=False, brand_color=theme.BRAND
             )
+            server.gui.set_panel_label(None)
             server.scene.world_axes.visible = False
             server.scene.set_background_image(np.full((2, 2, 3), theme.BACKGROUND, np.uint8), format="png")
             self._layers: tuple[Layer, ...] = tuple(make(server.scene) for make in LAYERS)
@@ -100,7 +101,7 @@ class Page:
         now.set_width(theme.RIGHT_PX)
         below = gui.add_panel()
         with below.add_tab("Legend"):
-            legend = LegendPanel(gui, post, self._layers)
+            legend = LegendPanel(gui, post, self._layers, state)
         with below.add_tab("Layers"):
             switches = LayersPanel(gui, post, self._layers, state)
         with below.add_tab("Problems"):

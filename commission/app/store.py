@@ -14,7 +14,7 @@ from commission.site.project import Project
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Factors that the play clock offers."""
 
-MAGNIFICATIONS = (1.0, 3.0, 10.0)
+MAGNIFICATIONS = (1.0, 3.0, 10.0, 30.0)
 """Factors at which ellipses can be drawn."""
 
 

@@ -15,7 +15,7 @@ Color: TypeAlias = tuple[int, int, int]
 BACKGROUND: Color = (16, 18, 21)
 UNKNOWN: Color = (24, 26, 30)
 FREE: Color = (37, 40, 45)
-WALL: Color = (150, 156, 165)
+WALL: Color = (96, 102, 112)
 GRID: Color = (50, 53, 59)
 GRID_METER: Color = (62, 66, 73)
 ROUTE: Color = (116, 128, 150)
@@ -25,7 +25,7 @@ POSE: Color = (255, 82, 82)
 INLIER: Color = (255, 214, 10)
 OUTLIER_ASSOCIATION: Color = (255, 59, 48)
 OUTLIER_DETECTOR: Color = (196, 74, 60)
-SCAN: Color = (158, 166, 176)
+SCAN: Color = (190, 197, 206)
 VEHICLE: Color = (236, 239, 244)
 TRAIL: Color = (64, 200, 150)
 REFERENCE: Color = (196, 140, 255)
@@ -44,7 +44,8 @@ class Height:
     ROUTE = 0.01
     ACCUMULATED = 0.015
     SCAN = 0.02
-    TRAIL = 0.025
+    REFERENCE = 0.024
+    TRAIL = 0.026
     REFLECTOR = 0.03
     GATE = 0.035
     DETECTION = 0.04
@@ -82,7 +83,7 @@ def css(color: Color) -> str:
 
 TOP_BAR_PX = 44
 BOTTOM_PX = 248
-LEFT_PX = 290
+LEFT_PX = 300
 RIGHT_PX = 270
 
 # viser docks panels to the left and right only. The rules below turn its main panel into a bar at the top and the
@@ -116,13 +117,14 @@ div:has(>div>.c-bottom)>:nth-child(2){{grid-column:span 5}}
 div:has(>div>.c-bottom)>:nth-child(3){{grid-column:span 2}}
 div:has(>div>.c-bottom)>:nth-child(4){{grid-column:span 3}}
 div:has(>div>.c-bottom)>:nth-child(5){{grid-column:span 14}}
-div:has(>div>.c-bottom)>:nth-child(6){{grid-column:span 24}}
+div:has(>div>.c-bottom)>:nth-child(6){{grid-column:11/span 14;margin:-9px 0 2px!important;padding:0 67px 0 18px!important}}
 div:has(>div>.c-bottom)>:nth-child(n+7){{grid-column:span 4}}
 div:has(>div>.c-bottom)>:nth-child(-n+3) [style*="7.25em"]{{display:none}}
 div:has(>div>.c-bottom)>:nth-child(5) [style*="7.25em"]{{display:none}}
 .c-table{{width:100%;border-collapse:collapse;font-size:12px;font-variant-numeric:tabular-nums}}
-.c-table td{{padding:2px 0;vertical-align:top}}
+.c-table td{{padding:1px 0;vertical-align:top}}
 .c-table td:first-child{{opacity:.65;padding-right:10px;white-space:nowrap}}
 .c-table td:last-child{{text-align:right}}
+@media (max-width:1500px){{.c-beside{{display:none}}}}
 .c-note{{font-size:11.5px;opacity:.7;line-height:1.35}}
 </style>"""

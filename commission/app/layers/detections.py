@@ -50,11 +50,12 @@ class DetectionLayer(BaseLayer):
     def draw(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
         """Draw every detection where it is seen from the estimated pose."""
         for status, cloud in self._clouds.items():
-            if run.estimate is None:
-                cloud.points = NO_POINTS
-            else:
-                chosen = run.estimate.points_map[run.estimate.status == status]
-                cloud.points = lift(chosen, theme.Height.DETECTION)
+            chosen = NO_POINTS
+            if run.estimate is not None:
+                of_status = run.estimate.points_map[run.estimate.status == status]
+                chosen = lift(of_status, theme.Height.DETECTION)
+            if len(chosen) or len(cloud.points):
+                cloud.points = chosen
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the marks of every status."""

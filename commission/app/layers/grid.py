@@ -47,7 +47,7 @@ class GridLayer(BaseLayer):
         extent = extent_of(project)
         step = grid_step(extent)
         lines = grid_lines(extent, step)
-        (x, y), height = extent.low, theme.Height.GRID
+        x, y, height = extent.low[0] + 0.1 * step, extent.low[1] + 0.35 * step, theme.Height.GRID
         bar = np.array([[(x, y), (x + step, y)], [(x, y - 0.12 * step), (x, y + 0.12 * step)]])
         bar = np.concatenate([bar, bar[1:] + np.array([step, 0.0])])
         self._nodes = (
@@ -56,8 +56,8 @@ class GridLayer(BaseLayer):
             self.scene.add_label(
                 "/grid/scale/text",
                 f"{step:g} m",
-                position=(x + 0.5 * step, y - 0.05 * step, height),
-                anchor="top-center",
+                position=(x + 0.5 * step, y + 0.05 * step, height),
+                anchor="bottom-center",
                 font_screen_scale=0.8,
             ),
         )

@@ -22,12 +22,18 @@ class ScanLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._points = scene.add_point_cloud(
-            "/run/scan", NO_POINTS, theme.SCAN, point_size=0.04, point_shading="flat", precision="float32"
+            "/run/scan",
+            NO_POINTS,
+            theme.SCAN,
+            point_size=0.04,
+            point_shape="circle",
+            point_shading="flat",
+            precision="float32",
         )
 
     def show_site(self, project: Project) -> None:
         """Adapt the size of points to the site's."""
-        self._points.point_size = 0.45 * extent_of(project).mark_size()
+        self._points.point_size = 0.4 * extent_of(project).mark_size()
 
     def draw(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
         """Draw the newest scan."""

@@ -10,7 +10,7 @@ from commission.app.layers.base import BaseLayer
 from commission.app.store import AppState
 from commission.app.view import RunView
 
-MOST_POINTS = 2000
+MOST_POINTS = 800
 
 
 class TrailLayer(BaseLayer):
@@ -22,7 +22,7 @@ class TrailLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._line = scene.add_line_segments(
-            "/run/trail", NO_SEGMENTS, theme.TRAIL, thickness=2.0, thickness_units="screen"
+            "/run/trail", NO_SEGMENTS, theme.TRAIL, thickness=1.5, thickness_units="screen"
         )
 
     def draw_slowly(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
@@ -43,12 +43,12 @@ class ReferenceLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._line = scene.add_line_segments(
-            "/run/reference", NO_SEGMENTS, theme.REFERENCE, thickness=1.0, thickness_units="screen"
+            "/run/reference", NO_SEGMENTS, theme.REFERENCE, thickness=3.0, thickness_units="screen"
         )
 
     def draw_slowly(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
         """Draw the reference positions up to now."""
-        self._line.points = polyline_segments(thinned(run.references, MOST_POINTS), theme.Height.TRAIL + 0.002)
+        self._line.points = polyline_segments(thinned(run.references, MOST_POINTS), theme.Height.REFERENCE)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the line."""

@@ -25,17 +25,19 @@ class UncertaintyLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._lines = scene.add_line_segments(
-            "/run/pose", NO_SEGMENTS, theme.POSE, thickness=2.0, thickness_units="screen"
+            "/vehicle/covariance", NO_SEGMENTS, theme.POSE, thickness=2.0, thickness_units="screen"
         )
 
     def draw(self, run: RunView, state: AppState) -> None:
         """Draw ellipse and rays."""
-        center, covariance = run.pose[:2], run.covariance
-        ellipse = ellipse_points(center[np.newaxis], covariance[np.newaxis, :2, :2], SIGMAS * state.magnify)
-        spread = min(SIGMAS * state.magnify * float(np.sqrt(covariance[2, 2])), np.pi)
-        headings = run.pose[2] + np.array([-spread, spread])
-        ends = center + RAY * np.stack([np.cos(headings), np.sin(headings)], axis=1)
-        rays = np.stack([np.broadcast_to(center, (2, 2)), ends], axis=1)
+        # Drawn in the vehicle's frame, so that it sits on the vehicle even where a slow browser skips pictures.
+        c, s = np.cos(run.pose[2]), np.sin(run.pose[2])
+        to_base = np.array([[c, s], [-s, c]])
+        covariance = to_base @ run.covariance[:2, :2] @ to_base.T
+        ellipse = ellipse_points(np.zeros((1, 2)), covariance[np.newaxis], SIGMAS * state.magnify)
+        spread = min(SIGMAS * state.magnify * float(np.sqrt(run.covariance[2, 2])), np.pi)
+        ends = RAY * np.array([(np.cos(spread), np.sin(-spread)), (np.cos(spread), np.sin(spread))])
+        rays = np.stack([np.zeros((2, 2)), ends], axis=1)
         self._lines.points = np.concatenate(
             [
                 outline_segments(ellipse, theme.Height.POSE),

@@ -21,11 +21,13 @@ SHAPES = {
 }
 
 
-def legend(layers: Sequence[Layer]) -> str:
-    """Return the legend of all layers."""
+def legend(layers: Sequence[Layer], magnify: float) -> str:
+    """Return the legend of all layers; it says when ellipses are not true to scale."""
+    scale = "" if magnify == 1.0 else f", drawn {magnify:g}x"
     rows = "".join(
         "<div style='display:flex;align-items:center;gap:8px;height:19px'><svg width='18' height='14'>"
-        f"{SHAPES[entry.mark].format(c=theme.css(entry.color))}</svg><span>{escaped(entry.text)}</span></div>"
+        f"{SHAPES[entry.mark].format(c=theme.css(entry.color))}</svg><span>{escaped(entry.text)}"
+        f"{scale if entry.mark is theme.Mark.RING else ''}</span></div>"
         for layer in layers
         for entry in layer.legend
     )
@@ -35,15 +37,23 @@ def legend(layers: Sequence[Layer]) -> str:
 class LegendPanel(BasePanel):
     """What the colors and shapes mean."""
 
-    def __init__(self, gui: GuiApi, post: Post, layers: Sequence[Layer]) -> None:
-        gui.add_html(legend(layers))
+    def __init__(self, gui: GuiApi, post: Post, layers: Sequence[Layer], state: AppState) -> None:
+        self._layers = layers
+        self._html = gui.add_html(legend(layers, state.magnify))
+        self._magnify = state.magnify
         scale = gui.add_dropdown(
             "Ellipses",
             tuple(_factor(m) for m in MAGNIFICATIONS),
-            initial_value=_factor(MAGNIFICATIONS[0]),
+            initial_value=_factor(state.magnify),
             hint="Draw validation areas and pose covariance larger than they are; true to scale is 1x.",
         )
         scale.on_update(posting(post, lambda event: actions.Magnify(float(str(event.target.value).rstrip("x")))))
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Say by how much ellipses are magnified."""
+        if view.state.magnify != self._magnify:
+            self._magnify = view.state.magnify
+            self._html.content = legend(self._layers, self._magnify)
 
 
 class LayersPanel(BasePanel):

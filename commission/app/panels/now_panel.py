@@ -19,8 +19,7 @@ def rows(run: RunView, limits: SupervisorParameters) -> list[tuple[str, str]]:
     shown = [
         ("Mode", "fail: output withheld" if run.mode is Mode.FAIL else "operational"),
         ("Fail episodes so far", str(len(lived))),
-        ("x", f"{x:.3f} m"),
-        ("y", f"{y:.3f} m"),
+        ("Position x, y", f"{x:.3f}, {y:.3f} m"),
         ("Heading", f"{math.degrees(heading):.2f} °"),
     ]
     if run.estimate is None:
@@ -36,8 +35,10 @@ def rows(run: RunView, limits: SupervisorParameters) -> list[tuple[str, str]]:
         ("2σ y / limit", f"{sigma_y * 1000:.1f} / {limit_mm}"),
         ("2σ heading / limit", f"{math.degrees(sigma_heading):.2f} / {math.degrees(limits.heading_limit):.1f} °"),
         ("Inliers", str(estimate.count(Status.INLIER))),
-        ("Outliers: beams", str(estimate.count(Status.OUTLIER_DETECTOR))),
-        ("Outliers: gate", str(estimate.count(Status.OUTLIER_ASSOCIATION))),
+        (
+            "Outliers by beams, gate",
+            f"{estimate.count(Status.OUTLIER_DETECTOR)}, {estimate.count(Status.OUTLIER_ASSOCIATION)}",
+        ),
         ("Largest NIS / gate", f"{nis} / {estimate.gate:.2f}"),
         ("Cycle time", f"{run.series.microseconds[-1]:.0f} µs"),
         ("Position error", f"{error * 1000:.1f} mm" if math.isfinite(error) else "no reference"),
@@ -55,4 +56,4 @@ class NowPanel(BasePanel):
         """Show the numbers."""
         if view.run is not None:
             shown = table(rows(view.run, view.state.project.parameters.supervisor))
-            self._html.content = f"<div class='c-now' style='padding:2px 6px'>{shown}</div>"
+            self._html.content = f"<div class='c-now' style='padding:2px 14px 2px 6px'>{shown}</div>"

@@ -7,12 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from viser import GuiApi, GuiUplotHandle, uplot
 
 from commission.app import theme
 from commission.app.panels.base import BasePanel
-from commission.app.view import PageView, Series
+from commission.app.view import PageView, RunView, Series
 from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
 from commission.localization.estimate import Status
@@ -46,8 +45,12 @@ class Chart:
     """Title with the unit."""
     lines: tuple[Line, ...]
     """Its curves."""
-    top: Callable[[Parameters], float] | None = None
-    """Largest value shown, in the plot's unit; none: as the curves need."""
+    span: Callable[[Parameters], tuple[float, float]] | None = None
+    """Smallest and largest value shown, in the plot's unit; none: as the curves need."""
+    is_logarithmic: bool = False
+    """Whether the vertical axis is logarithmic: a good run lies far below its limits."""
+    is_typical: bool = False
+    """Whether a curve shows the median of each stretch of the drive and not its largest value."""
 
 
 def _gate(parameters: Parameters) -> float:
@@ -66,7 +69,8 @@ CHARTS = (
             Line("y [mm]", ORANGE, lambda s, _p: s.two_sigma[:, 1] * 1000.0),
             Line("limit", LIMIT, lambda s, p: _constant(s, p.supervisor.position_limit * 1000.0), is_limit=True),
         ),
-        lambda p: 1500.0 * p.supervisor.position_limit,
+        lambda p: (5.0 * p.supervisor.position_limit, 3000.0 * p.supervisor.position_limit),
+        is_logarithmic=True,
     ),
     Chart(
         "2σ of heading [°]",
@@ -74,7 +78,11 @@ CHARTS = (
             Line("heading [°]", TURQUOISE, lambda s, _p: np.degrees(s.two_sigma[:, 2])),
             Line("limit", LIMIT, lambda s, p: _constant(s, math.degrees(p.supervisor.heading_limit)), is_limit=True),
         ),
-        lambda p: 1.5 * math.degrees(p.supervisor.heading_limit),
+        lambda p: (
+            0.005 * math.degrees(p.supervisor.heading_limit),
+            3.0 * math.degrees(p.supervisor.heading_limit),
+        ),
+        is_logarithmic=True,
     ),
     Chart(
         "NIS against gate",
@@ -82,7 +90,7 @@ CHARTS = (
             Line("largest NIS of a scan's inliers", TURQUOISE, lambda s, _p: s.nis),
             Line("gate", LIMIT, lambda s, p: _constant(s, _gate(p)), is_limit=True),
         ),
-        lambda p: 1.4 * _gate(p),
+        lambda p: (0.0, 1.4 * _gate(p)),
     ),
     Chart(
         "Inliers, outliers per scan",
@@ -95,7 +103,9 @@ CHARTS = (
             ),
         ),
     ),
-    Chart("Cycle time [µs]", (Line("cycle time [µs]", TURQUOISE, lambda s, _p: s.microseconds),)),
+    Chart(
+        "Cycle time [µs]", (Line("median cycle time [µs]", TURQUOISE, lambda s, _p: s.microseconds),), is_typical=True
+    ),
     Chart(
         "Position error [mm]",
         (Line("error against reference [mm]", theme.css(theme.REFERENCE), lambda s, _p: s.error * 1000.0),),
@@ -103,38 +113,40 @@ CHARTS = (
 )
 
 
-def binned(times: FloatArray, values: NDArray[np.float64], duration: float) -> FloatArray:
-    """Return the largest value in each of `BINS` equal stretches of the drive.
+def binned(times: FloatArray, values: FloatArray, duration: float, *, typical: bool = False) -> FloatArray:
+    """Return the largest value (or the median) in each of `BINS` equal stretches of the drive.
 
     Parameters
     ----------
     times : (K,) array [s], ascending.
     values : (K,) array; NaN where unknown.
     duration : length of the drive [s].
+    typical : median instead of the largest value.
 
     Returns
     -------
-    peaks : (BINS,) array; NaN where nothing is known. A peak is never lost, however long the drive.
+    levels : (BINS,) array; NaN where nothing is known. However long the drive, no peak is lost.
     """
-    peaks = np.full(BINS, -np.inf)
-    bins = np.minimum((times * (BINS / max(duration, 1e-9))).astype(np.int64), BINS - 1)
+    levels = np.full(BINS, np.nan)
     known = np.isfinite(values)
-    np.maximum.at(peaks, bins[known], values[known])
-    peaks[np.isneginf(peaks)] = np.nan
-    return peaks
+    bins = np.minimum((times[known] * (BINS / max(duration, 1e-9))).astype(np.int64), BINS - 1)
+    order = np.lexsort((values[known], bins))
+    bins, ranked = bins[order], values[known][order]
+    filled_bins, first, count = np.unique(bins, return_index=True, return_counts=True)
+    levels[filled_bins] = ranked[first + (count // 2 if typical else count - 1)]
+    return levels
 
 
-def filled(peaks: FloatArray, now: float, duration: float) -> FloatArray:
-    """Carry the last value over empty stretches up to now; zero ahead: uPlot knows no gaps.
+def carried(levels: FloatArray, now: float, duration: float) -> FloatArray:
+    """Carry the last value over empty stretches up to now; NaN ahead, where uPlot draws nothing.
 
-    A drive with fewer scans than stretches has empty ones between them.
+    A drive with fewer scans than stretches has empty ones between them, over which uPlot would draw a slope.
     """
     reached = min(BINS, int(now * (BINS / max(duration, 1e-9))) + 1)
-    known = np.isfinite(peaks)
-    latest = np.maximum.accumulate(np.where(known, np.arange(BINS), -1))
-    carried = np.where(latest >= 0, peaks[np.maximum(latest, 0)], 0.0)
-    carried[reached:] = 0.0
-    return carried
+    latest = np.maximum.accumulate(np.where(np.isfinite(levels), np.arange(BINS), -1))
+    curve = np.where(latest >= 0, levels[np.maximum(latest, 0)], np.nan)
+    curve[reached:] = np.nan
+    return curve
 
 
 class Plots(BasePanel):
@@ -144,7 +156,7 @@ class Plots(BasePanel):
         self._gui = gui
         self._plots: list[GuiUplotHandle] = []
         self._duration = 0.0
-        self._tops: tuple[float | None, ...] = ()
+        self._spans: tuple[tuple[float, float] | None, ...] = ()
         self._axis = np.linspace(0.0, 1.0, BINS)
         for chart in CHARTS:
             empty = tuple(np.zeros(2) for _ in range(len(chart.lines) + 3))
@@ -153,12 +165,12 @@ class Plots(BasePanel):
                     (np.array([0.0, 1.0]), *empty[1:]),
                     _series(chart),
                     title=chart.title,
-                    scales=_scales(1.0, None),
+                    scales=_scales(1.0, None, chart),
                     axes=(_axis(20), _axis(36)),
                     legend={"show": False},
                     cursor={"sync": {"key": "run"}, "drag": {"x": True, "y": False}},
                     height=HEIGHT_PX,
-                    padding=(2, 8, 0, 0),
+                    padding=(8, 8, 0, 0),
                 )
             )
 
@@ -168,36 +180,35 @@ class Plots(BasePanel):
         if run is None or run.duration <= 0.0:
             return
         parameters = view.state.project.parameters
-        tops = tuple(None if chart.top is None else chart.top(parameters) for chart in CHARTS)
-        if run.duration != self._duration or tops != self._tops:
+        spans = tuple(None if chart.span is None else chart.span(parameters) for chart in CHARTS)
+        if run.duration != self._duration or spans != self._spans:
             # A new scale rebuilds the chart and forgets the zoom: only when it must.
-            self._duration, self._tops = run.duration, tops
+            self._duration, self._spans = run.duration, spans
             self._axis = np.linspace(0.0, run.duration, BINS)
-            for plot, top in zip(self._plots, tops, strict=True):
-                plot.scales = _scales(run.duration, top)
+            for plot, span, chart in zip(self._plots, spans, CHARTS, strict=True):
+                plot.scales = _scales(run.duration, span, chart)
         failing = np.zeros(BINS)
         for start, end in run.episodes:
             failing[(self._axis >= start) & (self._axis <= max(end, start + run.duration / BINS))] = 1.0
         now = np.where(np.abs(self._axis - run.time) <= 0.5 * run.duration / BINS, 1.0, 0.0)
-        for chart, plot, top in zip(CHARTS, self._plots, tops, strict=True):
-            plot.data = (self._axis, *self._curves(chart, view, top), failing, now)
+        for chart, plot, span in zip(CHARTS, self._plots, spans, strict=True):
+            curves = _curves(chart, run, parameters)
+            if span is not None:
+                curves = [np.clip(curve, *span) for curve in curves]
+            plot.data = (self._axis, *curves, failing, now)
 
-    def _curves(self, chart: Chart, view: PageView, top: float | None) -> list[FloatArray]:
-        """One array per line of a chart."""
-        run = view.run
-        if run is None:
-            return []
-        parameters = view.state.project.parameters
-        curves: list[FloatArray] = []
-        for line in chart.lines:
-            if line.is_limit:
-                level = line.values(run.series, parameters)[:1]
-                curves.append(np.full(BINS, level[0] if len(level) else 0.0))
-                continue
-            peaks = binned(run.series.times, line.values(run.series, parameters), run.duration)
-            curve = filled(peaks, run.time, run.duration)
-            curves.append(curve if top is None else np.minimum(curve, top))
-        return curves
+
+def _curves(chart: Chart, run: RunView, parameters: Parameters) -> list[FloatArray]:
+    """One array per line of a chart."""
+    curves: list[FloatArray] = []
+    for line in chart.lines:
+        values = line.values(run.series, parameters)
+        if line.is_limit:
+            curves.append(np.full(BINS, values[0] if len(values) else np.nan))
+        else:
+            levels = binned(run.series.times, values, run.duration, typical=chart.is_typical)
+            curves.append(carried(levels, run.time, run.duration))
+    return curves
 
 
 def _series(chart: Chart) -> tuple[uplot.Series, ...]:
@@ -215,14 +226,12 @@ def _series(chart: Chart) -> tuple[uplot.Series, ...]:
     )
 
 
-def _scales(duration: float, top: float | None) -> dict[str, uplot.Scale]:
-    value: uplot.Scale = {} if top is None else {"range": (0.0, top)}
+def _scales(duration: float, span: tuple[float, float] | None, chart: Chart) -> dict[str, uplot.Scale]:
+    value: uplot.Scale = {} if span is None else {"range": span}
+    if chart.is_logarithmic:
+        value["distr"] = 3
     # The flags' scale starts above zero: their zero line stays outside of the plot.
-    return {
-        "x": {"time": False, "range": (0.0, duration)},
-        "y": value,
-        "flag": {"range": (0.01, 1.0)},
-    }
+    return {"x": {"time": False, "range": (0.0, duration)}, "y": value, "flag": {"range": (0.01, 1.0)}}
 
 
 def _axis(size: int) -> uplot.Axis:

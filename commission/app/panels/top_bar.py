@@ -53,7 +53,8 @@ class TopBar(BasePanel):
     def __init__(self, gui: GuiApi, post: Post, state: AppState) -> None:
         self._title = gui.add_html(theme.STYLE + title(state))
         self._badge = gui.add_html("")
-        self._shown: tuple[str, ...] = ()
+        self._shown = ("", "")
+        self._head = title(state)
         buttons = (
             ("Undo", "Take back the last change (Ctrl+Z)", actions.Undo(), "Z", "cmd/ctrl"),
             ("Redo", "Make it again (Ctrl+Y)", actions.Redo(), "Y", "cmd/ctrl"),
@@ -75,26 +76,31 @@ class TopBar(BasePanel):
         view.on_click(show)
 
     def draw(self, view: PageView) -> None:
-        """Show the supervisor's state, and what can be undone."""
+        """Show the supervisor's state without delay."""
         word, beside, color = badge_text(view.run, view.state.project.parameters.supervisor)
-        head = title(view.state)
-        shown = (word, beside, color, head)
-        if shown == self._shown:
+        if (word, color) == self._shown:
             return
-        if not self._shown or head != self._shown[-1]:
-            self._title.content = theme.STYLE + head
-        self._shown = shown
+        self._shown = (word, color)
+        self._show_badge(word, beside, color)
+
+    def _show_badge(self, word: str, beside: str, color: str) -> None:
+        """Write the badge."""
         self._badge.content = (
             "<div style='position:fixed;z-index:50;top:6px;left:50%;transform:translateX(-50%);display:flex;"
             "align-items:center;gap:12px;pointer-events:none;white-space:nowrap'>"
             f"<span class='c-badge' style='background:{color};color:#fff;font-weight:700;font-size:15px;"
             f"letter-spacing:.1em;padding:3px 20px;border-radius:3px'>{word}</span>"
-            f"<span style='font-size:12px;opacity:.8;font-variant-numeric:tabular-nums'>{beside}</span></div>"
+            f"<span class='c-beside' style='font-size:12px;opacity:.8;font-variant-numeric:tabular-nums'>{beside}</span></div>"
         )
 
     def draw_slowly(self, view: PageView) -> None:
-        """Enable what can be done."""
+        """Show the numbers beside the badge, what the project is called, and enable what can be done."""
         state = view.state
+        self._show_badge(*badge_text(view.run, state.project.parameters.supervisor))
+        head = title(state)
+        if head != self._head:
+            self._head = head
+            self._title.content = theme.STYLE + head
         wanted = {"Undo": bool(state.undo), "Redo": bool(state.redo), "Save": state.is_changed}
         for label, enabled in wanted.items():
             if self._buttons[label].disabled is enabled:

@@ -44,7 +44,7 @@ class Knob:
 
 
 KNOBS: dict[str, Knob] = {
-    "association.gate_probability": Knob("Gate probability", "%", 100.0, 50.0, 99.99, 0.01),
+    "association.gate_probability": Knob("Gate", "%", 100.0, 50.0, 99.99, 0.01),
     "detector.min_model_error": Knob("Beams too few", "", 1.0, 0, 20, 1),
     "detector.max_model_error": Knob("Beams too many", "", 1.0, 0, 20, 1),
     "detector.range_jump": Knob("Range jump", "mm", 1000.0, 10.0, 1000.0, 10.0),
@@ -58,8 +58,8 @@ KNOBS: dict[str, Knob] = {
     "odometry.heading_per_sqrt_rad": Knob("Heading, turning", "°/√rad", DEG, 0.0, 5.0, 0.01),
     "odometry.forward_per_sqrt_s": Knob("Along, in time", "mm/√s", 1000.0, 0.0, 50.0, 0.1),
     "odometry.heading_per_sqrt_s": Knob("Heading, in time", "°/√s", DEG, 0.0, 3.0, 0.01),
-    "supervisor.position_limit": Knob("2σ position limit", "mm", 1000.0, 5.0, 500.0, 1.0),
-    "supervisor.heading_limit": Knob("2σ heading limit", "°", DEG, 0.1, 15.0, 0.1),
+    "supervisor.position_limit": Knob("2σ position", "mm", 1000.0, 5.0, 500.0, 1.0),
+    "supervisor.heading_limit": Knob("2σ heading", "°", DEG, 0.1, 15.0, 0.1),
     "supervisor.recovery_ratio": Knob("Recovery ratio", "", 1.0, 1.0, 10.0, 0.1),
 }
 SWITCHES = {
