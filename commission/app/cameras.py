@@ -54,7 +54,7 @@ class Cameras:
         start = server.initial_camera
         x, y = extent.center
         start.position, start.look_at, start.up = (x, y, height), (x, y, 0.0), (0.0, 1.0, 0.0)
-        start.fov, start.near, start.far = PLAN_FOV, 10.0, 6.0 * height
+        start.fov, start.near, start.far = PLAN_FOV, _nearest(height), 6.0 * height
 
     def connected(self, client: ClientHandle) -> None:
         """Begin with the plan of the whole site."""
@@ -125,8 +125,9 @@ class Cameras:
         distance = visible_height / PLAN_FOV
         camera = client.camera
         with client.atomic():
-            camera.fov, camera.near, camera.far = PLAN_FOV, 10.0, max(6.0 * distance, 20_000.0)
-            camera.min_orbit_distance, camera.max_orbit_distance = 20.0, max(4.0 * distance, 10_000.0)
+            fitted = _visible_height(self._extent, _aspect(client)) / PLAN_FOV
+            camera.fov, camera.near, camera.far = PLAN_FOV, _nearest(fitted), 6.0 * fitted
+            camera.min_orbit_distance, camera.max_orbit_distance = 2.0 * _nearest(fitted), 4.0 * fitted
             camera.up_direction = (0.0, 1.0, 0.0)
             camera.position = (*center, distance)
             camera.look_at = (*center, 0.0)
@@ -159,6 +160,11 @@ def _visible_height(extent: Extent, aspect: float) -> float:
     """Height of the floor [m] that shows the whole rectangle."""
     width, height = extent.size
     return 1.04 * max(height, width / aspect)
+
+
+def _nearest(fitted_distance: float) -> float:
+    """Distance before which the plan draws nothing [m]: as far as zooming allows, for the sake of depth."""
+    return fitted_distance / 50.0
 
 
 def _aspect(client: ClientHandle) -> float:

@@ -156,10 +156,11 @@ class Plots(BasePanel):
         self._gui = gui
         self._plots: list[GuiUplotHandle] = []
         self._duration = 0.0
+        self._turn = 1
         self._spans: tuple[tuple[float, float] | None, ...] = ()
         self._axis = np.linspace(0.0, 1.0, BINS)
         for chart in CHARTS:
-            empty = tuple(np.zeros(2) for _ in range(len(chart.lines) + 3))
+            empty = tuple(np.zeros(2) for _ in range(len(chart.lines) + 4))
             self._plots.append(
                 gui.add_uplot(
                     (np.array([0.0, 1.0]), *empty[1:]),
@@ -191,11 +192,13 @@ class Plots(BasePanel):
         for start, end in run.episodes:
             failing[(self._axis >= start) & (self._axis <= max(end, start + run.duration / BINS))] = 1.0
         now = np.where(np.abs(self._axis - run.time) <= 0.5 * run.duration / BINS, 1.0, 0.0)
+        self._turn = -self._turn
+        waking = np.full(BINS, 2.0 + self._turn)
         for chart, plot, span in zip(CHARTS, self._plots, spans, strict=True):
             curves = _curves(chart, run, parameters)
             if span is not None:
                 curves = [np.clip(curve, *span) for curve in curves]
-            plot.data = (self._axis, *curves, failing, now)
+            plot.data = (self._axis, *curves, failing, now, waking)
 
 
 def _curves(chart: Chart, run: RunView, parameters: Parameters) -> list[FloatArray]:
@@ -223,6 +226,9 @@ def _series(chart: Chart) -> tuple[uplot.Series, ...]:
         *lines,
         uplot.Series(label="fail", scale="flag", fill="rgba(220,40,40,.28)", points={"show": False}),
         uplot.Series(label="now", scale="flag", stroke="#e8eaee", width=1, points={"show": False}),
+        # uPlot lays out its axes only when a scale changes: a chart that was made before the browser knew its width
+        # would stay without labels. This series is never seen, and changes its scale each time.
+        uplot.Series(label="", scale="waking", points={"show": False}),
     )
 
 

@@ -90,7 +90,8 @@ class TopBar(BasePanel):
             "align-items:center;gap:12px;pointer-events:none;white-space:nowrap'>"
             f"<span class='c-badge' style='background:{color};color:#fff;font-weight:700;font-size:15px;"
             f"letter-spacing:.1em;padding:3px 20px;border-radius:3px'>{word}</span>"
-            f"<span class='c-beside' style='font-size:12px;opacity:.8;font-variant-numeric:tabular-nums'>{beside}</span></div>"
+            "<span class='c-beside' style='font-size:12px;opacity:.8;font-variant-numeric:tabular-nums'>"
+            f"{beside}</span></div>"
         )
 
     def draw_slowly(self, view: PageView) -> None:
