@@ -1,0 +1,34 @@
+from collections.abc import Callable
+
+import pytest
+
+from commission.app.actions import VirtualDrive
+from commission.app.drives import prepare
+from commission.app.session import Drive
+from commission.site.project import Project
+from tests.app.sites import room
+
+
+@pytest.fixture(scope="session")
+def project() -> Project:
+    return room()
+
+
+@pytest.fixture(scope="session")
+def drive(project: Project) -> Drive:
+    return prepare(project, VirtualDrive(project.routes[0].name, seed=1), lambda _fraction: None)
+
+
+class Clock:
+    """A clock that a test moves."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock() -> Callable[[], float]:
+    return Clock()
