@@ -29,7 +29,7 @@ class Recording(Protocol):
         ...
 
     def load(self) -> RecordLog:
-        """Read everything into columns, several times as fast as record by record; raises FileFormatError."""
+        """Read everything into columns, two to three times as fast as record by record; raises FileFormatError."""
         ...
 
 
