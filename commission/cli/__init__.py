@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from commission.cli import covering, localizing, page, parsing, simulating
+from commission.cli import covering, localizing, page, parsing, predicting, simulating
 from commission.cli.parsing import Command
 from commission.cli.versions import Version
 from commission.errors import CommissionError
@@ -26,6 +26,7 @@ COMMANDS: dict[str, type[Command]] = {
     "simulate": simulating.Simulate,
     "localize": localizing.Localize,
     "coverage": covering.Coverage,
+    "predict": predicting.Predict,
     "version": Version,
 }
 

@@ -1,0 +1,63 @@
+"""The command `predict`: how well the vehicle will localize along a route, before it has driven it."""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+from commission.errors import UsageError
+
+if TYPE_CHECKING:
+    from commission.planning.route_prediction import RoutePrediction
+
+
+@dataclass(frozen=True, kw_only=True)
+class Predict:
+    """Predict the uncertainty of the localizer along a route; writes prediction.csv and summary.json."""
+
+    project: Positional[Path]
+    """Folder of the project (holds project.yaml)."""
+    out: Annotated[Path, arg(metavar="DIR")]
+    """Folder for the results; made when it does not exist."""
+    route: Annotated[str | None, arg(metavar="NAME")] = None
+    """Route to drive. None: the project's first."""
+    blocked_per_m: float = 0.0
+    """Probability per metre of ray that a person blocks it [1/m]."""
+
+    def run(self) -> None:
+        """Predict, write, and tell in a few lines what is to be expected."""
+        if not 0.0 <= self.blocked_per_m <= 1.0:
+            raise UsageError(f"--blocked-per-m is {self.blocked_per_m:g}; expected 0 to 1 per metre")
+
+        from commission.io.prediction_files import write_prediction
+        from commission.io.project_file import load_project
+        from commission.planning.route_prediction import PredictionOptions, plan_route, predict_route
+
+        project = load_project(self.project)
+        if self.route is None and not project.routes:
+            raise UsageError("the project has no route; expected one to predict along")
+        name = project.routes[0].name if self.route is None else self.route
+        prediction = predict_route(plan_route(project, name, PredictionOptions(blocked_per_m=self.blocked_per_m)))
+        write_prediction(self.out, name, prediction)
+        sys.stdout.write("\n".join([*_report(name, prediction), f"Written to   {self.out}"]) + "\n")
+
+
+def _report(name: str, prediction: RoutePrediction) -> list[str]:
+    """Lines for a person; millimetres and degrees as is the habit."""
+    x, y, heading = prediction.two_sigma.max(axis=0)
+    limits = prediction.limits
+    stops = ", ".join(f"{metre:.1f} m" for metre in prediction.trips()) or "none"
+    return [
+        f"Route        {name!r}, {prediction.drive.length:.1f} m in "
+        f"{prediction.drive.stamps_ns[-1] * 1e-9:.1f} s, {len(prediction.drive)} scans",
+        f"2-sigma      x {x * 1e3:.1f} mm, y {y * 1e3:.1f} mm (limit {limits.position_limit * 1e3:.0f}), "
+        f"heading {math.degrees(heading):.2f} deg (limit {math.degrees(limits.heading_limit):.2f}) at most",
+        f"Reflectors   {prediction.seen.min()} seen at least, {prediction.seen.mean():.1f} on average; "
+        f"at most {prediction.on_odometry.max():.1f} m on odometry alone",
+        f"Supervisor   stops at: {stops}; metres over a limit: {len(prediction.failing_metres())}",
+    ]

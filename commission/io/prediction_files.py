@@ -1,0 +1,75 @@
+"""A prediction along a route as files for spreadsheets and scripts: a row per metre, and a summary. Writing only."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+
+from commission.io.atomic import atomic_file, write_text
+from commission.planning.route_prediction import RoutePrediction
+
+PREDICTION = "prediction.csv"
+SUMMARY = "summary.json"
+COLUMNS = (
+    *("metre", "x", "y", "theta", "two_sigma_x", "two_sigma_y", "two_sigma_theta"),
+    *("visible", "on_odometry", "over_limit", "mode"),
+)
+
+
+def write_prediction(folder: Path, route: str, prediction: RoutePrediction) -> None:
+    """Write `prediction.csv` (the worst of each metre) and `summary.json`; each is replaced whole or not at all.
+
+    Parameters
+    ----------
+    folder : made when missing.
+    route : name of the route.
+    prediction : of that route.
+
+    Raises
+    ------
+    FileFormatError
+        a file cannot be written.
+    """
+    metres = prediction.per_metre()
+    columns = [
+        metres.metre,
+        *prediction.drive.poses[metres.first].T,
+        *metres.two_sigma.T,
+        metres.seen,
+        metres.on_odometry,
+        np.isin(metres.metre, prediction.failing_metres()).astype(np.int64),
+        np.where(metres.fails, "fail", "operational"),
+    ]
+    with atomic_file(folder / PREDICTION) as file:
+        text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
+        text.detach()
+    write_text(folder / SUMMARY, json.dumps(summary(route, prediction), indent=2, allow_nan=False) + "\n")
+
+
+def summary(route: str, prediction: RoutePrediction) -> dict[str, str | int | float | list[float]]:
+    """Return what a prediction comes to; metres, seconds and radians."""
+    x, y, theta = (float(value) for value in prediction.two_sigma.max(axis=0))
+    return {
+        "route": route,
+        "length_m": prediction.drive.length,
+        "duration_s": float(prediction.drive.stamps_ns[-1]) * 1e-9,
+        "scans": len(prediction.drive),
+        "two_sigma_x_max_m": x,
+        "two_sigma_y_max_m": y,
+        "two_sigma_theta_max_rad": theta,
+        "position_limit_m": prediction.limits.position_limit,
+        "heading_limit_rad": prediction.limits.heading_limit,
+        "metres_over_limit": len(prediction.failing_metres()),
+        "trips_m": prediction.trips().tolist(),
+        "recoveries_m": prediction.recoveries().tolist(),
+        "visible_min": int(prediction.seen.min()),
+        "visible_mean": float(prediction.seen.mean()),
+        "on_odometry_max_m": float(prediction.on_odometry.max()),
+    }

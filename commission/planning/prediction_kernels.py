@@ -1,0 +1,143 @@
+"""Compiled covariance recursion along a planned drive: the localizer's own *predict*, *correct* and supervisor."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.compiled import compiled, compiled_inline
+from commission.geometry.angles import wrap_scalar
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.geometry.se2 import compose_scalars, inverse_scalars
+from commission.localization.kalman import correct, innovation, squared_distance
+from commission.localization.observation import ObservationModel, expect, scanner_offset
+from commission.localization.odometry import OdometryNoise, predict
+from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.supervisor import SupervisorLimits, supervise
+
+
+class PredictionModel(NamedTuple):
+    """What the recursion reads besides the drive."""
+
+    odometry: OdometryNoise
+    observation: ObservationModel
+    limits: SupervisorLimits
+    gate_d2: float
+    """Squared Mahalanobis distance from which an expected innovation is rejected; infinite without the filter."""
+    inside_gate: float
+    """Probability that a detection of a visible reflector passes the association filter."""
+    free_per_m: float
+    """Probability per metre of ray that nobody is in the way."""
+
+
+class PredictionColumns(NamedTuple):
+    """Where the recursion writes, a row per scan."""
+
+    prior_covariances: FloatArray
+    means: FloatArray
+    covariances: FloatArray
+    modes: NDArray[np.int8]
+    seen: IntArray
+    on_odometry: FloatArray
+
+
+@compiled
+def predict_covariances(  # noqa: PLR0917 - the columns of a drive
+    stamps_ns: IntArray,
+    poses: FloatArray,
+    metres: FloatArray,
+    offsets: IntArray,
+    indices: IntArray,
+    places: FloatArray,
+    shifts: FloatArray,
+    reach: FloatArray,
+    belief: PoseGaussian,
+    model: PredictionModel,
+    columns: PredictionColumns,
+) -> None:
+    """Run the filter over exact odometry and exact detections.
+
+    Parameters
+    ----------
+    stamps_ns, poses, metres : the K scans of a drive.
+    offsets, indices : visible reflectors of each scan.
+    places : (M, 3) x, y and variance of each reflector as the map has it.
+    shifts : (M, 2) what the reflectors have moved since [m].
+    reach : (M,) distance up to which each is seen [m]; negative: never.
+    belief : at the first scan, before its detections.
+    columns : outputs.
+    """
+    prior_covariances, means, covariances, modes, seen, on_odometry = columns
+    mode, last_seen_at = 0, metres[0]
+    for k in range(len(stamps_ns)):
+        x, y, theta = poses[k, 0], poses[k, 1], poses[k, 2]
+        if k > 0:
+            back_x, back_y, back_theta = inverse_scalars(poses[k - 1, 0], poses[k - 1, 1], poses[k - 1, 2])
+            dx, dy, dtheta = compose_scalars(back_x, back_y, back_theta, x, y, theta)
+            belief = predict(belief, dx, dy, dtheta, 1e-9 * (stamps_ns[k] - stamps_ns[k - 1]), model.odometry)
+        _store_covariance(belief, k, prior_covariances)
+        prior = belief
+        offset_x, offset_y = scanner_offset(theta, model.observation)
+        found = 0
+        for i in range(offsets[k], offsets[k + 1]):
+            m = indices[i]
+            target_x, target_y = places[m, 0] + shifts[m, 0], places[m, 1] + shifts[m, 1]
+            mount = model.observation.mount_theta
+            truth = expect(x, y, theta, offset_x, offset_y, target_x, target_y, mount)
+            if truth.range > reach[m] or not _inside_gate(prior, truth.range, truth.bearing, places, m, model):
+                continue
+            found += 1
+            corrected = correct(
+                belief, truth.range, truth.bearing, places[m, 0], places[m, 1], places[m, 2], model.observation
+            )
+            belief = _mixed(belief, corrected, model.inside_gate * model.free_per_m**truth.range)
+        mode = supervise(mode, belief, model.limits)
+        if found > 0:
+            last_seen_at = metres[k]
+        means[k, 0], means[k, 1], means[k, 2] = belief.x, belief.y, belief.theta
+        _store_covariance(belief, k, covariances)
+        modes[k], seen[k], on_odometry[k] = mode, found, metres[k] - last_seen_at
+
+
+@compiled_inline
+def _inside_gate(  # noqa: PLR0917 - a measurement, number by number
+    prior: PoseGaussian, distance: float, bearing: float, places: FloatArray, m: int, model: PredictionModel
+) -> bool:
+    """Whether the expected detection passes the association filter at the predicted belief."""
+    offset_x, offset_y = scanner_offset(prior.theta, model.observation)
+    mount = model.observation.mount_theta
+    expected = expect(prior.x, prior.y, prior.theta, offset_x, offset_y, places[m, 0], places[m, 1], mount)
+    return squared_distance(innovation(prior, expected, distance, bearing, places[m, 2], model.observation)) <= (
+        model.gate_d2
+    )
+
+
+@compiled_inline
+def _mixed(before: PoseGaussian, after: PoseGaussian, probability: float) -> PoseGaussian:
+    """Mean of a belief with a detection and without it, by the probability of the detection.
+
+    Of the covariances alone (Sinopoli et al. 2004, the modified Riccati equation): the filter knows whether it was
+    corrected, so that the spread between the two means is no uncertainty of its own.
+    """
+    a, b = probability, 1.0 - probability
+    return PoseGaussian(
+        a * after.x + b * before.x,
+        a * after.y + b * before.y,
+        before.theta + a * wrap_scalar(after.theta - before.theta),
+        a * after.xx + b * before.xx,
+        a * after.xy + b * before.xy,
+        a * after.xt + b * before.xt,
+        a * after.yy + b * before.yy,
+        a * after.yt + b * before.yt,
+        a * after.tt + b * before.tt,
+    )
+
+
+@compiled_inline
+def _store_covariance(belief: PoseGaussian, row: int, covariances: FloatArray) -> None:
+    """Write a covariance to its row."""
+    covariances[row, 0, 0], covariances[row, 0, 1], covariances[row, 0, 2] = belief.xx, belief.xy, belief.xt
+    covariances[row, 1, 0], covariances[row, 1, 1], covariances[row, 1, 2] = belief.xy, belief.yy, belief.yt
+    covariances[row, 2, 0], covariances[row, 2, 1], covariances[row, 2, 2] = belief.xt, belief.yt, belief.tt

@@ -1,0 +1,292 @@
+"""Prediction along a route: the filter's own covariance recursion over the planned drive, with nothing drawn at random.
+
+The steps are those of `localization`, fed with the exact motion and exact measurements. With all reflectors as in the
+map the predicted mean stays on the route; a moved reflector pulls it off, by the bias that it would cause.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.geometry.angles import difference
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
+from commission.geometry.gaussian import chi_square_gate
+from commission.localization.estimate import Belief, Mode
+from commission.localization.observation import ObservationModel
+from commission.localization.odometry import odometry_noise
+from commission.localization.pose_gaussian import from_belief
+from commission.localization.supervisor import supervisor_limits
+from commission.planning.nominal_drive import DrivePlan, NominalDrive, nominal_drive
+from commission.planning.prediction_kernels import PredictionColumns, PredictionModel, predict_covariances
+from commission.planning.visibility import VisibilityModel, VisibleReflectors, visibility_model
+from commission.site.checks import above, between
+from commission.site.parameters import Parameters, SupervisorParameters
+from commission.site.project import Project
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.routes import Route, Segment
+
+
+@dataclass(frozen=True, slots=True)
+class PredictionOptions:
+    """Where the prediction starts, and what it expects of the hall."""
+
+    start_sigmas: tuple[float, float, float] = (0.02, 0.02, 0.01)
+    """1-sigma of the start pose: x [m], y [m], heading [rad], map frame."""
+    blocked_per_m: float = 0.0
+    """Probability per metre of ray that a person blocks it [1/m]."""
+    dirty_range: float = 0.5
+    """Share of its range up to which a dirty reflector is still seen [0..1]."""
+    plan: DrivePlan = field(default_factory=DrivePlan)
+    """Rests and limits of the drive."""
+
+    def __post_init__(self) -> None:
+        for sigma in self.start_sigmas:
+            above(sigma, 0.0, "prediction.start_sigmas")
+        between(self.blocked_per_m, (0.0, 1.0), "prediction.blocked_per_m", "per metre")
+        between(self.dirty_range, (0.0, 1.0), "prediction.dirty_range")
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """What is wrong with reflectors while the map still says otherwise. Reflectors are indices into the map."""
+
+    blocked: tuple[int, ...] = ()
+    """Reflectors that nothing sees."""
+    dirty: tuple[int, ...] = ()
+    """Reflectors that are seen from near by only."""
+    moved: tuple[tuple[int, float, float], ...] = ()
+    """Reflectors that stand elsewhere, each with its displacement in x and y [m]."""
+
+
+NO_DAMAGE = Damage()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlannedRoute:
+    """A planned drive and what it sees: all that a prediction needs, whatever reflectors fail."""
+
+    name: str
+    """Name of the route."""
+    drive: NominalDrive
+    """The K scans."""
+    visible: VisibleReflectors
+    """Reflectors visible at each scan."""
+    places: FloatArray
+    """(M, 3) x, y [m], map frame, and variance of the surveyed place [m^2] of each reflector."""
+    farthest: FloatArray
+    """(M,) largest distance from which each reflector is seen [m]."""
+    mounting: FloatArray
+    """(3,) `T_base_scanner` [m, m, rad]."""
+    parameters: Parameters
+    """Tunables of the localizer."""
+    options: PredictionOptions
+    """Start and hall."""
+
+    def model(self) -> PredictionModel:
+        """Numbers of the recursion."""
+        x, y, theta = (float(value) for value in self.mounting)
+        given, association = self.parameters.observation, self.parameters.association
+        return PredictionModel(
+            odometry_noise(self.parameters.odometry),
+            # The range bias is left out: measurements here are without it, and the filter takes it off.
+            ObservationModel(x, y, theta, given.range_sigma**2, given.bearing_sigma**2, 0.0),
+            supervisor_limits(self.parameters.supervisor),
+            chi_square_gate(association.gate_probability, 2) if association.enabled else math.inf,
+            association.gate_probability if association.enabled else 1.0,
+            1.0 - self.options.blocked_per_m,
+        )
+
+
+class PerMetre(NamedTuple):
+    """The worst of each metre of a route; B bins of one metre, the last one maybe shorter."""
+
+    metre: IntArray
+    """(B,) number of the metre: from `metre` to `metre + 1` m of the way."""
+    first: IntArray
+    """(B,) first scan of each metre."""
+    two_sigma: FloatArray
+    """(B, 3) largest 2-sigma of x [m], y [m] and heading [rad]."""
+    bias: FloatArray
+    """(B, 3) largest absolute bias of x [m], y [m] and heading [rad]."""
+    seen: IntArray
+    """(B,) fewest visible reflectors."""
+    on_odometry: FloatArray
+    """(B,) longest way driven on odometry alone [m]."""
+    fails: BoolArray
+    """(B,) whether the supervisor is in fail mode anywhere in it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoutePrediction:
+    """Expected course of the localizer along a route, after each of K scans. All arrays are read-only."""
+
+    drive: NominalDrive
+    """The planned drive."""
+    limits: SupervisorParameters
+    """Limits of 2-sigma."""
+    prior_covariances: FloatArray
+    """(K, 3, 3) before the detections of each scan, of x [m], y [m] and heading [rad]."""
+    means: FloatArray
+    """(K, 3) expected `T_map_base` [m, m, rad]: the drive's own pose unless a reflector has moved."""
+    covariances: FloatArray
+    """(K, 3, 3) of x [m], y [m] and heading [rad]."""
+    modes: NDArray[np.int8]
+    """(K,) a `Mode` each."""
+    seen: IntArray
+    """(K,) reflectors seen and inside the gate."""
+    on_odometry: FloatArray
+    """(K,) way driven since a reflector was seen last [m]."""
+
+    @property
+    def two_sigma(self) -> FloatArray:
+        """(K, 3) 2-sigma of x [m], y [m] and heading [rad]."""
+        return 2.0 * np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
+
+    @property
+    def bias(self) -> FloatArray:
+        """(K, 3) expected error of x [m], y [m] and heading [rad]."""
+        deviations = self.means - self.drive.poses
+        deviations[:, 2] = difference(self.means[:, 2], self.drive.poses[:, 2])
+        return deviations
+
+    def over_limit(self) -> BoolArray:
+        """(K,) whether bias and 2-sigma together pass the supervisor's limits in any axis, or it is in fail mode."""
+        limits = (self.limits.position_limit, self.limits.position_limit, self.limits.heading_limit)
+        return (np.abs(self.bias) + self.two_sigma > limits).any(axis=1) | (self.modes == Mode.FAIL)
+
+    def trips(self) -> FloatArray:
+        """Metres of the way at which the supervisor stops the vehicle [m]."""
+        return self._changes_to(Mode.FAIL)
+
+    def recoveries(self) -> FloatArray:
+        """Metres of the way at which the vehicle may drive again [m]."""
+        return self._changes_to(Mode.OPERATIONAL)
+
+    def failing_metres(self) -> IntArray:
+        """Numbers of the metres of the way in which `over_limit` holds anywhere."""
+        return np.unique(self.drive.metres[self.over_limit()].astype(np.int64))
+
+    def per_metre(self) -> PerMetre:
+        """Gather the worst of each metre."""
+        metre, first = np.unique(self.drive.metres.astype(np.int64), return_index=True)
+        largest = np.maximum.reduceat
+        return PerMetre(
+            metre,
+            first,
+            largest(self.two_sigma, first, axis=0),
+            largest(np.abs(self.bias), first, axis=0),
+            np.minimum.reduceat(self.seen, first),
+            largest(self.on_odometry, first),
+            largest(self.modes == Mode.FAIL, first),
+        )
+
+    def _changes_to(self, mode: Mode) -> FloatArray:
+        before = np.concatenate(([int(Mode.OPERATIONAL)], self.modes[:-1]))
+        return self.drive.metres[(self.modes == mode) & (before != mode)]
+
+
+def plan_route(
+    project: Project,
+    route_name: str,
+    options: PredictionOptions | None = None,
+    model: VisibilityModel | None = None,
+) -> PlannedRoute:
+    """Plan a drive and find what it sees.
+
+    Parameters
+    ----------
+    project : site, vehicle, scanner and parameters.
+    route_name : which route.
+    options : start and hall; the defaults when None.
+    model : of the same project, when it is at hand; made here when None.
+
+    Raises
+    ------
+    UsageError
+        unknown route.
+    """
+    options = options or PredictionOptions()
+    model = model or visibility_model(project)
+    drive = nominal_drive(project.route(route_name), project.vehicle, project.scanner, options.plan)
+    variances = [[reflector.sigma**2] for reflector in model.reflectors.reflectors]
+    places = np.concatenate((model.reflectors.centers, np.array(variances).reshape(-1, 1)), axis=1)
+    return PlannedRoute(
+        route_name,
+        drive,
+        model.visible_from_poses(drive.poses),
+        read_only(places),
+        read_only(model.targets.farthest),
+        project.scanner.mounting,
+        project.parameters,
+        options,
+    )
+
+
+def predict_route(planned: PlannedRoute, damage: Damage = NO_DAMAGE) -> RoutePrediction:
+    """Predict the localizer's belief along a planned drive.
+
+    A visible reflector is detected inside the gate with the probability P_G (and with that of a free ray among
+    people); the covariance after it is the mean of that with and without it (Sinopoli et al. 2004, equation 13).
+
+    Parameters
+    ----------
+    planned : drive and visible reflectors.
+    damage : reflectors that are not as the map says. A moved one is seen from where the one of the map would be; where
+        its expected innovation lies outside the gate it counts as not seen.
+
+    Returns
+    -------
+    prediction : one row per scan.
+    """
+    count = len(planned.drive)
+    # A hair more than visibility allows, so that rounding loses nothing it has found.
+    reach, shifts = planned.farthest + 1e-6, np.zeros((len(planned.places), 2))
+    reach[list(damage.dirty)] *= planned.options.dirty_range
+    reach[list(damage.blocked)] = -1.0
+    for index, dx, dy in damage.moved:
+        shifts[index] += dx, dy
+        reach[index] += math.hypot(dx, dy)
+    columns = PredictionColumns(
+        np.empty((count, 3, 3)),
+        np.empty((count, 3)),
+        np.empty((count, 3, 3)),
+        np.empty(count, np.int8),
+        np.empty(count, np.int64),
+        np.empty(count),
+    )
+    start = Belief(0, planned.drive.poses[0], np.diag(np.square(planned.options.start_sigmas)))
+    predict_covariances(
+        planned.drive.stamps_ns,
+        planned.drive.poses,
+        planned.drive.metres,
+        read_only(planned.visible.offsets),
+        read_only(planned.visible.indices),
+        planned.places,
+        read_only(shifts),
+        read_only(reach),
+        from_belief(start),
+        planned.model(),
+        columns,
+    )
+    return RoutePrediction(
+        planned.drive,
+        planned.parameters.supervisor,
+        read_only(columns.prior_covariances),
+        read_only(columns.means),
+        read_only(columns.covariances),
+        read_only(columns.modes),
+        read_only(columns.seen),
+        read_only(columns.on_odometry),
+    )
+
+
+def warm_up() -> None:
+    """Compile the recursion."""
+    route = Route("Line", (Segment(np.array([[0.0, 0.0], [0.1, 0.0]]), degree=1),))
+    project = Project(reflectors=ReflectorMap((Reflector("1", 2.0, 0.0),)), routes=(route,))
+    predict_route(plan_route(project, "Line"))

@@ -1,0 +1,28 @@
+import csv
+import json
+
+
+def test_a_route_is_predicted_metre_by_metre(commission, project, tmp_path):
+    code, told, err = commission("predict", project, "--route", "Straight", "--out", tmp_path / "out")
+    assert (code, err) == (0, "")
+    assert "route" in told.lower()
+    with (tmp_path / "out" / "prediction.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    # Six metres, and the row of the very end.
+    assert [row["metre"] for row in rows] == ["0", "1", "2", "3", "4", "5", "6"]
+    assert {row["mode"] for row in rows} == {"operational"}
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["length_m"] == 6.0
+    assert summary["visible_min"] == 5
+    assert summary["trips_m"] == []
+    assert max(float(row["two_sigma_x"]) for row in rows) == summary["two_sigma_x_max_m"]
+
+
+def test_an_unknown_route_and_an_impossible_crowd_are_refused(refused, project, tmp_path):
+    assert "no route is called 'Loop'" in refused("predict", project, "--route", "Loop", "--out", tmp_path / "out")
+    assert "--blocked-per-m is 2" in refused("predict", project, "--blocked-per-m", "2", "--out", tmp_path / "out")
+
+
+def test_a_project_without_a_route_cannot_be_predicted(refused, project, tmp_path):
+    (project / "project.yaml").write_text("schema: 1\n", encoding="utf-8")
+    assert "no route" in refused("predict", project, "--out", tmp_path / "out")
