@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ import tyro
 
 import commission
 from commission.errors import UsageError
+from commission.site.checks import LARGEST
 
 FRAME = "│╭╮╰╯"
 RULES = ("─", "╭", "╰")
@@ -83,8 +83,8 @@ def initial_pose(text: str) -> InitialPose:
         raise UsageError(f"--initial-pose is {text!r}; expected numbers {POSE_FORM}") from None
     if len(numbers) not in (3, 6):
         raise UsageError(f"--initial-pose {text!r} has {len(numbers)} numbers; expected {POSE_FORM}")
-    if not all(math.isfinite(number) for number in numbers):
-        raise UsageError(f"--initial-pose {text!r} holds a number that is not finite; expected {POSE_FORM}")
+    if not all(abs(number) <= LARGEST for number in numbers):
+        raise UsageError(f"--initial-pose {text!r} holds a number that no place has; expected {POSE_FORM}")
     x, y, theta, *sigmas = numbers
     if not sigmas:
         return InitialPose((x, y, theta), None)

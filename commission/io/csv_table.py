@@ -18,6 +18,7 @@ import numpy as np
 from commission.errors import FileFormatError
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.io.reading import cannot_read, check_size
+from commission.site.checks import LARGEST
 
 SIZE_LIMIT = 64_000_000_000
 """Bytes of a table; a day of odometry at 1 kHz has about 5,000,000,000."""
@@ -58,7 +59,7 @@ class Block:
             cells = [cell.replace(",", ".") for cell in cells]
         try:
             values = np.array(cells, dtype=np.float64)
-            if np.isfinite(values).all() and not _has_underscore(cells):
+            if (np.abs(values) <= LARGEST).all() and not _has_underscore(cells):
                 return values
         except ValueError:
             pass
@@ -74,8 +75,10 @@ class Block:
             value = float("_" if "_" in cell else cell.replace(",", ".") if self.decimal_comma else cell)
         except ValueError:
             raise self.error(row, column, f"is {shortened(cell)}", f"a number [{unit}]") from None
-        if not math.isfinite(value):
-            raise self.error(row, column, f"is {cell}", f"a finite number [{unit}]")
+        if not abs(value) <= LARGEST:
+            expected = f"at most {LARGEST:g}" if math.isfinite(value) else "a finite number"
+            found = cell if len(cell) <= 40 else shortened(cell)
+            raise self.error(row, column, f"is {found}", f"{expected} [{unit}]")
         return value
 
     def stamps(self, column: str = "stamp_ns") -> IntArray:

@@ -5,7 +5,6 @@ Scalars follow the core schema of YAML 1.2, so that `1e-3` is a number and a rou
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -16,6 +15,7 @@ import yaml
 
 from commission.errors import FileFormatError
 from commission.io.reading import read_text
+from commission.site.checks import LARGEST
 
 SIZE_LIMIT = 4_000_000
 """Bytes of a YAML file; a project with 1,000 routes has about 500,000."""
@@ -155,8 +155,8 @@ class _Builder:
             raise self.error(event, key_path, "is no value", "text, a number, a list or a mapping")
         # The style of an unquoted scalar is None in the Python parser and empty in the C parser.
         value = event.value if event.style else scalar(event.value)
-        if isinstance(value, float) and not math.isfinite(value):
-            raise self.error(event, key_path, f"is {event.value}", "a finite number")
+        if isinstance(value, int | float) and not abs(value) <= LARGEST:
+            raise self.error(event, key_path, f"is {event.value}", f"a finite number of at most {LARGEST:g}")
         return value
 
     def mapping(self, key_path: KeyPath) -> dict[str, Any]:

@@ -6,22 +6,27 @@ import ast
 import functools
 import inspect
 import itertools
-import math
 import textwrap
 
 FARTHEST = 1e7
 """Largest coordinate [m]: any national grid fits, and no square of it overflows."""
+LARGEST = 1e9
+"""No length, angle, speed or sigma that anybody means is larger; squares and products of much larger ones overflow."""
 
 
 def at_least(value: float, limit: float, name: str, unit: str = "") -> None:
-    """Raise ValueError unless `value` is finite and >= `limit`."""
-    if not (math.isfinite(value) and value >= limit):
+    """Raise ValueError unless `limit` <= `value` <= LARGEST."""
+    if value > LARGEST:
+        raise ValueError(f"{name} is {value:g}; expected at most {LARGEST:g}{unit and ' ' + unit}")
+    if not value >= limit:
         raise ValueError(f"{name} is {value:g}; expected {limit:g}{unit and ' ' + unit} or more")
 
 
 def above(value: float, limit: float, name: str, unit: str = "") -> None:
-    """Raise ValueError unless `value` is finite and > `limit`."""
-    if not (math.isfinite(value) and value > limit):
+    """Raise ValueError unless `limit` < `value` <= LARGEST."""
+    if value > LARGEST:
+        raise ValueError(f"{name} is {value:g}; expected at most {LARGEST:g}{unit and ' ' + unit}")
+    if not value > limit:
         raise ValueError(f"{name} is {value:g}; expected more than {limit:g}{unit and ' ' + unit}")
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from commission.errors import ProjectError
 from commission.geometry.arrays import FloatArray, frozen
-from commission.site.checks import FARTHEST
+from commission.site.checks import FARTHEST, at_least
 
 
 class ReflectorKind(StrEnum):
@@ -58,8 +58,7 @@ class Reflector:
             )
         if not 0.0 < self.radius <= 1.0:
             raise ValueError(f"radius is {self.radius:g}; expected more than 0 and at most 1 m")
-        if not (math.isfinite(self.sigma) and self.sigma >= 0.0):
-            raise ValueError(f"sigma is {self.sigma:g}; expected 0 m or more")
+        at_least(self.sigma, 0.0, "sigma", "m")
 
 
 @dataclass(frozen=True, slots=True)

@@ -192,3 +192,50 @@ def test_whatever_happens_to_a_file_the_command_ends_well_or_with_one_line(
         code, _, err = commission("localize", project, recording, "--out", tmp_path / "out")
         assert (code, err.count("\n")) in ((0, 0), (2, 1)), (seed, err)
         assert "commission: unexpected" not in err, (seed, err)
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "words"),
+    [
+        ("drive/odometry.csv", "stamp_ns,dx,dy,dtheta\n0,0,0,0\n100,1e300,0,0\n", []),
+        ("drive/odometry.csv", "stamp_ns,dx,dy,dtheta\n-9223372036854775808,0,0,0\n9223372036854775807,0,0,0\n", []),
+        ("drive/detections.csv", "stamp_ns,range,bearing\n0,1e308,1e300\n", []),
+        ("drive/reference.csv", "stamp_ns,x,y,theta\n0,1e300,1e308,0\n100000000,-1e308,-1e308,0\n", []),
+        ("hall/reflectors.csv", "id,x,y,radius\nA,1e300,1e300,0.1\nB,-1e300,0,0.1\n", []),
+        (None, "", ["--set", "observation.range_sigma=1e300"]),
+        (None, "", ["--set", "odometry.forward_per_sqrt_m=1e300"]),
+        (None, "", ["--set", "supervisor.position_limit=1e300"]),
+        (None, "", ["--set", "detector.min_model_error=99999999999999999999"]),
+        (None, "", ["--initial-pose", "1e308,1e308,1e308"]),
+        (None, "", ["--initial-pose", "0,0,0,1e200,1e200,1e200"]),
+    ],
+)
+def test_a_number_too_large_to_calculate_with_is_refused(file, text, words, refused, project, recording, tmp_path):
+    if file is not None:
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    refused("localize", project, recording, "--out", tmp_path / "out", *words)
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "words"),
+    [
+        ("drive/odometry.csv", "stamp_ns,dx,dy,dtheta\n0,0,0,0\n100,1e9,-1e9,1e9\n200,1e9,1e9,-1e9\n", []),
+        ("drive/detections.csv", "stamp_ns,range,bearing\n0,1e9,1e9\n100000000,0,0\n", []),
+        ("hall/reflectors.csv", "id,x,y,radius\n", []),
+        ("hall/reflectors.csv", "id,x,y,radius\nA,1e7,1e7,0.1\nB,-1e7,0,0.1\nC,0,0,0.1\n", []),
+        (None, "", ["--set", "observation.range_sigma=1e-300", "--set", "observation.bearing_sigma=1e-300"]),
+        (None, "", ["--set", "observation.range_sigma=1e9", "--set", "observation.bearing_sigma=1e9"]),
+        (None, "", ["--set", "odometry.forward_per_sqrt_m=1e9", "--set", "odometry.heading_per_sqrt_s=1e9"]),
+        (None, "", ["--initial-pose", "1e9,-1e9,1e9,1e9,1e9,1e9"]),
+        (None, "", ["--initial-pose", "0,0,0,1e-200,1e-200,1e-200"]),
+        (None, "", ["--set", "association.gate_probability=0.9999999999999999"]),
+        (None, "", ["--set", "association.enabled=false"]),
+    ],
+)
+def test_numbers_at_the_edge_of_sense_are_calculated_with(file, text, words, commission, project, recording, tmp_path):
+    if file is not None:
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    code, told, err = commission("localize", project, recording, "--out", tmp_path / "out", *words)
+    assert (code, err) == (0, "")
+    assert "Supervisor" in told
+    json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
