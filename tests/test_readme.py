@@ -40,9 +40,9 @@ def test_the_command_lines_that_end_by_themselves_succeed_one_after_the_other(tm
     assert [key for key in shown if f"`{key}`" not in README] == []
     told = re.search(r"position ([0-9.]+) mm RMS.*?([0-9.]+) at most", README)
     assert told
-    # Shown rounded; another processor's libm may change the last digit.
-    assert shown["position_rmse_m"] * 1e3 == pytest.approx(float(told[1]), abs=0.15)
-    assert shown["position_max_m"] * 1e3 == pytest.approx(float(told[2]), abs=0.3)
+    # One drive is an example: whoever changes a draw of the simulation need not change the README, unless it misleads.
+    assert shown["position_rmse_m"] * 1e3 == pytest.approx(float(told[1]), rel=0.25)
+    assert shown["position_max_m"] * 1e3 == pytest.approx(float(told[2]), rel=0.5)
 
 
 def test_files_that_the_readme_names_exist():
