@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.compiled import compiled
+from commission.compiled import compiled, compiled_inline
 from commission.geometry.angles import TURN, wrap_scalar
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.localization.estimate import Status
@@ -135,25 +135,30 @@ def detect(scan: Scan, model: DetectorModel, parameters: DetectorParameters) -> 
     return DetectedReflectors(range_bearing, widths, status)
 
 
-@compiled
+@compiled_inline
 def expected_beams(distance: float, radius: float, increment: float) -> int:
     """Beams that a reflector of a radius intercepts at a distance (equation 3)."""
     return math.floor(2.0 * math.asin(min(1.0, radius / max(distance, radius))) / abs(increment))
 
 
-@compiled
+@compiled_inline
 def _lit(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beam: int) -> bool:
     """Whether a beam is reflective and has a range."""
     return flags[beam] and ranges[beam] > 0.0 and ranges[beam] < math.inf
 
 
-@compiled
+@compiled_inline
 def _next_cluster(  # noqa: PLR0917 - a scan and a position in it
     ranges: NDArray[np.float32], flags: NDArray[np.bool_], count: int, position: int, end: int, jump: float
 ) -> tuple[int, int]:
     """First and last beam of the cluster at or after a position; first = end when none. Beams count on past a turn."""
     first = position
-    while first < end and not _lit(ranges, flags, first if first < count else first - count):
+    while True:
+        # Most beams are dark: this loop is most of the detector's time, so it does nothing else.
+        while first < min(end, count) and not flags[first]:
+            first += 1
+        if first >= end or _lit(ranges, flags, first if first < count else first - count):
+            break
         first += 1
     last = first
     while last + 1 < end:
@@ -173,7 +178,7 @@ def _next_cluster(  # noqa: PLR0917 - a scan and a position in it
     return first, last
 
 
-@compiled
+@compiled_inline
 def _start_of_turn(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams) -> int:
     """First beam after two dark ones, so that no cluster lies across the start of a full turn."""
     if not beams.full_turn:
@@ -228,7 +233,7 @@ def detect_clusters(  # noqa: PLR0917 - outputs are written into the arrays of t
     return row
 
 
-@compiled
+@compiled_inline
 def _judge(  # noqa: PLR0917 - a scan and a cluster in it
     ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, first: int, last: int, model: DetectorModel
 ) -> tuple[float, float, bool]:

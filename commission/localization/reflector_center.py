@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.compiled import compiled
+from commission.compiled import compiled_inline
 
 GRAZING = 0.9
 """Beams that pass the axis at more than this share of the radius do not shape the fit: there the surface falls away so
@@ -19,10 +19,11 @@ steeply that the echo is a mixture, and one beam's noise moves the center by sev
 MEAN_DEPTH = math.pi / 4.0
 """Mean distance, in radii, from the lit half of a circle to the line through its center across the beam."""
 ITERATIONS = 3
-"""Gauss-Newton steps; the third moves a center by less than a micrometre."""
+"""Gauss-Newton steps. Of 60 noisy posts at 0.4 to 9 m, the median center is then 0.01 micrometres from where it
+settles, the worst 0.6 mm."""
 
 
-@compiled
+@compiled_inline
 def _range_at(ranges: NDArray[np.float32], flags: NDArray[np.bool_], count: int, beam: int) -> float:
     """Range of a beam, NaN where it is not a reflective echo (a bridged beam)."""
     k = beam if beam < count else beam - count
@@ -31,7 +32,7 @@ def _range_at(ranges: NDArray[np.float32], flags: NDArray[np.bool_], count: int,
     return math.nan
 
 
-@compiled
+@compiled_inline
 def _mean_range(ranges: NDArray[np.float32], flags: NDArray[np.bool_], count: int, first: int, last: int) -> float:
     """Mean range of the reflective beams first to last, NaN when none is."""
     total, number = 0.0, 0
@@ -43,7 +44,7 @@ def _mean_range(ranges: NDArray[np.float32], flags: NDArray[np.bool_], count: in
     return total / number if number > 0 else math.nan
 
 
-@compiled
+@compiled_inline
 def central_beam(  # noqa: PLR0917 - a scan, a cluster in it and the reflector
     ranges: NDArray[np.float32],
     flags: NDArray[np.bool_],
@@ -65,7 +66,7 @@ def central_beam(  # noqa: PLR0917 - a scan, a cluster in it and the reflector
     return distance + radius, angle_min + 0.5 * increment * (first + last)
 
 
-@compiled
+@compiled_inline
 def plate(  # noqa: PLR0917 - a scan and a cluster in it
     ranges: NDArray[np.float32],
     flags: NDArray[np.bool_],
@@ -79,7 +80,7 @@ def plate(  # noqa: PLR0917 - a scan and a cluster in it
     return _mean_range(ranges, flags, count, first, last), angle_min + 0.5 * increment * (first + last)
 
 
-@compiled
+@compiled_inline
 def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it and the reflector
     ranges: NDArray[np.float32],
     flags: NDArray[np.bool_],
@@ -101,7 +102,9 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it and the reflector
     mean = _mean_range(ranges, flags, count, first, last)
     step_cos, step_sin = math.cos(increment), math.sin(increment)
     start_cos, start_sin = math.cos(0.5 * increment * (last - first)), -math.sin(0.5 * increment * (last - first))
-    along, across = mean + MEAN_DEPTH * radius, 0.0
+    start_along = mean + MEAN_DEPTH * radius
+    along, across = start_along, 0.0
+    widest = GRAZING * radius
     for _ in range(ITERATIONS):
         lateral_sigma = along * increment
         weight = 24.0 * range_sigma * range_sigma / (lateral_sigma * lateral_sigma)
@@ -110,13 +113,15 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it and the reflector
         used = 0
         c, s = start_cos, start_sin
         for beam in range(first, last + 1):
-            offset = across * c - along * s
             distance = _range_at(ranges, flags, count, beam)
-            if abs(offset) <= GRAZING * radius and not math.isnan(distance):
+            # Which beams count is settled at the start: one that came and went would keep the fit from settling.
+            if abs(start_along * s) <= widest and not math.isnan(distance):
+                offset = min(max(across * c - along * s, -widest), widest)
                 depth = math.sqrt(radius * radius - offset * offset)
                 residual = distance - (along * c + across * s - depth)
-                slope_a = c - offset * s / depth
-                slope_c = s + offset * c / depth
+                steepness = offset / depth
+                slope_a = c - steepness * s
+                slope_c = s + steepness * c
                 n_aa += slope_a * slope_a
                 n_ac += slope_a * slope_c
                 n_cc += slope_c * slope_c
