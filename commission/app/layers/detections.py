@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal, TypeAlias
+
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app import theme
@@ -13,12 +15,14 @@ from commission.app.view import RunView
 from commission.localization.estimate import Status
 from commission.site.project import Project
 
-STYLES = {
+Shape: TypeAlias = Literal["circle", "square", "diamond"]
+
+STYLES: dict[Status, tuple[theme.Color, Shape, str]] = {
     Status.INLIER: (theme.INLIER, "circle", "inlier"),
     Status.OUTLIER_ASSOCIATION: (theme.OUTLIER_ASSOCIATION, "square", "outlier: outside every gate"),
     Status.OUTLIER_DETECTOR: (theme.OUTLIER_DETECTOR, "diamond", "outlier: too few or many beams"),
 }
-MARKS = {"circle": theme.Mark.DOT, "square": theme.Mark.SQUARE, "diamond": theme.Mark.DIAMOND}
+MARKS: dict[Shape, theme.Mark] = {"circle": theme.Mark.DOT, "square": theme.Mark.SQUARE, "diamond": theme.Mark.DIAMOND}
 
 
 class DetectionLayer(BaseLayer):

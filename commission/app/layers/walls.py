@@ -103,7 +103,7 @@ def _decimated_boxes(occupied: BoolArray) -> tuple[NDArray[np.int64], float]:
         rows, columns = (math.ceil(n / step) for n in occupied.shape)
         padded = np.zeros((rows * step, columns * step), bool)
         padded[: occupied.shape[0], : occupied.shape[1]] = occupied
-        boxes = merged_boxes(padded.reshape(rows, step, columns, step).any(axis=(1, 3)))
+        boxes = merged_boxes(np.any(padded.reshape(rows, step, columns, step), axis=(1, 3)))
         if len(boxes) <= MOST_BOXES or min(rows, columns) < 2:
             return boxes, float(step)
         step *= 2

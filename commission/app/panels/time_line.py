@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 from viser import GuiApi
 
@@ -53,11 +53,12 @@ class TimeLine(BasePanel):
         self._slider.on_update(posting(post, lambda event: actions.Seek(float(event.target.value))))
         self._strip = gui.add_html(strip(None))
         self._shown = ("", "")
-        for label, key, action in (
+        keys: tuple[tuple[str, Literal["P", "N", "R"], actions.Action], ...] = (
             ("Play or pause", "P", actions.Play()),
             ("One scan further", "N", actions.Step()),
             ("Restart the drive", "R", actions.Restart()),
-        ):
+        )
+        for label, key, action in keys:
             gui.add_command(label, hotkey=key).on_trigger(lambda _event, action=action: post(action))
 
     def draw_slowly(self, view: PageView) -> None:

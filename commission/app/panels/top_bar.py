@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 from viser import GuiApi, GuiEvent
 
@@ -13,6 +13,8 @@ from commission.app.store import AppState
 from commission.app.view import PageView, RunView
 from commission.localization.estimate import Mode
 from commission.site.parameters import SupervisorParameters
+
+Modifier: TypeAlias = Literal["cmd/ctrl", "cmd/ctrl+shift"]
 
 
 def badge_text(run: RunView | None, limits: SupervisorParameters) -> tuple[str, str, str]:
@@ -55,7 +57,7 @@ class TopBar(BasePanel):
         self._badge = gui.add_html("")
         self._shown = ("", "")
         self._head = title(state)
-        buttons = (
+        buttons: tuple[tuple[str, str, actions.Action, Literal["Z", "Y", "S"], Modifier], ...] = (
             ("Undo", "Take back the last change (Ctrl+Z)", actions.Undo(), "Z", "cmd/ctrl"),
             ("Redo", "Make it again (Ctrl+Y)", actions.Redo(), "Y", "cmd/ctrl"),
             ("Save", "Write project.yaml (Ctrl+Shift+S)", actions.Save(), "S", "cmd/ctrl+shift"),

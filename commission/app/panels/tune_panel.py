@@ -78,9 +78,8 @@ GROUPS = {
 
 
 def shown(knob: Knob, value: float) -> float:
-    """Return a parameter in the page's unit, rounded to what the page can show."""
-    rounded = round(value * knob.scale, 4)
-    return int(rounded) if isinstance(value, int) else rounded
+    """Return a parameter in the page's unit, with six digits."""
+    return round(value * knob.scale) if isinstance(value, int) else float(f"{value * knob.scale:.6g}")
 
 
 def meant(knob: Knob, number: float, like: float) -> float:

@@ -1,0 +1,140 @@
+"""Handlers of the page on a real server, without a browser: what a person's click posts, and what is drawn."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import viser
+
+from commission.app import actions
+from commission.app.actions import Action
+from commission.app.page import Page
+from commission.app.panels.base import clock, escaped, posting
+from commission.app.panels.now_panel import rows
+from commission.app.panels.time_line import strip
+from commission.app.panels.top_bar import badge_text, title
+from commission.app.panels.tune_panel import KNOBS, SWITCHES, TunePanel, meant, shown
+from commission.app.reducer import parameter, with_parameter
+from commission.app.server import start_server
+from commission.app.session import Drive, Session
+from commission.app.store import AppState
+from commission.app.view import PageView
+from commission.localization.estimate import Mode
+from commission.localization.setup import LocalizerSetup
+from commission.site.project import Project
+
+NASTY = "<script>alert('hall')</script>"
+
+
+@pytest.fixture
+def server():
+    server = start_server("127.0.0.1", 0)
+    yield server
+    server.stop()
+
+
+@pytest.fixture
+def session(drive: Drive, project: Project) -> Session:
+    session = Session(drive, LocalizerSetup.of(project))
+    session.seek(3.0)
+    while session.seeking is not None:
+        session.advance(0.0)
+    return session
+
+
+def change(widget: Any, value: Any, client: object | None) -> None:
+    """Let a widget say that it was changed, as viser does when a browser (or the server itself) changes it."""
+    widget._impl.value = value
+    for callback in widget._impl.update_cb:
+        callback(SimpleNamespace(client=client, client_id=None, target=widget))
+
+
+def test_the_whole_page_is_built_and_draws_a_run(server: viser.ViserServer, project: Project, session: Session) -> None:
+    state = AppState(project, project)
+    page = Page(server, lambda _action: None, state)
+    page.show_site(state)
+    page.draw(PageView(state, session.view()), slowly=True)
+    hidden = replace(state, hidden=frozenset({"Scan"}))
+    page.draw(PageView(hidden, session.view()), slowly=True)
+
+
+def test_the_page_stands_before_any_run_exists(server: viser.ViserServer) -> None:
+    state = AppState(Project(), Project())
+    page = Page(server, lambda _action: None, state)
+    page.show_site(state)
+    page.draw(PageView(state, None), slowly=True)
+
+
+def test_a_person_posts_and_the_server_itself_does_not() -> None:
+    posted: list[Action] = []
+    callback: Any = posting(posted.append, lambda event: actions.Seek(event.target.value))
+    callback(SimpleNamespace(client=None, target=SimpleNamespace(value=1.0)))
+    assert posted == []
+    callback(SimpleNamespace(client=object(), target=SimpleNamespace(value=2.0)))
+    assert posted == [actions.Seek(2.0)]
+
+
+def test_every_slider_posts_its_parameter_in_si(server: viser.ViserServer, project: Project) -> None:
+    posted: list[Any] = []
+    panel = TunePanel(server.gui, posted.append, AppState(project, project))
+    for key, widget in panel._widgets.items():
+        change(widget, widget.value, client=object())
+        assert posted[-1].key == key
+        value = parameter(project.parameters, key)
+        # The page shows six digits.
+        assert posted[-1].value == (pytest.approx(value, rel=1e-5) if isinstance(value, float) else value)
+        with_parameter(project.parameters, key, posted[-1].value)
+    assert len(posted) == len(panel._widgets) >= len(KNOBS) + len(SWITCHES)
+
+
+def test_sliders_follow_undo_but_not_their_own_drag(server: viser.ViserServer, project: Project) -> None:
+    key = "supervisor.position_limit"
+    panel = TunePanel(server.gui, lambda _action: None, AppState(project, project))
+    edited = replace(project, parameters=with_parameter(project.parameters, key, 0.2))
+    panel.draw_slowly(PageView(AppState(edited, project), None))
+    assert panel._widgets[key].value == 200.0
+
+
+@pytest.mark.parametrize("key", sorted(KNOBS))
+def test_what_the_page_shows_means_the_same_parameter(project: Project, key: str) -> None:
+    value = parameter(project.parameters, key)
+    assert isinstance(value, int | float)
+    again = meant(KNOBS[key], shown(KNOBS[key], value), value)
+    assert type(again) is type(value)
+    assert again == pytest.approx(value, rel=1e-5)
+
+
+def test_names_from_files_are_never_read_as_html(project: Project) -> None:
+    state = AppState(replace(project, name=NASTY), project)
+    assert "<script" not in title(state)
+    assert "&lt;script" in title(state)
+    assert "<script" not in escaped(NASTY)
+
+
+def test_the_badge_says_operational_fail_or_that_nothing_runs(session: Session, project: Project) -> None:
+    limits = project.parameters.supervisor
+    run = session.view()
+    assert badge_text(None, limits)[0] == "NO RUN"
+    assert badge_text(run, limits)[0] == "OPERATIONAL"
+    word, beside, _ = badge_text(replace(run, mode=Mode.FAIL), limits)
+    assert word.startswith("FAIL")
+    assert "mm" in beside and "°" in beside
+
+
+def test_every_number_of_the_newest_cycle_is_shown(session: Session, project: Project) -> None:
+    run = session.view()
+    shown_rows = dict(rows(run, project.parameters.supervisor))
+    assert shown_rows["Inliers"] == str(run.series.counts[-1, 0])
+    assert shown_rows["Position error"].endswith(" mm")
+
+
+def test_each_fail_episode_is_marked_on_the_time_line(session: Session) -> None:
+    bar = strip(replace(session.view(), episodes=((1.0, 2.0), (5.0, 5.0))))
+    assert bar.count("<rect") == 3
+    assert "data-episodes='2'" in bar
+
+
+def test_times_are_shown_as_minutes_and_hours() -> None:
+    assert clock(125.4) == "02:05"
+    assert clock(3725.0) == "1:02:05"

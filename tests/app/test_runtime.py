@@ -1,0 +1,188 @@
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from commission.app import actions
+from commission.app.actions import Action, Source, View
+from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
+from commission.app.session import Drive
+from commission.app.store import AppState
+from commission.app.view import PageView
+from commission.errors import FileFormatError
+from commission.localization.setup import LocalizerSetup
+from commission.site.project import Project
+
+EPISODES = ((1.0, 2.0),)
+
+
+class Pictures:
+    """A page that remembers what it was told."""
+
+    def __init__(self) -> None:
+        self.views: list[PageView] = []
+        self.told: list[tuple[str, bool]] = []
+        self.browsers: list[int] = []
+        self.shown: list[tuple[int, View]] = []
+        self.fail_once = False
+
+    def show_site(self, state: AppState) -> None:
+        pass
+
+    def draw(self, view: PageView, *, slowly: bool) -> None:
+        if self.fail_once:
+            self.fail_once = False
+            raise RuntimeError("no such thing")
+        self.views.append(view)
+
+    def tell(self, text: str, *, failed: bool) -> None:
+        self.told.append((text, failed))
+
+    def show_view(self, client_id: int, view: View) -> None:
+        self.shown.append((client_id, view))
+
+    def connected(self, client_id: int) -> None:
+        self.browsers.append(client_id)
+
+    def disconnected(self, client_id: int) -> None:
+        self.browsers.remove(client_id)
+
+
+class Bench:
+    """A runtime with a drive that is there at once, and a page that only remembers."""
+
+    def __init__(self, project: Project, drive: Drive) -> None:
+        self.page = Pictures()
+        self.saved: list[Path] = []
+        self.drive = drive
+        state = AppState(project, project, folder=Path("hall"))
+        self.runtime = Runtime(state, Work(self._prepare, self._predict, self._save, lambda _progress: None))
+
+    def _prepare(self, _project: Project, source: Source, progress: Callable[[float], None]) -> Drive:
+        progress(0.5)
+        if isinstance(source, actions.Recording):
+            raise FileFormatError(source.path, "", "not a recording", "a folder with odometry.csv")
+        return self.drive
+
+    def _predict(self, _drive: Drive, _setup: LocalizerSetup) -> tuple[tuple[float, float], ...]:
+        return EPISODES
+
+    def _save(self, _project: Project, folder: Path) -> None:
+        self.saved.append(folder)
+
+    def post(self, *wishes: Action) -> None:
+        for wish in wishes:
+            self.runtime.post(wish)
+
+    def until(self, reached: Callable[[], bool]) -> None:
+        """Wait until something has happened, at most 20 s: compilation included."""
+        for _ in range(2000):
+            if reached():
+                return
+            time.sleep(0.01)
+        raise TimeoutError("it did not happen within 20 s")
+
+    def play(self) -> None:
+        self.post(actions.ChooseSource(actions.VirtualDrive("There and back")))
+        self.until(lambda: self.runtime.session is not None and self.runtime.session.cycles > 0)
+
+
+@pytest.fixture
+def bench(project: Project, drive: Drive):
+    bench = Bench(project, drive)
+    bench.runtime.start(bench.page)
+    yield bench
+    bench.runtime.stop()
+
+
+def test_a_chosen_drive_plays_by_itself_and_pictures_follow(bench: Bench) -> None:
+    bench.play()
+    bench.until(lambda: any(view.run is not None and len(view.run.series) > 3 for view in bench.page.views))
+    assert bench.runtime.state.playing
+
+
+def test_the_prediction_of_the_rest_reaches_the_time_line(bench: Bench) -> None:
+    bench.play()
+    bench.until(lambda: bench.runtime.session is not None and bench.runtime.session.predicted == EPISODES)
+
+
+def test_pictures_come_at_most_25_times_a_second(bench: Bench) -> None:
+    bench.play()
+    bench.post(actions.SetSpeed(50.0))
+    before, since = len(bench.page.views), time.monotonic()
+    time.sleep(1.0)
+    rate = (len(bench.page.views) - before) / (time.monotonic() - since)
+    assert rate <= 27.0  # 25 and the two pictures at the ends of the interval
+
+
+def test_a_recording_that_cannot_be_read_is_told_and_listed_and_the_page_lives_on(bench: Bench) -> None:
+    bench.post(actions.ChooseSource(actions.Recording(Path("nothing"))))
+    bench.until(lambda: bool(bench.page.told))
+    assert "not a recording" in bench.page.told[0][0]
+    assert bench.page.told[0][1]
+    assert len(bench.runtime.state.problems) == 1
+    bench.play()
+
+
+def test_a_mistake_of_ours_while_drawing_is_listed_and_the_page_lives_on(bench: Bench) -> None:
+    bench.page.fail_once = True
+    bench.play()
+    bench.until(lambda: bool(bench.runtime.state.problems))
+    assert "RuntimeError: no such thing" in bench.runtime.state.problems[0]
+    bench.until(lambda: len(bench.page.views) > 3)
+
+
+def test_a_value_out_of_range_is_told_and_changes_nothing(bench: Bench) -> None:
+    before = bench.runtime.state.project
+    bench.post(actions.SetParameter("association.gate_probability", 7.0))
+    bench.until(lambda: bool(bench.page.told))
+    assert "gate_probability is 7" in bench.page.told[0][0]
+    assert bench.runtime.state.project is before
+
+
+def test_of_many_seeks_in_a_row_the_last_one_counts(bench: Bench) -> None:
+    bench.play()
+    bench.post(actions.Play(playing=False), *(actions.Seek(0.1 * k) for k in range(50)))
+    session = bench.runtime.session
+    assert session is not None
+    bench.until(lambda: session.seeking is None and abs(session.view().time - 4.9) < 1e-6)
+
+
+def test_the_drive_stops_at_its_end_or_starts_again(bench: Bench) -> None:
+    bench.play()
+    bench.post(actions.Repeat(repeat=False), actions.SetSpeed(50.0))
+    bench.until(lambda: not bench.runtime.state.playing)
+    session = bench.runtime.session
+    assert session is not None and session.at_end
+    bench.post(actions.Repeat(repeat=True), actions.Play(playing=True))
+    bench.until(lambda: not session.at_end)
+
+
+def test_covering_reaches_the_next_scan(bench: Bench) -> None:
+    bench.play()
+    bench.post(actions.Cover(covered=True))
+    session = bench.runtime.session
+    assert session is not None
+
+    def sees_nothing() -> bool:
+        estimate = session.view().estimate
+        return estimate is not None and len(estimate.status) == 0
+
+    bench.until(sees_nothing)
+
+
+def test_saving_is_told_with_the_folder_and_the_time_of_day(bench: Bench) -> None:
+    bench.post(actions.SetParameter("association.gate_probability", 0.9), actions.Save())
+    bench.until(lambda: bool(bench.runtime.state.saved_at))
+    assert bench.saved == [Path("hall")]
+    assert not bench.runtime.state.is_changed
+
+
+def test_each_browser_has_its_own_view(bench: Bench) -> None:
+    bench.runtime.post(BrowserCame(1))
+    bench.runtime.post(BrowserCame(2))
+    bench.post(actions.SetView(2, View.THREE_D))
+    bench.runtime.post(BrowserLeft(1))
+    bench.until(lambda: bench.page.browsers == [2])
+    assert bench.page.shown == [(2, View.THREE_D)]
