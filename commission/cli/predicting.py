@@ -6,14 +6,21 @@ import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, arg
 
 from commission.errors import UsageError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from commission.planning.dependence import Dependence
     from commission.planning.route_prediction import RoutePrediction
+    from commission.site.reflectors import ReflectorMap
+
+MOST_NEEDED = 5
+"""Reflectors that the report names; the file has all."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,23 +35,32 @@ class Predict:
     """Route to drive. None: the project's first."""
     blocked_per_m: float = 0.0
     """Probability per metre of ray that a person blocks it [1/m]."""
+    what_if: Annotated[Literal["blocked", "dirty", "moved"] | None, arg(metavar="{blocked,dirty,moved}")] = None
+    """Let each reflector in turn fail so (moved: by 5 cm), and write dependents.csv, what depends on most first."""
 
     def run(self) -> None:
         """Predict, write, and tell in a few lines what is to be expected."""
         if not 0.0 <= self.blocked_per_m <= 1.0:
             raise UsageError(f"--blocked-per-m is {self.blocked_per_m:g}; expected 0 to 1 per metre")
 
-        from commission.io.prediction_files import write_prediction
+        from commission.io.prediction_files import write_dependents, write_prediction
         from commission.io.project_file import load_project
+        from commission.planning.dependence import Failure, FailureOptions, dependences
         from commission.planning.route_prediction import PredictionOptions, plan_route, predict_route
 
         project = load_project(self.project)
         if self.route is None and not project.routes:
             raise UsageError("the project has no route; expected one to predict along")
         name = project.routes[0].name if self.route is None else self.route
-        prediction = predict_route(plan_route(project, name, PredictionOptions(blocked_per_m=self.blocked_per_m)))
+        planned = plan_route(project, name, PredictionOptions(blocked_per_m=self.blocked_per_m))
+        prediction = predict_route(planned)
+        lines = _report(name, prediction)
+        if self.what_if is not None:
+            ranked = dependences([planned], FailureOptions(Failure(self.what_if)))
+            write_dependents(self.out, ranked, project.reflectors)
+            lines += _most_needed(ranked, project.reflectors)
         write_prediction(self.out, name, prediction)
-        sys.stdout.write("\n".join([*_report(name, prediction), f"Written to   {self.out}"]) + "\n")
+        sys.stdout.write("\n".join([*lines, f"Written to   {self.out}"]) + "\n")
 
 
 def _report(name: str, prediction: RoutePrediction) -> list[str]:
@@ -61,3 +77,13 @@ def _report(name: str, prediction: RoutePrediction) -> list[str]:
         f"at most {prediction.on_odometry.max():.1f} m on odometry alone",
         f"Supervisor   stops at: {stops}; metres over a limit: {len(prediction.failing_metres())}",
     ]
+
+
+def _most_needed(ranked: Sequence[Dependence], reflectors: ReflectorMap) -> list[str]:
+    """Line that names the reflectors on which metres depend."""
+    needed = [
+        f"{reflectors.reflectors[each.reflector].id} ({each.failing_metres} m)"
+        for each in ranked[:MOST_NEEDED]
+        if each.failing_metres
+    ]
+    return [f"What if      metres that fail with one reflector: {', '.join(needed) or 'none'}"]

@@ -5,19 +5,24 @@ from __future__ import annotations
 import csv
 import io
 import json
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from commission.io.atomic import atomic_file, write_text
+from commission.planning.dependence import Dependence
 from commission.planning.route_prediction import RoutePrediction
+from commission.site.reflectors import ReflectorMap
 
 PREDICTION = "prediction.csv"
+DEPENDENTS = "dependents.csv"
 SUMMARY = "summary.json"
 COLUMNS = (
     *("metre", "x", "y", "theta", "two_sigma_x", "two_sigma_y", "two_sigma_theta"),
     *("visible", "on_odometry", "over_limit", "mode"),
 )
+DEPENDENT_COLUMNS = ("reflector_id", "failure", "route", "failing_metres", "load", "metres")
 
 
 def write_prediction(folder: Path, route: str, prediction: RoutePrediction) -> None:
@@ -44,12 +49,7 @@ def write_prediction(folder: Path, route: str, prediction: RoutePrediction) -> N
         np.isin(metres.metre, prediction.failing_metres()).astype(np.int64),
         np.where(metres.fails, "fail", "operational"),
     ]
-    with atomic_file(folder / PREDICTION) as file:
-        text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        writer.writerows(zip(*(column.tolist() for column in columns), strict=True))
-        text.detach()
+    _write_table(folder / PREDICTION, COLUMNS, zip(*(column.tolist() for column in columns), strict=True))
     write_text(folder / SUMMARY, json.dumps(summary(route, prediction), indent=2, allow_nan=False) + "\n")
 
 
@@ -73,3 +73,35 @@ def summary(route: str, prediction: RoutePrediction) -> dict[str, str | int | fl
         "visible_mean": float(prediction.seen.mean()),
         "on_odometry_max_m": float(prediction.on_odometry.max()),
     }
+
+
+def write_dependents(folder: Path, ranked: Sequence[Dependence], reflectors: ReflectorMap) -> None:
+    """Write `dependents.csv`: a row per reflector and route, in the order given.
+
+    Parameters
+    ----------
+    folder : made when missing.
+    ranked : what depends on each reflector.
+    reflectors : the map that names them.
+
+    Raises
+    ------
+    FileFormatError
+        the file cannot be written.
+    """
+    rows = (
+        (reflectors.reflectors[each.reflector].id, each.failure, part.route, len(part.metres), part.load, metres)
+        for each in ranked
+        for part in each.routes
+        for metres in (" ".join(map(str, part.metres.tolist())),)
+    )
+    _write_table(folder / DEPENDENTS, DEPENDENT_COLUMNS, rows)
+
+
+def _write_table(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
+    with atomic_file(path) as file:
+        text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
+        text.detach()

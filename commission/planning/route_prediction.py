@@ -154,10 +154,15 @@ class RoutePrediction:
         deviations[:, 2] = difference(self.means[:, 2], self.drive.poses[:, 2])
         return deviations
 
-    def over_limit(self) -> BoolArray:
-        """(K,) whether bias and 2-sigma together pass the supervisor's limits in any axis, or it is in fail mode."""
+    @property
+    def load(self) -> FloatArray:
+        """(K,) bias and 2-sigma together as a share of the supervisor's limit, of the axis where it is largest [1]."""
         limits = (self.limits.position_limit, self.limits.position_limit, self.limits.heading_limit)
-        return (np.abs(self.bias) + self.two_sigma > limits).any(axis=1) | (self.modes == Mode.FAIL)
+        return ((np.abs(self.bias) + self.two_sigma) / limits).max(axis=1)
+
+    def over_limit(self) -> BoolArray:
+        """(K,) whether the load is above 1, or the supervisor is in fail mode."""
+        return (self.load > 1.0) | (self.modes == Mode.FAIL)
 
     def trips(self) -> FloatArray:
         """Metres of the way at which the supervisor stops the vehicle [m]."""

@@ -26,3 +26,14 @@ def test_an_unknown_route_and_an_impossible_crowd_are_refused(refused, project, 
 def test_a_project_without_a_route_cannot_be_predicted(refused, project, tmp_path):
     (project / "project.yaml").write_text("schema: 1\n", encoding="utf-8")
     assert "no route" in refused("predict", project, "--out", tmp_path / "out")
+
+
+def test_what_if_ranks_the_reflectors(commission, project, tmp_path):
+    code, told, err = commission("predict", project, "--what-if", "blocked", "--out", tmp_path / "out")
+    assert (code, err) == (0, "")
+    assert "What if" in told
+    with (tmp_path / "out" / "dependents.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert sorted(row["reflector_id"] for row in rows) == ["R0", "R1", "R2", "R3", "R4"]
+    loads = [float(row["load"]) for row in rows]
+    assert loads == sorted(loads, reverse=True)
