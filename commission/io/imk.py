@@ -198,7 +198,7 @@ def _layers(reflectors: ReflectorMap, found: Findings) -> dict[str, list[int]]:
 def _note_losses(reflectors: ReflectorMap, found: Findings) -> None:
     """Say which fields stay behind."""
     usual = Reflector("usual", 0.0, 0.0)
-    for name in ("heading", "height", "sigma", "note"):
+    for name in ("heading", "height", "sigma", "note", "locked"):
         count = sum(getattr(r, name) != getattr(usual, name) for r in reflectors.reflectors)
         if count:
             found.add("", f"{name} of {count} reflectors is not carried by the format")

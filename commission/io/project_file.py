@@ -26,6 +26,7 @@ from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
+from commission.site.stations import Station
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
 
 SCHEMA = 1
@@ -59,6 +60,8 @@ class ProjectDocument:
     """Tunables of the localizer."""
     disturbances: Disturbances = field(default_factory=Disturbances)
     """What a virtual drive suffers."""
+    stations: tuple[Station, ...] = ()
+    """Places where the vehicle has to stand accurately."""
 
 
 def project_file(path: Path) -> Path:
@@ -92,6 +95,7 @@ def load_project(path: Path) -> Project:
             keys.scanner,
             keys.parameters,
             keys.disturbances,
+            keys.stations,
         )
     except ProjectError as error:
         problem, _, remedy = str(error).partition("; expected ")

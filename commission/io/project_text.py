@@ -45,6 +45,7 @@ def project_text(project: Project, schema: int, floor_map: str | None, reflector
         "scanner:",
         *_fields(project.scanner, "  "),
         *_entry("routes", project.routes, "", ""),
+        *(_entry("stations", project.stations, "", "") if project.stations else ()),
         "parameters:",
         *_fields(project.parameters, "  "),
         "disturbances:",

@@ -13,12 +13,13 @@ from commission.io.csv_table import Block, read_table, shortened
 from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
 
 REQUIRED = ("id", "x", "y", "radius")
-OPTIONAL = ("kind", "heading", "height", "sigma", "layer", "note")
+OPTIONAL = ("kind", "heading", "height", "sigma", "layer", "note", "locked")
 SIZE_LIMIT = 64_000_000
 """Bytes of a reflector table: about 1,000,000 reflectors."""
 
 _UNITS = {"x": "m", "y": "m", "radius": "m", "heading": "rad", "height": "m", "sigma": "m"}
-_TEXTS = ("kind", "layer", "note")
+_TEXTS = ("kind", "layer", "note", "locked")
+_YES, _NO = ("yes", "true", "1"), ("", "no", "false", "0")
 _DEFAULTS: Mapping[str, float] = {"heading": 0.0, "height": 0.2, "sigma": 0.0}
 
 
@@ -27,8 +28,8 @@ def read_reflectors(path: Path) -> ReflectorMap:
 
     Parameters
     ----------
-    path : CSV file with the columns id, x, y, radius and, if wanted, kind, heading, height, sigma, layer, note
-        [m, rad, map frame], in any order.
+    path : CSV file with the columns id, x, y, radius and, if wanted, kind, heading, height, sigma, layer, note,
+        locked [m, rad, map frame], in any order.
 
     Returns
     -------
@@ -82,6 +83,8 @@ def write_reflectors(reflectors: ReflectorMap, path: Path) -> None:
 def _written(path: Path, reflector: Reflector, name: str) -> str:
     """Cell that reads back as the same value."""
     value = getattr(reflector, name)
+    if isinstance(value, bool):
+        return _YES[0] if value else _NO[0]
     if isinstance(value, float | int):
         return repr(float(value))
     text = str(value)
@@ -96,8 +99,11 @@ def _reflector(block: Block, row: int, texts: dict[str, str], numbers: Mapping[s
     kind = texts.pop("kind", "") or ReflectorKind.CYLINDER
     if kind not in list(ReflectorKind):
         raise block.error(row, "kind", f"is {shortened(kind)}", f"one of: {', '.join(ReflectorKind)}")
+    locked = texts.pop("locked", "").lower()
+    if locked not in _YES + _NO:
+        raise block.error(row, "locked", f"is {shortened(locked)}", "yes or no")
     try:
-        return Reflector(kind=ReflectorKind(kind), **numbers, **texts)  # type: ignore[arg-type]
+        return Reflector(kind=ReflectorKind(kind), locked=locked in _YES, **numbers, **texts)  # type: ignore[arg-type]
     except ValueError as error:
         problem, _, remedy = str(error).partition("; expected ")
         column, _, found = problem.partition(" ")

@@ -11,6 +11,7 @@ from commission.site.parameters import Parameters
 from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
+from commission.site.stations import Station
 from commission.site.vehicle import DifferentialVehicle, Vehicle
 
 
@@ -34,12 +35,16 @@ class Project:
     """Tunables of the localizer."""
     disturbances: Disturbances = field(default_factory=Disturbances)
     """What a virtual drive suffers."""
+    stations: tuple[Station, ...] = ()
+    """Places where the vehicle has to stand accurately; names are unique."""
 
     def __post_init__(self) -> None:
-        names = [route.name for route in self.routes]
-        for name in names:
-            if names.count(name) > 1:
-                raise ProjectError(f"route name {name!r} is used twice; expected unique names")
+        for kind, named in (("route", self.routes), ("station", self.stations)):
+            seen: set[str] = set()
+            for name in (value.name for value in named):
+                if name in seen:
+                    raise ProjectError(f"{kind} name {name!r} is used twice; expected unique names")
+                seen.add(name)
 
     def route(self, name: str) -> Route:
         """Return the route of that name; raises UsageError that lists the names there are."""

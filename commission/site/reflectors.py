@@ -44,6 +44,8 @@ class Reflector:
     """Group of reflectors that belong together."""
     note: str = ""
     """Free text."""
+    locked: bool = False
+    """Whether edits leave it as it is, until it is unlocked."""
 
     def __post_init__(self) -> None:
         if not self.id:

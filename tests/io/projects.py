@@ -22,6 +22,7 @@ from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Direction, Route, Segment
 from commission.site.scanner import Scanner
+from commission.site.stations import Station
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
 
 METRES = st.floats(-1e4, 1e4)
@@ -76,6 +77,11 @@ def segments(draw: st.DrawFn) -> Segment:
     )
 
 
+def stations() -> st.SearchStrategy[Station]:
+    heading, accuracy = st.floats(-math.pi, math.pi), st.floats(0.001, 10.0)
+    return st.builds(Station, name=NAME, x=METRES, y=METRES, heading=heading, required_accuracy=accuracy)
+
+
 def parameters() -> st.SearchStrategy[Parameters]:
     sigma = st.floats(0.0, 1.0)
     return st.builds(
@@ -125,4 +131,5 @@ def projects() -> st.SearchStrategy[Project]:
         scanner=scanners(),
         parameters=parameters(),
         disturbances=disturbances(),
+        stations=st.lists(stations(), max_size=2, unique_by=lambda s: s.name).map(tuple),
     )

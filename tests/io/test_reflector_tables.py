@@ -28,6 +28,7 @@ def reflectors() -> st.SearchStrategy[ReflectorMap]:
         sigma=st.floats(0.0, 0.1),
         layer=TEXT,
         note=TEXT,
+        locked=st.booleans(),
     )
     return st.lists(one, max_size=5, unique_by=lambda r: r.id).map(lambda rows: ReflectorMap(tuple(rows)))
 
@@ -72,6 +73,7 @@ def test_table_is_read_as_spreadsheets_save_it(tmp_path: Path, text: str) -> Non
         ("id,x,y,radius\n,1,2,0.1\n", "line 2, column id: is empty; expected a name"),
         ("id,x,y,radius\nA,1,2\n", "line 2: has 3 cells; expected 4 cells"),
         ("id,x,y,radius,kind\nA,1,2,0.1,round\n", "column kind: is 'round'; expected one of: cylinder, flat"),
+        ("id,x,y,radius,locked\nA,1,2,0.1,maybe\n", "line 2, column locked: is 'maybe'; expected yes or no"),
         ('id,x,y,radius\n"A,1,2,0.1\n', "line 2: is no row of a table"),
         ("id,x,y,radius\nA,1_0,2,0.1\n", "line 2, column x: is '1_0'; expected a number [m]"),
     ],

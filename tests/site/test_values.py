@@ -17,6 +17,7 @@ from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
 from commission.site.scanner import Scanner
+from commission.site.stations import Station
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle
 
 STRAIGHT = Segment([[0, 0], [1, 0], [2, 0], [3, 0]])
@@ -39,6 +40,9 @@ STRAIGHT = Segment([[0, 0], [1, 0], [2, 0], [3, 0]])
         (lambda: Route("r", ()), "has no segments"),
         (lambda: Segment([[0, 0], [1, 0]], degree=3), "control points"),
         (lambda: Disturbances(dropped_scans=1.5), "dropped_scans is 1.5; expected 0 to 1"),
+        (lambda: Station("", 0.0, 0.0), "a station's name is empty"),
+        (lambda: Station("Dock", 0.0, math.nan), "y is nan; expected"),
+        (lambda: Station("Dock", 0.0, 0.0, 0.0, 0.0), "required_accuracy is 0; expected 0.001 to 10 m"),
         (lambda: ShinyObject(math.inf, 0.0), "expected finite metres"),
         (lambda: TiltedStretch(0.0, 0.0, -1.0), "radius is -1; expected 0 m or more"),
     ],
@@ -51,6 +55,11 @@ def test_impossible_values_are_refused_with_what_was_found_and_expected(build, m
 def test_two_reflectors_with_one_id_are_refused():
     with pytest.raises(ProjectError, match="'a' is used twice"):
         ReflectorMap((Reflector("a", 0, 0), Reflector("a", 1, 0)))
+
+
+def test_two_stations_of_one_name_are_refused():
+    with pytest.raises(ProjectError, match="station name 'Dock' is used twice"):
+        Project(stations=(Station("Dock", 0.0, 0.0), Station("Dock", 1.0, 0.0)))
 
 
 def test_a_route_whose_segments_do_not_meet_is_refused_with_the_gap_in_millimetres():
