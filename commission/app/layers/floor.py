@@ -19,7 +19,10 @@ LONGEST_SIDE = 4000
 
 
 def picture(floor_map: FloorMap) -> NDArray[np.uint8]:
-    """Return the (H, W, 4) picture of a map, top row first; a huge map is thinned, walls survive."""
+    """Return the (H, W, 4) picture of a map as viser lays it on the floor; a huge map is thinned, walls survive.
+
+    viser draws the first row of a picture at its lowest y, as the map itself begins; seen from above it is upright.
+    """
     cells = floor_map.cells
     step = math.ceil(max(cells.shape) / LONGEST_SIDE)
     if step > 1:
@@ -28,7 +31,7 @@ def picture(floor_map: FloorMap) -> NDArray[np.uint8]:
     image = np.zeros((*cells.shape, 4), np.uint8)
     image[cells == FREE] = (*theme.FREE, 255)
     image[cells == OCCUPIED] = (*theme.WALL, 255)
-    return np.ascontiguousarray(image[::-1])
+    return image
 
 
 class FloorLayer(BaseLayer):

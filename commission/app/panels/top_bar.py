@@ -86,13 +86,13 @@ class TopBar(BasePanel):
         self._show_badge(word, beside, color)
 
     def _show_badge(self, word: str, beside: str, color: str) -> None:
-        """Write the badge."""
+        """Write the badge: in the row with the buttons, because above them it would cover them on a small screen."""
         self._badge.content = (
-            "<div style='position:fixed;z-index:50;top:6px;left:50%;transform:translateX(-50%);display:flex;"
-            "align-items:center;gap:12px;pointer-events:none;white-space:nowrap'>"
+            "<div style='display:flex;align-items:center;gap:12px;margin-right:24px;white-space:nowrap'>"
             f"<span class='c-badge' style='background:{color};color:#fff;font-weight:700;font-size:15px;"
             f"letter-spacing:.1em;padding:3px 20px;border-radius:3px'>{word}</span>"
-            "<span class='c-beside' style='font-size:12px;opacity:.8;font-variant-numeric:tabular-nums'>"
+            "<span class='c-beside' style='font-size:12px;opacity:.8;font-variant-numeric:tabular-nums;"
+            "min-width:130px'>"
             f"{beside}</span></div>"
         )
 
