@@ -84,23 +84,24 @@ def reflector_information(  # noqa: PLR0917 - one reflector, number by number
     dy: float,
     lever_x: float,
     lever_y: float,
-    range_variance: float,
-    bearing_variance: float,
+    range_weight: float,
+    bearing_weight: float,
 ) -> tuple[float, float, float, float, float, float]:
     """What range and bearing of a reflector at (dx, dy) from the scanner say about the pose, map axes.
 
-    The scanner stands at (lever_x, lever_y) from the point whose position is asked for. The numbers are the upper
-    triangle of the information row by row: xx, xy, xt, yy, yt, tt. A scanner on the reflector itself learns nothing.
+    The scanner stands at (lever_x, lever_y) from the point whose position is asked for; a weight is one over a
+    variance. The numbers are the upper triangle of the information row by row: xx, xy, xt, yy, yt, tt. A scanner on
+    the reflector itself learns nothing.
     """
     r = math.sqrt(dx * dx + dy * dy)
     if r < 1e-9:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    ux, uy = dx / r, dy / r
+    per_r = 1.0 / r
+    ux, uy = dx * per_r, dy * per_r
     # Rows of the Jacobian: range and bearing by x, y and heading. The lever moves the scanner when the heading turns.
     range_t = ux * lever_y - uy * lever_x
-    bearing_x, bearing_y = uy / r, -ux / r
+    bearing_x, bearing_y = uy * per_r, -ux * per_r
     bearing_t = -1.0 - bearing_x * lever_y + bearing_y * lever_x
-    range_weight, bearing_weight = 1.0 / range_variance, 1.0 / bearing_variance
     return (
         range_weight * ux * ux + bearing_weight * bearing_x * bearing_x,
         range_weight * ux * uy + bearing_weight * bearing_x * bearing_y,
@@ -139,6 +140,13 @@ def heading_variance(  # noqa: PLR0917 - parts of two matrices, number by number
 
 
 @compiled
+def weights_of(dx: float, dy: float, survey_sigma: float, model: FixModel) -> tuple[float, float]:
+    """Weights of the range and of the bearing; the survey error of the reflector's place adds to both noises."""
+    squared, survey = max(dx * dx + dy * dy, 1e-18), survey_sigma * survey_sigma
+    return 1.0 / (model.range_variance + survey), 1.0 / (model.bearing_variance + survey / squared)
+
+
+@compiled
 def fix_at_heading(  # noqa: PLR0917 - one point and heading
     seen: int, parts: FloatArray, turns: FloatArray, free: FloatArray, heading: float, model: FixModel, one: FloatArray
 ) -> int:
@@ -150,9 +158,10 @@ def fix_at_heading(  # noqa: PLR0917 - one point and heading
     i_xx, i_xy, i_xt = model.prior_position, 0.0, 0.0
     i_yy, i_yt, i_tt = model.prior_position, 0.0, model.prior_heading
     expected, none, single, pair = 0.0, 1.0, 0.0, 0.0
+    first, width, is_narrow, is_crowded = model.first, model.width, model.width < FULL_TURN, model.free_per_m < 1.0
     count = 0
     for k in range(seen):
-        if model.width < FULL_TURN and not in_field_of_view(turns[k] - heading, model.first, model.width):
+        if is_narrow and not in_field_of_view(turns[k] - heading, first, width):
             continue
         count += 1
         i_xx += parts[k, 0]
@@ -161,23 +170,30 @@ def fix_at_heading(  # noqa: PLR0917 - one point and heading
         i_yy += parts[k, 3]
         i_yt += parts[k, 4]
         i_tt += parts[k, 5]
-        # Recursion of the Poisson binomial distribution: probabilities of none, one and two so far.
-        p = free[k]
-        expected += p
-        pair += p * (single - pair)
-        single += p * (none - single)
-        none *= 1.0 - p
+        if is_crowded:
+            # Recursion of the Poisson binomial distribution: probabilities of none, one and two so far.
+            p = free[k]
+            expected += p
+            pair += p * (single - pair)
+            single += p * (none - single)
+            none *= 1.0 - p
     one[:PROMISING] = math.inf
-    one[PROMISING] = expected
-    # Rounding can leave a probability a hair outside.
-    one[PROMISING + 1] = min(max(1.0 - none - single, 0.0), 1.0)
-    one[PROMISING + 2] = min(max(1.0 - none - single - pair, 0.0), 1.0)
-    regular, p_xx, p_xy, p_yy = position_covariance(i_xx, i_xy, i_xt, i_yy, i_yt, i_tt)
-    if count >= model.fewest and regular:
-        half_difference = 0.5 * (p_xx - p_yy)
-        one[0] = 0.5 * (p_xx + p_yy) + math.sqrt(half_difference * half_difference + p_xy * p_xy)
-        one[1] = heading_variance(i_xt, i_yt, i_tt, p_xx, p_xy, p_yy)
-        one[2] = p_xx + p_yy
+    if is_crowded:
+        one[PROMISING] = expected
+        # Rounding can leave a probability a hair outside.
+        one[PROMISING + 1] = min(max(1.0 - none - single, 0.0), 1.0)
+        one[PROMISING + 2] = min(max(1.0 - none - single - pair, 0.0), 1.0)
+    else:
+        one[PROMISING] = count
+        one[PROMISING + 1] = 1.0 if count >= 2 else 0.0
+        one[PROMISING + 2] = 1.0 if count >= 3 else 0.0
+    if count >= model.fewest:
+        regular, p_xx, p_xy, p_yy = position_covariance(i_xx, i_xy, i_xt, i_yy, i_yt, i_tt)
+        if regular:
+            half_difference = 0.5 * (p_xx - p_yy)
+            one[0] = 0.5 * (p_xx + p_yy) + math.sqrt(half_difference * half_difference + p_xy * p_xy)
+            one[1] = heading_variance(i_xt, i_yt, i_tt, p_xx, p_xy, p_yy)
+            one[2] = p_xx + p_yy
     return count
 
 
@@ -212,7 +228,8 @@ def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
     one, best = np.empty(FIGURES), np.empty(FIGURES)
     headings, free_per_m, narrow = model.headings, model.free_per_m, model.width < FULL_TURN
     lever_x, lever_y = model.lever_x, model.lever_y
-    range_variance, bearing_variance = model.range_variance, model.bearing_variance
+    # Divisions are the slow part, and most maps know no survey error.
+    sure_range_weight, sure_bearing_weight = weights_of(1.0, 0.0, 0.0, model)
     for n in rows:
         seen = 0
         for word_index in range(mask.shape[1]):
@@ -221,17 +238,17 @@ def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
                 m = 64 * word_index + lowest_bit(word)
                 word &= word - np.uint64(1)
                 dx, dy = centers[m, 0] - points[n, 0], centers[m, 1] - points[n, 1]
-                squared, survey = max(dx * dx + dy * dy, 1e-18), float(survey_sigmas[m]) ** 2
-                # The survey error of the reflector's place adds to the noise of the range, and of the bearing.
-                information = reflector_information(
-                    dx, dy, lever_x, lever_y, range_variance + survey, bearing_variance + survey / squared
-                )
+                if survey_sigmas[m] > 0.0:
+                    range_weight, bearing_weight = weights_of(dx, dy, survey_sigmas[m], model)
+                else:
+                    range_weight, bearing_weight = sure_range_weight, sure_bearing_weight
+                information = reflector_information(dx, dy, lever_x, lever_y, range_weight, bearing_weight)
                 parts[seen, 0], parts[seen, 1], parts[seen, 2] = information[0], information[1], information[2]
                 parts[seen, 3], parts[seen, 4], parts[seen, 5] = information[3], information[4], information[5]
                 if narrow:
                     turns[seen] = math.atan2(dy, dx)
                 if free_per_m < 1.0:
-                    free[seen] = free_per_m ** math.sqrt(squared)
+                    free[seen] = free_per_m ** math.hypot(dx, dy)
                 seen += 1
         count = fix_at_heading(seen, parts, turns, free, headings[0], model, best)
         for h in range(1, len(headings)):
@@ -244,7 +261,7 @@ def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
         # Roots and quotients keep the order, so they can wait until the heading is chosen.
         figures[n, 0], figures[n, 1] = math.sqrt(best[0]), math.sqrt(best[1])
         figures[n, 2] = math.sqrt(best[2]) / model.position_noise
-        figures[n, 3] = figures[n, 1] / math.sqrt(bearing_variance)
+        figures[n, 3] = figures[n, 1] / math.sqrt(model.bearing_variance)
         for i in range(PROMISING, FIGURES):
             figures[n, i] = best[i]
 
@@ -266,15 +283,8 @@ def fill_covariances(  # noqa: PLR0917 - arrays in, arrays out
         i_yy, i_yt, i_tt = model.prior_position, 0.0, model.prior_heading
         for m in indices[offsets[n] : offsets[n + 1]]:
             dx, dy = centers[m, 0] - T_map_scanner[n, 0], centers[m, 1] - T_map_scanner[n, 1]
-            squared, survey = max(dx * dx + dy * dy, 1e-18), float(survey_sigmas[m]) ** 2
-            information = reflector_information(
-                dx,
-                dy,
-                levers[n, 0],
-                levers[n, 1],
-                model.range_variance + survey,
-                model.bearing_variance + survey / squared,
-            )
+            range_weight, bearing_weight = weights_of(dx, dy, float(survey_sigmas[m]), model)
+            information = reflector_information(dx, dy, levers[n, 0], levers[n, 1], range_weight, bearing_weight)
             i_xx += information[0]
             i_xy += information[1]
             i_xt += information[2]

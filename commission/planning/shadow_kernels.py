@@ -5,9 +5,10 @@ So the answer is that of the ray for every pair. What is a reflector, a scanner 
 
 Why a wedge of a shadow map can be trusted, with c the center and e, e' the free ranges along its two edges:
 
-- Bins are narrower than a cell at any range in use, so an occupied cell cannot hide between the edges: one that meets
-  the wedge meets an edge, at most a cell's diagonal farther out. Up to min(e, e') minus a diagonal all is free. Only a
-  cell that meets the edge underneath the reflector's own disc escapes; bins with such cells are marked in advance.
+- A wedge is as many bins wide as keep it narrower than a cell at the range of its hits, so an occupied cell cannot hide
+  between the edges: one that meets the wedge meets an edge, at most a cell's diagonal farther out. Up to min(e, e')
+  minus a diagonal all is free. Only a cell that meets the edge underneath the reflector's own disc escapes; bins with
+  such cells are marked in advance.
 - Where the two cells that stop the edges are linked by a chain of occupied cells that share sides, every ray between
   the edges crosses the chain. Beyond the chain all is hidden.
 """
@@ -30,6 +31,10 @@ ROUNDING = 1e-4
 EDGE = 1e-6
 # Cells of a chain that is followed to link two hits; a wall seen at a grazing angle needs a few dozen.
 LONGEST_CHAIN = 64
+
+# Bins of the widest wedge; the number of bins is a multiple of it. Extremes over such blocks make whole discs cheap.
+BLOCK = 64
+ALL_HIDDEN, ALL_CLEAR, MIXED = 0, 1, 2
 
 BitMask = NDArray[np.uint64]
 """(N, ceil(M / 64)): bit m of row n says that point n sees reflector m."""
@@ -56,6 +61,10 @@ class Targets(NamedTuple):
     """(M, K) squared distance up to which the whole bin is free [m^2]."""
     hidden: NDArray[np.float32]
     """(M, K) squared distance from which the whole bin is in shadow [m^2]."""
+    clear_blocks: NDArray[np.float32]
+    """(M, K / BLOCK) smallest `clear` of each block of bins."""
+    hidden_blocks: NDArray[np.float32]
+    """(M, K / BLOCK) largest `hidden` of each block of bins."""
 
 
 @compiled
@@ -83,6 +92,17 @@ def bin_edge(index: int, bins: int) -> tuple[float, float]:
         x, y = y, -x
     scale = 1.0 / math.sqrt(x * x + y * y)
     return x * scale, y * scale
+
+
+@compiled
+def trusted_range(cell: float, sine_yaw: float, cosine_yaw: float, bins: int) -> float:
+    """Range [m] up to which a bin is narrower than a cell, seen from any side, with 5 % to spare.
+
+    The widest bins, on the diagonals of the map, measure 8 / bins radians. In a grid along the map's axes a cell seen
+    diagonally is wider too, by sqrt(2).
+    """
+    is_aligned = abs(sine_yaw * cosine_yaw) < 1e-9
+    return 0.95 * cell * bins / (8.0 / math.sqrt(2.0) if is_aligned else 8.0)
 
 
 @compiled
@@ -158,50 +178,67 @@ def mark_cells_under(tables: RayTables, x: float, y: float, radius: float, uncle
 
 
 @compiled
-def cast_shadow(  # noqa: PLR0917 - one reflector, number by number
-    tables: RayTables,
-    x: float,
-    y: float,
-    radius: float,
-    farthest: float,
-    clear: NDArray[np.float32],
-    hidden: NDArray[np.float32],
-) -> None:
-    """Fill one reflector's rows of `Targets.clear` and `Targets.hidden`."""
-    bins = len(clear)
-    c, s, cell = tables.origin_cos, tables.origin_sin, tables.resolution
-    gx = (c * (x - tables.origin_x) + s * (y - tables.origin_y)) / cell
-    gy = (c * (y - tables.origin_y) - s * (x - tables.origin_x)) / cell
-    diagonal = math.sqrt(2.0) * cell
+def shadow_between(  # noqa: PLR0917 - two hits and a point, number by number
+    tables: RayTables, grid_x: float, grid_y: float, hits: FloatArray, cells: IntArray, one: int, other: int
+) -> float:
+    """Distance [m] from (grid_x, grid_y) beyond which all is hidden between two rays; inf if none is certain."""
+    if cells[one, 0] < 0 or cells[other, 0] < 0:
+        return math.inf
+    row, column, last_row, last_column = cells[one, 0], cells[one, 1], cells[other, 0], cells[other, 1]
+    shadow = tables.resolution * chain_reach(tables, grid_x, grid_y, row, column, last_row, last_column)
+    if shadow < math.inf and (row == last_row or column == last_column):
+        # A straight row of cells is convex: it contains the line between the two hits.
+        return min(shadow, max(hits[one], hits[other]))
+    return shadow
+
+
+@compiled
+def cast_shadow(tables: RayTables, targets: Targets, m: int) -> None:
+    """Fill the shadow map of reflector m: halve each wedge until it can be trusted as a whole."""
+    clear, hidden, radius, farthest = targets.clear[m], targets.hidden[m], targets.radii[m], targets.farthest[m]
+    x, y, bins = targets.centers[m, 0], targets.centers[m, 1], len(clear)
+    cosine, sine, cell = tables.origin_cos, tables.origin_sin, tables.resolution
+    grid_x = (cosine * (x - tables.origin_x) + sine * (y - tables.origin_y)) / cell
+    grid_y = (cosine * (y - tables.origin_y) - sine * (x - tables.origin_x)) / cell
+    diagonal, trusted = math.sqrt(2.0) * cell, trusted_range(cell, sine, cosine, bins)
     unclear = np.zeros(bins, dtype=np.bool_)
     mark_cells_under(tables, x, y, radius, unclear)
-    reach = farthest + 2.0 * diagonal
-    dir_x, dir_y = bin_edge(0, bins)
-    first = cast_ray(tables, x + radius * dir_x, y + radius * dir_y, dir_x, dir_y, reach)
-    here = first
-    for k in range(bins):
-        following = first
-        if k + 1 < bins:
-            dir_x, dir_y = bin_edge(k + 1, bins)
-            following = cast_ray(tables, x + radius * dir_x, y + radius * dir_y, dir_x, dir_y, reach)
-        free = radius + min(here[0], following[0]) - diagonal - ROUNDING
-        clear[k] = -1.0 if unclear[k] or free <= 0.0 else min(free, reach) ** 2
-        hidden[k] = math.inf
-        if here[1] >= 0 and following[1] >= 0:
-            shadow = chain_reach(tables, gx, gy, here[1], here[2], following[1], following[2]) * cell
-            if here[1] == following[1] or here[2] == following[2]:
-                # A straight row of cells is convex: it contains the line between the two hits.
-                shadow = min(shadow, radius + max(here[0], following[0])) if math.isfinite(shadow) else shadow
-            hidden[k] = (max(shadow, radius) + ROUNDING) ** 2
-        here = following
+    # Of each edge: distance from the center to the hit, negative before it is cast; and the cell that is hit.
+    hits, cells = np.full(bins, -1.0), np.empty((bins, 2), dtype=np.int64)
+    k, size = 0, BLOCK
+    while k < bins:
+        end = (k + size) % bins
+        for edge in (k, end):
+            if hits[edge] < 0.0:
+                dir_x, dir_y = bin_edge(edge, bins)
+                reach = farthest + 3.0 * cell
+                hit = cast_ray(tables, x + radius * dir_x, y + radius * dir_y, dir_x, dir_y, reach)
+                hits[edge], cells[edge, 0], cells[edge, 1] = radius + hit[0], hit[1], hit[2]
+        near, far, shadow = min(hits[k], hits[end]), max(hits[k], hits[end]), math.inf
+        # Between hits at very different ranges little would be decided, although that little could be trusted.
+        if size == 1 or (far - near < diagonal and far + diagonal <= trusted / size):
+            shadow = shadow_between(tables, grid_x, grid_y, hits, cells, k, end)
+        if size > 1 and shadow == math.inf:
+            size //= 2
+            continue
+        free = min(near, farthest + diagonal) - diagonal - ROUNDING
+        for i in range(k, k + size):
+            clear[i] = -1.0 if unclear[i] or free <= 0.0 else free * free
+            hidden[i] = (shadow + ROUNDING) ** 2
+        k += size
+        size = BLOCK
+        while k % size != 0:
+            size //= 2
+    for block in range(bins // BLOCK):
+        targets.clear_blocks[m, block] = clear[block * BLOCK : (block + 1) * BLOCK].min()
+        targets.hidden_blocks[m, block] = hidden[block * BLOCK : (block + 1) * BLOCK].max()
 
 
 @compiled
 def cast_shadows(tables: RayTables, targets: Targets) -> None:
     """Fill the shadow maps of all reflectors."""
     for m in range(len(targets.radii)):
-        x, y = targets.centers[m, 0], targets.centers[m, 1]
-        cast_shadow(tables, x, y, targets.radii[m], targets.farthest[m], targets.clear[m], targets.hidden[m])
+        cast_shadow(tables, targets, m)
 
 
 @compiled
@@ -247,24 +284,36 @@ def see_points(  # noqa: PLR0917 - one reflector, many points
 
 
 @compiled
-def in_shadow(targets: Targets, m: int, x: float, y: float, spread: float) -> bool:
-    """Whether all of the disc of radius `spread` around (x, y) is certainly out of sight of reflector m."""
-    dx, dy = x - targets.centers[m, 0], y - targets.centers[m, 1]
-    distance = math.hypot(dx, dy)
-    if distance - spread > targets.farthest[m]:
-        return True
-    if distance <= 1.01 * spread + targets.radii[m]:
-        return False
-    bins = targets.clear.shape[1]
+def sight_of_disc(targets: Targets, m: int, dx: float, dy: float, spread: float) -> int:
+    """Whether a disc at (dx, dy) from reflector m is all out of its sight, all in its sight, or neither is certain."""
+    distance = math.sqrt(dx * dx + dy * dy)
+    near, far = distance - spread, distance + spread
+    if near <= 0.01 * spread + targets.radii[m]:
+        return MIXED
+    is_plate = targets.normals[m, 0] != 0.0 or targets.normals[m, 1] != 0.0
+    can_be_clear = not is_plate and far <= targets.farthest[m] and near >= targets.nearest[m]
+    clear, hidden = targets.clear[m], targets.hidden[m]
+    clear_blocks, hidden_blocks = targets.clear_blocks[m], targets.hidden_blocks[m]
+    bins = len(clear)
     sine = spread / distance
     cosine = math.sqrt(1.0 - sine * sine)
-    first = int(direction_bin(cosine * dx + sine * dy, cosine * dy - sine * dx, bins)) - 1
+    k = int(direction_bin(cosine * dx + sine * dy, cosine * dy - sine * dx, bins)) - 1
     last = int(direction_bin(cosine * dx - sine * dy, cosine * dy + sine * dx, bins)) + 1
-    nearest_squared = (distance - spread) ** 2
-    for k in range(first, last + 1 if last >= first else last + bins + 1):
-        if targets.hidden[m, k % bins] > nearest_squared:
-            return False
-    return True
+    last += bins if last < k else 0
+    largest_hidden, smallest_clear = np.float32(0.0), np.float32(math.inf)
+    while k <= last:
+        at = k % bins
+        # A block that lies in the interval as a whole is one look; at the ends bins are looked at one by one.
+        if at % BLOCK == 0 and k + BLOCK - 1 <= last:
+            largest_hidden = max(largest_hidden, hidden_blocks[at // BLOCK])
+            smallest_clear = min(smallest_clear, clear_blocks[at // BLOCK])
+            k += BLOCK
+        else:
+            largest_hidden, smallest_clear = max(largest_hidden, hidden[at]), min(smallest_clear, clear[at])
+            k += 1
+        if largest_hidden > near * near and (not can_be_clear or smallest_clear < far * far):
+            return MIXED
+    return ALL_HIDDEN if largest_hidden <= near * near else ALL_CLEAR
 
 
 @compiled
@@ -283,6 +332,7 @@ def visible_mask(  # noqa: PLR0917 - points grouped by buckets
     mask : (N, ceil(M / 64)) array, zero on entry.
     """
     seen = np.empty(len(order), dtype=np.bool_)
+    centers, farthest = targets.centers, targets.farthest
     for b in range(len(starts) - 1):
         members = order[starts[b] : starts[b + 1]]
         low_x, high_x, low_y, high_y = math.inf, -math.inf, math.inf, -math.inf
@@ -290,10 +340,19 @@ def visible_mask(  # noqa: PLR0917 - points grouped by buckets
             low_x, high_x = min(low_x, points[n, 0]), max(high_x, points[n, 0])
             low_y, high_y = min(low_y, points[n, 1]), max(high_y, points[n, 1])
         spread = 0.5 * math.hypot(high_x - low_x, high_y - low_y) + 1e-9
-        for m in range(len(targets.radii)):
-            if in_shadow(targets, m, 0.5 * (low_x + high_x), 0.5 * (low_y + high_y), spread):
+        middle_x, middle_y = 0.5 * (low_x + high_x), 0.5 * (low_y + high_y)
+        for m in range(len(farthest)):
+            dx, dy = middle_x - centers[m, 0], middle_y - centers[m, 1]
+            # Most reflectors are too far away; this is said here, where it costs the least.
+            if dx * dx + dy * dy > (farthest[m] + spread) ** 2:
                 continue
-            see_points(tables, targets, m, points, members, seen)
+            sight = sight_of_disc(targets, m, dx, dy, spread)
+            if sight == ALL_HIDDEN:
+                continue
+            if sight == ALL_CLEAR:
+                seen[: len(members)] = True
+            else:
+                see_points(tables, targets, m, points, members, seen)
             word, bit = m >> 6, np.uint64(1) << np.uint64(m & 63)
             for i in range(len(members)):
                 if seen[i]:

@@ -19,14 +19,14 @@ from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
 from commission.geometry.se2 import compose
 from commission.planning import shadow_kernels
-from commission.planning.shadow_kernels import BitMask, Targets
+from commission.planning.shadow_kernels import BLOCK, BitMask, Targets
 from commission.site.checks import at_least, between
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 
-# Points are handled in squares of this edge [m]: reflectors out of sight of a whole square are skipped at once.
-BUCKET = 4.0
+# Points are handled in squares of this edge [m]: whether a whole square sees a reflector is often one answer.
+BUCKET = 2.0
 # Bearings this far outside the field of view still count [rad]: the last beam of a scan is rounded too.
 BEARING_TOLERANCE = 1e-9
 
@@ -155,7 +155,7 @@ class VisibilityModel:
 
     def bins_for(self, reflector: Reflector) -> int:
         """Bins of direction that a reflector needs; one that is seen from farther away needs more."""
-        return _bins(_limits(reflector, self.scanner, self.options)[1], self.caster.grid.resolution)
+        return _bins(_limits(reflector, self.scanner, self.options)[1], self.caster.grid)
 
 
 def visibility_model(project: Project, options: VisibilityOptions | None = None) -> VisibilityModel:
@@ -187,7 +187,7 @@ def build_visibility(
     """
     count = len(reflectors)
     limits = np.array([_limits(r, scanner, options) for r in reflectors.reflectors]).reshape(-1, 3)
-    bins = _bins(float(limits[:, 1].max(initial=1.0)), caster.grid.resolution)
+    bins = _bins(float(limits[:, 1].max(initial=1.0)), caster.grid)
     normals = np.stack((np.cos(reflectors.headings), np.sin(reflectors.headings)), axis=-1)
     targets = Targets(
         centers=np.array(reflectors.centers),
@@ -199,6 +199,8 @@ def build_visibility(
         cosine_limit=math.cos(math.radians(options.max_incidence_deg)),
         clear=np.empty((count, bins), dtype=np.float32),
         hidden=np.empty((count, bins), dtype=np.float32),
+        clear_blocks=np.empty((count, bins // BLOCK), dtype=np.float32),
+        hidden_blocks=np.empty((count, bins // BLOCK), dtype=np.float32),
     )
     shadow_kernels.cast_shadows(caster.tables, targets)
     return VisibilityModel(reflectors, scanner, options, caster, targets)
@@ -216,6 +218,8 @@ def copied(targets: Targets) -> Targets:
         cosine_limit=targets.cosine_limit,
         clear=targets.clear.copy(),
         hidden=targets.hidden.copy(),
+        clear_blocks=targets.clear_blocks.copy(),
+        hidden_blocks=targets.hidden_blocks.copy(),
     )
 
 
@@ -227,15 +231,7 @@ def replace_target(targets: Targets, index: int, reflector: Reflector, model: Vi
     targets.radii[index] = reflector.radius
     targets.normals[index] = (math.cos(reflector.heading), math.sin(reflector.heading)) if is_flat else (0.0, 0.0)
     targets.nearest[index], targets.farthest[index], targets.promised[index] = nearest, farthest, promised
-    shadow_kernels.cast_shadow(
-        model.caster.tables,
-        reflector.x,
-        reflector.y,
-        reflector.radius,
-        farthest,
-        targets.clear[index],
-        targets.hidden[index],
-    )
+    shadow_kernels.cast_shadow(model.caster.tables, targets, index)
 
 
 def field_of_view(scanner: Scanner) -> tuple[float, float]:
@@ -281,10 +277,12 @@ def _limits(reflector: Reflector, scanner: Scanner, options: VisibilityOptions) 
     return scanner.range[0] + depth, min(farthest, promised), promised
 
 
-def _bins(farthest: float, cell: float) -> int:
-    """Bins of direction, so that even the widest one (on a diagonal) is narrower than a cell at that range."""
-    needed = 4.0 * math.sqrt(2.0) * farthest / (0.95 * cell)
-    return 64 * max(1, math.ceil(needed / 64))
+def _bins(farthest: float, grid: OccupancyGrid) -> int:
+    """Bins of direction, so that even the widest is narrower than a cell at that range."""
+    yaw = float(grid.origin[2])
+    per_bin = shadow_kernels.trusted_range(grid.resolution, math.sin(yaw), math.cos(yaw), 1)
+    # What is hit a cell's diagonal beyond the range still matters.
+    return BLOCK * max(1, math.ceil((farthest + 2.0 * grid.resolution) / (per_bin * BLOCK)))
 
 
 @compiled
