@@ -101,6 +101,38 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
         modes[k], seen[k], on_odometry[k] = mode, found, metres[k] - last_seen_at
 
 
+@compiled
+def separations(  # noqa: PLR0917 - the columns of a drive
+    scans: IntArray,
+    poses: FloatArray,
+    prior_covariances: FloatArray,
+    places: FloatArray,
+    reflector: int,
+    neighbor: int,
+    model: PredictionModel,
+    squared: FloatArray,
+) -> None:
+    """Squared Mahalanobis distance between the expected observations of two reflectors at some scans.
+
+    Parameters
+    ----------
+    scans : (n,) rows of `poses` and `prior_covariances`.
+    places : (M, 3) x, y and variance of each reflector.
+    reflector, neighbor : rows of `places`; the covariance is that of the reflector's innovation.
+    squared : (n,) output.
+    """
+    for i in range(len(scans)):
+        x, y, theta = poses[scans[i], 0], poses[scans[i], 1], poses[scans[i], 2]
+        c = prior_covariances[scans[i]]
+        belief = PoseGaussian(x, y, theta, c[0, 0], c[0, 1], c[0, 2], c[1, 1], c[1, 2], c[2, 2])
+        offset_x, offset_y = scanner_offset(theta, model.observation)
+        mount = model.observation.mount_theta
+        own = expect(x, y, theta, offset_x, offset_y, places[reflector, 0], places[reflector, 1], mount)
+        other = expect(x, y, theta, offset_x, offset_y, places[neighbor, 0], places[neighbor, 1], mount)
+        between = innovation(belief, own, other.range, other.bearing, places[reflector, 2], model.observation)
+        squared[i] = squared_distance(between)
+
+
 @compiled_inline
 def _inside_gate(  # noqa: PLR0917 - a measurement, number by number
     prior: PoseGaussian, distance: float, bearing: float, places: FloatArray, m: int, model: PredictionModel

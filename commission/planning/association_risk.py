@@ -1,0 +1,108 @@
+"""Ambiguity while the pose is tracked: neighbors inside each other's gate along a route, and how often they mislead.
+
+Poses without any history are in `ambiguity`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
+from scipy.special import ndtr  # pyright: ignore[reportAttributeAccessIssue]
+
+from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.planning.prediction_kernels import separations
+from commission.planning.route_prediction import PlannedRoute, RoutePrediction
+
+WITHOUT_GATE = 25.0
+"""Squared Mahalanobis distance within which neighbors are listed when there is no gate: one mistake in 160."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NeighborRisk:
+    """Two reflectors that may be taken for each other on a route."""
+
+    reflector: int
+    """The one that is detected: index into the reflector map."""
+    neighbor: int
+    """The one it may be taken for."""
+    scans: IntArray
+    """Scans of the drive at which the neighbor lies inside the gate of the reflector."""
+    metres: FloatArray
+    """Way driven at those scans [m]."""
+    probability: FloatArray
+    """Probability at each of them that a detection of the reflector fits the neighbor better [0..0.5]."""
+
+    @property
+    def worst(self) -> float:
+        """Largest probability."""
+        return float(self.probability.max())
+
+
+def neighbor_risks(planned: PlannedRoute, prediction: RoutePrediction) -> tuple[NeighborRisk, ...]:
+    """Find the reflectors whose neighbors are closer than the gate along a route.
+
+    With S the innovation covariance and d the difference between the two expected observations, a detection is nearer
+    to the wrong one (in Mahalanobis distance, by which the association decides up to det S) with the probability
+    Phi(-sqrt(d^T S^-1 d) / 2). Where both reflectors are detected in one scan, the localizer lets only the nearer of
+    two claims stand: then a wrong association also needs the other detection to go astray or missing.
+
+    Parameters
+    ----------
+    planned : drive and visible reflectors.
+    prediction : of that drive; its covariance before each scan is what the gate is made of.
+
+    Returns
+    -------
+    risks : the most probable first; empty with fewer than two reflectors.
+    """
+    centers = planned.places[:, :2]
+    model = planned.model()
+    if len(centers) < 2 or not len(planned.visible.indices):
+        return ()
+    gate = model.gate_d2 if math.isfinite(model.gate_d2) else WITHOUT_GATE
+    pairs = cKDTree(centers).query_pairs(_reach(planned, prediction, gate), output_type="ndarray").reshape(-1, 2)
+    risks: list[NeighborRisk] = []
+    sees = _scans_by_reflector(planned)
+    for reflector, neighbor in np.concatenate((pairs, pairs[:, ::-1])).tolist():
+        scans = sees[reflector]
+        squared = np.empty(len(scans))
+        separations(
+            scans,
+            planned.drive.poses,
+            prediction.prior_covariances,
+            planned.places,
+            reflector,
+            neighbor,
+            model,
+            squared,
+        )
+        inside = squared <= gate
+        if inside.any():
+            probability = np.asarray(ndtr(-0.5 * np.sqrt(squared[inside])), dtype=np.float64)
+            chosen = scans[inside]
+            metres = planned.drive.metres[chosen]
+            risks.append(NeighborRisk(reflector, neighbor, read_only(chosen), metres, read_only(probability)))
+    return tuple(sorted(risks, key=lambda risk: (-risk.worst, risk.reflector, risk.neighbor)))
+
+
+def _reach(planned: PlannedRoute, prediction: RoutePrediction, gate: float) -> float:
+    """Distance on the floor beyond which no neighbor is ever inside a gate [m]."""
+    variances = np.diagonal(prediction.prior_covariances, axis1=1, axis2=2).max(axis=0)
+    noise = planned.parameters.observation
+    surveyed = float(planned.places[:, 2].max(initial=0.0))
+    farthest = float(planned.farthest.max(initial=0.0)) + float(np.hypot(*planned.mounting[:2]))
+    # Range and bearing each within sqrt(gate) of their own sigma; the bearing seen from the farthest reflector.
+    along = variances[0] + variances[1] + noise.range_sigma**2 + surveyed
+    across = variances[0] + variances[1] + surveyed + farthest**2 * (variances[2] + noise.bearing_sigma**2)
+    return math.sqrt(gate * (along + across))
+
+
+def _scans_by_reflector(planned: PlannedRoute) -> list[IntArray]:
+    """Scans at which each reflector is visible."""
+    scans = np.repeat(np.arange(len(planned.drive), dtype=np.int64), planned.visible.counts())
+    order = np.argsort(planned.visible.indices, kind="stable")
+    starts = np.searchsorted(planned.visible.indices[order], np.arange(len(planned.places) + 1))
+    return [scans[order[starts[m] : starts[m + 1]]] for m in range(len(planned.places))]
