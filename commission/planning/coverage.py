@@ -126,7 +126,7 @@ def coverage(
 ) -> Coverage:
     """Visibility and dilution at every point of a lattice.
 
-    Memory: 75 bytes per point of the lattice for points and figures, and one tile (`POINTS_PER_TILE`); time is linear
+    Memory: about 100 bytes per point of the lattice, and one tile (`POINTS_PER_TILE`) of masks; time is linear
     in the area.
 
     Parameters

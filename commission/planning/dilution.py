@@ -167,7 +167,8 @@ def fix_covariances(model: VisibilityModel, T_map_base: ArrayLike, options: FixO
     ----------
     model : reflectors, scanner and walls.
     T_map_base : (N, 3) array of poses [m, m, rad].
-    options : measurement model; its headings are not read, since a pose has one.
+    options : measurement model; with `all-round` the field of view does not limit, with any other heading it does, and
+        the heading itself is that of the pose.
 
     Returns
     -------
@@ -175,7 +176,7 @@ def fix_covariances(model: VisibilityModel, T_map_base: ArrayLike, options: FixO
         its diagonal is infinite and the rest zero.
     """
     poses = np.asarray(T_map_base, dtype=np.float64).reshape(-1, 3)
-    visible = model.visible_from_poses(poses)
+    visible = model.visible_from_poses(poses, all_round=options.heading is Heading.ALL_ROUND)
     T_map_scanner = compose(poses, model.scanner.mounting)
     covariances = np.empty((len(poses), 3, 3))
     dilution_kernels.fill_covariances(

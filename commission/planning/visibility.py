@@ -120,12 +120,13 @@ class VisibilityModel:
             shadow_kernels.visible_mask(self.caster.tables, self.targets, xy, order, starts, mask)
         return mask
 
-    def visible_from_poses(self, poses: ArrayLike) -> VisibleReflectors:
+    def visible_from_poses(self, poses: ArrayLike, *, all_round: bool = False) -> VisibleReflectors:
         """Reflectors inside the field of view from poses of the vehicle.
 
         Parameters
         ----------
         poses : (N, 3) array `T_map_base` [m, m, rad]; the scanner's mounting is added here.
+        all_round : whether to look all around, whatever the field of view.
 
         Returns
         -------
@@ -133,7 +134,7 @@ class VisibilityModel:
         """
         T_map_scanner = compose(np.asarray(poses, dtype=np.float64).reshape(-1, 3), self.scanner.mounting)
         mask = self.visible(T_map_scanner[:, :2])
-        first, width = field_of_view(self.scanner)
+        first, width = (-math.pi, 2.0 * math.pi) if all_round else field_of_view(self.scanner)
         offsets = np.zeros(len(mask) + 1, dtype=np.int64)
         # Two passes over the bits: the first counts, so that the second writes into an array of the right size.
         _list_visible(mask, T_map_scanner, self.targets.centers, first, width, offsets, np.empty(0, dtype=np.int64))

@@ -213,11 +213,19 @@ def test_worst_and_best_heading_bracket_every_given_one():
 def test_a_given_heading_is_the_fix_of_that_pose_with_its_mounting():
     model = open_field(np.random.default_rng(5).uniform(-8.0, 8.0, (6, 2)), narrow((0.6, -0.2, 0.4)))
     points = np.random.default_rng(6).uniform(-4.0, 4.0, (10, 2))
-    found = fixes(model, points, FixOptions(heading=Heading.GIVEN, given_heading=2.0))
-    covariances = fix_covariances(model, np.column_stack((points, np.full(10, 2.0))), FixOptions())
+    options = FixOptions(heading=Heading.GIVEN, given_heading=2.0)
+    found = fixes(model, points, options)
+    covariances = fix_covariances(model, np.column_stack((points, np.full(10, 2.0))), options)
     np.testing.assert_allclose(found.heading_sigma, np.sqrt(covariances[:, 2, 2]), rtol=1e-9)
     longest = np.array([np.linalg.eigvalsh(c[:2, :2])[1] if np.isfinite(c[0, 0]) else np.inf for c in covariances])
     np.testing.assert_allclose(found.position_sigma, np.sqrt(longest), rtol=1e-9)
+
+
+def test_an_ellipse_for_all_round_is_that_of_a_full_turn():
+    centers = np.random.default_rng(5).uniform(-8.0, 8.0, (6, 2))
+    poses = np.random.default_rng(6).uniform(-3.0, 3.0, (10, 3))
+    limited = fix_covariances(open_field(centers, narrow()), poses, FixOptions(heading=Heading.ALL_ROUND))
+    np.testing.assert_array_equal(limited, fix_covariances(open_field(centers), poses, FixOptions()))
 
 
 def test_figures_among_people_are_those_of_all_combinations_of_blocked_rays():
