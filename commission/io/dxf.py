@@ -1,0 +1,289 @@
+"""Floor plans from CAD drawings (DXF): lines, polylines with bulges, arcs, circles, ellipses, splines and blocks.
+
+A drawing is loaded once, as a job with progress; layers and resolution are chosen afterwards, on what was loaded.
+Texts, dimensions and hatches are no walls and are left out; how many is said.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from array import array
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.errors import FileFormatError, UsageError
+from commission.geometry.arrays import FloatArray, read_only
+from commission.io.dxf_shapes import Affine, Insert, Shape, insert_of, shapes_of
+from commission.io.dxf_tags import Group, read_groups, text_of
+from commission.io.findings import Findings, Progress, shown, silent
+from commission.io.outline import outline_map
+from commission.site.floor_map import FloorMap
+
+UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048, "dm": 0.1, "km": 1000.0}
+"""Metres in each unit that a drawing may be made in."""
+TOLERANCE = 0.001
+"""Distance [m] between a curve and its chords: a fiftieth of a map's usual cell."""
+SEGMENT_LIMIT = 10_000_000
+"""Segments of a drawing after its blocks are expanded; each takes 36 bytes."""
+INSERT_LIMIT = 200_000
+"""Blocks inserted, each repetition counted."""
+DEPTH_LIMIT = 32
+"""Blocks within blocks."""
+
+_INSERTS_PER_REPORT = 1000
+_UNIT_CODES = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 14: "dm"}
+_DRAWN = {b"LINE", b"LWPOLYLINE", b"POLYLINE", b"ARC", b"CIRCLE", b"ELLIPSE", b"SPLINE", b"INSERT"}
+_PARTS = {b"VERTEX", b"SEQEND", b"ATTRIB", b"ENDBLK", b"ENDSEC"}
+_BLIND_TOLERANCE = 0.02
+"""Tolerance in drawing units while the unit is unknown: 20 mm if they are metres, not too fine if millimetres."""
+_LARGEST_HALL = 1000.0
+"""A drawing without a unit that is larger than this is in millimetres, a smaller one in metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class DrawingLayer:
+    """One layer of a drawing."""
+
+    name: str
+    """Its name."""
+    is_visible: bool
+    """Whether it is switched on and thawed."""
+    segments: int
+    """Segments on it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawing:
+    """The lines of a drawing."""
+
+    path: Path
+    """Where it comes from."""
+    unit: str
+    """Unit in which it was drawn."""
+    layers: tuple[DrawingLayer, ...]
+    """Layers that hold lines."""
+    segments: FloatArray
+    """(N, 2, 2) start and end points [m]."""
+    layer_of: NDArray[np.int32]
+    """(N,) index of each segment's layer."""
+    warnings: tuple[str, ...]
+    """What was left out or assumed, one line each."""
+
+    def on(self, layers: Collection[str] | None = None) -> FloatArray:
+        """Segments on the named layers, on all visible ones when None: (M, 2, 2) array [m].
+
+        Raises UsageError, which names the layers that there are, for a name that is none of them.
+        """
+        names = [layer.name for layer in self.layers]
+        for name in layers or ():
+            if name not in names:
+                raise UsageError(f"no layer is called {name!r}; the drawing has: {', '.join(map(shown, names[:20]))}")
+        chosen = [layer.is_visible if layers is None else layer.name in layers for layer in self.layers]
+        return self.segments[np.array(chosen, dtype=np.bool_)[self.layer_of]]
+
+    def floor_map(
+        self, resolution: float, layers: Collection[str] | None = None, progress: Progress = silent
+    ) -> FloorMap:
+        """Outline of the named layers (all visible ones when None) in cells of `resolution` [m]; see `outline_map`."""
+        return outline_map(self.on(layers), resolution, self.path, progress)
+
+
+def read_drawing(path: Path, *, unit: str | None = None, progress: Progress = silent) -> Drawing:
+    """Read the lines of a drawing.
+
+    Parameters
+    ----------
+    path : DXF file, text or binary, of any version.
+    unit : key of `UNITS` in which it was drawn; what the drawing states when None, else judged by its size.
+    progress : told how far the reading is; may raise to cancel.
+
+    Returns
+    -------
+    drawing : all layers; curves are cut into chords within TOLERANCE.
+
+    Raises
+    ------
+    FileFormatError
+        the file is no complete DXF, or too large. An entity that cannot be read is passed over and counted.
+    UsageError
+        the unit is unknown.
+    """
+    if unit is not None and unit not in UNITS:
+        raise UsageError(f"unit is {unit!r}; expected one of: {', '.join(UNITS)}")
+    reader = _Reader(path, unit, progress)
+    for group in read_groups(path, reader.report):
+        reader.take(group)
+    reader.finish()
+    return reader.drawing()
+
+
+@dataclass(frozen=True, slots=True)
+class _Block:
+    """Content of a block, in its own coordinates."""
+
+    base: tuple[float, float]
+    content: list[tuple[str, Shape | Insert]]
+
+
+class _Reader:
+    """Takes a drawing's groups in the order of the file."""
+
+    def __init__(self, path: Path, unit: str | None, progress: Progress) -> None:
+        self._path = path
+        self._progress = progress
+        self._fraction = 0.0
+        self._unit = unit
+        self._found = Findings()
+        self._blocks: dict[str, _Block] = {}
+        self._hidden: set[str] = set()
+        self._left_out: Counter[str] = Counter()
+        self._section = ""
+        self._block: _Block | None = None
+        self._polyline: tuple[Group, list[Group]] | None = None
+        self._coordinates = array("d")
+        self._layers = array("i")
+        self._names: dict[str, int] = {}
+        self._inserts = 0
+
+    def report(self, fraction: float, message: str) -> None:
+        """Tell how much of the file is read."""
+        self._fraction = fraction
+        self._progress(fraction, message)
+
+    def take(self, group: Group) -> None:
+        """Take the next group."""
+        if self._polyline is not None and group.kind == b"VERTEX":
+            self._polyline[1].append(group)
+            return
+        self.finish()
+        if group.kind == b"SECTION":
+            self._section = group.name(2).upper()
+            if self._section == "HEADER":
+                self._read_header(group)
+        elif self._section == "TABLES" and group.kind == b"LAYER":
+            self._read_layer(group)
+        elif self._section == "BLOCKS" and group.kind == b"BLOCK":
+            self._open_block(group)
+        elif self._section in ("BLOCKS", "ENTITIES") and group.kind not in _PARTS:
+            self._take_entity(group)
+
+    def finish(self) -> None:
+        """Draw the polyline whose vertices have come one by one."""
+        if self._polyline is not None:
+            polyline, vertices = self._polyline
+            self._polyline = None
+            self._add(polyline, vertices)
+
+    def drawing(self) -> Drawing:
+        """Everything that was taken."""
+        segments = np.frombuffer(self._coordinates, dtype=np.float64).reshape(-1, 2, 2)
+        layer_of = np.frombuffer(self._layers, dtype=np.int32)
+        unit = self._unit
+        if unit is None:
+            extent = float(np.ptp(segments.reshape(-1, 2), axis=0).max()) if len(segments) else 0.0
+            unit = "mm" if extent > _LARGEST_HALL else "m"
+            self._found.add("", f"the drawing names no unit; judged by its size, it is drawn in {unit}")
+        for kind, count in self._left_out.most_common():
+            self._found.add("", f"{count} entities of kind {shown(kind)} are no walls or not understood, and left out")
+        counts = np.bincount(layer_of, minlength=len(self._names)).tolist()
+        layers = tuple(DrawingLayer(name, name not in self._hidden, counts[i]) for name, i in self._names.items())
+        return Drawing(
+            self._path, unit, layers, read_only(segments * UNITS[unit]), read_only(layer_of), self._found.lines()
+        )
+
+    def _read_header(self, group: Group) -> None:
+        """Unit of the drawing; a header is one group of names (code 9), each with its value behind it."""
+        for (code, name), (_, value) in itertools.pairwise(group.tags):
+            if code == 9 and name == b"$INSUNITS" and self._unit is None and value.isdigit():
+                self._unit = _UNIT_CODES.get(int(value[:6]))
+
+    def _read_layer(self, group: Group) -> None:
+        try:
+            is_frozen, is_off = group.whole(70) & 1, group.whole(62, 7) < 0
+        except ValueError:
+            is_frozen, is_off = 0, False
+        if is_frozen or is_off:
+            self._hidden.add(group.name(2))
+
+    def _open_block(self, group: Group) -> None:
+        try:
+            base = (group.number(10), group.number(20))
+        except ValueError:
+            base = (0.0, 0.0)
+        self._block = _Block(base, [])
+        self._blocks[group.name(2).upper()] = self._block
+
+    def _take_entity(self, group: Group) -> None:
+        """Draw an entity, or keep it in the block that is open."""
+        if group.kind not in _DRAWN:
+            self._left_out[text_of(group.kind)[:40]] += 1
+        elif group.kind == b"POLYLINE":
+            self._polyline = (group, [])
+        else:
+            self._add(group, ())
+
+    def _add(self, group: Group, vertices: Sequence[Group]) -> None:
+        try:
+            # What lies on a sheet of paper (67) or is invisible (60) is no part of the hall.
+            if group.whole(67) or group.whole(60):
+                return
+            if group.kind == b"POLYLINE" and group.whole(70) & (16 | 64):
+                self._left_out["POLYLINE (mesh)"] += 1
+                return
+            content = [insert_of(group)] if group.kind == b"INSERT" else list(shapes_of(group, vertices))
+            layer = group.name(8) or "0"
+            if self._section == "BLOCKS":
+                if self._block is not None:
+                    self._block.content.extend((layer, part) for part in content)
+                return
+            for part in content:
+                self._draw(part, layer, Affine(), 0)
+        except (ValueError, KeyError, OverflowError, ZeroDivisionError, IndexError, TypeError) as error:
+            self._found.add(f"line {group.line}", f"{text_of(group.kind)} cannot be read ({type(error).__name__})")
+
+    def _draw(self, part: Shape | Insert, layer: str, to: Affine, depth: int) -> None:
+        if isinstance(part, Insert):
+            self._expand(part, layer, to, depth)
+            return
+        points = part.chords(to, TOLERANCE / UNITS[self._unit] if self._unit is not None else _BLIND_TOLERANCE)
+        number = self._names.setdefault(layer, len(self._names))
+        for (x1, y1), (x2, y2) in itertools.pairwise(points):
+            if not abs(x1) + abs(y1) + abs(x2) + abs(y2) < 1e12:
+                raise OverflowError("coordinates are too large")
+            self._coordinates.extend((x1, y1, x2, y2))
+            self._layers.append(number)
+        if len(self._layers) > SEGMENT_LIMIT:
+            problem = f"has over {SEGMENT_LIMIT} line segments once its blocks are expanded"
+            raise FileFormatError(self._path, "", problem, "a drawing of the walls alone")
+
+    def _expand(self, insert: Insert, layer: str, to: Affine, depth: int) -> None:
+        """Draw the content of a block as often as it is inserted; what is on layer 0 in it takes the insert's layer."""
+        block = self._blocks.get(insert.block.upper())
+        if block is None or depth >= DEPTH_LIMIT:
+            problem = "does not exist" if block is None else f"is nested over {DEPTH_LIMIT} deep, or in itself"
+            self._found.add(f"block {shown(insert.block)}", problem)
+            return
+        for index in range(insert.rows * insert.columns):
+            self._inserts += 1
+            if self._inserts % _INSERTS_PER_REPORT == 0:
+                self._progress(self._fraction, "expanding blocks")
+            if self._inserts > INSERT_LIMIT:
+                problem = f"inserts blocks over {INSERT_LIMIT} times"
+                raise FileFormatError(self._path, f"block {shown(insert.block)}", problem, "fewer")
+            row, column = divmod(index, insert.columns)
+            shift = Affine(
+                x0=row * insert.row_step[0] + column * insert.column_step[0],
+                y0=row * insert.row_step[1] + column * insert.column_step[1],
+            )
+            base = Affine(x0=-block.base[0], y0=-block.base[1])
+            inner = to.after(shift).after(insert.to).after(base)
+            if not math.isfinite(inner.xx + inner.xy + inner.yx + inner.yy + inner.x0 + inner.y0):
+                raise OverflowError("the block is scaled beyond numbers")
+            for own, part in block.content:
+                self._draw(part, layer if own == "0" else own, inner, depth + 1)

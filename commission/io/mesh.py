@@ -1,0 +1,205 @@
+"""Floor plans from 3D models (STL, OBJ, GLB, PLY): a horizontal section, such as a scanner sees at its height.
+
+trimesh reads the files; the section is cut here, in pieces, so that it reports progress and can be cancelled.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+import trimesh
+
+from commission.errors import FileFormatError, UsageError
+from commission.geometry.arrays import FloatArray, frozen
+from commission.io.dxf import UNITS
+from commission.io.findings import Progress, silent
+from commission.io.outline import outline_map
+from commission.io.reading import cannot_read, check_size
+from commission.site.floor_map import FloorMap
+
+SIZE_LIMIT = 512_000_000
+"""Bytes of a model."""
+FACE_LIMIT = 10_000_000
+"""Triangles of a model, each repetition of a part counted; each takes 72 bytes."""
+KINDS = ("stl", "obj", "glb", "ply")
+
+_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+_FACES_AT_ONCE = 200_000
+_BYTES_AT_ONCE = 4_000_000
+# What trimesh, numpy and struct raise for files that are not what they claim to be depends on format and place.
+_GARBAGE = (
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    ArithmeticError,
+    AssertionError,
+    NotImplementedError,
+    ImportError,
+    MemoryError,
+    RecursionError,
+    EOFError,
+    struct.error,
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Model:
+    """A 3D model of a hall."""
+
+    path: Path
+    """Where it comes from."""
+    triangles: FloatArray
+    """(N, 3, 3) corners [m], z up, z = 0 the model's own zero."""
+
+    @property
+    def bounds(self) -> FloatArray:
+        """Lowest and highest x, y, z: (2, 3) array [m]."""
+        points = self.triangles.reshape(-1, 3)
+        return np.array([points.min(axis=0), points.max(axis=0)])
+
+    def section(self, height: float, progress: Progress = silent) -> FloatArray:
+        """Cut the model by a horizontal plane.
+
+        Parameters
+        ----------
+        height : height of the plane [m].
+        progress : told how far the cutting is; may raise to cancel.
+
+        Returns
+        -------
+        segments : (M, 2, 2) array [m]. A point in the plane counts as above it, so that a closed body gives closed
+            outlines, whatever lies in the plane.
+        """
+        pieces: list[FloatArray] = [np.empty((0, 2, 2))]
+        for start in range(0, len(self.triangles), _FACES_AT_ONCE):
+            progress(start / len(self.triangles), f"cutting at {height:g} m")
+            pieces.append(_cut(self.triangles[start : start + _FACES_AT_ONCE], height))
+        progress(1.0, f"cutting at {height:g} m")
+        return np.concatenate(pieces)
+
+    def floor_map(self, heights: tuple[float, ...], resolution: float, progress: Progress = silent) -> FloorMap:
+        """Outline at one or several heights [m] in cells of `resolution` [m]; see `outline_map`."""
+        segments = [self.section(height, progress) for height in heights]
+        return outline_map(np.concatenate([np.empty((0, 2, 2)), *segments]), resolution, self.path, progress)
+
+
+def read_model(path: Path, *, unit: str = "m", y_up: bool | None = None, progress: Progress = silent) -> Model:
+    """Read a model.
+
+    Parameters
+    ----------
+    path : file; its ending says which format it has.
+    unit : key of `UNITS` in which it was made; GLB is always in metres.
+    y_up : whether y points up, as GLB demands; that for GLB and z for the others when None.
+    progress : told how far the reading is; may raise to cancel, though not while trimesh makes triangles of the file.
+
+    Raises
+    ------
+    FileFormatError
+        another ending, a file too large or not of its format, no triangles, or one that is not finite.
+    UsageError
+        the unit is unknown.
+    """
+    kind = path.suffix.lower().removeprefix(".")
+    if kind not in KINDS:
+        raise FileFormatError(path, "", f"ends in {path.suffix!r}", f"a model: {', '.join(f'.{k}' for k in KINDS)}")
+    if unit not in UNITS:
+        raise UsageError(f"unit is {unit!r}; expected one of: {', '.join(UNITS)}")
+    check_size(path, SIZE_LIMIT)
+    try:
+        with path.open("rb") as file:
+            source = _Reported(file, path.stat().st_size, progress)
+            # No resolver: a model refers to no other files. No materials: pictures are not decoded.
+            loaded = trimesh.load(source, file_type=kind, process=False, skip_materials=True)  # type: ignore[arg-type]
+            progress(0.9, "collecting triangles")
+            triangles = _triangles(path, loaded)
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    except _GARBAGE as error:
+        raise FileFormatError(path, "", f"is no readable {kind.upper()} ({error})", "a complete model") from error
+    if kind == "glb" if y_up is None else y_up:
+        triangles = triangles @ _Y_UP.T
+    return Model(path, frozen(triangles * (1.0 if kind == "glb" else UNITS[unit]), (None, 3, 3), "triangles"))
+
+
+class _Reported:
+    """A file that reports how much of it has been read, and so is the place where reading can be cancelled."""
+
+    def __init__(self, file: IO[bytes], size: int, progress: Progress) -> None:
+        self._file = file
+        self._size = max(size, 1)
+        self._progress = progress
+        self.mode = "rb"
+
+    def read(self, count: int = -1) -> bytes:
+        """Read in pieces, however much is asked for."""
+        wanted = self._size if count is None or count < 0 else min(count, self._size)
+        pieces: list[bytes] = []
+        while wanted > 0 and (piece := self._file.read(min(wanted, _BYTES_AT_ONCE))):
+            pieces.append(piece)
+            wanted -= len(piece)
+            self._progress(0.5 * self._file.tell() / self._size, "reading the model")
+        return b"".join(pieces)
+
+    def readline(self, limit: int = -1) -> bytes:
+        """Next line."""
+        return self._file.readline(limit)
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        """Move to a byte."""
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        """Byte that is read next."""
+        return self._file.tell()
+
+    def close(self) -> None:
+        """Nothing: the file is closed by whoever opened it."""
+
+
+def _triangles(path: Path, loaded: object) -> FloatArray:
+    """(N, 3, 3) corners of all parts of a model, each part as often as the scene shows it."""
+    if isinstance(loaded, trimesh.Trimesh):
+        parts = [(loaded, np.eye(4))]
+    elif isinstance(loaded, trimesh.Scene):
+        graph = loaded.graph
+        placed = [graph.get(node) for node in graph.nodes_geometry]
+        parts = [(loaded.geometry[name], transform) for transform, name in placed]
+    else:
+        parts = []
+    meshes = [(part, transform) for part, transform in parts if isinstance(part, trimesh.Trimesh)]
+    count = sum(len(mesh.faces) for mesh, _ in meshes)
+    if not 0 < count <= FACE_LIMIT:
+        raise FileFormatError(path, "", f"has {count} triangles", f"1 to {FACE_LIMIT}")
+    pieces: list[FloatArray] = []
+    for mesh, transform in meshes:
+        points = np.asarray(mesh.vertices, dtype=np.float64)
+        moved = points @ np.asarray(transform)[:3, :3].T + np.asarray(transform)[:3, 3]
+        pieces.append(moved[np.asarray(mesh.faces)])
+    triangles = np.concatenate(pieces)
+    if not np.isfinite(triangles).all():
+        raise FileFormatError(path, "", "holds a corner that is not finite", "finite coordinates")
+    return triangles
+
+
+def _cut(triangles: FloatArray, height: float) -> FloatArray:
+    """(M, 2, 2) segments in which triangles meet the plane z = height."""
+    above = triangles[:, :, 2] >= height
+    crossing = triangles[above.any(axis=1) & ~above.all(axis=1)]
+    above = crossing[:, :, 2] >= height
+    # Turn each triangle so that the corner that is alone on its side comes first: both crossed edges begin there.
+    is_alone = above == (above.sum(axis=1) == 1)[:, np.newaxis]
+    alone = np.argmax(is_alone, axis=1)
+    rows = np.arange(len(crossing))
+    tip = crossing[rows, alone]
+    ends = []
+    for step in (1, 2):
+        other = crossing[rows, (alone + step) % 3]
+        part = (height - tip[:, 2]) / (other[:, 2] - tip[:, 2])
+        ends.append(tip[:, :2] + part[:, np.newaxis] * (other[:, :2] - tip[:, :2]))
+    return np.stack(ends, axis=1)
