@@ -1,0 +1,48 @@
+"""The command `convert`: reflectors, routes, floor plans and recordings from one format into another."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, UseAppendAction, arg
+
+
+@dataclass(frozen=True, kw_only=True)
+class Convert:
+    """Convert reflectors, routes, floor plans and recordings from one format into another, told apart by their endings.
+
+    Reflectors: .csv, .imk. Routes: VDMA LIF (.lif, .json), VDA 5050 orders (.json, read only). Floor plans (read only):
+    .dxf, .stl, .obj, .glb, .ply; they become a map (.yaml). A project folder gives and takes all of these. A recording
+    becomes a CSV folder.
+    """
+
+    source: Annotated[Positional[Path], arg(metavar="IN")]
+    """File or folder to read."""
+    target: Annotated[Positional[Path], arg(metavar="OUT")]
+    """File or folder to write; a project that is there keeps what IN does not hold."""
+    vehicle_type: Annotated[str | None, arg(metavar="NAME")] = None
+    """LIF: vehicle type whose edges are read. None: the one with the most edges."""
+    layout: Annotated[str | None, arg(metavar="NAME")] = None
+    """LIF: identifier of the layout to read. None: all of them."""
+    unit: Annotated[str | None, arg(metavar="mm|cm|m|in|ft")] = None
+    """Drawing or model: unit in which it was made. None: what a drawing states; metres for a model."""
+    layer: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = ()
+    """Drawing: a layer that holds walls; repeat it for several. None: every visible layer."""
+    height: Annotated[UseAppendAction[tuple[float, ...]], arg(metavar="M")] = ()
+    """Model: height at which it is cut [m]; repeat it for several. None: 0.2 m, a safety scanner's."""
+    resolution: float = 0.05
+    """Drawing or model: edge of a cell of the map [m]."""
+
+    def run(self) -> None:
+        """Convert, and tell what was made up, doubted or lost."""
+        from commission.io.interchange import ConvertOptions, convert_file
+
+        options = ConvertOptions(
+            self.vehicle_type, self.layout, self.unit, self.layer, self.height or (0.2,), self.resolution
+        )
+        for line in convert_file(self.source, self.target, options):
+            sys.stdout.write(f"Note         {line}\n")
+        sys.stdout.write(f"Written to   {self.target}\n")

@@ -1,0 +1,244 @@
+"""From a file of one system to a file of another: which kinds there are, which go into which, and what gets lost.
+
+The formats themselves are modules beside this one.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+from commission.errors import FileFormatError, UsageError
+from commission.io import mesh
+from commission.io.dxf import read_drawing
+from commission.io.edges import RouteImport
+from commission.io.findings import Findings
+from commission.io.imk import read_imk, write_imk
+from commission.io.json_document import read_json
+from commission.io.lif import read_lif
+from commission.io.lif_writer import write_lif
+from commission.io.map_server import write_floor_map
+from commission.io.project_file import FILE_NAME, load_project, project_file, save_project
+from commission.io.recordings.base import open_recording
+from commission.io.recordings.csv_writer import write_recording
+from commission.io.reflector_tables import read_reflectors, write_reflectors
+from commission.io.vda5050 import read_order
+from commission.site.floor_map import FloorMap
+from commission.site.project import Project
+from commission.site.reflector_diff import difference
+from commission.site.reflectors import ReflectorMap
+
+
+class Kind(StrEnum):
+    """What a file holds, in the words of a message."""
+
+    PROJECT = "a project"
+    TABLE = "a reflector table (.csv)"
+    IMK = "a SICK layout (.imk)"
+    LIF = "a VDMA LIF layout (.lif, .json)"
+    ORDER = "a VDA 5050 order (.json)"
+    DRAWING = "a CAD drawing (.dxf)"
+    MODEL = "a 3D model (.stl, .obj, .glb, .ply)"
+    MAP = "a floor map (.yaml)"
+    RECORDING = "a recording"
+
+
+TARGETS: dict[Kind, tuple[Kind, ...]] = {
+    Kind.PROJECT: (Kind.TABLE, Kind.IMK, Kind.LIF, Kind.MAP),
+    Kind.TABLE: (Kind.IMK, Kind.TABLE, Kind.PROJECT),
+    Kind.IMK: (Kind.TABLE, Kind.IMK, Kind.PROJECT),
+    Kind.LIF: (Kind.PROJECT, Kind.LIF),
+    Kind.ORDER: (Kind.PROJECT, Kind.LIF),
+    Kind.DRAWING: (Kind.MAP, Kind.PROJECT),
+    Kind.MODEL: (Kind.MAP, Kind.PROJECT),
+    Kind.RECORDING: (Kind.RECORDING,),
+}
+"""Into which kinds each kind can be converted."""
+
+_SUFFIXES = {
+    ".csv": Kind.TABLE,
+    ".imk": Kind.IMK,
+    ".lif": Kind.LIF,
+    ".json": Kind.LIF,
+    ".dxf": Kind.DRAWING,
+    ".yaml": Kind.MAP,
+    **{f".{suffix}": Kind.MODEL for suffix in mesh.KINDS},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ConvertOptions:
+    """What a file leaves open."""
+
+    vehicle_type: str | None = None
+    """LIF: vehicle type whose edges are read; the most frequent when None."""
+    layout: str | None = None
+    """LIF: identifier of the layout that is read; all when None."""
+    unit: str | None = None
+    """Drawing, model: unit in which it was made; as the drawing states, metres for a model when None."""
+    layers: tuple[str, ...] = ()
+    """Drawing: layers that hold walls; all visible ones when empty."""
+    heights: tuple[float, ...] = (0.2,)
+    """Model: heights of the sections that become walls [m]."""
+    resolution: float = 0.05
+    """Drawing, model: edge of a cell of the map [m]."""
+
+
+def kind_of_source(path: Path) -> Kind:
+    """Kind of an existing file or folder; raises FileFormatError when it does not exist or is none of them."""
+    if not path.exists():
+        raise FileFormatError(path, "", "does not exist", "a file or folder to convert")
+    if path.is_dir() or path.name == FILE_NAME:
+        return Kind.PROJECT if project_file(path).is_file() else Kind.RECORDING
+    kind = _SUFFIXES.get(path.suffix.lower(), Kind.RECORDING)
+    if path.suffix.lower() == ".json" and "layouts" not in read_json(path, Findings()).values:
+        return Kind.ORDER
+    return kind
+
+
+def kind_of_target(path: Path, source: Kind) -> Kind:
+    """Kind that a file to be written shall have, by its ending; a name without one is a folder."""
+    if path.name == FILE_NAME:
+        return Kind.PROJECT
+    kind = _SUFFIXES.get(path.suffix.lower())
+    if kind is None or path.is_dir():
+        return Kind.RECORDING if source is Kind.RECORDING else Kind.PROJECT
+    return kind
+
+
+def convert_file(source: Path, target: Path, options: ConvertOptions) -> tuple[str, ...]:
+    """Convert a file or folder.
+
+    Parameters
+    ----------
+    source : what to read.
+    target : what to write. An existing project keeps what the source does not hold: reflectors and the floor map are
+        replaced, routes of the same name too, others stay.
+    options : what the source leaves open.
+
+    Returns
+    -------
+    report : what was made up, doubted or lost, one line each.
+
+    Raises
+    ------
+    FileFormatError
+        the source is unreadable or the target cannot be written.
+    UsageError
+        the one cannot become the other.
+    """
+    kind = kind_of_source(source)
+    if kind not in TARGETS:
+        raise UsageError(f"{source}: {kind} cannot be converted; expected {'; '.join(TARGETS)}")
+    wanted = kind_of_target(target, kind)
+    if wanted not in TARGETS[kind]:
+        remedy = "; ".join(TARGETS[kind])
+        raise UsageError(f"{target}: {kind} cannot become {wanted}; expected {remedy}")
+    if target.exists() and source.resolve() == target.resolve():
+        raise UsageError(f"{target} is the source itself; expected another place")
+    return _CONVERTERS[kind](source, target, wanted, options)
+
+
+def _from_project(source: Path, target: Path, wanted: Kind, _: ConvertOptions) -> tuple[str, ...]:
+    project = load_project(source)
+    if wanted is Kind.LIF:
+        return write_lif(project, target)
+    if wanted is Kind.MAP:
+        if project.floor_map is None:
+            raise UsageError(f"{source} has no floor map; expected a project with one")
+        return _written_map(project.floor_map, target, wanted)
+    return _written_reflectors(project.reflectors, target, wanted)
+
+
+def _from_reflectors(source: Path, target: Path, wanted: Kind, _: ConvertOptions) -> tuple[str, ...]:
+    if source.suffix.lower() == ".imk":
+        imported = read_imk(source)
+        return (*imported.warnings, *_written_reflectors(imported.reflectors, target, wanted))
+    return _written_reflectors(read_reflectors(source), target, wanted)
+
+
+def _from_routes(source: Path, target: Path, wanted: Kind, options: ConvertOptions) -> tuple[str, ...]:
+    imported = _routes(source, options)
+    if wanted is Kind.LIF:
+        return (*imported.warnings, *write_lif(Project(name=source.stem, routes=imported.routes), target))
+    project = _existing(target)
+    names = {route.name for route in imported.routes}
+    kept = tuple(route for route in project.routes if route.name not in names)
+    save_project(dataclasses.replace(project, routes=(*kept, *imported.routes)), _folder(target))
+    return (*imported.warnings, f"{len(imported.routes)} routes read, {len(kept)} others kept")
+
+
+def _routes(source: Path, options: ConvertOptions) -> RouteImport:
+    if kind_of_source(source) is Kind.ORDER:
+        return read_order(source)
+    return read_lif(source, vehicle_type=options.vehicle_type, layout=options.layout)
+
+
+def _from_drawing(source: Path, target: Path, wanted: Kind, options: ConvertOptions) -> tuple[str, ...]:
+    drawing = read_drawing(source, unit=options.unit)
+    floor_map = _checked(lambda: drawing.floor_map(options.resolution, options.layers or None))
+    return (*drawing.warnings, *_written_map(floor_map, target, wanted))
+
+
+def _from_model(source: Path, target: Path, wanted: Kind, options: ConvertOptions) -> tuple[str, ...]:
+    model = mesh.read_model(source, unit=options.unit or "m")
+    return _written_map(_checked(lambda: model.floor_map(options.heights, options.resolution)), target, wanted)
+
+
+def _from_recording(source: Path, target: Path, _: Kind, __: ConvertOptions) -> tuple[str, ...]:
+    write_recording(target, open_recording(source).records())
+    return ()
+
+
+def _written_reflectors(reflectors: ReflectorMap, target: Path, wanted: Kind) -> tuple[str, ...]:
+    if wanted is Kind.IMK:
+        return write_imk(reflectors, target)
+    if wanted is Kind.TABLE:
+        write_reflectors(reflectors, target)
+        return ()
+    project = _existing(target)
+    diff = difference(project.reflectors, reflectors)
+    save_project(dataclasses.replace(project, reflectors=reflectors), _folder(target))
+    added, changed, removed = len(diff.added), len(diff.changed), len(diff.removed)
+    return (f"reflectors: {added} added, {changed} changed, {removed} removed, {diff.unchanged} as before",)
+
+
+def _written_map(floor_map: FloorMap, target: Path, wanted: Kind) -> tuple[str, ...]:
+    if wanted is Kind.MAP:
+        write_floor_map(floor_map, target)
+    else:
+        save_project(dataclasses.replace(_existing(target), floor_map=floor_map), _folder(target))
+    width, height = floor_map.size
+    return (f"floor map of {width:.2f} x {height:.2f} m, cells of {floor_map.resolution:g} m",)
+
+
+def _existing(target: Path) -> Project:
+    """Project that is there already, or a new one."""
+    return load_project(target) if project_file(target).is_file() else Project(name=_folder(target).name or "Unnamed")
+
+
+def _folder(target: Path) -> Path:
+    return target.parent if target.name == FILE_NAME else target
+
+
+def _checked(make: Callable[[], FloorMap]) -> FloorMap:
+    """A wrong resolution came from the user, not from the file."""
+    try:
+        return make()
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+
+
+_CONVERTERS: dict[Kind, Callable[[Path, Path, Kind, ConvertOptions], tuple[str, ...]]] = {
+    Kind.PROJECT: _from_project,
+    Kind.TABLE: _from_reflectors,
+    Kind.IMK: _from_reflectors,
+    Kind.LIF: _from_routes,
+    Kind.ORDER: _from_routes,
+    Kind.DRAWING: _from_drawing,
+    Kind.MODEL: _from_model,
+    Kind.RECORDING: _from_recording,
+}
