@@ -18,7 +18,7 @@ from commission.app.panels.tune_panel import KNOBS, SWITCHES, TunePanel, meant, 
 from commission.app.reducer import parameter, with_parameter
 from commission.app.server import start_server
 from commission.app.session import Drive, Session
-from commission.app.store import AppState
+from commission.app.store import AppState, LastEdit
 from commission.app.view import PageView
 from commission.localization.estimate import Mode
 from commission.localization.setup import LocalizerSetup
@@ -92,8 +92,11 @@ def test_sliders_follow_undo_but_not_their_own_drag(server: viser.ViserServer, p
     key = "supervisor.position_limit"
     panel = TunePanel(server.gui, lambda _action: None, AppState(project, project))
     edited = replace(project, parameters=with_parameter(project.parameters, key, 0.2))
-    panel.draw_slowly(PageView(AppState(edited, project), None))
+    change(panel._widgets[key], 200.0, client=object())
+    panel.draw_slowly(PageView(AppState(edited, project, last_edit=LastEdit(key, 0.0)), None))
     assert panel._widgets[key].value == 200.0
+    panel.draw_slowly(PageView(AppState(project, project), None))
+    assert panel._widgets[key].value == 100.0
 
 
 @pytest.mark.parametrize("key", sorted(KNOBS))

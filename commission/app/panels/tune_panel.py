@@ -144,10 +144,8 @@ class TunePanel(BasePanel):
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow undo, redo and reset; while somebody moves a slider, leave it alone."""
-        parameters = view.state.project.parameters
-        if parameters is self._parameters or view.state.last_edit is not None:
-            return
-        self.show(parameters)
+        if view.state.last_edit is None:
+            self.show(view.state.project.parameters)
 
     def show(self, parameters: Parameters) -> None:
         """Set every widget."""

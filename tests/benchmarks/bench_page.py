@@ -1,0 +1,67 @@
+"""What the page costs its server: 25 scans a second of about 1,081 beams in the laboratory, one browser connected.
+
+The browser is a raw websocket client in a process of its own that takes in everything, so that drawing does not count.
+Required: less than 40 % of one core. Run: python -m tests.benchmarks.bench_page [seconds]
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+import time
+from dataclasses import replace
+
+import viser
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+from commission.app.actions import Repeat, VirtualDrive
+from commission.app.launch import open_page
+from commission.app.server import start_server
+from commission.io.bundled import bundled_folder
+from commission.io.project_file import load_project
+
+BEAMS = 1081
+REQUIRED = 0.40
+
+
+def take_in(port: int, seconds: float, received: multiprocessing.Queue[int]) -> None:
+    """Receive for a while; report the number of bytes."""
+    total = 0
+    protocol = Subprotocol(f"viser-v{viser.__version__}")
+    with connect(f"ws://127.0.0.1:{port}", subprotocols=[protocol], max_size=None) as client:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            total += len(client.recv(timeout=10.0))
+    received.put(total)
+
+
+def main(seconds: float = 20.0) -> None:
+    """Measure and print."""
+    project = load_project(bundled_folder("maps") / "laboratory")
+    scanner = replace(project.scanner, field_of_view_deg=(-135.0, 135.0), resolution_deg=270.0 / (BEAMS - 1), rate=25.0)
+    project = replace(project, scanner=scanner)
+    server = start_server("127.0.0.1", 0)
+    runtime = open_page(server, project, source=VirtualDrive(project.routes[0].name))
+    runtime.post(Repeat(repeat=True))
+    while runtime.session is None or runtime.session.cycles == 0:
+        time.sleep(0.1)
+    received: multiprocessing.Queue[int] = multiprocessing.get_context("spawn").Queue()
+    client = multiprocessing.get_context("spawn").Process(
+        target=take_in, args=(server.get_port(), seconds + 4.0, received)
+    )
+    client.start()
+    time.sleep(4.0)
+    cycles, cpu, wall = runtime.session.cycles, time.process_time(), time.monotonic()
+    time.sleep(seconds)
+    cpu, wall = time.process_time() - cpu, time.monotonic() - wall
+    cycles = runtime.session.cycles - cycles
+    print(f"{project.scanner.beam_count} beams, {cycles / wall:.1f} scans/s, {received.get() / wall / 1e6:.1f} MB/s")
+    print(f"page: {100 * cpu / wall:.1f} % of one core (required: less than {100 * REQUIRED:.0f} %)")
+    client.join()
+    runtime.stop()
+    server.stop()
+
+
+if __name__ == "__main__":
+    main(*(float(argument) for argument in sys.argv[1:2]))

@@ -1,0 +1,187 @@
+"""The page of a project in a real browser: what the issue promises a person who opens it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from playwright.sync_api import Browser
+
+from commission.app import actions
+from commission.app.actions import VirtualDrive
+from commission.app.launch import open_page
+from commission.app.panels.base import clock
+from commission.app.reducer import with_parameter
+from commission.app.runtime import Runtime
+from commission.app.server import start_server
+from commission.app.session import Session
+from commission.site.project import Project
+from tests.app.sites import room
+from tests.browser.page import SMALL, OpenPage
+
+NODES = ("/floor/map", "/vehicle/outline", "/run/gates", "/run/scan", "/reflectors/marks", "/routes")
+
+
+class OpenRun:
+    """A served project whose virtual vehicle drives."""
+
+    def __init__(self, project: Project) -> None:
+        self.server = start_server("127.0.0.1", 0)
+        self.runtime: Runtime = open_page(self.server, project, source=VirtualDrive(project.routes[0].name))
+        self.until(lambda: self.runtime.session is not None)
+
+    @property
+    def session(self) -> Session:
+        session = self.runtime.session
+        assert session is not None
+        return session
+
+    def until(self, reached: Callable[[], bool], seconds: float = 60.0) -> None:
+        """Wait until something has happened on the server."""
+        end = time.monotonic() + seconds
+        while not reached():
+            assert time.monotonic() < end, f"it did not happen within {seconds} s: {self.runtime.state.problems}"
+            time.sleep(0.02)
+
+    def close(self) -> None:
+        self.runtime.stop()
+        self.server.stop()
+
+
+@pytest.fixture(scope="module")
+def run() -> Iterator[OpenRun]:
+    project = room()
+    # Tight enough that half a minute without reflectors is too long.
+    opened = OpenRun(replace(project, parameters=with_parameter(project.parameters, "supervisor.position_limit", 0.03)))
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(scope="module")
+def page(browser: Browser, run: OpenRun) -> Iterator[OpenPage]:
+    """One small window for all tests: where the processor draws, opening one is what takes longest."""
+    opened = OpenPage(browser, run.server, SMALL)
+    opened.page.set_default_timeout(60_000)
+    opened.open(nodes=NODES)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(autouse=True)
+def from_the_start(run: OpenRun, page: OpenPage) -> None:
+    """Each test finds the drive playing from its start with the saved parameters."""
+    run.runtime.post(actions.ResetParameters())
+    run.runtime.post(actions.Cover(covered=False))
+    run.runtime.post(actions.Restart())
+    run.runtime.post(actions.SetSpeed(1.0))
+    run.runtime.post(actions.Play(playing=True))
+
+
+def wait_for_badge(page: OpenPage, word: str) -> None:
+    page.page.wait_for_function("word => document.querySelector('.c-badge').innerText.includes(word)", arg=word)
+
+
+def settled_clock(run: OpenRun) -> str:
+    """Time that every browser shows once the run is paused."""
+    run.until(lambda: not run.runtime.state.playing and run.session.seeking is None)
+    return clock(run.session.view().time)
+
+
+def vehicle_in(page: OpenPage) -> np.ndarray:
+    """Where the browser has the vehicle."""
+    place = "(() => { const p = window.__viserMutable.nodeRefFromName['/vehicle'].position; return [p.x, p.y] })()"
+    return np.array(page.page.evaluate(place))
+
+
+def test_the_page_shows_a_driving_vehicle_its_badge_and_every_panel(run: OpenRun, page: OpenPage) -> None:
+    wait_for_badge(page, "OPERATIONAL")
+    before = vehicle_in(page)
+    page.page.wait_for_timeout(2000)
+    assert np.hypot(*(vehicle_in(page) - before)) > 0.1
+    for text in ("Largest NIS / gate", "validation area", "Position error", "Floor map"):
+        page.wait_for_text(text)
+    assert page.page.locator(".uplot").count() == 6
+    assert page.errors == []
+    assert run.runtime.state.problems == ()
+
+
+def test_the_badge_turns_red_when_reflectors_are_covered_and_back(run: OpenRun, page: OpenPage) -> None:
+    wait_for_badge(page, "OPERATIONAL")
+    page.open_tab("Run")
+    page.tick("Cover reflectors")
+    wait_for_badge(page, "FAIL")
+    assert "rgb(197, 34, 31)" in page.page.evaluate("getComputedStyle(document.querySelector('.c-badge')).background")
+    page.tick("Cover reflectors")
+    wait_for_badge(page, "OPERATIONAL")
+
+
+def test_the_gate_slider_widens_the_validation_areas(run: OpenRun, page: OpenPage) -> None:
+    run.runtime.post(actions.Play(playing=False))
+    # Some way from the start, where the initial uncertainty no longer shrinks from scan to scan.
+    run.runtime.post(actions.Seek(2.0))
+    run.until(lambda: run.session.seeking is None and run.session.view().time == pytest.approx(2.0))
+    before = np.ptp(run.session.view().gates, axis=1).mean()
+    page.open_tab("Tune")
+    page.fill("Gate [%]", "99.99")
+    run.until(lambda: run.runtime.state.project.parameters.association.gate_probability == pytest.approx(0.9999))
+    page.press("Step")
+    run.until(lambda: np.ptp(run.session.view().gates, axis=1).mean() > 1.5 * before)
+    page.press("Undo")
+    run.until(lambda: run.runtime.state.project.parameters.association.gate_probability == 0.95)
+    page.page.wait_for_function("() => [...document.querySelectorAll('input')].some(i => i.value === '95')")
+
+
+def test_the_time_line_seeks_and_play_and_pause_obey(run: OpenRun, page: OpenPage) -> None:
+    page.press("Pause")
+    run.until(lambda: not run.runtime.state.playing)
+    track = page.page.locator("div:has(> div > .c-bottom) .mantine-Slider-track").first.bounding_box()
+    assert track is not None
+    page.page.mouse.click(track["x"] + 0.5 * track["width"], track["y"] + 0.5 * track["height"])
+    half = 0.5 * run.session.view().duration
+    run.until(lambda: run.session.seeking is None and abs(run.session.view().time - half) < 0.05 * half)
+    page.press("Play")
+    run.until(lambda: run.session.view().time > 1.1 * half)
+
+
+def test_two_browsers_see_the_same_run_each_in_its_own_view(
+    run: OpenRun, page: OpenPage, window: Callable[..., OpenPage]
+) -> None:
+    one, other = page, window(run.server, SMALL)
+    other.page.set_default_timeout(60_000)
+    other.open(nodes=NODES)
+    other.press("3D")
+    other.wait_until_drawn(("/floor/walls", "/vehicle/body", "/reflectors/bodies/cylinder"))
+    assert not one.page.evaluate("'/floor/walls' in window.__viserMutable.nodeRefFromName")
+    one.press("Pause")
+    run.until(lambda: not run.runtime.state.playing)
+    other.page.wait_for_function(
+        "text => document.querySelector('.c-clock b').innerText === text", arg=settled_clock(run)
+    )
+    one.page.wait_for_timeout(1000)
+    np.testing.assert_allclose(vehicle_in(one), vehicle_in(other), atol=1e-4)
+    assert one.page.locator(".c-clock b").inner_text() == other.page.locator(".c-clock b").inner_text()
+
+
+def test_a_layer_switched_off_disappears_and_the_legend_explains_the_rest(run: OpenRun, page: OpenPage) -> None:
+    for entry in ("inlier", "outlier: outside every gate", "outlier: too few or many beams", "reference (truth)"):
+        page.wait_for_text(entry)
+    page.open_tab("Layers")
+    page.tick("Routes")
+    page.page.wait_for_function("() => !window.__viserMutable.nodeRefFromName['/routes'].visible")
+    page.tick("Routes")
+    page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/routes'].visible")
+
+
+def test_a_recording_that_is_none_gives_one_clear_line_on_the_page(run: OpenRun, page: OpenPage) -> None:
+    page.open_tab("Run")
+    page.fill("Folder", "/no/such <b>recording</b>")
+    page.press("Open")
+    run.until(lambda: bool(run.runtime.state.problems))
+    page.open_tab("Problems")
+    page.wait_for_text("/no/such <b>recording</b>")
+    assert "\n" not in run.runtime.state.problems[-1]
+    page.press("Clear")
+    run.until(lambda: not run.runtime.state.problems)
