@@ -100,7 +100,7 @@ class TunePanel(BasePanel):
         reset = gui.add_button("Reset to saved", color="gray", hint="Back to the parameters of project.yaml.")
         reset.on_click(posting(post, lambda _event: actions.ResetParameters()))
         with gui.add_folder("Save a copy", expand_by_default=False):
-            folder = gui.add_text("Folder", "", hint="Path of a folder on the computer that serves this page.")
+            folder = gui.add_text("Copy into", "", hint="Path of a folder on the computer that serves this page.")
             save = gui.add_button("Save copy", color="gray")
         save.on_click(
             posting(
