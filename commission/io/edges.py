@@ -16,7 +16,8 @@ from commission.geometry.angles import wrap_scalar
 from commission.geometry.splines import clamped_uniform_knots
 from commission.io.findings import Findings
 from commission.io.json_document import Fields
-from commission.site.routes import Direction, Route, Segment
+from commission.site.routes import SPEEDS, Direction, Route, Segment
+from commission.site.stations import Station
 
 GAP = 0.01
 """Distance [m] up to which two ends are one place: what `Route` accepts between its segments."""
@@ -43,24 +44,6 @@ class Edge:
 
 
 @dataclass(frozen=True, slots=True)
-class Station:
-    """A place where a vehicle takes or gives a load."""
-
-    id: str
-    """Its identifier."""
-    name: str
-    """Its name; empty when it has none."""
-    nodes: tuple[str, ...]
-    """Nodes from which it is served."""
-    x: float
-    """Place, map frame [m]: its own position, or that of its first node."""
-    y: float
-    """Place, map frame [m]."""
-    theta: float | None
-    """Direction, map frame [rad]; None when none is given."""
-
-
-@dataclass(frozen=True, slots=True)
 class RouteImport:
     """Routes from a file of another system."""
 
@@ -69,7 +52,7 @@ class RouteImport:
     warnings: tuple[str, ...] = ()
     """What was doubtful, made up or passed over, one line each."""
     stations: tuple[Station, ...] = ()
-    """Stations, where the format has them."""
+    """Where vehicles stand to serve stations, where the format has them; names are unique."""
     vehicle_types: tuple[str, ...] = ()
     """Vehicle types that the file speaks of; the routes are those of one."""
     layouts: tuple[str, ...] = ()
@@ -226,6 +209,16 @@ def directed(segment: Segment, fields: Fields, angles: Angles) -> Segment:
         problem = f"the vehicle drives at {math.degrees(relative):.0f} deg to its path; only forward or reverse is kept"
         fields.found.add(fields.where, problem)
     return replace(segment, direction=Direction.REVERSE) if relative > math.pi / 2.0 else segment
+
+
+def speed_in(fields: Fields, keys: Sequence[str]) -> float | None:
+    """Permitted speed under the first of the keys that holds one [m/s]; None, which is noted, if nobody drives so."""
+    speed = next((value for key in keys if (value := fields.number(key)) is not None), None)
+    if speed is not None and not SPEEDS[0] <= speed <= SPEEDS[1]:
+        problem = f"the speed is {speed:g}; expected {SPEEDS[0]:g} to {SPEEDS[1]:g} m/s, so it is passed over"
+        fields.found.add(fields.where, problem)
+        return None
+    return speed
 
 
 def turn(before: Segment, after: Segment) -> float:

@@ -40,6 +40,8 @@ class ReflectorImport:
     """In the order of the file."""
     warnings: tuple[str, ...] = ()
     """What was made up or could not be read, one line each."""
+    fields: tuple[str, ...] = ("x", "y", "radius", "kind", "layer")
+    """Fields that the file speaks of, for `reflector_diff.difference`; those of a layout."""
 
 
 def read_imk(path: Path) -> ReflectorImport:

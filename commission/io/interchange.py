@@ -116,7 +116,7 @@ def convert_file(source: Path, target: Path, options: ConvertOptions) -> tuple[s
     ----------
     source : what to read.
     target : what to write. An existing project keeps what the source does not hold: reflectors and the floor map are
-        replaced, routes of the same name too, others stay.
+        replaced, routes and stations of the same name too, others stay.
     options : what the source leaves open.
 
     Returns
@@ -163,18 +163,27 @@ def _from_reflectors(source: Path, target: Path, wanted: Kind, _: ConvertOptions
 def _from_routes(source: Path, target: Path, wanted: Kind, options: ConvertOptions) -> tuple[str, ...]:
     imported = _routes(source, options)
     if wanted is Kind.LIF:
-        return (*imported.warnings, *write_lif(Project(name=source.stem, routes=imported.routes), target))
+        return (*imported.warnings, *write_lif(_network(source, imported), target))
     project = _existing(target)
     names = {route.name for route in imported.routes}
     kept = tuple(route for route in project.routes if route.name not in names)
-    save_project(dataclasses.replace(project, routes=(*kept, *imported.routes)), _folder(target))
-    return (*imported.warnings, f"{len(imported.routes)} routes read, {len(kept)} others kept")
+    places = {station.name for station in imported.stations}
+    stations = (*(s for s in project.stations if s.name not in places), *imported.stations)
+    changed = dataclasses.replace(project, routes=(*kept, *imported.routes), stations=stations)
+    save_project(changed, _folder(target))
+    report = f"{len(imported.routes)} routes and {len(places)} stations read, {len(kept)} other routes kept"
+    return (*imported.warnings, report)
 
 
 def _routes(source: Path, options: ConvertOptions) -> RouteImport:
     if kind_of_source(source) is Kind.ORDER:
         return read_order(source)
     return read_lif(source, vehicle_type=options.vehicle_type, layout=options.layout)
+
+
+def _network(source: Path, imported: RouteImport) -> Project:
+    """Project of nothing but what a layout holds."""
+    return Project(name=source.stem, routes=imported.routes, stations=imported.stations)
 
 
 def _from_drawing(source: Path, target: Path, wanted: Kind, options: ConvertOptions) -> tuple[str, ...]:

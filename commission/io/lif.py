@@ -19,19 +19,20 @@ from commission.io.edges import (
     Angles,
     Edge,
     RouteImport,
-    Station,
     angles_of,
     curve,
     directed,
     follows,
     note_corners,
     route_of,
+    speed_in,
     turn,
     unique,
 )
 from commission.io.findings import Findings, shown
 from commission.io.json_document import Fields, read_json
 from commission.site.routes import Route
+from commission.site.stations import Station
 
 _NUMBERED = re.compile(r"(?P<name>.+)/(?P<number>[1-9][0-9]{0,5})", re.DOTALL)
 
@@ -45,6 +46,8 @@ class _Layout:
     stations: list[Fields]
     orientation: Angles
     theta: Angles
+    headings: dict[tuple[str, str], float]
+    """Heading of a vehicle type on a node [rad]."""
 
 
 def read_lif(path: Path, *, vehicle_type: str | None = None, layout: str | None = None) -> RouteImport:
@@ -83,7 +86,7 @@ def read_lif(path: Path, *, vehicle_type: str | None = None, layout: str | None 
         for edge in _edge(fields, part, content)
     ]
     routes = _routes(edges, found)
-    stations = tuple(station for fields in content.stations for station in _station(fields, content))
+    stations = tuple(_stations(content, kind))
     return RouteImport(routes, found.lines(), stations, tuple(counts), names)
 
 
@@ -102,12 +105,12 @@ def _content(layouts: list[Fields], found: Findings) -> _Layout:
     nodes: dict[str, tuple[float, float]] = {}
     edges: list[tuple[Fields, Fields]] = []
     stations: list[Fields] = []
-    poses: list[Fields] = []
+    poses: list[tuple[str, Fields]] = []
     for layout in layouts:
         if "stations" not in layout.values:
             found.add(layout.where, "stations is missing; LIF demands the key, if only with an empty list")
         for node in layout.mappings("nodes", "node", "nodeId"):
-            poses.extend(node.mappings("vehicleTypeNodeProperties"))
+            poses.extend((node.text("nodeId"), part) for part in node.mappings("vehicleTypeNodeProperties"))
             _add_node(node, nodes)
         for edge in layout.mappings("edges", "edge", "edgeId"):
             parts = list(edge.mappings("vehicleTypeEdgeProperties"))
@@ -117,7 +120,11 @@ def _content(layouts: list[Fields], found: Findings) -> _Layout:
         stations.extend(layout.mappings("stations", "station", "stationId"))
     positions = [p for station in stations if (p := station.mapping("stationPosition")) is not None]
     orientation = angles_of((part for _, part in edges), "vehicleOrientation")
-    return _Layout(nodes, edges, stations, orientation, angles_of([*poses, *positions], "theta"))
+    theta = angles_of([*(part for _, part in poses), *positions], "theta")
+    headings = {
+        (node, part.text("vehicleTypeId")): angle for node, part in poses if (angle := theta.of(part)) is not None
+    }
+    return _Layout(nodes, edges, stations, orientation, theta, headings)
 
 
 def _add_node(node: Fields, nodes: dict[str, tuple[float, float]]) -> None:
@@ -155,28 +162,32 @@ def _edge(fields: Fields, part: Fields, content: _Layout) -> Iterator[Edge]:
     if segment is None:
         return
     segment = directed(segment, part, content.orientation)
-    speed = part.number("maxSpeed", least=0.0)
-    if speed == 0.0:
-        part.found.add(part.where, "maxSpeed is 0; it is passed over")
-    yield Edge(fields.text("edgeId") or f"{start}-{end}", start, end, replace(segment, speed=speed or None))
+    speed = speed_in(part, ("maxSpeed",))
+    yield Edge(fields.text("edgeId") or f"{start}-{end}", start, end, replace(segment, speed=speed))
 
 
-def _station(fields: Fields, content: _Layout) -> Iterator[Station]:
-    """Yield the station, or nothing after noting why."""
-    values = fields.values.get("interactionNodeIds")
-    nodes = tuple(node for node in values if isinstance(node, str)) if isinstance(values, list) else ()
-    for node in nodes:
-        if node not in content.nodes:
-            fields.found.add(fields.where, f"node {shown(node)} does not exist or has no place")
-    position = fields.mapping("stationPosition")
-    x, y = (position.number("x"), position.number("y")) if position is not None else (None, None)
-    theta = content.theta.of(position) if position is not None else None
-    if x is None or y is None:
-        x, y = next((content.nodes[node] for node in nodes if node in content.nodes), (None, None))
-    if x is None or y is None:
-        fields.found.add(fields.where, "has no place; it is left out")
-        return
-    yield Station(fields.text("stationId"), fields.text("stationName"), nodes, x, y, theta)
+def _stations(content: _Layout, kind: str) -> Iterator[Station]:
+    """Yield a station for each node at which a vehicle stands to serve one; notes those without a place."""
+    taken: set[str] = set()
+    for fields in content.stations:
+        values = fields.values.get("interactionNodeIds")
+        nodes = [node for node in values if isinstance(node, str)] if isinstance(values, list) else []
+        for node in nodes:
+            if node not in content.nodes:
+                fields.found.add(fields.where, f"node {shown(node)} does not exist or has no place")
+        usable = [node for node in nodes if node in content.nodes]
+        if not usable:
+            fields.found.add(fields.where, "no vehicle can stand at it; it is left out")
+        position = fields.mapping("stationPosition")
+        for node in usable:
+            name = fields.text("stationName") or fields.text("stationId") or node
+            theta = content.headings.get((node, kind))
+            if theta is None and position is not None:
+                theta = content.theta.of(position)
+            if theta is None:
+                fields.found.add(fields.where, "says no heading; it is set to 0 rad")
+            name = unique(name if len(usable) == 1 else f"{name} from {node}", taken)
+            yield Station(name, *content.nodes[node], 0.0 if theta is None else theta)
 
 
 def _routes(edges: list[Edge], found: Findings) -> tuple[Route, ...]:

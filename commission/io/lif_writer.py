@@ -14,11 +14,13 @@ from typing import Any
 import numpy as np
 
 from commission.errors import FileFormatError
+from commission.geometry.angles import wrap_scalar
 from commission.geometry.splines import clamped_uniform_knots
 from commission.io.atomic import write_text
 from commission.io.findings import Findings
 from commission.site.project import Project
 from commission.site.routes import Direction, Route, Segment
+from commission.site.stations import Station
 
 LIF_VERSION = "1.0.0"
 SAME_NODE = 0.001
@@ -51,6 +53,7 @@ def write_lif(project: Project, path: Path, *, exported_at: datetime | None = No
         for route in project.routes
         for number, (segment, start, end) in enumerate(_steps(route, nodes, found), start=1)
     ]
+    stations = [_station(station, nodes.at(np.array([station.x, station.y]))) for station in project.stations]
     _note_losses(project, found)
     document = {
         "metaInformation": {
@@ -72,7 +75,7 @@ def write_lif(project: Project, path: Path, *, exported_at: datetime | None = No
                     for index, (x, y) in enumerate(nodes.places, start=1)
                 ],
                 "edges": edges,
-                "stations": [],
+                "stations": stations,
             }
         ],
     }
@@ -149,6 +152,13 @@ def _properties(route: Route, segment: Segment, vehicle: str, found: Findings) -
     }
 
 
+def _station(station: Station, node: str) -> dict[str, Any]:
+    """Station served from a node; its heading lies within [-pi, pi], as LIF demands."""
+    heading = station.heading if abs(station.heading) <= math.pi else wrap_scalar(station.heading)
+    position = {"x": float(station.x), "y": float(station.y), "theta": float(heading)}
+    return {"stationId": station.name, "interactionNodeIds": [node], "stationPosition": position}
+
+
 def _note_losses(project: Project, found: Findings) -> None:
     """Say what LIF has no place for."""
     if len(project.reflectors):
@@ -156,5 +166,7 @@ def _note_losses(project: Project, found: Findings) -> None:
     if project.floor_map is not None:
         found.add("", "the floor map is not carried")
     found.add("", "vehicle, scanner, parameters and disturbances are not carried")
+    if project.stations:
+        found.add("", f"the required accuracy of {len(project.stations)} stations is not carried")
     if any(segment.speed is not None for route in project.routes for segment in route.segments):
         found.add("", "each edge carries its speed; which of them were a route's own is lost")

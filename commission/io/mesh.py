@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 import trimesh
@@ -162,7 +162,7 @@ class _Reported:
         """Nothing: the file is closed by whoever opened it."""
 
 
-def _triangles(path: Path, loaded: object) -> FloatArray:
+def _triangles(path: Path, loaded: Any) -> FloatArray:
     """(N, 3, 3) corners of all parts of a model, each part as often as the scene shows it."""
     if isinstance(loaded, trimesh.Trimesh):
         parts = [(loaded, np.eye(4))]

@@ -72,10 +72,11 @@ def parse_table(text: str) -> ReflectorImport:
     # A table that writes points for decimals has its commas for something else: those cells are then errors.
     comma = delimiter != "," and not any("." in cell for cell in numbers)
     found = Findings()
+    said = tuple("radius" if name == "diameter" else name for name in names)
     block = Block(_SOURCE, lines, columns, decimal_comma=comma)
     _apply_units(block, units)
     _fill_in(block, units, found)
-    return ReflectorImport(reflectors_of([block]), found.lines())
+    return ReflectorImport(reflectors_of([block]), found.lines(), said)
 
 
 def _rows(text: str) -> tuple[list[int], list[list[str]], str]:

@@ -16,6 +16,7 @@ from commission.io.edges import (
     follows,
     note_corners,
     route_of,
+    speed_in,
     unique,
 )
 from commission.io.findings import Findings, shown
@@ -110,7 +111,7 @@ def _edge(fields: Fields, places: _Places, orientation: Angles) -> Iterator[Edge
     segment = curve(fields, (start_place, end_place))
     if segment is None:
         return
-    speed = next((value for key in _SPEEDS if (value := fields.number(key, least=0.0))), None)
+    speed = speed_in(fields, _SPEEDS)
     yield Edge(fields.text("edgeId"), start, end, replace(directed(segment, fields, orientation), speed=speed))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +56,13 @@ class ReflectorDiff:
         return bool(self.added or self.changed or self.removed)
 
 
-def difference(before: ReflectorMap, after: ReflectorMap, same_place: float = SAME_PLACE) -> ReflectorDiff:
+def difference(
+    before: ReflectorMap,
+    after: ReflectorMap,
+    *,
+    same_place: float = SAME_PLACE,
+    fields: Collection[str] | None = None,
+) -> ReflectorDiff:
     """Compare two reflector maps.
 
     Parameters
@@ -63,13 +70,16 @@ def difference(before: ReflectorMap, after: ReflectorMap, same_place: float = SA
     before, after : the maps.
     same_place : reflectors that share no id with the other map are still one reflector, renamed, when each is the
         other's nearest and they are at most so far apart [m]; 0 compares by id alone.
+    fields : fields that `after` speaks of, for a format that knows no others: what it is silent about stays as it
+        is. All when None.
 
     Returns
     -------
     difference : added and changed in the order of `after`, removed in the order of `before`.
     """
     partners = _partners(before, after, same_place)
-    pairs = [(partners.get(reflector.id), reflector) for reflector in after.reflectors]
+    silent = [f.name for f in dataclasses.fields(Reflector) if fields is not None and f.name not in (*fields, "id")]
+    pairs = [_pair(partners.get(reflector.id), reflector, silent) for reflector in after.reflectors]
     kept = {old.id for old in partners.values()}
     changed = tuple(ReflectorChange(old, new) for old, new in pairs if old is not None and old != new)
     return ReflectorDiff(
@@ -98,6 +108,13 @@ def merged(before: ReflectorMap, diff: ReflectorDiff, *, remove: bool) -> Reflec
     changes = {change.before.id: change.after for change in diff.changed}
     kept = [changes.get(reflector.id, reflector) for reflector in before.reflectors if reflector.id not in gone]
     return ReflectorMap((*kept, *diff.added))
+
+
+def _pair(old: Reflector | None, new: Reflector, silent: list[str]) -> tuple[Reflector | None, Reflector]:
+    """Reflector before and after, the latter with the earlier values of the fields that nothing is said about."""
+    if old is None or not silent:
+        return old, new
+    return old, dataclasses.replace(new, **{name: getattr(old, name) for name in silent})
 
 
 def _partners(before: ReflectorMap, after: ReflectorMap, same_place: float) -> dict[str, Reflector]:

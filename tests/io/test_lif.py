@@ -21,7 +21,8 @@ from commission.site.floor_map import FloorMap
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Direction, Route, Segment
-from tests.io.projects import NAME, POSITIVE, segments
+from commission.site.stations import Station
+from tests.io.projects import NAME, SPEED, segments
 
 EXAMPLES = [f"{number:02}.json" for number in range(20)]
 ARC = {
@@ -86,7 +87,7 @@ def routes(draw: st.DrawFn) -> Route:
         points[0] = chain[-1].control_points[-1]
         if (points != points[0]).any():
             chain.append(replace(following, control_points=points))
-    return Route(draw(NAME.filter(lambda name: name == name.strip())), tuple(chain), draw(POSITIVE))
+    return Route(draw(NAME.filter(lambda name: name == name.strip())), tuple(chain), draw(SPEED))
 
 
 @given(several=st.lists(routes(), max_size=3, unique_by=lambda route: route.name))
@@ -97,6 +98,18 @@ def test_routes_that_are_written_and_read_again_are_equal(
     write_lif(Project(routes=tuple(several)), path)
     again = read_lif(path)
     assert [spelled_out(route) for route in again.routes] == [spelled_out(route) for route in several]
+
+
+def test_stations_are_written_and_read_again(tmp_path: Path) -> None:
+    stations = (Station("Dock 1", 2.0, 0.0, math.pi / 2, 0.01), Station("Wait", 7.5, -3.0, 4.0))
+    route = Route("Loop", (Segment(np.array([[0.0, 0.0], [2.0, 0.0]]), degree=1),))
+    losses = write_lif(Project(routes=(route,), stations=stations), tmp_path / "out.lif")
+    assert "the required accuracy of 2 stations is not carried" in losses
+    # Headings beyond a half turn come back as the same direction.
+    expected = (Station("Dock 1", 2.0, 0.0, math.pi / 2), Station("Wait", 7.5, -3.0, 4.0 - 2 * math.pi))
+    again = read_lif(tmp_path / "out.lif").stations
+    assert [(s.name, s.x, s.y) for s in again] == [(s.name, s.x, s.y) for s in expected]
+    assert [s.heading for s in again] == pytest.approx([s.heading for s in expected])
 
 
 def test_what_lif_cannot_carry_is_said(tmp_path: Path) -> None:
@@ -212,7 +225,10 @@ def test_orientation_becomes_a_direction_and_what_is_doubtful_is_said(
         ({"controlPoints": []}, "0 control points; expected 2 to"),
         ({"controlPoints": {"x": 1}}, "controlPoints is a mapping; expected a list"),
         ({"controlPoints": [{"x": 2, "y": 0}, {"x": 4}, {"x": 4, "y": 2}]}, "a control point has no place"),
-        ({"controlPoints": [{"x": 2, "y": 0}, {"x": 4, "y": 0, "weight": 0}, {"x": 4, "y": 2}]}, "weights[1] is 0"),
+        (
+            {"controlPoints": [{"x": 2, "y": 0}, {"x": 4, "y": 0, "weight": 0}, {"x": 4, "y": 2}]},
+            "weights: smallest is 0",
+        ),
         ({"controlPoints": [{"x": 3, "y": 0}, {"x": 4, "y": 0}, {"x": 4, "y": 3}]}, "starts 1.000 m from its node"),
     ],
 )
@@ -266,7 +282,9 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     return [path, *(place for key, part in items for place in places(part, (*path, key)))]
 
 
-GARBAGE = st.sampled_from([None, True, "", "x", "\u202e<b>", "1e400", -1, 0, 1e300, 10**400, [], [[]], {}, [{"x": {}}]])
+GARBAGE = st.sampled_from(
+    [None, True, "", "x", "\u202e<b>", "1e400", -1, 0, 1e-5, 5000, 1e300, 10**400, [], [[]], {}, [{"x": {}}]]
+)
 
 
 @given(data=st.data())

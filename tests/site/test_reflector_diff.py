@@ -45,6 +45,13 @@ def test_every_reflector_is_counted_once_and_applying_the_difference_gives_the_l
     assert set(result.reflectors) == set(after.reflectors)
 
 
+def test_fields_that_an_import_is_silent_about_stay_as_they_are() -> None:
+    before = replace(A, height=1.8, note="pillar", locked=True)
+    diff = difference(ReflectorMap((before, B)), ReflectorMap((replace(A, x=0.5), B)), fields=("x", "y"))
+    assert diff.changed == (ReflectorChange(before, replace(before, x=0.5)),)
+    assert diff.changed[0].fields == ("x",)
+
+
 def test_reflectors_that_an_import_lacks_can_stay() -> None:
     diff = difference(ReflectorMap((A, B)), ReflectorMap((C,)))
     assert merged(ReflectorMap((A, B)), diff, remove=False).reflectors == (A, B, C)
