@@ -28,7 +28,7 @@ from commission.io.reflector_tables import read_reflectors, write_reflectors
 from commission.io.vda5050 import read_order
 from commission.site.floor_map import FloorMap
 from commission.site.project import Project
-from commission.site.reflector_diff import difference
+from commission.site.reflector_diff import difference, merged
 from commission.site.reflectors import ReflectorMap
 
 
@@ -156,7 +156,8 @@ def _from_project(source: Path, target: Path, wanted: Kind, _: ConvertOptions) -
 def _from_reflectors(source: Path, target: Path, wanted: Kind, _: ConvertOptions) -> tuple[str, ...]:
     if source.suffix.lower() == ".imk":
         imported = read_imk(source)
-        return (*imported.warnings, *_written_reflectors(imported.reflectors, target, wanted))
+        written = _written_reflectors(imported.reflectors, target, wanted, imported.fields)
+        return (*imported.warnings, *written)
     return _written_reflectors(read_reflectors(source), target, wanted)
 
 
@@ -202,15 +203,19 @@ def _from_recording(source: Path, target: Path, _: Kind, __: ConvertOptions) -> 
     return ()
 
 
-def _written_reflectors(reflectors: ReflectorMap, target: Path, wanted: Kind) -> tuple[str, ...]:
+def _written_reflectors(
+    reflectors: ReflectorMap, target: Path, wanted: Kind, fields: tuple[str, ...] | None = None
+) -> tuple[str, ...]:
+    """Write reflectors; `fields` are those that their source speaks of, the others a project keeps."""
     if wanted is Kind.IMK:
         return write_imk(reflectors, target)
     if wanted is Kind.TABLE:
         write_reflectors(reflectors, target)
         return ()
     project = _existing(target)
-    diff = difference(project.reflectors, reflectors)
-    save_project(dataclasses.replace(project, reflectors=reflectors), _folder(target))
+    diff = difference(project.reflectors, reflectors, fields=fields)
+    changed_map = merged(project.reflectors, diff, remove=True)
+    save_project(dataclasses.replace(project, reflectors=changed_map), _folder(target))
     added, changed, removed = len(diff.added), len(diff.changed), len(diff.removed)
     return (f"reflectors: {added} added, {changed} changed, {removed} removed, {diff.unchanged} as before",)
 

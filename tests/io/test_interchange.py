@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 import trimesh
 
 from commission.errors import CommissionError, FileFormatError, UsageError
+from commission.io.imk import write_imk
 from commission.io.interchange import ConvertOptions, Kind, convert_file, kind_of_source
 from commission.io.map_server import read_floor_map
 from commission.io.project_file import load_project, save_project
@@ -52,6 +54,17 @@ def test_project_gives_and_takes_reflectors_and_routes(tmp_path: Path) -> None:
     assert copy.reflectors == REFLECTORS
     assert [route.name for route in copy.routes] == ["Loop"]
     np.testing.assert_array_equal(copy.routes[0].segments[0].control_points, ROUTE.segments[0].control_points)
+
+
+def test_layout_leaves_alone_what_it_cannot_say_about_the_reflectors_of_a_project(tmp_path: Path) -> None:
+    first, *rest = REFLECTORS.reflectors
+    noted = replace(first, height=1.8, note="pillar 7")
+    save_project(Project(reflectors=ReflectorMap((noted, *rest))), tmp_path / "hall")
+    write_imk(ReflectorMap((replace(first, x=9.0), *rest[:-1])), tmp_path / "hall.imk")
+    assert convert_file(tmp_path / "hall.imk", tmp_path / "hall", USUAL) == (
+        "reflectors: 0 added, 1 changed, 1 removed, 2 as before",
+    )
+    assert load_project(tmp_path / "hall").reflectors.reflectors == (replace(noted, x=9.0), *rest[:-1])
 
 
 def test_order_is_added_to_the_routes_of_a_project(tmp_path: Path) -> None:
