@@ -146,32 +146,30 @@ def _nurbs(trajectory: Fields) -> Segment | None:
         problem = "the knot vector is unreadable"
     if not problem:
         try:
-            segment = Segment(np.array(points, dtype=np.float64), degree=int(degree), knots=_array(knots))
             # Weights of 1 are none; a curve that needs them is rational.
-            if any(weight != 1.0 for weight in weights):
-                segment = replace(segment, weights=np.array(weights))
+            rational = np.array(weights) if any(weight != 1.0 for weight in weights) else None
+            controls = np.array(points, dtype=np.float64)
+            segment = Segment(
+                controls, degree=int(degree), knots=_usual(knots, int(degree), trajectory), weights=rational
+            )
         except (ValueError, OverflowError) as error:
             problem = str(error)
         else:
-            return _with_usual_knots(segment, trajectory)
+            return segment
     found.add(where, f"the trajectory cannot be used ({problem})")
     return None
 
 
-def _with_usual_knots(segment: Segment, trajectory: Fields) -> Segment:
-    """Leave out knots that are the usual ones; note those beyond [0, 1], which both formats forbid."""
-    if segment.knots is None:
-        return segment
-    low, high = float(segment.knots[0]), float(segment.knots[-1])
-    if (low, high) != (0.0, 1.0):
-        problem = f"knots run from {low:g} to {high:g}; expected 0 to 1 (the curve is the same)"
+def _usual(knots: list[float] | None, degree: int, trajectory: Fields) -> np.ndarray | None:
+    """Knots, or None for the usual ones; notes those beyond [0, 1], which both formats forbid."""
+    if knots is None:
+        return None
+    if knots and (knots[0], knots[-1]) != (0.0, 1.0):
+        problem = f"knots run from {knots[0]:g} to {knots[-1]:g}; expected 0 to 1 (the curve is the same)"
         trajectory.found.add(trajectory.where, problem)
-    usual = clamped_uniform_knots(segment.degree, len(segment.control_points))
-    return replace(segment, knots=None) if np.array_equal(segment.knots, usual) else segment
-
-
-def _array(values: list[float] | None) -> np.ndarray | None:
-    return None if values is None else np.array(values)
+    n = len(knots) - degree - 1
+    is_usual = n > degree and np.array_equal(knots, clamped_uniform_knots(degree, n))
+    return None if is_usual else np.array(knots)
 
 
 def _note_missed_nodes(
@@ -202,9 +200,9 @@ def directed(segment: Segment, fields: Fields, angles: Angles) -> Segment:
         fields.found.add(fields.where, f"orientationType is {kind!r}; taken for TANGENTIAL")
     relative = angle
     if kind == "GLOBAL":
-        relative = angle - float(segment.spline().heading(segment.spline().domain[0]))
+        relative = angle - _heading(segment, 0)
         fields.found.add(fields.where, "the heading is fixed in the map; only forward or reverse is kept")
-    relative = abs(wrap_scalar(relative)) if math.isfinite(relative) else 0.0
+    relative = abs(wrap_scalar(relative))
     if CROOKED < relative < math.pi - CROOKED:
         problem = f"the vehicle drives at {math.degrees(relative):.0f} deg to its path; only forward or reverse is kept"
         fields.found.add(fields.where, problem)
@@ -222,16 +220,19 @@ def speed_in(fields: Fields, keys: Sequence[str]) -> float | None:
 
 
 def turn(before: Segment, after: Segment) -> float:
-    """Angle by which the vehicle must turn on the spot between two segments [rad]; 0 where a tangent is undefined."""
-    angle = _heading(after, 0) - _heading(before, 1)
-    return abs(wrap_scalar(angle)) if math.isfinite(angle) else 0.0
+    """Angle by which the vehicle must turn on the spot between two segments [rad]."""
+    return abs(wrap_scalar(_heading(after, 0) - _heading(before, 1)))
 
 
 def _heading(segment: Segment, end: int) -> float:
-    """Heading of the vehicle at an end of a segment [rad]."""
-    spline = segment.spline()
-    heading = float(spline.heading(spline.domain[end]))
-    return heading + math.pi if segment.direction is Direction.REVERSE else heading
+    """Heading of the vehicle at an end of a segment [rad].
+
+    A clamped curve leaves along its control polygon (The NURBS Book, equation 3.7), so none is evaluated.
+    """
+    points = segment.control_points if end == 0 else segment.control_points[::-1]
+    onward = points[np.flatnonzero((points != points[0]).any(axis=1))[0]] - points[0]
+    x, y = onward if end == 0 else -onward
+    return math.atan2(y, x) + (math.pi if segment.direction is Direction.REVERSE else 0.0)
 
 
 def follows(before: Edge, after: Edge) -> bool:

@@ -219,6 +219,7 @@ def test_orientation_becomes_a_direction_and_what_is_doubtful_is_said(
         ({"knotVector": [0, 0, 0, 1, 0.5, 1]}, "expected nondecreasing knots"),
         ({"knotVector": ["zero"]}, "knotVector is not a list of numbers"),
         ({"knotVector": [0, 0, 0, 7, 7, 7]}, "knots run from 0 to 7; expected 0 to 1"),
+        ({"knotVector": []}, "0 knots; expected 6"),
         ({"degree": 0}, "degree is 0; expected 1 to 10"),
         ({"degree": 2.5}, "degree is 2.5; expected 1 to 10"),
         ({"degree": 1e9}, "degree is"),
