@@ -98,4 +98,5 @@ def _timed(leg: Leg, start: float, driven: float) -> FloatArray:
     seconds = np.concatenate(([0.0], np.cumsum(2.0 * leg.step / (speeds[1:] + speeds[:-1]))))
     facing = math.pi if leg.reverse else 0.0
     way = driven + leg.step * np.arange(len(leg.points))
-    return np.column_stack((start + seconds, leg.points, np.unwrap(leg.travel_headings) + facing, way))
+    headings = np.unwrap(leg.travel_headings) + facing
+    return np.column_stack((start + seconds, leg.points, headings, way)).astype(np.float64, copy=False)

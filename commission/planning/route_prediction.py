@@ -7,6 +7,7 @@ map the predicted mean stays on the route; a moved reflector pulls it off, by th
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -29,6 +30,12 @@ from commission.site.parameters import Parameters, SupervisorParameters
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
+from commission.site.stations import Station
+
+AT_STATION = 0.2
+"""Distance within which the vehicle is at a station [m]."""
+FACING_STATION = math.radians(30.0)
+"""Difference of heading within which it is [rad]; a route may pass the same place another way round."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -195,6 +202,25 @@ class RoutePrediction:
         return self.drive.metres[(self.modes == mode) & (before != mode)]
 
 
+@dataclass(frozen=True, slots=True)
+class StationAccuracy:
+    """Predicted uncertainty at a station."""
+
+    station: str
+    """Name of the station."""
+    metre: float
+    """Way driven until there [m]."""
+    two_sigma: float
+    """Largest predicted 2-sigma of x or y while there [m]."""
+    required: float
+    """Largest 2-sigma that the station allows [m]."""
+
+    @property
+    def is_met(self) -> bool:
+        """Whether the prediction keeps to it."""
+        return self.two_sigma <= self.required
+
+
 def plan_route(
     project: Project,
     route_name: str,
@@ -229,6 +255,39 @@ def plan_route(
         project.scanner.mounting,
         project.parameters,
         options,
+    )
+
+
+def station_scans(drive: NominalDrive, stations: Sequence[Station]) -> Iterator[tuple[Station, IntArray]]:
+    """Scans of a drive at which the vehicle is at a station, for each station that the route passes.
+
+    A vehicle is at a station within `AT_STATION` of it and with less than `FACING_STATION` between the headings.
+    """
+    for station in stations:
+        distance = np.hypot(*(drive.poses[:, :2] - station.pose[:2]).T)
+        turned = np.abs(difference(drive.poses[:, 2], station.pose[2]))
+        scans = np.flatnonzero((distance <= AT_STATION) & (turned < FACING_STATION))
+        if len(scans):
+            yield station, scans
+
+
+def station_accuracies(prediction: RoutePrediction, stations: Sequence[Station]) -> tuple[StationAccuracy, ...]:
+    """Compare the predicted uncertainty with what each station on the route requires.
+
+    Parameters
+    ----------
+    prediction : along a route.
+    stations : of the project; those beside the route are left out.
+    """
+    position = prediction.two_sigma[:, :2].max(axis=1)
+    return tuple(
+        StationAccuracy(
+            station.name,
+            float(prediction.drive.metres[scans[0]]),
+            float(position[scans].max()),
+            station.required_accuracy,
+        )
+        for station, scans in station_scans(prediction.drive, stations)
     )
 
 

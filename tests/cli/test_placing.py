@@ -1,0 +1,59 @@
+import numpy as np
+import pytest
+from PIL import Image
+
+from commission.io.project_file import load_project
+
+
+@pytest.fixture
+def walled(project):
+    """The project with a hall of 8 x 6 m around its route."""
+    pixels = np.full((60, 80), 254, dtype=np.uint8)
+    pixels[[0, -1]] = 0
+    pixels[:, [0, -1]] = 0
+    Image.fromarray(pixels).save(project / "map.png")
+    (project / "map.yaml").write_text(
+        "image: map.png\nresolution: 0.1\norigin: [-1.0, -3.0, 0.0]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n",
+        encoding="utf-8",
+    )
+    text = (project / "project.yaml").read_text(encoding="utf-8")
+    (project / "project.yaml").write_text(text.replace("reflectors:", "floor_map: map.yaml\nreflectors:"))
+    return project
+
+
+def test_a_layout_is_suggested_as_a_project_that_loads(commission, walled, tmp_path):
+    words = ("--no-extend", "--visible", 2, "--keep-out", "-1,-3,3,0")
+    code, told, err = commission("place", walled, "--out", tmp_path / "placed", *words)
+    assert (code, err) == (0, "")
+    assert "Not met" not in told
+    placed, before = load_project(tmp_path / "placed"), load_project(walled)
+    assert 3 <= len(placed.reflectors) <= 4
+    assert placed.routes == before.routes
+    assert not ((placed.reflectors.centers <= (3.0, 0.0)).all(axis=1)).any()
+
+
+def test_reflectors_that_are_enough_stay_alone(commission, project, tmp_path):
+    code, told, _ = commission("place", project, "--out", tmp_path / "placed")
+    assert code == 0
+    assert "0 suggested" in told
+    assert load_project(tmp_path / "placed").reflectors == load_project(project).reflectors
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--visible", "0"], "demands.visible is 0"),
+        (["--keep-out", "1,2,3"], "--keep-out is '1,2,3'; expected X1,Y1,X2,Y2 (metres)"),
+        (["--spacing", "0"], "candidates.spacing is 0"),
+        (["--position-limit", "-1"], "demands.position_limit is -1"),
+        (["--route", "Loop"], "no route is called 'Loop'"),
+    ],
+)
+def test_a_bad_option_is_refused_by_name(words, said, refused, project, tmp_path):
+    assert said in refused("place", project, "--out", tmp_path / "placed", *words)
+    assert not (tmp_path / "placed").exists()
+
+
+def test_the_project_itself_is_never_overwritten(refused, project):
+    assert "another folder" in refused("place", project, "--out", project)
