@@ -10,6 +10,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TypeAlias
 
+from commission.app.editing.actions import EditAction
 from commission.site.project import Project
 
 ParameterValue: TypeAlias = bool | int | float | str
@@ -59,10 +60,16 @@ class ResetParameters:
 class Undo:
     """Take back the last change of the project."""
 
+    client: int | None = None
+    """Number of the browser that asks; none: nobody in particular."""
+
 
 @dataclass(frozen=True, slots=True)
 class Redo:
     """Make the change that was taken back again."""
+
+    client: int | None = None
+    """Number of the browser that asks; none: nobody in particular."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,4 +222,5 @@ Action: TypeAlias = (
     | SetView
     | Report
     | ClearProblems
+    | EditAction
 )

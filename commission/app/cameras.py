@@ -5,8 +5,9 @@ All browsers share one scene; the camera, and what only plan or 3D needs, belong
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field
+from typing import Any, TypeAlias
 
 import numpy as np
 import viser
@@ -23,8 +24,13 @@ THREE_D_FOV = 0.85
 ASPECT_AT_START = 1.7
 FOLLOWED_HEIGHT = 6.0
 """Visible height when the vehicle is first followed in the plan [m]."""
+NEAREST_FLIGHT = 8.0
+"""Visible height when a place is flown to from farther away [m]."""
 STRAIGHT_DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 LOCK = "/lock"
+
+OnDrag: TypeAlias = Callable[[Any], Coroutine[Any, Any, None]]
+"""Takes viser's drag events of the floor; `async`, since only those keep their order."""
 
 
 @dataclass(slots=True)
@@ -44,7 +50,10 @@ class ClientView:
 class Cameras:
     """The views of all browsers; called by the owner thread alone."""
 
-    def __init__(self, server: viser.ViserServer, layers: Sequence[Layer], extent: Extent) -> None:
+    def __init__(
+        self, server: viser.ViserServer, layers: Sequence[Layer], extent: Extent, on_drag: OnDrag | None = None
+    ) -> None:
+        self._on_drag = on_drag or _ignore
         self._server = server
         self._layers = layers
         self._extent = extent
@@ -86,17 +95,35 @@ class Cameras:
         else:
             self._look_down(own.client, self._extent.center, _visible_height(self._extent, _aspect(own.client)))
 
+    def look_at(self, client_id: int, place: tuple[float, float]) -> None:
+        """Bring a place into the middle of a browser's view, near enough to see it."""
+        own = self._views.get(client_id)
+        if own is None:
+            return
+        own.follow = False
+        camera = own.client.camera
+        distance = float(np.linalg.norm(camera.position - camera.look_at))
+        if not own.three_d:
+            self._look_down(own.client, place, min(distance * PLAN_FOV, NEAREST_FLIGHT))
+            return
+        target = np.array([*place, 0.0])
+        away = camera.position - camera.look_at
+        with own.client.atomic():
+            camera.position = target + away * min(1.0, NEAREST_FLIGHT / max(distance, 1e-6))
+            camera.look_at = target
+
     def show_layer(self, name: str, *, visible: bool) -> None:
         """Show or hide a layer's nodes in the browsers that have some of their own."""
         for own in self._views.values():
             for node in own.furniture.get(name, ()):
                 node.visible = visible
 
-    def refurnish(self, hidden: frozenset[str]) -> None:
-        """Make every browser's own nodes anew, after the project changed."""
+    def refurnish(self, changed: frozenset[str], extent: Extent, hidden: frozenset[str]) -> None:
+        """Make the browsers' own nodes of these layers anew, after the project changed."""
+        self._extent = extent
         for own in self._views.values():
-            self._furnish(own)
-        for name in hidden:
+            self._furnish_layers(own, changed)
+        for name in hidden & changed:
             self.show_layer(name, visible=False)
 
     def follow(self, run: RunView) -> None:
@@ -112,14 +139,20 @@ class Cameras:
                     camera.look_at = target
 
     def _furnish(self, own: ClientView) -> None:
-        """Replace a browser's own nodes."""
-        for nodes in own.furniture.values():
-            for node in nodes:
-                node.remove()
-        scene = own.client.scene
-        own.furniture = {layer.name: layer.furnish(scene, three_d=own.three_d) for layer in self._layers}
+        """Replace all of a browser's own nodes."""
+        self._furnish_layers(own, frozenset(layer.name for layer in self._layers))
+        for node in own.furniture.pop(LOCK, ()):
+            node.remove()
         if not own.three_d:
-            own.furniture[LOCK] = (_rotation_lock(own.client),)
+            own.furniture[LOCK] = (_rotation_lock(own.client, self._on_drag),)
+
+    def _furnish_layers(self, own: ClientView, names: frozenset[str]) -> None:
+        """Replace a browser's own nodes of some layers."""
+        for layer in self._layers:
+            if layer.name in names:
+                for node in own.furniture.get(layer.name, ()):
+                    node.remove()
+                own.furniture[layer.name] = layer.furnish(own.client.scene, three_d=own.three_d)
 
     def _look_down(self, client: ClientHandle, center: tuple[float, float], visible_height: float) -> None:
         distance = visible_height / PLAN_FOV
@@ -173,7 +206,7 @@ def _aspect(client: ClientHandle) -> float:
     return aspect if 0.2 < aspect < 8.0 else ASPECT_AT_START
 
 
-def _rotation_lock(client: ClientHandle) -> SceneNodeHandle:
+def _rotation_lock(client: ClientHandle, on_drag: OnDrag) -> SceneNodeHandle:
     """Put a sheet under everything that takes left drags: the camera would turn by them, and north not stay up."""
     sheet = client.scene.add_box(
         LOCK,
@@ -183,9 +216,10 @@ def _rotation_lock(client: ClientHandle) -> SceneNodeHandle:
         cast_shadow=False,
         receive_shadow=False,
     )
-
-    async def take(_event: object) -> None:
-        pass
-
-    sheet.on_drag("left")(take)
+    sheet.on_drag("left")(on_drag)
+    sheet.on_drag("left", modifier="shift")(on_drag)
     return sheet
+
+
+async def _ignore(_event: object) -> None:
+    """Take a drag of the floor so that the camera does not."""

@@ -11,6 +11,8 @@ import viser
 from commission.app import theme
 from commission.app.actions import View
 from commission.app.cameras import Cameras
+from commission.app.editing.desk import Desk, DeskTabs
+from commission.app.editing.pointer import floor_drag
 from commission.app.extent import extent_of
 from commission.app.layers.accumulated import AccumulatedLayer
 from commission.app.layers.base import Layer
@@ -27,7 +29,6 @@ from commission.app.layers.vehicle import VehicleLayer
 from commission.app.layers.walls import WallLayer
 from commission.app.panels.base import Panel, Post
 from commission.app.panels.layers_panel import LayersPanel, LegendPanel
-from commission.app.panels.now_panel import NowPanel
 from commission.app.panels.plots import Plots
 from commission.app.panels.problems_panel import ProblemsPanel
 from commission.app.panels.run_panel import RunPanel
@@ -37,6 +38,7 @@ from commission.app.panels.top_bar import TopBar
 from commission.app.panels.tune_panel import TunePanel
 from commission.app.store import AppState
 from commission.app.view import PageView
+from commission.site.project import Project
 
 LAYERS = (
     FloorLayer,
@@ -69,7 +71,10 @@ class Page:
 
     def __init__(self, server: viser.ViserServer, post: Post, state: AppState) -> None:
         self._server = server
+        self._post = post
         self._hidden: frozenset[str] = frozenset()
+        self._project: Project | None = None
+        self._desks: dict[int, Desk] = {}
         with server.atomic():
             server.gui.configure_theme(
                 dark_mode=True, show_logo=False, show_share_button=False, brand_color=theme.BRAND
@@ -79,10 +84,10 @@ class Page:
             server.scene.set_background_image(np.full((2, 2, 3), theme.BACKGROUND, np.uint8), format="png")
             self._layers: tuple[Layer, ...] = tuple(make(server.scene) for make in LAYERS)
             self._panels = self._build_panels(post, state)
-            self._cameras = Cameras(server, self._layers, extent_of(state.project))
+            self._cameras = Cameras(server, self._layers, extent_of(state.project), floor_drag(post))
 
     def _build_panels(self, post: Post, state: AppState) -> tuple[Panel, ...]:
-        """Make every panel and dock it: steps on the left, what is now on the right, time below."""
+        """Make every panel and dock it: steps on the left, what is selected on the right, time below."""
         gui = self._server.gui
         top = TopBar(gui, post, state)
         left = gui.add_panel()
@@ -94,11 +99,10 @@ class Page:
             tune = TunePanel(gui, post, state)
         left.dock_left()
         left.set_width(theme.LEFT_PX)
-        now = gui.add_panel()
-        with now.add_tab("Now"):
-            numbers = NowPanel(gui)
-        now.dock_right()
-        now.set_width(theme.RIGHT_PX)
+        above = gui.add_panel()
+        self._tabs = DeskTabs(above.add_tab("Selection"), above.add_tab("Reflectors"))
+        above.dock_right()
+        above.set_width(theme.RIGHT_PX)
         below = gui.add_panel()
         with below.add_tab("Legend"):
             legend = LegendPanel(gui, post, self._layers, state)
@@ -106,21 +110,29 @@ class Page:
             switches = LayersPanel(gui, post, self._layers, state)
         with below.add_tab("Problems"):
             problems = ProblemsPanel(gui, post)
-        below.dock_below(now)
+        below.dock_below(above)
         bottom = gui.add_panel()
         with bottom.add_tab("Time"):
             time_line = TimeLine(gui, post, state.speed)
             plots = Plots(gui)
         bottom.float(x=0, y=-1, width=1000, height=theme.BOTTOM_PX)
-        return top, site, run, tune, numbers, legend, switches, problems, time_line, plots
+        return top, site, run, tune, legend, switches, problems, time_line, plots
 
     def show_site(self, state: AppState) -> None:
-        """Draw the project."""
+        """Draw what has changed of the project since it was last drawn."""
+        project, before = state.project, self._project
+        changed = tuple(
+            layer
+            for layer in self._layers
+            if before is None or any(getattr(project, part) is not getattr(before, part) for part in layer.reads)
+        )
+        self._project = project
         with self._server.atomic():
-            for layer in self._layers:
-                layer.show_site(state.project)
-        self._hide(state.hidden, every_layer=True)
-        self._cameras.refurnish(state.hidden)
+            for layer in changed:
+                layer.show_site(project)
+        names = frozenset(layer.name for layer in changed)
+        self._hide(state.hidden, drawn_anew=names)
+        self._cameras.refurnish(names, extent_of(project), state.hidden)
 
     def draw(self, view: PageView, *, slowly: bool) -> None:
         """Draw a view.
@@ -140,13 +152,15 @@ class Page:
                 panel.draw(view)
                 if slowly:
                     panel.draw_slowly(view)
+        for desk in self._desks.values():
+            desk.draw(view, slowly=slowly)
         self._hide(view.state.hidden)
         if view.run is not None:
             self._cameras.follow(view.run)
 
-    def _hide(self, hidden: frozenset[str], *, every_layer: bool = False) -> None:
-        """Show and hide layers where that changed."""
-        changed = {layer.name for layer in self._layers} if every_layer else hidden ^ self._hidden
+    def _hide(self, hidden: frozenset[str], *, drawn_anew: frozenset[str] = frozenset()) -> None:
+        """Show and hide layers where that changed, and those whose nodes are new."""
+        changed = drawn_anew | (hidden ^ self._hidden)
         self._hidden = hidden
         for layer in self._layers:
             if layer.name in changed:
@@ -168,12 +182,18 @@ class Page:
         """Change what one browser looks at."""
         self._cameras.show(client_id, view)
 
+    def look_at(self, client_id: int, place: tuple[float, float]) -> None:
+        """Bring a place into one browser's view."""
+        self._cameras.look_at(client_id, place)
+
     def connected(self, client_id: int) -> None:
-        """Set up a new browser's own view."""
+        """Set up a new browser's own view and panels."""
         client = self._server.get_clients().get(client_id)
         if client is not None:
+            self._desks[client_id] = Desk(client, self._post, self._tabs)
             self._cameras.connected(client)
 
     def disconnected(self, client_id: int) -> None:
         """Forget a browser."""
+        self._desks.pop(client_id, None)
         self._cameras.disconnected(client_id)

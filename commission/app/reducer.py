@@ -3,92 +3,28 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass, replace
-from functools import singledispatch
-from pathlib import Path
-from typing import Any, TypeAlias
+from dataclasses import replace
+from typing import Any
 
+import commission.app.editing.site_reducer  # noqa: F401 - registers what editing actions mean
 from commission.app import actions
-from commission.app.actions import Action, ParameterValue, Source, View
-from commission.app.store import AppState, LastEdit
+from commission.app.actions import ParameterValue
+from commission.app.reduction import (
+    ApplyParameters,
+    LoadSource,
+    MoveTo,
+    PlaceCamera,
+    ProcessOneScan,
+    Reduction,
+    Tell,
+    WriteProject,
+    reduce,
+)
+from commission.app.store import AppState, Edit, Step, edited
 from commission.errors import UsageError
 from commission.site.parameters import Parameters
-from commission.site.project import Project
 
-UNDO_STEPS = 200
-MERGE_WITHIN_S = 1.0
 PROBLEMS_KEPT = 20
-
-
-@dataclass(frozen=True, slots=True)
-class LoadSource:
-    """Simulate or read what drives."""
-
-    source: Source
-    """What drives."""
-
-
-@dataclass(frozen=True, slots=True)
-class ApplyParameters:
-    """Hand the project's parameters to the running localizer."""
-
-
-@dataclass(frozen=True, slots=True)
-class WriteProject:
-    """Write the project."""
-
-    project: Project
-    """What to write."""
-    folder: Path
-    """Where to."""
-
-
-@dataclass(frozen=True, slots=True)
-class MoveTo:
-    """Bring the run to a time of the drive."""
-
-    time: float
-    """Seconds after its start [s]."""
-    afresh: bool = False
-    """Whether it begins again at the initial pose even when the time is ahead."""
-
-
-@dataclass(frozen=True, slots=True)
-class ProcessOneScan:
-    """Let the localizer process one more scan."""
-
-
-@dataclass(frozen=True, slots=True)
-class Tell:
-    """Show a notification."""
-
-    text: str
-    """One line."""
-    failed: bool
-    """Whether something went wrong."""
-
-
-@dataclass(frozen=True, slots=True)
-class PlaceCamera:
-    """Change what one browser looks at."""
-
-    client: int
-    """Number of the browser's connection."""
-    view: View
-    """What it looks at."""
-
-
-Effect: TypeAlias = LoadSource | ApplyParameters | WriteProject | MoveTo | ProcessOneScan | Tell | PlaceCamera
-
-
-@dataclass(frozen=True, slots=True)
-class Reduction:
-    """Outcome of one action."""
-
-    state: AppState
-    """The next state."""
-    effects: tuple[Effect, ...] = ()
-    """What has to be done besides, in this order."""
 
 
 def parameter(parameters: Parameters, key: str) -> ParameterValue:
@@ -108,73 +44,56 @@ def with_parameter(parameters: Parameters, key: str, value: ParameterValue) -> P
     return dataclasses.replace(parameters, **changes)
 
 
-@singledispatch
-def reduce(action: Action, state: AppState) -> Reduction:
-    """Return what follows from an action.
-
-    Parameters
-    ----------
-    action : what was asked for.
-    state : the state it was asked in.
-
-    Raises
-    ------
-    CommissionError, ValueError
-        the action asks for something that does not exist or is out of range; the state stays as it is.
-    """
-    raise TypeError(f"{type(action).__name__} is not an action; state has playing = {state.playing}")
-
-
 @reduce.register
 def _(action: actions.SetParameter, state: AppState) -> Reduction:
     if parameter(state.project.parameters, action.key) == action.value:
         return Reduction(state)
     parameters = with_parameter(state.project.parameters, action.key, action.value)
-    last = state.last_edit
-    merged = last is not None and last.key == action.key and action.at - last.at <= MERGE_WITHIN_S
-    undo = state.undo if merged else (*state.undo, state.project)[-UNDO_STEPS:]
-    edited = replace(
-        state,
-        project=replace(state.project, parameters=parameters),
-        undo=undo,
-        redo=(),
-        last_edit=LastEdit(action.key, action.at),
-    )
-    return Reduction(edited, (ApplyParameters(),))
+    name = action.key.partition(".")[2].replace("_", " ")
+    edit = Edit(f"set {name}", key=action.key, at=action.at)
+    changed = edited(state, replace(state.project, parameters=parameters), edit)
+    return Reduction(changed, (ApplyParameters(),))
 
 
 @reduce.register
 def _(_action: actions.ResetParameters, state: AppState) -> Reduction:
     if state.project.parameters == state.saved.parameters:
         return Reduction(state)
-    edited = replace(
-        state,
-        project=replace(state.project, parameters=state.saved.parameters),
-        undo=(*state.undo, state.project)[-UNDO_STEPS:],
-        redo=(),
-        last_edit=None,
-    )
-    return Reduction(edited, (ApplyParameters(),))
+    project = replace(state.project, parameters=state.saved.parameters)
+    return Reduction(edited(state, project, Edit("reset parameters")), (ApplyParameters(),))
 
 
 @reduce.register
-def _(_action: actions.Undo, state: AppState) -> Reduction:
+def _(action: actions.Undo, state: AppState) -> Reduction:
     if not state.undo:
         return Reduction(state)
-    before = replace(
-        state, project=state.undo[-1], undo=state.undo[:-1], redo=(*state.redo, state.project), last_edit=None
-    )
+    step = state.undo[-1]
+    if _is_anothers(step, action.client, state):
+        return Reduction(state, (_in_the_way(step, "undo"),))
+    taken_back = replace(step, project=state.project)
+    before = replace(state, project=step.project, undo=state.undo[:-1], redo=(*state.redo, taken_back), last_edit=None)
     return Reduction(before, (ApplyParameters(),))
 
 
 @reduce.register
-def _(_action: actions.Redo, state: AppState) -> Reduction:
+def _(action: actions.Redo, state: AppState) -> Reduction:
     if not state.redo:
         return Reduction(state)
-    after = replace(
-        state, project=state.redo[-1], redo=state.redo[:-1], undo=(*state.undo, state.project), last_edit=None
-    )
+    step = state.redo[-1]
+    if _is_anothers(step, action.client, state):
+        return Reduction(state, (_in_the_way(step, "redo"),))
+    made_again = replace(step, project=state.project)
+    after = replace(state, project=step.project, undo=(*state.undo, made_again), redo=state.redo[:-1], last_edit=None)
     return Reduction(after, (ApplyParameters(),))
+
+
+def _is_anothers(step: Step, client: int | None, state: AppState) -> bool:
+    """Whether a step belongs to another browser that is still there: only that one takes it back."""
+    return client is not None and step.client not in (None, client) and step.client in state.editors
+
+
+def _in_the_way(step: Step, what: str) -> Tell:
+    return Tell(f"nothing to {what} here: the last edit, {step.name}, is browser {step.client}'s own", failed=False)
 
 
 @reduce.register

@@ -14,8 +14,9 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Protocol, TypeAlias
 
-from commission.app import actions, reducer
+from commission.app import actions, reducer, reduction
 from commission.app.actions import Action, Source, View
+from commission.app.editing import actions as editing
 from commission.app.jobs import Job, JobReport, Jobs, JobState, Progress
 from commission.app.session import Drive, Session
 from commission.app.store import AppState
@@ -68,6 +69,9 @@ class PageLike(Protocol):
     def show_view(self, client_id: int, view: View) -> None:
         """Change what one browser looks at."""
 
+    def look_at(self, client_id: int, place: tuple[float, float]) -> None:
+        """Bring a place into one browser's view."""
+
     def connected(self, client_id: int) -> None:
         """Set up a browser."""
 
@@ -108,6 +112,7 @@ class Runtime:
         self._jobs = Jobs(self._queue.put)
         self._shown_jobs: dict[int, Job] = {}
         self._page: PageLike | None = None
+        self._shown: Project | None = None
         self._dirty = True
         self._slow_dirty = True
         self._drawn_at = self._drawn_slowly_at = self._ticked_at = clock()
@@ -148,7 +153,7 @@ class Runtime:
             self._apply(actions.Report(text))
 
     def _drained(self) -> list[Message]:
-        """Wait until something is due and return what has arrived; of seeks in a row only the newest."""
+        """Wait until something is due and return what has arrived; of seeks and drags in a row only the newest."""
         messages: list[Message] = []
         try:
             messages.append(self._queue.get(timeout=self._time_left()))
@@ -159,7 +164,7 @@ class Runtime:
         return [
             message
             for message, following in itertools.zip_longest(messages, messages[1:])
-            if not (isinstance(message, actions.Seek) and isinstance(following, actions.Seek))
+            if not _is_outdated(message, following)
         ]
 
     def _time_left(self) -> float:
@@ -180,9 +185,11 @@ class Runtime:
         if isinstance(message, JobReport):
             self._hear(message)
         elif isinstance(message, BrowserCame):
+            self._apply(editing.Join(message.client))
             if page is not None:
                 page.connected(message.client)
         elif isinstance(message, BrowserLeft):
+            self._apply(editing.Leave(message.client))
             if page is not None:
                 page.disconnected(message.client)
         else:
@@ -191,40 +198,37 @@ class Runtime:
 
     def _apply(self, action: Action) -> None:
         """Reduce an action and carry out what follows."""
-        reduction = reducer.reduce(action, self.state)
-        self.state = reduction.state
+        outcome = reducer.reduce(action, self.state)
+        self.state = outcome.state
         if self.session is not None:
             self.session.covered = self.state.covered
-        for effect in reduction.effects:
+        for effect in outcome.effects:
             self._carry_out(effect)
         self._dirty = self._slow_dirty = True
 
-    def _carry_out(self, effect: reducer.Effect) -> None:
+    def _carry_out(self, effect: reduction.Effect) -> None:
         """Do one thing that the reducer asks for."""
-        session, page = self.session, self._page
+        session = self.session
         match effect:
-            case reducer.LoadSource(source):
+            case reduction.LoadSource(source):
                 project = self.state.project
                 self._jobs.start(PREPARE, lambda progress: self._work.prepare(project, source, progress))
-            case reducer.ApplyParameters():
+            case reduction.ApplyParameters():
                 if session is not None:
                     session.set_setup(LocalizerSetup.of(self.state.project))
                     self._predict()
-            case reducer.WriteProject(project, folder):
+            case reduction.WriteProject(project, folder):
                 self._work.save(project, folder)
                 self.post(actions.ProjectSaved(project, folder, time.strftime("%H:%M")))
-            case reducer.MoveTo(seconds, afresh):
+            case reduction.MoveTo(seconds, afresh):
                 if session is not None:
                     session.seek(seconds, afresh=afresh)
-            case reducer.ProcessOneScan():
+            case reduction.ProcessOneScan():
                 if session is not None:
                     session.step()
-            case reducer.Tell(text, failed):
-                if page is not None:
-                    page.tell(text, failed=failed)
-            case reducer.PlaceCamera(client, view):
-                if page is not None:
-                    page.show_view(client, view)
+            case reduction.Tell() | reduction.PlaceCamera() | reduction.FlyTo():
+                if self._page is not None:
+                    _show(self._page, effect)
 
     def _hear(self, report: JobReport) -> None:
         """Follow a job; take its result or its error."""
@@ -268,6 +272,8 @@ class Runtime:
             self._advance(session, elapsed)
         if self._page is None:
             return
+        if self.state.project is not self._shown:
+            self._show_site()
         slowly = self._slow_dirty and now - self._drawn_slowly_at >= SLOW_FRAME_S
         if slowly or (self._dirty and now - self._drawn_at >= FRAME_S):
             self._drawn_at = now
@@ -300,4 +306,30 @@ class Runtime:
 
     def _show_site(self) -> None:
         if self._page is not None:
+            self._shown = self.state.project
             self._page.show_site(self.state)
+
+
+def _show(page: PageLike, effect: reduction.Tell | reduction.PlaceCamera | reduction.FlyTo) -> None:
+    """Do what only the page can do."""
+    match effect:
+        case reduction.Tell(text, failed):
+            page.tell(text, failed=failed)
+        case reduction.PlaceCamera(client, view):
+            page.show_view(client, view)
+        case reduction.FlyTo(client, place):
+            page.look_at(client, place)
+
+
+def _is_outdated(message: Message, following: Message | None) -> bool:
+    """Whether the message behind makes this one pointless: the newest place of the time line or of a drag counts."""
+    match message, following:
+        case actions.Seek(), actions.Seek():
+            return True
+        case (editing.DragFloor(phase="update"), editing.DragFloor(phase="update")) | (
+            editing.DragSelection(phase="update"),
+            editing.DragSelection(phase="update"),
+        ):
+            return message.client == following.client
+        case _:
+            return False

@@ -5,10 +5,12 @@ No widget and no estimator: the state of the run itself lives in `session`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from commission.app.actions import Source
+from commission.app.editing.editor import Editor
 from commission.site.project import Project
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
@@ -18,12 +20,29 @@ MAGNIFICATIONS = (1.0, 3.0, 10.0, 30.0)
 """Factors at which ellipses can be drawn."""
 
 
+UNDO_STEPS = 10_000
+"""Undo steps that are kept: nobody goes back farther, and memory stays bounded. Projects share what did not change."""
+MERGE_WITHIN_S = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A project that undo or redo brings back."""
+
+    project: Project
+    """The project."""
+    name: str = ""
+    """What is taken back or made again by that, as its button says."""
+    client: int | None = None
+    """Number of the browser that did it; none: nobody in particular."""
+
+
 @dataclass(frozen=True, slots=True)
 class LastEdit:
-    """Which parameter the newest undo step changed, and when: what follows quickly belongs to it."""
+    """What the newest undo step changed, and when: what follows quickly belongs to it."""
 
     key: str
-    """`group.name`."""
+    """Names the thing that was changed: `group.name` of a parameter."""
     at: float
     """When [s, any monotonic clock]."""
 
@@ -40,12 +59,14 @@ class AppState:
     """Where the project is written to; none: it is bundled with the program and stays as it is."""
     saved_at: str = ""
     """Time of day of the last save; empty: not saved in this session."""
-    undo: tuple[Project, ...] = ()
+    undo: tuple[Step, ...] = ()
     """Earlier projects, the newest last."""
-    redo: tuple[Project, ...] = ()
+    redo: tuple[Step, ...] = ()
     """Projects that were taken back, the newest last."""
     last_edit: LastEdit | None = None
-    """The edit that a quick next one of the same parameter is merged with."""
+    """The edit that a quick next one of the same thing is merged with."""
+    editors: Mapping[int, Editor] = field(default_factory=dict)
+    """How each connected browser edits, by its number; never changed in place."""
     source: Source | None = None
     """What drives."""
     playing: bool = False
@@ -66,4 +87,33 @@ class AppState:
     @property
     def is_changed(self) -> bool:
         """Whether there is something to save."""
-        return self.project is not self.saved and self.project.parameters != self.saved.parameters
+        return self.project is not self.saved and self.project != self.saved
+
+    def with_editor(self, client: int, editor: Editor) -> AppState:
+        """Return the state with one browser's editor exchanged."""
+        return replace(self, editors={**self.editors, client: editor})
+
+
+@dataclass(frozen=True, slots=True)
+class Edit:
+    """What an edit is called, who made it, and what it may be merged with."""
+
+    name: str
+    """As the undo button says: `move R3`."""
+    client: int | None = None
+    """Number of the browser that made it; none: nobody in particular."""
+    key: str = ""
+    """Names the thing that was changed; edits of one thing in quick succession are one step. Empty: never merged."""
+    at: float = 0.0
+    """When [s, any monotonic clock]."""
+
+
+def edited(state: AppState, project: Project, edit: Edit) -> AppState:
+    """Return the state after an edit: one more undo step, unless it belongs to the newest one."""
+    last = state.last_edit
+    merged = bool(edit.key) and last is not None and last.key == edit.key and edit.at - last.at <= MERGE_WITHIN_S
+    step = Step(state.project, edit.name, edit.client)
+    undo = state.undo if merged and state.undo else (*state.undo, step)[-UNDO_STEPS:]
+    return replace(
+        state, project=project, undo=undo, redo=(), last_edit=LastEdit(edit.key, edit.at) if edit.key else None
+    )

@@ -29,6 +29,7 @@ SCAN: Color = (190, 197, 206)
 VEHICLE: Color = (236, 239, 244)
 TRAIL: Color = (64, 200, 150)
 REFERENCE: Color = (196, 140, 255)
+SELECTED: Color = (255, 159, 28)
 
 OPERATIONAL_COLOR = "#1c7c3c"
 FAIL_COLOR = "#c5221f"
@@ -55,6 +56,7 @@ class Height:
     VEHICLE = 0.10
     POSE = 0.11
     LABEL = 0.12
+    EDITING = 0.13
 
 
 class Mark(StrEnum):
@@ -88,6 +90,9 @@ TOP_BAR_PX = 44
 BOTTOM_PX = 248
 LEFT_PX = 300
 RIGHT_PX = 270
+
+WIDE = "<div class='c-wide'></div>"
+"""An html element that lets the widget behind it, which has no label, take the label's room, too."""
 
 # viser docks panels to the left and right only. The rules below turn its main panel into a bar at the top and the
 # floating panel of the time line into a strip at the bottom, and take their space from the floor. Where a rule does not
@@ -125,6 +130,8 @@ div:has(>div>.c-bottom)>:nth-child(6){{grid-column:11/span 14;margin:-9px 0 2px!
 div:has(>div>.c-bottom)>:nth-child(n+7){{grid-column:span 4}}
 div:has(>div>.c-bottom)>:nth-child(-n+3) [style*="7.25em"]{{display:none}}
 div:has(>div>.c-bottom)>:nth-child(5) [style*="7.25em"]{{display:none}}
+div:has(>.c-wide){{display:none}}
+div:has(>.c-wide)+* [style*="7.25em"]{{display:none}}
 .c-table{{width:100%;border-collapse:collapse;font-size:12px;font-variant-numeric:tabular-nums}}
 .c-table td{{padding:1px 0;vertical-align:top}}
 .c-table td:first-child{{opacity:.65;padding-right:10px;white-space:nowrap}}

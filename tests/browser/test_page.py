@@ -129,7 +129,7 @@ def test_the_gate_slider_widens_the_validation_areas(run: OpenRun, page: OpenPag
     run.until(lambda: run.runtime.state.project.parameters.association.gate_probability == pytest.approx(0.9999))
     page.press("Step")
     run.until(lambda: np.ptp(run.session.view().gates, axis=1).mean() > 1.5 * before)
-    page.press("Undo")
+    page.press("Undo set gate probability")
     run.until(lambda: run.runtime.state.project.parameters.association.gate_probability == 0.95)
     page.page.wait_for_function("() => [...document.querySelectorAll('input')].some(i => i.value === '95')")
 

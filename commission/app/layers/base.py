@@ -19,6 +19,8 @@ class Layer(Protocol):
     """Shown beside its switch; unique."""
     legend: tuple[Legend, ...]
     """Its entries in the legend."""
+    reads: tuple[str, ...]
+    """Parts of the project that it draws from: it is drawn anew when one of them is another value."""
 
     def show_site(self, project: Project) -> None:
         """Draw what depends on the project alone."""
@@ -43,6 +45,7 @@ class BaseLayer:
 
     name = ""
     legend: tuple[Legend, ...] = ()
+    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes", "vehicle", "scanner")
 
     def __init__(self, scene: SceneApi) -> None:
         self.scene = scene

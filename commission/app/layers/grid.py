@@ -35,16 +35,21 @@ class GridLayer(BaseLayer):
     """Grid and scale bar."""
 
     name = "Grid"
+    reads = ("floor_map", "reflectors", "routes")
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._nodes: tuple[SceneNodeHandle, ...] = ()
+        self._extent: Extent | None = None
 
     def show_site(self, project: Project) -> None:
         """Draw the grid over the site's rectangle."""
+        extent = extent_of(project)
+        if extent == self._extent:
+            return
+        self._extent = extent
         for node in self._nodes:
             node.remove()
-        extent = extent_of(project)
         step = grid_step(extent)
         lines = grid_lines(extent, step)
         x, y, height = extent.low[0] + 0.1 * step, extent.low[1] + 0.35 * step, theme.Height.GRID

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
-from viser import SceneApi, SceneNodeHandle
+from viser import LabelHandle, SceneApi, SceneNodeHandle
 
 from commission.app import theme
-from commission.app.drawing import lift
+from commission.app.drawing import NO_POINTS, lift
 from commission.app.extent import extent_of
 from commission.app.layers.base import BaseLayer
 from commission.site.project import Project
@@ -22,33 +22,29 @@ class ReflectorLayer(BaseLayer):
     """Where the map says that reflectors are."""
 
     name = "Reflectors"
+    reads = ("floor_map", "reflectors", "routes")
     legend = (theme.Legend("reflector (paper: dark blue)", theme.REFLECTOR, theme.Mark.DOT),)
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._project = Project()
-        self._nodes: tuple[SceneNodeHandle, ...] = ()
-
-    def show_site(self, project: Project) -> None:
-        """Draw a mark at each reflector's center."""
-        for node in self._nodes:
-            node.remove()
-        self._nodes = ()
-        self._project = project
-        reflectors = project.reflectors
-        if not len(reflectors):
-            return
-        size = max(1.2 * extent_of(project).mark_size(), 2.0 * float(reflectors.radii.max()))
-        mark = self.scene.add_point_cloud(
+        self._marks = scene.add_point_cloud(
             "/reflectors/marks",
-            lift(reflectors.centers, theme.Height.REFLECTOR),
+            NO_POINTS,
             theme.REFLECTOR,
-            point_size=size,
+            point_size=0.1,
             point_shape="circle",
             point_shading="flat",
             precision="float32",
         )
-        self._nodes = (mark,)
+
+    def show_site(self, project: Project) -> None:
+        """Draw a mark at each reflector's center."""
+        self._project = project
+        reflectors = project.reflectors
+        smallest = 1.2 * extent_of(project).mark_size()
+        self._marks.point_size = max(smallest, 2.0 * float(reflectors.radii.max(initial=0.0)))
+        self._marks.points = lift(reflectors.centers, theme.Height.REFLECTOR)
 
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:
         """Add bodies in 3D; they would hide the marks' surroundings in the plan."""
@@ -56,38 +52,43 @@ class ReflectorLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the marks."""
-        return self._nodes
+        return (self._marks,)
 
 
 class ReflectorNameLayer(BaseLayer):
     """Names of the reflectors, where they are few enough to be read."""
 
     name = "Reflector names"
+    reads = ("floor_map", "reflectors", "routes")
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._nodes: tuple[SceneNodeHandle, ...] = ()
+        self._labels: dict[str, LabelHandle] = {}
 
     def show_site(self, project: Project) -> None:
-        """Write each name beside its reflector."""
-        for node in self._nodes:
-            node.remove()
+        """Write each name beside its reflector; labels that stay are moved, not made anew."""
         shown = project.reflectors.reflectors if len(project.reflectors) <= MOST_LABELS else ()
         offset = extent_of(project).mark_size()
-        self._nodes = tuple(
-            self.scene.add_label(
-                f"/reflector_names/{index}",
+        names = {reflector.id for reflector in shown}
+        for name in [name for name in self._labels if name not in names]:
+            self._labels.pop(name).remove()
+        for reflector in shown:
+            position = (reflector.x + offset, reflector.y + offset, theme.Height.LABEL)
+            label = self._labels.get(reflector.id)
+            if label is not None:
+                label.position = position
+                continue
+            self._labels[reflector.id] = self.scene.add_label(
+                f"/reflector_names/{reflector.id.encode().hex()}",
                 reflector.id,
-                position=(reflector.x + offset, reflector.y + offset, theme.Height.LABEL),
+                position=position,
                 font_screen_scale=0.7,
                 anchor="bottom-left",
             )
-            for index, reflector in enumerate(shown)
-        )
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the names."""
-        return self._nodes
+        return tuple(self._labels.values())
 
 
 def _bodies(scene: SceneApi, project: Project) -> tuple[SceneNodeHandle, ...]:

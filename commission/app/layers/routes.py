@@ -6,7 +6,7 @@ import numpy as np
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app import theme
-from commission.app.drawing import lift
+from commission.app.drawing import NO_SEGMENTS, lift
 from commission.app.extent import extent_of
 from commission.app.layers.base import BaseLayer
 from commission.geometry.arrays import FloatArray
@@ -41,17 +41,17 @@ class RouteLayer(BaseLayer):
     """All routes of the project."""
 
     name = "Routes"
+    reads = ("floor_map", "reflectors", "routes")
     legend = (theme.Legend("route (dashed: in reverse)", theme.ROUTE, theme.Mark.LINE),)
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._nodes: tuple[SceneNodeHandle, ...] = ()
+        self._lines = scene.add_line_segments(
+            "/routes", NO_SEGMENTS, theme.ROUTE, thickness=1.5, thickness_units="screen"
+        )
 
     def show_site(self, project: Project) -> None:
         """Draw every segment of every route in one set of lines."""
-        for node in self._nodes:
-            node.remove()
-        self._nodes = ()
         size = 2.2 * extent_of(project).mark_size()
         strokes: list[FloatArray] = []
         for segment in (segment for route in project.routes for segment in route.segments):
@@ -60,12 +60,10 @@ class RouteLayer(BaseLayer):
             if segment.direction is Direction.REVERSE:
                 line = line[(np.arange(len(line)) // DASH) % 2 == 0]
             strokes += [line, _arrows(curve, size)]
-        if strokes:
-            points = lift(np.concatenate(strokes).reshape(-1, 2), theme.Height.ROUTE).reshape(-1, 2, 3)
-            self._nodes = (
-                self.scene.add_line_segments("/routes", points, theme.ROUTE, thickness=1.5, thickness_units="screen"),
-            )
+        every = np.concatenate(strokes) if strokes else np.empty((0, 2, 2))
+        points = lift(every.reshape(-1, 2), theme.Height.ROUTE).reshape(-1, 2, 3)
+        self._lines.points = points if strokes else NO_SEGMENTS
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the lines."""
-        return self._nodes
+        return (self._lines,)

@@ -52,6 +52,16 @@ class NowPanel(BasePanel):
     def __init__(self, gui: GuiApi) -> None:
         self._html = gui.add_html("<div class='c-note'>Numbers appear with the first scan.</div>")
 
+    @property
+    def visible(self) -> bool:
+        """Whether they are shown."""
+        return self._html.visible
+
+    @visible.setter
+    def visible(self, visible: bool) -> None:
+        if self._html.visible is not visible:
+            self._html.visible = visible
+
     def draw_slowly(self, view: PageView) -> None:
         """Show the numbers."""
         if view.run is not None:

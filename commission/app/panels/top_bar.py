@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, Literal, TypeAlias
 
 from viser import GuiApi, GuiEvent
 
 from commission.app import actions, theme
 from commission.app.panels.base import BasePanel, Post, escaped, posting
-from commission.app.store import AppState
+from commission.app.store import AppState, Step
 from commission.app.view import PageView, RunView
 from commission.localization.estimate import Mode
 from commission.site.parameters import SupervisorParameters
+
+LONGEST_NAME = 22
+"""Letters of a step's name that fit on a button."""
 
 Modifier: TypeAlias = Literal["cmd/ctrl", "cmd/ctrl+shift"]
 
@@ -36,7 +40,7 @@ def badge_text(run: RunView | None, limits: SupervisorParameters) -> tuple[str, 
 def title(state: AppState) -> str:
     """Return the left end of the bar."""
     if state.is_changed:
-        saved = "changed, not saved"
+        saved = "unsaved"
     elif state.saved_at:
         saved = f"saved {escaped(state.saved_at)}"
     else:
@@ -49,6 +53,14 @@ def title(state: AppState) -> str:
     )
 
 
+def button_text(label: str, steps: tuple[Step, ...]) -> str:
+    """Return what stands on the undo or redo button: the step's name, cut where it would crowd the bar."""
+    if not steps:
+        return label
+    name = steps[-1].name
+    return f"{label} {name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1] + '…'}"
+
+
 class TopBar(BasePanel):
     """The main panel, turned into a bar by the page's style."""
 
@@ -57,18 +69,18 @@ class TopBar(BasePanel):
         self._badge = gui.add_html("")
         self._shown = ("", "")
         self._head = title(state)
-        buttons: tuple[tuple[str, str, actions.Action, Literal["Z", "Y", "S"], Modifier], ...] = (
-            ("Undo", "Take back the last change (Ctrl+Z)", actions.Undo(), "Z", "cmd/ctrl"),
-            ("Redo", "Make it again (Ctrl+Y)", actions.Redo(), "Y", "cmd/ctrl"),
-            ("Save", "Write project.yaml (Ctrl+Shift+S)", actions.Save(), "S", "cmd/ctrl+shift"),
+        buttons: tuple[tuple[str, str, Callable[[int | None], actions.Action], Literal["Z", "S"], Modifier], ...] = (
+            ("Undo", "Take back the last change (Ctrl+Z)", actions.Undo, "Z", "cmd/ctrl"),
+            ("Redo", "Make it again (Ctrl+Shift+Z)", actions.Redo, "Z", "cmd/ctrl+shift"),
+            ("Save", "Write the project (Ctrl+Shift+S)", lambda _client: actions.Save(), "S", "cmd/ctrl+shift"),
         )
         self._buttons = {}
-        for label, hint, action, key, modifier in buttons:
+        for label, hint, make, key, modifier in buttons:
             button = gui.add_button(label, hint=hint, color="dark")
-            button.on_click(posting(post, lambda _event, action=action: action))
+            button.on_click(posting(post, lambda event, make=make: make(event.client_id)))
             self._buttons[label] = button
             command = gui.add_command(label, hotkey=key, modifier=modifier)
-            command.on_trigger(lambda _event, action=action: post(action))
+            command.on_trigger(lambda event, make=make: post(make(event.client_id)))
         view = gui.add_button_group("", tuple(v.value for v in actions.View))
 
         def show(event: GuiEvent[Any]) -> None:
@@ -108,3 +120,7 @@ class TopBar(BasePanel):
         for label, enabled in wanted.items():
             if self._buttons[label].disabled is enabled:
                 self._buttons[label].disabled = not enabled
+        for label, steps in (("Undo", state.undo), ("Redo", state.redo)):
+            text = button_text(label, steps)
+            if self._buttons[label].label != text:
+                self._buttons[label].label = text

@@ -1,0 +1,127 @@
+"""What one browser is editing with: its tool, its selection, a gesture under way. Each browser has its own; frozen."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import TypeAlias
+
+Point: TypeAlias = tuple[float, float]
+"""A place on the floor [m, m], map frame."""
+
+
+class Tool(StrEnum):
+    """What a click on the floor does."""
+
+    SELECT = "Select"
+    PLACE = "Place"
+    ROUTE = "Route"
+    MEASURE = "Measure"
+
+
+class Grab(StrEnum):
+    """What a drag moves."""
+
+    REFLECTORS = "reflectors"
+    CONTROL_POINT = "control point"
+    RECTANGLE = "rectangle"
+
+
+@dataclass(frozen=True, slots=True)
+class Drag:
+    """A drag under way: nothing of the project has changed yet."""
+
+    grab: Grab
+    """What it moves."""
+    start: Point
+    """Where it began [m]."""
+    now: Point
+    """Where it is [m]."""
+    add: bool = False
+    """Whether a rectangle adds to the selection."""
+
+    @property
+    def offset(self) -> Point:
+        """From start to now [m, m]."""
+        return self.now[0] - self.start[0], self.now[1] - self.start[1]
+
+
+@dataclass(frozen=True, slots=True)
+class ControlPoint:
+    """A control point of a planned route."""
+
+    route: str
+    """Name of the route."""
+    segment: int = 0
+    """Which of its segments."""
+    index: int = 0
+    """Which point of the segment."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snapping:
+    """What attracts a reflector that is placed or dragged."""
+
+    walls: bool = True
+    """The nearest wall's surface."""
+    neighbors: bool = False
+    """Row and column of other reflectors."""
+    grid: float = 0.0
+    """Multiples of this spacing [m]; 0: no grid."""
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.grid) and 0.0 <= self.grid <= 100.0):
+            raise ValueError(f"spacing of the grid is {self.grid:g}; expected 0 (none) to 100 m")
+
+
+@dataclass(frozen=True, slots=True)
+class Editor:
+    """How one browser edits."""
+
+    tool: Tool = Tool.SELECT
+    """What a click does."""
+    selected: tuple[str, ...] = ()
+    """Ids of the selected reflectors."""
+    point: ControlPoint | None = None
+    """The selected control point; its route is the selected one."""
+    drag: Drag | None = None
+    """A drag under way."""
+    draft: tuple[Point, ...] = ()
+    """Points of a route that is being drawn [m]."""
+    measured: tuple[Point, ...] = ()
+    """One or two points of a measurement [m]."""
+    last_click: Point | None = None
+    """Where the floor was last clicked [m]."""
+    snapping: Snapping = Snapping()
+    """What attracts."""
+    reach: float = 0.1
+    """How near a click has to be to mean something, at the zoom of the newest gesture [m]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """From one point to another."""
+
+    dx: float
+    """Along x [m]."""
+    dy: float
+    """Along y [m]."""
+
+    @property
+    def distance(self) -> float:
+        """Length of the straight line [m]."""
+        return math.hypot(self.dx, self.dy)
+
+    @property
+    def bearing(self) -> float:
+        """Direction, counterclockwise from the x axis [rad]; 0 when the points coincide."""
+        return math.atan2(self.dy, self.dx)
+
+
+def measurement(editor: Editor) -> Measurement | None:
+    """Return what was measured; none before the second click."""
+    if len(editor.measured) < 2:
+        return None
+    (x0, y0), (x1, y1) = editor.measured
+    return Measurement(x1 - x0, y1 - y0)

@@ -1,0 +1,160 @@
+"""What one browser sees of its own editing: rings around the selection, a preview of what is being done, a handle.
+
+It draws from the state only; the project itself is drawn by the layers, for everyone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Coroutine
+from typing import Any
+
+import numpy as np
+from viser import ClientHandle, LabelHandle, TransformControlsEvent
+
+from commission.app import theme
+from commission.app.drawing import NO_POINTS, NO_SEGMENTS, lift, outline_segments, polyline_segments
+from commission.app.editing import actions
+from commission.app.editing.editor import Editor, Grab, Tool, measurement
+from commission.app.editing.gestures import moved, selected_of
+from commission.app.editing.route_gestures import curve, moved_route
+from commission.app.extent import extent_of
+from commission.app.panels.base import Post
+from commission.geometry.arrays import FloatArray
+from commission.site.editing.routes import segment_of
+from commission.site.project import Project
+
+RING_POINTS = 28
+HANDLE_FROM = 14.0
+"""Size of the selection's handle, in sizes of a mark."""
+
+
+def rings(centers: FloatArray, radius: float) -> FloatArray:
+    """Return the (N, RING_POINTS, 2) outlines of circles [m]."""
+    angles = np.linspace(0.0, 2.0 * np.pi, RING_POINTS, endpoint=False)
+    return centers[:, np.newaxis, :] + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+def millimeters(editor: Editor) -> str:
+    """Return a measurement as it is written beside its line."""
+    found = measurement(editor)
+    if found is None:
+        return ""
+    return f"{found.distance:.3f} m, {math.degrees(found.bearing):.1f}°  (dx {found.dx:.3f} m, dy {found.dy:.3f} m)"
+
+
+class Overlay:
+    """One browser's own marks.
+
+    Parameters
+    ----------
+    client : the browser.
+    post : takes the actions of the handle.
+    """
+
+    def __init__(self, client: ClientHandle, post: Post) -> None:
+        self._client = client
+        scene = client.scene
+        self._selected = scene.add_line_segments(
+            "/editing/selected", NO_SEGMENTS, theme.SELECTED, thickness=2.0, thickness_units="screen"
+        )
+        self._preview = scene.add_line_segments(
+            "/editing/preview", NO_SEGMENTS, theme.VEHICLE, thickness=1.5, thickness_units="screen"
+        )
+        self._points = scene.add_point_cloud(
+            "/editing/points",
+            NO_POINTS,
+            theme.SELECTED,
+            point_size=0.1,
+            point_shape="circle",
+            point_shading="flat",
+            precision="float32",
+        )
+        self._label: LabelHandle | None = None
+        self._handle = scene.add_transform_controls(
+            "/editing/handle",
+            active_axes=(True, True, False),
+            disable_rotations=True,
+            depth_test=False,
+            visible=False,
+        )
+        self._dragging = False
+        self._handle.on_update(self._drag_handle(post))
+        self._shown: tuple[Project, Editor] | None = None
+
+    def _drag_handle(self, post: Post) -> Callable[[TransformControlsEvent], Coroutine[Any, Any, None]]:
+        async def dragged(event: TransformControlsEvent) -> None:
+            if event.client is None:
+                return
+            self._dragging = event.phase != "end"
+            x, y = (float(value) for value in event.target.position[:2])
+            post(actions.DragSelection(event.client.client_id, event.phase, (x, y)))
+
+        return dragged
+
+    def draw(self, project: Project, editor: Editor) -> None:
+        """Show an editor where it or the project has changed."""
+        if self._shown is not None and self._shown[0] is project and self._shown[1] == editor:
+            return
+        self._shown = project, editor
+        size = 0.9 * extent_of(project).mark_size()
+        selected = selected_of(project, editor)
+        centers = np.array([(r.x, r.y) for r in selected]).reshape(-1, 2)
+        self._selected.points = outline_segments(rings(centers, 1.5 * size), theme.Height.EDITING)
+        self._preview.points = self._preview_of(project, editor, size)
+        self._draw_points(project, editor, size)
+        self._write(editor)
+        self._draw_handle(centers, editor, size)
+
+    def _draw_handle(self, centers: FloatArray, editor: Editor, size: float) -> None:
+        """Put the handle at the middle of the selection, except while it is being dragged itself."""
+        wanted = bool(len(centers)) and editor.tool is Tool.SELECT and (editor.drag is None or self._dragging)
+        self._handle.visible = wanted
+        if wanted and not self._dragging:
+            self._handle.scale = HANDLE_FROM * size
+            self._handle.position = (*(float(value) for value in centers.mean(axis=0)), theme.Height.EDITING)
+
+    def _preview_of(self, project: Project, editor: Editor, size: float) -> np.ndarray:
+        """Return the lines of what is being dragged, drawn or measured."""
+        height = theme.Height.EDITING
+        lines: list[np.ndarray] = []
+        drag = editor.drag
+        if drag is not None and drag.grab is Grab.REFLECTORS:
+            places = {r.id: (r.x, r.y) for r in moved(project, editor).reflectors}
+            pairs = np.array([((r.x, r.y), places[r.id]) for r in selected_of(project, editor)]).reshape(-1, 2, 2)
+            lines.append(outline_segments(rings(pairs[:, 1], size), height))
+            lines.append(lift(pairs.reshape(-1, 2), height).reshape(-1, 2, 3))
+        elif drag is not None and drag.grab is Grab.RECTANGLE:
+            (x0, y0), (x1, y1) = drag.start, drag.now
+            lines.append(outline_segments(np.array([[(x0, y0), (x1, y0), (x1, y1), (x0, y1)]]), height))
+        if editor.point is not None:
+            for segment in moved_route(project, editor):
+                lines.append(polyline_segments(segment.control_points, height))
+                lines.append(polyline_segments(curve(segment), height))
+        if len(set(editor.draft)) > 1:
+            lines.append(polyline_segments(curve(segment_of(editor.draft)), height))
+        if len(editor.measured) == 2:
+            lines.append(polyline_segments(np.array(editor.measured), height))
+        return np.concatenate(lines) if lines else NO_SEGMENTS
+
+    def _draw_points(self, project: Project, editor: Editor, size: float) -> None:
+        """Show the control points of the selected route, or the points drawn or measured so far."""
+        places: list[FloatArray] = [np.array(editor.draft).reshape(-1, 2), np.array(editor.measured).reshape(-1, 2)]
+        if editor.point is not None:
+            places += [segment.control_points for segment in moved_route(project, editor)]
+        self._points.point_size = size
+        self._points.points = lift(np.concatenate(places), theme.Height.EDITING)
+
+    def _write(self, editor: Editor) -> None:
+        """Write a measurement beside its line."""
+        text = millimeters(editor)
+        if not text:
+            if self._label is not None:
+                self._label.remove()
+                self._label = None
+            return
+        middle = np.mean(editor.measured, axis=0)
+        place = (float(middle[0]), float(middle[1]), theme.Height.EDITING)
+        if self._label is None:
+            self._label = self._client.scene.add_label("/editing/label", text, position=place)
+        self._label.text, self._label.position = text, place

@@ -1,0 +1,295 @@
+"""What an editing action means: tools, selection, gestures, and edits of reflectors. Pure, like `app.reducer`.
+
+Importing this module registers its actions with `reduce`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from commission.app.editing import actions
+from commission.app.editing.editor import Drag, Editor, Grab, Tool
+from commission.app.editing.gestures import (
+    grabbed,
+    moved,
+    reflector_at,
+    reflectors_in,
+    selected_of,
+    to_place,
+)
+from commission.app.editing.route_gestures import route_at
+from commission.app.reduction import ApplyParameters, FlyTo, Reduction, Tell, reduce
+from commission.app.store import AppState, Edit, edited
+from commission.errors import UsageError
+from commission.site.editing import reflectors as edits
+from commission.site.editing.snapping import snap_to_wall
+from commission.site.reflectors import ReflectorMap
+
+
+def editor_of(state: AppState, client: int) -> Editor:
+    """Return how a browser edits."""
+    return state.editors.get(client, Editor())
+
+
+def counted(state: AppState, editor: Editor) -> str:
+    """Return what the selection is called on a button: `R3`, `12 reflectors`."""
+    selected = selected_of(state.project, editor)
+    return selected[0].id if len(selected) == 1 else f"{len(selected)} reflectors"
+
+
+def with_reflectors(state: AppState, reflectors: ReflectorMap, edit: Edit) -> Reduction:
+    """Return what follows from another reflector map: one undo step, and the running localizer uses it."""
+    if reflectors == state.project.reflectors:
+        return Reduction(state)
+    project = replace(state.project, reflectors=reflectors)
+    return Reduction(edited(state, project, edit), (ApplyParameters(),))
+
+
+def _selection(state: AppState, client: int) -> tuple[Editor, tuple[str, ...]]:
+    """Return a browser's editor and the ids of what it has selected; raises UsageError when that is nothing."""
+    editor = editor_of(state, client)
+    ids = tuple(r.id for r in selected_of(state.project, editor))
+    if not ids:
+        raise UsageError("no reflector is selected; expected one or more")
+    return editor, ids
+
+
+def _telling_of_locked(state: AppState, ids: tuple[str, ...], reduction: Reduction) -> Reduction:
+    """Add a word about the reflectors that an edit left alone."""
+    locked = edits.locked_among(state.project.reflectors, ids)
+    if not locked:
+        return reduction
+    shown = ", ".join(locked[:5]) + (f" and {len(locked) - 5} more" if len(locked) > 5 else "")
+    told = Tell(f"locked and left as they are: {shown}", failed=False)
+    return replace(reduction, effects=(*reduction.effects, told))
+
+
+@reduce.register
+def _(action: actions.Join, state: AppState) -> Reduction:
+    return Reduction(state.with_editor(action.client, Editor()))
+
+
+@reduce.register
+def _(action: actions.Leave, state: AppState) -> Reduction:
+    left = {client: editor for client, editor in state.editors.items() if client != action.client}
+    return Reduction(replace(state, editors=left))
+
+
+@reduce.register
+def _(action: actions.ChooseTool, state: AppState) -> Reduction:
+    editor = replace(editor_of(state, action.client), tool=action.tool, drag=None, draft=(), measured=())
+    return Reduction(state.with_editor(action.client, editor))
+
+
+@reduce.register
+def _(action: actions.ChooseSnapping, state: AppState) -> Reduction:
+    return Reduction(
+        state.with_editor(action.client, replace(editor_of(state, action.client), snapping=action.snapping))
+    )
+
+
+@reduce.register
+def _(action: actions.Cancel, state: AppState) -> Reduction:
+    editor = editor_of(state, action.client)
+    if editor.drag is not None or editor.draft or editor.measured:
+        editor = replace(editor, drag=None, draft=(), measured=())
+    elif editor.tool is not Tool.SELECT:
+        editor = replace(editor, tool=Tool.SELECT)
+    else:
+        editor = replace(editor, selected=(), point=None)
+    return Reduction(state.with_editor(action.client, editor))
+
+
+@reduce.register
+def _(action: actions.ClickFloor, state: AppState) -> Reduction:
+    editor = replace(editor_of(state, action.client), reach=action.reach, last_click=action.place, drag=None)
+    match editor.tool:
+        case Tool.SELECT:
+            return Reduction(state.with_editor(action.client, _picked(state, editor, action)))
+        case Tool.PLACE:
+            return _placed(state, editor, action)
+        case Tool.ROUTE:
+            return Reduction(state.with_editor(action.client, replace(editor, draft=(*editor.draft, action.place))))
+        case Tool.MEASURE:
+            before = editor.measured if len(editor.measured) == 1 else ()
+            place = _on_something(state, editor, action)
+            return Reduction(state.with_editor(action.client, replace(editor, measured=(*before, place))))
+
+
+def _picked(state: AppState, editor: Editor, action: actions.ClickFloor) -> Editor:
+    """Select what was clicked; nothing when nothing was, unless the click adds."""
+    found = reflector_at(state.project.reflectors, action.place, action.reach)
+    if found is not None:
+        if not action.add:
+            return replace(editor, selected=(found,), point=None)
+        others = tuple(name for name in editor.selected if name != found)
+        return replace(editor, selected=others if found in editor.selected else (*others, found), point=None)
+    if action.add:
+        return editor
+    return replace(editor, selected=(), point=route_at(state.project, action.place, action.reach))
+
+
+def _placed(state: AppState, editor: Editor, action: actions.ClickFloor) -> Reduction:
+    """Place a reflector where the click is attracted to."""
+    like = to_place(state.project, action.place, editor)
+    added = edits.add(state.project.reflectors, [(like.x, like.y)], like)
+    reduction = with_reflectors(state, added.reflectors, Edit(f"place {added.ids[0]}", action.client))
+    selecting = reduction.state.with_editor(action.client, replace(editor, selected=added.ids, point=None))
+    return replace(reduction, state=selecting)
+
+
+def _on_something(state: AppState, editor: Editor, action: actions.ClickFloor) -> tuple[float, float]:
+    """Return the center of the reflector that was clicked, or the place itself."""
+    found = reflector_at(state.project.reflectors, action.place, editor.reach)
+    if found is None:
+        return action.place
+    hit = next(r for r in state.project.reflectors.reflectors if r.id == found)
+    return hit.x, hit.y
+
+
+@reduce.register
+def _(action: actions.DragFloor, state: AppState) -> Reduction:
+    editor = editor_of(state, action.client)
+    if editor.tool is not Tool.SELECT:
+        return Reduction(state)
+    drag = editor.drag
+    if action.phase == "start" or drag is None:
+        begun = replace(editor, reach=action.reach)
+        editor = grabbed(state.project, begun, Drag(Grab.RECTANGLE, action.start, action.now, action.add))
+    else:
+        editor = replace(editor, drag=replace(drag, now=action.now))
+    if action.phase != "end":
+        return Reduction(state.with_editor(action.client, editor))
+    return _dropped(state, editor, action.client)
+
+
+@reduce.register
+def _(action: actions.DragSelection, state: AppState) -> Reduction:
+    editor = editor_of(state, action.client)
+    selected = [r for r in selected_of(state.project, editor) if not r.locked]
+    if not selected:
+        return Reduction(state)
+    middle = middle_of(state, editor)
+    editor = replace(editor, drag=Drag(Grab.REFLECTORS, middle, action.now))
+    if action.phase != "end":
+        return Reduction(state.with_editor(action.client, editor))
+    return _dropped(state, editor, action.client)
+
+
+def middle_of(state: AppState, editor: Editor) -> tuple[float, float]:
+    """Return the middle of the selected reflectors that can be moved [m]; the origin when there are none."""
+    movable = [r for r in selected_of(state.project, editor) if not r.locked]
+    if not movable:
+        return 0.0, 0.0
+    return sum(r.x for r in movable) / len(movable), sum(r.y for r in movable) / len(movable)
+
+
+def _dropped(state: AppState, editor: Editor, client: int) -> Reduction:
+    """Do what the drag that ends now was for."""
+    drag = editor.drag
+    done = replace(editor, drag=None)
+    resting = state.with_editor(client, done)
+    if drag is None:
+        return Reduction(resting)
+    match drag.grab:
+        case Grab.REFLECTORS:
+            edit = Edit(f"move {counted(state, editor)}", client)
+            return (
+                _telling_of_locked(state, editor.selected, with_reflectors(resting, moved(state.project, editor), edit))
+                if selected_of(state.project, editor)
+                else Reduction(resting)
+            )
+        case Grab.RECTANGLE:
+            inside = reflectors_in(state.project.reflectors, drag.start, drag.now)
+            kept = editor.selected if drag.add else ()
+            chosen = (*kept, *(name for name in inside if name not in kept))
+            return Reduction(state.with_editor(client, replace(done, selected=chosen, point=None)))
+        case Grab.CONTROL_POINT:
+            return reduce(actions.PlaceControlPoint(client, drag.now), resting)
+
+
+@reduce.register
+def _(action: actions.SelectReflectors, state: AppState) -> Reduction:
+    editor = replace(editor_of(state, action.client), selected=action.ids, point=None)
+    selecting = state.with_editor(action.client, editor)
+    if not action.fly or not selected_of(state.project, editor):
+        return Reduction(selecting)
+    every = selected_of(state.project, editor)
+    middle = sum(r.x for r in every) / len(every), sum(r.y for r in every) / len(every)
+    return Reduction(selecting, (FlyTo(action.client, middle),))
+
+
+@reduce.register
+def _(action: actions.DeleteSelected, state: AppState) -> Reduction:
+    editor = editor_of(state, action.client)
+    if editor.point is not None and not editor.selected:
+        return reduce(actions.DeleteControlPoint(action.client), state)
+    editor, ids = _selection(state, action.client)
+    edit = Edit(f"delete {counted(state, editor)}", action.client)
+    return _telling_of_locked(state, ids, with_reflectors(state, edits.delete(state.project.reflectors, ids), edit))
+
+
+def _adding(state: AppState, client: int, added: edits.Added, name: str) -> Reduction:
+    """Return what follows from copies: they are selected."""
+    reduction = with_reflectors(state, added.reflectors, Edit(name, client))
+    editor = replace(editor_of(state, client), selected=added.ids, point=None)
+    return replace(reduction, state=reduction.state.with_editor(client, editor))
+
+
+@reduce.register
+def _(action: actions.DuplicateSelected, state: AppState) -> Reduction:
+    editor, ids = _selection(state, action.client)
+    aside = 3.0 * editor.reach
+    added = edits.duplicate(state.project.reflectors, ids, (aside, -aside))
+    return _adding(state, action.client, added, f"duplicate {counted(state, editor)}")
+
+
+@reduce.register
+def _(action: actions.SetSelected, state: AppState) -> Reduction:
+    editor, ids = _selection(state, action.client)
+    what = counted(state, editor)
+    if action.name == "locked":
+        verb = "lock" if action.value else "unlock"
+        changed = edits.set_locked(state.project.reflectors, ids, bool(action.value))
+        return with_reflectors(state, changed, Edit(f"{verb} {what}", action.client))
+    changed = edits.set_values(state.project.reflectors, ids, {action.name: action.value})
+    edit = Edit(f"set {action.name} of {what}", action.client, f"{action.client}:{ids}:{action.name}", action.at)
+    reduction = _telling_of_locked(state, ids, with_reflectors(state, changed, edit))
+    if action.name != "id":
+        return reduction
+    renamed = replace(editor, selected=(str(action.value),))
+    return replace(reduction, state=reduction.state.with_editor(action.client, renamed))
+
+
+@reduce.register
+def _(action: actions.MirrorSelected, state: AppState) -> Reduction:
+    editor, ids = _selection(state, action.client)
+    axis = edits.Axis(*action.through, action.angle)
+    name = f"mirror {counted(state, editor)}"
+    if action.copy:
+        return _adding(state, action.client, edits.duplicate_mirrored(state.project.reflectors, ids, axis), name)
+    mirrored = edits.mirror(state.project.reflectors, ids, axis)
+    return _telling_of_locked(state, ids, with_reflectors(state, mirrored, Edit(name, action.client)))
+
+
+@reduce.register
+def _(action: actions.RepeatSelected, state: AppState) -> Reduction:
+    editor, ids = _selection(state, action.client)
+    added = edits.repeat(state.project.reflectors, ids, action.step, action.count)
+    return _adding(state, action.client, added, f"repeat {counted(state, editor)} {action.count}x")
+
+
+@reduce.register
+def _(action: actions.SnapSelected, state: AppState) -> Reduction:
+    editor, ids = _selection(state, action.client)
+    floor_map = state.project.floor_map
+    if floor_map is None:
+        raise UsageError("the project has no floor map to snap to; expected one")
+    snapped = snap_to_wall(state.project.reflectors, ids, floor_map.occupancy())
+    edit = Edit(f"snap {counted(state, editor)} to walls", action.client)
+    return _telling_of_locked(state, ids, with_reflectors(state, snapped, edit))
+
+
+@reduce.register
+def _(action: actions.LookAt, state: AppState) -> Reduction:
+    return Reduction(state, (FlyTo(action.client, action.place),))

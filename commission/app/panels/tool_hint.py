@@ -1,0 +1,67 @@
+"""One line over the floor that says what a click does now and how far one has come. Nothing to click in it."""
+
+from __future__ import annotations
+
+from viser import GuiApi
+
+from commission.app.editing.editor import Editor, Tool
+from commission.app.editing.gestures import moved, selected_of
+from commission.app.panels.base import BasePanel, escaped
+from commission.app.view import PageView
+from commission.site.project import Project
+
+
+def hint(project: Project, editor: Editor) -> str:
+    """Return what the tool in use expects; empty when there is nothing to say."""
+    if editor.drag is not None and editor.selected:
+        return _dragging(project, editor)
+    match editor.tool:
+        case Tool.SELECT:
+            said = ""
+        case Tool.PLACE:
+            where = " at the nearest wall" if editor.snapping.walls else ""
+            said = f"Place: click on the floor for a reflector{where} &nbsp; (Esc ends)"
+        case Tool.ROUTE:
+            points = len(editor.draft)
+            ready = ", Enter makes a route of them" if points > 1 else ""
+            said = f"Route: click its points, {points} so far{ready} &nbsp; (Esc drops them)"
+        case Tool.MEASURE:
+            which = "second" if len(editor.measured) == 1 else "first"
+            said = f"Measure: click the {which} point &nbsp; (Esc ends)"
+    return said
+
+
+def _dragging(project: Project, editor: Editor) -> str:
+    """Say where what is being dragged would come to lie."""
+    selected = selected_of(project, editor)
+    if editor.drag is None or not selected:
+        return ""
+    if len(selected) > 1:
+        dx, dy = editor.drag.offset
+        return f"{len(selected)} reflectors by {dx:+.3f} m, {dy:+.3f} m"
+    place = next(r for r in moved(project, editor).reflectors if r.id == selected[0].id)
+    return f"{escaped(place.id)} to x {place.x:.3f} m, y {place.y:.3f} m"
+
+
+class ToolHint(BasePanel):
+    """The line, in the middle above the floor."""
+
+    def __init__(self, gui: GuiApi, client: int) -> None:
+        self._client = client
+        self._html = gui.add_html("")
+        self._shown = ""
+
+    def draw(self, view: PageView) -> None:
+        """Follow the editor without delay."""
+        editor = view.state.editors.get(self._client)
+        text = "" if editor is None else hint(view.state.project, editor)
+        if text == self._shown:
+            return
+        self._shown = text
+        self._html.content = (
+            "<div class='c-hint' style='position:fixed;z-index:40;top:52px;left:50%;transform:translateX(-50%);"
+            "pointer-events:none;white-space:nowrap;font-size:12.5px;padding:3px 14px;border-radius:3px;"
+            f"background:rgba(16,18,21,.88);border:1px solid #ff9f1c'>{text}</div>"
+            if text
+            else ""
+        )

@@ -1,0 +1,113 @@
+"""What follows from an action: the next state, and effects that the runtime carries out. The one function `reduce`.
+
+What each action means is registered with it by `reducer` and by `editing`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import singledispatch
+from pathlib import Path
+from typing import TypeAlias
+
+from commission.app.actions import Action, Source, View
+from commission.app.store import AppState
+from commission.site.project import Project
+
+
+@dataclass(frozen=True, slots=True)
+class LoadSource:
+    """Simulate or read what drives."""
+
+    source: Source
+    """What drives."""
+
+
+@dataclass(frozen=True, slots=True)
+class ApplyParameters:
+    """Hand the project's parameters to the running localizer."""
+
+
+@dataclass(frozen=True, slots=True)
+class WriteProject:
+    """Write the project."""
+
+    project: Project
+    """What to write."""
+    folder: Path
+    """Where to."""
+
+
+@dataclass(frozen=True, slots=True)
+class MoveTo:
+    """Bring the run to a time of the drive."""
+
+    time: float
+    """Seconds after its start [s]."""
+    afresh: bool = False
+    """Whether it begins again at the initial pose even when the time is ahead."""
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessOneScan:
+    """Let the localizer process one more scan."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tell:
+    """Show a notification."""
+
+    text: str
+    """One line."""
+    failed: bool
+    """Whether something went wrong."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceCamera:
+    """Change what one browser looks at."""
+
+    client: int
+    """Number of the browser's connection."""
+    view: View
+    """What it looks at."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlyTo:
+    """Bring a place into one browser's view."""
+
+    client: int
+    """Number of the browser's connection."""
+    place: tuple[float, float]
+    """Where [m], map frame."""
+
+
+Effect: TypeAlias = LoadSource | ApplyParameters | WriteProject | MoveTo | ProcessOneScan | Tell | PlaceCamera | FlyTo
+
+
+@dataclass(frozen=True, slots=True)
+class Reduction:
+    """Outcome of one action."""
+
+    state: AppState
+    """The next state."""
+    effects: tuple[Effect, ...] = ()
+    """What has to be done besides, in this order."""
+
+
+@singledispatch
+def reduce(action: Action, state: AppState) -> Reduction:
+    """Return what follows from an action.
+
+    Parameters
+    ----------
+    action : what was asked for.
+    state : the state it was asked in.
+
+    Raises
+    ------
+    CommissionError, ValueError
+        the action asks for something that does not exist or is out of range; the state stays as it is.
+    """
+    raise TypeError(f"{type(action).__name__} is not an action; state has playing = {state.playing}")
