@@ -1,0 +1,182 @@
+"""Scanners that are common on vehicles, as starting points: each figure says where it comes from.
+
+A preset is not a data sheet: variants of a device differ, and what counts is measured on the vehicle (`calibrate`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from enum import StrEnum
+from types import MappingProxyType
+
+from commission.errors import UsageError
+from commission.site.scanner import Scanner
+
+
+class Origin(StrEnum):
+    """Where a figure comes from."""
+
+    DOCUMENT = "document"
+    """Read in the named document of the manufacturer."""
+    QUOTED = "quoted"
+    """The manufacturer's figure as drivers and other public sources quote it; compare it with your data sheet."""
+    ASSUMED = "assumed"
+    """No published figure: a cautious value of ours. Measure it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ScannerPreset:
+    """One scanner as delivered, mounted nowhere yet."""
+
+    name: str
+    """Manufacturer and type."""
+    scanner: Scanner
+    """Its values; the mounting is that of a scanner in the middle of the vehicle, looking ahead."""
+    source: str
+    """Documents and other sources of the figures."""
+    quoted: frozenset[str]
+    """Fields of the scanner whose figure is `Origin.QUOTED`."""
+    read: frozenset[str] = frozenset()
+    """Fields of the scanner whose figure is `Origin.DOCUMENT`."""
+
+    def origin(self, field: str) -> Origin:
+        """Where the figure of a field comes from."""
+        if field in self.read:
+            return Origin.DOCUMENT
+        return Origin.QUOTED if field in self.quoted else Origin.ASSUMED
+
+    def origins(self) -> Mapping[str, Origin]:
+        """Where each figure comes from, by the names of the scanner's fields but for the mounting."""
+        names = (field.name for field in fields(Scanner) if field.name != "mounting")
+        return MappingProxyType({name: self.origin(name) for name in names})
+
+
+_GEOMETRY = frozenset({"field_of_view_deg", "resolution_deg", "rate", "range"})
+
+SCANNERS: tuple[ScannerPreset, ...] = (
+    ScannerPreset(
+        "SICK microScan3",
+        Scanner(
+            field_of_view_deg=(-137.5, 137.5),
+            resolution_deg=0.39,
+            rate=25.0,
+            range=(0.1, 40.0),
+            range_sigma=0.02,
+            bearing_sigma_deg=0.1,
+            beam_width_deg=0.4,
+            reflector_range=20.0,
+        ),
+        "Scan of 275 deg, 0.39 deg at a scan cycle time of 40 ms (0.51 deg at 30 ms), distances up to 40 m: operating "
+        "instructions microScan3 Core I/O (8025870) and data output (8022708), as quoted. Variants with a protective "
+        "field of 9 m scan finer.",
+        _GEOMETRY,
+    ),
+    ScannerPreset(
+        "SICK nanoScan3",
+        Scanner(
+            field_of_view_deg=(-137.5, 137.5),
+            resolution_deg=1.0 / 6.0,
+            rate=1000.0 / 30.0,
+            range=(0.05, 40.0),
+            range_sigma=0.02,
+            bearing_sigma_deg=0.05,
+            beam_width_deg=0.3,
+            reflector_range=15.0,
+        ),
+        "1,651 beams over 275 deg, scan cycle time 30 ms, 40 m for no echo: telegrams of a real device (data output "
+        "8022708); near range of 50 mm: operating instructions nanoScan3 I/O, as quoted.",
+        _GEOMETRY,
+    ),
+    ScannerPreset(
+        "SICK S300",
+        Scanner(
+            field_of_view_deg=(-135.0, 135.0),
+            resolution_deg=0.5,
+            rate=12.5,
+            range=(0.1, 30.0),
+            range_sigma=0.03,
+            bearing_sigma_deg=0.1,
+            beam_width_deg=0.5,
+            reflector_range=15.0,
+        ),
+        "270 deg, 0.5 deg, basic response time 80 ms, distances up to 30 m: operating instructions S300 (8010948), as "
+        "quoted.",
+        _GEOMETRY,
+    ),
+    ScannerPreset(
+        "SICK TiM781",
+        Scanner(
+            field_of_view_deg=(-135.0, 135.0),
+            resolution_deg=1.0 / 3.0,
+            rate=15.0,
+            range=(0.05, 25.0),
+            range_sigma=0.02,
+            bearing_sigma_deg=0.1,
+            beam_width_deg=0.5,
+            reflector_range=20.0,
+        ),
+        "811 beams over 270 deg at 15 Hz, 0.05 to 25 m: data sheet of part 1096807 and operating instructions 8024231, "
+        "as quoted.",
+        _GEOMETRY,
+    ),
+    ScannerPreset(
+        "SICK NAV350",
+        Scanner(
+            field_of_view_deg=(-180.0, 180.0),
+            resolution_deg=0.25,
+            rate=8.0,
+            range=(0.5, 70.0),
+            range_sigma=0.015,
+            bearing_sigma_deg=0.05,
+            beam_width_deg=0.286,
+            reflector_range=70.0,
+        ),
+        "0.5 to 70 m and a beam that widens by 5.0 mrad: operating instructions NAV350 (8013889, 2017), section 3.10.3 "
+        "and table 8; 1,440 beams of 0.25 deg at 8 Hz: telegram listing (8013892), as quoted.",
+        frozenset({"field_of_view_deg", "resolution_deg", "rate"}),
+        frozenset({"range", "beam_width_deg"}),
+    ),
+    ScannerPreset(
+        "Hokuyo UAM-05LP",
+        Scanner(
+            field_of_view_deg=(-135.0, 135.0),
+            resolution_deg=0.25,
+            rate=1000.0 / 30.0,
+            range=(0.1, 20.0),
+            range_sigma=0.03,
+            bearing_sigma_deg=0.1,
+            beam_width_deg=0.3,
+            reflector_range=10.0,
+        ),
+        "1,081 steps of 0.25 deg over 270 deg, a scan in 30 ms, warning zone up to 20 m: data sheet UAM-05LP-T301 and "
+        "its communication protocol, as quoted.",
+        _GEOMETRY,
+    ),
+    ScannerPreset(
+        "Pepperl+Fuchs R2000",
+        Scanner(
+            field_of_view_deg=(-180.0, 180.0),
+            resolution_deg=0.1,
+            rate=20.0,
+            range=(0.1, 30.0),
+            range_sigma=0.012,
+            bearing_sigma_deg=0.03,
+            beam_width_deg=0.1,
+            reflector_range=30.0,
+        ),
+        "360 deg, 10 to 50 scans and up to 250,000 measurements per second (here 3,600 at 20 Hz), 30 m (OMD30M-R2000): "
+        "data sheet 232934 and Ethernet protocol, as quoted.",
+        _GEOMETRY,
+    ),
+)
+"""Presets in the order in which they are offered."""
+
+
+def with_preset(scanner: Scanner, name: str) -> Scanner:
+    """Scanner of a preset, mounted where the given one is; raises UsageError that lists the presets there are."""
+    for preset in SCANNERS:
+        if preset.name == name:
+            return replace(preset.scanner, mounting=scanner.mounting)
+    known = ", ".join(preset.name for preset in SCANNERS)
+    raise UsageError(f"no scanner preset is called {name!r}; expected one of: {known}")

@@ -1,0 +1,382 @@
+"""What is wrong with a site while it is being edited: quick checks, each with its place, after every edit.
+
+Only what can be told in milliseconds from geometry; what the localizer makes of a site is for coverage and prediction.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from commission.geometry.arrays import FloatArray
+from commission.geometry.gaussian import chi_square_gate
+from commission.planning.route_check import FloorDistances, Way, outline_points, room_along, smallest_radius, way_of
+from commission.site.path import KINK
+from commission.site.project import Project
+from commission.site.reflectors import Reflector
+from commission.site.routes import Route
+from commission.site.vehicle import OmnidirectionalVehicle, Vehicle
+
+MOST_OF_A_KIND = 50
+"""Problems of one kind that are listed; the rest is counted."""
+SAME_PLACE = 0.001
+"""Two reflectors this close are one that was entered twice [m]."""
+BRIDGED_BEAMS = 2
+"""Beams without a reflector between two reflectors that separate their clusters: the detector bridges one."""
+_RIM_POINTS = 16
+_SLIT = 0.1
+"""A scanner this deep inside the outline looks out through a slit in the vehicle's body [m]."""
+
+
+class Severity(StrEnum):
+    """How bad a problem is."""
+
+    ERROR = "error"
+    """Will not work."""
+    WARNING = "warning"
+    """Will work badly, or only sometimes."""
+    NOTE = "note"
+    """Worth knowing."""
+
+
+class Subject(StrEnum):
+    """What a problem is about, for selecting it."""
+
+    REFLECTOR = "reflector"
+    ROUTE = "route"
+    STATION = "station"
+    SCANNER = "scanner"
+    FLOOR_MAP = "floor map"
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One thing that is wrong."""
+
+    severity: Severity
+    """How bad it is."""
+    text: str
+    """One line: what was found and what is expected, with units."""
+    subject: Subject
+    """What kind of thing it is about."""
+    ids: tuple[str, ...] = ()
+    """Ids of reflectors, names of routes or stations."""
+    place: tuple[float, float] | None = None
+    """Where to look [m, m], map frame; None: nowhere in particular."""
+
+
+@dataclass(frozen=True, slots=True)
+class CheckLimits:
+    """What is expected of a site."""
+
+    clearance: float = 0.1
+    """Smallest room between the vehicle's outline and a wall along a route [m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Findings:
+    """Problems of a project, and what the next check needs not find again."""
+
+    problems: tuple[Problem, ...]
+    """Errors first."""
+    project: Project
+    """The project that was checked."""
+    floor: FloorDistances | None
+    """Its walls."""
+    limits: CheckLimits
+    """What was expected."""
+    by_route: tuple[tuple[Problem, ...], ...]
+    """Problems of each of its routes."""
+
+
+def find_problems(
+    project: Project,
+    floor: FloorDistances | None,
+    previous: Findings | None = None,
+    limits: CheckLimits | None = None,
+) -> Findings:
+    """Check a project.
+
+    Parameters
+    ----------
+    project : what to check.
+    floor : its floor map, prepared; None, or that of another map: what needs walls is not checked yet, which is noted.
+    previous : findings of an earlier state: a route that is still the same object is not checked again.
+    limits : what is expected; the defaults when None.
+    """
+    limits = limits or CheckLimits()
+    floor = floor if floor is not None and floor.floor_map is project.floor_map else None
+    known: dict[int, tuple[Problem, ...]] = {}
+    if previous is not None and _same_conditions(previous, project, floor, limits):
+        known = dict(zip(map(id, previous.project.routes), previous.by_route, strict=True))
+    by_route = tuple(
+        known[id(route)] if id(route) in known else route_problems(route, project.vehicle, floor, limits)
+        for route in project.routes
+    )
+    found = [
+        *_map_problems(project, floor),
+        *_scanner_problems(project),
+        *_close_reflectors(project),
+        *_reflectors_and_walls(project, floor),
+        *_station_problems(project, floor),
+        *(problem for problems in by_route for problem in problems),
+    ]
+    order = list(Severity)
+    found.sort(key=lambda problem: order.index(problem.severity))
+    return Findings(tuple(found), project, floor, limits, by_route)
+
+
+def route_problems(
+    route: Route, vehicle: Vehicle, floor: FloorDistances | None, limits: CheckLimits
+) -> tuple[Problem, ...]:
+    """Check one route: room, curvature, corners; one problem for each stretch of the way."""
+    way = way_of(route)
+    found = [*_curvature_problems(route, way, vehicle), *_corner_problems(route, way, vehicle)]
+    if floor is not None:
+        room = room_along(way, vehicle.outline, floor)
+        for first, last in _stretches(room <= 0.0):
+            length = _length(way, first, last)
+            text = f"Route {route.name!r}: the vehicle's outline cuts a wall over {length:.2f} m"
+            found.append(_on_route(Severity.ERROR, text, route, way.poses[(first + last) // 2]))
+        for first, last in _stretches(room < limits.clearance):
+            least = first + int(np.argmin(room[first : last + 1]))
+            if room[least] > 0.0:
+                text = (
+                    f"Route {route.name!r}: {1000 * room[least]:.0f} mm between the vehicle's outline and a wall; "
+                    f"expected {1000 * limits.clearance:.0f} mm or more"
+                )
+                found.append(_on_route(Severity.WARNING, text, route, way.poses[least]))
+    return tuple(_limited(found))
+
+
+def _same_conditions(previous: Findings, project: Project, floor: FloorDistances | None, limits: CheckLimits) -> bool:
+    """Whether routes are checked as they were."""
+    return (
+        previous.floor is floor
+        and previous.limits == limits
+        and (previous.project.vehicle is project.vehicle or previous.project.vehicle == project.vehicle)
+    )
+
+
+def _map_problems(project: Project, floor: FloorDistances | None) -> Iterable[Problem]:
+    if project.floor_map is None:
+        text = (
+            "No floor map: nothing blocks the line of sight and nothing stands in the way; expected a map of the hall"
+        )
+        yield Problem(Severity.WARNING, text, Subject.FLOOR_MAP)
+    elif floor is None:
+        yield Problem(Severity.NOTE, "The floor map is being prepared: walls are not checked yet", Subject.FLOOR_MAP)
+    elif not floor.grid.occupied.any():
+        yield Problem(Severity.WARNING, "The floor map has no walls; expected occupied cells", Subject.FLOOR_MAP)
+    if not len(project.reflectors):
+        yield Problem(Severity.WARNING, "No reflectors; expected at least 3 around every route", Subject.REFLECTOR)
+
+
+def _scanner_problems(project: Project) -> Iterable[Problem]:
+    """Beams that meet the vehicle's own outline."""
+    scanner, outline = project.scanner, np.asarray(project.vehicle.outline, dtype=np.float64)
+    position = scanner.mounting[:2]
+    depth = float(np.hypot(*(outline_points(outline, 0.01) - position).T).min())
+    if depth > 0.01 and _inside(position, outline):
+        if depth > _SLIT:
+            text = (
+                f"The scanner is {1000 * depth:.0f} mm inside the vehicle's outline; "
+                "expected at its edge, unless it stands above the body"
+            )
+            yield Problem(Severity.NOTE, text, Subject.SCANNER)
+        return
+    bearings = scanner.angle_min + np.arange(scanner.beam_count) * scanner.angle_increment
+    blocked = np.flatnonzero(_crosses(position, bearings + scanner.mounting[2], outline))
+    if len(blocked):
+        low, high = (math.degrees(bearings[index]) for index in (blocked[0], blocked[-1]))
+        text = (
+            f"The vehicle's own outline blocks {len(blocked)} of {scanner.beam_count} beams, between {low:.1f} and "
+            f"{high:.1f} deg; expected a field of view that leaves the vehicle out"
+        )
+        yield Problem(Severity.WARNING, text, Subject.SCANNER)
+
+
+def _close_reflectors(project: Project) -> Iterable[Problem]:
+    """Reflectors that are one, touch, or cannot be told apart by the detector or by the association."""
+    reflectors = project.reflectors
+    if len(reflectors) < 2:
+        return ()
+    apart, gap = separation_needed(project)
+    farthest = max(apart, gap + 2.0 * float(reflectors.radii.max()))
+    pairs = np.asarray(KDTree(reflectors.centers).query_pairs(farthest, output_type="ndarray"))
+    if len(pairs) == 0:
+        return ()
+    first, second = pairs[:, 0], pairs[:, 1]
+    distances = np.hypot(*(reflectors.centers[first] - reflectors.centers[second]).T)
+    needed = np.maximum(apart, gap + reflectors.radii[first] + reflectors.radii[second])
+    near = np.flatnonzero(distances < needed)
+    near = near[np.argsort(distances[near], kind="stable")]
+    values = reflectors.reflectors
+    found = (_pair_problem(values[first[i]], values[second[i]], float(distances[i]), float(needed[i])) for i in near)
+    return _limited(islice(found, MOST_OF_A_KIND), len(near))
+
+
+def separation_needed(project: Project) -> tuple[float, float]:
+    """Distances at which two reflectors are told apart wherever the vehicle is.
+
+    Returns
+    -------
+    apart : between centers, so that a detection of one cannot fall nearer to the other and still be accepted while the
+        supervisor is content: twice the gate's radius at the alarm limit, but for the reflectors' own uncertainty [m].
+    gap : between their edges, so that the detector sees two clusters up to the scanner's range for reflectors [m].
+    """
+    parameters, scanner = project.parameters, project.scanner
+    sigma = math.hypot(0.5 * parameters.supervisor.position_limit, parameters.observation.range_sigma)
+    apart = 2.0 * math.sqrt(chi_square_gate(parameters.association.gate_probability, 2)) * sigma
+    angle = BRIDGED_BEAMS * scanner.angle_increment + math.radians(scanner.beam_width_deg)
+    return apart, min(scanner.range[1], scanner.reflector_range) * angle
+
+
+def _pair_problem(first: Reflector, second: Reflector, distance: float, needed: float) -> Problem:
+    names, place = f"{first.id!r} and {second.id!r}", (0.5 * (first.x + second.x), 0.5 * (first.y + second.y))
+    ids = (first.id, second.id)
+    if distance <= SAME_PLACE:
+        text = f"Reflectors {names} are at the same place; expected one of them"
+        return Problem(Severity.ERROR, text, Subject.REFLECTOR, ids, place)
+    touch = first.radius + second.radius
+    is_one = distance < touch
+    expected = f"expected {needed:.2f} m or more to tell them apart at any range"
+    text = f"Reflectors {names} are {1000 * distance:.0f} mm apart{' and overlap' if is_one else ''}; {expected}"
+    return Problem(Severity.ERROR if is_one else Severity.WARNING, text, Subject.REFLECTOR, ids, place)
+
+
+def _reflectors_and_walls(project: Project, floor: FloorDistances | None) -> Iterable[Problem]:
+    """Reflectors that stand inside walls, where no ray reaches them, or beside the map."""
+    reflectors = project.reflectors
+    if floor is None or not len(reflectors):
+        return ()
+    grid = floor.grid
+    angles = np.linspace(0.0, 2.0 * math.pi, _RIM_POINTS, endpoint=False)
+    reach = 1.001 * reflectors.radii[:, np.newaxis, np.newaxis]
+    rims = reflectors.centers[:, np.newaxis] + reach * np.stack((np.cos(angles), np.sin(angles)), axis=-1)
+    # A plate is seen from the side that it faces.
+    turns = np.cos(angles - reflectors.headings[:, np.newaxis])
+    seen = ~reflectors.is_flat[:, np.newaxis] | (turns > 0.0)
+    walled = (grid.is_occupied(rims) | ~seen).all(axis=1)
+    outside = ~grid.contains(reflectors.centers)
+    found: list[Problem] = []
+    for indices, severity, text in (
+        (walled, Severity.ERROR, "is inside a wall; expected where a ray can reach it"),
+        (outside, Severity.WARNING, "is outside of the floor map; expected on it"),
+    ):
+        some = [_of_reflector(severity, reflectors.reflectors[i], text) for i in np.flatnonzero(indices)]
+        found.extend(_limited(some))
+    return found
+
+
+def _station_problems(project: Project, floor: FloorDistances | None) -> Iterable[Problem]:
+    """Stations where the vehicle does not fit."""
+    if floor is None or not project.stations:
+        return ()
+    poses = np.array([station.pose for station in project.stations])
+    way = Way(poses, np.zeros(len(poses)), np.zeros(len(poses), np.int64), np.zeros(len(poses) - 1))
+    room = room_along(way, project.vehicle.outline, floor)
+    return [
+        Problem(
+            Severity.ERROR,
+            f"Station {station.name!r}: the vehicle's outline cuts a wall; expected room for it",
+            Subject.STATION,
+            (station.name,),
+            (station.x, station.y),
+        )
+        for station, left in zip(project.stations, room, strict=True)
+        if left <= 0.0
+    ]
+
+
+def _curvature_problems(route: Route, way: Way, vehicle: Vehicle) -> Iterable[Problem]:
+    radius = smallest_radius(vehicle)
+    if radius <= 0.0:
+        return
+    # A thousandth is the rounding of a circle that was drawn with just that radius.
+    for first, last in _stretches(np.abs(way.curvatures) * radius > 1.001):
+        tightest = first + int(np.argmax(np.abs(way.curvatures[first : last + 1])))
+        text = (
+            f"Route {route.name!r}: a curve of {1.0 / abs(way.curvatures[tightest]):.2f} m radius over "
+            f"{_length(way, first, last):.2f} m; expected {radius:.2f} m or more, the least that the vehicle can drive"
+        )
+        yield _on_route(Severity.ERROR, text, route, way.poses[tightest])
+
+
+def _corner_problems(route: Route, way: Way, vehicle: Vehicle) -> Iterable[Problem]:
+    """Places where the vehicle would have to turn on the spot."""
+    if isinstance(vehicle, OmnidirectionalVehicle):
+        return
+    can_turn = smallest_radius(vehicle) <= 0.0
+    for index in np.flatnonzero(np.abs(way.corners) > KINK):
+        between = way.segments[index] != way.segments[index + 1]
+        if can_turn and between:
+            continue
+        turn = abs(math.degrees(way.corners[index]))
+        remedy = "expected a stop there: a segment of its own" if can_turn else "expected a curve: it cannot do that"
+        text = f"Route {route.name!r}: the vehicle turns by {turn:.0f} deg on the spot; {remedy}"
+        severity = Severity.WARNING if can_turn else Severity.ERROR
+        yield _on_route(severity, text, route, way.poses[index + 1])
+
+
+def _on_route(severity: Severity, text: str, route: Route, pose: FloatArray) -> Problem:
+    return Problem(severity, text, Subject.ROUTE, (route.name,), (float(pose[0]), float(pose[1])))
+
+
+def _of_reflector(severity: Severity, reflector: Reflector, text: str) -> Problem:
+    place = (reflector.x, reflector.y)
+    return Problem(severity, f"Reflector {reflector.id!r} {text}", Subject.REFLECTOR, (reflector.id,), place)
+
+
+def _limited(found: Iterable[Problem], count: int | None = None) -> list[Problem]:
+    """The first problems of a kind, and how many more there are."""
+    problems = list(found)
+    more = (len(problems) if count is None else count) - MOST_OF_A_KIND
+    if more > 0:
+        worst = problems[0]
+        rest = Problem(
+            worst.severity, f"... and {more} more like {worst.text!r}", worst.subject, worst.ids, worst.place
+        )
+        return [*problems[:MOST_OF_A_KIND], rest]
+    return problems
+
+
+def _stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last index of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
+
+
+def _length(way: Way, first: int, last: int) -> float:
+    """Way from one pose to another [m]."""
+    return float(np.hypot(*np.diff(way.poses[first : last + 1, :2], axis=0).T).sum())
+
+
+def _inside(point: FloatArray, outline: FloatArray) -> bool:
+    """Whether a point is inside a polygon (K, 2): it is surrounded an odd number of times."""
+    ahead = np.roll(outline, -1, axis=0)
+    straddles = (outline[:, 1] > point[1]) != (ahead[:, 1] > point[1])
+    rise = np.where(straddles, ahead[:, 1] - outline[:, 1], 1.0)
+    at = outline[:, 0] + (point[1] - outline[:, 1]) / rise * (ahead[:, 0] - outline[:, 0])
+    return bool((straddles & (point[0] < at)).sum() % 2)
+
+
+def _crosses(position: FloatArray, directions: FloatArray, outline: FloatArray) -> NDArray[np.bool_]:
+    """(B,) whether rays [rad] from a place outside of a polygon, or on its edge, meet its inside."""
+    c, s = np.cos(directions)[:, np.newaxis], np.sin(directions)[:, np.newaxis]
+    edges = np.roll(outline, -1, axis=0) - outline
+    offsets = outline - position
+    across = c * edges[:, 1] - s * edges[:, 0]
+    safe = np.where(np.abs(across) > 1e-12, across, np.inf)
+    along = (offsets[:, 0] * edges[:, 1] - offsets[:, 1] * edges[:, 0]) / safe
+    share = (offsets[:, 0] * s - offsets[:, 1] * c) / safe
+    hits = (np.abs(across) > 1e-12) & (along > 1e-3) & (share >= 0.0) & (share < 1.0)
+    # A ray that goes inside from the edge comes out again through another one.
+    return np.asarray(hits.any(axis=1))

@@ -1,0 +1,181 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from commission.planning.route_check import MOST_ROOM, FloorDistances, room_along, smallest_radius, way_of
+from commission.site.floor_map import FREE, OCCUPIED, FloorMap
+from commission.site.project import Project
+from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
+from commission.site.routes import Direction, Route, Segment
+from commission.site.scanner import Scanner
+from commission.site.stations import Station
+from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle
+from commission.studies.problems import MOST_OF_A_KIND, Severity, Subject, find_problems, separation_needed
+
+CELL = 0.05
+BOX = DifferentialVehicle(outline=((0.5, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.5, -0.3)))
+
+
+def hall() -> FloorMap:
+    """12 x 8 m with a wall of 0.3 m around it and a wall at x = 6 m up to y = 4 m."""
+    cells = np.full((160, 240), FREE, np.int8)
+    cells[:6], cells[-6:], cells[:, :6], cells[:, -6:] = OCCUPIED, OCCUPIED, OCCUPIED, OCCUPIED
+    cells[:80, 120:124] = OCCUPIED
+    return FloorMap(cells, CELL)
+
+
+FLOOR = FloorDistances(hall())
+REFLECTORS = ReflectorMap(tuple(Reflector(n, x, y) for n, x, y in (("A", 1, 7.6), ("B", 4, 7.6), ("C", 11, 7.6))))
+EDGE = Scanner(mounting=[0.5, 0.0, 0.0], field_of_view_deg=(-90.0, 90.0))
+SITE = Project(floor_map=FLOOR.floor_map, reflectors=REFLECTORS, vehicle=BOX, scanner=EDGE)
+
+
+def line(*points: tuple[float, float], name: str = "r", direction: Direction = Direction.FORWARD) -> Route:
+    return Route(name, (Segment(np.array(points, float), direction, 1),))
+
+
+def texts(project: Project) -> list[str]:
+    return [problem.text for problem in find_problems(project, FLOOR).problems]
+
+
+def test_a_sound_site_has_no_problems():
+    assert texts(replace(SITE, routes=(line((1.5, 6.0), (10.5, 6.0)),))) == []
+
+
+def test_a_route_through_a_wall_says_where_and_over_what_length():
+    findings = find_problems(replace(SITE, routes=(line((2.0, 2.0), (10.0, 2.0)),)), FLOOR)
+    (error,) = [p for p in findings.problems if p.severity is Severity.ERROR]
+    # From where the front (0.5 m ahead) meets the wall to where the rear leaves it: 1 m of vehicle, 0.2 m of wall.
+    assert error.text.startswith("Route 'r': the vehicle's outline cuts a wall over ")
+    # Poses are 0.05 m apart: the first and the last one that touch may lie a pose inside.
+    assert 1.1 <= float(error.text.split()[-2]) <= 1.25
+    assert (error.subject, error.ids) == (Subject.ROUTE, ("r",))
+    assert error.place == pytest.approx((6.1, 2.0), abs=0.06)
+
+
+def test_room_is_the_distance_between_outline_and_wall():
+    for y in (1.0, 2.0, 0.75):
+        way = way_of(line((2.0, y), (4.0, y)))
+        room = room_along(way, BOX.outline, FLOOR)
+        # The wall ends at y = 0.3 m, the vehicle 0.3 m below its middle; distances are good to a cell.
+        np.testing.assert_allclose(room, min(y - 0.6, MOST_ROOM), atol=CELL)
+
+
+def test_little_room_is_a_warning_with_millimetres():
+    (text,) = texts(replace(SITE, routes=(line((1.5, 0.68), (4.5, 0.68)),)))
+    assert text.endswith("mm between the vehicle's outline and a wall; expected 100 mm or more")
+
+
+def test_a_reverse_segment_is_checked_with_the_vehicle_turned_round():
+    long = replace(BOX, outline=((0.2, 0.3), (-1.5, 0.3), (-1.5, -0.3), (0.2, -0.3)))
+    forward = find_problems(replace(SITE, vehicle=long, routes=(line((3, 2), (5, 2)),)), FLOOR).problems
+    reverse = line((3, 2), (5, 2), direction=Direction.REVERSE)
+    backward = find_problems(replace(SITE, vehicle=long, routes=(reverse,)), FLOOR).problems
+    assert not [p for p in forward if p.subject is Subject.ROUTE]
+    assert next(p.severity for p in backward if p.subject is Subject.ROUTE) is Severity.ERROR
+
+
+@pytest.mark.parametrize(("steering", "radius"), [(45.0, 1.2), (75.0, 0.3215), (90.0, 0.0)])
+def test_a_tricycle_can_drive_its_wheelbase_over_the_tangent_of_its_steering(steering, radius):
+    assert smallest_radius(TricycleVehicle(1.2, steering)) == pytest.approx(radius, abs=1e-4)
+
+
+def test_a_curve_tighter_than_the_vehicle_can_drive_is_an_error_with_both_radii():
+    weight = math.cos(math.pi / 4.0)
+    corner = [[9.0, 5.0], [10.0, 5.0], [10.0, 6.0]]
+    quarter = Segment(np.array(corner), degree=2, weights=np.array([1.0, weight, 1.0]))
+    route = Route("bend", (quarter,))
+    small = TricycleVehicle(1.2, 45.0, outline=((0.1, 0.1), (-0.1, 0.1), (0.0, -0.1)))
+    site = replace(SITE, routes=(route,), vehicle=small, scanner=Scanner(mounting=[0.0, 0.0, 0.0]))
+    (text,) = [t for t in texts(site) if "Route" in t]
+    assert "a curve of 1.00 m radius over 1.5" in text
+    assert "expected 1.20 m or more" in text
+    assert not [t for t in texts(replace(site, vehicle=replace(small, wheelbase=0.99))) if "Route" in t]
+
+
+def test_a_corner_is_an_error_a_warning_or_fine_depending_on_the_vehicle():
+    corner = line((2.0, 6.0), (4.0, 6.0), (4.0, 3.0))
+    two = Route("r", (line((2, 6), (4, 6)).segments[0], line((4, 6), (4, 3)).segments[0]))
+    small = ((0.1, 0.1), (-0.1, 0.1), (-0.1, -0.1), (0.1, -0.1))
+    tricycle, wheels = TricycleVehicle(outline=small), DifferentialVehicle(outline=small)
+    omni, scanner = OmnidirectionalVehicle(outline=small), Scanner(mounting=[0.1, 0, 0], field_of_view_deg=(-90, 90))
+
+    def found(vehicle, route):
+        site = replace(SITE, vehicle=vehicle, routes=(route,), scanner=scanner)
+        return [(p.severity, "90 deg on the spot" in p.text) for p in find_problems(site, FLOOR).problems]
+
+    assert found(tricycle, corner) == found(tricycle, two) == [(Severity.ERROR, True)]
+    assert found(wheels, corner) == [(Severity.WARNING, True)]
+    assert found(wheels, two) == found(omni, corner) == []
+
+
+def test_close_reflectors_are_told_by_what_cannot_tell_them_apart():
+    apart, gap = separation_needed(SITE)
+    needed = max(apart, gap + 0.08)
+
+    def pair(distance):
+        both = ReflectorMap((Reflector("A", 3.0, 7.0), Reflector("B", 3.0 + distance, 7.0)))
+        return [(p.severity, p.text) for p in find_problems(replace(SITE, reflectors=both), FLOOR).problems]
+
+    assert pair(needed + 0.01) == []
+    assert pair(0.0) == [(Severity.ERROR, "Reflectors 'A' and 'B' are at the same place; expected one of them")]
+    assert pair(0.05)[0][0] is Severity.ERROR
+    assert "50 mm apart and overlap" in pair(0.05)[0][1]
+    ((severity, text),) = pair(0.2)
+    assert severity is Severity.WARNING
+    assert text.endswith(f"are 200 mm apart; expected {needed:.2f} m or more to tell them apart at any range")
+
+
+def test_many_close_reflectors_are_counted_instead_of_listed():
+    crowd = ReflectorMap(tuple(Reflector(str(i), 1.0 + 0.1 * i, 7.0) for i in range(90)))
+    found = texts(replace(SITE, reflectors=crowd))
+    assert len(found) == MOST_OF_A_KIND + 1
+    assert "more like" in found[-1]
+
+
+def test_reflectors_that_no_ray_reaches_are_inside_a_wall():
+    plate = Reflector("P", 0.3, 4.0, kind=ReflectorKind.FLAT, heading=math.pi)
+    some = (Reflector("in", 0.12, 2.0), Reflector("on", 0.34, 2.0), plate, replace(plate, id="Q", y=6, heading=0.0))
+    site = replace(SITE, reflectors=ReflectorMap((*some, Reflector("far", 20.0, 20.0))))
+    found = find_problems(site, FLOOR).problems
+    assert [p.ids for p in found if "inside a wall" in p.text] == [("in",), ("P",)]
+    assert [p.ids for p in found if "outside of the floor map" in p.text] == [("far",)]
+
+
+def test_a_station_without_room_is_an_error():
+    site = replace(SITE, stations=(Station("Dock", 0.6, 4.0), Station("Gate", 3.0, 4.0)))
+    assert [p.ids for p in find_problems(site, FLOOR).problems] == [("Dock",)]
+
+
+def test_beams_into_the_vehicle_are_counted_with_their_bearings():
+    wide = replace(SITE, scanner=Scanner(mounting=[0.5, 0.0, 0.0], field_of_view_deg=(-135.0, 135.0)))
+    (text,) = texts(wide)
+    # From the middle of the front edge everything behind +-90 deg is vehicle: 45 deg on both sides.
+    assert "blocks 180 of 541 beams, between -135.0 and 135.0 deg" in text
+    (note,) = find_problems(replace(SITE, scanner=Scanner()), FLOOR).problems
+    assert (note.severity, note.subject) == (Severity.NOTE, Subject.SCANNER)
+    assert note.text.startswith("The scanner is 300 mm inside the vehicle's outline")
+
+
+def test_a_missing_or_unprepared_map_is_said():
+    assert "No floor map" in find_problems(replace(SITE, floor_map=None), FLOOR).problems[0].text
+    assert "is being prepared" in find_problems(SITE, None).problems[0].text
+    other = FloorDistances(FloorMap(np.zeros((2, 2), np.int8), 1.0))
+    assert "is being prepared" in find_problems(SITE, other).problems[0].text
+    assert "No reflectors" in find_problems(replace(SITE, reflectors=ReflectorMap()), FLOOR).problems[0].text
+
+
+def test_only_what_changed_is_checked_again_with_the_same_result(monkeypatch):
+    routes = (line((2, 2), (10, 2), name="a"), line((1.5, 0.7), (4.5, 0.7), name="b"))
+    before = find_problems(replace(SITE, routes=routes), FLOOR)
+    moved = replace(SITE, routes=(routes[0], line((1.5, 6), (4.5, 6), name="b")))
+    again = find_problems(moved, FLOOR, before)
+    assert again.problems == find_problems(moved, FLOOR).problems
+    monkeypatch.setattr("commission.studies.problems.route_problems", None)
+    assert find_problems(replace(moved, name="x"), FLOOR, again).problems == again.problems
+    with pytest.raises(TypeError):
+        find_problems(replace(moved, vehicle=TricycleVehicle()), FLOOR, again)
