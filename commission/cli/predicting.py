@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from commission.planning.dependence import Dependence
-    from commission.planning.route_prediction import RoutePrediction
+    from commission.planning.route_prediction import RoutePrediction, StationAccuracy
     from commission.site.reflectors import ReflectorMap
 
 MOST_NEEDED = 5
@@ -46,7 +46,12 @@ class Predict:
         from commission.io.prediction_files import write_dependents, write_prediction
         from commission.io.project_file import load_project
         from commission.planning.dependence import Failure, FailureOptions, dependences
-        from commission.planning.route_prediction import PredictionOptions, plan_route, predict_route
+        from commission.planning.route_prediction import (
+            PredictionOptions,
+            plan_route,
+            predict_route,
+            station_accuracies,
+        )
 
         project = load_project(self.project)
         if self.route is None and not project.routes:
@@ -54,12 +59,13 @@ class Predict:
         name = project.routes[0].name if self.route is None else self.route
         planned = plan_route(project, name, PredictionOptions(blocked_per_m=self.blocked_per_m))
         prediction = predict_route(planned)
-        lines = _report(name, prediction)
+        stations = station_accuracies(prediction, project.stations)
+        lines = [*_report(name, prediction), *_at_stations(stations)]
         if self.what_if is not None:
             ranked = dependences([planned], FailureOptions(Failure(self.what_if)))
             write_dependents(self.out, ranked, project.reflectors)
             lines += _most_needed(ranked, project.reflectors)
-        write_prediction(self.out, name, prediction)
+        write_prediction(self.out, name, prediction, stations)
         sys.stdout.write("\n".join([*lines, f"Written to   {self.out}"]) + "\n")
 
 
@@ -77,6 +83,19 @@ def _report(name: str, prediction: RoutePrediction) -> list[str]:
         f"at most {prediction.on_odometry.max():.1f} m on odometry alone",
         f"Supervisor   stops at: {stops}; metres over a limit: {len(prediction.failing_metres())}",
     ]
+
+
+def _at_stations(stations: Sequence[StationAccuracy]) -> list[str]:
+    """Line about the stations on the route, if there are any."""
+    if not stations:
+        return []
+    missed = [
+        f"{each.station} {each.two_sigma * 1e3:.1f} mm (allowed {each.required * 1e3:.0f})"
+        for each in stations
+        if not each.is_met
+    ]
+    verdict = f"too uncertain at {', '.join(missed)}" if missed else "each is reached as accurately as it requires"
+    return [f"Stations     {len(stations)} on the route; {verdict}"]
 
 
 def _most_needed(ranked: Sequence[Dependence], reflectors: ReflectorMap) -> list[str]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from commission.io.atomic import atomic_file, write_text
 from commission.planning.dependence import Dependence
-from commission.planning.route_prediction import RoutePrediction
+from commission.planning.route_prediction import RoutePrediction, StationAccuracy
 from commission.site.reflectors import ReflectorMap
 
 PREDICTION = "prediction.csv"
@@ -25,7 +25,9 @@ COLUMNS = (
 DEPENDENT_COLUMNS = ("reflector_id", "failure", "route", "failing_metres", "load", "metres")
 
 
-def write_prediction(folder: Path, route: str, prediction: RoutePrediction) -> None:
+def write_prediction(
+    folder: Path, route: str, prediction: RoutePrediction, stations: Sequence[StationAccuracy] = ()
+) -> None:
     """Write `prediction.csv` (the worst of each metre) and `summary.json`; each is replaced whole or not at all.
 
     Parameters
@@ -33,6 +35,7 @@ def write_prediction(folder: Path, route: str, prediction: RoutePrediction) -> N
     folder : made when missing.
     route : name of the route.
     prediction : of that route.
+    stations : uncertainty at the stations on it; a list in the summary.
 
     Raises
     ------
@@ -50,7 +53,8 @@ def write_prediction(folder: Path, route: str, prediction: RoutePrediction) -> N
         np.where(metres.fails, "fail", "operational"),
     ]
     _write_table(folder / PREDICTION, COLUMNS, zip(*(column.tolist() for column in columns), strict=True))
-    write_text(folder / SUMMARY, json.dumps(summary(route, prediction), indent=2, allow_nan=False) + "\n")
+    entries = {**summary(route, prediction), "stations": [_station_entry(station) for station in stations]}
+    write_text(folder / SUMMARY, json.dumps(entries, indent=2, allow_nan=False) + "\n")
 
 
 def summary(route: str, prediction: RoutePrediction) -> dict[str, str | int | float | list[float]]:
@@ -72,6 +76,16 @@ def summary(route: str, prediction: RoutePrediction) -> dict[str, str | int | fl
         "visible_min": int(prediction.seen.min()),
         "visible_mean": float(prediction.seen.mean()),
         "on_odometry_max_m": float(prediction.on_odometry.max()),
+    }
+
+
+def _station_entry(station: StationAccuracy) -> dict[str, str | float | bool]:
+    return {
+        "station": station.station,
+        "metre": station.metre,
+        "two_sigma_m": station.two_sigma,
+        "required_m": station.required,
+        "met": station.is_met,
     }
 
 

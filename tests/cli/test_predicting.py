@@ -37,3 +37,19 @@ def test_what_if_ranks_the_reflectors(commission, project, tmp_path):
     assert sorted(row["reflector_id"] for row in rows) == ["R0", "R1", "R2", "R3", "R4"]
     loads = [float(row["load"]) for row in rows]
     assert loads == sorted(loads, reverse=True)
+
+
+def test_stations_on_the_route_are_met_or_named(commission, project, tmp_path):
+    with (project / "project.yaml").open("a", encoding="utf-8") as file:
+        file.write(
+            "stations:\n"
+            "  - {name: Dock, x: 6.0, y: 0.0, required_accuracy: 0.001}\n"
+            "  - {name: Gate, x: 3.0, y: 0.1, required_accuracy: 0.1}\n"
+            "  - {name: Elsewhere, x: 3.0, y: 5.0}\n"
+            "  - {name: Other way round, x: 3.0, y: 0.0, heading: 3.1}\n"
+        )
+    code, told, err = commission("predict", project, "--out", tmp_path / "out")
+    assert (code, err) == (0, "")
+    assert "too uncertain at Dock" in told
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    assert [(each["station"], each["met"]) for each in summary["stations"]] == [("Dock", False), ("Gate", True)]
