@@ -5,6 +5,7 @@ All browsers share one scene; the camera, and what only plan or 3D needs, belong
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
@@ -28,6 +29,8 @@ NEAREST_FLIGHT = 8.0
 """Visible height when a place is flown to from farther away [m]."""
 STRAIGHT_DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 LOCK = "/lock"
+SETTLING = 4.0
+"""Time after a browser came during which its panels still take their places and change the shape of the floor [s]."""
 
 OnDrag: TypeAlias = Callable[[Any], Coroutine[Any, Any, None]]
 """Takes viser's drag events of the floor; `async`, since only those keep their order."""
@@ -45,6 +48,10 @@ class ClientView:
     """Whether the camera goes with the vehicle."""
     furniture: dict[str, tuple[SceneNodeHandle, ...]] = field(default_factory=dict)
     """Its own nodes by layer."""
+    aspect: float = 0.0
+    """Shape of the floor, width over height, that the plan was fitted to."""
+    came_at: float = field(default_factory=time.monotonic)
+    """When it came, on the clock of this computer [s]."""
 
 
 class Cameras:
@@ -68,7 +75,7 @@ class Cameras:
     def connected(self, client: ClientHandle) -> None:
         """Begin with the plan of the whole site."""
         self._views[client.client_id] = ClientView(client)
-        client.camera.on_update(self._keep_north_up)
+        client.camera.on_update(self._watch)
         self._furnish(self._views[client.client_id])
         self.show(client.client_id, View.FIT)
 
@@ -93,14 +100,14 @@ class Cameras:
         if own.three_d:
             self._look_from_the_south(own.client)
         else:
-            self._look_down(own.client, self._extent.center, _visible_height(self._extent, _aspect(own.client)))
+            self._fit(own)
 
     def look_at(self, client_id: int, place: tuple[float, float]) -> None:
         """Bring a place into the middle of a browser's view, near enough to see it."""
         own = self._views.get(client_id)
         if own is None:
             return
-        own.follow = False
+        own.follow, own.came_at = False, -SETTLING
         camera = own.client.camera
         distance = float(np.linalg.norm(camera.position - camera.look_at))
         if not own.three_d:
@@ -154,6 +161,11 @@ class Cameras:
                     node.remove()
                 own.furniture[layer.name] = layer.furnish(own.client.scene, three_d=own.three_d)
 
+    def _fit(self, own: ClientView) -> None:
+        """Show the plan of the whole site."""
+        own.aspect = _aspect(own.client)
+        self._look_down(own.client, self._extent.center, _visible_height(self._extent, own.aspect))
+
     def _look_down(self, client: ClientHandle, center: tuple[float, float], visible_height: float) -> None:
         distance = visible_height / PLAN_FOV
         camera = client.camera
@@ -176,10 +188,25 @@ class Cameras:
             camera.position = (x, y - 0.85 * reach, 0.85 * reach)
             camera.look_at = (x, y, 0.0)
 
-    async def _keep_north_up(self, camera: CameraHandle) -> None:
-        """Undo a turn by the arrow keys, which cannot be switched off."""
+    async def _watch(self, camera: CameraHandle) -> None:
+        """Fit anew while the page still builds up, and keep north up afterwards.
+
+        A browser reports the camera that it began with, and the floor takes its shape when the panels have come: a plan
+        fitted before that shows a corner of the site.
+        """
         own = self._views.get(camera.client.client_id)
-        if own is None or own.three_d or abs(abs(float(camera.wxyz @ STRAIGHT_DOWN)) - 1.0) < 1e-6:
+        if own is None or own.three_d or own.follow:
+            return
+        if time.monotonic() - own.came_at < SETTLING:
+            shift = float(np.hypot(*(camera.look_at[:2] - self._extent.center)))
+            if abs(_aspect(own.client) - own.aspect) > 0.01 or shift > 0.01 * max(self._extent.size):
+                self._fit(own)
+                return
+        self._keep_north_up(camera)
+
+    def _keep_north_up(self, camera: CameraHandle) -> None:
+        """Undo a turn by the arrow keys, which cannot be switched off."""
+        if abs(abs(float(camera.wxyz @ STRAIGHT_DOWN)) - 1.0) < 1e-6:
             return
         distance = float(np.linalg.norm(camera.position - camera.look_at))
         x, y = (float(value) for value in camera.look_at[:2])
