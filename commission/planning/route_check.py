@@ -91,7 +91,7 @@ def way_of(route: Route, step: float = STEP) -> Way:
     return Way(np.column_stack((rows[:, :2], headings)), curvatures, segments, corners)
 
 
-def room_along(way: Way, outline: ArrayLike, floor: FloorDistances) -> FloatArray:
+def room_along(way: Way, outline: ArrayLike, floor: FloorDistances, enough: float = MOST_ROOM) -> FloatArray:
     """Room between a vehicle's outline and the walls along a way.
 
     Parameters
@@ -99,17 +99,18 @@ def room_along(way: Way, outline: ArrayLike, floor: FloorDistances) -> FloatArra
     way : poses of the vehicle.
     outline : (K, 2) corners [m], base frame.
     floor : the walls.
+    enough : room beyond which it does not matter how much it is [m]; less is faster.
 
     Returns
     -------
-    room : (N,) array [m], at most MOST_ROOM and good to a cell; 0 or less where the outline cuts an occupied cell.
+    room : (N,) array [m], at most `enough` and good to a cell; 0 or less where the outline cuts an occupied cell.
     """
     points = outline_points(outline)
     center = 0.5 * (points.min(axis=0) + points.max(axis=0))
     radius = float(np.hypot(*(points - center).T).max())
     grid = floor.grid
     frame = frozen([*grid.origin, grid.resolution], (4,), "frame")
-    return _room(floor.distances, frame, way.poses, np.vstack((center, points)), radius)
+    return _room(floor.distances, frame, way.poses, np.vstack((center, points)), (radius, float(enough)))
 
 
 def outline_points(outline: ArrayLike, step: float = OUTLINE_STEP) -> FloatArray:
@@ -148,9 +149,17 @@ def _rows(spline: Spline, step: float) -> FloatArray:
 
 @compiled
 def _room(
-    distances: NDArray[np.float32], frame: FloatArray, poses: FloatArray, points: FloatArray, radius: float
+    distances: NDArray[np.float32],
+    frame: FloatArray,
+    poses: FloatArray,
+    points: FloatArray,
+    limits: tuple[float, float],
 ) -> FloatArray:
-    """Room of each pose; points[0] is the center of the circle around the outline, which is asked first."""
+    """Room of each pose; points[0] is the center of the circle around the outline, which is asked first.
+
+    `limits` are that circle's radius and the room that is enough [m].
+    """
+    radius, enough = limits
     rows, columns = distances.shape
     cell = frame[3]
     c, s = math.cos(frame[2]), math.sin(frame[2])
@@ -160,7 +169,7 @@ def _room(
         x, y = c * dx + s * dy, c * dy - s * dx
         turn = poses[n, 2] - frame[2]
         ct, st = math.cos(turn), math.sin(turn)
-        least = MOST_ROOM + 0.5 * cell
+        least = enough + 0.5 * cell
         k = 0
         while k < len(points):
             px = x + ct * points[k, 0] - st * points[k, 1]
@@ -170,7 +179,7 @@ def _room(
             if 0 <= row < rows and 0 <= column < columns:
                 here = float(distances[row, column])
                 # Centers of cells are what the field knows: half a cell is the wall's own.
-                if k == 0 and here - radius - 0.5 * cell > MOST_ROOM + cell:
+                if k == 0 and here - radius - 0.5 * cell > enough + cell:
                     break
             if k > 0 or here <= 0.0:
                 least = min(least, here)

@@ -140,7 +140,7 @@ def route_problems(
     way = way_of(route)
     found = [*_curvature_problems(route, way, vehicle), *_corner_problems(route, way, vehicle)]
     if floor is not None:
-        room = room_along(way, vehicle.outline, floor)
+        room = room_along(way, vehicle.outline, floor, limits.clearance)
         for first, last in _stretches(room <= 0.0):
             length = _length(way, first, last)
             text = f"Route {route.name!r}: the vehicle's outline cuts a wall over {length:.2f} m"
