@@ -23,11 +23,12 @@ from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
 from commission.app.server import start_server
 from commission.app.session import Drive
 from commission.app.store import MAGNIFICATIONS, AppState
+from commission.geometry import raycast, se2, spline_kernels
 from commission.io.project_file import load_project, save_project
-from commission.localization import whole_run
+from commission.localization import localizer, whole_run
 from commission.localization.estimate import Mode
 from commission.localization.setup import LocalizerSetup
-from commission.simulation import scenario
+from commission.simulation import follower, scan
 from commission.site.project import Project
 
 log = logging.getLogger(__name__)
@@ -134,4 +135,13 @@ def predicted_episodes(drive: Drive, setup: LocalizerSetup) -> tuple[tuple[float
 
 def compile_kernels(progress: Callable[[float, str], None]) -> None:
     """Compile every kernel that the page needs, the first needed first."""
-    compiled.warm_up((("simulation", scenario.warm_up), ("localizer", whole_run.warm_up)), progress)
+    steps = (
+        ("poses", se2.warm_up),
+        ("curves", spline_kernels.warm_up),
+        ("rays", raycast.warm_up),
+        ("virtual vehicle", follower.warm_up),
+        ("virtual scanner", scan.warm_up),
+        ("localizer", localizer.warm_up),
+        ("prediction", whole_run.warm_up),
+    )
+    compiled.warm_up(steps, progress)

@@ -19,7 +19,7 @@ from commission.app.reducer import parameter, with_parameter
 from commission.app.server import start_server
 from commission.app.session import Drive, Session
 from commission.app.store import AppState, LastEdit
-from commission.app.view import PageView
+from commission.app.view import PageView, Progress
 from commission.localization.estimate import Mode
 from commission.localization.setup import LocalizerSetup
 from commission.site.project import Project
@@ -116,13 +116,17 @@ def test_names_from_files_are_never_read_as_html(project: Project) -> None:
 
 
 def test_the_badge_says_operational_fail_or_that_nothing_runs(session: Session, project: Project) -> None:
-    limits = project.parameters.supervisor
-    run = session.view()
-    assert badge_text(None, limits)[0] == "NO RUN"
-    assert badge_text(run, limits)[0] == "OPERATIONAL"
-    word, beside, _ = badge_text(replace(run, mode=Mode.FAIL), limits)
+    state, run = AppState(project, project), session.view()
+    assert badge_text(PageView(state, None))[0] == "NO RUN"
+    assert badge_text(PageView(state, run))[0] == "OPERATIONAL"
+    word, beside, _ = badge_text(PageView(state, replace(run, mode=Mode.FAIL)))
     assert word.startswith("FAIL")
     assert "mm" in beside and "°" in beside
+
+
+def test_what_is_being_prepared_is_said_where_the_badge_is(project: Project) -> None:
+    view = PageView(AppState(project, project), None, (Progress("Compiling: <rays>", 0.4),))
+    assert badge_text(view)[:2] == ("PREPARING", "Compiling: &lt;rays&gt; 40%")
 
 
 def test_every_number_of_the_newest_cycle_is_shown(session: Session, project: Project) -> None:

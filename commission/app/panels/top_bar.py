@@ -11,9 +11,8 @@ from viser import GuiApi, GuiEvent
 from commission.app import actions, theme
 from commission.app.panels.base import BasePanel, Post, escaped, posting
 from commission.app.store import AppState, Step
-from commission.app.view import PageView, RunView
+from commission.app.view import PageView
 from commission.localization.estimate import Mode
-from commission.site.parameters import SupervisorParameters
 
 LONGEST_NAME = 22
 """Letters of a step's name that fit on a button."""
@@ -21,10 +20,12 @@ LONGEST_NAME = 22
 Modifier: TypeAlias = Literal["cmd/ctrl", "cmd/ctrl+shift"]
 
 
-def badge_text(run: RunView | None, limits: SupervisorParameters) -> tuple[str, str, str]:
+def badge_text(view: PageView) -> tuple[str, str, str]:
     """Return the badge's word, what stands beside it, and its color."""
+    run, limits = view.run, view.state.project.parameters.supervisor
     if run is None or run.estimate is None:
-        return "NO RUN", "", theme.IDLE_COLOR
+        under_way = [f"{escaped(job.name)} {job.fraction:.0%}" for job in view.jobs]
+        return ("PREPARING" if under_way else "NO RUN"), "; ".join(under_way), theme.IDLE_COLOR
     x, y, heading = run.series.two_sigma[-1]
     beside = (
         f"2σ {max(x, y) * 1000:.0f} / {limits.position_limit * 1000:.0f} mm"
@@ -91,7 +92,7 @@ class TopBar(BasePanel):
 
     def draw(self, view: PageView) -> None:
         """Show the supervisor's state without delay."""
-        word, beside, color = badge_text(view.run, view.state.project.parameters.supervisor)
+        word, beside, color = badge_text(view)
         if (word, color) == self._shown:
             return
         self._shown = (word, color)
@@ -111,7 +112,7 @@ class TopBar(BasePanel):
     def draw_slowly(self, view: PageView) -> None:
         """Show the numbers beside the badge, what the project is called, and enable what can be done."""
         state = view.state
-        self._show_badge(*badge_text(view.run, state.project.parameters.supervisor))
+        self._show_badge(*badge_text(view))
         head = title(state)
         if head != self._head:
             self._head = head
