@@ -78,6 +78,8 @@ class Save:
 
     folder: Path | None = None
     """Where to; none: where it came from."""
+    overwrite: bool = False
+    """Whether files that somebody else has changed meanwhile are replaced."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +92,27 @@ class ProjectSaved:
     """Where to."""
     time_of_day: str
     """When, as the page shows it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChangedOnDisk:
+    """The project's files were looked at, because something has happened in their folder."""
+
+    files: tuple[str, ...]
+    """Names of those that somebody else has changed since they were read or saved; empty: none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reload:
+    """Read the project from its files again, as an edit that can be undone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reloaded:
+    """The project was read again."""
+
+    project: Project
+    """As its files are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,6 +232,9 @@ Action: TypeAlias = (
     | Redo
     | Save
     | ProjectSaved
+    | ChangedOnDisk
+    | Reload
+    | Reloaded
     | ChooseSource
     | Play
     | Step

@@ -15,8 +15,10 @@ import viser
 from commission import compiled
 from commission.app.actions import Recording, Source, VirtualDrive
 from commission.app.drives import prepare
+from commission.app.editing.actions import Restored
 from commission.app.extent import extent_of
 from commission.app.history import episodes
+from commission.app.keeping import Keeping
 from commission.app.layers.accumulated import AccumulatedLayer
 from commission.app.page import Page
 from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
@@ -24,7 +26,8 @@ from commission.app.server import start_server
 from commission.app.session import Drive
 from commission.app.store import MAGNIFICATIONS, AppState
 from commission.geometry import raycast, se2, spline_kernels
-from commission.io.project_file import load_project, save_project
+from commission.io.journal import restore
+from commission.io.project_file import load_project, project_file
 from commission.localization import localizer, whole_run
 from commission.localization.estimate import Mode
 from commission.localization.setup import LocalizerSetup
@@ -63,8 +66,9 @@ def serve(
         the project cannot be read, or the page cannot be served as asked.
     """
     loaded = load_project(project)
+    folder = None if demo else project_file(project).parent
     server = start_server(host, port, token)
-    runtime = open_page(server, loaded, folder=None if demo else project, source=first_source(loaded, recording, demo))
+    runtime = open_page(server, loaded, folder=folder, source=first_source(loaded, recording, demo))
     address = f"http://{host}:{server.get_port()}/" + (f"?token={quote(token)}" if token else "")
     log.info("page at %s", address)
     if open_browser:
@@ -92,7 +96,8 @@ def open_page(
     ----------
     server : a started server without content.
     project : what to show.
-    folder : where it is saved to; none: nowhere unless a folder is named.
+    folder : where it is saved to; none: nowhere unless a folder is named. Edits that a killed program left in the
+        journal there are made again.
     source : what drives at once; none: nothing yet.
     """
     state = AppState(
@@ -104,7 +109,18 @@ def open_page(
         hidden=frozenset({AccumulatedLayer.name}),
         magnify=seen_magnification(project),
     )
-    runtime = Runtime(state, Work(prepare, predicted_episodes, save_project, compile_kernels))
+    keeping = Keeping(folder, project)
+    work = Work(
+        prepare,
+        predicted_episodes,
+        keeping.save,
+        compile_kernels,
+        note=keeping.note,
+        foreign_changes=keeping.foreign_changes,
+        close=keeping.close,
+        load=keeping.load,
+    )
+    runtime = Runtime(state, work)
     page = Page(server, runtime.post, state)
 
     @server.on_client_connect
@@ -115,6 +131,9 @@ def open_page(
     def _(client: viser.ClientHandle) -> None:
         runtime.post(BrowserLeft(client.client_id))
 
+    restored = None if folder is None else restore(folder, project)
+    if restored is not None:
+        runtime.post(Restored(restored.project, restored.summary()))
     runtime.start(page)
     return runtime
 

@@ -15,6 +15,7 @@ from commission.app.reduction import (
     MoveTo,
     PlaceCamera,
     ProcessOneScan,
+    ReadProject,
     Reduction,
     Tell,
     WriteProject,
@@ -101,13 +102,43 @@ def _(action: actions.Save, state: AppState) -> Reduction:
     folder = action.folder or state.folder
     if folder is None:
         raise UsageError("this project is bundled with the program and stays as it is; name a folder to save a copy in")
-    return Reduction(state, (WriteProject(state.project, folder),))
+    return Reduction(state, (WriteProject(state.project, folder, action.overwrite),))
 
 
 @reduce.register
 def _(action: actions.ProjectSaved, state: AppState) -> Reduction:
-    saved = replace(state, saved=action.project, folder=action.folder, saved_at=action.time_of_day, last_edit=None)
+    saved = replace(
+        state,
+        saved=action.project,
+        folder=action.folder,
+        saved_at=action.time_of_day,
+        last_edit=None,
+        foreign=(),
+        greeting="",
+    )
     return Reduction(saved, (Tell(f"saved in {action.folder}", failed=False),))
+
+
+@reduce.register
+def _(action: actions.ChangedOnDisk, state: AppState) -> Reduction:
+    if action.files == state.foreign:
+        return Reduction(state)
+    text = f"changed on disk by somebody else: {', '.join(action.files)}; read it again, or save to overwrite it"
+    told = (Tell(text, failed=True),) if action.files else ()
+    return Reduction(replace(state, foreign=action.files), told)
+
+
+@reduce.register
+def _(_action: actions.Reload, state: AppState) -> Reduction:
+    if state.folder is None:
+        raise UsageError("this project is bundled with the program; expected one in a folder")
+    return Reduction(state, (ReadProject(state.folder),))
+
+
+@reduce.register
+def _(action: actions.Reloaded, state: AppState) -> Reduction:
+    read = replace(state, saved=action.project, foreign=())
+    return Reduction(edited(read, action.project, Edit("read again from disk")), (ApplyParameters(),))
 
 
 @reduce.register

@@ -36,6 +36,16 @@ class WriteProject:
     """What to write."""
     folder: Path
     """Where to."""
+    overwrite: bool = False
+    """Whether files that somebody else has changed meanwhile are replaced."""
+
+
+@dataclass(frozen=True, slots=True)
+class ReadProject:
+    """Read the project from its files again."""
+
+    folder: Path
+    """Where from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +93,9 @@ class FlyTo:
     """Where [m], map frame."""
 
 
-Effect: TypeAlias = LoadSource | ApplyParameters | WriteProject | MoveTo | ProcessOneScan | Tell | PlaceCamera | FlyTo
+Effect: TypeAlias = (
+    LoadSource | ApplyParameters | WriteProject | ReadProject | MoveTo | ProcessOneScan | Tell | PlaceCamera | FlyTo
+)
 
 
 @dataclass(frozen=True, slots=True)

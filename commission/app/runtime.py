@@ -31,6 +31,8 @@ FRAME_S = 0.04
 SLOW_FRAME_S = 0.2
 """The same for plots, trails and numbers [s]."""
 IDLE_S = 0.5
+LOOK_AT_DISK_S = 2.0
+"""Time between two looks at the project's folder [s]."""
 
 PREPARE, PREDICT, COMPILE = "Preparing the drive", "Predicting the rest", "Compiling"
 
@@ -87,10 +89,18 @@ class Work:
     """From a source to a drive."""
     predict: Callable[[Drive, LocalizerSetup], tuple[tuple[float, float], ...]]
     """Fail episodes [s] of a whole run with these parameters."""
-    save: Callable[[Project, Path], None]
-    """Write a project into a folder."""
+    save: Callable[[Project, Path, bool], None]
+    """Write a project into a folder; the last says whether what others changed there is replaced."""
     compile: Callable[[Callable[[float, str], None]], None]
     """Compile all kernels."""
+    note: Callable[[Project, str], None] = lambda _project, _what: None
+    """Journal an edit by its name."""
+    foreign_changes: Callable[[], tuple[str, ...] | None] = lambda: None
+    """Files of the project that somebody else has changed; none when nothing has happened since the last call."""
+    close: Callable[[], None] = lambda: None
+    """Bring the journal to the disk."""
+    load: Callable[[Path], Project] | None = None
+    """Read a project from a folder; none: it cannot be read again."""
 
 
 class Runtime:
@@ -115,7 +125,7 @@ class Runtime:
         self._shown: Project | None = None
         self._dirty = True
         self._slow_dirty = True
-        self._drawn_at = self._drawn_slowly_at = self._ticked_at = clock()
+        self._drawn_at = self._drawn_slowly_at = self._ticked_at = self._looked_at = clock()
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._loop, name="owner", daemon=True)
 
@@ -136,6 +146,7 @@ class Runtime:
         self._stopped.set()
         self._jobs.close()
         self._thread.join(timeout=2.0)
+        self._work.close()
 
     def _loop(self) -> None:
         self._guarded(self._show_site)
@@ -198,13 +209,16 @@ class Runtime:
 
     def _apply(self, action: Action) -> None:
         """Reduce an action and carry out what follows."""
-        outcome = reducer.reduce(action, self.state)
+        before = self.state
+        outcome = reducer.reduce(action, before)
         self.state = outcome.state
         if self.session is not None:
             self.session.covered = self.state.covered
+        self._dirty = self._slow_dirty = True
         for effect in outcome.effects:
             self._carry_out(effect)
-        self._dirty = self._slow_dirty = True
+        if outcome.state.project is not before.project:
+            self._work.note(outcome.state.project, _name_of(action, before, outcome.state))
 
     def _carry_out(self, effect: reduction.Effect) -> None:
         """Do one thing that the reducer asks for."""
@@ -217,8 +231,11 @@ class Runtime:
                 if session is not None:
                     session.set_setup(LocalizerSetup.of(self.state.project))
                     self._predict()
-            case reduction.WriteProject(project, folder):
-                self._work.save(project, folder)
+            case reduction.ReadProject(folder):
+                if self._work.load is not None:
+                    self.post(actions.Reloaded(self._work.load(folder)))
+            case reduction.WriteProject(project, folder, overwrite):
+                self._work.save(project, folder, overwrite)
                 self.post(actions.ProjectSaved(project, folder, time.strftime("%H:%M")))
             case reduction.MoveTo(seconds, afresh):
                 if session is not None:
@@ -270,6 +287,11 @@ class Runtime:
         session = self.session
         if session is not None and (self.state.playing or session.seeking is not None):
             self._advance(session, elapsed)
+        if now - self._looked_at >= LOOK_AT_DISK_S:
+            self._looked_at = now
+            files = self._work.foreign_changes()
+            if files is not None:
+                self._apply(actions.ChangedOnDisk(files))
         if self._page is None:
             return
         if self.state.project is not self._shown:
@@ -308,6 +330,17 @@ class Runtime:
         if self._page is not None:
             self._shown = self.state.project
             self._page.show_site(self.state)
+
+
+def _name_of(action: Action, before: AppState, after: AppState) -> str:
+    """Return what the journal calls an edit: the undo step's name, or which one was taken back or made again."""
+    match action:
+        case actions.Undo() if before.undo:
+            return f"undo {before.undo[-1].name}"
+        case actions.Redo() if before.redo:
+            return f"redo {before.redo[-1].name}"
+        case _:
+            return after.undo[-1].name if after.undo else "edit"
 
 
 def _show(page: PageLike, effect: reduction.Tell | reduction.PlaceCamera | reduction.FlyTo) -> None:

@@ -59,6 +59,10 @@ class AppState:
     """Where the project is written to; none: it is bundled with the program and stays as it is."""
     saved_at: str = ""
     """Time of day of the last save; empty: not saved in this session."""
+    foreign: tuple[str, ...] = ()
+    """Files of the project that somebody else has changed since they were read or saved."""
+    greeting: str = ""
+    """What each browser is told when it comes: what was restored after a crash, until it is saved."""
     undo: tuple[Step, ...] = ()
     """Earlier projects, the newest last."""
     redo: tuple[Step, ...] = ()

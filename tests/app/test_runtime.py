@@ -68,7 +68,7 @@ class Bench:
     def _predict(self, _drive: Drive, _setup: LocalizerSetup) -> tuple[tuple[float, float], ...]:
         return EPISODES
 
-    def _save(self, _project: Project, folder: Path) -> None:
+    def _save(self, _project: Project, folder: Path, _overwrite: bool) -> None:
         self.saved.append(folder)
 
     def post(self, *wishes: Action) -> None:

@@ -66,7 +66,8 @@ def _telling_of_locked(state: AppState, ids: tuple[str, ...], reduction: Reducti
 
 @reduce.register
 def _(action: actions.Join, state: AppState) -> Reduction:
-    return Reduction(state.with_editor(action.client, Editor()))
+    greeting = (Tell(state.greeting, failed=False),) if state.greeting else ()
+    return Reduction(state.with_editor(action.client, Editor()), greeting)
 
 
 @reduce.register

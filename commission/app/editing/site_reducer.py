@@ -10,7 +10,7 @@ from commission.app.editing import actions
 from commission.app.editing.editor import ControlPoint, Editor, Point, Tool
 from commission.app.editing.reducer import editor_of
 from commission.app.editing.route_gestures import route_of, segment_of
-from commission.app.reduction import ApplyParameters, FlyTo, Reduction, reduce
+from commission.app.reduction import ApplyParameters, FlyTo, Reduction, Tell, reduce
 from commission.app.store import AppState, Edit, edited
 from commission.errors import UsageError
 from commission.site.editing import routes as edits
@@ -147,4 +147,5 @@ def _(action: actions.SetScanner, state: AppState) -> Reduction:
 
 @reduce.register
 def _(action: actions.Restored, state: AppState) -> Reduction:
-    return Reduction(edited(state, action.project, Edit("restore unsaved edits")))
+    restored = edited(replace(state, greeting=action.text), action.project, Edit("restore unsaved edits"))
+    return Reduction(restored, (Tell(action.text, failed=False),))

@@ -40,7 +40,9 @@ def badge_text(view: PageView) -> tuple[str, str, str]:
 
 def title(state: AppState) -> str:
     """Return the left end of the bar."""
-    if state.is_changed:
+    if state.foreign:
+        saved = f"changed on disk: {escaped(', '.join(state.foreign))}"
+    elif state.is_changed:
         saved = "unsaved"
     elif state.saved_at:
         saved = f"saved {escaped(state.saved_at)}"
@@ -82,6 +84,14 @@ class TopBar(BasePanel):
             self._buttons[label] = button
             command = gui.add_command(label, hotkey=key, modifier=modifier)
             command.on_trigger(lambda event, make=make: post(make(event.client_id)))
+        self._overwrite = gui.add_button(
+            "Overwrite", hint="Save over what somebody else has written.", color="red", visible=False
+        )
+        self._overwrite.on_click(posting(post, lambda _event: actions.Save(overwrite=True)))
+        self._reload = gui.add_button(
+            "Read again", hint="Take what somebody else has written; undo brings yours back.", visible=False
+        )
+        self._reload.on_click(posting(post, lambda _event: actions.Reload()))
         view = gui.add_button_group("", tuple(v.value for v in actions.View))
 
         def show(event: GuiEvent[Any]) -> None:
@@ -117,7 +127,10 @@ class TopBar(BasePanel):
         if head != self._head:
             self._head = head
             self._title.content = theme.STYLE + head
-        wanted = {"Undo": bool(state.undo), "Redo": bool(state.redo), "Save": state.is_changed}
+        wanted = {"Undo": bool(state.undo), "Redo": bool(state.redo), "Save": state.is_changed and not state.foreign}
+        for button in (self._overwrite, self._reload):
+            if button.visible is not bool(state.foreign):
+                button.visible = bool(state.foreign)
         for label, enabled in wanted.items():
             if self._buttons[label].disabled is enabled:
                 self._buttons[label].disabled = not enabled
