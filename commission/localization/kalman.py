@@ -36,6 +36,17 @@ class Innovation(NamedTuple):
     bearing_pt: float
 
 
+class Gain(NamedTuple):
+    """Kalman gain: what a metre of range and a radian of bearing move each state by."""
+
+    xr: float
+    xb: float
+    yr: float
+    yb: float
+    tr: float
+    tb: float
+
+
 @compiled_inline
 def innovation(  # noqa: PLR0917 - a measurement, number by number
     belief: PoseGaussian,
@@ -105,39 +116,74 @@ def correct(  # noqa: PLR0917 - a measurement and a reflector, number by number
     offset_x, offset_y = scanner_offset(belief.theta, model)
     e = expect(belief.x, belief.y, belief.theta, offset_x, offset_y, reflector_x, reflector_y, model.mount_theta)
     v = innovation(belief, e, measured_range, measured_bearing, surveyed_variance, model)
-    # Gain K = P H^T S^-1, a row per state, solved with the factors of S.
+    k = gain(v)
+    xx, xy, xt, yy, yt, tt = corrected_covariance(belief, e, k, v.range_noise, v.bearing_noise)
+    return PoseGaussian(
+        belief.x + k.xr * v.range + k.xb * v.bearing,
+        belief.y + k.yr * v.range + k.yb * v.bearing,
+        wrap_scalar(belief.theta + k.tr * v.range + k.tb * v.bearing),
+        xx,
+        xy,
+        xt,
+        yy,
+        yt,
+        tt,
+    )
+
+
+@compiled_inline
+def gain(given: Innovation) -> Gain:
+    """K = P H^T S^-1, a row per state, solved with the factors of S."""
+    v = given
     xb, yb = _second(v.range_px, v.bearing_px, v), _second(v.range_py, v.bearing_py, v)
     tb = _second(v.range_pt, v.bearing_pt, v)
-    xr, yr, tr = v.range_px / v.s_rr - v.w * xb, v.range_py / v.s_rr - v.w * yb, v.range_pt / v.s_rr - v.w * tb
-    # A = I - K H.
-    a00 = 1.0 - xr * e.range_x - xb * e.bearing_x
-    a01 = -xr * e.range_y - xb * e.bearing_y
-    a02 = -xr * e.range_theta - xb * e.bearing_theta
-    a10 = -yr * e.range_x - yb * e.bearing_x
-    a11 = 1.0 - yr * e.range_y - yb * e.bearing_y
-    a12 = -yr * e.range_theta - yb * e.bearing_theta
-    a20 = -tr * e.range_x - tb * e.bearing_x
-    a21 = -tr * e.range_y - tb * e.bearing_y
-    a22 = 1.0 - tr * e.range_theta - tb * e.bearing_theta
+    return Gain(
+        v.range_px / v.s_rr - v.w * xb,
+        xb,
+        v.range_py / v.s_rr - v.w * yb,
+        yb,
+        v.range_pt / v.s_rr - v.w * tb,
+        tb,
+    )
+
+
+@compiled_inline
+def corrected_covariance(
+    p: PoseGaussian, e: Expected, k: Gain, range_noise: float, bearing_noise: float
+) -> tuple[float, float, float, float, float, float]:
+    """Upper triangle after a correction with any gain (Joseph form): A P A^T + K R K^T with A = I - K H.
+
+    Parameters
+    ----------
+    p : its covariance is P; its mean is not read.
+    e : its Jacobian is H.
+    k : gain, of this covariance or of another one.
+    range_noise, bearing_noise : R [m^2], [rad^2].
+    """
+    a00 = 1.0 - k.xr * e.range_x - k.xb * e.bearing_x
+    a01 = -k.xr * e.range_y - k.xb * e.bearing_y
+    a02 = -k.xr * e.range_theta - k.xb * e.bearing_theta
+    a10 = -k.yr * e.range_x - k.yb * e.bearing_x
+    a11 = 1.0 - k.yr * e.range_y - k.yb * e.bearing_y
+    a12 = -k.yr * e.range_theta - k.yb * e.bearing_theta
+    a20 = -k.tr * e.range_x - k.tb * e.bearing_x
+    a21 = -k.tr * e.range_y - k.tb * e.bearing_y
+    a22 = 1.0 - k.tr * e.range_theta - k.tb * e.bearing_theta
     # M = A P, then A P A^T + K R K^T: the upper triangle alone, which is the one symmetrization.
-    p = belief
     m00, m01 = a00 * p.xx + a01 * p.xy + a02 * p.xt, a00 * p.xy + a01 * p.yy + a02 * p.yt
     m02 = a00 * p.xt + a01 * p.yt + a02 * p.tt
     m10, m11 = a10 * p.xx + a11 * p.xy + a12 * p.xt, a10 * p.xy + a11 * p.yy + a12 * p.yt
     m12 = a10 * p.xt + a11 * p.yt + a12 * p.tt
     m20, m21 = a20 * p.xx + a21 * p.xy + a22 * p.xt, a20 * p.xy + a21 * p.yy + a22 * p.yt
     m22 = a20 * p.xt + a21 * p.yt + a22 * p.tt
-    rr, bb = v.range_noise, v.bearing_noise
-    return PoseGaussian(
-        p.x + xr * v.range + xb * v.bearing,
-        p.y + yr * v.range + yb * v.bearing,
-        wrap_scalar(p.theta + tr * v.range + tb * v.bearing),
-        m00 * a00 + m01 * a01 + m02 * a02 + rr * xr * xr + bb * xb * xb,
-        m00 * a10 + m01 * a11 + m02 * a12 + rr * xr * yr + bb * xb * yb,
-        m00 * a20 + m01 * a21 + m02 * a22 + rr * xr * tr + bb * xb * tb,
-        m10 * a10 + m11 * a11 + m12 * a12 + rr * yr * yr + bb * yb * yb,
-        m10 * a20 + m11 * a21 + m12 * a22 + rr * yr * tr + bb * yb * tb,
-        m20 * a20 + m21 * a21 + m22 * a22 + rr * tr * tr + bb * tb * tb,
+    rr, bb = range_noise, bearing_noise
+    return (
+        m00 * a00 + m01 * a01 + m02 * a02 + rr * k.xr * k.xr + bb * k.xb * k.xb,
+        m00 * a10 + m01 * a11 + m02 * a12 + rr * k.xr * k.yr + bb * k.xb * k.yb,
+        m00 * a20 + m01 * a21 + m02 * a22 + rr * k.xr * k.tr + bb * k.xb * k.tb,
+        m10 * a10 + m11 * a11 + m12 * a12 + rr * k.yr * k.yr + bb * k.yb * k.yb,
+        m10 * a20 + m11 * a21 + m12 * a22 + rr * k.yr * k.tr + bb * k.yb * k.tb,
+        m20 * a20 + m21 * a21 + m22 * a22 + rr * k.tr * k.tr + bb * k.tb * k.tb,
     )
 
 

@@ -93,7 +93,7 @@ def _reach(planned: PlannedRoute, prediction: RoutePrediction, gate: float) -> f
     variances = np.diagonal(prediction.prior_covariances, axis1=1, axis2=2).max(axis=0)
     noise = planned.parameters.observation
     surveyed = float(planned.places[:, 2].max(initial=0.0))
-    farthest = float(planned.farthest.max(initial=0.0)) + float(np.hypot(*planned.mounting[:2]))
+    farthest = float(planned.farthest.max(initial=0.0)) + float(np.hypot(*planned.scanner.mounting[:2]))
     # Range and bearing each within sqrt(gate) of their own sigma; the bearing seen from the farthest reflector.
     along = variances[0] + variances[1] + noise.range_sigma**2 + surveyed
     across = variances[0] + variances[1] + surveyed + farthest**2 * (variances[2] + noise.bearing_sigma**2)

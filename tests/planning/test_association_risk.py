@@ -35,7 +35,7 @@ def test_separation_is_that_of_the_innovation_covariance():
     for scan, probability in list(zip(risk.scans.tolist(), risk.probability, strict=True))[::20]:
         pose = planned.drive.poses[scan]
         belief = Belief(0, pose, prediction.prior_covariances[scan])
-        own, other = range_bearing(pose, planned.mounting, centers[2:4])
+        own, other = range_bearing(pose, planned.scanner.mounting, centers[2:4])
         d = np.array([other[0] - own[0], difference(other[1], own[1])])
         squared = d @ np.linalg.solve(innovation_covariances(belief, planned.model().observation, centers[2:3])[0], d)
         assert squared <= gate
@@ -49,7 +49,7 @@ def test_no_neighbor_within_a_gate_is_missed():
     for scan in range(0, len(planned.drive), 37):
         pose = planned.drive.poses[scan]
         belief = Belief(0, pose, prediction.prior_covariances[scan])
-        observed = range_bearing(pose, planned.mounting, centers)
+        observed = range_bearing(pose, planned.scanner.mounting, centers)
         S = innovation_covariances(belief, planned.model().observation, centers)
         for i in planned.visible.of(scan).tolist():
             for j in set(range(len(centers))) - {i}:

@@ -159,11 +159,11 @@ def drives_along(project, route, seeds, planned):
 
 
 def predicted_squares(planned, prediction):
-    """Mean predicted variance of x, y and heading in each metre."""
+    """Mean predicted squared error of x, y and heading in each metre."""
     metre = np.minimum(planned.drive.metres, planned.drive.length - 1e-6).astype(int)
     first = np.unique(metre, return_index=True)[1]
     counts = np.diff(np.append(first, len(metre)))[:, np.newaxis]
-    return np.add.reduceat(np.diagonal(prediction.covariances, axis1=1, axis2=2), first) / counts
+    return np.add.reduceat(np.diagonal(prediction.error_covariances, axis1=1, axis2=2), first) / counts
 
 
 @pytest.mark.slow
