@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from commission.app.editing.actions import EditAction
+from commission.app.plan.actions import PlanAction
 from commission.site.project import Project
 
 ParameterValue: TypeAlias = bool | int | float | str
@@ -249,4 +250,5 @@ Action: TypeAlias = (
     | Report
     | ClearProblems
     | EditAction
+    | PlanAction
 )

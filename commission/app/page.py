@@ -17,9 +17,12 @@ from commission.app.extent import extent_of
 from commission.app.layers.accumulated import AccumulatedLayer
 from commission.app.layers.base import Layer
 from commission.app.layers.detections import DetectionLayer
+from commission.app.layers.failing import FailingLayer
 from commission.app.layers.floor import FloorLayer
 from commission.app.layers.gates import GateLayer
 from commission.app.layers.grid import GridLayer
+from commission.app.layers.heatmap import HeatLayer
+from commission.app.layers.prediction import RibbonLayer
 from commission.app.layers.reflectors import ReflectorLayer, ReflectorNameLayer
 from commission.app.layers.routes import RouteLayer
 from commission.app.layers.scan import ScanLayer
@@ -28,7 +31,9 @@ from commission.app.layers.uncertainty import UncertaintyLayer
 from commission.app.layers.vehicle import VehicleLayer
 from commission.app.layers.walls import WallLayer
 from commission.app.panels.base import Panel, Post
+from commission.app.panels.heat_legend import HeatLegend
 from commission.app.panels.layers_panel import LayersPanel, LegendPanel
+from commission.app.panels.plan_panel import PlanPanel
 from commission.app.panels.plots import Plots
 from commission.app.panels.problems_panel import ProblemsPanel
 from commission.app.panels.run_panel import RunPanel
@@ -36,14 +41,18 @@ from commission.app.panels.site_panel import SitePanel
 from commission.app.panels.time_line import TimeLine
 from commission.app.panels.top_bar import TopBar
 from commission.app.panels.tune_panel import TunePanel
+from commission.app.plan.pointer import read_clicks
 from commission.app.store import AppState
 from commission.app.view import PageView
 from commission.site.project import Project
 
 LAYERS = (
     FloorLayer,
+    HeatLayer,
     GridLayer,
     RouteLayer,
+    RibbonLayer,
+    FailingLayer,
     ReflectorLayer,
     ReflectorNameLayer,
     GateLayer,
@@ -84,6 +93,7 @@ class Page:
             server.scene.set_background_image(np.full((2, 2, 3), theme.BACKGROUND, np.uint8), format="png")
             self._layers: tuple[Layer, ...] = tuple(make(server.scene) for make in LAYERS)
             self._panels = self._build_panels(post, state)
+            read_clicks(server, post)
             self._cameras = Cameras(server, self._layers, extent_of(state.project), floor_drag(post))
 
     def _build_panels(self, post: Post, state: AppState) -> tuple[Panel, ...]:
@@ -93,6 +103,8 @@ class Page:
         left = gui.add_panel()
         with left.add_tab("Site"):
             site = SitePanel(gui, state.project)
+        with left.add_tab("Plan"):
+            plan = PlanPanel(gui, post, state)
         with left.add_tab("Run"):
             run = RunPanel(gui, post, state)
         with left.add_tab("Tune"):
@@ -105,6 +117,7 @@ class Page:
         above.set_width(theme.RIGHT_PX)
         below = gui.add_panel()
         with below.add_tab("Legend"):
+            scales = HeatLegend(gui)
             legend = LegendPanel(gui, post, self._layers, state)
         with below.add_tab("Layers"):
             switches = LayersPanel(gui, post, self._layers, state)
@@ -116,7 +129,7 @@ class Page:
             time_line = TimeLine(gui, post, state.speed)
             plots = Plots(gui)
         bottom.float(x=0, y=-1, width=1000, height=theme.BOTTOM_PX)
-        return top, site, run, tune, legend, switches, problems, time_line, plots
+        return top, site, plan, scales, run, tune, legend, switches, problems, time_line, plots
 
     def show_site(self, state: AppState) -> None:
         """Draw what has changed of the project since it was last drawn."""
@@ -148,6 +161,8 @@ class Page:
                     layer.draw(view.run, view.state)
                     if slowly:
                         layer.draw_slowly(view.run, view.state)
+            for layer in self._layers:
+                layer.draw_plan(view.plan, view.state)
             for panel in self._panels:
                 panel.draw(view)
                 if slowly:

@@ -9,6 +9,8 @@ from typing import Any
 import commission.app.editing.site_reducer  # noqa: F401 - registers what editing actions mean
 from commission.app import actions
 from commission.app.actions import ParameterValue
+from commission.app.plan import reducer as plan
+from commission.app.plan.actions import ReadFloor, SetPlan
 from commission.app.reduction import (
     ApplyParameters,
     LoadSource,
@@ -218,3 +220,13 @@ def _(action: actions.Report, state: AppState) -> Reduction:
 @reduce.register
 def _(_action: actions.ClearProblems, state: AppState) -> Reduction:
     return Reduction(replace(state, problems=()))
+
+
+@reduce.register
+def _(action: SetPlan, state: AppState) -> Reduction:
+    return Reduction(replace(state, plan=plan.changed(action, state.plan, state.project)))
+
+
+@reduce.register
+def _(action: ReadFloor, state: AppState) -> Reduction:
+    return Reduction(replace(state, plan=plan.clicked(action, state.plan, state.project)))

@@ -18,6 +18,7 @@ from commission.app import actions, reducer, reduction
 from commission.app.actions import Action, Source, View
 from commission.app.editing import actions as editing
 from commission.app.jobs import Job, JobReport, Jobs, JobState, Progress
+from commission.app.plan.planner import Planner
 from commission.app.session import Drive, Session
 from commission.app.store import AppState
 from commission.app.view import PageView, RunView
@@ -120,6 +121,7 @@ class Runtime:
         self._clock = clock
         self._queue: SimpleQueue[Message] = SimpleQueue()
         self._jobs = Jobs(self._queue.put)
+        self._planner = Planner(self._jobs)
         self._shown_jobs: dict[int, Job] = {}
         self._page: PageLike | None = None
         self._shown: Project | None = None
@@ -254,6 +256,7 @@ class Runtime:
             self._shown_jobs[job.number] = job
             return
         self._shown_jobs.pop(job.number, None)
+        self._planner.hear(report)
         if job.state is JobState.FAILED:
             self._apply(actions.Report(f"{job.name}: {job.error}"))
         elif job.state is JobState.DONE and isinstance(report.result, Drive):
@@ -292,6 +295,8 @@ class Runtime:
             files = self._work.foreign_changes()
             if files is not None:
                 self._apply(actions.ChangedOnDisk(files))
+        if self._planner.follow(self.state):
+            self._dirty = self._slow_dirty = True
         if self._page is None:
             return
         if self.state.project is not self._shown:
@@ -324,7 +329,7 @@ class Runtime:
             for job in self._shown_jobs.values()
             if job.state is JobState.RUNNING and job.name != PREDICT
         )
-        return PageView(self.state, run, jobs)
+        return PageView(self.state, run, jobs, self._planner.view)
 
     def _show_site(self) -> None:
         if self._page is not None:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from commission.app.actions import Source
 from commission.app.editing.editor import Editor
+from commission.app.plan.settings import PlanSettings
 from commission.site.project import Project
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
@@ -85,6 +86,8 @@ class AppState:
     """Names of layers that are not drawn."""
     magnify: float = 1.0
     """Factor at which ellipses are drawn."""
+    plan: PlanSettings = field(default_factory=PlanSettings)
+    """What the step Plan shows."""
     problems: tuple[str, ...] = field(default=())
     """What went wrong, the newest last."""
 

@@ -30,6 +30,8 @@ VEHICLE: Color = (236, 239, 244)
 TRAIL: Color = (64, 200, 150)
 REFERENCE: Color = (196, 140, 255)
 SELECTED: Color = (255, 159, 28)
+DEPENDENT: Color = (255, 92, 205)
+OVER_LIMIT: Color = (255, 59, 48)
 
 OPERATIONAL_COLOR = "#1c7c3c"
 FAIL_COLOR = "#c5221f"
@@ -43,7 +45,8 @@ class Height:
     A centimetre apart: less flickers, because from far above the depth of two neighbors is rounded to the same.
     """
 
-    FLOOR = 0.0
+    FLOOR = -0.01
+    HEAT = 0.0
     GRID = 0.01
     ROUTE = 0.02
     ACCUMULATED = 0.03

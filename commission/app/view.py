@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from commission.app.plan.view import PlanView
 from commission.app.store import AppState
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Estimate, Mode
@@ -104,3 +105,5 @@ class PageView:
     """The run; none until a drive is loaded."""
     jobs: tuple[Progress, ...] = ()
     """Background work under way."""
+    plan: PlanView = field(default_factory=PlanView)
+    """What the step Plan has found."""

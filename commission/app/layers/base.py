@@ -6,6 +6,7 @@ from typing import Protocol
 
 from viser import SceneApi, SceneNodeHandle
 
+from commission.app.plan.view import PlanView
 from commission.app.store import AppState
 from commission.app.theme import Legend
 from commission.app.view import RunView
@@ -30,6 +31,9 @@ class Layer(Protocol):
 
     def draw_slowly(self, run: RunView, state: AppState) -> None:
         """Draw what may lag some scans behind: whatever grows with the drive."""
+
+    def draw_plan(self, plan: PlanView, state: AppState) -> None:
+        """Draw what the step Plan has found."""
 
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:
         """Add what only one browser's view needs; the caller removes it when the view changes."""
@@ -58,6 +62,9 @@ class BaseLayer:
 
     def draw_slowly(self, run: RunView, state: AppState) -> None:
         """Draw what may lag some scans behind."""
+
+    def draw_plan(self, plan: PlanView, state: AppState) -> None:
+        """Draw what the step Plan has found."""
 
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:  # noqa: ARG002 - a default
         """Add what only one browser's view needs."""

@@ -1,0 +1,61 @@
+"""What fails with one reflector: a ring around it and the metres of the routes that depend on it."""
+
+from __future__ import annotations
+
+import numpy as np
+from viser import SceneApi, SceneNodeHandle
+
+from commission.app import theme
+from commission.app.drawing import NO_SEGMENTS, outline_segments, polyline_segments
+from commission.app.extent import extent_of
+from commission.app.layers.base import BaseLayer
+from commission.app.plan.view import FailureView, PlanView
+from commission.app.store import AppState
+from commission.site.project import Project
+
+RING_POINTS = 32
+RING_MARKS = 2.2
+"""Radius of the ring, in sizes of a mark."""
+
+
+class FailingLayer(BaseLayer):
+    """The chosen reflector and its dependents."""
+
+    name = "What if one fails"
+    reads = ("floor_map", "reflectors", "routes")
+    legend = (theme.Legend("fails without the chosen reflector", theme.DEPENDENT, theme.Mark.LINE),)
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._mark = 0.1
+        self._shown: FailureView | None = None
+        self._metres, self._ring = (
+            scene.add_line_segments(
+                f"/plan/failing/{name}", NO_SEGMENTS, theme.DEPENDENT, thickness=width, thickness_units="screen"
+            )
+            for name, width in (("metres", 8.0), ("ring", 3.0))
+        )
+
+    def show_site(self, project: Project) -> None:
+        """Adapt the size of the ring to the site's."""
+        self._mark = extent_of(project).mark_size()
+
+    def draw_plan(self, plan: PlanView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+        """Draw what depends on the chosen reflector."""
+        if plan.failures is self._shown:
+            return
+        self._shown = plan.failures
+        lines = () if plan.failures is None else plan.failures.failing
+        height = theme.Height.REFERENCE
+        self._metres.points = np.concatenate([NO_SEGMENTS, *(polyline_segments(line, height) for line in lines)])
+        place = None if plan.failures is None else plan.failures.place
+        if place is None:
+            self._ring.points = NO_SEGMENTS
+            return
+        angles = np.linspace(0.0, 2.0 * np.pi, RING_POINTS, endpoint=False)
+        circle = np.array(place) + RING_MARKS * self._mark * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        self._ring.points = outline_segments(circle[np.newaxis], theme.Height.LABEL)
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return ring and metres."""
+        return self._metres, self._ring

@@ -1,0 +1,84 @@
+"""The heatmap of the step Plan: one small picture on the floor, and a mark where its values are read."""
+
+from __future__ import annotations
+
+from viser import ImageHandle, LabelHandle, SceneApi, SceneNodeHandle
+
+from commission.app import theme
+from commission.app.layers.base import BaseLayer
+from commission.app.plan.scale import picture
+from commission.app.plan.view import HeatView, PlanView, Reading
+from commission.app.plan.words import value_text
+from commission.app.store import AppState
+
+
+class HeatLayer(BaseLayer):
+    """Coverage of the floor."""
+
+    name = "Heatmap"
+    reads = ()
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._image: ImageHandle | None = None
+        self._label: LabelHandle | None = None
+        self._shown: tuple[HeatView | None, float] = (None, 0.0)
+        self._read: tuple[Reading | None, HeatView | None] = (None, None)
+
+    def draw_plan(self, plan: PlanView, state: AppState) -> None:
+        """Draw the picture anew where it or its opacity has changed."""
+        visible = self.name not in state.hidden
+        if (plan.heat, state.plan.opacity) != self._shown:
+            before, self._shown = self._shown[0], (plan.heat, state.plan.opacity)
+            self._draw(plan.heat, before, state.plan.opacity, visible=visible)
+        if (plan.reading, plan.heat) != self._read:
+            self._read = (plan.reading, plan.heat)
+            self._write(plan.reading, plan.heat, visible=visible)
+
+    def _draw(self, heat: HeatView | None, before: HeatView | None, opacity: float, *, visible: bool) -> None:
+        """Exchange the picture's content, or the picture itself where its place is another one."""
+        if self._image is not None and (heat is None or before is None or heat.lattice != before.lattice):
+            self._image.remove()
+            self._image = None
+        if heat is None:
+            return
+        image = picture(heat.classes, heat.scale, opacity)
+        if self._image is not None:
+            self._image.image = image
+            return
+        lattice = heat.lattice
+        x = lattice.x + 0.5 * (lattice.columns - 1) * lattice.spacing
+        y = lattice.y + 0.5 * (lattice.rows - 1) * lattice.spacing
+        self._image = self.scene.add_image(
+            "/plan/heat",
+            image,
+            render_width=lattice.columns * lattice.spacing,
+            render_height=lattice.rows * lattice.spacing,
+            format="png",
+            position=(x, y, theme.Height.HEAT),
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=visible,
+        )
+
+    def _write(self, reading: Reading | None, heat: HeatView | None, *, visible: bool) -> None:
+        """Write the value where the floor was clicked."""
+        if self._label is not None:
+            self._label.remove()
+            self._label = None
+        if reading is None or heat is None:
+            return
+        figure = heat.scale.figure
+        text = value_text(figure, reading.values[figure]) if reading.on_floor else "no floor here"
+        self._label = self.scene.add_label(
+            "/plan/reading",
+            text,
+            position=(*reading.place, theme.Height.LABEL),
+            anchor="bottom-center",
+            font_screen_scale=0.9,
+            visible=visible,
+        )
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the picture and the value on it."""
+        return tuple(node for node in (self._image, self._label) if node is not None)

@@ -1,0 +1,56 @@
+"""What the actions of the step Plan mean for its settings. Pure; the page's own reducer calls it."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from commission.app.plan.actions import ReadFloor, SetPlan
+from commission.app.plan.settings import Figure, PlanSettings
+from commission.errors import UsageError
+from commission.planning.dependence import Failure
+from commission.planning.dilution import Heading, Measurement
+from commission.site.project import Project
+
+CHOICES: dict[str, type[Figure] | type[Heading] | type[Measurement] | type[Failure]] = {
+    "figure": Figure,
+    "heading": Heading,
+    "measurement": Measurement,
+    "failure": Failure,
+}
+
+
+def changed(action: SetPlan, plan: PlanSettings, project: Project) -> PlanSettings:
+    """Return the settings with one changed.
+
+    Raises
+    ------
+    CommissionError, ValueError
+        there is no such setting or route, or the value is out of range.
+    """
+    if action.name not in {field.name for field in dataclasses.fields(PlanSettings)}:
+        raise UsageError(f"the step Plan has no setting {action.name!r}")
+    if action.name == "route" and action.value:
+        project.route(str(action.value))
+    choice = CHOICES.get(action.name)
+    changes: dict[str, Any] = {action.name: action.value if choice is None else choice(str(action.value))}
+    if action.name == "ranking":
+        # Counted, so that asking again after an edit is told apart from having asked.
+        changes["ranking"] = plan.ranking + 1 if action.value else 0
+    if action.name == "failure" or (action.name == "ranking" and not action.value):
+        changes["failed"] = ""
+    return replace(plan, **changes)
+
+
+def clicked(action: ReadFloor, plan: PlanSettings, project: Project) -> PlanSettings:
+    """Return the settings after a click: on a ranked reflector it asks for its dependents, elsewhere for values."""
+    reflectors = project.reflectors
+    if plan.ranking and len(reflectors):
+        distances = np.hypot(*(reflectors.centers - action.place).T)
+        nearest = int(np.argmin(distances))
+        if distances[nearest] <= action.reach:
+            return replace(plan, failed=reflectors.reflectors[nearest].id)
+    return replace(plan, probe=action.place if plan.figure else None)

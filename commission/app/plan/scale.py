@@ -1,0 +1,163 @@
+"""From the figures of a coverage to classes of color: round bounds, few steps, one look for "no fix".
+
+Bright asks for attention: few reflectors, large errors. Few steps keep the picture small on its way to the browser and
+its values readable by eye; the colors grow evenly in lightness (after matplotlib's viridis) and are told apart by
+color-blind people. Where there is no fix the floor is hatched, so that it is never taken for a value.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from commission.app.plan.settings import Figure
+from commission.geometry.arrays import BoolArray, FloatArray
+from commission.planning.dilution import Measurement
+
+NOTHING, NO_FIX, FIRST = 0, 1, 2
+"""Classes: beside the floor, no fix; the steps of the scale follow."""
+MOST_BOUNDS = 9
+NICE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
+HATCH = 3
+"""Width of a stripe, in points of the lattice."""
+NO_FIX_COLORS = ((228, 92, 60), (58, 22, 22))
+# Anchors of viridis (van der Walt & Smith 2015, public domain), dark to bright.
+ANCHORS = np.array(
+    [
+        (68, 1, 84),
+        (71, 44, 122),
+        (59, 81, 139),
+        (44, 113, 142),
+        (33, 144, 141),
+        (39, 173, 129),
+        (92, 200, 99),
+        (170, 220, 50),
+        (253, 231, 37),
+    ],
+    dtype=np.float64,
+)
+COUNTS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
+PERCENT = (50.0, 70.0, 80.0, 90.0, 95.0, 98.0, 99.0, 99.9)
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """How a figure is shown."""
+
+    label: str
+    """Its name, with unit where it has one."""
+    unit: str
+    """Unit on the page."""
+    factor: float
+    """Number on the page for one SI unit."""
+    bounds: tuple[float, ...] = ()
+    """Fixed bounds of its classes in the page's unit; none: chosen from the values."""
+    more_is_better: bool = False
+    """Whether a large number is good."""
+
+
+QUANTITIES: dict[Figure, Quantity] = {
+    Figure.VISIBLE: Quantity("Visible reflectors", "", 1.0, COUNTS, more_is_better=True),
+    Figure.POSITION_SIGMA: Quantity("Position error, 1σ [mm]", "mm", 1000.0),
+    Figure.HEADING_SIGMA: Quantity("Heading error, 1σ [°]", "°", math.degrees(1.0)),
+    Figure.POSITION_DOP: Quantity("Position dilution (DOP)", "", 1.0),
+    Figure.HEADING_DOP: Quantity("Heading dilution (DOP)", "", 1.0),
+    Figure.EXPECTED_VISIBLE: Quantity("Visible among people, mean", "", 1.0, (1.0, *COUNTS), more_is_better=True),
+    Figure.TWO_OR_MORE: Quantity("Chance of 2 or more [%]", "%", 100.0, PERCENT, more_is_better=True),
+    Figure.THREE_OR_MORE: Quantity("Chance of 3 or more [%]", "%", 100.0, PERCENT, more_is_better=True),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """Classes of one figure."""
+
+    figure: Figure
+    """What it shows."""
+    bounds: tuple[float, ...]
+    """Where one class ends and the next begins, ascending, in the page's unit."""
+
+    @property
+    def quantity(self) -> Quantity:
+        """How the figure is shown."""
+        return QUANTITIES[self.figure]
+
+    def colors(self) -> NDArray[np.uint8]:
+        """(K, 3) color of each class, in the order of its values."""
+        ramp = colors(len(self.bounds) + 1)
+        return ramp[::-1] if self.quantity.more_is_better else ramp
+
+    def classes(self, values: FloatArray, floor: BoolArray) -> NDArray[np.uint8]:
+        """Class of each value.
+
+        Parameters
+        ----------
+        values : (N,) array, SI; not finite where there is no fix.
+        floor : (N,) whether there is floor at all.
+        """
+        shown = values * self.quantity.factor
+        # A hair, so that 3 reflectors and 0.95 are in the class that begins with them, however they were rounded.
+        steps = np.digitize(shown * (1.0 + 1e-12), self.bounds).astype(np.uint8)
+        found = np.where(is_fix(self.figure, values), steps + FIRST, NO_FIX)
+        return np.where(floor, found, NOTHING).astype(np.uint8)
+
+
+def colors(count: int) -> NDArray[np.uint8]:
+    """Return `count` colors from dark to bright in even steps: (count, 3) array."""
+    at = np.linspace(0.0, len(ANCHORS) - 1.0, count)
+    return np.stack([np.interp(at, np.arange(len(ANCHORS)), channel) for channel in ANCHORS.T], axis=1).astype(np.uint8)
+
+
+def is_fix(figure: Figure, values: ArrayLike) -> BoolArray:
+    """Whether there is something to show: a fix, or for counts at least one reflector."""
+    return np.asarray(values) > 0.0 if figure is Figure.VISIBLE else np.isfinite(values)
+
+
+def scale_for(figure: Figure, values: FloatArray) -> Scale:
+    """Choose round bounds for a figure.
+
+    Parameters
+    ----------
+    figure : what is shown.
+    values : (N,) array of it on the floor, SI; the bounds span all but the outer hundredths.
+    """
+    quantity = QUANTITIES[figure]
+    if quantity.bounds:
+        return Scale(figure, quantity.bounds)
+    known = np.sort(values[np.isfinite(values)]) * quantity.factor
+    if not len(known):
+        return Scale(figure, (1.0,))
+    low, high = (float(known[int(share * (len(known) - 1))]) for share in (0.02, 0.98))
+    return Scale(figure, round_bounds(max(low, 1e-9), max(high, 1e-9)))
+
+
+def round_bounds(low: float, high: float) -> tuple[float, ...]:
+    """Return up to `MOST_BOUNDS` round numbers from about `low` to about `high`, both greater than 0."""
+    first, last = math.floor(math.log10(low)), math.ceil(math.log10(high))
+    every = [float(f"{nice}e{power}") for power in range(first, last + 1) for nice in NICE]
+    inside = [bound for bound in every if low <= bound <= high]
+    if not inside:
+        return (min(every, key=lambda bound: abs(math.log(bound / low))),)
+    step = math.ceil(len(inside) / MOST_BOUNDS)
+    return tuple(inside[::step])
+
+
+def picture(classes: NDArray[np.uint8], scale: Scale, opacity: float) -> NDArray[np.uint8]:
+    """Return the (rows, columns, 4) picture of classes given as (rows, columns)."""
+    palette = np.zeros((256, 4), np.uint8)
+    ramp = scale.colors()
+    palette[FIRST : FIRST + len(ramp), :3] = ramp
+    palette[NO_FIX:, 3] = round(255 * opacity)
+    image = palette[classes]
+    row, column = np.nonzero(classes == NO_FIX)
+    image[row, column, :3] = np.array(NO_FIX_COLORS, np.uint8)[((row + column) // HATCH) % 2]
+    return image
+
+
+def unit_of(figure: Figure, measurement: Measurement) -> str:
+    """Return the unit of a figure; a position's dilution of bearings alone is not a plain number."""
+    triangulates = measurement is Measurement.BEARING_ONLY
+    return "m/rad" if figure is Figure.POSITION_DOP and triangulates else QUANTITIES[figure].unit

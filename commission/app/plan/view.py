@@ -1,0 +1,99 @@
+"""What the step Plan has found, as panels and layers draw it: frozen, newest wins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.app.plan.scale import Scale
+from commission.app.plan.settings import Figure
+from commission.geometry.arrays import BoolArray, FloatArray
+from commission.planning.coverage import Lattice
+from commission.planning.dependence import Dependence
+from commission.planning.route_prediction import PerMetre, RoutePrediction
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Values at one place of the floor."""
+
+    place: tuple[float, float]
+    """Where [m], map frame."""
+    values: dict[Figure, float]
+    """Every figure, SI."""
+    on_floor: bool
+    """Whether a vehicle could stand there."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeatView:
+    """A heatmap."""
+
+    lattice: Lattice
+    """Its points."""
+    scale: Scale
+    """Its classes."""
+    classes: NDArray[np.uint8]
+    """(rows, columns) class of each point; row 0 is the lowest y."""
+    shares: FloatArray
+    """Share of the floor in each class, from `NO_FIX` on [0..1]."""
+    outdated: bool
+    """Whether the site has changed since, and it is being computed anew."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RouteView:
+    """What is expected along a route."""
+
+    name: str
+    """Name of the route."""
+    prediction: RoutePrediction
+    """Scan by scan."""
+    metres: PerMetre
+    """The worst of each metre."""
+    loads: FloatArray
+    """(B,) largest share of the supervisor's limit in each metre [1]."""
+    outdated: bool
+    """Whether the site has changed since, and it is being predicted anew."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FailureView:
+    """Which reflectors the routes depend on."""
+
+    ranking: tuple[Dependence, ...]
+    """The one on which most depends first."""
+    names: tuple[str, ...]
+    """Id of the reflector of each."""
+    chosen: Dependence | None
+    """The one that is shown on the floor."""
+    place: tuple[float, float] | None
+    """Where the chosen reflector stands [m]."""
+    failing: tuple[FloatArray, ...]
+    """Stretches of the routes that fail with it, (N, 2) points each [m]."""
+    outdated: bool
+    """Whether the site has changed since."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanView:
+    """Everything the step Plan has found so far."""
+
+    heat: HeatView | None = None
+    """The heatmap."""
+    reading: Reading | None = None
+    """Values at the place that was clicked."""
+    route: RouteView | None = None
+    """The prediction."""
+    failures: FailureView | None = None
+    """The ranking."""
+    waiting: bool = False
+    """Whether something is wanted that is not there yet."""
+
+
+def stretches(points: FloatArray, chosen: BoolArray) -> tuple[FloatArray, ...]:
+    """Cut the chosen ones of (K, 2) points in a row into pieces without gaps."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
+    return tuple(points[start:end] for start, end in zip(edges[::2], edges[1::2], strict=True))

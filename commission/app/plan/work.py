@@ -1,0 +1,135 @@
+"""What the step Plan has computed in the background: plain values in, a result out, progress and cancel in between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from commission.app.plan.settings import PlanSettings
+from commission.geometry.arrays import BoolArray
+from commission.planning import coverage, dependence, route_prediction
+from commission.planning.coverage import Lattice, LiveCoverage, lattice_of
+from commission.planning.dependence import Dependence, FailureOptions
+from commission.planning.dilution import FixOptions, fix_options, odometry_prior
+from commission.planning.route_prediction import PlannedRoute, PredictionOptions, RoutePrediction
+from commission.planning.visibility import VisibilityModel, VisibilityOptions, visibility_model
+from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
+from commission.studies.coverage import drivable
+
+Progress: TypeAlias = Callable[[float, str], None]
+
+LONGEST_SIDE = 400
+"""Points of the lattice along the longer side: as many as the floor has pixels on a small screen."""
+FINEST = 0.1
+"""Smallest distance between points [m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Covered:
+    """A coverage that can be kept up to date."""
+
+    live: LiveCoverage
+    """The figures; whoever holds this result may move reflectors."""
+    floor: BoolArray
+    """(N,) where a vehicle could stand."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Predicted:
+    """A prediction along one route."""
+
+    prediction: RoutePrediction
+    """Scan by scan."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ranked:
+    """Reflectors ranked by what depends on them."""
+
+    reflectors: ReflectorMap
+    """The reflectors that were ranked."""
+    planned: tuple[PlannedRoute, ...]
+    """The routes, in the order of each dependence's parts."""
+    ranking: tuple[Dependence, ...]
+    """The one on which most depends first."""
+
+
+def fix_options_of(project: Project, settings: PlanSettings) -> FixOptions:
+    """Return what a heatmap asks of each spot; the noise is what the project's localizer assumes."""
+    speed = project.routes[0].speed if project.routes else 0.5
+    position, heading = odometry_prior(project.parameters.odometry, settings.on_odometry, speed)
+    return fix_options(
+        project.parameters.observation,
+        measurement=settings.measurement,
+        heading=settings.heading,
+        given_heading=settings.given_heading,
+        blocked_per_m=settings.blocked_per_m,
+        prior_position_sigma=max(position, 1e-6),
+        prior_heading_sigma=max(heading, 1e-6),
+    )
+
+
+def spacing_of(project: Project) -> float:
+    """Return the distance between the lattice's points [m]: a round one that keeps the picture small."""
+    longest = max(_size(lattice_of(project, 1.0)))
+    wanted = max(FINEST, longest / LONGEST_SIDE)
+    return next((step for step in (0.1, 0.2, 0.25, 0.5, 1.0, 2.0) if step >= wanted), wanted)
+
+
+def cover(project: Project, settings: PlanSettings, progress: Progress) -> Covered:
+    """Compute the coverage of the floor, and keep what it takes to follow reflectors."""
+    progress(0.0, "compiling")
+    coverage.warm_up()
+    progress(0.05, "sight of each reflector")
+    model = _model(project, settings)
+    lattice = lattice_of(project, spacing_of(project))
+    live = LiveCoverage(model, lattice, fix_options_of(project, settings), _part(progress, 0.3, 0.95))
+    progress(0.95, "floor")
+    return Covered(live, drivable(project, live.coverage))
+
+
+def predict(project: Project, settings: PlanSettings, progress: Progress) -> Predicted:
+    """Predict the localizer along the chosen route."""
+    progress(0.0, "compiling")
+    route_prediction.warm_up()
+    progress(0.2, "sight of each reflector")
+    options = PredictionOptions(blocked_per_m=settings.blocked_per_m)
+    model = _model(project, settings)
+    progress(0.5, "route")
+    return Predicted(
+        route_prediction.predict_route(route_prediction.plan_route(project, settings.route, options, model))
+    )
+
+
+def rank(project: Project, settings: PlanSettings, progress: Progress) -> Ranked:
+    """Let each reflector in turn fail on every route."""
+    progress(0.0, "compiling")
+    route_prediction.warm_up()
+    progress(0.05, "sight of each reflector")
+    options = PredictionOptions(blocked_per_m=settings.blocked_per_m)
+    model = _model(project, settings)
+    planned: list[PlannedRoute] = []
+    for number, route in enumerate(project.routes):
+        progress(0.1 + 0.2 * number / len(project.routes), "routes")
+        planned.append(route_prediction.plan_route(project, route.name, options, model))
+    ranking = dependence.dependences(planned, FailureOptions(settings.failure), _part(progress, 0.3, 1.0))
+    return Ranked(project.reflectors, tuple(planned), ranking)
+
+
+def _model(project: Project, settings: PlanSettings) -> VisibilityModel:
+    return visibility_model(project, VisibilityOptions(min_beams=settings.min_beams))
+
+
+def _size(lattice: Lattice) -> tuple[float, float]:
+    return lattice.columns * lattice.spacing, lattice.rows * lattice.spacing
+
+
+def _part(progress: Progress, start: float, end: float) -> Progress:
+    """Progress of a part of the work as progress of the whole."""
+
+    def part(fraction: float, message: str) -> None:
+        progress(start + (end - start) * fraction, message)
+
+    return part
