@@ -102,7 +102,7 @@ class Page:
         top = TopBar(gui, post, state)
         left = gui.add_panel()
         with left.add_tab("Site"):
-            site = SitePanel(gui, state.project)
+            site = SitePanel(gui, post, state.project)
         with left.add_tab("Plan"):
             plan = PlanPanel(gui, post, state)
         with left.add_tab("Run"):
@@ -121,8 +121,7 @@ class Page:
             legend = LegendPanel(gui, post, self._layers, state)
         with below.add_tab("Layers"):
             switches = LayersPanel(gui, post, self._layers, state)
-        with below.add_tab("Problems"):
-            problems = ProblemsPanel(gui, post)
+        problems = ProblemsPanel(gui, post, below.add_tab("Problems"))
         below.dock_below(above)
         bottom = gui.add_panel()
         with bottom.add_tab("Time"):

@@ -6,9 +6,9 @@ import dataclasses
 from dataclasses import replace
 from typing import Any
 
-import commission.app.editing.site_reducer  # noqa: F401 - registers what editing actions mean
 from commission.app import actions
 from commission.app.actions import ParameterValue
+from commission.app.editing import site_reducer
 from commission.app.plan import reducer as plan
 from commission.app.plan.actions import ReadFloor, SetPlan
 from commission.app.reduction import (
@@ -28,6 +28,8 @@ from commission.errors import UsageError
 from commission.site.parameters import Parameters
 
 PROBLEMS_KEPT = 20
+
+__all__ = ["parameter", "reduce", "site_reducer", "with_parameter"]  # site_reducer registers what editing means
 
 
 def parameter(parameters: Parameters, key: str) -> ParameterValue:

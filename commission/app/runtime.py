@@ -16,6 +16,7 @@ from typing import Protocol, TypeAlias
 
 from commission.app import actions, reducer, reduction
 from commission.app.actions import Action, Source, View
+from commission.app.checking import Checker
 from commission.app.editing import actions as editing
 from commission.app.jobs import Job, JobReport, Jobs, JobState, Progress
 from commission.app.plan.planner import Planner
@@ -26,6 +27,7 @@ from commission.app.view import Progress as ShownProgress
 from commission.errors import CommissionError
 from commission.localization.setup import LocalizerSetup
 from commission.site.project import Project
+from commission.studies.problems import Findings, Problem
 
 FRAME_S = 0.04
 """Shortest time between two pictures: 25 Hz [s]."""
@@ -35,7 +37,7 @@ IDLE_S = 0.5
 LOOK_AT_DISK_S = 2.0
 """Time between two looks at the project's folder [s]."""
 
-PREPARE, PREDICT, COMPILE = "Preparing the drive", "Predicting the rest", "Compiling"
+PREPARE, PREDICT, COMPILE, CHECK = "Preparing the drive", "Predicting the rest", "Compiling", "Checking the site"
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +124,11 @@ class Runtime:
         self._queue: SimpleQueue[Message] = SimpleQueue()
         self._jobs = Jobs(self._queue.put)
         self._planner = Planner(self._jobs)
+        # Checks take milliseconds and do not wait for a simulation.
+        self._checks = Jobs(self._queue.put)
+        self._checker = Checker()
+        self._checked: Project | None = None
+        self._found: tuple[Problem, ...] = ()
         self._shown_jobs: dict[int, Job] = {}
         self._page: PageLike | None = None
         self._shown: Project | None = None
@@ -147,6 +154,7 @@ class Runtime:
         """End the loop and the background work."""
         self._stopped.set()
         self._jobs.close()
+        self._checks.close()
         self._thread.join(timeout=2.0)
         self._work.close()
 
@@ -261,6 +269,8 @@ class Runtime:
             self._apply(actions.Report(f"{job.name}: {job.error}"))
         elif job.state is JobState.DONE and isinstance(report.result, Drive):
             self._begin(report.result)
+        elif job.state is JobState.DONE and isinstance(report.result, Findings):
+            self._found = report.result.problems
         elif job.state is JobState.DONE and isinstance(report.result, tuple) and self.session is not None:
             self.session.predicted = report.result
 
@@ -270,6 +280,11 @@ class Runtime:
         self.session.covered = self.state.covered
         self._apply(actions.Play(playing=True))
         self._predict()
+
+    def _check(self) -> None:
+        """Look for problems in the background; edits meanwhile are checked afterwards."""
+        project = self._checked = self.state.project
+        self._checks.start(CHECK, lambda progress: self._checker.check(project, progress))
 
     def _predict(self) -> None:
         """Look ahead in the background: where the supervisor will stop the vehicle with these parameters."""
@@ -299,6 +314,8 @@ class Runtime:
             self._dirty = self._slow_dirty = True
         if self._page is None:
             return
+        if self.state.project is not self._checked and not self._checks.unfinished():
+            self._check()
         if self.state.project is not self._shown:
             self._show_site()
         slowly = self._slow_dirty and now - self._drawn_slowly_at >= SLOW_FRAME_S
@@ -327,9 +344,9 @@ class Runtime:
         jobs = tuple(
             ShownProgress(f"{job.name}{job.message and ': '}{job.message}", job.fraction)
             for job in self._shown_jobs.values()
-            if job.state is JobState.RUNNING and job.name != PREDICT
+            if job.state is JobState.RUNNING and job.name not in (PREDICT, CHECK)
         )
-        return PageView(self.state, run, jobs, self._planner.view)
+        return PageView(self.state, run, jobs, self._planner.view, self._found)
 
     def _show_site(self) -> None:
         if self._page is not None:

@@ -135,6 +135,13 @@ div:has(>div>.c-bottom)>:nth-child(-n+3) [style*="7.25em"]{{display:none}}
 div:has(>div>.c-bottom)>:nth-child(5) [style*="7.25em"]{{display:none}}
 div:has(>.c-wide){{display:none}}
 div:has(>.c-wide)+* [style*="7.25em"]{{display:none}}
+div:has(>.c-rows){{display:none}}
+div:has(>.c-rows)~div{{padding-top:0!important;padding-bottom:1px!important}}
+div:has(>.c-rows)~div button{{height:auto!important;min-height:22px;padding:2px 6px!important;
+ font-size:12px!important;font-weight:400!important}}
+div:has(>.c-rows)~div .mantine-Button-inner{{justify-content:flex-start}}
+div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:left;line-height:1.3;
+ font-variant-numeric:tabular-nums}}
 .c-table{{width:100%;border-collapse:collapse;font-size:12px;font-variant-numeric:tabular-nums}}
 .c-table td{{padding:1px 0;vertical-align:top}}
 .c-table td:first-child{{opacity:.65;padding-right:10px;white-space:nowrap}}

@@ -11,6 +11,7 @@ from commission.app.plan.view import PlanView
 from commission.app.store import AppState
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Estimate, Mode
+from commission.studies.problems import Problem
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -107,3 +108,5 @@ class PageView:
     """Background work under way."""
     plan: PlanView = field(default_factory=PlanView)
     """What the step Plan has found."""
+    found: tuple[Problem, ...] = ()
+    """What is wrong with the site, errors first; of the newest project that was checked."""

@@ -10,6 +10,7 @@ from commission.site.project import Project
 from commission.site.routes import Direction
 from commission.site.scanner import Scanner
 from commission.site.vehicle import Vehicle
+from commission.studies.problems import Problem
 
 Phase: TypeAlias = Literal["start", "update", "end"]
 
@@ -301,6 +302,16 @@ class LookAt:
 
 
 @dataclass(frozen=True, slots=True)
+class ShowProblem:
+    """Select what a problem is about and go to its place."""
+
+    client: int
+    """Number of the browser's connection."""
+    problem: Problem
+    """Which one."""
+
+
+@dataclass(frozen=True, slots=True)
 class Restored:
     """The journal held edits that were not saved."""
 
@@ -338,5 +349,6 @@ EditAction: TypeAlias = (
     | SetVehicle
     | SetScanner
     | LookAt
+    | ShowProblem
     | Restored
 )

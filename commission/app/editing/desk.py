@@ -44,8 +44,7 @@ class Desk:
             with tabs.selection:
                 selection = SelectionPanel(gui, post, number)
                 hint = ToolHint(gui, number)
-            with tabs.reflectors:
-                table = ReflectorTable(gui, post, number, tabs.reflectors)
+            table = ReflectorTable(gui, post, number, tabs.reflectors)
         self._panels: tuple[Panel, ...] = (selection, table, hint)
         take_clicks(client, post)
 

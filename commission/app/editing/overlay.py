@@ -112,7 +112,8 @@ class Overlay:
         self._handle.visible = wanted
         if wanted and not self._dragging:
             self._handle.scale = HANDLE_FROM * size
-            self._handle.position = (*(float(value) for value in centers.mean(axis=0)), theme.Height.EDITING)
+            x, y = (float(value) for value in centers.mean(axis=0))
+            self._handle.position = (x, y, theme.Height.EDITING)
 
     def _preview_of(self, project: Project, editor: Editor, size: float) -> np.ndarray:
         """Return the lines of what is being dragged, drawn or measured."""

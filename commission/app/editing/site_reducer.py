@@ -9,12 +9,13 @@ import numpy as np
 from commission.app.editing import actions
 from commission.app.editing.editor import ControlPoint, Editor, Point, Tool
 from commission.app.editing.reducer import editor_of
-from commission.app.editing.route_gestures import route_of, segment_of
+from commission.app.editing.route_gestures import control_point_at, route_of, segment_of
 from commission.app.reduction import ApplyParameters, FlyTo, Reduction, Tell, reduce
 from commission.app.store import AppState, Edit, edited
 from commission.errors import UsageError
 from commission.site.editing import routes as edits
 from commission.site.routes import Route, Segment
+from commission.studies.problems import Subject
 
 
 def _with_routes(state: AppState, routes: tuple[Route, ...], edit: Edit, point: ControlPoint | None) -> Reduction:
@@ -143,6 +144,19 @@ def _(action: actions.SetScanner, state: AppState) -> Reduction:
         return Reduction(state)
     edit = Edit("change the scanner", action.client, "scanner", action.at)
     return Reduction(edited(state, replace(state.project, scanner=action.scanner), edit), (ApplyParameters(),))
+
+
+@reduce.register
+def _(action: actions.ShowProblem, state: AppState) -> Reduction:
+    problem = action.problem
+    editor = replace(editor_of(state, action.client), tool=Tool.SELECT, selected=(), point=None)
+    if problem.subject is Subject.REFLECTOR:
+        editor = replace(editor, selected=problem.ids)
+    elif problem.subject is Subject.ROUTE and problem.ids:
+        near = problem.place or (0.0, 0.0)
+        editor = replace(editor, point=control_point_at(state.project, problem.ids[0], near, float("inf")))
+    there = () if problem.place is None else (FlyTo(action.client, problem.place),)
+    return Reduction(state.with_editor(action.client, editor), there)
 
 
 @reduce.register

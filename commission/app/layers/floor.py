@@ -38,7 +38,7 @@ class FloorLayer(BaseLayer):
     """The floor map."""
 
     name = "Floor map"
-    reads = ("floor_map",)
+    reads: tuple[str, ...] = ("floor_map",)
     legend = (theme.Legend("wall", theme.WALL, theme.Mark.SQUARE),)
 
     def __init__(self, scene: SceneApi) -> None:

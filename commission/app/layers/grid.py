@@ -35,7 +35,7 @@ class GridLayer(BaseLayer):
     """Grid and scale bar."""
 
     name = "Grid"
-    reads = ("floor_map", "reflectors", "routes")
+    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)

@@ -22,7 +22,7 @@ class ReflectorLayer(BaseLayer):
     """Where the map says that reflectors are."""
 
     name = "Reflectors"
-    reads = ("floor_map", "reflectors", "routes")
+    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
     legend = (theme.Legend("reflector (paper: dark blue)", theme.REFLECTOR, theme.Mark.DOT),)
 
     def __init__(self, scene: SceneApi) -> None:
@@ -59,7 +59,7 @@ class ReflectorNameLayer(BaseLayer):
     """Names of the reflectors, where they are few enough to be read."""
 
     name = "Reflector names"
-    reads = ("floor_map", "reflectors", "routes")
+    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)

@@ -38,7 +38,7 @@ class VehicleLayer(BaseLayer):
     """The vehicle."""
 
     name = "Vehicle"
-    reads = ("vehicle", "scanner")
+    reads: tuple[str, ...] = ("vehicle", "scanner")
     legend = (theme.Legend("vehicle (estimate)", theme.VEHICLE, theme.Mark.LINE),)
 
     def __init__(self, scene: SceneApi) -> None:

@@ -51,7 +51,7 @@ class WallLayer(BaseLayer):
     """Extruded walls."""
 
     name = "Walls in 3D"
-    reads = ("floor_map",)
+    reads: tuple[str, ...] = ("floor_map",)
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)

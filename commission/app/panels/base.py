@@ -52,6 +52,12 @@ def posting(post: Post, make: Callable[[Any], Action]) -> Callable[[GuiEvent[Any
     return callback
 
 
+def write(widget: Any, value: object) -> None:
+    """Show a value in an input where it is another one: nothing is sent for what is there already."""
+    if widget.value != value:
+        widget.value = value
+
+
 def escaped(text: object) -> str:
     """Return text of a file or a person as html shows it, never as html reads it."""
     return html.escape(str(text), quote=True)

@@ -9,7 +9,8 @@ from viser import GuiApi, GuiTabHandle
 
 from commission.app.editing import actions
 from commission.app.editing.editor import Editor
-from commission.app.panels.base import BasePanel, Post, posting
+from commission.app.panels.base import BasePanel, Post
+from commission.app.panels.rows import Rows
 from commission.app.view import PageView
 from commission.site.reflectors import Reflector
 
@@ -36,13 +37,14 @@ class ReflectorTable(BasePanel):
     """The table of one browser."""
 
     def __init__(self, gui: GuiApi, post: Post, client: int, tab: GuiTabHandle) -> None:
-        self._gui, self._post, self._client, self._tab = gui, post, client, tab
-        self._order = gui.add_dropdown("Sort by", tuple(ORDERS))
-        self._find = gui.add_text("Find", "", hint="Part of a name, layer or note.")
-        self._page = gui.add_number("Page", 1, min=1, step=1, visible=False)
-        self._count = gui.add_html("")
-        self._rows: list[Any] = []
-        self._ids: list[str] = []
+        self._client = client
+        with tab:
+            self._order = gui.add_dropdown("Sort by", tuple(ORDERS))
+            self._find = gui.add_text("Find", "", hint="Part of a name, layer or note.")
+            self._page = gui.add_number("Page", 1, min=1, step=1, visible=False)
+            self._count = gui.add_html("")
+        self._ids: tuple[str, ...] = ()
+        self._rows = Rows(gui, tab, post, self._selecting)
         self._drawn: tuple[object, ...] = ()
 
     def draw_slowly(self, view: PageView) -> None:
@@ -63,32 +65,10 @@ class ReflectorTable(BasePanel):
             f"<div class='c-note' style='padding:2px 6px'>{len(found)} of {len(reflectors)} reflectors"
             f"{f', page {first // ROWS + 1} of {pages}' if pages > 1 else ''}</div>"
         )
-        self._show(found[first : first + ROWS], frozenset(editor.selected))
+        shown, selected = found[first : first + ROWS], frozenset(editor.selected)
+        self._ids = tuple(r.id for r in shown)
+        self._rows.show([(row_text(r), "orange" if r.id in selected else "dark") for r in shown])
 
-    def _show(self, shown: list[Reflector], selected: frozenset[str]) -> None:
-        """Write the rows; buttons that are there are used again."""
-        while len(self._rows) < len(shown):
-            self._rows.append(self._row(len(self._rows)))
-        self._ids = [r.id for r in shown]
-        for index, button in enumerate(self._rows):
-            visible = index < len(shown)
-            if visible:
-                text, color = row_text(shown[index]), "orange" if shown[index].id in selected else "dark"
-                if button.label != text:
-                    button.label = text
-                if button.color != color:
-                    button.color = color
-            if button.visible is not visible:
-                button.visible = visible
-
-    def _row(self, index: int) -> Any:
-        """Make one more row at the end."""
-        with self._tab:
-            button = self._gui.add_button(" ", color="dark")
-        button.on_click(
-            posting(
-                self._post,
-                lambda _event: actions.SelectReflectors(self._client, tuple(self._ids[index : index + 1]), fly=True),
-            )
-        )
-        return button
+    def _selecting(self, index: int, client: int) -> actions.SelectReflectors:
+        """Return the action of a row."""
+        return actions.SelectReflectors(client, self._ids[index : index + 1], fly=True)

@@ -12,7 +12,7 @@ from commission.app import theme
 from commission.app.editing import actions
 from commission.app.editing.editor import Editor
 from commission.app.editing.route_gestures import route_of, segment_of
-from commission.app.panels.base import Post, posting
+from commission.app.panels.base import Post, posting, write
 from commission.site.project import Project
 from commission.site.routes import SPEEDS, Direction
 
@@ -87,5 +87,4 @@ class RouteFields:
             (self._speed, round(route.speed_of(segment), 4)),
         )
         for widget, value in values:
-            if widget.value != value:
-                widget.value = value
+            write(widget, value)

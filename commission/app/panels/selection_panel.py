@@ -240,7 +240,7 @@ def _head(editor: Editor, reflectors: tuple[Reflector, ...]) -> str:
             ("Bearing", f"{math.degrees(found.bearing):.2f} °"),
             ("dx, dy", f"{found.dx:.3f}, {found.dy:.3f} m"),
         ]
-    if editor.last_click is not None:
+    if editor.last_click is not None and not reflectors:
         rows.append(("Last click x, y", f"{editor.last_click[0]:.3f}, {editor.last_click[1]:.3f} m"))
     if len(reflectors) > 1:
         title = f"{len(reflectors)} reflectors"

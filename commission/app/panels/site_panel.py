@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from viser import GuiApi
 
-from commission.app.panels.base import BasePanel, escaped, table
+from commission.app.panels.base import BasePanel, Post, escaped, table
+from commission.app.panels.equipment_fields import EquipmentFields
+from commission.app.view import PageView
 from commission.site.project import Project
 
 
@@ -25,23 +27,38 @@ def rows(project: Project) -> list[tuple[str, str]]:
         ("Reflectors", str(len(project.reflectors))),
         ("Routes", str(len(project.routes))),
         ("Vehicle", escaped(project.vehicle.kind)),
-        ("Field of view", f"{first:g} to {last:g} °"),
-        ("Beams", f"{scanner.beam_count}, every {scanner.resolution_deg:g} °"),
-        ("Scans", f"{scanner.rate:g} per second"),
-        ("Range", f"{scanner.range[0]:g} to {scanner.range[1]:g} m"),
-        ("Reflectors seen to", f"{scanner.reflector_range:g} m"),
+        ("Scanner", f"{scanner.beam_count} beams, {first:g} to {last:g} °"),
     ]
     return shown
 
 
-class SitePanel(BasePanel):
-    """Facts of the project."""
+def route_rows(project: Project) -> list[tuple[str, str]]:
+    """Return name, length and speed of each route."""
+    return [
+        (escaped(route.name), f"{sum(s.spline().length for s in route.segments):.1f} m, {route.speed:g} m/s")
+        for route in project.routes
+    ]
 
-    def __init__(self, gui: GuiApi, project: Project) -> None:
-        gui.add_html(f"<div style='padding:2px 6px'>{table(rows(project))}</div>")
-        if project.routes:
-            lengths = [
-                (escaped(route.name), f"{sum(s.spline().length for s in route.segments):.1f} m, {route.speed:g} m/s")
-                for route in project.routes
-            ]
-            gui.add_html(f"<div style='padding:8px 6px 2px'><div class='c-note'>Routes</div>{table(lengths)}</div>")
+
+class SitePanel(BasePanel):
+    """Facts of the project, and the editor of vehicle and scanner."""
+
+    def __init__(self, gui: GuiApi, post: Post, project: Project) -> None:
+        self._html = gui.add_html("")
+        self._equipment = EquipmentFields(gui, post, project)
+        self._shown: Project | None = None
+        self._show(project)
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Follow the project."""
+        if view.state.project is not self._shown:
+            self._show(view.state.project)
+
+    def _show(self, project: Project) -> None:
+        self._shown = project
+        facts = f"<div style='padding:2px 6px'>{table(rows(project))}</div>"
+        routes = f"<div style='padding:8px 6px 2px'><div class='c-note'>Routes</div>{table(route_rows(project))}</div>"
+        content = facts + (routes if project.routes else "")
+        if self._html.content != content:
+            self._html.content = content
+        self._equipment.show(project)

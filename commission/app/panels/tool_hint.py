@@ -34,12 +34,12 @@ def hint(project: Project, editor: Editor) -> str:
 def _dragging(project: Project, editor: Editor) -> str:
     """Say where what is being dragged would come to lie."""
     selected = selected_of(project, editor)
-    if editor.drag is None or not selected:
+    if editor.drag is None or len(selected) == 0:
         return ""
     if len(selected) > 1:
         dx, dy = editor.drag.offset
         return f"{len(selected)} reflectors by {dx:+.3f} m, {dy:+.3f} m"
-    place = next(r for r in moved(project, editor).reflectors if r.id == selected[0].id)
+    place = next(r for r in moved(project, editor).reflectors if r.id == selected[-1].id)
     return f"{escaped(place.id)} to x {place.x:.3f} m, y {place.y:.3f} m"
 
 

@@ -1,0 +1,113 @@
+"""The site edited as an engineer does it: with the mouse on the floor, keys and buttons, in a real browser."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commission.app.editing.editor import Tool
+from commission.app.launch import open_page
+from commission.app.runtime import Runtime
+from commission.app.server import start_server
+from commission.app.store import AppState
+from commission.io.project_file import load_project, save_project
+from tests.app.sites import room
+from tests.browser.page import OpenPage
+
+NODES = ("/floor/map", "/reflectors/marks", "/editing/handle")
+WALL, RADIUS = 0.15, 0.04
+
+
+class OpenSite:
+    """A served project in a folder; nothing drives."""
+
+    def __init__(self, folder: Path) -> None:
+        save_project(room(), folder)
+        self.folder = folder
+        self.server = start_server("127.0.0.1", 0)
+        self.runtime: Runtime = open_page(self.server, load_project(folder), folder=folder)
+
+    @property
+    def state(self) -> AppState:
+        return self.runtime.state
+
+    @property
+    def centers(self) -> np.ndarray:
+        return self.state.project.reflectors.centers
+
+    def until(self, reached: Callable[[], bool], seconds: float = 60.0) -> None:
+        """Wait until something has happened on the server."""
+        end = time.monotonic() + seconds
+        while not reached():
+            assert time.monotonic() < end, f"it did not happen within {seconds} s: {self.state.problems}"
+            time.sleep(0.02)
+
+    def close(self) -> None:
+        self.runtime.stop()
+        self.server.stop()
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Iterator[OpenSite]:
+    opened = OpenSite(tmp_path)
+    yield opened
+    opened.close()
+
+
+def choose(site: OpenSite, page: OpenPage, client: int, tool: Tool) -> None:
+    page.press(tool.value)
+    site.until(lambda: site.state.editors[client].tool is tool)
+
+
+def test_reflectors_are_placed_dragged_undone_redone_and_saved(site: OpenSite, window: Callable[..., OpenPage]) -> None:
+    page = window(site.server)
+    client = page.open(nodes=NODES).client_id
+    choose(site, page, client, Tool.PLACE)
+    page.click_at((4.0, 0.3))
+    site.until(lambda: len(site.centers) == 5)
+    page.click_at((8.0, 7.6))
+    site.until(lambda: len(site.centers) == 6)
+    # Both touch the wall that they were clicked near to; a click is good for a pixel or two.
+    np.testing.assert_allclose(site.centers[4:, 1], [WALL + RADIUS, 8.0 - WALL - RADIUS], atol=1e-9)
+    np.testing.assert_allclose(site.centers[4:, 0], [4.0, 8.0], atol=0.05)
+    choose(site, page, client, Tool.SELECT)
+    placed = site.state.project
+    page.drag(site.centers[5], (6.0, 5.0))
+    site.until(lambda: site.state.project is not placed)
+    np.testing.assert_allclose(site.centers[5], (6.0, 5.0), atol=0.06)
+    moved = site.state.project
+    page.wait_for_text("Undo move R6")
+    page.press("Undo move R6")
+    site.until(lambda: site.state.project is placed)
+    page.press("Redo move R6")
+    site.until(lambda: site.state.project is moved)
+    page.page.keyboard.press("Control+z")
+    site.until(lambda: site.state.project is placed)
+    page.page.keyboard.press("Control+Shift+z")
+    site.until(lambda: site.state.project is moved)
+    page.wait_for_text("unsaved")
+    page.press("Save")
+    page.wait_for_text("saved ")
+    assert load_project(site.folder) == moved
+    assert page.errors == []
+    assert site.state.problems == ()
+
+
+def test_typed_values_change_a_reflector_and_another_browser_sees_it(
+    site: OpenSite, window: Callable[..., OpenPage]
+) -> None:
+    page, other = window(site.server), window(site.server)
+    client = page.open(nodes=NODES).client_id
+    theirs = other.open(nodes=NODES).client_id
+    page.click_at(site.centers[0])
+    site.until(lambda: site.state.editors[client].selected == ("R1",))
+    assert site.state.editors[theirs].selected == ()
+    page.fill("Radius [mm]", "35")
+    site.until(lambda: site.state.project.reflectors.radii[0] == 0.035)
+    other.wait_for_text("Undo set radius of R1")
+    page.page.keyboard.press("Escape")
+    site.until(lambda: site.state.editors[client].selected == ())
