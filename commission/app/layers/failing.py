@@ -22,7 +22,7 @@ class FailingLayer(BaseLayer):
     """The chosen reflector and its dependents."""
 
     name = "What if one fails"
-    reads = ("floor_map", "reflectors", "routes")
+    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
     legend = (theme.Legend("fails without the chosen reflector", theme.DEPENDENT, theme.Mark.LINE),)
 
     def __init__(self, scene: SceneApi) -> None:

@@ -16,7 +16,7 @@ class HeatLayer(BaseLayer):
     """Coverage of the floor."""
 
     name = "Heatmap"
-    reads = ()
+    reads: tuple[str, ...] = ()
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)

@@ -42,7 +42,7 @@ class RibbonLayer(BaseLayer):
     """Predicted uncertainty along the chosen route."""
 
     name = "Route prediction"
-    reads = ()
+    reads: tuple[str, ...] = ()
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
