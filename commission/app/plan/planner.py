@@ -5,8 +5,12 @@ Called by the owner thread alone; knows no widget.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from commission.app.editing.editor import Editor, Grab
+from commission.app.editing.gestures import moved
 from commission.app.jobs import JobReport, Jobs
 from commission.app.plan import work
 from commission.app.plan.scale import FIRST, NO_FIX, QUANTITIES, Scale, scale_for
@@ -40,6 +44,7 @@ class Planner:
         self._view = PlanView()
         self._shown: tuple[object, ...] = ()
         self._moves = 0
+        self._drag: tuple[Project, tuple[Editor, ...], Project] | None = None
 
     @property
     def view(self) -> PlanView:
@@ -56,7 +61,8 @@ class Planner:
     def follow(self, state: AppState) -> bool:
         """Start what is wanted and not there, drop what is not wanted; return whether the view is another one."""
         project, plan = state.project, state.plan
-        self._keep_coverage(project, plan)
+        floor = self._dragged(state)
+        self._keep_coverage(floor, plan)
         if plan.route and any(route.name == plan.route for route in project.routes):
             self._prediction.keep(_route_key(project, plan), lambda progress: work.predict(project, plan, progress))
         else:
@@ -65,12 +71,31 @@ class Planner:
             self._keep_ranking(project, plan)
         else:
             self._ranking.drop()
-        shown = (*(part for each in self._all() for part in (each.result, each.is_running)), self._moves, plan, project)
+        shown = (
+            *(part for each in self._all() for part in (each.result, each.is_running)),
+            self._moves,
+            plan,
+            project,
+            floor,
+        )
         if len(shown) == len(self._shown) and all(a is b for a, b in zip(shown, self._shown, strict=True)):
             return False
         self._shown = shown
-        self._view = self._look(project, plan)
+        self._view = self._look(project, floor, plan)
         return True
+
+    def _dragged(self, state: AppState) -> Project:
+        """Return the site with reflectors where they are being dragged to: the heatmap shows what a drag would do."""
+        editors = tuple(e for e in state.editors.values() if e.drag is not None and e.drag.grab is Grab.REFLECTORS)
+        if not editors:
+            self._drag = None
+            return state.project
+        if self._drag is None or self._drag[0] is not state.project or self._drag[1] != editors:
+            floor = state.project
+            for editor in editors:
+                floor = replace(floor, reflectors=moved(floor, editor))
+            self._drag = (state.project, editors, floor)
+        return self._drag[2]
 
     def _all(self) -> tuple[Upkeep[Covered], Upkeep[Predicted], Upkeep[Ranked]]:
         return self._coverage, self._prediction, self._ranking
@@ -84,11 +109,11 @@ class Planner:
         key = _floor_key(project, plan)
         before, covered = self._coverage.key, self._coverage.result
         if covered is not None and is_same(key[1:], before[1:]) and key[0] is not before[0]:
-            moved = _moved(covered.live.reflectors, project.reflectors)
-            if moved is not None:
+            changed = _changed(covered.live.reflectors, project.reflectors)
+            if changed is not None:
                 self._coverage.key = key
                 self._moves += 1
-                for index in moved:
+                for index in changed:
                     covered.live.move(index, project.reflectors.reflectors[index])
         self._coverage.keep(key, lambda progress: work.cover(project, plan, progress))
 
@@ -97,9 +122,9 @@ class Planner:
         if self._ranking.result is None or self._ranking.key[-2:] != (plan.failure.value, plan.ranking):
             self._ranking.keep(_ranking_key(project, plan), lambda progress: work.rank(project, plan, progress))
 
-    def _look(self, project: Project, plan: PlanSettings) -> PlanView:
+    def _look(self, project: Project, floor: Project, plan: PlanSettings) -> PlanView:
         return PlanView(
-            self._heat(project, plan),
+            self._heat(floor, plan),
             self._reading(plan),
             self._route(project, plan),
             self._failures(project, plan),
@@ -207,10 +232,10 @@ def _ranking_key(project: Project, plan: PlanSettings) -> Key:
     return (*_site_key(project, plan), plan.failure.value, plan.ranking)
 
 
-def _moved(before: ReflectorMap, after: ReflectorMap) -> list[int] | None:
+def _changed(before: ReflectorMap, after: ReflectorMap) -> list[int] | None:
     """Indices of the reflectors that changed; none when there are other ones, or too many."""
     if len(before) != len(after):
         return None
     pairs = zip(before.reflectors, after.reflectors, strict=True)
-    moved = [index for index, (old, new) in enumerate(pairs) if old != new]
-    return moved if len(moved) <= MOST_MOVED else None
+    changed = [index for index, (old, new) in enumerate(pairs) if old != new]
+    return changed if len(changed) <= MOST_MOVED else None

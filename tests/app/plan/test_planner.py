@@ -8,6 +8,7 @@ from queue import SimpleQueue
 import numpy as np
 import pytest
 
+from commission.app.editing.editor import Drag, Editor, Grab, Snapping
 from commission.app.jobs import JobReport, Jobs
 from commission.app.plan import work
 from commission.app.plan.planner import Planner
@@ -96,6 +97,26 @@ def test_a_moved_reflector_is_followed_at_once_and_equals_a_new_computation(benc
     floor = afresh.live.coverage.floor
     expected = after.scale.classes(afresh.live.coverage.fixes.position_sigma, afresh.floor & floor)
     assert np.array_equal(after.classes.ravel(), expected)
+
+
+def test_the_heatmap_follows_a_drag_before_it_is_an_edit(bench: Bench) -> None:
+    bench.ask(figure=Figure.POSITION_SIGMA)
+    before = bench.settle().heat
+    name = bench.state.project.reflectors.reflectors[0].id
+    drag = Drag(Grab.REFLECTORS, (0.0, 0.0), (0.7, 0.0))
+    bench.state = bench.state.with_editor(1, Editor(selected=(name,), drag=drag, snapping=Snapping(walls=False)))
+    assert bench.planner.follow(bench.state)
+    during = bench.planner.view.heat
+    assert not bench.planner.follow(bench.state)
+    bench.state = bench.state.with_editor(1, Editor())
+    bench.planner.follow(bench.state)
+    after = bench.planner.view.heat
+    assert before is not None
+    assert during is not None
+    assert after is not None
+    assert np.any(before.classes != during.classes)
+    assert np.array_equal(before.classes, after.classes)
+    assert not bench.jobs.unfinished()
 
 
 def test_what_is_not_wanted_any_more_is_dropped_and_its_job_cancelled(bench: Bench) -> None:
