@@ -20,6 +20,7 @@ from commission.app.checking import Checker
 from commission.app.editing import actions as editing
 from commission.app.jobs import Job, JobReport, Jobs, JobState, Progress
 from commission.app.plan.planner import Planner
+from commission.app.plan.view import PlanView
 from commission.app.session import Drive, Session
 from commission.app.store import AppState
 from commission.app.view import PageView, RunView
@@ -338,6 +339,11 @@ class Runtime:
             else:
                 self._apply(actions.Play(playing=False))
 
+    @property
+    def plan(self) -> PlanView:
+        """What the step Plan has found so far."""
+        return self._planner.view
+
     def view(self, *, whole: bool = True) -> PageView:
         """Return everything the page shows; `whole` with what is drawn slowly, too."""
         run: RunView | None = None if self.session is None else self.session.view(whole=whole)
@@ -346,7 +352,7 @@ class Runtime:
             for job in self._shown_jobs.values()
             if job.state is JobState.RUNNING and job.name not in (PREDICT, CHECK)
         )
-        return PageView(self.state, run, jobs, self._planner.view, self._found)
+        return PageView(self.state, run, jobs, self.plan, self._found)
 
     def _show_site(self) -> None:
         if self._page is not None:

@@ -1,0 +1,114 @@
+"""The step Plan in a real browser: a heatmap is switched on, seen, read, and follows a reflector."""
+
+from __future__ import annotations
+
+import io
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Browser
+
+from commission.app.launch import open_page
+from commission.app.plan.scale import FIRST
+from commission.app.plan.view import HeatView
+from commission.app.runtime import Runtime
+from commission.app.server import start_server
+from commission.io.bundled import bundled_folder
+from commission.io.project_file import load_project
+from tests.browser.page import SMALL, OpenPage
+
+SPOT = (20.0, 35.0)
+
+
+class OpenSite:
+    """The warehouse, served."""
+
+    def __init__(self) -> None:
+        self.project = load_project(bundled_folder("maps") / "warehouse")
+        self.server = start_server("127.0.0.1", 0)
+        self.runtime: Runtime = open_page(self.server, self.project)
+
+    def until(self, reached: Callable[[], bool]) -> None:
+        """Wait until something has happened on the server, at most two minutes: compilation included."""
+        end = time.monotonic() + 120.0
+        while not reached():
+            assert time.monotonic() < end, f"it did not happen: {self.runtime.state.problems}"
+            time.sleep(0.05)
+
+    @property
+    def heat(self) -> HeatView | None:
+        return self.runtime.plan.heat
+
+    def close(self) -> None:
+        self.runtime.stop()
+        self.server.stop()
+
+
+@pytest.fixture(scope="module")
+def site() -> Iterator[OpenSite]:
+    opened = OpenSite()
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(scope="module")
+def page(browser: Browser, site: OpenSite) -> Iterator[OpenPage]:
+    opened = OpenPage(browser, site.server, SMALL)
+    opened.open(nodes=["/floor/map", "/reflectors/marks"])
+    opened.open_tab("Plan")
+    yield opened
+    opened.close()
+
+
+def color_at(page: OpenPage, place: tuple[float, float]) -> tuple[int, ...]:
+    """What the window shows at a place of the floor: red, green, blue."""
+    shot = Image.open(io.BytesIO(page.page.screenshot())).convert("RGB")
+    x, y = page.pixel_of(place)
+    return shot.getpixel((round(x), round(y)))
+
+
+def test_a_heatmap_is_switched_on_seen_and_read(page: OpenPage, site: OpenSite) -> None:
+    without = color_at(page, SPOT)
+    page.choose("Show", "Visible reflectors")
+    site.until(lambda: site.heat is not None)
+    page.wait_until_drawn(["/plan/heat"])
+    page.page.wait_for_timeout(1500)
+    heat = site.heat
+    assert heat is not None
+    index = heat.lattice.index_near(*SPOT)
+    assert index is not None
+    seen = color_at(page, SPOT)
+    assert seen != without
+    # The floor's own dark shines through, and light falls on the picture: nearest of the scale, not equal to it.
+    ramp = 0.8 * heat.scale.colors().astype(float) + 0.2 * np.array(without)
+    nearest = int(np.argmin(np.linalg.norm(ramp - np.array(seen), axis=1)))
+    assert nearest == int(heat.classes.ravel()[index]) - FIRST, (seen, ramp.tolist())
+    page.click_at(SPOT)
+    page.wait_for_text("Clicked at x, y")
+    reading = site.runtime.plan.reading
+    assert reading is not None
+    assert abs(reading.place[0] - SPOT[0]) < 0.2
+    assert abs(reading.place[1] - SPOT[1]) < 0.2
+    assert page.errors == []
+
+
+def test_the_heatmap_follows_a_dragged_reflector(page: OpenPage, site: OpenSite) -> None:
+    before = site.heat
+    assert before is not None
+    reflector = next(r for r in site.project.reflectors.reflectors if 40.0 < r.x < 60.0 and 20.0 < r.y < 50.0)
+    page.drag((reflector.x, reflector.y), (reflector.x, reflector.y - 3.0))
+    site.until(lambda: bool(site.runtime.state.undo))
+    site.until(lambda: site.heat is not before)
+    after = site.heat
+    assert after is not None
+    assert (after.classes != before.classes).any()
+
+
+def test_a_route_is_predicted_over_its_metres(page: OpenPage, site: OpenSite) -> None:
+    page.choose("Route", site.project.routes[0].name)
+    page.wait_for_text("Supervisor stops")
+    assert site.runtime.plan.route is not None
+    assert page.errors == []
