@@ -100,7 +100,8 @@ class Overlay:
         size = 0.9 * extent_of(project).mark_size()
         selected = selected_of(project, editor)
         centers = np.array([(r.x, r.y) for r in selected]).reshape(-1, 2)
-        self._selected.points = outline_segments(rings(centers, 1.5 * size), theme.Height.EDITING)
+        ringed = np.concatenate([centers, _point_place(project, editor)])
+        self._selected.points = outline_segments(rings(ringed, 1.5 * size), theme.Height.EDITING)
         self._preview.points = self._preview_of(project, editor, size)
         self._draw_points(project, editor, size)
         self._write(editor)
@@ -159,3 +160,11 @@ class Overlay:
         if self._label is None:
             self._label = self._client.scene.add_label("/editing/label", text, position=place)
         self._label.text, self._label.position = text, place
+
+
+def _point_place(project: Project, editor: Editor) -> FloatArray:
+    """Return the (1, 2) place of the selected control point [m]; (0, 2) when there is none."""
+    point, segments = editor.point, moved_route(project, editor)
+    if point is None or point.segment >= len(segments):
+        return np.empty((0, 2))
+    return segments[point.segment].control_points[point.index : point.index + 1]

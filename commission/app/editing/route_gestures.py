@@ -35,6 +35,10 @@ def route_at(project: Project, place: Point, reach: float) -> ControlPoint | Non
     best: tuple[float, ControlPoint] | None = None
     for route in project.routes:
         for number, segment in enumerate(route.segments):
+            # The curve lies within the hull of its control points: most routes need not be evaluated.
+            low, high = segment.control_points.min(axis=0) - reach, segment.control_points.max(axis=0) + reach
+            if np.any(low > place) or np.any(high < place):
+                continue
             gap = float(np.min(np.hypot(*(curve(segment) - place).T)))
             if gap <= reach and (best is None or gap < best[0]):
                 index = int(np.argmin(np.hypot(*(segment.control_points - place).T)))

@@ -41,7 +41,7 @@ class RouteLayer(BaseLayer):
     """All routes of the project."""
 
     name = "Routes"
-    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
+    reads: tuple[str, ...] = ("floor_map", "routes")
     legend = (theme.Legend("route (dashed: in reverse)", theme.ROUTE, theme.Mark.LINE),)
 
     def __init__(self, scene: SceneApi) -> None:

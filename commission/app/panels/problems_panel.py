@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from viser import GuiApi, GuiTabHandle
 
-from commission.app import actions
+from commission.app import actions, theme
 from commission.app.editing.actions import ShowProblem
 from commission.app.panels.base import BasePanel, Post, escaped, posting
 from commission.app.panels.rows import Rows
 from commission.app.view import PageView
 from commission.studies.problems import Problem, Severity
 
-COLORS = {Severity.ERROR: "red", Severity.WARNING: "orange", Severity.NOTE: "dark"}
+COLORS: dict[Severity, theme.Color] = {
+    Severity.ERROR: theme.ERROR_LINE,
+    Severity.WARNING: theme.WARNING_LINE,
+    Severity.NOTE: theme.LINE,
+}
 MOST_SHOWN = 60
 
 

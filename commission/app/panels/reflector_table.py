@@ -7,6 +7,7 @@ from typing import Any
 
 from viser import GuiApi, GuiTabHandle
 
+from commission.app import theme
 from commission.app.editing import actions
 from commission.app.editing.editor import Editor
 from commission.app.panels.base import BasePanel, Post
@@ -67,7 +68,7 @@ class ReflectorTable(BasePanel):
         )
         shown, selected = found[first : first + ROWS], frozenset(editor.selected)
         self._ids = tuple(r.id for r in shown)
-        self._rows.show([(row_text(r), "orange" if r.id in selected else "dark") for r in shown])
+        self._rows.show([(row_text(r), theme.SELECTED_LINE if r.id in selected else theme.LINE) for r in shown])
 
     def _selecting(self, index: int, client: int) -> actions.SelectReflectors:
         """Return the action of a row."""

@@ -7,6 +7,7 @@ from typing import Any
 
 from viser import GuiApi, GuiTabHandle
 
+from commission.app import theme
 from commission.app.actions import Action
 from commission.app.panels.base import Post, posting
 
@@ -31,7 +32,7 @@ class Rows:
             gui.add_html(ROWS)
         self._buttons: list[Any] = []
 
-    def show(self, lines: Sequence[tuple[str, Any]]) -> None:
+    def show(self, lines: Sequence[tuple[str, theme.Color]]) -> None:
         """Show these lines with their colors and no others."""
         with self._tab:
             while len(self._buttons) < len(lines):
@@ -49,6 +50,6 @@ class Rows:
 
     def _added(self, index: int) -> Any:
         """Make one more line at the end."""
-        button = self._gui.add_button(" ", color="dark")
+        button = self._gui.add_button(" ", color=theme.LINE)
         button.on_click(posting(self._post, lambda event: self._make(index, event.client_id)))
         return button

@@ -74,6 +74,8 @@ class SelectionPanel(BasePanel):
         gui.add_html(theme.WIDE)
         tools = gui.add_button_group("", tuple(tool.value for tool in Tool))
         tools.on_click(posting(post, lambda event: actions.ChooseTool(client, Tool(event.target.value))))
+        self._finish = gui.add_button("Finish the route", visible=False, hint="Make a route of its points (Enter).")
+        self._finish.on_click(posting(post, lambda _event: actions.FinishRoute(client)))
         self._head = gui.add_html("")
         self._fields: dict[str, GuiInputHandle[Any]] = {}
         self._add_fields()
@@ -206,6 +208,7 @@ class SelectionPanel(BasePanel):
             return
         self._drawn = drawn
         self._reflectors = selected_of(view.state.project, editor)
+        self._finish.visible = len(editor.draft) > 1
         self._head.content = _head(editor, self._reflectors)
         self._now.visible = not self._reflectors and editor.point is None
         self._buttons.visible = self._copies.visible = bool(self._reflectors)

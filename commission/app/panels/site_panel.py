@@ -47,6 +47,7 @@ class SitePanel(BasePanel):
         self._html = gui.add_html("")
         self._equipment = EquipmentFields(gui, post, project)
         self._shown: Project | None = None
+        self._routes = ""
         self._show(project)
 
     def draw_slowly(self, view: PageView) -> None:
@@ -55,9 +56,11 @@ class SitePanel(BasePanel):
             self._show(view.state.project)
 
     def _show(self, project: Project) -> None:
+        if self._shown is None or project.routes is not self._shown.routes:
+            self._routes = table(route_rows(project))  # lengths of many curves take a while
         self._shown = project
         facts = f"<div style='padding:2px 6px'>{table(rows(project))}</div>"
-        routes = f"<div style='padding:8px 6px 2px'><div class='c-note'>Routes</div>{table(route_rows(project))}</div>"
+        routes = f"<div style='padding:8px 6px 2px'><div class='c-note'>Routes</div>{self._routes}</div>"
         content = facts + (routes if project.routes else "")
         if self._html.content != content:
             self._html.content = content

@@ -1,0 +1,93 @@
+"""Time from a gesture to the drawn and journaled edit: 2,000 reflectors, 50 routes, 200 x 100 m; no browser.
+
+Run as `python -m tests.benchmarks.bench_workspace`.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from commission.app import actions, reducer
+from commission.app.editing import actions as editing
+from commission.app.editing.editor import Tool
+from commission.app.keeping import Keeping
+from commission.app.page import Page
+from commission.app.server import start_server
+from commission.app.store import AppState
+from commission.io.project_file import save_project
+from commission.site.editing import reflectors as edits
+from commission.site.floor_map import FREE, OCCUPIED, FloorMap
+from commission.site.project import Project
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.routes import Route, Segment
+
+ME, REACH, ROUNDS = 1, 0.5, 10
+
+
+def large_site() -> Project:
+    """Return a hall of 200 x 100 m with 2,000 reflectors and 50 routes."""
+    rng = np.random.default_rng(1)
+    cells = np.full((2000, 4000), FREE, np.int8)
+    cells[:3], cells[-3:], cells[:, :3], cells[:, -3:] = (OCCUPIED,) * 4
+    places = rng.uniform((1.0, 1.0), (199.0, 99.0), (2000, 2))
+    reflectors = edits.add(ReflectorMap(), places, Reflector("R0", 0.0, 0.0)).reflectors
+    routes = tuple(Route(f"Route {i}", (Segment(rng.uniform(5.0, 95.0, (12, 2))),)) for i in range(50))
+    return Project("Large", FloorMap(cells, 0.05), reflectors, routes)
+
+
+def main() -> None:
+    """Print the median and the longest time of each gesture."""
+    project = large_site()
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        save_project(project, folder)
+        keeping = Keeping(folder, project)
+        server = start_server("127.0.0.1", 0)
+        state = reducer.reduce(editing.Join(ME), AppState(project, project, folder=folder)).state
+        page = Page(server, lambda _action: None, state)
+        page.show_site(state)
+
+        def done(*wishes: actions.Action) -> float:
+            nonlocal state
+            begun = time.perf_counter()
+            for wish in wishes:
+                before = state.project
+                state = reducer.reduce(wish, state).state
+                if state.project is not before:
+                    keeping.note(state.project, "edit")
+                    page.show_site(state)
+            return time.perf_counter() - begun
+
+        def drag() -> float:
+            r = state.project.reflectors.reflectors[7]
+            start, end = (r.x, r.y), (r.x + 1.0, r.y + 1.0)
+            return done(
+                editing.DragFloor(ME, "start", start, start, REACH), editing.DragFloor(ME, "end", start, end, REACH)
+            )
+
+        def place() -> float:
+            done(editing.ChooseTool(ME, Tool.PLACE))
+            spent = done(editing.ClickFloor(ME, (50.0, 0.5), REACH))
+            done(editing.ChooseTool(ME, Tool.SELECT))
+            return spent
+
+        gestures: dict[str, Callable[[], float]] = {
+            "place": place,
+            "drag": drag,
+            "undo": lambda: done(actions.Undo(ME)),
+        }
+        for gesture, run in gestures.items():
+            spent = [run() * 1e3 for _ in range(ROUNDS)]
+            sys.stdout.write(f"{gesture:>6}: median {np.median(spent):.1f} ms, longest {max(spent):.1f} ms\n")
+        keeping.close()
+        server.stop()
+
+
+if __name__ == "__main__":
+    main()
