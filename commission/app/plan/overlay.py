@@ -11,8 +11,9 @@ from commission.geometry.arrays import FloatArray
 from commission.planning.route_prediction import RoutePrediction
 
 MOST_CYCLES = 300
-AHEAD = 4.0
-"""How far ahead of the last metre the next one is searched [m]: routes cross themselves and go back on themselves."""
+AHEAD = 0.5
+"""How much farther than the vehicle moved the next metre is searched [m]: a route that goes back on itself passes each
+place twice, and only the way driven tells which time it is."""
 BESIDE = 1.0
 """Distance from the route at which a run is another one's [m]."""
 
