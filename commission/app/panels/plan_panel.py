@@ -210,7 +210,7 @@ def _route_chart(view: PageView) -> str:
 
 def _ranking_table(failures: FailureView) -> str:
     """The reflectors on which most depends, and what fails with the chosen one."""
-    rows = [("<b>Without reflector</b>", "<b>metres that fail</b>; 2σ, % of limit")]
+    rows = [("<b>Without</b>", "<b>fails</b>; 2σ / limit")]
     rows += [
         (escaped(name), f"{each.failing_metres} m; {100 * each.load:.0f} %")
         for name, each in list(zip(failures.names, failures.ranking, strict=True))[:RANKED_SHOWN]
