@@ -6,6 +6,7 @@ import logging
 import threading
 import webbrowser
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from urllib.parse import quote
 
@@ -67,17 +68,17 @@ def serve(
     """
     loaded = load_project(project)
     folder = None if demo else project_file(project).parent
-    server = start_server(host, port, token)
-    runtime = open_page(server, loaded, folder=folder, source=first_source(loaded, recording, demo))
-    address = f"http://{host}:{server.get_port()}/" + (f"?token={quote(token)}" if token else "")
-    log.info("page at %s", address)
-    if open_browser:
-        webbrowser.open(address)
-    try:
+    with ExitStack() as open_things:
+        # Ctrl-C may come at any moment from here on, and what is running would keep the program alive.
+        server = start_server(host, port, token)
+        open_things.callback(server.stop)
+        runtime = open_page(server, loaded, folder=folder, source=first_source(loaded, recording, demo))
+        open_things.callback(runtime.stop)
+        address = f"http://{host}:{server.get_port()}/" + (f"?token={quote(token)}" if token else "")
+        log.info("page at %s", address)
+        if open_browser:
+            webbrowser.open(address)
         threading.Event().wait()
-    finally:
-        runtime.stop()
-        server.stop()
 
 
 def first_source(project: Project, recording: Path | None, demo: bool) -> Source | None:

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.ndimage import distance_transform_edt
 
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, equal_fields, frozen
 from commission.geometry.se2 import inverse, transform_points
@@ -105,6 +104,8 @@ class OccupancyGrid:
         -------
         distance : (H, W) array [m]; 0 in occupied cells, inf everywhere when none is occupied.
         """
+        from scipy.ndimage import distance_transform_edt
+
         if not self.occupied.any():
             return np.full(self.occupied.shape, np.inf)
         free = np.logical_not(self.occupied)

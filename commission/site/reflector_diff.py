@@ -8,7 +8,6 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from commission.site.reflectors import Reflector, ReflectorMap
 
@@ -124,6 +123,8 @@ def _partners(before: ReflectorMap, after: ReflectorMap, same_place: float) -> d
     old = [i for i, r in enumerate(before.reflectors) if r.id not in partners]
     new = [i for i, r in enumerate(after.reflectors) if r.id not in partners]
     if same_place > 0.0 and old and new:
+        from scipy.spatial import KDTree
+
         old_tree, new_tree = KDTree(before.centers[old]), KDTree(after.centers[new])
         distance, nearest_old = map(np.asarray, old_tree.query(after.centers[new]))
         nearest_new = np.asarray(new_tree.query(before.centers[old])[1])

@@ -13,7 +13,6 @@ from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
@@ -210,6 +209,8 @@ def _close_reflectors(project: Project) -> Iterable[Problem]:
         return ()
     apart, gap = separation_needed(project)
     farthest = max(apart, gap + 2.0 * float(reflectors.radii.max()))
+    from scipy.spatial import KDTree
+
     pairs = np.asarray(KDTree(reflectors.centers).query_pairs(farthest, output_type="ndarray"))
     if len(pairs) == 0:
         return ()

@@ -30,7 +30,10 @@ def serve(*words):
 def closed(process):
     """Press Ctrl-C; returns exit code and what was said on stderr."""
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=FIRST_ANSWER)
+    try:
+        _, err = process.communicate(timeout=FIRST_ANSWER)
+    finally:
+        process.kill()
     return process.returncode, err
 
 

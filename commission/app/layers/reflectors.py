@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import trimesh
 from viser import LabelHandle, SceneApi, SceneNodeHandle
 
 from commission.app import theme
@@ -93,6 +92,8 @@ class ReflectorNameLayer(BaseLayer):
 
 def _bodies(scene: SceneApi, project: Project) -> tuple[SceneNodeHandle, ...]:
     """Add all cylinders as one batch and all plates as another."""
+    import trimesh
+
     every = project.reflectors.reflectors
     nodes: list[SceneNodeHandle] = []
     unit_cylinder = trimesh.creation.cylinder(radius=1.0, height=1.0, sections=20)

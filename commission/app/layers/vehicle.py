@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import trimesh
-from trimesh.creation import extrude_triangulation
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app import theme
@@ -14,6 +14,9 @@ from commission.app.store import AppState
 from commission.app.view import RunView
 from commission.site.project import Project
 from commission.site.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    import trimesh
 
 GROUND_CLEARANCE = 0.05
 
@@ -27,6 +30,8 @@ def heading_mark(outline: np.ndarray) -> np.ndarray:
 
 def body(vehicle: Vehicle) -> trimesh.Trimesh:
     """Return the outline extruded to the vehicle's height, with a beacon where the front is."""
+    from trimesh.creation import extrude_triangulation
+
     outline = np.array(vehicle.outline)
     fan = np.array([(0, i, i + 1) for i in range(1, len(outline) - 1)])
     hull = extrude_triangulation(outline, fan, vehicle.height - GROUND_CLEARANCE)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from viser import SceneApi, SceneNodeHandle
 
@@ -77,6 +76,8 @@ class WallLayer(BaseLayer):
         row0, row1, column0, column1 = (boxes * edge).T
         centers = np.stack([0.5 * (column0 + column1), 0.5 * (row0 + row1), np.full(len(boxes), 0.5 * WALL_HEIGHT)], 1)
         sizes = np.stack([column1 - column0, row1 - row0, np.full(len(boxes), WALL_HEIGHT)], 1)
+        import trimesh
+
         unit = trimesh.creation.box(extents=(1.0, 1.0, 1.0))
         x, y, heading = (float(value) for value in floor_map.origin)
         return (

@@ -20,7 +20,7 @@ def rows(run: RunView, limits: SupervisorParameters) -> list[tuple[str, str]]:
         ("Mode", "fail: output withheld" if run.mode is Mode.FAIL else "operational"),
         ("Fail episodes so far", str(len(lived))),
         ("Position x, y", f"{x:.3f}, {y:.3f} m"),
-        ("Heading", f"{math.degrees(heading):.2f} °"),
+        ("Heading", f"{round(math.degrees(heading), 2) + 0.0:.2f} °"),
     ]
     if run.estimate is None:
         return shown
