@@ -26,7 +26,7 @@ from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
 from commission.app.server import start_server
 from commission.app.session import Drive
 from commission.app.store import MAGNIFICATIONS, AppState
-from commission.geometry import raycast, se2, spline_kernels
+from commission.geometry import se2, spline_kernels
 from commission.io.journal import restore
 from commission.io.project_file import load_project, project_file
 from commission.localization import localizer, whole_run
@@ -154,11 +154,10 @@ def predicted_episodes(drive: Drive, setup: LocalizerSetup) -> tuple[tuple[float
 
 
 def compile_kernels(progress: Callable[[float, str], None]) -> None:
-    """Compile every kernel that the page needs, the first needed first."""
+    """Compile the kernels that a run needs, the first needed first; those of planning wait for their own jobs."""
     steps = (
         ("poses", se2.warm_up),
         ("curves", spline_kernels.warm_up),
-        ("rays", raycast.warm_up),
         ("virtual vehicle", follower.warm_up),
         ("virtual scanner", scan.warm_up),
         ("localizer", localizer.warm_up),
