@@ -10,6 +10,7 @@ from commission.app.plan.scale import picture
 from commission.app.plan.view import HeatView, PlanView, Reading
 from commission.app.plan.words import value_text
 from commission.app.store import AppState
+from commission.planning.dilution import Measurement
 
 
 class HeatLayer(BaseLayer):
@@ -33,7 +34,7 @@ class HeatLayer(BaseLayer):
             self._draw(plan.heat, before, state.plan.opacity, visible=visible)
         if (plan.reading, plan.heat) != self._read:
             self._read = (plan.reading, plan.heat)
-            self._write(plan.reading, plan.heat, visible=visible)
+            self._write(plan.reading, plan.heat, state.plan.measurement, visible=visible)
 
     def _draw(self, heat: HeatView | None, before: HeatView | None, opacity: float, *, visible: bool) -> None:
         """Exchange the picture's content, or the picture itself where its place is another one."""
@@ -61,7 +62,9 @@ class HeatLayer(BaseLayer):
             visible=visible,
         )
 
-    def _write(self, reading: Reading | None, heat: HeatView | None, *, visible: bool) -> None:
+    def _write(
+        self, reading: Reading | None, heat: HeatView | None, measurement: Measurement, *, visible: bool
+    ) -> None:
         """Write the value where the floor was clicked."""
         if self._label is not None:
             self._label.remove()
@@ -69,7 +72,7 @@ class HeatLayer(BaseLayer):
         if reading is None or heat is None:
             return
         figure = heat.scale.figure
-        text = value_text(figure, reading.values[figure]) if reading.on_floor else "no floor here"
+        text = value_text(figure, reading.values[figure], measurement) if reading.on_floor else "no floor here"
         self._label = self.scene.add_label(
             "/plan/reading",
             text,

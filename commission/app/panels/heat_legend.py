@@ -73,7 +73,7 @@ def reading_table(reading: Reading, plan: PlanSettings) -> str:
         rows.append(("", "no floor that is known to be free"))
     for figure, value in reading.values.items() if reading.on_floor else ():
         if plan.blocked_per_m > 0.0 or figure not in AMONG_PEOPLE:
-            rows.append((escaped(FIGURE_NAMES[figure].split(" [")[0]), value_text(figure, value)))
+            rows.append((escaped(FIGURE_NAMES[figure].split(" [")[0]), value_text(figure, value, plan.measurement)))
     return f"<div class='c-reading' style='padding:6px 6px 0 0'>{table(rows)}</div>"
 
 

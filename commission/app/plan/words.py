@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from commission.app.plan.scale import QUANTITIES, is_fix
+from commission.app.plan.scale import QUANTITIES, is_fix, unit_of
 from commission.app.plan.settings import Figure
 from commission.planning.dependence import Failure
 from commission.planning.dilution import Heading, Measurement
@@ -33,8 +33,8 @@ def number_text(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
 
 
-def value_text(figure: Figure, value: float) -> str:
-    """Return a value of a figure (SI) in the page's unit."""
+def value_text(figure: Figure, value: float, measurement: Measurement) -> str:
+    """Return a value of a figure (SI) in the page's unit, which may depend on what is measured."""
     if not is_fix(figure, value):
         return "none visible" if figure is Figure.VISIBLE else "no fix"
     quantity = QUANTITIES[figure]
@@ -44,4 +44,4 @@ def value_text(figure: Figure, value: float) -> str:
         text = f"{math.floor(shown * 10.0) / 10.0:.1f}"
     else:
         text = number_text(shown)
-    return f"{text} {quantity.unit}".rstrip()
+    return f"{text} {unit_of(figure, measurement)}".rstrip()
