@@ -1,0 +1,177 @@
+"""Takes pictures of the page, every panel at both sizes that it is made for.
+
+    python -m tests.tools.take_pictures FOLDER [WORD ...]
+
+Words choose the pictures whose names hold one of them. The README's are those at 1600x900, named alike in `web_assets`.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import viser
+from playwright.sync_api import Browser, sync_playwright
+
+from commission.app import actions
+from commission.app.actions import VirtualDrive
+from commission.app.editing.editor import Tool
+from commission.app.launch import open_page
+from commission.app.runtime import Runtime
+from commission.app.server import start_server
+from commission.io.bundled import bundled_folder
+from commission.io.project_file import load_project
+from tests.browser.page import CHROMIUM, FLAGS, SMALL, WIDE, OpenPage
+
+Steps = Callable[[OpenPage, Runtime], None]
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """What is in a picture."""
+
+    name: str
+    """Name of its file, without the size."""
+    site: str
+    """Bundled site that is open."""
+    steps: Steps
+    """What is done on the page before it is taken."""
+    time: float = 30.0
+    """Time of the drive [s]."""
+
+
+def until(reached: Callable[[], bool], seconds: float = 180.0) -> None:
+    """Wait for the server."""
+    end = time.monotonic() + seconds
+    while not reached():
+        if time.monotonic() > end:
+            raise TimeoutError(f"it did not happen within {seconds:g} s")
+        time.sleep(0.05)
+
+
+def tab(*names: str) -> Steps:
+    """Bring tabs to the front."""
+
+    def steps(page: OpenPage, _runtime: Runtime) -> None:
+        for name in names:
+            page.open_tab(name)
+
+    return steps
+
+
+def three_d(page: OpenPage, _runtime: Runtime) -> None:
+    page.press("3D")
+
+
+def covered(page: OpenPage, runtime: Runtime) -> None:
+    """Nothing has been seen for a while."""
+    page.open_tab("Run")
+    page.open_tab("Layers")
+    runtime.post(actions.Seek(5.0))
+    until(lambda: _is_at(runtime, 5.0))
+    runtime.post(actions.Cover(covered=True))
+    runtime.post(actions.Seek(30.0))
+
+
+def selected(page: OpenPage, runtime: Runtime) -> None:
+    """One reflector is selected."""
+    reflector = runtime.state.project.reflectors.reflectors[4]
+    page.click_at((reflector.x, reflector.y))
+    until(lambda: any(editor.selected for editor in runtime.state.editors.values()))
+
+
+def on_route(page: OpenPage, runtime: Runtime) -> None:
+    """A control point of a route is selected."""
+    selected(page, runtime)
+    point = runtime.state.project.routes[1].segments[0].control_points[1]
+    page.click_at((float(point[0]), float(point[1])))
+    until(lambda: any(editor.point for editor in runtime.state.editors.values()))
+
+
+def measured(page: OpenPage, runtime: Runtime) -> None:
+    """A distance has been measured."""
+    page.press(Tool.MEASURE.value)
+    until(lambda: any(editor.tool is Tool.MEASURE for editor in runtime.state.editors.values()))
+    first, second = runtime.state.project.reflectors.reflectors[:2]
+    for reflector in (first, second):
+        page.click_at((reflector.x, reflector.y))
+    until(lambda: any(len(editor.measured) == 2 for editor in runtime.state.editors.values()))
+
+
+def heatmap(page: OpenPage, runtime: Runtime) -> None:
+    """The position error all over the floor."""
+    page.open_tab("Plan")
+    page.choose("Show", "Position error, 1σ [mm]")
+    until(lambda: runtime.plan.heat is not None)
+
+
+def predicted(page: OpenPage, runtime: Runtime) -> None:
+    """What the filter will say along a route."""
+    page.open_tab("Plan")
+    page.choose("Route", runtime.state.project.routes[1].name)
+    until(lambda: runtime.plan.route is not None)
+
+
+PICTURES = (
+    Picture("page_laboratory", "laboratory", tab("Run", "Legend")),
+    Picture("page_3d", "shop_floor", three_d),
+    Picture("page_shop_floor", "shop_floor", covered),
+    Picture("site", "shop_floor", tab("Site", "Problems")),
+    Picture("tune", "shop_floor", tab("Tune", "Reflectors")),
+    Picture("selected", "shop_floor", selected),
+    Picture("route", "shop_floor", on_route),
+    Picture("measured", "laboratory", measured),
+    Picture("page_plan", "shop_floor", heatmap),
+    Picture("plan_route", "warehouse", predicted),
+)
+
+
+def _is_at(runtime: Runtime, seconds: float) -> bool:
+    session = runtime.session
+    return session is not None and session.seeking is None and session.view().time >= seconds - 0.1
+
+
+@contextmanager
+def served(site: str) -> Iterator[tuple[viser.ViserServer, Runtime]]:
+    """A page of a bundled site, as `commission demo` opens it."""
+    project = load_project(bundled_folder("maps") / site)
+    server = start_server("127.0.0.1", 0)
+    runtime = open_page(server, project, source=VirtualDrive(project.routes[0].name))
+    until(lambda: runtime.session is not None)
+    try:
+        yield server, runtime
+    finally:
+        runtime.stop()
+        server.stop()
+
+
+def take(browser: Browser, picture: Picture, folder: Path) -> None:
+    """Take one picture at both sizes."""
+    for size in (WIDE, SMALL):
+        with served(picture.site) as (server, runtime):
+            page = OpenPage(browser, server, size)
+            page.page.set_default_timeout(60_000)
+            page.open(nodes=("/floor/map", "/vehicle/outline"))
+            runtime.post(actions.Play(playing=False))
+            runtime.post(actions.Seek(picture.time))
+            until(lambda: _is_at(runtime, picture.time))
+            picture.steps(page, runtime)
+            page.page.wait_for_timeout(1500)
+            page.wait_until_drawn()
+            path = folder / f"{picture.name}_{size[0]}x{size[1]}.png"
+            page.screenshot(path)
+            page.close()
+            sys.stdout.write(f"{path}\n")
+
+
+if __name__ == "__main__":
+    chosen = [p for p in PICTURES if not sys.argv[2:] or any(word in p.name for word in sys.argv[2:])]
+    with sync_playwright() as playwright:
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
+        for each in chosen:
+            take(chromium, each, Path(sys.argv[1]))
+        chromium.close()
