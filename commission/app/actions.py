@@ -212,6 +212,24 @@ class SetView:
 
 
 @dataclass(frozen=True, slots=True)
+class RenameProject:
+    """Call the project something else."""
+
+    name: str
+    """New name."""
+    client: int | None = None
+    """Number of the browser that asks; none: nobody in particular."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopJob:
+    """Stop a piece of background work; what there was before it stays."""
+
+    number: int
+    """Number of the job."""
+
+
+@dataclass(frozen=True, slots=True)
 class Report:
     """Something went wrong outside the owner thread, or is worth telling."""
 
@@ -247,6 +265,8 @@ Action: TypeAlias = (
     | ShowLayer
     | Magnify
     | SetView
+    | RenameProject
+    | StopJob
     | Report
     | ClearProblems
     | EditAction

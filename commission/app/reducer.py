@@ -13,6 +13,7 @@ from commission.app.plan import reducer as plan
 from commission.app.plan.actions import ReadFloor, SetPlan
 from commission.app.reduction import (
     ApplyParameters,
+    CancelJob,
     LoadSource,
     MoveTo,
     PlaceCamera,
@@ -208,6 +209,21 @@ def _(action: actions.Magnify, state: AppState) -> Reduction:
 @reduce.register
 def _(action: actions.SetView, state: AppState) -> Reduction:
     return Reduction(state, (PlaceCamera(action.client, action.view),))
+
+
+@reduce.register
+def _(action: actions.RenameProject, state: AppState) -> Reduction:
+    name = " ".join(action.name.split())
+    if not name:
+        raise UsageError("the project was given no name; expected some letters")
+    if name == state.project.name:
+        return Reduction(state)
+    return Reduction(edited(state, replace(state.project, name=name), Edit("rename the project", action.client)))
+
+
+@reduce.register
+def _(action: actions.StopJob, state: AppState) -> Reduction:
+    return Reduction(state, (CancelJob(action.number),))
 
 
 @reduce.register

@@ -64,6 +64,14 @@ class ProcessOneScan:
 
 
 @dataclass(frozen=True, slots=True)
+class CancelJob:
+    """Stop a piece of background work."""
+
+    number: int
+    """Number of the job."""
+
+
+@dataclass(frozen=True, slots=True)
 class Tell:
     """Show a notification."""
 
@@ -94,7 +102,16 @@ class FlyTo:
 
 
 Effect: TypeAlias = (
-    LoadSource | ApplyParameters | WriteProject | ReadProject | MoveTo | ProcessOneScan | Tell | PlaceCamera | FlyTo
+    LoadSource
+    | ApplyParameters
+    | WriteProject
+    | ReadProject
+    | MoveTo
+    | ProcessOneScan
+    | CancelJob
+    | Tell
+    | PlaceCamera
+    | FlyTo
 )
 
 

@@ -233,30 +233,37 @@ class Runtime:
 
     def _carry_out(self, effect: reduction.Effect) -> None:
         """Do one thing that the reducer asks for."""
-        session = self.session
         match effect:
             case reduction.LoadSource(source):
                 project = self.state.project
                 self._jobs.start(PREPARE, lambda progress: self._work.prepare(project, source, progress))
-            case reduction.ApplyParameters():
-                if session is not None:
-                    session.set_setup(LocalizerSetup.of(self.state.project))
-                    self._predict()
             case reduction.ReadProject(folder):
                 if self._work.load is not None:
                     self.post(actions.Reloaded(self._work.load(folder)))
             case reduction.WriteProject(project, folder, overwrite):
                 self._work.save(project, folder, overwrite)
                 self.post(actions.ProjectSaved(project, folder, time.strftime("%H:%M")))
-            case reduction.MoveTo(seconds, afresh):
-                if session is not None:
-                    session.seek(seconds, afresh=afresh)
-            case reduction.ProcessOneScan():
-                if session is not None:
-                    session.step()
+            case reduction.CancelJob(number):
+                self._jobs.cancel(number)
+            case reduction.ApplyParameters() | reduction.MoveTo() | reduction.ProcessOneScan():
+                if self.session is not None:
+                    self._act_on_run(self.session, effect)
             case reduction.Tell() | reduction.PlaceCamera() | reduction.FlyTo():
                 if self._page is not None:
                     _show(self._page, effect)
+
+    def _act_on_run(
+        self, session: Session, effect: reduction.ApplyParameters | reduction.MoveTo | reduction.ProcessOneScan
+    ) -> None:
+        """Do what concerns the drive that is there."""
+        match effect:
+            case reduction.ApplyParameters():
+                session.set_setup(LocalizerSetup.of(self.state.project))
+                self._predict()
+            case reduction.MoveTo(seconds, afresh):
+                session.seek(seconds, afresh=afresh)
+            case reduction.ProcessOneScan():
+                session.step()
 
     def _hear(self, report: JobReport) -> None:
         """Follow a job; take its result or its error."""
@@ -348,7 +355,7 @@ class Runtime:
         """Return everything the page shows; `whole` with what is drawn slowly, too."""
         run: RunView | None = None if self.session is None else self.session.view(whole=whole)
         jobs = tuple(
-            ShownProgress(f"{job.name}{job.message and ': '}{job.message}", job.fraction)
+            ShownProgress(job.number, job.name, job.message, job.fraction)
             for job in self._shown_jobs.values()
             if job.state is JobState.RUNNING and job.name not in (PREDICT, CHECK)
         )

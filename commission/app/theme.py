@@ -117,11 +117,11 @@ STYLE = f"""<style>
  {{display:none!important}}
 [data-floating-window]:has(.c-top) :is([data-dock-resize],[data-dock-minimize]){{display:none!important}}
 [data-floating-window]:has(.c-top) .mantine-Stack-root{{display:none!important}}
-[data-dock-unmergeable-header]{{position:fixed!important;top:0;right:0;height:var(--c-top)!important;width:130px;
+[data-dock-unmergeable-header]{{position:fixed!important;top:0;right:0;height:var(--c-top)!important;width:146px;
  background:none!important;pointer-events:none}}
 [data-dock-unmergeable-header] button{{display:none!important}}
 [data-dock-region-handle],[data-dock-leaf] [data-dock-griphandle]{{display:none!important}}
-div:has(>div>.c-top){{display:flex;align-items:center;height:var(--c-top);padding:0 140px 0 0!important;gap:6px}}
+div:has(>div>.c-top){{display:flex;align-items:center;height:var(--c-top);padding:0 152px 0 0!important;gap:6px}}
 div:has(>div>.c-top)>div{{padding:0!important;margin:0!important}}
 div:has(>div>.c-top)>:first-child{{flex:1}}
 div:has(>div>.c-top) button{{height:26px!important;padding:0 10px!important;font-size:12px!important}}

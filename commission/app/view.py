@@ -90,10 +90,19 @@ class RunView:
 class Progress:
     """A piece of background work, as the page shows it."""
 
+    number: int
+    """Number of the job."""
     name: str
     """What is being done."""
+    message: str
+    """What it does now; empty when it does not say."""
     fraction: float
     """Share that is done [0..1]."""
+
+    @property
+    def line(self) -> str:
+        """All of it in one line."""
+        return f"{self.name}{self.message and ': '}{self.message} {self.fraction:.0%}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,6 +12,7 @@ from commission.app.actions import Action
 from commission.app.page import Page
 from commission.app.panels.base import clock, escaped, posting
 from commission.app.panels.now_panel import rows
+from commission.app.panels.run_panel import NO_ROUTE, RunPanel
 from commission.app.panels.time_line import strip
 from commission.app.panels.top_bar import badge_text, title
 from commission.app.panels.tune_panel import KNOBS, SWITCHES, TunePanel, meant, shown
@@ -125,7 +126,7 @@ def test_the_badge_says_operational_fail_or_that_nothing_runs(session: Session, 
 
 
 def test_what_is_being_prepared_is_said_where_the_badge_is(project: Project) -> None:
-    view = PageView(AppState(project, project), None, (Progress("Compiling: <rays>", 0.4),))
+    view = PageView(AppState(project, project), None, (Progress(1, "Compiling", "<rays>", 0.4),))
     assert badge_text(view)[:2] == ("PREPARING", "Compiling: &lt;rays&gt; 40%")
 
 
@@ -145,3 +146,12 @@ def test_each_fail_episode_is_marked_on_the_time_line(session: Session) -> None:
 def test_times_are_shown_as_minutes_and_hours() -> None:
     assert clock(125.4) == "02:05"
     assert clock(3725.0) == "1:02:05"
+
+
+def test_a_route_that_was_drawn_can_be_driven(server: viser.ViserServer, project: Project) -> None:
+    bare = AppState(replace(project, routes=()), project)
+    panel = RunPanel(server.gui, lambda _action: None, bare)
+    (offered,) = (w for w in server.gui._gui_input_handle_from_uuid.values() if getattr(w, "label", "") == "Route")
+    assert (offered.options, offered.disabled) == (NO_ROUTE, True)
+    panel.draw_slowly(PageView(AppState(project, project), None))
+    assert (offered.options, offered.disabled) == (("There and back",), False)

@@ -146,3 +146,12 @@ def test_good_news_are_told_and_not_listed(state: AppState) -> None:
     told = after(state, actions.Report("saved", failed=False))
     assert told.state.problems == ()
     assert told.effects == (reducer.Tell("saved", failed=False),)
+
+
+def test_a_project_gets_another_name_as_one_step_and_an_empty_one_is_refused(state: AppState) -> None:
+    renamed = after(state, actions.RenameProject("  Hall   7 ", 3)).state
+    assert renamed.project.name == "Hall 7"
+    assert renamed.undo[-1].name == "rename the project"
+    assert after(renamed, actions.Undo(3)).state.project == state.project
+    with pytest.raises(UsageError, match="expected some letters"):
+        after(state, actions.RenameProject("  "))

@@ -1,3 +1,4 @@
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -56,10 +57,13 @@ class Bench:
         self.page = Pictures()
         self.saved: list[Path] = []
         self.drive = drive
+        self.slow: Callable[..., Drive] | None = None
         state = AppState(project, project, folder=Path("hall"))
         self.runtime = Runtime(state, Work(self._prepare, self._predict, self._save, lambda _progress: None))
 
     def _prepare(self, _project: Project, source: Source, progress: Callable[[float], None]) -> Drive:
+        if self.slow is not None:
+            return self.slow(_project, source, progress)
         progress(0.5)
         if isinstance(source, actions.Recording):
             raise FileFormatError(source.path, "", "not a recording", "a folder with odometry.csv")
@@ -186,3 +190,27 @@ def test_each_browser_has_its_own_view(bench: Bench) -> None:
     bench.runtime.post(BrowserLeft(1))
     bench.until(lambda: bench.page.browsers == [2])
     assert bench.page.shown == [(2, View.THREE_D)]
+
+
+def test_a_job_in_sight_is_stopped_by_its_button_and_what_there_was_stays(bench: Bench) -> None:
+    bench.play()
+    before = bench.runtime.session
+    started, end = threading.Event(), threading.Event()
+
+    def prepare(_project: Project, _source: Source, progress: Callable[[float], None]) -> Drive:
+        started.set()
+        while not end.wait(0.01):
+            progress(0.5)
+        raise TimeoutError("nobody stopped it")
+
+    bench.slow = prepare
+    bench.post(actions.ChooseSource(actions.VirtualDrive("There and back")))
+    assert started.wait(20.0)
+    bench.until(lambda: bool(bench.page.views) and bool(bench.page.views[-1].jobs))
+    (job,) = bench.page.views[-1].jobs
+    assert job.line.startswith("Preparing the drive")
+    bench.post(actions.StopJob(job.number))
+    bench.until(lambda: not bench.page.views[-1].jobs)
+    end.set()
+    assert bench.runtime.session is before
+    assert bench.page.told == []

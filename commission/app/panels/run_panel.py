@@ -11,7 +11,7 @@ from commission.app.panels.base import BasePanel, Post, escaped, posting
 from commission.app.store import AppState
 from commission.app.view import PageView
 
-NO_ROUTE = "(the project has none)"
+NO_ROUTE = ("(the project has none)",)
 
 
 class RunPanel(BasePanel):
@@ -41,24 +41,23 @@ class RunPanel(BasePanel):
             restart.on_click(posting(post, lambda _event: actions.Restart()))
 
     def _add_drive(self, post: Post, state: AppState) -> None:
-        names = tuple(route.name for route in state.project.routes)
+        names = _routes(state)
         drive = state.source if isinstance(state.source, actions.VirtualDrive) else None
         with self._gui.add_folder("Virtual drive"):
-            route = self._gui.add_dropdown(
-                "Route", names or (NO_ROUTE,), initial_value=drive.route if drive else None, disabled=not names
-            )
+            self._route = self._gui.add_dropdown("Route", names, initial_value=drive.route if drive else None)
             seed = self._gui.add_number(
                 "Seed", drive.seed if drive else 1, min=0, step=1, hint="The same seed gives the same drive."
             )
             people = self._gui.add_number(
                 "People", state.project.disturbances.people, min=0, max=500, step=1, hint="People walking about."
             )
-            start = self._gui.add_button("Drive", disabled=not names, hint="Simulate the drive and run it.")
-        start.on_click(
+            self._drive = self._gui.add_button("Drive", hint="Simulate the drive and run it.")
+        self._follow_routes(state)
+        self._drive.on_click(
             posting(
                 post,
                 lambda _event: actions.ChooseSource(
-                    actions.VirtualDrive(route.value, int(seed.value), int(people.value))
+                    actions.VirtualDrive(self._route.value, int(seed.value), int(people.value))
                 ),
             )
         )
@@ -81,8 +80,18 @@ class RunPanel(BasePanel):
             )
         )
 
+    def _follow_routes(self, state: AppState) -> None:
+        """Offer the routes that there are now."""
+        names = _routes(state)
+        if self._route.options != names:
+            self._route.options = names
+        for widget in (self._route, self._drive):
+            if widget.disabled is not (names == NO_ROUTE):
+                widget.disabled = names == NO_ROUTE
+
     def draw_slowly(self, view: PageView) -> None:
         """Show what runs and what is being prepared."""
+        self._follow_routes(view.state)
         content = _now(view)
         if content != self._shown:
             self._shown = content
@@ -99,6 +108,11 @@ class RunPanel(BasePanel):
             self._repeat.value = view.state.repeat
 
 
+def _routes(state: AppState) -> tuple[str, ...]:
+    """Return what the list of routes offers."""
+    return tuple(route.name for route in state.project.routes) or NO_ROUTE
+
+
 def _now(view: PageView) -> str:
     """Say in one line what drives, and what is under way."""
     source = view.state.source
@@ -108,7 +122,7 @@ def _now(view: PageView) -> str:
         what = f"Recording <b>{escaped(source.path.name)}</b>"
     else:
         what = "Nothing drives yet: choose a virtual drive or a recording."
-    under_way = [f"{escaped(job.name)} {job.fraction:.0%}" for job in view.jobs]
+    under_way = [escaped(job.line) for job in view.jobs]
     if view.run is not None and view.run.seeking is not None:
         under_way.append(f"Replaying {view.run.seeking:.0%}")
     note = f"<br><span class='c-note'>{'; '.join(under_way)}</span>" if under_way else ""

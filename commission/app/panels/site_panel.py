@@ -6,6 +6,7 @@ from viser import GuiApi
 
 from commission.app.panels.base import BasePanel, Post, escaped, table
 from commission.app.panels.equipment_fields import EquipmentFields
+from commission.app.panels.project_fields import ProjectFields
 from commission.app.view import PageView
 from commission.site.project import Project
 
@@ -45,6 +46,7 @@ class SitePanel(BasePanel):
 
     def __init__(self, gui: GuiApi, post: Post, project: Project) -> None:
         self._html = gui.add_html("")
+        self._project = ProjectFields(gui, post, project)
         self._equipment = EquipmentFields(gui, post, project)
         self._shown: Project | None = None
         self._routes = ""
@@ -64,4 +66,5 @@ class SitePanel(BasePanel):
         content = facts + (routes if project.routes else "")
         if self._html.content != content:
             self._html.content = content
+        self._project.show(project)
         self._equipment.show(project)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from typing import Any, Literal, TypeAlias
 
-from viser import GuiApi, GuiEvent
+from viser import GuiApi, GuiButtonHandle, GuiEvent
 
 from commission.app import actions, theme
 from commission.app.panels.base import BasePanel, Post, escaped, posting
@@ -16,6 +16,8 @@ from commission.localization.estimate import Mode
 
 LONGEST_NAME = 22
 """Letters of a step's name that fit on a button."""
+LONGEST_JOB = 16
+"""Letters of a job's name that fit on a button."""
 
 Modifier: TypeAlias = Literal["cmd/ctrl", "cmd/ctrl+shift"]
 
@@ -24,7 +26,7 @@ def badge_text(view: PageView) -> tuple[str, str, str]:
     """Return the badge's word, what stands beside it, and its color."""
     run, limits = view.run, view.state.project.parameters.supervisor
     if run is None or run.estimate is None:
-        under_way = [f"{escaped(job.name)} {job.fraction:.0%}" for job in view.jobs]
+        under_way = [escaped(job.line) for job in view.jobs]
         return ("PREPARING" if under_way else "NO RUN"), "; ".join(under_way), theme.IDLE_COLOR
     x, y, heading = run.series.two_sigma[-1]
     beside = (
@@ -60,8 +62,18 @@ def button_text(label: str, steps: tuple[Step, ...]) -> str:
     """Return what stands on the undo or redo button: the step's name, cut where it would crowd the bar."""
     if not steps:
         return label
-    name = steps[-1].name
-    return f"{label} {name if len(name) <= LONGEST_NAME else name[: LONGEST_NAME - 1] + '…'}"
+    return f"{label} {shortened(steps[-1].name, LONGEST_NAME)}"
+
+
+def shortened(text: str, longest: int) -> str:
+    """Return a text that has at most so many letters."""
+    return text if len(text) <= longest else text[: longest - 1] + "…"
+
+
+def write_label(button: GuiButtonHandle, text: str) -> None:
+    """Write on a button what it does not say already."""
+    if button.label != text:
+        button.label = text
 
 
 class TopBar(BasePanel):
@@ -72,6 +84,9 @@ class TopBar(BasePanel):
         self._badge = gui.add_html("")
         self._shown = ("", "")
         self._head = title(state)
+        self._job: int | None = None
+        self._stop = gui.add_button("", hint="Background work; press to stop it.", color="gray", visible=False)
+        self._stop.on_click(posting(post, lambda _event: actions.StopJob(self._job or 0)))
         buttons: tuple[tuple[str, str, Callable[[int | None], actions.Action], Literal["Z", "S"], Modifier], ...] = (
             ("Undo", "Take back the last change (Ctrl+Z)", actions.Undo, "Z", "cmd/ctrl"),
             ("Redo", "Make it again (Ctrl+Shift+Z)", actions.Redo, "Z", "cmd/ctrl+shift"),
@@ -99,6 +114,15 @@ class TopBar(BasePanel):
                 post(actions.SetView(event.client.client_id, actions.View(event.target.value)))
 
         view.on_click(show)
+
+    def _show_job(self, view: PageView) -> None:
+        """Show the work under way as the button that stops it: wherever the engineer is on the page, it is in sight."""
+        job = view.jobs[0] if view.jobs else None
+        self._job = None if job is None else job.number
+        if self._stop.visible is not (job is not None):
+            self._stop.visible = job is not None
+        if job is not None:
+            write_label(self._stop, f"✕ {shortened(job.name, LONGEST_JOB)} {job.fraction:.0%}")
 
     def draw(self, view: PageView) -> None:
         """Show the supervisor's state without delay."""
@@ -128,6 +152,7 @@ class TopBar(BasePanel):
             self._head = head
             self._title.content = theme.STYLE + head
         wanted = {"Undo": bool(state.undo), "Redo": bool(state.redo), "Save": state.is_changed and not state.foreign}
+        self._show_job(view)
         for button in (self._overwrite, self._reload):
             if button.visible is not bool(state.foreign):
                 button.visible = bool(state.foreign)
@@ -135,6 +160,4 @@ class TopBar(BasePanel):
             if self._buttons[label].disabled is enabled:
                 self._buttons[label].disabled = not enabled
         for label, steps in (("Undo", state.undo), ("Redo", state.redo)):
-            text = button_text(label, steps)
-            if self._buttons[label].label != text:
-                self._buttons[label].label = text
+            write_label(self._buttons[label], button_text(label, steps))

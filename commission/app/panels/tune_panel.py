@@ -9,7 +9,6 @@ import dataclasses
 import math
 import time
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from viser import GuiApi, GuiInputHandle
@@ -99,19 +98,6 @@ class TunePanel(BasePanel):
                 self._add_group(gui, post, name)
         reset = gui.add_button("Reset to saved", color="gray", hint="Back to the parameters of project.yaml.")
         reset.on_click(posting(post, lambda _event: actions.ResetParameters()))
-        with gui.add_folder("Save a copy", expand_by_default=False):
-            folder = gui.add_text("Copy into", "", hint="Path of a folder on the computer that serves this page.")
-            save = gui.add_button("Save copy", color="gray")
-        save.on_click(
-            posting(
-                post,
-                lambda _event: (
-                    actions.Save(Path(folder.value.strip()).expanduser())
-                    if folder.value.strip()
-                    else actions.Report("no folder was named; expected the path of a folder")
-                ),
-            )
-        )
 
     def _add_group(self, gui: GuiApi, post: Post, group: str) -> None:
         """Add a widget for each field of a group of parameters."""
