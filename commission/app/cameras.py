@@ -50,6 +50,8 @@ class ClientView:
     """Its own nodes by layer."""
     aspect: float = 0.0
     """Shape of the floor, width over height, that the plan was fitted to."""
+    fitted: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the camera was put to show the whole site [m]."""
     came_at: float = field(default_factory=time.monotonic)
     """When it came, on the clock of this computer [s]."""
 
@@ -164,7 +166,9 @@ class Cameras:
     def _fit(self, own: ClientView) -> None:
         """Show the plan of the whole site."""
         own.aspect = _aspect(own.client)
-        self._look_down(own.client, self._extent.center, _visible_height(self._extent, own.aspect))
+        height = _visible_height(self._extent, own.aspect)
+        own.fitted = (*self._extent.center, height / PLAN_FOV)
+        self._look_down(own.client, self._extent.center, height)
 
     def _look_down(self, client: ClientHandle, center: tuple[float, float], visible_height: float) -> None:
         distance = visible_height / PLAN_FOV
@@ -192,16 +196,21 @@ class Cameras:
         """Fit anew while the page still builds up, and keep north up afterwards.
 
         A browser reports the camera that it began with, and the floor takes its shape when the panels have come: a plan
-        fitted before that shows a corner of the site.
+        fitted before that shows a corner of the site. Later the floor changes its shape with the window, or when the
+        plots are folded: who had the whole site in view keeps it.
         """
         own = self._views.get(camera.client.client_id)
         if own is None or own.three_d or own.follow:
             return
+        shift = float(np.hypot(*(camera.look_at[:2] - self._extent.center)))
+        is_reshaped = abs(_aspect(own.client) - own.aspect) > 0.01
         if time.monotonic() - own.came_at < SETTLING:
-            shift = float(np.hypot(*(camera.look_at[:2] - self._extent.center)))
-            if abs(_aspect(own.client) - own.aspect) > 0.01 or shift > 0.01 * max(self._extent.size):
-                self._fit(own)
-                return
+            is_due = is_reshaped or shift > 0.01 * max(self._extent.size)
+        else:
+            is_due = is_reshaped and np.allclose(camera.position, own.fitted, rtol=1e-3)
+        if is_due:
+            self._fit(own)
+            return
         self._keep_north_up(camera)
 
     def _keep_north_up(self, camera: CameraHandle) -> None:

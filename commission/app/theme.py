@@ -95,6 +95,8 @@ def css(color: Color) -> str:
 
 TOP_BAR_PX = 44
 BOTTOM_PX = 248
+FOLDED_PX = 46
+"""Height of the bottom strip when its plots are folded away [pixels]."""
 LEFT_PX = 300
 RIGHT_PX = 270
 
@@ -127,14 +129,22 @@ div:has(>div>.c-top)>:first-child{{flex:1}}
 div:has(>div>.c-top) button{{height:26px!important;padding:0 10px!important;font-size:12px!important}}
 div:has(>div>.c-bottom){{display:grid;grid-template-columns:repeat(24,minmax(0,1fr));align-items:center;
  padding-top:2px!important}}
-div:has(>div>.c-bottom)>:nth-child(1){{display:none}}
-div:has(>div>.c-bottom)>:nth-child(2){{grid-column:span 5}}
-div:has(>div>.c-bottom)>:nth-child(3){{grid-column:span 2}}
-div:has(>div>.c-bottom)>:nth-child(4){{grid-column:span 3}}
-div:has(>div>.c-bottom)>:nth-child(5){{grid-column:span 14}}
+div:has(>div>.c-bottom)>:nth-child(-n+5){{grid-row:1}}
+div:has(>div>.c-bottom)>:nth-child(1){{grid-column:10}}
+div:has(>div>.c-bottom)>:nth-child(2){{grid-column:1/span 4}}
+div:has(>div>.c-bottom)>:nth-child(3){{grid-column:5/span 2}}
+div:has(>div>.c-bottom)>:nth-child(4){{grid-column:7/span 3}}
+div:has(>div>.c-bottom)>:nth-child(5){{grid-column:11/span 14}}
 div:has(>div>.c-bottom)>:nth-child(6){{grid-column:11/span 14;margin:-9px 0 2px!important;
  padding:0 67px 0 18px!important}}
 div:has(>div>.c-bottom)>:nth-child(n+7){{grid-column:span 4}}
+:root:has(.c-fold input:checked){{--c-bottom:{FOLDED_PX}px}}
+[data-floating-window]:has(.c-fold input:checked){{overflow:hidden!important}}
+.c-fold{{display:block;text-align:center;font-size:11px;opacity:.7;cursor:pointer;white-space:nowrap}}
+.c-fold:hover,.c-fold:focus-within{{opacity:1;text-decoration:underline}}
+.c-fold input{{position:absolute;opacity:0;width:0;height:0}}
+.c-fold:not(:has(:checked))::after{{content:"plots ▾"}}
+.c-fold:has(:checked)::after{{content:"plots ▴"}}
 div:has(>div>.c-bottom)>:nth-child(-n+3) [style*="7.25em"]{{display:none}}
 div:has(>div>.c-bottom)>:nth-child(5) [style*="7.25em"]{{display:none}}
 div:has(>.c-wide){{display:none}}

@@ -185,3 +185,21 @@ def test_a_recording_that_is_none_gives_one_clear_line_on_the_page(run: OpenRun,
     assert "\n" not in run.runtime.state.problems[-1]
     page.press("Clear")
     run.until(lambda: not run.runtime.state.problems)
+
+
+def test_folded_plots_leave_their_room_to_the_floor_which_is_fitted_anew(run: OpenRun, page: OpenPage) -> None:
+    page.press("Fit")
+    page.wait_until_drawn()
+    height = "window.__viserMutable.canvas.getBoundingClientRect().height"
+    unfolded = page.page.evaluate(height)
+    corners = ((0.0, 0.0), (12.0, 8.0))
+    page.page.locator(".c-fold").click()
+    page.page.wait_for_function(f"before => {height} > before + 150", arg=unfolded)
+    page.wait_until_drawn()
+    (left, bottom), (right, top) = (page.pixel_of(corner) for corner in corners)
+    box = page.page.evaluate("(b => [b.left, b.right])(window.__viserMutable.canvas.getBoundingClientRect())")
+    # The room is wider than the floor's window is high: after the fold its width decides.
+    assert box[0] < left < box[0] + 0.1 * (box[1] - box[0])
+    assert bottom - top > 0.9 * (right - left) * 8.0 / 12.0
+    page.page.locator(".c-fold").click()
+    page.page.wait_for_function(f"before => {height} === before", arg=unfolded)

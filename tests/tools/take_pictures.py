@@ -63,6 +63,12 @@ def tab(*names: str) -> Steps:
     return steps
 
 
+def folded(page: OpenPage, runtime: Runtime) -> None:
+    """The plots are folded away, for the sake of the panels."""
+    selected(page, runtime)
+    page.page.locator(".c-fold").click()
+
+
 def three_d(page: OpenPage, _runtime: Runtime) -> None:
     page.press("3D")
 
@@ -123,6 +129,7 @@ PICTURES = (
     Picture("site", "shop_floor", tab("Site", "Problems")),
     Picture("tune", "shop_floor", tab("Tune", "Reflectors")),
     Picture("selected", "shop_floor", selected),
+    Picture("folded", "shop_floor", folded),
     Picture("route", "shop_floor", on_route),
     Picture("measured", "laboratory", measured),
     Picture("page_plan", "shop_floor", heatmap),

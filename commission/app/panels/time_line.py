@@ -12,6 +12,11 @@ from commission.app.store import SPEEDS
 from commission.app.view import PageView, RunView
 
 PLAY, PAUSE, STEP = "Play", "Pause", "Step"
+FOLD = (
+    "<div class='c-bottom'><label class='c-fold' title='Fold the plots away, or show them'>"
+    "<input type='checkbox' aria-label='Fold the plots away'></label></div>"
+)
+"""A switch of the browser's own, which the page's style obeys: nobody else's plots are folded by it."""
 SHORTEST_SHOWN = 0.3
 """Percent of the time line that even the shortest episode takes, so that it is seen."""
 
@@ -41,7 +46,7 @@ class TimeLine(BasePanel):
     """Play clock and seeking; the page's style turns this panel into a strip."""
 
     def __init__(self, gui: GuiApi, post: Post, speed: float) -> None:
-        gui.add_html("<div class='c-bottom'></div>")
+        gui.add_html(FOLD)
         buttons = gui.add_button_group("", (PLAY, PAUSE, STEP))
         buttons.on_click(posting(post, lambda event: _clicked(event.target.value)))
         self._speed = gui.add_dropdown(
