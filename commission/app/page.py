@@ -26,6 +26,7 @@ from commission.app.layers.prediction import RibbonLayer
 from commission.app.layers.reflectors import ReflectorLayer, ReflectorNameLayer
 from commission.app.layers.routes import RouteLayer
 from commission.app.layers.scan import ScanLayer
+from commission.app.layers.suggestion import SuggestionLayer
 from commission.app.layers.trails import ReferenceLayer, TrailLayer
 from commission.app.layers.uncertainty import UncertaintyLayer
 from commission.app.layers.vehicle import VehicleLayer
@@ -54,6 +55,7 @@ LAYERS = (
     RibbonLayer,
     FailingLayer,
     ReflectorLayer,
+    SuggestionLayer,
     ReflectorNameLayer,
     GateLayer,
     ScanLayer,
@@ -104,7 +106,7 @@ class Page:
         with left.add_tab("Site"):
             site = SitePanel(gui, post, state.project)
         with left.add_tab("Plan"):
-            plan = PlanPanel(gui, post, state)
+            plan = PlanPanel(gui, post)
         with left.add_tab("Run"):
             run = RunPanel(gui, post, state)
         with left.add_tab("Tune"):

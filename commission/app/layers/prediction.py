@@ -6,7 +6,7 @@ import numpy as np
 from viser import LabelHandle, LineSegmentsHandle, SceneApi, SceneNodeHandle
 
 from commission.app import theme
-from commission.app.drawing import NO_SEGMENTS, Points, lift
+from commission.app.drawing import NO_SEGMENTS, stroke_segments
 from commission.app.layers.base import BaseLayer
 from commission.app.plan.loads import load_classes, palette
 from commission.app.plan.view import PlanView
@@ -68,11 +68,11 @@ class RibbonLayer(BaseLayer):
         if prediction is not None:
             points, loads = prediction.drive.poses[:, :2], prediction.load
         lines, classes = pieces(points, loads, MOST_PIECES) if len(points) > 1 else (points.reshape(0, 2, 2), loads)
-        self._rim.points = _segments(lines, theme.Height.ROUTE)
+        self._rim.points = stroke_segments(lines, theme.Height.ROUTE)
         for index, node in enumerate(self._ribbon):
             chosen = lines[classes == index]
             if len(chosen) or len(node.points) > 1:
-                node.points = _segments(chosen, theme.Height.ACCUMULATED)
+                node.points = stroke_segments(chosen, theme.Height.ACCUMULATED)
         for label in self._stops:
             label.remove()
         self._stops = () if prediction is None else self._write(prediction, visible=self.name not in state.hidden)
@@ -96,7 +96,3 @@ class RibbonLayer(BaseLayer):
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return ribbon, rim and stops."""
         return self._rim, *self._ribbon, *self._stops
-
-
-def _segments(lines: FloatArray, height: float) -> Points:
-    return lift(lines.reshape(-1, 2), height).reshape(-1, 2, 3) if len(lines) else NO_SEGMENTS

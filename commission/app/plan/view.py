@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from commission.app.plan.layout import Suggestion
 from commission.app.plan.scale import Scale
 from commission.app.plan.settings import Figure
 from commission.geometry.arrays import BoolArray, FloatArray
@@ -78,6 +79,18 @@ class FailureView:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class LayoutView:
+    """A suggested layout."""
+
+    suggestion: Suggestion
+    """What was found."""
+    outdated: bool
+    """Whether the site has changed since."""
+    wished_otherwise: bool
+    """Whether something else is wished for by now."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PlanView:
     """Everything the step Plan has found so far."""
 
@@ -89,6 +102,8 @@ class PlanView:
     """The prediction."""
     failures: FailureView | None = None
     """The ranking."""
+    layout: LayoutView | None = None
+    """The suggested layout."""
     waiting: bool = False
     """Whether something is wanted that is not there yet."""
 

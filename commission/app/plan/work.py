@@ -40,6 +40,8 @@ class Covered:
 class Predicted:
     """A prediction along one route."""
 
+    name: str
+    """Name of the route."""
     prediction: RoutePrediction
     """Scan by scan."""
 
@@ -98,9 +100,8 @@ def predict(project: Project, settings: PlanSettings, progress: Progress) -> Pre
     options = PredictionOptions(blocked_per_m=settings.blocked_per_m)
     model = _model(project, settings)
     progress(0.5, "route")
-    return Predicted(
-        route_prediction.predict_route(route_prediction.plan_route(project, settings.route, options, model))
-    )
+    planned = route_prediction.plan_route(project, settings.route, options, model)
+    return Predicted(settings.route, route_prediction.predict_route(planned))
 
 
 def rank(project: Project, settings: PlanSettings, progress: Progress) -> Ranked:

@@ -1,0 +1,63 @@
+"""From what was computed for the step Plan to what panels and layers draw. Pure; when it is drawn is `planner`'s."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from commission.app.plan.layout import LayoutWish, Suggestion
+from commission.app.plan.scale import FIRST, NO_FIX, QUANTITIES, Scale
+from commission.app.plan.view import FailureView, HeatView, LayoutView, Reading, RouteView, stretches
+from commission.app.plan.work import Covered, Predicted, Ranked
+from commission.geometry.arrays import FloatArray
+from commission.site.project import Project
+
+
+def heat_view(covered: Covered, scale: Scale, *, outdated: bool) -> HeatView:
+    """Sort the figure into the classes of its scale."""
+    lattice = covered.live.coverage.lattice
+    classes = scale.classes(getattr(covered.live.coverage.fixes, scale.figure.value), covered.floor)
+    counts = np.bincount(classes, minlength=FIRST + len(scale.bounds) + 1)[NO_FIX:]
+    return HeatView(
+        lattice, scale, classes.reshape(lattice.rows, lattice.columns), counts / max(1, counts.sum()), outdated
+    )
+
+
+def reading_of(covered: Covered, probe: tuple[float, float]) -> Reading | None:
+    """Read every figure at a place; none beside the lattice."""
+    index = covered.live.coverage.lattice.index_near(*probe)
+    if index is None:
+        return None
+    fixes = covered.live.coverage.fixes
+    values = {figure: float(getattr(fixes, figure.value)[index]) for figure in QUANTITIES}
+    return Reading(probe, values, bool(covered.floor[index]))
+
+
+def route_view(predicted: Predicted, *, outdated: bool) -> RouteView:
+    """Gather the worst of each metre."""
+    prediction = predicted.prediction
+    metres = prediction.per_metre()
+    return RouteView(predicted.name, prediction, metres, np.maximum.reduceat(prediction.load, metres.first), outdated)
+
+
+def failure_view(ranked: Ranked, failed: str, *, outdated: bool) -> FailureView:
+    """Find the reflector that is shown, and the stretches of the routes that depend on it."""
+    reflectors = ranked.reflectors
+    names = tuple(reflectors.reflectors[each.reflector].id for each in ranked.ranking)
+    chosen = ranked.ranking[names.index(failed)] if failed in names else None
+    place, failing = None, list[FloatArray]()
+    if chosen is not None:
+        reflector = reflectors.reflectors[chosen.reflector]
+        place = (reflector.x, reflector.y)
+        for planned, part in zip(ranked.planned, chosen.routes, strict=True):
+            fails = np.isin(planned.drive.metres.astype(np.int64), part.metres)
+            failing.extend(stretches(planned.drive.poses[:, :2], fails))
+    return FailureView(ranked.ranking, names, chosen, place, tuple(failing), outdated)
+
+
+def layout_view(suggestion: Suggestion, project: Project, wish: LayoutWish) -> LayoutView:
+    """Hold a suggestion against the site and the wishes of now."""
+    return LayoutView(
+        suggestion,
+        outdated=not suggestion.is_of(project),
+        wished_otherwise=suggestion.wish != wish,
+    )
