@@ -52,7 +52,7 @@ class SuggestionLayer(BaseLayer):
     name = "Suggested layout"
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
     legend = (
-        theme.Legend("suggested reflector", theme.SUGGESTED, theme.Mark.RING),
+        theme.Legend("suggested reflector", theme.SUGGESTED, theme.Mark.DOT),
         theme.Legend("would be taken down", theme.TAKEN_DOWN, theme.Mark.SQUARE),
         theme.Legend("no new reflectors here", theme.KEEP_OUT, theme.Mark.LINE),
     )
@@ -116,6 +116,10 @@ class SuggestionLayer(BaseLayer):
                 *(stroke_segments(stroke, theme.Height.EDITING) for stroke in strokes),
             ]
         )
+
+    def is_used(self, plan: PlanView, state: AppState) -> bool:
+        """Whether there is a suggestion, or an area without reflectors."""
+        return plan.layout is not None or bool(state.layout.keep_out)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return ghosts, marks and areas."""

@@ -70,11 +70,11 @@ class LayoutPanel(BasePanel):
     def _add_demands(self) -> None:
         gui, inputs = self._gui, self._inputs
         hint = "Whether the reflectors that are there stay; if not, only the locked ones do."
-        inputs.switch("extend", "Keep present ones", hint)
+        inputs.switch("extend", "Keep present", hint)
         hint = "Reflectors that every scan on the routes must see."
         inputs.count("demands.visible", gui.add_number("Visible, at least", 2, min=1, max=20, step=1, hint=hint))
         hint = "Whether all demands must hold as well with any single reflector blocked."
-        inputs.switch("demands.survive_failure", "Any one may fail", hint)
+        inputs.switch("demands.survive_failure", "One may fail", hint)
         hint = "Largest 2-sigma of x and of y on the routes; the supervisor's limit unless changed here."
         limit = gui.add_number("2σ x, y [mm]", 100, min=1, max=10_000, step=1, hint=hint)
         inputs.number(POSITION, MM, limit)
