@@ -15,6 +15,7 @@ from commission.app.editing.desk import Desk, DeskTabs
 from commission.app.editing.pointer import floor_drag
 from commission.app.extent import extent_of
 from commission.app.layers.accumulated import AccumulatedLayer
+from commission.app.layers.ambiguity import AmbiguityLayer
 from commission.app.layers.base import Layer
 from commission.app.layers.detections import DetectionLayer
 from commission.app.layers.failing import FailingLayer
@@ -50,6 +51,7 @@ from commission.site.project import Project
 LAYERS = (
     FloorLayer,
     HeatLayer,
+    AmbiguityLayer,
     GridLayer,
     RouteLayer,
     RibbonLayer,

@@ -6,6 +6,7 @@ from viser import GuiApi
 
 from commission.app.panels.base import BasePanel, Panel, Post, escaped
 from commission.app.panels.inputs import write_html
+from commission.app.panels.plan_cold_start import ColdStartPanel
 from commission.app.panels.plan_failures import FailurePanel
 from commission.app.panels.plan_heatmap import HeatmapPanel
 from commission.app.panels.plan_layout import LayoutPanel
@@ -25,8 +26,9 @@ class PlanPanel(BasePanel):
             route = RoutePanel(gui, post)
         with gui.add_folder("What if one reflector fails", expand_by_default=False):
             failures = FailurePanel(gui, post)
+        cold_start = ColdStartPanel(gui, post, gui.add_folder("Ambiguous places", expand_by_default=False))
         layout = LayoutPanel(gui, post, gui.add_folder("Suggested layout", expand_by_default=False))
-        self._parts: tuple[Panel, ...] = (heatmap, route, failures, layout)
+        self._parts: tuple[Panel, ...] = (heatmap, route, failures, cold_start, layout)
 
     def draw_slowly(self, view: PageView) -> None:
         """Draw each part; say what keeps all of them waiting."""

@@ -52,6 +52,11 @@ def ranking_key(project: Project, plan: PlanSettings) -> Key:
     return (*site_key(project, plan), plan.failure.value, plan.ranking)
 
 
+def cold_start_key(project: Project, plan: PlanSettings) -> Key:
+    """Return what ambiguous places depend on."""
+    return (project.reflectors, project.floor_map, project.scanner, plan.min_beams, plan.tolerance)
+
+
 def changed_reflectors(before: ReflectorMap, after: ReflectorMap) -> list[int] | None:
     """Return the indices of the reflectors that changed; none when there are other ones, or too many."""
     if len(before) != len(after):

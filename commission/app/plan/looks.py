@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
+from commission.app.plan.cold_start import Ambiguity
 from commission.app.plan.layout import LayoutWish, Suggestion
 from commission.app.plan.scale import FIRST, NO_FIX, QUANTITIES, Scale
-from commission.app.plan.view import FailureView, HeatView, LayoutView, Reading, RouteView, stretches
+from commission.app.plan.settings import PlanSettings
+from commission.app.plan.view import (
+    ColdStartView,
+    FailureView,
+    HeatView,
+    LayoutView,
+    Reading,
+    RouteView,
+    TwinsView,
+    stretches,
+)
 from commission.app.plan.work import Covered, Predicted, Ranked
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
@@ -52,6 +63,17 @@ def failure_view(ranked: Ranked, failed: str, *, outdated: bool) -> FailureView:
             fails = np.isin(planned.drive.metres.astype(np.int64), part.metres)
             failing.extend(stretches(planned.drive.poses[:, :2], fails))
     return FailureView(ranked.ranking, names, chosen, place, tuple(failing), outdated)
+
+
+def cold_start_view(ambiguity: Ambiguity, plan: PlanSettings, *, outdated: bool) -> ColdStartView:
+    """Find the reflectors and poses of the pair that is shown."""
+    twins = None
+    if 0 <= plan.pair < len(ambiguity.pairs):
+        pair = ambiguity.pairs[plan.pair]
+        centers = ambiguity.reflectors.centers
+        groups = centers[list(pair.constellation)], centers[list(pair.image)]
+        twins = TwinsView(groups, (pair.example, pair.partner))
+    return ColdStartView(ambiguity, twins, not plan.figure, outdated)
 
 
 def layout_view(suggestion: Suggestion, project: Project, wish: LayoutWish) -> LayoutView:

@@ -12,21 +12,23 @@ from commission.app.editing.editor import Editor, Grab
 from commission.app.editing.gestures import moved
 from commission.app.jobs import JobReport, Jobs
 from commission.app.plan import work
-from commission.app.plan.keys import changed_reflectors, floor_key, ranking_key, route_key
+from commission.app.plan.cold_start import Ambiguity, look_alike
+from commission.app.plan.keys import changed_reflectors, cold_start_key, floor_key, ranking_key, route_key
 from commission.app.plan.layout import Suggestion, suggest
-from commission.app.plan.looks import failure_view, heat_view, layout_view, reading_of, route_view
+from commission.app.plan.looks import cold_start_view, failure_view, heat_view, layout_view, reading_of, route_view
 from commission.app.plan.remembered import Remembered
 from commission.app.plan.scale import Scale, scale_for
 from commission.app.plan.settings import PlanSettings
 from commission.app.plan.upkeep import Upkeep, is_same
-from commission.app.plan.view import FailureView, HeatView, LayoutView, PlanView, RouteView
+from commission.app.plan.view import ColdStartView, FailureView, HeatView, LayoutView, PlanView, RouteView
 from commission.app.plan.work import Covered, Predicted, Ranked
 from commission.app.store import AppState
 from commission.site.project import Project
 
 COVERAGE, PREDICTION, RANKING = "Coverage", "Route prediction", "What if one fails"
 LAYOUT = "Suggested layout"
-JOBS = (COVERAGE, PREDICTION, RANKING, LAYOUT)
+COLD_START = "Ambiguous places"
+JOBS = (COVERAGE, PREDICTION, RANKING, COLD_START, LAYOUT)
 """Names of the jobs, as the page shows them."""
 
 
@@ -43,11 +45,13 @@ class Planner:
         self._coverage = Upkeep(COVERAGE, Covered, jobs)
         self._prediction = Upkeep(PREDICTION, Predicted, jobs)
         self._ranking = Upkeep(RANKING, Ranked, jobs)
+        self._cold_start = Upkeep(COLD_START, Ambiguity, patient)
         self._layout = Upkeep(LAYOUT, Suggestion, patient)
         self._scale: Scale | None = None
         self._view = PlanView()
         self._route_view = Remembered[RouteView]()
         self._failure_view = Remembered[FailureView]()
+        self._cold_start_view = Remembered[ColdStartView]()
         self._layout_view = Remembered[LayoutView]()
         self._shown: tuple[object, ...] = ()
         self._moves = 0
@@ -78,7 +82,7 @@ class Planner:
             self._keep_ranking(project, plan)
         else:
             self._ranking.drop()
-        self._keep_layout(state)
+        self._keep_patiently(state)
         shown = (
             *(part for each in self._all() for part in (each.result, each.is_running)),
             self._moves,
@@ -107,7 +111,7 @@ class Planner:
         return self._drag[2]
 
     def _all(self) -> tuple[Upkeep[Any], ...]:
-        return self._coverage, self._prediction, self._ranking, self._layout
+        return self._coverage, self._prediction, self._ranking, self._cold_start, self._layout
 
     def _keep_coverage(self, project: Project, plan: PlanSettings) -> None:
         """Follow moved reflectors at once, anything else by a job."""
@@ -131,9 +135,14 @@ class Planner:
         if self._ranking.result is None or self._ranking.key[-2:] != (plan.failure.value, plan.ranking):
             self._ranking.keep(ranking_key(project, plan), lambda progress: work.rank(project, plan, progress))
 
-    def _keep_layout(self, state: AppState) -> None:
-        """Suggest once; it takes long, so other wishes and other sites wait until it is asked for again."""
-        project, wish = state.project, state.layout
+    def _keep_patiently(self, state: AppState) -> None:
+        """Do what takes long once: other wishes and other sites wait until it is asked for again."""
+        project, plan, wish = state.project, state.plan, state.layout
+        if not plan.cold_start:
+            self._cold_start.drop()
+        elif self._cold_start.key[:1] != (plan.cold_start,):
+            key = (plan.cold_start, *cold_start_key(project, plan))
+            self._cold_start.keep(key, lambda progress: look_alike(project, plan, progress))
         if wish.wanted:
             self._layout.ask((wish.asked,), lambda progress: suggest(project, wish, progress))
         else:
@@ -143,9 +152,10 @@ class Planner:
         """Put the view together; parts that did not change stay the same value."""
         project, plan = state.project, state.plan
         covered, predicted, ranked = self._coverage.result, self._prediction.result, self._ranking.result
-        suggestion = self._layout.result
+        ambiguity, suggestion = self._cold_start.result, self._layout.result
         old_route = not is_same(self._prediction.key, route_key(project, plan))
         old_ranking = not is_same(self._ranking.key[:-1], ranking_key(project, plan)[:-1])
+        old_places = not is_same(self._cold_start.key[1:], cold_start_key(project, plan))
         return PlanView(
             None if covered is None or not plan.figure else self._heat(covered, floor, plan),
             None if covered is None or plan.probe is None else reading_of(covered, plan.probe),
@@ -155,6 +165,10 @@ class Planner:
             self._failure_view.of(
                 (ranked, plan.failed, old_ranking),
                 lambda: ranked and failure_view(ranked, plan.failed, outdated=old_ranking),
+            ),
+            self._cold_start_view.of(
+                (ambiguity, plan.pair, bool(plan.figure), old_places),
+                lambda: ambiguity and cold_start_view(ambiguity, plan, outdated=old_places),
             ),
             self._layout_view.of(
                 (suggestion, project, state.layout),

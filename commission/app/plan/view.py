@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from commission.app.plan.cold_start import Ambiguity
 from commission.app.plan.layout import Suggestion
 from commission.app.plan.scale import Scale
 from commission.app.plan.settings import Figure
@@ -14,6 +16,9 @@ from commission.geometry.arrays import BoolArray, FloatArray
 from commission.planning.coverage import Lattice
 from commission.planning.dependence import Dependence
 from commission.planning.route_prediction import PerMetre, RoutePrediction
+
+Pose: TypeAlias = tuple[float, float, float]
+"""x, y and heading of base, map frame [m, m, rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +84,30 @@ class FailureView:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class TwinsView:
+    """One pair of look-alikes: two groups of reflectors, and two poses that see the same."""
+
+    groups: tuple[FloatArray, FloatArray]
+    """(n, 2) places of the reflectors of each group [m], in the same order."""
+    poses: tuple[Pose, Pose]
+    """A pose that sees the first group, and the one that sees the second alike [m, m, rad]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColdStartView:
+    """Where a vehicle could take its place for another one."""
+
+    ambiguity: Ambiguity
+    """Map and pairs."""
+    twins: TwinsView | None
+    """The pair that is shown on the floor."""
+    is_drawn: bool
+    """Whether its map is: where a heatmap is, it is not."""
+    outdated: bool
+    """Whether the site or the tolerance has changed since."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class LayoutView:
     """A suggested layout."""
 
@@ -102,6 +131,8 @@ class PlanView:
     """The prediction."""
     failures: FailureView | None = None
     """The ranking."""
+    cold_start: ColdStartView | None = None
+    """The ambiguous places."""
     layout: LayoutView | None = None
     """The suggested layout."""
     waiting: bool = False
