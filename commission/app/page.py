@@ -18,6 +18,7 @@ from commission.app.layers.accumulated import AccumulatedLayer
 from commission.app.layers.ambiguity import AmbiguityLayer
 from commission.app.layers.base import Layer
 from commission.app.layers.detections import DetectionLayer
+from commission.app.layers.events import EventLayer
 from commission.app.layers.failing import FailingLayer
 from commission.app.layers.floor import FloorLayer
 from commission.app.layers.gates import GateLayer
@@ -55,6 +56,7 @@ LAYERS = (
     GridLayer,
     RouteLayer,
     RibbonLayer,
+    EventLayer,
     FailingLayer,
     ReflectorLayer,
     SuggestionLayer,

@@ -22,8 +22,7 @@ class PlanPanel(BasePanel):
         self._note = gui.add_html("", visible=False)
         with gui.add_folder("Heatmap of the floor"):
             heatmap = HeatmapPanel(gui, post)
-        with gui.add_folder("Along a route", expand_by_default=False):
-            route = RoutePanel(gui, post)
+        route = RoutePanel(gui, post, gui.add_folder("Along a route", expand_by_default=False))
         with gui.add_folder("What if one reflector fails", expand_by_default=False):
             failures = FailurePanel(gui, post)
         cold_start = ColdStartPanel(gui, post, gui.add_folder("Ambiguous places", expand_by_default=False))

@@ -37,6 +37,7 @@ def site_key(project: Project, plan: PlanSettings) -> Key:
         project.vehicle,
         project.parameters,
         project.routes,
+        project.stations,
         plan.blocked_per_m,
         plan.min_beams,
     )

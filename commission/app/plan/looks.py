@@ -14,12 +14,14 @@ from commission.app.plan.view import (
     HeatView,
     LayoutView,
     Reading,
+    RiskView,
     RouteView,
     TwinsView,
     stretches,
 )
 from commission.app.plan.work import Covered, Predicted, Ranked
 from commission.geometry.arrays import FloatArray
+from commission.planning.association_risk import NeighborRisk
 from commission.site.project import Project
 
 
@@ -47,7 +49,33 @@ def route_view(predicted: Predicted, *, outdated: bool) -> RouteView:
     """Gather the worst of each metre."""
     prediction = predicted.prediction
     metres = prediction.per_metre()
-    return RouteView(predicted.name, prediction, metres, np.maximum.reduceat(prediction.load, metres.first), outdated)
+    chances = np.zeros(len(prediction.drive))
+    for risk in predicted.risks:
+        chances[risk.scans] = np.maximum(chances[risk.scans], risk.probability)
+    return RouteView(
+        predicted.name,
+        prediction,
+        metres,
+        np.maximum.reduceat(prediction.load, metres.first),
+        np.maximum.reduceat(chances, metres.first),
+        tuple(_risk_view(predicted, risk) for risk in predicted.risks),
+        predicted.stations,
+        outdated,
+    )
+
+
+def _risk_view(predicted: Predicted, risk: NeighborRisk) -> RiskView:
+    """Name two neighbors, and the places from which one may be taken for the other."""
+    reflectors, poses = predicted.reflectors.reflectors, predicted.prediction.drive.poses
+    worst = poses[risk.scans[int(np.argmax(risk.probability))]]
+    return RiskView(
+        reflectors[risk.reflector].id,
+        reflectors[risk.neighbor].id,
+        risk.worst,
+        tuple(np.unique(risk.metres.astype(np.int64)).tolist()),
+        poses[risk.scans, :2],
+        (float(worst[0]), float(worst[1])),
+    )
 
 
 def failure_view(ranked: Ranked, failed: str, *, outdated: bool) -> FailureView:
