@@ -37,6 +37,11 @@ def polyline_segments(points: FloatArray, height: float) -> Points:
     return np.stack([lifted[:-1], lifted[1:]], axis=1)
 
 
+def stroke_segments(strokes: FloatArray, height: float) -> Points:
+    """Return the (N, 2, 3) segments of N strokes given as (N, 2, 2) points [m]."""
+    return lift(strokes.reshape(-1, 2), height).reshape(-1, 2, 3) if len(strokes) else NO_SEGMENTS
+
+
 def thinned(points: FloatArray, at_most: int) -> FloatArray:
     """Return about every k-th of (N, ...) points so that at most `at_most` remain; the last one always does."""
     if len(points) <= at_most:

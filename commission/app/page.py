@@ -15,8 +15,10 @@ from commission.app.editing.desk import Desk, DeskTabs
 from commission.app.editing.pointer import floor_drag
 from commission.app.extent import extent_of
 from commission.app.layers.accumulated import AccumulatedLayer
+from commission.app.layers.ambiguity import AmbiguityLayer
 from commission.app.layers.base import Layer
 from commission.app.layers.detections import DetectionLayer
+from commission.app.layers.events import EventLayer
 from commission.app.layers.failing import FailingLayer
 from commission.app.layers.floor import FloorLayer
 from commission.app.layers.gates import GateLayer
@@ -26,6 +28,7 @@ from commission.app.layers.prediction import RibbonLayer
 from commission.app.layers.reflectors import ReflectorLayer, ReflectorNameLayer
 from commission.app.layers.routes import RouteLayer
 from commission.app.layers.scan import ScanLayer
+from commission.app.layers.suggestion import SuggestionLayer
 from commission.app.layers.trails import ReferenceLayer, TrailLayer
 from commission.app.layers.uncertainty import UncertaintyLayer
 from commission.app.layers.vehicle import VehicleLayer
@@ -49,11 +52,14 @@ from commission.site.project import Project
 LAYERS = (
     FloorLayer,
     HeatLayer,
+    AmbiguityLayer,
     GridLayer,
     RouteLayer,
     RibbonLayer,
+    EventLayer,
     FailingLayer,
     ReflectorLayer,
+    SuggestionLayer,
     ReflectorNameLayer,
     GateLayer,
     ScanLayer,
@@ -104,7 +110,7 @@ class Page:
         with left.add_tab("Site"):
             site = SitePanel(gui, post, state.project)
         with left.add_tab("Plan"):
-            plan = PlanPanel(gui, post, state)
+            plan = PlanPanel(gui, post)
         with left.add_tab("Run"):
             run = RunPanel(gui, post, state)
         with left.add_tab("Tune"):

@@ -124,13 +124,14 @@ class Runtime:
         self._clock = clock
         self._queue: SimpleQueue[Message] = SimpleQueue()
         self._jobs = Jobs(self._queue.put)
-        self._planner = Planner(self._jobs)
+        self._patient_jobs = Jobs(self._queue.put)
+        self._planner = Planner(self._jobs, self._patient_jobs)
         # Checks take milliseconds and do not wait for a simulation.
         self._checks = Jobs(self._queue.put)
         self._checker = Checker()
         self._checked: Project | None = None
         self._found: tuple[Problem, ...] = ()
-        self._shown_jobs: dict[int, Job] = {}
+        self._shown_jobs: dict[tuple[str, int], Job] = {}
         self._page: PageLike | None = None
         self._shown: Project | None = None
         self._dirty = True
@@ -154,8 +155,8 @@ class Runtime:
     def stop(self) -> None:
         """End the loop and the background work."""
         self._stopped.set()
-        self._jobs.close()
-        self._checks.close()
+        for jobs in (self._jobs, self._patient_jobs, self._checks):
+            jobs.close()
         self._thread.join(timeout=2.0)
         self._work.close()
 
@@ -269,9 +270,9 @@ class Runtime:
         """Follow a job; take its result or its error."""
         job = report.job
         if job.state in (JobState.WAITING, JobState.RUNNING):
-            self._shown_jobs[job.number] = job
+            self._shown_jobs[job.name, job.number] = job
             return
-        self._shown_jobs.pop(job.number, None)
+        self._shown_jobs.pop((job.name, job.number), None)
         self._planner.hear(report)
         if job.state is JobState.FAILED:
             self._apply(actions.Report(f"{job.name}: {job.error}"))

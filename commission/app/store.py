@@ -11,6 +11,7 @@ from pathlib import Path
 
 from commission.app.actions import Source
 from commission.app.editing.editor import Editor
+from commission.app.plan.layout import LayoutWish
 from commission.app.plan.settings import PlanSettings
 from commission.site.project import Project
 
@@ -88,6 +89,8 @@ class AppState:
     """Factor at which ellipses are drawn."""
     plan: PlanSettings = field(default_factory=PlanSettings)
     """What the step Plan shows."""
+    layout: LayoutWish = field(default_factory=LayoutWish)
+    """What a suggested layout must achieve."""
     problems: tuple[str, ...] = field(default=())
     """What went wrong, the newest last."""
 

@@ -36,6 +36,13 @@ WARNING_LINE: Color = (98, 70, 18)
 ERROR_LINE: Color = (112, 34, 32)
 DEPENDENT: Color = (255, 92, 205)
 OVER_LIMIT: Color = (255, 59, 48)
+RECOVERY: Color = (64, 200, 150)
+RISK: Color = (255, 140, 40)
+SUGGESTED: Color = (92, 240, 214)
+TAKEN_DOWN: Color = (255, 138, 101)
+FIRST_TWIN: Color = (120, 220, 255)
+SECOND_TWIN: Color = (255, 120, 220)
+KEEP_OUT: Color = (222, 150, 70)
 
 OPERATIONAL_COLOR = "#1c7c3c"
 FAIL_COLOR = "#c5221f"
@@ -97,6 +104,8 @@ TOP_BAR_PX = 44
 BOTTOM_PX = 248
 FOLDED_PX = 46
 """Height of the bottom strip when its plots are folded away [pixels]."""
+LOW_BOTTOM_PX = 200
+"""The same where the window is low."""
 LEFT_PX = 300
 RIGHT_PX = 270
 
@@ -108,8 +117,9 @@ WIDE = "<div class='c-wide'></div>"
 # match (another viser), the panels float and everything still works.
 STYLE = f"""<style>
 :root{{--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px}}
-[data-dock-root]{{height:calc(100% - var(--c-top) - var(--c-bottom))!important;margin-top:var(--c-top);
+[data-dock-root]{{height:calc(100% - var(--c-top) - var(--c-bottom))!important;top:var(--c-top);
  overflow:visible!important}}
+[data-dock-region] .mantine-ScrollArea-viewport>div{{padding-right:6px}}
 [data-floating-window]:has(.c-bottom),[data-floating-window]:has(.c-top){{position:fixed!important;left:0!important;
  right:0!important;width:100vw!important;max-width:none!important;border-radius:0!important;box-shadow:none!important}}
 [data-floating-window]:has(.c-bottom){{top:auto!important;bottom:0!important;height:var(--c-bottom)!important;
@@ -161,5 +171,7 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 .c-table td:first-child{{opacity:.65;padding-right:10px;white-space:nowrap}}
 .c-table td:last-child{{text-align:right}}
 @media (max-width:1500px){{.c-beside{{display:none}}}}
+@media (max-height:800px){{:root{{--c-bottom:{LOW_BOTTOM_PX}px}}
+ div:has(>div>.c-bottom)>:nth-child(n+7){{zoom:.78}}}}
 .c-note{{font-size:11.5px;opacity:.7;line-height:1.35}}
 </style>"""

@@ -56,6 +56,11 @@ class Lattice:
         """Return the number of points."""
         return self.rows * self.columns
 
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Middle of the first and the last point [m], map frame."""
+        return self.x + 0.5 * (self.columns - 1) * self.spacing, self.y + 0.5 * (self.rows - 1) * self.spacing
+
     def points(self) -> FloatArray:
         """All points: (rows * columns, 2) array [m], map frame."""
         grid_y, grid_x = np.mgrid[: self.rows, : self.columns].astype(np.float64)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.geometry.arrays import BoolArray
+from commission.geometry.arrays import BoolArray, FloatArray
 from commission.planning.coverage import Coverage, coverage, lattice_of
 from commission.planning.dilution import FixOptions
 from commission.planning.visibility import VisibilityOptions, visibility_model
@@ -44,10 +44,15 @@ def coverage_of(
 
 def drivable(project: Project, found: Coverage) -> BoolArray:
     """Whether each point lies on floor that the map knows to be free: (N,) array; all of it without a map."""
+    return np.array(found.floor) if project.floor_map is None else free_floor(project, found.lattice.points())
+
+
+def free_floor(project: Project, points: FloatArray) -> BoolArray:
+    """Whether points (N, 2) [m, map frame] lie on floor that the map knows to be free; all do without a map."""
     if project.floor_map is None:
-        return np.array(found.floor)
+        return np.ones(len(points), dtype=np.bool_)
     grid = project.floor_map.occupancy()
-    cells = grid.cells_at(found.lattice.points())
+    cells = grid.cells_at(points)
     inside = np.all((cells >= 0) & (cells < project.floor_map.cells.shape), axis=-1)
     row, column = np.where(inside[:, np.newaxis], cells, 0).T
     return inside & (project.floor_map.cells[row, column] == FREE)

@@ -18,6 +18,7 @@ class Tool(StrEnum):
     PLACE = "Place"
     ROUTE = "Route"
     MEASURE = "Measure"
+    KEEP_OUT = "Keep out"
 
 
 class Grab(StrEnum):

@@ -18,6 +18,7 @@ from commission.app.editing.gestures import (
     to_place,
 )
 from commission.app.editing.route_gestures import route_at
+from commission.app.plan.actions import FreeAreas, KeepOut
 from commission.app.reduction import ApplyParameters, FlyTo, Reduction, Tell, reduce
 from commission.app.store import AppState, Edit, edited
 from commission.errors import UsageError
@@ -115,6 +116,8 @@ def _(action: actions.ClickFloor, state: AppState) -> Reduction:
             before = editor.measured if len(editor.measured) == 1 else ()
             place = _on_something(state, editor, action)
             return Reduction(state.with_editor(action.client, replace(editor, measured=(*before, place))))
+        case Tool.KEEP_OUT:
+            return reduce(FreeAreas(action.place), state.with_editor(action.client, editor))
 
 
 def _picked(state: AppState, editor: Editor, action: actions.ClickFloor) -> Editor:
@@ -151,12 +154,13 @@ def _on_something(state: AppState, editor: Editor, action: actions.ClickFloor) -
 @reduce.register
 def _(action: actions.DragFloor, state: AppState) -> Reduction:
     editor = editor_of(state, action.client)
-    if editor.tool is not Tool.SELECT:
+    if editor.tool not in {Tool.SELECT, Tool.KEEP_OUT}:
         return Reduction(state)
     drag = editor.drag
     if action.phase == "start" or drag is None:
-        begun = replace(editor, reach=action.reach)
-        editor = grabbed(state.project, begun, Drag(Grab.RECTANGLE, action.start, action.now, action.add))
+        begun, whole = replace(editor, reach=action.reach), Drag(Grab.RECTANGLE, action.start, action.now, action.add)
+        takes_hold = editor.tool is Tool.SELECT
+        editor = grabbed(state.project, begun, whole) if takes_hold else replace(begun, drag=whole)
     else:
         editor = replace(editor, drag=replace(drag, now=action.now))
     if action.phase != "end":
@@ -200,6 +204,8 @@ def _dropped(state: AppState, editor: Editor, client: int) -> Reduction:
                 if selected_of(state.project, editor)
                 else Reduction(resting)
             )
+        case Grab.RECTANGLE if editor.tool is Tool.KEEP_OUT:
+            return reduce(KeepOut((*drag.start, *drag.now)), resting)
         case Grab.RECTANGLE:
             inside = reflectors_in(state.project.reflectors, drag.start, drag.now)
             kept = editor.selected if drag.add else ()

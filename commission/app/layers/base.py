@@ -35,6 +35,10 @@ class Layer(Protocol):
     def draw_plan(self, plan: PlanView, state: AppState) -> None:
         """Draw what the step Plan has found."""
 
+    def is_used(self, plan: PlanView, state: AppState) -> bool:
+        """Whether there is something that the legend has to explain."""
+        ...
+
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:
         """Add what only one browser's view needs; the caller removes it when the view changes."""
         ...
@@ -65,6 +69,10 @@ class BaseLayer:
 
     def draw_plan(self, plan: PlanView, state: AppState) -> None:
         """Draw what the step Plan has found."""
+
+    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - a default
+        """Whether there is something that the legend has to explain."""
+        return True
 
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:  # noqa: ARG002 - a default
         """Add what only one browser's view needs."""

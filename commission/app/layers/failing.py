@@ -56,6 +56,10 @@ class FailingLayer(BaseLayer):
         circle = np.array(place) + RING_MARKS * self._mark * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         self._ring.points = outline_segments(circle[np.newaxis], theme.Height.LABEL)
 
+    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - the protocol's
+        """Whether a reflector's failure is shown."""
+        return plan.failures is not None and plan.failures.place is not None
+
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return ring and metres."""
         return self._metres, self._ring

@@ -48,15 +48,13 @@ class HeatLayer(BaseLayer):
             self._image.image = image
             return
         lattice = heat.lattice
-        x = lattice.x + 0.5 * (lattice.columns - 1) * lattice.spacing
-        y = lattice.y + 0.5 * (lattice.rows - 1) * lattice.spacing
         self._image = self.scene.add_image(
             "/plan/heat",
             image,
             render_width=lattice.columns * lattice.spacing,
             render_height=lattice.rows * lattice.spacing,
             format="png",
-            position=(x, y, theme.Height.HEAT),
+            position=(*lattice.middle, theme.Height.HEAT),
             cast_shadow=False,
             receive_shadow=False,
             visible=visible,

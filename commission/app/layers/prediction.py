@@ -1,12 +1,12 @@
-"""What the step Plan expects along a route: a ribbon in the colors of its load, and where the supervisor stops."""
+"""What the step Plan expects along a route: a ribbon in the colors of its load. What happens on it is in `events`."""
 
 from __future__ import annotations
 
 import numpy as np
-from viser import LabelHandle, LineSegmentsHandle, SceneApi, SceneNodeHandle
+from viser import LineSegmentsHandle, SceneApi, SceneNodeHandle
 
 from commission.app import theme
-from commission.app.drawing import NO_SEGMENTS, Points, lift
+from commission.app.drawing import NO_SEGMENTS, stroke_segments
 from commission.app.layers.base import BaseLayer
 from commission.app.plan.loads import load_classes, palette
 from commission.app.plan.view import PlanView
@@ -50,7 +50,6 @@ class RibbonLayer(BaseLayer):
         # single vertices come out lighter in the browser than the same color of a whole node.
         self._rim = self._lines("rim", (0, 0, 0), RIM)
         self._ribbon = tuple(self._lines(f"ribbon/{index}", color, WIDTH) for index, color in enumerate(palette()))
-        self._stops: tuple[LabelHandle, ...] = ()
         self._shown: RoutePrediction | None = None
 
     def _lines(self, name: str, color: theme.Color, width: float) -> LineSegmentsHandle:
@@ -58,7 +57,7 @@ class RibbonLayer(BaseLayer):
             f"/plan/{name}", NO_SEGMENTS, color, thickness=width, thickness_units="screen"
         )
 
-    def draw_plan(self, plan: PlanView, state: AppState) -> None:
+    def draw_plan(self, plan: PlanView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
         """Draw the ribbon anew where the prediction has changed."""
         prediction = None if plan.route is None else plan.route.prediction
         if prediction is self._shown:
@@ -68,35 +67,12 @@ class RibbonLayer(BaseLayer):
         if prediction is not None:
             points, loads = prediction.drive.poses[:, :2], prediction.load
         lines, classes = pieces(points, loads, MOST_PIECES) if len(points) > 1 else (points.reshape(0, 2, 2), loads)
-        self._rim.points = _segments(lines, theme.Height.ROUTE)
+        self._rim.points = stroke_segments(lines, theme.Height.ROUTE)
         for index, node in enumerate(self._ribbon):
             chosen = lines[classes == index]
             if len(chosen) or len(node.points) > 1:
-                node.points = _segments(chosen, theme.Height.ACCUMULATED)
-        for label in self._stops:
-            label.remove()
-        self._stops = () if prediction is None else self._write(prediction, visible=self.name not in state.hidden)
-
-    def _write(self, prediction: RoutePrediction, *, visible: bool) -> tuple[LabelHandle, ...]:
-        """Write where the supervisor stops the vehicle."""
-        drive = prediction.drive
-        places = [min(int(np.searchsorted(drive.metres, metre)), len(drive) - 1) for metre in prediction.trips()]
-        return tuple(
-            self.scene.add_label(
-                f"/plan/stops/{number}",
-                f"supervisor stops at {metre:.0f} m",
-                position=(float(drive.poses[place, 0]), float(drive.poses[place, 1]), theme.Height.LABEL),
-                anchor="bottom-center",
-                font_screen_scale=0.8,
-                visible=visible,
-            )
-            for number, (metre, place) in enumerate(zip(prediction.trips(), places, strict=True))
-        )
+                node.points = stroke_segments(chosen, theme.Height.ACCUMULATED)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
-        """Return ribbon, rim and stops."""
-        return self._rim, *self._ribbon, *self._stops
-
-
-def _segments(lines: FloatArray, height: float) -> Points:
-    return lift(lines.reshape(-1, 2), height).reshape(-1, 2, 3) if len(lines) else NO_SEGMENTS
+        """Return ribbon and rim."""
+        return self._rim, *self._ribbon

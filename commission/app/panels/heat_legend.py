@@ -7,16 +7,24 @@ import math
 from viser import GuiApi
 
 from commission.app import theme
+from commission.app.layers.ambiguity import MAP_COLORS
 from commission.app.panels.base import BasePanel, escaped, table
+from commission.app.plan.cold_start import EVERY, SOME, TOO_FEW, UNIQUE
 from commission.app.plan.loads import BOUNDS, palette
 from commission.app.plan.scale import NO_FIX_COLORS
 from commission.app.plan.settings import Figure, PlanSettings
-from commission.app.plan.view import HeatView, Reading, RouteView
+from commission.app.plan.view import ColdStartView, HeatView, Reading, RouteView
 from commission.app.plan.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES, number_text, value_text
 from commission.app.store import AppState
 from commission.app.view import PageView
 
 AMONG_PEOPLE = (Figure.EXPECTED_VISIBLE, Figure.TWO_OR_MORE, Figure.THREE_OR_MORE)
+COLD_START_TEXTS = {
+    UNIQUE: "every heading tells the place",
+    TOO_FEW: "fewer than 2 visible at some headings",
+    SOME: "a look-alike at some headings",
+    EVERY: "no heading tells the place",
+}
 HATCH_CSS = "repeating-linear-gradient(135deg,{0} 0 3px,{1} 3px 6px)"
 
 
@@ -29,8 +37,9 @@ class HeatLegend(BasePanel):
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow what is drawn."""
-        heat, route = view.plan.heat, view.plan.route
+        heat, cold, route = view.plan.heat, view.plan.cold_start, view.plan.route
         content = "" if heat is None else heat_scale(heat, view.state)
+        content += "" if cold is None or not cold.is_drawn else cold_start_scale(cold)
         content += "" if view.plan.reading is None else reading_table(view.plan.reading, view.state.plan)
         content += "" if route is None else load_scale(route)
         if content != self._shown:
@@ -63,6 +72,21 @@ def heat_scale(heat: HeatView, state: AppState) -> str:
     if heat.outdated:
         lines.append("<div class='c-note'>computing anew …</div>")
     return head + "".join(lines)
+
+
+def cold_start_scale(cold: ColdStartView) -> str:
+    """Return the classes of the ambiguous places with the share of the floor in each."""
+    shares = cold.ambiguity.shares()
+    rows = "".join(
+        "<div style='display:flex;align-items:center;gap:8px'><span style='width:18px;height:12px;"
+        f"background:{theme.css(MAP_COLORS[index])}'></span><span style='flex:1'>{escaped(text)}</span>"
+        f"<span>{100 * shares[index - UNIQUE]:.1f} %</span></div>"
+        for index, text in COLD_START_TEXTS.items()
+    )
+    note = "<div class='c-note'>the site has changed since</div>" if cold.outdated else ""
+    title = "<b>Ambiguous cold start</b> [% of the floor]"
+    spots = f"<div class='c-note'>a spot every {cold.ambiguity.lattice.spacing:g} m</div>"
+    return f"<div class='c-cold-start'>{title}{spots}{rows}{note}</div>"
 
 
 def reading_table(reading: Reading, plan: PlanSettings) -> str:

@@ -22,7 +22,7 @@ SHAPES = {
 
 
 def legend(layers: Sequence[Layer], magnify: float) -> str:
-    """Return the legend of all layers; it says when ellipses are not true to scale."""
+    """Return the legend of layers; it says when ellipses are not true to scale."""
     scale = "" if magnify == 1.0 else f", drawn {magnify:g}x"
     rows = "".join(
         "<div style='display:flex;align-items:center;gap:8px;height:19px'><svg width='18' height='14'>"
@@ -39,8 +39,8 @@ class LegendPanel(BasePanel):
 
     def __init__(self, gui: GuiApi, post: Post, layers: Sequence[Layer], state: AppState) -> None:
         self._layers = layers
-        self._html = gui.add_html(legend(layers, state.magnify))
-        self._magnify = state.magnify
+        self._html = gui.add_html("")
+        self._shown: tuple[object, ...] = ()
         scale = gui.add_dropdown(
             "Ellipses",
             tuple(_factor(m) for m in MAGNIFICATIONS),
@@ -50,10 +50,13 @@ class LegendPanel(BasePanel):
         scale.on_update(posting(post, lambda event: actions.Magnify(float(str(event.target.value).rstrip("x")))))
 
     def draw_slowly(self, view: PageView) -> None:
-        """Say by how much ellipses are magnified."""
-        if view.state.magnify != self._magnify:
-            self._magnify = view.state.magnify
-            self._html.content = legend(self._layers, self._magnify)
+        """Explain what is drawn now, and say by how much ellipses are magnified."""
+        state = view.state
+        used = [layer for layer in self._layers if layer.name not in state.hidden and layer.is_used(view.plan, state)]
+        shown = (state.magnify, *(layer.name for layer in used))
+        if shown != self._shown:
+            self._shown = shown
+            self._html.content = legend(used, state.magnify)
 
 
 class LayersPanel(BasePanel):

@@ -28,6 +28,8 @@ def hint(project: Project, editor: Editor) -> str:
         case Tool.MEASURE:
             which = "second" if len(editor.measured) == 1 else "first"
             said = f"Measure: click the {which} point &nbsp; (Esc ends)"
+        case Tool.KEEP_OUT:
+            said = "Keep out: drag over an area without new reflectors, click one to free it &nbsp; (Esc ends)"
     return said
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from commission.app.plan.layout import Suggestion
 from commission.app.plan.settings import Place, PlanValue
+from commission.planning.candidates import Rectangle
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,4 +30,62 @@ class ReadFloor:
     """How near to a reflector counts as on it [m]: some pixels at the browser's zoom."""
 
 
-PlanAction: TypeAlias = SetPlan | ReadFloor
+@dataclass(frozen=True, slots=True)
+class SetLayout:
+    """Change one option of the suggested layout."""
+
+    name: str
+    """Field of `PlacementOptions`, or `group.name` of its demands or candidates."""
+    value: PlanValue
+    """New value, SI and radians."""
+
+
+@dataclass(frozen=True, slots=True)
+class CountRoute:
+    """Let a route count for the suggested layout, or not."""
+
+    name: str
+    """Name of the route."""
+    counts: bool
+    """Whether it counts."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeepOut:
+    """Keep new reflectors out of one more area."""
+
+    area: Rectangle
+    """Two opposite corners [m], map frame."""
+
+
+@dataclass(frozen=True, slots=True)
+class FreeAreas:
+    """Allow new reflectors again where they were kept out."""
+
+    place: Place | None = None
+    """In the areas around this place [m]; none: everywhere."""
+
+
+@dataclass(frozen=True, slots=True)
+class AskLayout:
+    """Suggest a layout; one that is being looked for or shown is dropped."""
+
+
+@dataclass(frozen=True, slots=True)
+class DiscardLayout:
+    """Drop the suggested layout, or stop looking for one."""
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptLayout:
+    """Put up the suggested reflectors."""
+
+    client: int
+    """Number of the browser's connection."""
+    suggestion: Suggestion
+    """What was seen on the page when it was accepted."""
+
+
+PlanAction: TypeAlias = (
+    SetPlan | ReadFloor | SetLayout | CountRoute | KeepOut | FreeAreas | AskLayout | DiscardLayout | AcceptLayout
+)

@@ -6,26 +6,30 @@ Called by the owner thread alone; knows no widget.
 from __future__ import annotations
 
 from dataclasses import replace
-
-import numpy as np
+from typing import Any
 
 from commission.app.editing.editor import Editor, Grab
 from commission.app.editing.gestures import moved
 from commission.app.jobs import JobReport, Jobs
 from commission.app.plan import work
-from commission.app.plan.scale import FIRST, NO_FIX, QUANTITIES, Scale, scale_for
+from commission.app.plan.cold_start import Ambiguity, look_alike
+from commission.app.plan.keys import changed_reflectors, cold_start_key, floor_key, ranking_key, route_key
+from commission.app.plan.layout import Suggestion, suggest
+from commission.app.plan.looks import cold_start_view, failure_view, heat_view, layout_view, reading_of, route_view
+from commission.app.plan.remembered import Remembered
+from commission.app.plan.scale import Scale, scale_for
 from commission.app.plan.settings import PlanSettings
-from commission.app.plan.upkeep import Key, Upkeep, is_same
-from commission.app.plan.view import FailureView, HeatView, PlanView, Reading, RouteView, stretches
+from commission.app.plan.upkeep import Upkeep, is_same
+from commission.app.plan.view import ColdStartView, FailureView, HeatView, LayoutView, PlanView, RouteView
 from commission.app.plan.work import Covered, Predicted, Ranked
 from commission.app.store import AppState
-from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
-from commission.site.reflectors import ReflectorMap
 
 COVERAGE, PREDICTION, RANKING = "Coverage", "Route prediction", "What if one fails"
-MOST_MOVED = 12
-"""Reflectors that are moved one by one; the floor is computed anew when more have changed."""
+LAYOUT = "Suggested layout"
+COLD_START = "Ambiguous places"
+JOBS = (COVERAGE, PREDICTION, RANKING, COLD_START, LAYOUT)
+"""Names of the jobs, as the page shows them."""
 
 
 class Planner:
@@ -34,14 +38,21 @@ class Planner:
     Parameters
     ----------
     jobs : where they are computed.
+    patient : where what takes long is computed, so that the rest need not wait for it.
     """
 
-    def __init__(self, jobs: Jobs) -> None:
+    def __init__(self, jobs: Jobs, patient: Jobs) -> None:
         self._coverage = Upkeep(COVERAGE, Covered, jobs)
         self._prediction = Upkeep(PREDICTION, Predicted, jobs)
         self._ranking = Upkeep(RANKING, Ranked, jobs)
+        self._cold_start = Upkeep(COLD_START, Ambiguity, patient)
+        self._layout = Upkeep(LAYOUT, Suggestion, patient)
         self._scale: Scale | None = None
         self._view = PlanView()
+        self._route_view = Remembered[RouteView]()
+        self._failure_view = Remembered[FailureView]()
+        self._cold_start_view = Remembered[ColdStartView]()
+        self._layout_view = Remembered[LayoutView]()
         self._shown: tuple[object, ...] = ()
         self._moves = 0
         self._drag: tuple[Project, tuple[Editor, ...], Project] | None = None
@@ -56,7 +67,7 @@ class Planner:
         if self._coverage.hear(report):
             self._scale = None
             return True
-        return self._prediction.hear(report) or self._ranking.hear(report)
+        return any(each.hear(report) for each in self._all())
 
     def follow(self, state: AppState) -> bool:
         """Start what is wanted and not there, drop what is not wanted; return whether the view is another one."""
@@ -64,24 +75,26 @@ class Planner:
         floor = self._dragged(state)
         self._keep_coverage(floor, plan)
         if plan.route and any(route.name == plan.route for route in project.routes):
-            self._prediction.keep(_route_key(project, plan), lambda progress: work.predict(project, plan, progress))
+            self._prediction.keep(route_key(project, plan), lambda progress: work.predict(project, plan, progress))
         else:
             self._prediction.drop()
         if plan.ranking:
             self._keep_ranking(project, plan)
         else:
             self._ranking.drop()
+        self._keep_patiently(state)
         shown = (
             *(part for each in self._all() for part in (each.result, each.is_running)),
             self._moves,
             plan,
+            state.layout,
             project,
             floor,
         )
         if len(shown) == len(self._shown) and all(a is b for a, b in zip(shown, self._shown, strict=True)):
             return False
         self._shown = shown
-        self._view = self._look(project, floor, plan)
+        self._view = self._look(floor, state)
         return True
 
     def _dragged(self, state: AppState) -> Project:
@@ -97,8 +110,8 @@ class Planner:
             self._drag = (state.project, editors, floor)
         return self._drag[2]
 
-    def _all(self) -> tuple[Upkeep[Covered], Upkeep[Predicted], Upkeep[Ranked]]:
-        return self._coverage, self._prediction, self._ranking
+    def _all(self) -> tuple[Upkeep[Any], ...]:
+        return self._coverage, self._prediction, self._ranking, self._cold_start, self._layout
 
     def _keep_coverage(self, project: Project, plan: PlanSettings) -> None:
         """Follow moved reflectors at once, anything else by a job."""
@@ -106,10 +119,10 @@ class Planner:
             self._coverage.drop()
             self._scale = None
             return
-        key = _floor_key(project, plan)
+        key = floor_key(project, plan)
         before, covered = self._coverage.key, self._coverage.result
         if covered is not None and is_same(key[1:], before[1:]) and key[0] is not before[0]:
-            changed = _changed(covered.live.reflectors, project.reflectors)
+            changed = changed_reflectors(covered.live.reflectors, project.reflectors)
             if changed is not None:
                 self._coverage.key = key
                 self._moves += 1
@@ -120,122 +133,53 @@ class Planner:
     def _keep_ranking(self, project: Project, plan: PlanSettings) -> None:
         """Rank once; after an edit the ranking is outdated until it is asked for again, since it takes long."""
         if self._ranking.result is None or self._ranking.key[-2:] != (plan.failure.value, plan.ranking):
-            self._ranking.keep(_ranking_key(project, plan), lambda progress: work.rank(project, plan, progress))
+            self._ranking.keep(ranking_key(project, plan), lambda progress: work.rank(project, plan, progress))
 
-    def _look(self, project: Project, floor: Project, plan: PlanSettings) -> PlanView:
+    def _keep_patiently(self, state: AppState) -> None:
+        """Do what takes long once: other wishes and other sites wait until it is asked for again."""
+        project, plan, wish = state.project, state.plan, state.layout
+        if not plan.cold_start:
+            self._cold_start.drop()
+        elif self._cold_start.key[:1] != (plan.cold_start,):
+            key = (plan.cold_start, *cold_start_key(project, plan))
+            self._cold_start.keep(key, lambda progress: look_alike(project, plan, progress))
+        if wish.wanted:
+            self._layout.ask((wish.asked,), lambda progress: suggest(project, wish, progress))
+        else:
+            self._layout.drop()
+
+    def _look(self, floor: Project, state: AppState) -> PlanView:
+        """Put the view together; parts that did not change stay the same value."""
+        project, plan = state.project, state.plan
+        covered, predicted, ranked = self._coverage.result, self._prediction.result, self._ranking.result
+        ambiguity, suggestion = self._cold_start.result, self._layout.result
+        old_route = not is_same(self._prediction.key, route_key(project, plan))
+        old_ranking = not is_same(self._ranking.key[:-1], ranking_key(project, plan)[:-1])
+        old_places = not is_same(self._cold_start.key[1:], cold_start_key(project, plan))
         return PlanView(
-            self._heat(floor, plan),
-            self._reading(plan),
-            self._route(project, plan),
-            self._failures(project, plan),
+            None if covered is None or not plan.figure else self._heat(covered, floor, plan),
+            None if covered is None or plan.probe is None else reading_of(covered, plan.probe),
+            self._route_view.of(
+                (predicted, old_route), lambda: predicted and route_view(predicted, outdated=old_route)
+            ),
+            self._failure_view.of(
+                (ranked, plan.failed, old_ranking),
+                lambda: ranked and failure_view(ranked, plan.failed, outdated=old_ranking),
+            ),
+            self._cold_start_view.of(
+                (ambiguity, plan.pair, bool(plan.figure), old_places),
+                lambda: ambiguity and cold_start_view(ambiguity, plan, outdated=old_places),
+            ),
+            self._layout_view.of(
+                (suggestion, project, state.layout),
+                lambda: suggestion and layout_view(suggestion, project, state.layout),
+            ),
             any(each.is_running for each in self._all()),
         )
 
-    def _heat(self, project: Project, plan: PlanSettings) -> HeatView | None:
-        """Sort the figure into its classes; the scale stays while reflectors move, so that colors compare."""
-        covered = self._coverage.result
-        if covered is None or not plan.figure:
-            return None
-        lattice = covered.live.coverage.lattice
-        values = getattr(covered.live.coverage.fixes, plan.figure.value)
+    def _heat(self, covered: Covered, floor: Project, plan: PlanSettings) -> HeatView:
+        """The heatmap; its scale stays while reflectors move, so that colors compare."""
         if self._scale is None or self._scale.figure is not plan.figure:
+            values = getattr(covered.live.coverage.fixes, plan.figure.value)
             self._scale = scale_for(plan.figure, values[covered.floor])
-        classes = self._scale.classes(values, covered.floor)
-        counts = np.bincount(classes, minlength=FIRST + len(self._scale.bounds) + 1)[NO_FIX:]
-        return HeatView(
-            lattice,
-            self._scale,
-            classes.reshape(lattice.rows, lattice.columns),
-            counts / max(1, counts.sum()),
-            not is_same(self._coverage.key, _floor_key(project, plan)),
-        )
-
-    def _reading(self, plan: PlanSettings) -> Reading | None:
-        covered = self._coverage.result
-        if covered is None or plan.probe is None:
-            return None
-        index = covered.live.coverage.lattice.index_near(*plan.probe)
-        if index is None:
-            return None
-        fixes = covered.live.coverage.fixes
-        values = {figure: float(getattr(fixes, figure.value)[index]) for figure in QUANTITIES}
-        return Reading(plan.probe, values, bool(covered.floor[index]))
-
-    def _route(self, project: Project, plan: PlanSettings) -> RouteView | None:
-        predicted = self._prediction.result
-        if predicted is None:
-            return None
-        prediction = predicted.prediction
-        metres = prediction.per_metre()
-        outdated = not is_same(self._prediction.key, _route_key(project, plan))
-        return RouteView(
-            str(self._prediction.key[-1]),
-            prediction,
-            metres,
-            np.maximum.reduceat(prediction.load, metres.first),
-            outdated,
-        )
-
-    def _failures(self, project: Project, plan: PlanSettings) -> FailureView | None:
-        ranked = self._ranking.result
-        if ranked is None:
-            return None
-        reflectors = ranked.reflectors
-        names = tuple(reflectors.reflectors[each.reflector].id for each in ranked.ranking)
-        chosen = ranked.ranking[names.index(plan.failed)] if plan.failed in names else None
-        place, failing = None, list[FloatArray]()
-        if chosen is not None:
-            reflector = reflectors.reflectors[chosen.reflector]
-            place = (reflector.x, reflector.y)
-            for planned, part in zip(ranked.planned, chosen.routes, strict=True):
-                fails = np.isin(planned.drive.metres.astype(np.int64), part.metres)
-                failing.extend(stretches(planned.drive.poses[:, :2], fails))
-        outdated = not is_same(self._ranking.key[:-1], _ranking_key(project, plan)[:-1])
-        return FailureView(ranked.ranking, names, chosen, place, tuple(failing), outdated)
-
-
-def _floor_key(project: Project, plan: PlanSettings) -> Key:
-    return (
-        project.reflectors,
-        project.floor_map,
-        project.scanner,
-        project.parameters.observation,
-        project.parameters.odometry,
-        plan.heading.value,
-        plan.given_heading,
-        plan.measurement.value,
-        plan.on_odometry,
-        plan.blocked_per_m,
-        plan.min_beams,
-    )
-
-
-def _site_key(project: Project, plan: PlanSettings) -> Key:
-    """What predictions depend on besides the route."""
-    return (
-        project.reflectors,
-        project.floor_map,
-        project.scanner,
-        project.vehicle,
-        project.parameters,
-        project.routes,
-        plan.blocked_per_m,
-        plan.min_beams,
-    )
-
-
-def _route_key(project: Project, plan: PlanSettings) -> Key:
-    return (*_site_key(project, plan), plan.route)
-
-
-def _ranking_key(project: Project, plan: PlanSettings) -> Key:
-    return (*_site_key(project, plan), plan.failure.value, plan.ranking)
-
-
-def _changed(before: ReflectorMap, after: ReflectorMap) -> list[int] | None:
-    """Indices of the reflectors that changed; none when there are other ones, or too many."""
-    if len(before) != len(after):
-        return None
-    pairs = zip(before.reflectors, after.reflectors, strict=True)
-    changed = [index for index, (old, new) in enumerate(pairs) if old != new]
-    return changed if len(changed) <= MOST_MOVED else None
+        return heat_view(covered, self._scale, outdated=not is_same(self._coverage.key, floor_key(floor, plan)))

@@ -22,6 +22,9 @@ CHOICES: dict[str, type[Figure] | type[Heading] | type[Measurement] | type[Failu
     "failure": Failure,
 }
 
+COUNTED = ("ranking", "cold_start")
+"""Settings that are requests: each true value is one more."""
+
 
 def changed(action: SetPlan, plan: PlanSettings, project: Project) -> PlanSettings:
     """Return the settings with one changed.
@@ -37,9 +40,14 @@ def changed(action: SetPlan, plan: PlanSettings, project: Project) -> PlanSettin
         project.route(str(action.value))
     choice = CHOICES.get(action.name)
     changes: dict[str, Any] = {action.name: action.value if choice is None else choice(str(action.value))}
-    if action.name == "ranking":
+    if action.name in COUNTED:
         # Counted, so that asking again after an edit is told apart from having asked.
-        changes["ranking"] = plan.ranking + 1 if action.value else 0
+        changes[action.name] = getattr(plan, action.name) + 1 if action.value else 0
+    if action.name == "cold_start":
+        # Its map is drawn where the heatmap would be.
+        changes |= {"pair": -1, "figure": Figure.NONE if action.value else plan.figure}
+    if action.name == "pair" and action.value == plan.pair:
+        changes["pair"] = -1
     if action.name == "failure" or (action.name == "ranking" and not action.value):
         changes["failed"] = ""
     return replace(plan, **changes)

@@ -62,7 +62,15 @@ class PlanSettings:
     failed: str = ""
     """Id of the reflector whose failure is shown on the floor; empty: none."""
 
+    cold_start: int = 0
+    """Number of times ambiguous places were asked for; 0: they are not wanted."""
+    tolerance: float = 0.1
+    """Distance up to which a reflector counts as standing where a look-alike of it does [m]."""
+    pair: int = -1
+    """Which pair of look-alikes is shown, counted in the order of the list; -1: none."""
+
     def __post_init__(self) -> None:
+        above(self.tolerance, 0.0, "tolerance", "m")
         between(self.opacity, (0.0, 1.0), "opacity")
         between(self.blocked_per_m, (0.0, 1.0), "blocked", "per metre")
         above(self.on_odometry, 0.0, "way on odometry", "m")

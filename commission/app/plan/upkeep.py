@@ -44,6 +44,13 @@ class Upkeep(Generic[Result]):
         if self._running is None and not is_same(key, self.key):
             self._running = (self._jobs.start(self.name, work).number, key)
 
+    def ask(self, key: Key, work: Callable[[Progress], Result]) -> None:
+        """Start the job where the key is another one than before; what the one before led to is dropped."""
+        before = self.key if self._running is None else self._running[1]
+        if not is_same(key, before):
+            self.drop()
+            self.keep(key, work)
+
     def drop(self) -> None:
         """Forget the result and stop the job: it is not wanted any more."""
         if self._running is not None:
@@ -52,7 +59,8 @@ class Upkeep(Generic[Result]):
 
     def hear(self, report: JobReport) -> bool:
         """Take the end of the job; return whether it was this one's."""
-        if self._running is None or report.job.number != self._running[0]:
+        # Numbers tell jobs of one runner apart; there are several runners.
+        if self._running is None or (report.job.name, report.job.number) != (self.name, self._running[0]):
             return False
         if report.job.state in (JobState.WAITING, JobState.RUNNING):
             return False

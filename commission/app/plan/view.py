@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from commission.app.plan.cold_start import Ambiguity
+from commission.app.plan.layout import Suggestion
 from commission.app.plan.scale import Scale
-from commission.app.plan.settings import Figure
+from commission.app.plan.settings import Figure, Place
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.planning.coverage import Lattice
 from commission.planning.dependence import Dependence
-from commission.planning.route_prediction import PerMetre, RoutePrediction
+from commission.planning.route_prediction import PerMetre, RoutePrediction, StationAccuracy
+
+Pose: TypeAlias = tuple[float, float, float]
+"""x, y and heading of base, map frame [m, m, rad]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +50,24 @@ class HeatView:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class RiskView:
+    """A reflector that may be taken for a neighbor inside its gate."""
+
+    reflector: str
+    """Id of the one that is detected."""
+    neighbor: str
+    """Id of the one that it may be taken for."""
+    chance: float
+    """Largest probability that a detection fits the neighbor better [0..0.5]."""
+    metres: tuple[int, ...]
+    """Metres of the way where they are that near to each other."""
+    points: FloatArray
+    """(N, 2) where the vehicle is then [m]."""
+    worst: Place
+    """Where the vehicle is when it is most probable [m]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class RouteView:
     """What is expected along a route."""
 
@@ -55,6 +79,12 @@ class RouteView:
     """The worst of each metre."""
     loads: FloatArray
     """(B,) largest share of the supervisor's limit in each metre [1]."""
+    risk: FloatArray
+    """(B,) largest chance of a wrong association in each metre [0..0.5]."""
+    risks: tuple[RiskView, ...]
+    """Neighbors that may be taken for each other, the most probable first."""
+    stations: tuple[StationAccuracy, ...]
+    """Stations on the route, and whether what they require is met."""
     outdated: bool
     """Whether the site has changed since, and it is being predicted anew."""
 
@@ -78,6 +108,42 @@ class FailureView:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class TwinsView:
+    """One pair of look-alikes: two groups of reflectors, and two poses that see the same."""
+
+    groups: tuple[FloatArray, FloatArray]
+    """(n, 2) places of the reflectors of each group [m], in the same order."""
+    poses: tuple[Pose, Pose]
+    """A pose that sees the first group, and the one that sees the second alike [m, m, rad]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ColdStartView:
+    """Where a vehicle could take its place for another one."""
+
+    ambiguity: Ambiguity
+    """Map and pairs."""
+    twins: TwinsView | None
+    """The pair that is shown on the floor."""
+    is_drawn: bool
+    """Whether its map is: where a heatmap is, it is not."""
+    outdated: bool
+    """Whether the site or the tolerance has changed since."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LayoutView:
+    """A suggested layout."""
+
+    suggestion: Suggestion
+    """What was found."""
+    outdated: bool
+    """Whether the site has changed since."""
+    wished_otherwise: bool
+    """Whether something else is wished for by now."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PlanView:
     """Everything the step Plan has found so far."""
 
@@ -89,6 +155,10 @@ class PlanView:
     """The prediction."""
     failures: FailureView | None = None
     """The ranking."""
+    cold_start: ColdStartView | None = None
+    """The ambiguous places."""
+    layout: LayoutView | None = None
+    """The suggested layout."""
     waiting: bool = False
     """Whether something is wanted that is not there yet."""
 

@@ -45,3 +45,14 @@ def value_text(figure: Figure, value: float, measurement: Measurement) -> str:
     else:
         text = number_text(shown)
     return f"{text} {unit_of(figure, measurement)}".rstrip()
+
+
+def metres_text(metres: list[int]) -> str:
+    """Return numbers of metres as the ranges of the way that they make up."""
+    ranges: list[list[int]] = []
+    for metre in metres:
+        if ranges and metre == ranges[-1][1]:
+            ranges[-1][1] = metre + 1
+        else:
+            ranges.append([metre, metre + 1])
+    return ", ".join(f"{number_text(a)} to {number_text(b)} m" for a, b in ranges) or "nothing fails"

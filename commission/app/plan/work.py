@@ -9,10 +9,11 @@ from typing import TypeAlias
 from commission.app.plan.settings import PlanSettings
 from commission.geometry.arrays import BoolArray
 from commission.planning import coverage, dependence, route_prediction
+from commission.planning.association_risk import NeighborRisk, neighbor_risks
 from commission.planning.coverage import Lattice, LiveCoverage, lattice_of
 from commission.planning.dependence import Dependence, FailureOptions
 from commission.planning.dilution import FixOptions, fix_options, odometry_prior
-from commission.planning.route_prediction import PlannedRoute, PredictionOptions, RoutePrediction
+from commission.planning.route_prediction import PlannedRoute, PredictionOptions, RoutePrediction, StationAccuracy
 from commission.planning.visibility import VisibilityModel, VisibilityOptions, visibility_model
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -40,8 +41,16 @@ class Covered:
 class Predicted:
     """A prediction along one route."""
 
+    name: str
+    """Name of the route."""
+    reflectors: ReflectorMap
+    """The reflectors that were there."""
     prediction: RoutePrediction
     """Scan by scan."""
+    stations: tuple[StationAccuracy, ...]
+    """The stations on it."""
+    risks: tuple[NeighborRisk, ...]
+    """Neighbors inside each other's gate, the most probable mistake first."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,8 +107,15 @@ def predict(project: Project, settings: PlanSettings, progress: Progress) -> Pre
     options = PredictionOptions(blocked_per_m=settings.blocked_per_m)
     model = _model(project, settings)
     progress(0.5, "route")
+    planned = route_prediction.plan_route(project, settings.route, options, model)
+    prediction = route_prediction.predict_route(planned)
+    progress(0.9, "neighbors")
     return Predicted(
-        route_prediction.predict_route(route_prediction.plan_route(project, settings.route, options, model))
+        settings.route,
+        project.reflectors,
+        prediction,
+        route_prediction.station_accuracies(prediction, project.stations),
+        neighbor_risks(planned, prediction),
     )
 
 

@@ -5,15 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from commission.app.layers.events import events, place_at
 from commission.app.layers.prediction import pieces
 from commission.app.panels.plan_chart import chart
+from commission.app.panels.plan_tracks import round_up
 from commission.app.plan.loads import BOUNDS, load_classes, palette
+from commission.app.plan.looks import route_view
 from commission.app.plan.overlay import driven
+from commission.app.plan.settings import PlanSettings
 from commission.app.plan.view import RouteView, stretches
+from commission.app.plan.work import predict
 from commission.app.session import Drive, Session
 from commission.localization.setup import LocalizerSetup
 from commission.planning.route_prediction import RoutePrediction, plan_route, predict_route
 from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
+from commission.site.stations import Station
 
 
 @pytest.fixture(scope="module")
@@ -69,16 +76,66 @@ def test_a_run_elsewhere_is_not_laid_over_the_route(session: Session, prediction
     assert driven(replace(series, means=series.means + np.array([3.0, 3.0, 0.0])), prediction) is None
 
 
-def test_the_chart_says_where_the_supervisor_stops(project: Project, prediction: RoutePrediction) -> None:
-    assert "nowhere" in chart(_view(prediction), None)
-    limits = replace(project.parameters.supervisor, position_limit=0.001)
-    strict = replace(project, parameters=replace(project.parameters, supervisor=limits))
-    stopped = predict_route(plan_route(strict, project.routes[0].name))
-    assert len(stopped.trips())
-    assert "nowhere" not in chart(_view(stopped), None)
+def strict(project: Project) -> Project:
+    """A project whose supervisor stops the vehicle at once, and lets it go on metres later."""
+    limits = replace(project.parameters.supervisor, position_limit=0.012)
+    return replace(project, parameters=replace(project.parameters, supervisor=limits))
 
 
-def _view(prediction: RoutePrediction) -> RouteView:
-    metres = prediction.per_metre()
-    loads = np.maximum.reduceat(prediction.load, metres.first)
-    return RouteView("There and back", prediction, metres, loads, outdated=False)
+def expected(project: Project) -> RouteView:
+    """What the page shows of the first route."""
+    settings = PlanSettings(route=project.routes[0].name)
+    return route_view(predict(project, settings, lambda _fraction, _message: None), outdated=False)
+
+
+def test_the_chart_says_where_the_supervisor_stops_and_draws_it(project: Project) -> None:
+    calm = chart(expected(project), None)
+    assert "nowhere" in calm
+    assert "c-stop" not in calm
+    route = expected(strict(project))
+    drawn = chart(route, None)
+    assert "nowhere" not in drawn
+    # One line in each of the four drawings.
+    assert drawn.count("class='c-stop'") == 4 * len(route.prediction.trips()) > 0
+    assert drawn.count("class='c-recovery'") == 4 * len(route.prediction.recoveries()) > 0
+
+
+def test_the_floor_is_marked_where_the_supervisor_stops_and_lets_go_on(project: Project) -> None:
+    route = expected(strict(project))
+    found = events(route)
+    assert len(found) == len(route.prediction.trips()) + len(route.prediction.recoveries())
+    assert found[0].text.startswith("stops at")
+    assert found[0].place == place_at(route.prediction, float(route.prediction.trips()[0]))
+
+
+def test_a_station_says_whether_its_accuracy_is_met(project: Project) -> None:
+    x, y = (float(value) for value in project.routes[0].segments[0].control_points[-1])
+    drive = expected(project).prediction.drive
+    heading = float(drive.poses[np.argmin(np.hypot(*(drive.poses[:, :2] - (x, y)).T)), 2])
+    stations = Station("Easy <dock>", x, y, heading, 0.1), Station("Hard", x, y, heading, 0.001)
+    route = expected(replace(project, stations=stations))
+    drawn = chart(route, None)
+    assert [each.is_met for each in route.stations] == [True, False]
+    assert "Easy &lt;dock&gt;" in drawn
+    assert ">met<" in drawn
+    assert ">not met<" in drawn
+    assert [event.text.endswith("not met") for event in events(route)] == [False, True]
+
+
+def test_neighbors_inside_the_gate_are_listed_with_chance_and_metres_and_drawn(project: Project) -> None:
+    assert not expected(project).risks
+    first = project.reflectors.reflectors[0]
+    twin = replace(first, id="Twin", y=first.y + 0.05)
+    crowded = replace(project, reflectors=ReflectorMap((*project.reflectors.reflectors, twin)))
+    route = expected(crowded)
+    assert {(risk.reflector, risk.neighbor) for risk in route.risks} == {(first.id, "Twin"), ("Twin", first.id)}
+    worst = route.risks[0]
+    assert 0.1 < worst.chance <= 0.5
+    assert route.risk.max() == worst.chance
+    assert set(worst.metres) <= set(route.metres.metre.tolist())
+    assert np.hypot(*(worst.points - worst.worst).T).min() == 0.0
+    assert "wrong association" in chart(route, None)
+
+
+def test_the_axis_of_a_plain_track_ends_at_a_round_number() -> None:
+    assert [round_up(value) for value in (0.5, 0.51, 1.0, 3.0, 7.0, 20.0)] == [0.5, 1.0, 1.0, 5.0, 10.0, 20.0]

@@ -25,7 +25,7 @@ class Bench:
     def __init__(self, project: Project) -> None:
         self.queue: SimpleQueue[JobReport] = SimpleQueue()
         self.jobs = Jobs(self.queue.put)
-        self.planner = Planner(self.jobs)
+        self.planner = Planner(self.jobs, self.jobs)
         self.state = AppState(project, project)
 
     def ask(self, **settings: object) -> None:

@@ -1,0 +1,91 @@
+"""Where a vehicle that is switched on could take its place for another one: the job, its map, its pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.app.plan.settings import PlanSettings
+from commission.geometry.arrays import FloatArray
+from commission.planning.ambiguity import AmbiguityOptions, AmbiguousPair, ColdStart, cold_start
+from commission.planning.coverage import Lattice, lattice_of
+from commission.planning.visibility import VisibilityModel, VisibilityOptions, visibility_model
+from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
+from commission.studies.coverage import free_floor
+
+NOTHING, UNIQUE, TOO_FEW, SOME, EVERY = range(5)
+"""Classes: beside the floor; each heading tells its place; fewer than two visible somewhere, no twin; a twin at some
+headings; no heading tells its place."""
+CLASSES = EVERY + 1
+SPACINGS = (0.25, 0.5, 1.0, 2.0)
+"""Distances between the spots that are tried [m]."""
+MOST_SPOTS = 8000
+"""Spots of the floor and its surroundings together: the time of the job is about proportional to them."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ambiguity:
+    """The ambiguous floor."""
+
+    reflectors: ReflectorMap
+    """The reflectors that were looked at."""
+    lattice: Lattice
+    """The spots."""
+    classes: NDArray[np.uint8]
+    """(rows, columns) class of each spot; row 0 is the lowest y."""
+    pairs: tuple[AmbiguousPair, ...]
+    """Groups of reflectors that are taken for each other, one way or the other; the most frequent first."""
+
+    def shares(self) -> FloatArray:
+        """Share of the floor in each class from `UNIQUE` on [0..1]."""
+        counts = np.bincount(self.classes.ravel(), minlength=CLASSES)[UNIQUE:]
+        return counts / max(1, counts.sum())
+
+    def names(self, group: tuple[int, ...]) -> tuple[str, ...]:
+        """Ids of a group of reflectors."""
+        return tuple(self.reflectors.reflectors[index].id for index in group)
+
+
+def spots_of(project: Project) -> Lattice:
+    """Return the lattice of spots: as fine as the number of spots allows."""
+    lattices = (lattice_of(project, spacing) for spacing in SPACINGS)
+    return next((lattice for lattice in lattices if len(lattice) <= MOST_SPOTS), lattice_of(project, SPACINGS[-1]))
+
+
+def look_alike(project: Project, settings: PlanSettings, progress: Callable[[float, str], None]) -> Ambiguity:
+    """Ask for every free spot of the floor, heading by heading, whether another pose sees the same."""
+    progress(0.0, "sight of each reflector")
+    model = visibility_model(project, VisibilityOptions(min_beams=settings.min_beams))
+    lattice = spots_of(project)
+    options = AmbiguityOptions(tolerance=settings.tolerance)
+    found = cold_start(model, lattice, options, progress)
+    return Ambiguity(project.reflectors, lattice, _classes(project, model, lattice, found), both_ways(found.pairs))
+
+
+def both_ways(pairs: tuple[AmbiguousPair, ...]) -> tuple[AmbiguousPair, ...]:
+    """Merge pairs of the same two groups, whichever is taken for the other; the most frequent come first."""
+    merged: dict[frozenset[tuple[int, ...]], AmbiguousPair] = {}
+    for pair in pairs:
+        key = frozenset((pair.constellation, tuple(sorted(pair.image))))
+        first = merged.get(key)
+        merged[key] = pair if first is None else replace(first, poses=first.poses + pair.poses)
+    return tuple(sorted(merged.values(), key=lambda pair: -pair.poses))
+
+
+def _classes(project: Project, model: VisibilityModel, lattice: Lattice, found: ColdStart) -> NDArray[np.uint8]:
+    """Sort the spots; `found` holds heading by heading those that are not in a wall."""
+    points = lattice.points()
+    asked = ~model.caster.grid.is_occupied(points)
+    ambiguous = found.ambiguous.reshape(-1, int(asked.sum()))
+    twins = np.isfinite(found.partners[:, 0]).reshape(ambiguous.shape).any(axis=0)
+    kinds = np.where(ambiguous.any(axis=0), TOO_FEW, UNIQUE)
+    kinds = np.where(twins, SOME, kinds)
+    kinds = np.where(ambiguous.all(axis=0), EVERY, kinds)
+    classes = np.full(len(points), NOTHING, np.uint8)
+    classes[asked] = kinds
+    classes[~free_floor(project, points)] = NOTHING
+    return classes.reshape(lattice.rows, lattice.columns)
