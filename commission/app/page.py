@@ -29,6 +29,7 @@ from commission.app.layers.scan import ScanLayer
 from commission.app.layers.trails import ReferenceLayer, TrailLayer
 from commission.app.layers.uncertainty import UncertaintyLayer
 from commission.app.layers.vehicle import VehicleLayer
+from commission.app.layers.violations import ViolationLayer
 from commission.app.layers.walls import WallLayer
 from commission.app.panels.base import Panel, Post
 from commission.app.panels.heat_legend import HeatLegend
@@ -51,6 +52,7 @@ LAYERS = (
     HeatLayer,
     GridLayer,
     RouteLayer,
+    ViolationLayer,
     RibbonLayer,
     FailingLayer,
     ReflectorLayer,
@@ -112,7 +114,7 @@ class Page:
         left.dock_left()
         left.set_width(theme.LEFT_PX)
         above = gui.add_panel()
-        self._tabs = DeskTabs(above.add_tab("Selection"), above.add_tab("Reflectors"))
+        selection, reflectors = above.add_tab("Selection"), above.add_tab("Reflectors")
         above.dock_right()
         above.set_width(theme.RIGHT_PX)
         below = gui.add_panel()
@@ -127,6 +129,7 @@ class Page:
         with bottom.add_tab("Time"):
             time_line = TimeLine(gui, post, state.speed)
             plots = Plots(gui)
+        self._tabs = DeskTabs(selection, reflectors, bottom.add_tab("Route"))
         bottom.float(x=0, y=-1, width=1000, height=theme.BOTTOM_PX)
         return top, site, plan, scales, run, tune, legend, switches, problems, time_line, plots
 
@@ -162,6 +165,7 @@ class Page:
                         layer.draw_slowly(view.run, view.state)
             for layer in self._layers:
                 layer.draw_plan(view.plan, view.state)
+                layer.draw_violations(view.violations)
             for panel in self._panels:
                 panel.draw(view)
                 if slowly:

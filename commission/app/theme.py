@@ -36,6 +36,7 @@ WARNING_LINE: Color = (98, 70, 18)
 ERROR_LINE: Color = (112, 34, 32)
 DEPENDENT: Color = (255, 92, 205)
 OVER_LIMIT: Color = (255, 59, 48)
+TOO_LITTLE: Color = (240, 132, 52)
 
 OPERATIONAL_COLOR = "#1c7c3c"
 FAIL_COLOR = "#c5221f"
@@ -95,6 +96,7 @@ def css(color: Color) -> str:
 
 TOP_BAR_PX = 44
 BOTTOM_PX = 248
+TABS_PX = 138
 LEFT_PX = 300
 RIGHT_PX = 270
 
@@ -105,7 +107,7 @@ WIDE = "<div class='c-wide'></div>"
 # floating panel of the time line into a strip at the bottom, and take their space from the floor. Where a rule does not
 # match (another viser), the panels float and everything still works.
 STYLE = f"""<style>
-:root{{--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px}}
+:root{{--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px;--c-tabs:{TABS_PX}px}}
 [data-dock-root]{{height:calc(100% - var(--c-top) - var(--c-bottom))!important;margin-top:var(--c-top);
  overflow:visible!important}}
 [data-floating-window]:has(.c-bottom),[data-floating-window]:has(.c-top){{position:fixed!important;left:0!important;
@@ -113,8 +115,11 @@ STYLE = f"""<style>
 [data-floating-window]:has(.c-bottom){{top:auto!important;bottom:0!important;height:var(--c-bottom)!important;
  border-top:1px solid #3a3a3a}}
 [data-floating-window]:has(.c-top){{top:0!important;height:var(--c-top)!important;border-bottom:1px solid #3a3a3a}}
-[data-floating-window]:has(.c-bottom) :is([data-dock-strip],[data-dock-griphandle],[data-dock-resize])
+[data-floating-window]:has(.c-bottom) :is([data-dock-griphandle],[data-dock-resize])
  {{display:none!important}}
+[data-floating-window]:has(.c-bottom) [data-dock-group]{{position:relative}}
+[data-floating-window]:has(.c-bottom) [data-dock-strip]{{position:absolute;top:3px;left:4px;z-index:2;
+ background:none!important}}
 [data-floating-window]:has(.c-top) :is([data-dock-resize],[data-dock-minimize]){{display:none!important}}
 [data-floating-window]:has(.c-top) .mantine-Stack-root{{display:none!important}}
 [data-dock-unmergeable-header]{{position:fixed!important;top:0;right:0;height:var(--c-top)!important;width:130px;
@@ -128,15 +133,18 @@ div:has(>div>.c-top) button{{height:26px!important;padding:0 10px!important;font
 div:has(>div>.c-bottom){{display:grid;grid-template-columns:repeat(24,minmax(0,1fr));align-items:center;
  padding-top:2px!important}}
 div:has(>div>.c-bottom)>:nth-child(1){{display:none}}
-div:has(>div>.c-bottom)>:nth-child(2){{grid-column:span 5}}
+div:has(>div>.c-bottom)>:nth-child(2){{grid-column:span 7;padding-left:var(--c-tabs)!important}}
 div:has(>div>.c-bottom)>:nth-child(3){{grid-column:span 2}}
 div:has(>div>.c-bottom)>:nth-child(4){{grid-column:span 3}}
-div:has(>div>.c-bottom)>:nth-child(5){{grid-column:span 14}}
-div:has(>div>.c-bottom)>:nth-child(6){{grid-column:11/span 14;margin:-9px 0 2px!important;
+div:has(>div>.c-bottom)>:nth-child(5){{grid-column:span 12}}
+div:has(>div>.c-bottom)>:nth-child(6){{grid-column:13/span 12;margin:-9px 0 2px!important;
  padding:0 67px 0 18px!important}}
 div:has(>div>.c-bottom)>:nth-child(n+7){{grid-column:span 4}}
 div:has(>div>.c-bottom)>:nth-child(-n+3) [style*="7.25em"]{{display:none}}
 div:has(>div>.c-bottom)>:nth-child(5) [style*="7.25em"]{{display:none}}
+div:has(>div>.c-route){{display:grid;grid-template-columns:repeat(3,minmax(0,1fr));padding-top:2px!important}}
+div:has(>div>.c-route)>:nth-child(1){{grid-column:span 3;padding-left:var(--c-tabs)}}
+.c-route{{font-size:12px;height:44px;display:flex;align-items:center;white-space:nowrap;overflow:hidden}}
 div:has(>.c-wide){{display:none}}
 div:has(>.c-wide)+* [style*="7.25em"]{{display:none}}
 div:has(>.c-rows){{display:none}}

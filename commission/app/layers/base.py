@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from viser import SceneApi, SceneNodeHandle
@@ -11,6 +12,7 @@ from commission.app.store import AppState
 from commission.app.theme import Legend
 from commission.app.view import RunView
 from commission.site.project import Project
+from commission.studies.violations import Violation
 
 
 class Layer(Protocol):
@@ -34,6 +36,9 @@ class Layer(Protocol):
 
     def draw_plan(self, plan: PlanView, state: AppState) -> None:
         """Draw what the step Plan has found."""
+
+    def draw_violations(self, violations: Sequence[Violation]) -> None:
+        """Mark where routes ask too much of the vehicle."""
 
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:
         """Add what only one browser's view needs; the caller removes it when the view changes."""
@@ -65,6 +70,9 @@ class BaseLayer:
 
     def draw_plan(self, plan: PlanView, state: AppState) -> None:
         """Draw what the step Plan has found."""
+
+    def draw_violations(self, violations: Sequence[Violation]) -> None:
+        """Mark where routes ask too much of the vehicle."""
 
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:  # noqa: ARG002 - a default
         """Add what only one browser's view needs."""
