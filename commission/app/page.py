@@ -26,6 +26,7 @@ from commission.app.layers.prediction import RibbonLayer
 from commission.app.layers.reflectors import ReflectorLayer, ReflectorNameLayer
 from commission.app.layers.routes import RouteLayer
 from commission.app.layers.scan import ScanLayer
+from commission.app.layers.stations import StationLayer
 from commission.app.layers.trails import ReferenceLayer, TrailLayer
 from commission.app.layers.uncertainty import UncertaintyLayer
 from commission.app.layers.vehicle import VehicleLayer
@@ -53,6 +54,7 @@ LAYERS = (
     GridLayer,
     RouteLayer,
     ViolationLayer,
+    StationLayer,
     RibbonLayer,
     FailingLayer,
     ReflectorLayer,
@@ -114,7 +116,7 @@ class Page:
         left.dock_left()
         left.set_width(theme.LEFT_PX)
         above = gui.add_panel()
-        selection, reflectors = above.add_tab("Selection"), above.add_tab("Reflectors")
+        selection, reflectors, routes = (above.add_tab(name) for name in ("Selection", "Reflectors", "Routes"))
         above.dock_right()
         above.set_width(theme.RIGHT_PX)
         below = gui.add_panel()
@@ -129,7 +131,7 @@ class Page:
         with bottom.add_tab("Time"):
             time_line = TimeLine(gui, post, state.speed)
             plots = Plots(gui)
-        self._tabs = DeskTabs(selection, reflectors, bottom.add_tab("Route"))
+        self._tabs = DeskTabs(selection, reflectors, routes, bottom.add_tab("Route"))
         bottom.float(x=0, y=-1, width=1000, height=theme.BOTTOM_PX)
         return top, site, plan, scales, run, tune, legend, switches, problems, time_line, plots
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from commission.app import actions
 from commission.app.actions import ParameterValue
-from commission.app.editing import site_reducer
+from commission.app.editing import site_reducer, station_reducer
 from commission.app.plan import reducer as plan
 from commission.app.plan.actions import ReadFloor, SetPlan
 from commission.app.reduction import (
@@ -29,7 +29,7 @@ from commission.site.parameters import Parameters
 
 PROBLEMS_KEPT = 20
 
-__all__ = ["parameter", "reduce", "site_reducer", "with_parameter"]  # site_reducer registers what editing means
+__all__ = ["parameter", "reduce", "site_reducer", "station_reducer", "with_parameter"]  # these register what edits mean
 
 
 def parameter(parameters: Parameters, key: str) -> ParameterValue:
