@@ -171,7 +171,7 @@ def test_the_table_lists_routes_and_stations_and_a_row_selects_and_flies(placed:
     table.draw_slowly(PageView(placed, None))
     assert [row.text.split("   ")[0] for row in table._shown] == [ROUTE, "Station 1"]
     assert "100 mm" in table._shown[1].text
-    assert "1 reverse" in table._shown[0].text
+    assert "1 of 2 reverse" in table._shown[0].text
     assert table._selecting(1, ME) == SelectStation(ME, "Station 1", fly=True)
     assert table._selecting(0, ME) == actions.SelectControlPoint(ME, ControlPoint(ROUTE), fly=True)
     assert table._selecting(9, ME) == page.Report("this row is gone", failed=False)

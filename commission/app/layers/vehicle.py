@@ -71,8 +71,8 @@ class VehicleLayer(BaseLayer):
     name = "Vehicle"
     reads: tuple[str, ...] = ("vehicle", "scanner", "routes")
     legend = (
-        theme.Legend("vehicle: estimate, or start of the first route", theme.VEHICLE, theme.Mark.LINE),
-        theme.Legend("field of view; outer: reach for reflectors", theme.FIELD, theme.Mark.LINE),
+        theme.Legend("vehicle; before a run at the start", theme.VEHICLE, theme.Mark.LINE),
+        theme.Legend("field of view, reach for reflectors", theme.FIELD, theme.Mark.LINE),
     )
 
     def __init__(self, scene: SceneApi) -> None:

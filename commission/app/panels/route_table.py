@@ -40,8 +40,7 @@ def route_row(route: Route, violations: int) -> Row:
     speeds = sorted({route.speed_of(segment) for segment in route.segments})
     speed = f"{speeds[0]:g}" + (f" to {speeds[-1]:g}" if len(speeds) > 1 else "")
     reverse = sum(segment.direction is Direction.REVERSE for segment in route.segments)
-    count = len(route.segments)
-    parts = [f"{speed} m/s", f"{count} segment{'s' if count > 1 else ''}" + (f", {reverse} reverse" if reverse else "")]
+    parts = [f"{speed} m/s", *([f"{reverse} of {len(route.segments)} reverse"] if reverse else [])]
     if violations:
         parts.append(f"{violations} violation{'s' if violations > 1 else ''}")
     return Row(f"{route.name}   {'  '.join(parts)}", route=route.name)
@@ -50,7 +49,7 @@ def route_row(route: Route, violations: int) -> Row:
 def station_row(station: Station) -> Row:
     """Return a station on one line."""
     accuracy = f"{1000.0 * station.required_accuracy:g} mm"
-    return Row(f"{station.name}   {accuracy}  at {station.x:.3f}  {station.y:.3f} m", station=station.name)
+    return Row(f"{station.name}   {accuracy}  {station.x:.2f}  {station.y:.2f} m", station=station.name)
 
 
 def rows(project: Project, violations: Counter[str], sought: str) -> list[Row]:

@@ -72,7 +72,7 @@ class SelectionPanel(BasePanel):
         self._editor = Editor()
         self._reflectors: tuple[Reflector, ...] = ()
         self._drawn: tuple[object, ...] = ()
-        gui.add_html(theme.WIDE)
+        gui.add_html(theme.WIDE.replace("c-wide", "c-wide c-tools"))
         tools = gui.add_button_group("", tuple(tool.value for tool in Tool))
         tools.on_click(posting(post, lambda event: actions.ChooseTool(client, Tool(event.target.value))))
         self._finish = gui.add_button("Finish the route", visible=False, hint="Make a route of its points (Enter).")

@@ -40,7 +40,7 @@ class StationFields:
                 "x": gui.add_number("x [m]", 0.0, step=0.001, hint=hints["x"]),
                 "y": gui.add_number("y [m]", 0.0, step=0.001, hint=hints["y"]),
                 "heading": gui.add_number("Heading [°]", 0.0, step=0.01, hint=hints["heading"]),
-                "required_accuracy": gui.add_number("Accuracy [mm]", 100.0, step=0.1, hint=hints["required_accuracy"]),
+                "required_accuracy": gui.add_number("Within [mm]", 100.0, step=0.1, hint=hints["required_accuracy"]),
             }
             for field, widget in self._numbers.items():
                 widget.on_update(posting(post, self._setting(field, lambda typed, f=field: float(typed) / SCALES[f])))
