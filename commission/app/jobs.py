@@ -11,7 +11,7 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from queue import SimpleQueue
@@ -92,11 +92,12 @@ class Jobs:
     ----------
     post : takes each `JobReport`, from the thread in which it arises. It should only put it into the owner's queue.
         Reports about one job arrive in order. Progress is thinned out; a change of state or message never is.
+    numbers : where the jobs' numbers come from; runners that report to the same owner share it.
     """
 
-    def __init__(self, post: Callable[[JobReport], None]) -> None:
+    def __init__(self, post: Callable[[JobReport], None], numbers: Iterator[int] | None = None) -> None:
         self._post = post
-        self._numbers = itertools.count(1)
+        self._numbers = itertools.count(1) if numbers is None else numbers
         # Held while a report is posted, so that they arrive in order; re-entrant, in case `post` looks at the jobs.
         self._lock = threading.RLock()
         self._unfinished: dict[int, Job] = {}

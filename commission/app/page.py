@@ -28,10 +28,12 @@ from commission.app.layers.prediction import RibbonLayer
 from commission.app.layers.reflectors import ReflectorLayer, ReflectorNameLayer
 from commission.app.layers.routes import RouteLayer
 from commission.app.layers.scan import ScanLayer
+from commission.app.layers.stations import StationLayer
 from commission.app.layers.suggestion import SuggestionLayer
 from commission.app.layers.trails import ReferenceLayer, TrailLayer
 from commission.app.layers.uncertainty import UncertaintyLayer
 from commission.app.layers.vehicle import VehicleLayer
+from commission.app.layers.violations import ViolationLayer
 from commission.app.layers.walls import WallLayer
 from commission.app.panels.base import Panel, Post
 from commission.app.panels.heat_legend import HeatLegend
@@ -55,6 +57,8 @@ LAYERS = (
     AmbiguityLayer,
     GridLayer,
     RouteLayer,
+    ViolationLayer,
+    StationLayer,
     RibbonLayer,
     EventLayer,
     FailingLayer,
@@ -118,7 +122,7 @@ class Page:
         left.dock_left()
         left.set_width(theme.LEFT_PX)
         above = gui.add_panel()
-        self._tabs = DeskTabs(above.add_tab("Selection"), above.add_tab("Reflectors"))
+        selection, reflectors, routes = (above.add_tab(name) for name in ("Selection", "Reflectors", "Routes"))
         above.dock_right()
         above.set_width(theme.RIGHT_PX)
         below = gui.add_panel()
@@ -133,6 +137,7 @@ class Page:
         with bottom.add_tab("Time"):
             time_line = TimeLine(gui, post, state.speed)
             plots = Plots(gui)
+        self._tabs = DeskTabs(selection, reflectors, routes, bottom.add_tab("Route"))
         bottom.float(x=0, y=-1, width=1000, height=theme.BOTTOM_PX)
         return top, site, plan, scales, run, tune, legend, switches, problems, time_line, plots
 
@@ -168,6 +173,7 @@ class Page:
                         layer.draw_slowly(view.run, view.state)
             for layer in self._layers:
                 layer.draw_plan(view.plan, view.state)
+                layer.draw_violations(view.violations)
             for panel in self._panels:
                 panel.draw(view)
                 if slowly:

@@ -8,7 +8,7 @@ from typing import Any
 
 from commission.app import actions
 from commission.app.actions import ParameterValue
-from commission.app.editing import site_reducer
+from commission.app.editing import site_reducer, station_reducer
 from commission.app.plan import layout_reducer
 from commission.app.plan import reducer as plan
 from commission.app.plan.actions import ReadFloor, SetPlan
@@ -31,8 +31,8 @@ from commission.site.parameters import Parameters
 
 PROBLEMS_KEPT = 20
 
-# The two reducers are imported because they register what editing and suggested layouts mean.
-__all__ = ["layout_reducer", "parameter", "reduce", "site_reducer", "with_parameter"]
+# These reducers are imported because they register what editing and suggested layouts mean.
+__all__ = ["layout_reducer", "parameter", "reduce", "site_reducer", "station_reducer", "with_parameter"]
 
 
 def parameter(parameters: Parameters, key: str) -> ParameterValue:

@@ -16,8 +16,8 @@ from typing import Protocol, TypeAlias
 
 from commission.app import actions, reducer, reduction
 from commission.app.actions import Action, Source, View
-from commission.app.checking import Checker
 from commission.app.editing import actions as editing
+from commission.app.inspection import Inspection
 from commission.app.jobs import Job, JobReport, Jobs, JobState, Progress
 from commission.app.plan.planner import Planner
 from commission.app.plan.view import PlanView
@@ -28,7 +28,6 @@ from commission.app.view import Progress as ShownProgress
 from commission.errors import CommissionError
 from commission.localization.setup import LocalizerSetup
 from commission.site.project import Project
-from commission.studies.problems import Findings, Problem
 
 FRAME_S = 0.04
 """Shortest time between two pictures: 25 Hz [s]."""
@@ -38,7 +37,7 @@ IDLE_S = 0.5
 LOOK_AT_DISK_S = 2.0
 """Time between two looks at the project's folder [s]."""
 
-PREPARE, PREDICT, COMPILE, CHECK = "Preparing the drive", "Predicting the rest", "Compiling", "Checking the site"
+PREPARE, PREDICT, COMPILE = "Preparing the drive", "Predicting the rest", "Compiling"
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,15 +122,12 @@ class Runtime:
         self._work = work
         self._clock = clock
         self._queue: SimpleQueue[Message] = SimpleQueue()
-        self._jobs = Jobs(self._queue.put)
-        self._patient_jobs = Jobs(self._queue.put)
+        numbers = itertools.count(1)
+        self._jobs, self._patient_jobs = Jobs(self._queue.put, numbers), Jobs(self._queue.put, numbers)
         self._planner = Planner(self._jobs, self._patient_jobs)
-        # Checks take milliseconds and do not wait for a simulation.
-        self._checks = Jobs(self._queue.put)
-        self._checker = Checker()
-        self._checked: Project | None = None
-        self._found: tuple[Problem, ...] = ()
-        self._shown_jobs: dict[tuple[str, int], Job] = {}
+        # Looking at the site takes milliseconds and does not wait for a simulation.
+        self._inspection = Inspection(Jobs(self._queue.put, numbers))
+        self._shown_jobs: dict[int, Job] = {}
         self._page: PageLike | None = None
         self._shown: Project | None = None
         self._dirty = True
@@ -155,7 +151,7 @@ class Runtime:
     def stop(self) -> None:
         """End the loop and the background work."""
         self._stopped.set()
-        for jobs in (self._jobs, self._patient_jobs, self._checks):
+        for jobs in (self._jobs, self._patient_jobs, self._inspection):
             jobs.close()
         self._thread.join(timeout=2.0)
         self._work.close()
@@ -245,7 +241,8 @@ class Runtime:
                 self._work.save(project, folder, overwrite)
                 self.post(actions.ProjectSaved(project, folder, time.strftime("%H:%M")))
             case reduction.CancelJob(number):
-                self._jobs.cancel(number)
+                for jobs in (self._jobs, self._patient_jobs):
+                    jobs.cancel(number)
             case reduction.ApplyParameters() | reduction.MoveTo() | reduction.ProcessOneScan():
                 if self.session is not None:
                     self._act_on_run(self.session, effect)
@@ -269,17 +266,17 @@ class Runtime:
     def _hear(self, report: JobReport) -> None:
         """Follow a job; take its result or its error."""
         job = report.job
-        if job.state in (JobState.WAITING, JobState.RUNNING):
-            self._shown_jobs[job.name, job.number] = job
-            return
-        self._shown_jobs.pop((job.name, job.number), None)
-        self._planner.hear(report)
         if job.state is JobState.FAILED:
             self._apply(actions.Report(f"{job.name}: {job.error}"))
-        elif job.state is JobState.DONE and isinstance(report.result, Drive):
+        if self._inspection.hear(report):
+            return
+        if job.state in (JobState.WAITING, JobState.RUNNING):
+            self._shown_jobs[job.number] = job
+            return
+        self._shown_jobs.pop(job.number, None)
+        self._planner.hear(report)
+        if job.state is JobState.DONE and isinstance(report.result, Drive):
             self._begin(report.result)
-        elif job.state is JobState.DONE and isinstance(report.result, Findings):
-            self._found = report.result.problems
         elif job.state is JobState.DONE and isinstance(report.result, tuple) and self.session is not None:
             self.session.predicted = report.result
 
@@ -289,11 +286,6 @@ class Runtime:
         self.session.covered = self.state.covered
         self._apply(actions.Play(playing=True))
         self._predict()
-
-    def _check(self) -> None:
-        """Look for problems in the background; edits meanwhile are checked afterwards."""
-        project = self._checked = self.state.project
-        self._checks.start(CHECK, lambda progress: self._checker.check(project, progress))
 
     def _predict(self) -> None:
         """Look ahead in the background: where the supervisor will stop the vehicle with these parameters."""
@@ -323,8 +315,7 @@ class Runtime:
             self._dirty = self._slow_dirty = True
         if self._page is None:
             return
-        if self.state.project is not self._checked and not self._checks.unfinished():
-            self._check()
+        self._inspection.follow(self.state)
         if self.state.project is not self._shown:
             self._show_site()
         slowly = self._slow_dirty and now - self._drawn_slowly_at >= SLOW_FRAME_S
@@ -358,9 +349,10 @@ class Runtime:
         jobs = tuple(
             ShownProgress(job.number, job.name, job.message, job.fraction)
             for job in self._shown_jobs.values()
-            if job.state is JobState.RUNNING and job.name not in (PREDICT, CHECK)
+            if job.state is JobState.RUNNING and job.name != PREDICT
         )
-        return PageView(self.state, run, jobs, self.plan, self._found)
+        seen = self._inspection
+        return PageView(self.state, run, jobs, self.plan, seen.problems, seen.violations, seen.profiles)
 
     def _show_site(self) -> None:
         if self._page is not None:

@@ -19,6 +19,7 @@ WALL: Color = (96, 102, 112)
 GRID: Color = (50, 53, 59)
 GRID_METER: Color = (62, 66, 73)
 ROUTE: Color = (116, 128, 150)
+STATION: Color = (92, 214, 220)
 REFLECTOR: Color = (48, 108, 255)
 GATE: Color = (96, 176, 255)
 POSE: Color = (255, 82, 82)
@@ -27,6 +28,8 @@ OUTLIER_ASSOCIATION: Color = (255, 59, 48)
 OUTLIER_DETECTOR: Color = (196, 74, 60)
 SCAN: Color = (190, 197, 206)
 VEHICLE: Color = (236, 239, 244)
+FIELD: Color = (150, 160, 120)
+FAR_FIELD: Color = (78, 84, 64)
 TRAIL: Color = (64, 200, 150)
 REFERENCE: Color = (196, 140, 255)
 SELECTED: Color = (255, 159, 28)
@@ -43,6 +46,7 @@ TAKEN_DOWN: Color = (255, 138, 101)
 FIRST_TWIN: Color = (120, 220, 255)
 SECOND_TWIN: Color = (255, 120, 220)
 KEEP_OUT: Color = (222, 150, 70)
+TOO_LITTLE: Color = (240, 132, 52)
 
 OPERATIONAL_COLOR = "#1c7c3c"
 FAIL_COLOR = "#c5221f"
@@ -106,6 +110,7 @@ FOLDED_PX = 46
 """Height of the bottom strip when its plots are folded away [pixels]."""
 LOW_BOTTOM_PX = 200
 """The same where the window is low."""
+TABS_PX = 138
 LEFT_PX = 300
 RIGHT_PX = 270
 
@@ -116,7 +121,7 @@ WIDE = "<div class='c-wide'></div>"
 # floating panel of the time line into a strip at the bottom, and take their space from the floor. Where a rule does not
 # match (another viser), the panels float and everything still works.
 STYLE = f"""<style>
-:root{{--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px}}
+:root{{--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px;--c-tabs:{TABS_PX}px}}
 [data-dock-root]{{height:calc(100% - var(--c-top) - var(--c-bottom))!important;top:var(--c-top);
  overflow:visible!important}}
 [data-dock-region] .mantine-ScrollArea-viewport>div{{padding-right:6px}}
@@ -125,8 +130,11 @@ STYLE = f"""<style>
 [data-floating-window]:has(.c-bottom){{top:auto!important;bottom:0!important;height:var(--c-bottom)!important;
  border-top:1px solid #3a3a3a}}
 [data-floating-window]:has(.c-top){{top:0!important;height:var(--c-top)!important;border-bottom:1px solid #3a3a3a}}
-[data-floating-window]:has(.c-bottom) :is([data-dock-strip],[data-dock-griphandle],[data-dock-resize])
+[data-floating-window]:has(.c-bottom) :is([data-dock-griphandle],[data-dock-resize])
  {{display:none!important}}
+[data-floating-window]:has(.c-bottom) [data-dock-group]{{position:relative}}
+[data-floating-window]:has(.c-bottom) [data-dock-strip]{{position:absolute;top:3px;left:4px;z-index:2;
+ background:none!important}}
 [data-floating-window]:has(.c-top) :is([data-dock-resize],[data-dock-minimize]){{display:none!important}}
 [data-floating-window]:has(.c-top) .mantine-Stack-root{{display:none!important}}
 [data-dock-unmergeable-header]{{position:fixed!important;top:0;right:0;height:var(--c-top)!important;width:146px;
@@ -140,12 +148,12 @@ div:has(>div>.c-top) button{{height:26px!important;padding:0 10px!important;font
 div:has(>div>.c-bottom){{display:grid;grid-template-columns:repeat(24,minmax(0,1fr));align-items:center;
  padding-top:2px!important}}
 div:has(>div>.c-bottom)>:nth-child(-n+5){{grid-row:1}}
-div:has(>div>.c-bottom)>:nth-child(1){{grid-column:10}}
-div:has(>div>.c-bottom)>:nth-child(2){{grid-column:1/span 4}}
-div:has(>div>.c-bottom)>:nth-child(3){{grid-column:5/span 2}}
-div:has(>div>.c-bottom)>:nth-child(4){{grid-column:7/span 3}}
-div:has(>div>.c-bottom)>:nth-child(5){{grid-column:11/span 14}}
-div:has(>div>.c-bottom)>:nth-child(6){{grid-column:11/span 14;margin:-9px 0 2px!important;
+div:has(>div>.c-bottom)>:nth-child(1){{grid-column:12}}
+div:has(>div>.c-bottom)>:nth-child(2){{grid-column:1/span 6;padding-left:var(--c-tabs)!important}}
+div:has(>div>.c-bottom)>:nth-child(3){{grid-column:7/span 2}}
+div:has(>div>.c-bottom)>:nth-child(4){{grid-column:9/span 3}}
+div:has(>div>.c-bottom)>:nth-child(5){{grid-column:13/span 12}}
+div:has(>div>.c-bottom)>:nth-child(6){{grid-column:13/span 12;margin:-9px 0 2px!important;
  padding:0 67px 0 18px!important}}
 div:has(>div>.c-bottom)>:nth-child(n+7){{grid-column:span 4}}
 :root:has(.c-fold input:checked){{--c-bottom:{FOLDED_PX}px}}
@@ -157,8 +165,12 @@ div:has(>div>.c-bottom)>:nth-child(n+7){{grid-column:span 4}}
 .c-fold:has(:checked)::after{{content:"plots ▴"}}
 div:has(>div>.c-bottom)>:nth-child(-n+3) [style*="7.25em"]{{display:none}}
 div:has(>div>.c-bottom)>:nth-child(5) [style*="7.25em"]{{display:none}}
+div:has(>div>.c-route){{display:grid;grid-template-columns:repeat(3,minmax(0,1fr));padding-top:2px!important}}
+div:has(>div>.c-route)>:nth-child(1){{grid-column:span 3;padding-left:var(--c-tabs)}}
+.c-route{{font-size:12px;height:44px;display:flex;align-items:center;white-space:nowrap;overflow:hidden}}
 div:has(>.c-wide){{display:none}}
 div:has(>.c-wide)+* [style*="7.25em"]{{display:none}}
+div:has(>.c-tools)+* .mantine-Button-root{{padding:0 3px!important;font-size:11.5px!important}}
 div:has(>.c-rows){{display:none}}
 div:has(>.c-rows)~div{{padding-top:0!important;padding-bottom:1px!important}}
 div:has(>.c-rows)~div button{{height:auto!important;min-height:22px;padding:2px 6px!important;

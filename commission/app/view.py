@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +12,9 @@ from commission.app.plan.view import PlanView
 from commission.app.store import AppState
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Estimate, Mode
+from commission.planning.route_profile import RouteProfile
 from commission.studies.problems import Problem
+from commission.studies.violations import Violation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,3 +122,7 @@ class PageView:
     """What the step Plan has found."""
     found: tuple[Problem, ...] = ()
     """What is wrong with the site, errors first; of the newest project that was checked."""
+    violations: tuple[Violation, ...] = ()
+    """Where routes ask too much of the vehicle; the same value as long as nothing changes."""
+    profiles: Mapping[str, RouteProfile] = field(default_factory=dict)
+    """How the routes drive that some browser has selected, by name."""

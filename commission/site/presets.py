@@ -113,11 +113,11 @@ SCANNERS: tuple[ScannerPreset, ...] = (
             range=(0.05, 25.0),
             range_sigma=0.02,
             bearing_sigma_deg=0.1,
-            beam_width_deg=0.5,
+            beam_width_deg=0.49,
             reflector_range=20.0,
         ),
         "811 beams over 270 deg at 15 Hz, 0.05 to 25 m: data sheet of part 1096807 and operating instructions 8024231, "
-        "as quoted.",
+        "as quoted. Beam width: that of the smaller TiM3xx, 8.6 mrad (8024851, section 3.6.4).",
         _GEOMETRY,
     ),
     ScannerPreset(

@@ -16,12 +16,10 @@ from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
-from commission.planning.route_check import FloorDistances, Way, outline_points, room_along, smallest_radius, way_of
-from commission.site.path import KINK
+from commission.planning.route_check import FloorDistances, Way, outline_points, room_along
 from commission.site.project import Project
 from commission.site.reflectors import Reflector
-from commission.site.routes import Route
-from commission.site.vehicle import OmnidirectionalVehicle, Vehicle
+from commission.studies.violations import Violation, ViolationKind, route_violations
 
 MOST_OF_A_KIND = 50
 """Problems of one kind that are listed; the rest is counted."""
@@ -91,8 +89,8 @@ class Findings:
     """Its walls."""
     limits: CheckLimits
     """What was expected."""
-    by_route: tuple[tuple[Problem, ...], ...]
-    """Problems of each of its routes."""
+    by_route: tuple[tuple[Violation, ...], ...]
+    """Where each of its routes asks too much."""
 
 
 def find_problems(
@@ -112,11 +110,11 @@ def find_problems(
     """
     limits = limits or CheckLimits()
     floor = floor if floor is not None and floor.floor_map is project.floor_map else None
-    known: dict[int, tuple[Problem, ...]] = {}
+    known: dict[int, tuple[Violation, ...]] = {}
     if previous is not None and _same_conditions(previous, project, floor, limits):
         known = dict(zip(map(id, previous.project.routes), previous.by_route, strict=True))
     by_route = tuple(
-        known[id(route)] if id(route) in known else route_problems(route, project.vehicle, floor, limits)
+        known[id(route)] if id(route) in known else route_violations(route, project.vehicle, floor, limits.clearance)
         for route in project.routes
     )
     found = [
@@ -125,34 +123,47 @@ def find_problems(
         *_close_reflectors(project),
         *_reflectors_and_walls(project, floor),
         *_station_problems(project, floor),
-        *(problem for problems in by_route for problem in problems),
+        *(problem for violations in by_route for problem in route_problems(violations)),
     ]
     order = list(Severity)
     found.sort(key=lambda problem: order.index(problem.severity))
     return Findings(tuple(found), project, floor, limits, by_route)
 
 
-def route_problems(
-    route: Route, vehicle: Vehicle, floor: FloorDistances | None, limits: CheckLimits
-) -> tuple[Problem, ...]:
-    """Check one route: room, curvature, corners; one problem for each stretch of the way."""
-    way = way_of(route)
-    found = [*_curvature_problems(route, way, vehicle), *_corner_problems(route, way, vehicle)]
-    if floor is not None:
-        room = room_along(way, vehicle.outline, floor, limits.clearance)
-        for first, last in _stretches(room <= 0.0):
-            length = _length(way, first, last)
-            text = f"Route {route.name!r}: the vehicle's outline cuts a wall over {length:.2f} m"
-            found.append(_on_route(Severity.ERROR, text, route, way.poses[(first + last) // 2]))
-        for first, last in _stretches(room < limits.clearance):
-            least = first + int(np.argmin(room[first : last + 1]))
-            if room[least] > 0.0:
-                text = (
-                    f"Route {route.name!r}: {1000 * room[least]:.0f} mm between the vehicle's outline and a wall; "
-                    f"expected {1000 * limits.clearance:.0f} mm or more"
-                )
-                found.append(_on_route(Severity.WARNING, text, route, way.poses[least]))
-    return tuple(_limited(found))
+def route_problems(violations: Iterable[Violation]) -> Iterable[Problem]:
+    """Say what a route asks too much: one problem for each stretch of its way, the first ones of many."""
+    found = tuple(violations)
+    return _limited(map(_route_problem, found[:MOST_OF_A_KIND]), len(found))
+
+
+def _route_problem(violation: Violation) -> Problem:
+    """One stretch of a route in words."""
+    x, y, _ = (float(value) for value in violation.where.worst_pose)
+    text = f"Route {violation.route!r}: {_asked_too_much(violation)}"
+    severity = Severity.ERROR if violation.is_fatal else Severity.WARNING
+    return Problem(severity, text, Subject.ROUTE, (violation.route,), (x, y))
+
+
+def _asked_too_much(violation: Violation) -> str:
+    """What is too much, and what is expected."""
+    found, expected, length = violation.found, violation.expected, violation.where.length
+    match violation.kind:
+        case ViolationKind.CURVE:
+            return (
+                f"a curve of {found:.2f} m radius over {length:.2f} m; expected {expected:.2f} m or more, "
+                "the least that the vehicle can drive"
+            )
+        case ViolationKind.CORNER:
+            is_fatal = violation.is_fatal
+            remedy = "a curve: it cannot do that" if is_fatal else "a stop there: a segment of its own"
+            return f"the vehicle turns by {math.degrees(found):.0f} deg on the spot; expected {remedy}"
+        case ViolationKind.WALL:
+            return f"the vehicle's outline cuts a wall over {length:.2f} m"
+        case ViolationKind.ROOM:
+            return (
+                f"{1000 * found:.0f} mm between the vehicle's outline and a wall; "
+                f"expected {1000 * expected:.0f} mm or more"
+            )
 
 
 def _same_conditions(previous: Findings, project: Project, floor: FloorDistances | None, limits: CheckLimits) -> bool:
@@ -297,40 +308,6 @@ def _station_problems(project: Project, floor: FloorDistances | None) -> Iterabl
     ]
 
 
-def _curvature_problems(route: Route, way: Way, vehicle: Vehicle) -> Iterable[Problem]:
-    radius = smallest_radius(vehicle)
-    if radius <= 0.0:
-        return
-    # A thousandth is the rounding of a circle that was drawn with just that radius.
-    for first, last in _stretches(np.abs(way.curvatures) * radius > 1.001):
-        tightest = first + int(np.argmax(np.abs(way.curvatures[first : last + 1])))
-        text = (
-            f"Route {route.name!r}: a curve of {1.0 / abs(way.curvatures[tightest]):.2f} m radius over "
-            f"{_length(way, first, last):.2f} m; expected {radius:.2f} m or more, the least that the vehicle can drive"
-        )
-        yield _on_route(Severity.ERROR, text, route, way.poses[tightest])
-
-
-def _corner_problems(route: Route, way: Way, vehicle: Vehicle) -> Iterable[Problem]:
-    """Places where the vehicle would have to turn on the spot."""
-    if isinstance(vehicle, OmnidirectionalVehicle):
-        return
-    can_turn = smallest_radius(vehicle) <= 0.0
-    for index in np.flatnonzero(np.abs(way.corners) > KINK):
-        between = way.segments[index] != way.segments[index + 1]
-        if can_turn and between:
-            continue
-        turn = abs(math.degrees(way.corners[index]))
-        remedy = "expected a stop there: a segment of its own" if can_turn else "expected a curve: it cannot do that"
-        text = f"Route {route.name!r}: the vehicle turns by {turn:.0f} deg on the spot; {remedy}"
-        severity = Severity.WARNING if can_turn else Severity.ERROR
-        yield _on_route(severity, text, route, way.poses[index + 1])
-
-
-def _on_route(severity: Severity, text: str, route: Route, pose: FloatArray) -> Problem:
-    return Problem(severity, text, Subject.ROUTE, (route.name,), (float(pose[0]), float(pose[1])))
-
-
 def _of_reflector(severity: Severity, reflector: Reflector, text: str) -> Problem:
     place = (reflector.x, reflector.y)
     return Problem(severity, f"Reflector {reflector.id!r} {text}", Subject.REFLECTOR, (reflector.id,), place)
@@ -347,17 +324,6 @@ def _limited(found: Iterable[Problem], count: int | None = None) -> list[Problem
         )
         return [*problems[:MOST_OF_A_KIND], rest]
     return problems
-
-
-def _stretches(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last index of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
-    return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
-
-
-def _length(way: Way, first: int, last: int) -> float:
-    """Way from one pose to another [m]."""
-    return float(np.hypot(*np.diff(way.poses[first : last + 1, :2], axis=0).T).sum())
 
 
 def _inside(point: FloatArray, outline: FloatArray) -> bool:

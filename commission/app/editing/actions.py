@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from commission.app.editing.editor import ControlPoint, Point, Snapping, Tool
+from commission.app.editing.station_actions import StationAction
 from commission.site.project import Project
 from commission.site.routes import Direction
 from commission.site.scanner import Scanner
@@ -117,7 +118,7 @@ class SelectReflectors:
 
 @dataclass(frozen=True, slots=True)
 class DeleteSelected:
-    """Delete the selected reflectors, or the selected control point."""
+    """Delete what is selected: reflectors, a control point or a station."""
 
     client: int
     """Number of the browser's connection."""
@@ -348,6 +349,7 @@ EditAction: TypeAlias = (
     | DeleteRoute
     | SetVehicle
     | SetScanner
+    | StationAction
     | LookAt
     | ShowProblem
     | Restored

@@ -11,6 +11,8 @@ from commission.app.editing.overlay import Overlay
 from commission.app.editing.pointer import take_clicks
 from commission.app.panels.base import Panel, Post
 from commission.app.panels.reflector_table import ReflectorTable
+from commission.app.panels.route_plots import RoutePlots
+from commission.app.panels.route_table import RouteTable
 from commission.app.panels.selection_panel import SelectionPanel
 from commission.app.panels.tool_hint import ToolHint
 from commission.app.view import PageView
@@ -24,6 +26,10 @@ class DeskTabs:
     """Tools, and the values of what is selected."""
     reflectors: GuiTabHandle
     """The table of all reflectors."""
+    routes: GuiTabHandle
+    """The table of all routes and stations."""
+    route: GuiTabHandle
+    """Plots along the selected route."""
 
 
 class Desk:
@@ -45,7 +51,10 @@ class Desk:
                 selection = SelectionPanel(gui, post, number)
                 hint = ToolHint(gui, number)
             table = ReflectorTable(gui, post, number, tabs.reflectors)
-        self._panels: tuple[Panel, ...] = (selection, table, hint)
+            routes = RouteTable(gui, post, number, tabs.routes)
+            with tabs.route:
+                plots = RoutePlots(gui, number)
+        self._panels: tuple[Panel, ...] = (selection, table, hint, routes, plots)
         take_clicks(client, post)
 
     def draw(self, view: PageView, *, slowly: bool) -> None:

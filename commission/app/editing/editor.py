@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TypeAlias
 
@@ -17,6 +17,7 @@ class Tool(StrEnum):
     SELECT = "Select"
     PLACE = "Place"
     ROUTE = "Route"
+    STATION = "Station"
     MEASURE = "Measure"
     KEEP_OUT = "Keep out"
 
@@ -26,6 +27,8 @@ class Grab(StrEnum):
 
     REFLECTORS = "reflectors"
     CONTROL_POINT = "control point"
+    STATION = "station"
+    HEADING = "heading"
     RECTANGLE = "rectangle"
 
 
@@ -86,6 +89,8 @@ class Editor:
     """Ids of the selected reflectors."""
     point: ControlPoint | None = None
     """The selected control point; its route is the selected one."""
+    station: str = ""
+    """Name of the selected station; empty: none."""
     drag: Drag | None = None
     """A drag under way."""
     draft: tuple[Point, ...] = ()
@@ -98,6 +103,17 @@ class Editor:
     """What attracts."""
     reach: float = 0.1
     """How near a click has to be to mean something, at the zoom of the newest gesture [m]."""
+
+    def selecting(
+        self, reflectors: tuple[str, ...] = (), *, point: ControlPoint | None = None, station: str = ""
+    ) -> Editor:
+        """Return the editor with this selected and nothing else."""
+        return replace(self, selected=reflectors, point=point, station=station)
+
+    @property
+    def has_selection(self) -> bool:
+        """Whether anything is selected."""
+        return bool(self.selected) or self.point is not None or bool(self.station)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from commission.app.editing.editor import Drag, Editor, Grab, Point
 from commission.app.editing.route_gestures import control_point_at
+from commission.app.editing.station_gestures import grabbed_of_station, station_at
 from commission.geometry import se2
 from commission.geometry.occupancy import OccupancyGrid
 from commission.site.editing import reflectors as edits
@@ -115,13 +116,19 @@ def moved(project: Project, editor: Editor) -> ReflectorMap:
 
 
 def grabbed(project: Project, editor: Editor, drag: Drag) -> Editor:
-    """Return the editor with a drag begun: on a control point of the selected route, a reflector, or the floor."""
+    """Return the editor with a drag begun: on something selected, a reflector, a station, or the floor."""
     reach = editor.reach
+    of_station = grabbed_of_station(project, editor, drag.start)
+    if of_station is not None:
+        return replace(editor, drag=replace(drag, grab=of_station))
     point = None if editor.point is None else control_point_at(project, editor.point.route, drag.start, reach)
     if point is not None:
         return replace(editor, point=point, drag=replace(drag, grab=Grab.CONTROL_POINT))
     found = reflector_at(project.reflectors, drag.start, reach)
     if found is not None:
         selected = editor.selected if found in editor.selected else (found,)
-        return replace(editor, selected=selected, point=None, drag=replace(drag, grab=Grab.REFLECTORS))
+        return replace(editor.selecting(selected), drag=replace(drag, grab=Grab.REFLECTORS))
+    station = station_at(project, drag.start, reach)
+    if station is not None:
+        return replace(editor.selecting(station=station), drag=replace(drag, grab=Grab.STATION))
     return replace(editor, drag=replace(drag, grab=Grab.RECTANGLE))

@@ -18,11 +18,14 @@ from commission.app.editing import actions
 from commission.app.editing.editor import Editor, Grab, Tool, measurement
 from commission.app.editing.gestures import moved, selected_of
 from commission.app.editing.route_gestures import curve, moved_route
+from commission.app.editing.station_gestures import heading_tip, moved_station
 from commission.app.extent import extent_of
+from commission.app.layers.stations import station_marks
 from commission.app.panels.base import Post
 from commission.geometry.arrays import FloatArray
 from commission.site.editing.routes import segment_of
 from commission.site.project import Project
+from commission.site.stations import Station
 
 RING_POINTS = 28
 HANDLE_FROM = 14.0
@@ -100,7 +103,8 @@ class Overlay:
         size = 0.9 * extent_of(project).mark_size()
         selected = selected_of(project, editor)
         centers = np.array([(r.x, r.y) for r in selected]).reshape(-1, 2)
-        ringed = np.concatenate([centers, _point_place(project, editor)])
+        station = moved_station(project, editor)
+        ringed = np.concatenate([centers, _point_place(project, editor), _places(station)])
         self._selected.points = outline_segments(rings(ringed, 1.5 * size), theme.Height.EDITING)
         self._preview.points = self._preview_of(project, editor, size)
         self._draw_points(project, editor, size)
@@ -129,6 +133,11 @@ class Overlay:
         elif drag is not None and drag.grab is Grab.RECTANGLE:
             (x0, y0), (x1, y1) = drag.start, drag.now
             lines.append(outline_segments(np.array([[(x0, y0), (x1, y0), (x1, y1), (x0, y1)]]), height))
+        station = moved_station(project, editor)
+        if station is not None:
+            # A line to the tip by which it is turned.
+            ends = np.array([(station.x, station.y), heading_tip(project, station)])
+            lines += [outline_segments(station_marks((station,), size), height), polyline_segments(ends, height)]
         if editor.point is not None:
             for segment in moved_route(project, editor):
                 lines.append(polyline_segments(segment.control_points, height))
@@ -144,6 +153,9 @@ class Overlay:
         places: list[FloatArray] = [np.array(editor.draft).reshape(-1, 2), np.array(editor.measured).reshape(-1, 2)]
         if editor.point is not None:
             places += [segment.control_points for segment in moved_route(project, editor)]
+        station = moved_station(project, editor)
+        if station is not None:
+            places.append(np.array([heading_tip(project, station)]))
         self._points.point_size = size
         self._points.points = lift(np.concatenate(places), theme.Height.EDITING)
 
@@ -160,6 +172,11 @@ class Overlay:
         if self._label is None:
             self._label = self._client.scene.add_label("/editing/label", text, position=place)
         self._label.text, self._label.position = text, place
+
+
+def _places(station: Station | None) -> FloatArray:
+    """Return the (1, 2) place of a station [m]; (0, 2) when there is none."""
+    return np.empty((0, 2)) if station is None else np.array([[station.x, station.y]])
 
 
 def _point_place(project: Project, editor: Editor) -> FloatArray:

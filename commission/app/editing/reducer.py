@@ -18,6 +18,8 @@ from commission.app.editing.gestures import (
     to_place,
 )
 from commission.app.editing.route_gestures import route_at
+from commission.app.editing.station_actions import DeleteStation, MoveStation, PlaceStation
+from commission.app.editing.station_gestures import moved_station, station_at
 from commission.app.plan.actions import FreeAreas, KeepOut
 from commission.app.reduction import ApplyParameters, FlyTo, Reduction, Tell, reduce
 from commission.app.store import AppState, Edit, edited
@@ -98,7 +100,7 @@ def _(action: actions.Cancel, state: AppState) -> Reduction:
     elif editor.tool is not Tool.SELECT:
         editor = replace(editor, tool=Tool.SELECT)
     else:
-        editor = replace(editor, selected=(), point=None)
+        editor = editor.selecting()
     return Reduction(state.with_editor(action.client, editor))
 
 
@@ -112,6 +114,9 @@ def _(action: actions.ClickFloor, state: AppState) -> Reduction:
             return _placed(state, editor, action)
         case Tool.ROUTE:
             return Reduction(state.with_editor(action.client, replace(editor, draft=(*editor.draft, action.place))))
+        case Tool.STATION:
+            put = PlaceStation(action.client, action.place, action.reach)
+            return reduce(put, state.with_editor(action.client, editor))
         case Tool.MEASURE:
             before = editor.measured if len(editor.measured) == 1 else ()
             place = _on_something(state, editor, action)
@@ -125,12 +130,15 @@ def _picked(state: AppState, editor: Editor, action: actions.ClickFloor) -> Edit
     found = reflector_at(state.project.reflectors, action.place, action.reach)
     if found is not None:
         if not action.add:
-            return replace(editor, selected=(found,), point=None)
+            return editor.selecting((found,))
         others = tuple(name for name in editor.selected if name != found)
-        return replace(editor, selected=others if found in editor.selected else (*others, found), point=None)
+        return editor.selecting(others if found in editor.selected else (*others, found))
     if action.add:
         return editor
-    return replace(editor, selected=(), point=route_at(state.project, action.place, action.reach))
+    station = station_at(state.project, action.place, action.reach)
+    if station is not None:
+        return editor.selecting(station=station)
+    return editor.selecting(point=route_at(state.project, action.place, action.reach))
 
 
 def _placed(state: AppState, editor: Editor, action: actions.ClickFloor) -> Reduction:
@@ -138,7 +146,7 @@ def _placed(state: AppState, editor: Editor, action: actions.ClickFloor) -> Redu
     like = to_place(state.project, action.place, editor)
     added = edits.add(state.project.reflectors, [(like.x, like.y)], like)
     reduction = with_reflectors(state, added.reflectors, Edit(f"place {added.ids[0]}", action.client))
-    selecting = reduction.state.with_editor(action.client, replace(editor, selected=added.ids, point=None))
+    selecting = reduction.state.with_editor(action.client, editor.selecting(added.ids))
     return replace(reduction, state=selecting)
 
 
@@ -198,26 +206,42 @@ def _dropped(state: AppState, editor: Editor, client: int) -> Reduction:
         return Reduction(resting)
     match drag.grab:
         case Grab.REFLECTORS:
-            edit = Edit(f"move {counted(state, editor)}", client)
-            return (
-                _telling_of_locked(state, editor.selected, with_reflectors(resting, moved(state.project, editor), edit))
-                if selected_of(state.project, editor)
-                else Reduction(resting)
-            )
-        case Grab.RECTANGLE if editor.tool is Tool.KEEP_OUT:
-            return reduce(KeepOut((*drag.start, *drag.now)), resting)
+            return _moved(state, editor, resting, client)
         case Grab.RECTANGLE:
-            inside = reflectors_in(state.project.reflectors, drag.start, drag.now)
-            kept = editor.selected if drag.add else ()
-            chosen = (*kept, *(name for name in inside if name not in kept))
-            return Reduction(state.with_editor(client, replace(done, selected=chosen, point=None)))
+            return _enclosed(state, editor, resting, client)
         case Grab.CONTROL_POINT:
             return reduce(actions.PlaceControlPoint(client, drag.now), resting)
+        case Grab.STATION | Grab.HEADING:
+            station = moved_station(state.project, editor)
+            if station is None:
+                return Reduction(resting)
+            return reduce(MoveStation(client, (station.x, station.y), station.heading), resting)
+
+
+def _moved(state: AppState, editor: Editor, resting: AppState, client: int) -> Reduction:
+    """Leave the dragged reflectors where they are."""
+    if not selected_of(state.project, editor):
+        return Reduction(resting)
+    edit = Edit(f"move {counted(state, editor)}", client)
+    return _telling_of_locked(state, editor.selected, with_reflectors(resting, moved(state.project, editor), edit))
+
+
+def _enclosed(state: AppState, editor: Editor, resting: AppState, client: int) -> Reduction:
+    """Select what lies in the rectangle, or keep it free of reflectors."""
+    drag = editor.drag
+    if drag is None:
+        return Reduction(resting)
+    if editor.tool is Tool.KEEP_OUT:
+        return reduce(KeepOut((*drag.start, *drag.now)), resting)
+    inside = reflectors_in(state.project.reflectors, drag.start, drag.now)
+    kept = editor.selected if drag.add else ()
+    chosen = (*kept, *(name for name in inside if name not in kept))
+    return Reduction(resting.with_editor(client, replace(editor, drag=None).selecting(chosen)))
 
 
 @reduce.register
 def _(action: actions.SelectReflectors, state: AppState) -> Reduction:
-    editor = replace(editor_of(state, action.client), selected=action.ids, point=None)
+    editor = editor_of(state, action.client).selecting(action.ids)
     selecting = state.with_editor(action.client, editor)
     if not action.fly or not selected_of(state.project, editor):
         return Reduction(selecting)
@@ -231,6 +255,8 @@ def _(action: actions.DeleteSelected, state: AppState) -> Reduction:
     editor = editor_of(state, action.client)
     if editor.point is not None and not editor.selected:
         return reduce(actions.DeleteControlPoint(action.client), state)
+    if editor.station:
+        return reduce(DeleteStation(action.client), state)
     editor, ids = _selection(state, action.client)
     edit = Edit(f"delete {counted(state, editor)}", action.client)
     return _telling_of_locked(state, ids, with_reflectors(state, edits.delete(state.project.reflectors, ids), edit))
@@ -239,7 +265,7 @@ def _(action: actions.DeleteSelected, state: AppState) -> Reduction:
 def _adding(state: AppState, client: int, added: edits.Added, name: str) -> Reduction:
     """Return what follows from copies: they are selected."""
     reduction = with_reflectors(state, added.reflectors, Edit(name, client))
-    editor = replace(editor_of(state, client), selected=added.ids, point=None)
+    editor = editor_of(state, client).selecting(added.ids)
     return replace(reduction, state=reduction.state.with_editor(client, editor))
 
 

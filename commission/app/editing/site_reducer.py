@@ -23,7 +23,7 @@ def _with_routes(state: AppState, routes: tuple[Route, ...], edit: Edit, point: 
     client = edit.client
     after = edited(state, replace(state.project, routes=routes), edit)
     if client is not None:
-        after = after.with_editor(client, replace(editor_of(after, client), point=point, selected=()))
+        after = after.with_editor(client, editor_of(after, client).selecting(point=point))
     return Reduction(after)
 
 
@@ -48,7 +48,7 @@ def _(action: actions.FinishRoute, state: AppState) -> Reduction:
 
 @reduce.register
 def _(action: actions.SelectControlPoint, state: AppState) -> Reduction:
-    editor = replace(editor_of(state, action.client), point=action.point, selected=())
+    editor = editor_of(state, action.client).selecting(point=action.point)
     selecting = state.with_editor(action.client, editor)
     segment = segment_of(state.project, editor)
     if not action.fly or segment is None:
@@ -149,12 +149,14 @@ def _(action: actions.SetScanner, state: AppState) -> Reduction:
 @reduce.register
 def _(action: actions.ShowProblem, state: AppState) -> Reduction:
     problem = action.problem
-    editor = replace(editor_of(state, action.client), tool=Tool.SELECT, selected=(), point=None)
+    editor = replace(editor_of(state, action.client), tool=Tool.SELECT).selecting()
     if problem.subject is Subject.REFLECTOR:
-        editor = replace(editor, selected=problem.ids)
+        editor = editor.selecting(problem.ids)
+    elif problem.subject is Subject.STATION and problem.ids:
+        editor = editor.selecting(station=problem.ids[0])
     elif problem.subject is Subject.ROUTE and problem.ids:
         near = problem.place or (0.0, 0.0)
-        editor = replace(editor, point=control_point_at(state.project, problem.ids[0], near, float("inf")))
+        editor = editor.selecting(point=control_point_at(state.project, problem.ids[0], near, float("inf")))
     there = () if problem.place is None else (FlyTo(action.client, problem.place),)
     return Reduction(state.with_editor(action.client, editor), there)
 

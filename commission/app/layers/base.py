@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 from viser import SceneApi, SceneNodeHandle
@@ -11,6 +12,7 @@ from commission.app.store import AppState
 from commission.app.theme import Legend
 from commission.app.view import RunView
 from commission.site.project import Project
+from commission.studies.violations import Violation
 
 
 class Layer(Protocol):
@@ -38,6 +40,9 @@ class Layer(Protocol):
     def is_used(self, plan: PlanView, state: AppState) -> bool:
         """Whether there is something that the legend has to explain."""
         ...
+
+    def draw_violations(self, violations: Sequence[Violation]) -> None:
+        """Mark where routes ask too much of the vehicle."""
 
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:
         """Add what only one browser's view needs; the caller removes it when the view changes."""
@@ -73,6 +78,9 @@ class BaseLayer:
     def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - a default
         """Whether there is something that the legend has to explain."""
         return True
+
+    def draw_violations(self, violations: Sequence[Violation]) -> None:
+        """Mark where routes ask too much of the vehicle."""
 
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:  # noqa: ARG002 - a default
         """Add what only one browser's view needs."""

@@ -14,7 +14,7 @@ from commission.app import actions as page_actions
 from commission.app.editing import actions
 from commission.app.panels.base import Post, escaped, posting, write
 from commission.site.checks import field_hints
-from commission.site.presets import SCANNERS, with_preset
+from commission.site.presets import SCANNERS, Origin, ScannerPreset, with_preset
 from commission.site.project import Project
 from commission.site.scanner import Scanner
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
@@ -72,6 +72,22 @@ SCANNER = (
     Entry("Beam width [°]", "beam_width_deg", step=0.01),
     Entry("Reflectors to [m]", "reflector_range", step=0.1),
 )
+FIGURES = {
+    "field_of_view_deg": "field of view",
+    "resolution_deg": "resolution",
+    "rate": "scans per s",
+    "range": "range",
+    "range_sigma": "range 1σ",
+    "bearing_sigma_deg": "bearing 1σ",
+    "beam_width_deg": "beam width",
+    "reflector_range": "reach for reflectors",
+}
+"""What the fields of the scanner are called in a sentence."""
+ORIGINS = {
+    Origin.DOCUMENT: "Read in the document",
+    Origin.QUOTED: "The maker's, as others quote it",
+    Origin.ASSUMED: "Ours, without a source; measure it",
+}
 VEHICLE = {
     "wheel_separation": "Wheels apart [m]",
     "wheelbase": "Wheelbase [m]",
@@ -110,6 +126,20 @@ def of_kind(vehicle: Vehicle, kind: str) -> Vehicle:
     if vehicle.kind == kind:
         return vehicle
     return KINDS[kind](outline=vehicle.outline, height=vehicle.height)
+
+
+def source_html(preset: ScannerPreset | None) -> str:
+    """Say where the figures of a preset come from, and which ones are nobody's but ours."""
+    if preset is None:
+        return ""
+    origins = preset.origins()
+    lines = [
+        f"{text}: {', '.join(FIGURES[name] for name, its in origins.items() if its is origin)}."
+        for origin, text in ORIGINS.items()
+        if origin in origins.values()
+    ]
+    parts = "".join(f"<div style='padding-top:3px'>{escaped(line)}</div>" for line in (preset.source, *lines))
+    return f"<div class='c-note' style='padding:2px 6px'>{parts}</div>"
 
 
 class EquipmentFields:
@@ -199,6 +229,6 @@ class EquipmentFields:
             write(number, entry.read(scanner))
         preset = next((p for p in SCANNERS if with_preset(scanner, p.name) == scanner), None)
         write(self._preset, OWN if preset is None else preset.name)
-        source = "" if preset is None else f"<div class='c-note' style='padding:2px 6px'>{escaped(preset.source)}</div>"
+        source = source_html(preset)
         if self._source.content != source:
             self._source.content = source

@@ -167,7 +167,7 @@ class Plots(BasePanel):
                     _series(chart),
                     title=chart.title,
                     scales=_scales(1.0, None, chart),
-                    axes=(_axis(20), _axis(36)),
+                    axes=(axis_style(20), axis_style(36)),
                     legend={"show": False},
                     cursor={"sync": {"key": "run"}, "drag": {"x": True, "y": False}},
                     height=HEIGHT_PX,
@@ -240,7 +240,8 @@ def _scales(duration: float, span: tuple[float, float] | None, chart: Chart) -> 
     return {"x": {"time": False, "range": (0.0, duration)}, "y": value, "flag": {"range": (0.01, 1.0)}}
 
 
-def _axis(size: int) -> uplot.Axis:
+def axis_style(size: int) -> uplot.Axis:
+    """Return how an axis is drawn; `size` is the room for its numbers [pixels]."""
     return {
         "size": size,
         "font": "10px sans-serif",

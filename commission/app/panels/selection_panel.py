@@ -18,6 +18,7 @@ from commission.app.editing.gestures import selected_of
 from commission.app.panels.base import BasePanel, Post, escaped, posting, table
 from commission.app.panels.now_panel import NowPanel
 from commission.app.panels.route_fields import RouteFields
+from commission.app.panels.station_fields import StationFields
 from commission.app.view import PageView
 from commission.site.checks import field_hints
 from commission.site.reflectors import Reflector, ReflectorKind
@@ -71,7 +72,7 @@ class SelectionPanel(BasePanel):
         self._editor = Editor()
         self._reflectors: tuple[Reflector, ...] = ()
         self._drawn: tuple[object, ...] = ()
-        gui.add_html(theme.WIDE)
+        gui.add_html(theme.WIDE.replace("c-wide", "c-wide c-tools"))
         tools = gui.add_button_group("", tuple(tool.value for tool in Tool if tool is not Tool.KEEP_OUT))
         tools.on_click(posting(post, lambda event: actions.ChooseTool(client, Tool(event.target.value))))
         self._finish = gui.add_button("Finish the route", visible=False, hint="Make a route of its points (Enter).")
@@ -87,6 +88,7 @@ class SelectionPanel(BasePanel):
             self._add_mirror()
             self._add_repeat()
         self._route = RouteFields(gui, post, client)
+        self._station = StationFields(gui, post, client)
         self._now = NowPanel(gui)
         with gui.add_folder("Snapping", expand_by_default=False):
             self._add_snapping()
@@ -187,6 +189,7 @@ class SelectionPanel(BasePanel):
             ("Select", "V", None, actions.ChooseTool(client, Tool.SELECT)),
             ("Place reflectors", "R", None, actions.ChooseTool(client, Tool.PLACE)),
             ("Draw a route", "T", None, actions.ChooseTool(client, Tool.ROUTE)),
+            ("Place stations", "K", None, actions.ChooseTool(client, Tool.STATION)),
             ("Measure", "M", None, actions.ChooseTool(client, Tool.MEASURE)),
             ("Finish the route", "enter", None, actions.FinishRoute(client)),
             ("Cancel", "escape", None, actions.Cancel(client)),
@@ -201,7 +204,7 @@ class SelectionPanel(BasePanel):
         """Show what is selected."""
         editor = view.state.editors.get(self._client, Editor())
         self._editor = editor
-        if not editor.selected and editor.point is None:
+        if not editor.has_selection:
             self._now.draw_slowly(view)
         drawn = (view.state.project, editor)
         if self._drawn and self._drawn[0] is drawn[0] and self._drawn[1] == drawn[1]:
@@ -210,7 +213,7 @@ class SelectionPanel(BasePanel):
         self._reflectors = selected_of(view.state.project, editor)
         self._finish.visible = len(editor.draft) > 1
         self._head.content = _head(editor, self._reflectors)
-        self._now.visible = not self._reflectors and editor.point is None
+        self._now.visible = not editor.has_selection
         self._buttons.visible = self._copies.visible = bool(self._reflectors)
         for name, widget in self._fields.items():
             shown = bool(self._reflectors) and (len(self._reflectors) == 1 or name not in ALONE)
@@ -221,6 +224,7 @@ class SelectionPanel(BasePanel):
             if shown:
                 self._show_value(name, widget)
         self._route.show(view.state.project, editor)
+        self._station.show(view.state.project, editor)
 
     def _show_value(self, name: str, widget: GuiInputHandle[Any]) -> None:
         """Write a value into its widget, the first one's where several are selected."""
@@ -251,6 +255,8 @@ def _head(editor: Editor, reflectors: tuple[Reflector, ...]) -> str:
         title = f"Reflector {escaped(reflectors[0].id)}"
     elif editor.point is not None:
         title = f"Route {escaped(editor.point.route)}"
+    elif editor.station:
+        title = f"Station {escaped(editor.station)}"
     else:
         title = "Vehicle"
     return f"<div style='padding:2px 14px 2px 6px'>{table(rows)}<div class='c-selected'><b>{title}</b></div></div>"

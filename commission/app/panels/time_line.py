@@ -58,10 +58,10 @@ class TimeLine(BasePanel):
         self._slider.on_update(posting(post, lambda event: actions.Seek(float(event.target.value))))
         self._strip = gui.add_html(strip(None))
         self._shown = ("", "")
-        keys: tuple[tuple[str, Literal["P", "N", "R"], actions.Action], ...] = (
+        keys: tuple[tuple[str, Literal["P", "N", "B"], actions.Action], ...] = (
             ("Play or pause", "P", actions.Play()),
             ("One scan further", "N", actions.Step()),
-            ("Restart the drive", "R", actions.Restart()),
+            ("Restart the drive", "B", actions.Restart()),
         )
         for label, key, action in keys:
             gui.add_command(label, hotkey=key).on_trigger(lambda _event, action=action: post(action))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 from viser import GuiApi
 
 from commission.app.editing.editor import Editor, Tool
 from commission.app.editing.gestures import moved, selected_of
+from commission.app.editing.station_gestures import moved_station
 from commission.app.panels.base import BasePanel, escaped
 from commission.app.view import PageView
 from commission.site.project import Project
@@ -13,7 +16,7 @@ from commission.site.project import Project
 
 def hint(project: Project, editor: Editor) -> str:
     """Return what the tool in use expects; empty when there is nothing to say."""
-    if editor.drag is not None and editor.selected:
+    if editor.drag is not None and (editor.selected or editor.station):
         return _dragging(project, editor)
     match editor.tool:
         case Tool.SELECT:
@@ -25,6 +28,8 @@ def hint(project: Project, editor: Editor) -> str:
             points = len(editor.draft)
             ready = ", Enter makes a route of them" if points > 1 else ""
             said = f"Route: click its points, {points} so far{ready} &nbsp; (Esc drops them)"
+        case Tool.STATION:
+            said = "Station: click where the vehicle has to stand, on a route it looks along it &nbsp; (Esc ends)"
         case Tool.MEASURE:
             which = "second" if len(editor.measured) == 1 else "first"
             said = f"Measure: click the {which} point &nbsp; (Esc ends)"
@@ -35,6 +40,10 @@ def hint(project: Project, editor: Editor) -> str:
 
 def _dragging(project: Project, editor: Editor) -> str:
     """Say where what is being dragged would come to lie."""
+    station = moved_station(project, editor)
+    if station is not None:
+        heading = f"{math.degrees(station.heading):.1f}°"
+        return f"{escaped(station.name)} to x {station.x:.3f} m, y {station.y:.3f} m, heading {heading}"
     selected = selected_of(project, editor)
     if editor.drag is None or len(selected) == 0:
         return ""

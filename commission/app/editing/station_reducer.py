@@ -1,0 +1,96 @@
+"""What actions about stations mean. Pure; importing it registers them with `reduce`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from commission.app.editing import station_actions as actions
+from commission.app.editing.reducer import editor_of
+from commission.app.editing.station_gestures import station_of
+from commission.app.reduction import FlyTo, Reduction, reduce
+from commission.app.store import AppState, Edit, edited
+from commission.errors import UsageError
+from commission.site.editing import stations as edits
+from commission.site.stations import Station
+
+WORDS = {"x": "place", "y": "place", "heading": "heading", "required_accuracy": "accuracy"}
+"""What the fields of a station are called in an undo step."""
+
+
+def _selected(state: AppState, client: int) -> Station:
+    """Return the station that a browser has selected; raises UsageError for none."""
+    station = station_of(state.project, editor_of(state, client))
+    if station is None:
+        raise UsageError("no station is selected; expected one")
+    return station
+
+
+def _with_stations(state: AppState, stations: tuple[Station, ...], edit: Edit, selected: str) -> Reduction:
+    """Return what follows from other stations: one undo step, and one of them is selected."""
+    if stations == state.project.stations:
+        return Reduction(state)
+    after = edited(state, replace(state.project, stations=stations), edit)
+    if edit.client is not None:
+        after = after.with_editor(edit.client, editor_of(after, edit.client).selecting(station=selected))
+    return Reduction(after)
+
+
+@reduce.register
+def _(action: actions.SelectStation, state: AppState) -> Reduction:
+    editor = editor_of(state, action.client).selecting(station=action.name)
+    selecting, station = state.with_editor(action.client, editor), station_of(state.project, editor)
+    if not action.fly or station is None:
+        return Reduction(selecting)
+    return Reduction(selecting, (FlyTo(action.client, (station.x, station.y)),))
+
+
+@reduce.register
+def _(action: actions.PlaceStation, state: AppState) -> Reduction:
+    stations = state.project.stations
+    name = edits.fresh_name(stations)
+    last = stations[-1] if stations else Station(name, *action.place)
+    placed = Station(name, *action.place, last.heading, last.required_accuracy)
+    pose = edits.on_route(state.project.routes, action.place, action.reach)
+    if pose is not None:
+        x, y, heading = (float(value) for value in pose)
+        placed = replace(placed, x=x, y=y, heading=heading)
+    return _with_stations(state, edits.put(stations, placed), Edit(f"place {name}", action.client), name)
+
+
+@reduce.register
+def _(action: actions.MoveStation, state: AppState) -> Reduction:
+    station = _selected(state, action.client)
+    verb = "turn" if action.place == (station.x, station.y) else "move"
+    moved = replace(station, x=action.place[0], y=action.place[1], heading=action.heading)
+    stations = edits.put(state.project.stations, moved, station.name)
+    return _with_stations(state, stations, Edit(f"{verb} {station.name}", action.client), station.name)
+
+
+@reduce.register
+def _(action: actions.SetStation, state: AppState) -> Reduction:
+    station = _selected(state, action.client)
+    changes: dict[str, Any] = {action.field: action.value}
+    changed = replace(station, **changes)
+    what = f"rename {station.name}" if action.field == "name" else f"set {WORDS[action.field]} of {station.name}"
+    key = "" if action.field == "name" else f"{action.client}:{station.name}:{action.field}"
+    stations = edits.put(state.project.stations, changed, station.name)
+    return _with_stations(state, stations, Edit(what, action.client, key, action.at), changed.name)
+
+
+@reduce.register
+def _(action: actions.AlignStation, state: AppState) -> Reduction:
+    station = _selected(state, action.client)
+    pose = edits.on_route(state.project.routes, (station.x, station.y), math.inf)
+    if pose is None:
+        raise UsageError("the project has no route to put the station on; expected one")
+    stations = edits.put(state.project.stations, edits.aligned(station, pose), station.name)
+    return _with_stations(state, stations, Edit(f"align {station.name}", action.client), station.name)
+
+
+@reduce.register
+def _(action: actions.DeleteStation, state: AppState) -> Reduction:
+    station = _selected(state, action.client)
+    stations = edits.remove(state.project.stations, station.name)
+    return _with_stations(state, stations, Edit(f"delete {station.name}", action.client), "")

@@ -1,0 +1,157 @@
+"""Where a route asks too much of its vehicle: stretches of the way, with the poses at which it does.
+
+Numbers and places only; `problems` says them in words, the page marks them on the floor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.geometry.arrays import FloatArray
+from commission.planning.route_check import FloorDistances, Way, room_along, smallest_radius, way_of
+from commission.site.path import KINK
+from commission.site.routes import Route
+from commission.site.vehicle import OmnidirectionalVehicle, Vehicle
+
+
+class ViolationKind(StrEnum):
+    """What is too much."""
+
+    CURVE = "curve"
+    """A curve is tighter than the vehicle can drive."""
+    CORNER = "corner"
+    """The vehicle would have to turn on the spot."""
+    WALL = "wall"
+    """The vehicle's outline cuts a wall."""
+    ROOM = "room"
+    """There is less room between outline and wall than expected."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stretch:
+    """A piece of a route's way."""
+
+    poses: FloatArray
+    """(N, 3) `T_map_base` along it [m, m, rad]; a single one has no length."""
+    metres: tuple[float, float]
+    """Where it begins and ends, along the route [m]."""
+    worst: int
+    """Index of the pose that is worst."""
+
+    @property
+    def length(self) -> float:
+        """Its way [m]."""
+        return self.metres[1] - self.metres[0]
+
+    @property
+    def worst_pose(self) -> FloatArray:
+        """(3,) the pose that is worst [m, m, rad]."""
+        return self.poses[self.worst]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Violation:
+    """One stretch of a route that asks too much."""
+
+    kind: ViolationKind
+    """What is too much."""
+    route: str
+    """Name of the route."""
+    where: Stretch
+    """Where along it."""
+    found: float
+    """Radius [m], angle [rad] or room [m] at the worst place."""
+    expected: float
+    """Smallest radius or room [m], largest angle [rad]."""
+    is_fatal: bool
+    """Whether the vehicle cannot drive it at all."""
+
+
+class _Walk(NamedTuple):
+    """A way with its length."""
+
+    name: str
+    way: Way
+    metres: FloatArray
+
+    def stretch(self, first: int, last: int, worst: int) -> Stretch:
+        """Piece from one pose to another, both included; `worst` is an index of the whole way."""
+        metres = float(self.metres[first]), float(self.metres[last])
+        return Stretch(self.way.poses[first : last + 1], metres, worst - first)
+
+
+def route_violations(
+    route: Route, vehicle: Vehicle, floor: FloorDistances | None, clearance: float
+) -> tuple[Violation, ...]:
+    """Look along one route.
+
+    Parameters
+    ----------
+    route : the route.
+    vehicle : its outline and the tightest curve it can drive.
+    floor : the walls; None: room is not asked for.
+    clearance : smallest room between the vehicle's outline and a wall [m].
+
+    Returns
+    -------
+    violations : one for each stretch: curves, corners, walls, little room, each in order of driving.
+    """
+    way = way_of(route)
+    steps = np.hypot(*np.diff(way.poses[:, :2], axis=0).T)
+    walk = _Walk(route.name, way, np.concatenate(([0.0], np.cumsum(steps))))
+    found = [*_curves(walk, vehicle), *_corners(walk, vehicle)]
+    if floor is not None:
+        found.extend(_room(walk, room_along(way, vehicle.outline, floor, clearance), clearance))
+    return tuple(found)
+
+
+def _curves(walk: _Walk, vehicle: Vehicle) -> Iterable[Violation]:
+    """Curves tighter than the vehicle can drive."""
+    radius, bends = smallest_radius(vehicle), np.abs(walk.way.curvatures)
+    # A thousandth is the rounding of a circle that was drawn with just that radius.
+    for first, last in _runs(bends * radius > 1.001):
+        tightest = first + int(np.argmax(bends[first : last + 1]))
+        where = walk.stretch(first, last, tightest)
+        yield Violation(ViolationKind.CURVE, walk.name, where, 1.0 / float(bends[tightest]), radius, is_fatal=True)
+
+
+def _corners(walk: _Walk, vehicle: Vehicle) -> Iterable[Violation]:
+    """Places where the vehicle would have to turn on the spot."""
+    if isinstance(vehicle, OmnidirectionalVehicle):
+        return
+    way, can_turn = walk.way, smallest_radius(vehicle) <= 0.0
+    for index in np.flatnonzero(np.abs(way.corners) > KINK):
+        # Between two segments a vehicle that can turn stops and does.
+        if can_turn and way.segments[index] != way.segments[index + 1]:
+            continue
+        after = int(index) + 1
+        turn = abs(float(way.corners[index]))
+        yield Violation(
+            ViolationKind.CORNER, walk.name, walk.stretch(after, after, after), turn, KINK, is_fatal=not can_turn
+        )
+
+
+def _room(walk: _Walk, room: FloatArray, clearance: float) -> Iterable[Violation]:
+    """Walls in the way, and stretches with little room that meet none."""
+    for first, last in _runs(room <= 0.0):
+        where = walk.stretch(first, last, (first + last) // 2)
+        yield Violation(
+            ViolationKind.WALL, walk.name, where, float(room[first : last + 1].min()), clearance, is_fatal=True
+        )
+    for first, last in _runs(room < clearance):
+        least = first + int(np.argmin(room[first : last + 1]))
+        if room[least] > 0.0:
+            where = walk.stretch(first, last, least)
+            yield Violation(ViolationKind.ROOM, walk.name, where, float(room[least]), clearance, is_fatal=False)
+
+
+def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last index of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
