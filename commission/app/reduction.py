@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from commission.app.actions import Action, Source, View
+from commission.app.mapping.effects import MapEffect
 from commission.app.store import AppState
 from commission.site.project import Project
 
@@ -94,7 +95,16 @@ class FlyTo:
 
 
 Effect: TypeAlias = (
-    LoadSource | ApplyParameters | WriteProject | ReadProject | MoveTo | ProcessOneScan | Tell | PlaceCamera | FlyTo
+    LoadSource
+    | ApplyParameters
+    | WriteProject
+    | ReadProject
+    | MoveTo
+    | ProcessOneScan
+    | Tell
+    | PlaceCamera
+    | FlyTo
+    | MapEffect
 )
 
 

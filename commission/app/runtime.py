@@ -19,6 +19,9 @@ from commission.app.actions import Action, Source, View
 from commission.app.checking import Checker
 from commission.app.editing import actions as editing
 from commission.app.jobs import Job, JobReport, Jobs, JobState, Progress
+from commission.app.mapping.actions import ImageMissing, MapFailed, MapMade, MapOpened
+from commission.app.mapping.effects import DrawMap, ReadMapFile, StopMapWork
+from commission.app.mapping.work import MapWork
 from commission.app.plan.planner import Planner
 from commission.app.plan.view import PlanView
 from commission.app.session import Drive, Session
@@ -128,9 +131,12 @@ class Runtime:
         # Checks take milliseconds and do not wait for a simulation.
         self._checks = Jobs(self._queue.put)
         self._checker = Checker()
+        # A file that was just sent waits for neither.
+        self._reading = Jobs(self._queue.put)
+        self._map_work = MapWork(self._reading)
         self._checked: Project | None = None
         self._found: tuple[Problem, ...] = ()
-        self._shown_jobs: dict[int, Job] = {}
+        self._shown_jobs: dict[tuple[str, int], Job] = {}
         self._page: PageLike | None = None
         self._shown: Project | None = None
         self._dirty = True
@@ -156,6 +162,7 @@ class Runtime:
         self._stopped.set()
         self._jobs.close()
         self._checks.close()
+        self._reading.close()
         self._thread.join(timeout=2.0)
         self._work.close()
 
@@ -254,22 +261,33 @@ class Runtime:
             case reduction.ProcessOneScan():
                 if session is not None:
                     session.step()
+            case ReadMapFile() | DrawMap() | StopMapWork():
+                self._map_work.do(effect)
             case reduction.Tell() | reduction.PlaceCamera() | reduction.FlyTo():
-                if self._page is not None:
-                    _show(self._page, effect)
+                self._show_effect(effect)
+
+    def _show_effect(self, effect: reduction.Tell | reduction.PlaceCamera | reduction.FlyTo) -> None:
+        """Do what only the page can do; a camera is fitted to the site as it is now, not as it was drawn last."""
+        if self._page is None:
+            return
+        if not isinstance(effect, reduction.Tell) and self.state.project is not self._shown:
+            self._show_site()
+        _show(self._page, effect)
 
     def _hear(self, report: JobReport) -> None:
         """Follow a job; take its result or its error."""
         job = report.job
         if job.state in (JobState.WAITING, JobState.RUNNING):
-            self._shown_jobs[job.number] = job
+            self._shown_jobs[job.name, job.number] = job
             return
-        self._shown_jobs.pop(job.number, None)
+        self._shown_jobs.pop((job.name, job.number), None)
         self._planner.hear(report)
         if job.state is JobState.FAILED:
             self._apply(actions.Report(f"{job.name}: {job.error}"))
         elif job.state is JobState.DONE and isinstance(report.result, Drive):
             self._begin(report.result)
+        elif job.state is JobState.DONE and isinstance(report.result, MapOpened | MapMade | ImageMissing | MapFailed):
+            self._apply(report.result)
         elif job.state is JobState.DONE and isinstance(report.result, Findings):
             self._found = report.result.problems
         elif job.state is JobState.DONE and isinstance(report.result, tuple) and self.session is not None:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from commission.app.actions import Source
 from commission.app.editing.editor import Editor
+from commission.app.mapping.draft import MapLoading
 from commission.app.plan.settings import PlanSettings
 from commission.site.project import Project
 
@@ -20,6 +21,9 @@ SPEEDS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 MAGNIFICATIONS = (1.0, 3.0, 10.0, 30.0)
 """Factors at which ellipses can be drawn."""
 
+
+NOTHING_SAVED = Project(name="")
+"""What is on disk of a new project: it differs from any, so that there is something to save."""
 
 UNDO_STEPS = 10_000
 """Undo steps that are kept: nobody goes back farther, and memory stays bounded. Projects share what did not change."""
@@ -88,6 +92,8 @@ class AppState:
     """Factor at which ellipses are drawn."""
     plan: PlanSettings = field(default_factory=PlanSettings)
     """What the step Plan shows."""
+    mapping: MapLoading = field(default_factory=MapLoading)
+    """The floor map that is being loaded."""
     problems: tuple[str, ...] = field(default=())
     """What went wrong, the newest last."""
 
@@ -95,6 +101,10 @@ class AppState:
     def is_changed(self) -> bool:
         """Whether there is something to save."""
         return self.project is not self.saved and self.project != self.saved
+
+    def editor(self, client: int) -> Editor:
+        """Return how a browser edits; one that is not known yet selects."""
+        return self.editors.get(client, Editor())
 
     def with_editor(self, client: int, editor: Editor) -> AppState:
         """Return the state with one browser's editor exchanged."""

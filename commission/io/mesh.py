@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-import trimesh
 
 from commission.errors import FileFormatError, UsageError
 from commission.geometry.arrays import FloatArray, frozen
@@ -111,6 +110,8 @@ def read_model(path: Path, *, unit: str = "m", y_up: bool | None = None, progres
     if unit not in UNITS:
         raise UsageError(f"unit is {unit!r}; expected one of: {', '.join(UNITS)}")
     check_size(path, SIZE_LIMIT)
+    import trimesh
+
     try:
         with path.open("rb") as file:
             source = _Reported(file, path.stat().st_size, progress)
@@ -164,6 +165,8 @@ class _Reported:
 
 def _triangles(path: Path, loaded: Any) -> FloatArray:
     """(N, 3, 3) corners of all parts of a model, each part as often as the scene shows it."""
+    import trimesh
+
     if isinstance(loaded, trimesh.Trimesh):
         parts = [(loaded, np.eye(4))]
     elif isinstance(loaded, trimesh.Scene):

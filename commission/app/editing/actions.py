@@ -180,6 +180,14 @@ class SnapSelected:
 
 
 @dataclass(frozen=True, slots=True)
+class Finish:
+    """Make what the tool in use is for of the points drawn so far."""
+
+    client: int
+    """Number of the browser's connection."""
+
+
+@dataclass(frozen=True, slots=True)
 class FinishRoute:
     """Make a route of the points drawn so far."""
 
@@ -337,6 +345,7 @@ EditAction: TypeAlias = (
     | MirrorSelected
     | RepeatSelected
     | SnapSelected
+    | Finish
     | FinishRoute
     | SelectControlPoint
     | InsertControlPoint

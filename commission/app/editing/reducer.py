@@ -8,9 +8,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from commission.app.editing import actions
-from commission.app.editing.editor import Drag, Editor, Grab, Tool
+from commission.app.editing.editor import AlignmentDraft, Drag, Editor, Grab, Tool
 from commission.app.editing.gestures import (
     grabbed,
+    marked_place,
     moved,
     reflector_at,
     reflectors_in,
@@ -18,6 +19,8 @@ from commission.app.editing.gestures import (
     to_place,
 )
 from commission.app.editing.route_gestures import route_at
+from commission.app.mapping import tools as map_tools
+from commission.app.mapping.actions import FinishShape
 from commission.app.reduction import ApplyParameters, FlyTo, Reduction, Tell, reduce
 from commission.app.store import AppState, Edit, edited
 from commission.errors import UsageError
@@ -28,7 +31,7 @@ from commission.site.reflectors import ReflectorMap
 
 def editor_of(state: AppState, client: int) -> Editor:
     """Return how a browser edits."""
-    return state.editors.get(client, Editor())
+    return state.editor(client)
 
 
 def counted(state: AppState, editor: Editor) -> str:
@@ -78,7 +81,9 @@ def _(action: actions.Leave, state: AppState) -> Reduction:
 
 @reduce.register
 def _(action: actions.ChooseTool, state: AppState) -> Reduction:
-    editor = replace(editor_of(state, action.client), tool=action.tool, drag=None, draft=(), measured=())
+    editor = replace(
+        editor_of(state, action.client), tool=action.tool, drag=None, draft=(), measured=(), alignment=AlignmentDraft()
+    )
     return Reduction(state.with_editor(action.client, editor))
 
 
@@ -92,13 +97,19 @@ def _(action: actions.ChooseSnapping, state: AppState) -> Reduction:
 @reduce.register
 def _(action: actions.Cancel, state: AppState) -> Reduction:
     editor = editor_of(state, action.client)
-    if editor.drag is not None or editor.draft or editor.measured:
-        editor = replace(editor, drag=None, draft=(), measured=())
+    if editor.drag is not None or editor.draft or editor.measured or editor.alignment.points:
+        editor = replace(editor, drag=None, draft=(), measured=(), alignment=AlignmentDraft())
     elif editor.tool is not Tool.SELECT:
         editor = replace(editor, tool=Tool.SELECT)
     else:
         editor = replace(editor, selected=(), point=None)
     return Reduction(state.with_editor(action.client, editor))
+
+
+@reduce.register
+def _(action: actions.Finish, state: AppState) -> Reduction:
+    is_route = editor_of(state, action.client).tool is Tool.ROUTE
+    return reduce(actions.FinishRoute(action.client) if is_route else FinishShape(action.client), state)
 
 
 @reduce.register
@@ -113,8 +124,10 @@ def _(action: actions.ClickFloor, state: AppState) -> Reduction:
             return Reduction(state.with_editor(action.client, replace(editor, draft=(*editor.draft, action.place))))
         case Tool.MEASURE:
             before = editor.measured if len(editor.measured) == 1 else ()
-            place = _on_something(state, editor, action)
+            place = marked_place(state.project, action.place, editor.reach)
             return Reduction(state.with_editor(action.client, replace(editor, measured=(*before, place))))
+        case Tool.ERASE | Tool.WALL | Tool.OBSTACLE | Tool.ALIGN | Tool.CALIBRATE:
+            return map_tools.clicked(state, editor, action)
 
 
 def _picked(state: AppState, editor: Editor, action: actions.ClickFloor) -> Editor:
@@ -139,18 +152,11 @@ def _placed(state: AppState, editor: Editor, action: actions.ClickFloor) -> Redu
     return replace(reduction, state=selecting)
 
 
-def _on_something(state: AppState, editor: Editor, action: actions.ClickFloor) -> tuple[float, float]:
-    """Return the center of the reflector that was clicked, or the place itself."""
-    found = reflector_at(state.project.reflectors, action.place, editor.reach)
-    if found is None:
-        return action.place
-    hit = next(r for r in state.project.reflectors.reflectors if r.id == found)
-    return hit.x, hit.y
-
-
 @reduce.register
 def _(action: actions.DragFloor, state: AppState) -> Reduction:
     editor = editor_of(state, action.client)
+    if editor.tool in map_tools.AREA_TOOLS:
+        return map_tools.dragged(state, editor, action)
     if editor.tool is not Tool.SELECT:
         return Reduction(state)
     drag = editor.drag
