@@ -26,7 +26,7 @@ from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
 from commission.app.server import start_server
 from commission.app.session import Drive
 from commission.app.store import MAGNIFICATIONS, NOTHING_SAVED, AppState
-from commission.geometry import se2, spline_kernels
+from commission.geometry import rasterize, se2, spline_kernels
 from commission.io.journal import restore
 from commission.io.project_file import OpenedProject, load_project, open_project
 from commission.localization import localizer, whole_run
@@ -170,5 +170,6 @@ def compile_kernels(progress: Callable[[float, str], None]) -> None:
         ("virtual scanner", scan.warm_up),
         ("localizer", localizer.warm_up),
         ("prediction", whole_run.warm_up),
+        ("drawing", rasterize.warm_up),
     )
     compiled.warm_up(steps, progress)
