@@ -24,7 +24,7 @@ from commission.app.reduction import (
     WriteProject,
     reduce,
 )
-from commission.app.store import AppState, Edit, Step, edited
+from commission.app.store import AppState, Edit, Step, edited, with_maps_packed
 from commission.errors import UsageError
 from commission.site.parameters import Parameters
 
@@ -77,8 +77,9 @@ def _(action: actions.Undo, state: AppState) -> Reduction:
     step = state.undo[-1]
     if _is_anothers(step, action.client, state):
         return Reduction(state, (_in_the_way(step, "undo"),))
-    taken_back = replace(step, project=state.project)
-    before = replace(state, project=step.project, undo=state.undo[:-1], redo=(*state.redo, taken_back), last_edit=None)
+    taken_back = Step(state.project, step.name, step.client)
+    redo = with_maps_packed((*state.redo, taken_back))
+    before = replace(state, project=step.whole, undo=state.undo[:-1], redo=redo, last_edit=None)
     return Reduction(before, (ApplyParameters(),))
 
 
@@ -89,8 +90,9 @@ def _(action: actions.Redo, state: AppState) -> Reduction:
     step = state.redo[-1]
     if _is_anothers(step, action.client, state):
         return Reduction(state, (_in_the_way(step, "redo"),))
-    made_again = replace(step, project=state.project)
-    after = replace(state, project=step.project, undo=(*state.undo, made_again), redo=state.redo[:-1], last_edit=None)
+    made_again = Step(state.project, step.name, step.client)
+    undo = with_maps_packed((*state.undo, made_again))
+    after = replace(state, project=step.whole, undo=undo, redo=state.redo[:-1], last_edit=None)
     return Reduction(after, (ApplyParameters(),))
 
 
