@@ -28,7 +28,9 @@ class PackedMap:
     def of(floor_map: FloorMap) -> PackedMap:
         """Pack a map."""
         rows, columns = floor_map.cells.shape
-        return PackedMap(zlib.compress(floor_map.cells, 1), (rows, columns), floor_map.resolution, floor_map.origin)
+        return PackedMap(
+            zlib.compress(floor_map.cells.tobytes(), 1), (rows, columns), floor_map.resolution, floor_map.origin
+        )
 
     def unpacked(self) -> FloorMap:
         """Return an equal map."""
