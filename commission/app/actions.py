@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from commission.app.editing.actions import EditAction
+from commission.app.mapping.actions import MapAction
 from commission.app.plan.actions import PlanAction
 from commission.site.project import Project
 
@@ -270,5 +271,6 @@ Action: TypeAlias = (
     | Report
     | ClearProblems
     | EditAction
+    | MapAction
     | PlanAction
 )

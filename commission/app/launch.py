@@ -25,10 +25,10 @@ from commission.app.page import Page
 from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
 from commission.app.server import start_server
 from commission.app.session import Drive
-from commission.app.store import MAGNIFICATIONS, AppState
-from commission.geometry import se2, spline_kernels
+from commission.app.store import MAGNIFICATIONS, NOTHING_SAVED, AppState
+from commission.geometry import rasterize, se2, spline_kernels
 from commission.io.journal import restore
-from commission.io.project_file import load_project, project_file
+from commission.io.project_file import OpenedProject, load_project, open_project
 from commission.localization import localizer, whole_run
 from commission.localization.estimate import Mode
 from commission.localization.setup import LocalizerSetup
@@ -55,7 +55,7 @@ def serve(
 
     Parameters
     ----------
-    project : folder of the project.
+    project : folder of the project; one that holds none, or does not exist yet, begins a new one.
     host, port, token : where, and what a browser must bring; see `start_server`.
     open_browser : whether to open the page in this computer's browser.
     recording : what to play; none: choose on the page.
@@ -66,13 +66,14 @@ def serve(
     CommissionError
         the project cannot be read, or the page cannot be served as asked.
     """
-    loaded = load_project(project)
-    folder = None if demo else project_file(project).parent
+    opened = OpenedProject(load_project(project), project, False) if demo else open_project(project)
+    loaded, folder = opened.project, None if demo else opened.folder
     with ExitStack() as open_things:
         # Ctrl-C may come at any moment from here on, and what is running would keep the program alive.
         server = start_server(host, port, token)
         open_things.callback(server.stop)
-        runtime = open_page(server, loaded, folder=folder, source=first_source(loaded, recording, demo))
+        source = first_source(loaded, recording, demo)
+        runtime = open_page(server, loaded, folder=folder, source=source, is_new=opened.is_new)
         open_things.callback(runtime.stop)
         address = f"http://{host}:{server.get_port()}/" + (f"?token={quote(token)}" if token else "")
         log.info("page at %s", address)
@@ -89,7 +90,12 @@ def first_source(project: Project, recording: Path | None, demo: bool) -> Source
 
 
 def open_page(
-    server: viser.ViserServer, project: Project, *, folder: Path | None = None, source: Source | None = None
+    server: viser.ViserServer,
+    project: Project,
+    *,
+    folder: Path | None = None,
+    source: Source | None = None,
+    is_new: bool = False,
 ) -> Runtime:
     """Fill a server with the page of a project and start its owner thread; returns at once.
 
@@ -100,15 +106,17 @@ def open_page(
     folder : where it is saved to; none: nowhere unless a folder is named. Edits that a killed program left in the
         journal there are made again.
     source : what drives at once; none: nothing yet.
+    is_new : whether nothing of the project is on disk yet.
     """
     state = AppState(
         project,
-        project,
+        NOTHING_SAVED if is_new else project,
         folder=folder,
         source=source,
         repeat=folder is None,
         hidden=frozenset({AccumulatedLayer.name}),
         magnify=seen_magnification(project),
+        greeting=f"A new project in {folder}: it is empty until you load a map or place something" if is_new else "",
     )
     keeping = Keeping(folder, project)
     work = Work(
@@ -162,5 +170,6 @@ def compile_kernels(progress: Callable[[float, str], None]) -> None:
         ("virtual scanner", scan.warm_up),
         ("localizer", localizer.warm_up),
         ("prediction", whole_run.warm_up),
+        ("drawing", rasterize.warm_up),
     )
     compiled.warm_up(steps, progress)

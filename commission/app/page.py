@@ -24,6 +24,7 @@ from commission.app.layers.floor import FloorLayer
 from commission.app.layers.gates import GateLayer
 from commission.app.layers.grid import GridLayer
 from commission.app.layers.heatmap import HeatLayer
+from commission.app.layers.map_draft import MapDraftLayer
 from commission.app.layers.prediction import RibbonLayer
 from commission.app.layers.reflectors import ReflectorLayer, ReflectorNameLayer
 from commission.app.layers.routes import RouteLayer
@@ -74,6 +75,7 @@ LAYERS = (
     TrailLayer,
     ReferenceLayer,
     WallLayer,
+    MapDraftLayer,
 )
 TOLD_FOR_S = 6.0
 

@@ -9,6 +9,7 @@ from typing import Any
 from commission.app import actions
 from commission.app.actions import ParameterValue
 from commission.app.editing import site_reducer, station_reducer
+from commission.app.mapping import reducer as map_reducer
 from commission.app.plan import layout_reducer
 from commission.app.plan import reducer as plan
 from commission.app.plan.actions import ReadFloor, SetPlan
@@ -25,14 +26,14 @@ from commission.app.reduction import (
     WriteProject,
     reduce,
 )
-from commission.app.store import AppState, Edit, Step, edited
+from commission.app.store import AppState, Edit, Step, edited, with_maps_packed
 from commission.errors import UsageError
 from commission.site.parameters import Parameters
 
 PROBLEMS_KEPT = 20
 
-# These reducers are imported because they register what editing and suggested layouts mean.
-__all__ = ["layout_reducer", "parameter", "reduce", "site_reducer", "station_reducer", "with_parameter"]
+# These reducers are imported because they register what editing, loading and suggested layouts mean.
+__all__ = ["layout_reducer", "map_reducer", "parameter", "reduce", "site_reducer", "station_reducer", "with_parameter"]
 
 
 def parameter(parameters: Parameters, key: str) -> ParameterValue:
@@ -78,8 +79,9 @@ def _(action: actions.Undo, state: AppState) -> Reduction:
     step = state.undo[-1]
     if _is_anothers(step, action.client, state):
         return Reduction(state, (_in_the_way(step, "undo"),))
-    taken_back = replace(step, project=state.project)
-    before = replace(state, project=step.project, undo=state.undo[:-1], redo=(*state.redo, taken_back), last_edit=None)
+    taken_back = Step(state.project, step.name, step.client)
+    redo = with_maps_packed((*state.redo, taken_back))
+    before = replace(state, project=step.whole, undo=state.undo[:-1], redo=redo, last_edit=None)
     return Reduction(before, (ApplyParameters(),))
 
 
@@ -90,8 +92,9 @@ def _(action: actions.Redo, state: AppState) -> Reduction:
     step = state.redo[-1]
     if _is_anothers(step, action.client, state):
         return Reduction(state, (_in_the_way(step, "redo"),))
-    made_again = replace(step, project=state.project)
-    after = replace(state, project=step.project, undo=(*state.undo, made_again), redo=state.redo[:-1], last_edit=None)
+    made_again = Step(state.project, step.name, step.client)
+    undo = with_maps_packed((*state.undo, made_again))
+    after = replace(state, project=step.whole, undo=undo, redo=state.redo[:-1], last_edit=None)
     return Reduction(after, (ApplyParameters(),))
 
 

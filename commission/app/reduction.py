@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from commission.app.actions import Action, Source, View
+from commission.app.mapping.effects import MapEffect
 from commission.app.store import AppState
 from commission.site.project import Project
 
@@ -112,6 +113,7 @@ Effect: TypeAlias = (
     | Tell
     | PlaceCamera
     | FlyTo
+    | MapEffect
 )
 
 

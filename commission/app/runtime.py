@@ -19,6 +19,9 @@ from commission.app.actions import Action, Source, View
 from commission.app.editing import actions as editing
 from commission.app.inspection import Inspection
 from commission.app.jobs import Job, JobReport, Jobs, JobState, Progress
+from commission.app.mapping.actions import ImageMissing, MapFailed, MapMade, MapOpened
+from commission.app.mapping.effects import DrawMap, ReadMapFile, StopMapWork
+from commission.app.mapping.work import MapWork
 from commission.app.plan.planner import Planner
 from commission.app.plan.view import PlanView
 from commission.app.session import Drive, Session
@@ -125,8 +128,10 @@ class Runtime:
         numbers = itertools.count(1)
         self._jobs, self._patient_jobs = Jobs(self._queue.put, numbers), Jobs(self._queue.put, numbers)
         self._planner = Planner(self._jobs, self._patient_jobs)
-        # Looking at the site takes milliseconds and does not wait for a simulation.
+        # Looking at the site takes milliseconds and does not wait for a simulation, nor does a file that was just sent.
         self._inspection = Inspection(Jobs(self._queue.put, numbers))
+        self._reading = Jobs(self._queue.put, numbers)
+        self._map_work = MapWork(self._reading)
         self._shown_jobs: dict[int, Job] = {}
         self._page: PageLike | None = None
         self._shown: Project | None = None
@@ -151,7 +156,7 @@ class Runtime:
     def stop(self) -> None:
         """End the loop and the background work."""
         self._stopped.set()
-        for jobs in (self._jobs, self._patient_jobs, self._inspection):
+        for jobs in (self._jobs, self._patient_jobs, self._reading, self._inspection):
             jobs.close()
         self._thread.join(timeout=2.0)
         self._work.close()
@@ -241,14 +246,23 @@ class Runtime:
                 self._work.save(project, folder, overwrite)
                 self.post(actions.ProjectSaved(project, folder, time.strftime("%H:%M")))
             case reduction.CancelJob(number):
-                for jobs in (self._jobs, self._patient_jobs):
+                for jobs in (self._jobs, self._patient_jobs, self._reading):
                     jobs.cancel(number)
             case reduction.ApplyParameters() | reduction.MoveTo() | reduction.ProcessOneScan():
                 if self.session is not None:
                     self._act_on_run(self.session, effect)
+            case ReadMapFile() | DrawMap() | StopMapWork():
+                self._map_work.do(effect)
             case reduction.Tell() | reduction.PlaceCamera() | reduction.FlyTo():
-                if self._page is not None:
-                    _show(self._page, effect)
+                self._show_effect(effect)
+
+    def _show_effect(self, effect: reduction.Tell | reduction.PlaceCamera | reduction.FlyTo) -> None:
+        """Do what only the page can do; a camera is fitted to the site as it is now, not as it was drawn last."""
+        if self._page is None:
+            return
+        if not isinstance(effect, reduction.Tell) and self.state.project is not self._shown:
+            self._show_site()
+        _show(self._page, effect)
 
     def _act_on_run(
         self, session: Session, effect: reduction.ApplyParameters | reduction.MoveTo | reduction.ProcessOneScan
@@ -277,6 +291,8 @@ class Runtime:
         self._planner.hear(report)
         if job.state is JobState.DONE and isinstance(report.result, Drive):
             self._begin(report.result)
+        elif job.state is JobState.DONE and isinstance(report.result, MapOpened | MapMade | ImageMissing | MapFailed):
+            self._apply(report.result)
         elif job.state is JobState.DONE and isinstance(report.result, tuple) and self.session is not None:
             self.session.predicted = report.result
 

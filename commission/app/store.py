@@ -11,8 +11,10 @@ from pathlib import Path
 
 from commission.app.actions import Source
 from commission.app.editing.editor import Editor
+from commission.app.mapping.draft import MapLoading
 from commission.app.plan.layout import LayoutWish
 from commission.app.plan.settings import PlanSettings
+from commission.site.editing.packed_map import PackedMap
 from commission.site.project import Project
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
@@ -22,8 +24,13 @@ MAGNIFICATIONS = (1.0, 3.0, 10.0, 30.0)
 """Factors at which ellipses can be drawn."""
 
 
+NOTHING_SAVED = Project(name="")
+"""What is on disk of a new project: it differs from any, so that there is something to save."""
+
 UNDO_STEPS = 10_000
 """Undo steps that are kept: nobody goes back farther, and memory stays bounded. Projects share what did not change."""
+MAP_BYTES = 200_000_000
+"""Bytes of cells that the undo steps hold as they are, and as many the redo steps; older maps are packed."""
 MERGE_WITHIN_S = 1.0
 
 
@@ -32,11 +39,18 @@ class Step:
     """A project that undo or redo brings back."""
 
     project: Project
-    """The project."""
+    """The project; without its floor map where that is packed."""
     name: str = ""
     """What is taken back or made again by that, as its button says."""
     client: int | None = None
     """Number of the browser that did it; none: nobody in particular."""
+    packed: PackedMap | None = None
+    """Its floor map, where that is packed."""
+
+    @property
+    def whole(self) -> Project:
+        """The project with its floor map."""
+        return self.project if self.packed is None else replace(self.project, floor_map=self.packed.unpacked())
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +105,8 @@ class AppState:
     """What the step Plan shows."""
     layout: LayoutWish = field(default_factory=LayoutWish)
     """What a suggested layout must achieve."""
+    mapping: MapLoading = field(default_factory=MapLoading)
+    """The floor map that is being loaded."""
     problems: tuple[str, ...] = field(default=())
     """What went wrong, the newest last."""
 
@@ -98,6 +114,10 @@ class AppState:
     def is_changed(self) -> bool:
         """Whether there is something to save."""
         return self.project is not self.saved and self.project != self.saved
+
+    def editor(self, client: int) -> Editor:
+        """Return how a browser edits; one that is not known yet selects."""
+        return self.editors.get(client, Editor())
 
     def with_editor(self, client: int, editor: Editor) -> AppState:
         """Return the state with one browser's editor exchanged."""
@@ -124,6 +144,34 @@ def edited(state: AppState, project: Project, edit: Edit) -> AppState:
     merged = bool(edit.key) and last is not None and last.key == edit.key and edit.at - last.at <= MERGE_WITHIN_S
     step = Step(state.project, edit.name, edit.client)
     undo = state.undo if merged and state.undo else (*state.undo, step)[-UNDO_STEPS:]
+    if project.floor_map is not state.project.floor_map:
+        undo = with_maps_packed(undo)
     return replace(
         state, project=project, undo=undo, redo=(), last_edit=LastEdit(edit.key, edit.at) if edit.key else None
     )
+
+
+def with_maps_packed(steps: tuple[Step, ...]) -> tuple[Step, ...]:
+    """Return the steps with the floor maps of the older ones packed, as far as they hold more than MAP_BYTES.
+
+    Each edit of a map makes another array of cells, 8 MB for 200 x 100 m; steps between share theirs.
+    """
+    left, counted = MAP_BYTES, set[int]()
+    packed: dict[int, PackedMap] = {}
+    changed: dict[int, Step] = {}
+    for index in range(len(steps) - 1, -1, -1):
+        project = steps[index].project
+        floor_map = project.floor_map
+        if floor_map is None:
+            continue
+        if id(floor_map.cells) not in counted:
+            counted.add(id(floor_map.cells))
+            left -= floor_map.cells.nbytes
+        # The newest is never packed: it is gone back to at once, and shares its cells with what is shown.
+        if left < 0 and index < len(steps) - 1:
+            if id(floor_map) not in packed:
+                packed[id(floor_map)] = PackedMap.of(floor_map)
+            changed[index] = replace(
+                steps[index], project=replace(project, floor_map=None), packed=packed[id(floor_map)]
+            )
+    return tuple(changed.get(index, step) for index, step in enumerate(steps)) if changed else steps

@@ -74,7 +74,8 @@ class Height:
     VEHICLE = 0.10
     POSE = 0.11
     LABEL = 0.12
-    EDITING = 0.13
+    DRAFT = 0.13
+    EDITING = 0.14
 
 
 class Mark(StrEnum):

@@ -88,7 +88,7 @@ class Serve(_Page):
     """Open the page for a project."""
 
     project: Positional[Path]
-    """Folder of the project (holds project.yaml)."""
+    """Folder of the project (holds project.yaml); one that is empty or does not exist yet begins a new project."""
     recording: Annotated[Path | None, arg(metavar="PATH")] = None
     """Recording to play: a CSV folder. None: choose it on the page, or drive a virtual AGV."""
 

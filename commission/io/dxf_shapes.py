@@ -10,8 +10,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from ezdxf.math import OCS, Vec3, fit_points_to_cad_cv
-from scipy.interpolate import BSpline
 
 from commission.geometry.arrays import FloatArray
 from commission.io.dxf_tags import Group
@@ -97,6 +95,8 @@ class Curve:
         w = self.controls[:, 2]
         x = to.xx * self.controls[:, 0] + to.xy * self.controls[:, 1] + to.x0 * w
         y = to.yx * self.controls[:, 0] + to.yy * self.controls[:, 1] + to.y0 * w
+        from scipy.interpolate import BSpline
+
         spline = BSpline(self.knots, np.column_stack((x, y, w)), self.degree)
         breaks = np.unique(self.knots[self.degree : len(self.controls) + 1])
         while True:
@@ -167,6 +167,8 @@ def _plane(group: Group) -> Affine:
     extrusion = (group.number(210), group.number(220), group.number(230, 1.0))
     if extrusion[0] == extrusion[1] == 0.0 and extrusion[2] > 0.0:
         return Affine()
+    from ezdxf.math import OCS, Vec3
+
     ocs = OCS(Vec3(extrusion))
     x, y, up = ocs.ux, ocs.uy, ocs.uz * (group.number(38) or group.number(30))
     return Affine(x.x, y.x, x.y, y.y, up.x, up.y)
@@ -189,6 +191,8 @@ def _circle(group: Group) -> Arc:
 
 def _ellipse(group: Group) -> Arc:
     """Center and major axis are given in the drawing's coordinates; the minor axis lies across them and the normal."""
+    from ezdxf.math import Vec3
+
     major = Vec3(group.number(11), group.number(21), group.number(31))
     normal = Vec3(group.number(210), group.number(220), group.number(230, 1.0)).normalize()
     minor = normal.cross(major) * group.number(40, 1.0)
@@ -244,6 +248,8 @@ def _spline(group: Group) -> Curve:
     if values[10]:
         points, knots, weights = list(zip(values[10], values[20], strict=True)), values[40], values[41]
     else:
+        from ezdxf.math import Vec3, fit_points_to_cad_cv
+
         fitted = fit_points_to_cad_cv([Vec3(x, y) for x, y in zip(values[11], values[21], strict=True)])
         points, knots, weights = [(p.x, p.y) for p in fitted.control_points], list(fitted.knots()), []
         degree = fitted.degree

@@ -12,9 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from ezdxf.lldxf.const import DXFError
-from ezdxf.lldxf.tagger import binary_tags_loader
-
 from commission.errors import FileFormatError
 from commission.io.findings import Progress
 from commission.io.reading import cannot_read, check_size, read_bytes
@@ -138,6 +135,9 @@ def _text_tags(path: Path, file: IO[bytes], progress: Progress) -> Iterator[tupl
 
 def _binary_tags(path: Path) -> Iterator[tuple[int, int, bytes]]:
     """Number, code and value of each pair of a binary file."""
+    from ezdxf.lldxf.const import DXFError
+    from ezdxf.lldxf.tagger import binary_tags_loader
+
     data = read_bytes(path, BINARY_LIMIT)
     try:
         for number, tag in enumerate(binary_tags_loader(data), start=1):

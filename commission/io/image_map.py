@@ -69,38 +69,63 @@ class ImagePlacement:
         return np.array([x - (c * right - s * up), y - (s * right + c * up), math.remainder(yaw, 2.0 * math.pi)])
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Picture:
+    """A plain image: gray values without a scale. Its two arrays are one where nothing is transparent."""
+
+    on_white: NDArray[np.uint8]
+    """(H, W) gray values, top row first; what is transparent shows white."""
+    on_black: NDArray[np.uint8]
+    """(H, W) gray values, top row first; what is transparent shows black."""
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height [pixels]."""
+        height, width = self.on_white.shape
+        return width, height
+
+    def walls(self, threshold: float = 0.5, *, light_walls: bool = False) -> NDArray[np.bool_]:
+        """Which pixels are walls.
+
+        Parameters
+        ----------
+        threshold : brightness [0..1] below which a pixel is a wall.
+        light_walls : whether walls are light on dark: then pixels brighter than the threshold are walls.
+
+        Returns
+        -------
+        walls : (H, W) array, top row first; transparent pixels are none.
+        """
+        between(threshold, (0.0, 1.0), "threshold")
+        return self.on_black > 255.0 * threshold if light_walls else self.on_white < 255.0 * threshold
+
+    def floor_map(self, placement: ImagePlacement, *, threshold: float = 0.5, light_walls: bool = False) -> FloorMap:
+        """Return the picture as a floor map with one cell for each pixel; see `walls` for the options."""
+        walls = self.walls(threshold, light_walls=light_walls)
+        cells = np.where(np.flipud(walls), np.int8(OCCUPIED), np.int8(FREE))
+        return FloorMap(cells, placement.resolution, placement.origin(len(cells)))
+
+
 def read_image_map(
     path: Path, placement: ImagePlacement, *, threshold: float = 0.5, light_walls: bool = False
 ) -> FloorMap:
-    """Read an image as a floor map.
+    """Read an image as a floor map: `read_picture`, then `Picture.floor_map`."""
+    between(threshold, (0.0, 1.0), "threshold")
+    return read_picture(path).floor_map(placement, threshold=threshold, light_walls=light_walls)
+
+
+def read_picture(path: Path) -> Picture:
+    """Read an image.
 
     Parameters
     ----------
     path : image file in one of `FORMATS`.
-    placement : where it lies, and how large it is.
-    threshold : brightness [0..1] below which a pixel is a wall.
-    light_walls : whether walls are light on dark: then pixels brighter than the threshold are walls.
-
-    Returns
-    -------
-    floor_map : one cell for each pixel; transparent pixels are free.
 
     Raises
     ------
     FileFormatError
         the file is missing, no image, truncated or too large; too large is found out before it is unpacked.
-    ValueError
-        the threshold is out of range.
     """
-    between(threshold, (0.0, 1.0), "threshold")
-    brightness = _brightness(path, light_walls)
-    walls = brightness > 255.0 * threshold if light_walls else brightness < 255.0 * threshold
-    cells = np.where(np.flipud(walls), np.int8(OCCUPIED), np.int8(FREE))
-    return FloorMap(cells, placement.resolution, placement.origin(len(cells)))
-
-
-def _brightness(path: Path, light_walls: bool) -> NDArray[np.uint8]:
-    """(H, W) gray values, top row first; what is transparent shows a ground on which walls would stand out."""
     check_size(path, FILE_LIMIT)
     try:
         with warnings.catch_warnings():
@@ -110,7 +135,7 @@ def _brightness(path: Path, light_walls: bool) -> NDArray[np.uint8]:
                 width, height = image.size
                 if not 0 < width * height <= CELL_LIMIT:
                     raise FileFormatError(path, "", f"has {width} x {height} pixels", f"1 to {CELL_LIMIT} pixels")
-                return _gray(image, 0 if light_walls else 255)
+                return _picture(image)
     except FileFormatError:
         raise
     except Image.DecompressionBombError as error:
@@ -120,14 +145,21 @@ def _brightness(path: Path, light_walls: bool) -> NDArray[np.uint8]:
         raise FileFormatError(path, "", f"is no readable image ({error})", f"one of: {', '.join(FORMATS)}") from error
 
 
-def _gray(image: Image.Image, ground: int) -> NDArray[np.uint8]:
+def _picture(image: Image.Image) -> Picture:
     if image.mode.startswith("I") or image.mode == "F":
         # 16 bits a pixel: Pillow's own conversion would cut off at 255 instead of scaling.
         pixels = np.asarray(image, dtype=np.float64)
         full_scale = 65535.0 if pixels.max(initial=0.0) > 255.0 else 255.0
-        return (np.clip(pixels / full_scale, 0.0, 1.0) * 255.0).astype(np.uint8)
+        gray = (np.clip(pixels / full_scale, 0.0, 1.0) * 255.0).astype(np.uint8)
+        return Picture(gray, gray)
     if "A" in image.getbands() or "transparency" in image.info:
         image = image.convert("RGBA")
-        canvas = Image.new("RGBA", image.size, (ground, ground, ground, 255))
-        image = Image.alpha_composite(canvas, image)
-    return np.asarray(image.convert("L"))
+        return Picture(_gray_on(image, 255), _gray_on(image, 0))
+    gray = np.asarray(image.convert("L"))
+    return Picture(gray, gray)
+
+
+def _gray_on(image: Image.Image, ground: int) -> NDArray[np.uint8]:
+    """(H, W) gray values of an image with transparency on a ground of that gray."""
+    canvas = Image.new("RGBA", image.size, (ground, ground, ground, 255))
+    return np.asarray(Image.alpha_composite(canvas, image).convert("L"))

@@ -171,6 +171,8 @@ class Journal:
         beginning = self.path.with_name(f"{FILE_NAME}.new")
         descriptor = None
         try:
+            # A new project's folder appears with its first edit.
+            self._folder.mkdir(parents=True, exist_ok=True)
             flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND | getattr(os, "O_BINARY", 0)
             descriptor = os.open(beginning, flags, 0o644)
             self._write(descriptor, header + first)

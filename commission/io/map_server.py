@@ -13,7 +13,7 @@ import warnings
 import zlib
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +25,10 @@ from commission.io.conversion import convert
 from commission.io.reading import check_size, inside
 from commission.io.yaml_document import YamlDocument, read_yaml
 from commission.site.checks import above, between
-from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
+from commission.site.floor_map import FREE, MOST_CELLS, OCCUPIED, UNKNOWN, FloorMap
 
-CELL_LIMIT = 64_000_000
-"""Cells of a map: 400 x 400 m at 0.05 m. Known from the image's header, before its pixels are unpacked."""
+CELL_LIMIT = MOST_CELLS
+"""Cells of a map, known from the image's header before its pixels are unpacked."""
 FILE_LIMIT = 512_000_000
 """Bytes of an image: a text PGM needs up to 6 bytes for each cell."""
 
@@ -78,13 +78,19 @@ class MapDescription:
             raise ValueError(f"free_thresh is {self.free_thresh:g}; expected at most occupied_thresh")
 
 
-def read_floor_map(path: Path, folder: Path | None = None) -> FloorMap:
+def image_name(path: Path) -> str:
+    """Return what a `map_server` YAML file calls its image, without folders; raises FileFormatError as reading does."""
+    return PurePath(_description(path)[1].image.replace("\\", "/")).name
+
+
+def read_floor_map(path: Path, folder: Path | None = None, *, image: Path | None = None) -> FloorMap:
     """Read a `map_server` map.
 
     Parameters
     ----------
     path : the YAML file.
     folder : folder that the image must lie in; the YAML file's own when None.
+    image : the image, where it does not lie under the name that the YAML file gives it.
 
     Returns
     -------
@@ -95,13 +101,8 @@ def read_floor_map(path: Path, folder: Path | None = None) -> FloorMap:
     FileFormatError
         names file, key, what was found and what is expected.
     """
-    document = read_yaml(path)
-    description = convert(document, MapDescription, ignore_unknown=True)
-    image_path = inside(folder or path.parent, description.image, path, document.place(("image",)))
-    if not image_path.is_file():
-        beside = sorted(p.name for p in path.parent.iterdir() if p.suffix.lower() in {".pgm", ".png"})
-        remedy = f"an existing image; beside it there are: {', '.join(beside[:5])}" if beside else "an existing image"
-        raise document.error(("image",), f"{description.image!r} does not exist", remedy)
+    document, description = _description(path)
+    image_path = image or _image_beside(document, description, folder)
     cells = _read_cells(image_path, description)
     try:
         return FloorMap(np.flipud(cells), description.resolution, np.array(description.origin))
@@ -132,6 +133,22 @@ def write_floor_map(floor_map: FloorMap, path: Path) -> None:
         f"origin: [{x}, {y}, {yaw}]  # x [m], y [m], yaw [rad] of the lower-left corner\n"
         "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\nmode: trinary\n",
     )
+
+
+def _description(path: Path) -> tuple[YamlDocument, MapDescription]:
+    document = read_yaml(path)
+    return document, convert(document, MapDescription, ignore_unknown=True)
+
+
+def _image_beside(document: YamlDocument, description: MapDescription, folder: Path | None) -> Path:
+    """Path of the image that a YAML file names; raises FileFormatError when there is none."""
+    path = document.path
+    image_path = inside(folder or path.parent, description.image, path, document.place(("image",)))
+    if not image_path.is_file():
+        beside = sorted(p.name for p in path.parent.iterdir() if p.suffix.lower() in {".pgm", ".png"})
+        remedy = f"an existing image; beside it there are: {', '.join(beside[:5])}" if beside else "an existing image"
+        raise document.error(("image",), f"{description.image!r} does not exist", remedy)
+    return image_path
 
 
 def _from_value_error(document: YamlDocument, error: ValueError) -> FileFormatError:

@@ -6,15 +6,15 @@ trimesh reads the files; the section is cut here, in pieces, so that it reports 
 from __future__ import annotations
 
 import struct
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-import trimesh
 
 from commission.errors import FileFormatError, UsageError
-from commission.geometry.arrays import FloatArray, frozen
+from commission.geometry.arrays import FloatArray, read_only
 from commission.io.dxf import UNITS
 from commission.io.findings import Progress, silent
 from commission.io.outline import outline_map
@@ -30,6 +30,8 @@ KINDS = ("stl", "obj", "glb", "ply")
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 _FACES_AT_ONCE = 200_000
 _BYTES_AT_ONCE = 4_000_000
+_LOOK_S = 0.05
+"""Time between two looks at how far trimesh is [s]."""
 # What trimesh, numpy and struct raise for files that are not what they claim to be depends on format and place.
 _GARBAGE = (
     ValueError,
@@ -96,7 +98,7 @@ def read_model(path: Path, *, unit: str = "m", y_up: bool | None = None, progres
     path : file; its ending says which format it has.
     unit : key of `UNITS` in which it was made; GLB is always in metres.
     y_up : whether y points up, as GLB demands; that for GLB and z for the others when None.
-    progress : told how far the reading is; may raise to cancel, though not while trimesh makes triangles of the file.
+    progress : told how far the reading is; may raise to cancel.
 
     Raises
     ------
@@ -113,27 +115,27 @@ def read_model(path: Path, *, unit: str = "m", y_up: bool | None = None, progres
     check_size(path, SIZE_LIMIT)
     try:
         with path.open("rb") as file:
-            source = _Reported(file, path.stat().st_size, progress)
-            # No resolver: a model refers to no other files. No materials: pictures are not decoded.
-            loaded = trimesh.load(source, file_type=kind, process=False, skip_materials=True)  # type: ignore[arg-type]
-            progress(0.9, "collecting triangles")
-            triangles = _triangles(path, loaded)
+            loaded = _loaded(_Reported(file, path.stat().st_size), kind, progress)
+            is_y_up = kind == "glb" if y_up is None else y_up
+            to_model = (_Y_UP if is_y_up else np.eye(3)) * (1.0 if kind == "glb" else UNITS[unit])
+            triangles = _triangles(path, loaded, to_model, progress)
     except OSError as error:
         raise cannot_read(path, error) from error
     except _GARBAGE as error:
         raise FileFormatError(path, "", f"is no readable {kind.upper()} ({error})", "a complete model") from error
-    if kind == "glb" if y_up is None else y_up:
-        triangles = triangles @ _Y_UP.T
-    return Model(path, frozen(triangles * (1.0 if kind == "glb" else UNITS[unit]), (None, 3, 3), "triangles"))
+    return Model(path, triangles)
 
 
 class _Reported:
-    """A file that reports how much of it has been read, and so is the place where reading can be cancelled."""
+    """A file that knows how much of it has been read, and ends when nobody wants it any more."""
 
-    def __init__(self, file: IO[bytes], size: int, progress: Progress) -> None:
+    def __init__(self, file: IO[bytes], size: int) -> None:
         self._file = file
         self._size = max(size, 1)
-        self._progress = progress
+        self.share = 0.0
+        """Part that has been read [0..1]."""
+        self.is_wanted = True
+        """Whether reading goes on."""
         self.mode = "rb"
 
     def read(self, count: int = -1) -> bytes:
@@ -141,9 +143,11 @@ class _Reported:
         wanted = self._size if count is None or count < 0 else min(count, self._size)
         pieces: list[bytes] = []
         while wanted > 0 and (piece := self._file.read(min(wanted, _BYTES_AT_ONCE))):
+            if not self.is_wanted:
+                raise EOFError("nobody wants the model any more")
             pieces.append(piece)
             wanted -= len(piece)
-            self._progress(0.5 * self._file.tell() / self._size, "reading the model")
+            self.share = self._file.tell() / self._size
         return b"".join(pieces)
 
     def readline(self, limit: int = -1) -> bytes:
@@ -162,8 +166,44 @@ class _Reported:
         """Nothing: the file is closed by whoever opened it."""
 
 
-def _triangles(path: Path, loaded: Any) -> FloatArray:
-    """(N, 3, 3) corners of all parts of a model, each part as often as the scene shows it."""
+def _loaded(source: _Reported, kind: str, progress: Progress) -> Any:
+    """What trimesh makes of a file.
+
+    trimesh asks nobody while it makes triangles of what it has read, for seconds with a large file. So it works on a
+    thread of its own, which is left alone when the work is cancelled: it ends by itself, and nobody takes what it made.
+    """
+    made: list[Any] = []
+    failed: list[Exception] = []
+
+    def load() -> None:
+        import trimesh
+
+        try:
+            # No resolver: a model refers to no other files. No materials: pictures are not decoded.
+            made.append(trimesh.load(source, file_type=kind, process=False, skip_materials=True))  # type: ignore[arg-type]
+        except (OSError, *_GARBAGE) as error:
+            failed.append(error)
+
+    worker = threading.Thread(target=load, name="model", daemon=True)
+    worker.start()
+    try:
+        while worker.is_alive():
+            worker.join(_LOOK_S)
+            reading = source.share < 1.0
+            progress(0.5 * source.share, "reading the model" if reading else "making triangles")
+    finally:
+        source.is_wanted = False
+    if failed:
+        raise failed[0]
+    if not made:
+        raise ValueError("trimesh has failed")
+    return made[0]
+
+
+def _triangles(path: Path, loaded: Any, to_model: FloatArray, progress: Progress) -> FloatArray:
+    """(N, 3, 3) corners of all parts of a model, each part as often as the scene shows it, turned and scaled."""
+    import trimesh
+
     if isinstance(loaded, trimesh.Trimesh):
         parts = [(loaded, np.eye(4))]
     elif isinstance(loaded, trimesh.Scene):
@@ -172,19 +212,24 @@ def _triangles(path: Path, loaded: Any) -> FloatArray:
         parts = [(loaded.geometry[name], transform) for transform, name in placed]
     else:
         parts = []
-    meshes = [(part, transform) for part, transform in parts if isinstance(part, trimesh.Trimesh)]
+    meshes = [(part, np.asarray(transform)) for part, transform in parts if isinstance(part, trimesh.Trimesh)]
     count = sum(len(mesh.faces) for mesh, _ in meshes)
     if not 0 < count <= FACE_LIMIT:
         raise FileFormatError(path, "", f"has {count} triangles", f"1 to {FACE_LIMIT}")
-    pieces: list[FloatArray] = []
+    triangles = np.empty((count, 3, 3))
+    done = 0
     for mesh, transform in meshes:
-        points = np.asarray(mesh.vertices, dtype=np.float64)
-        moved = points @ np.asarray(transform)[:3, :3].T + np.asarray(transform)[:3, 3]
-        pieces.append(moved[np.asarray(mesh.faces)])
-    triangles = np.concatenate(pieces)
-    if not np.isfinite(triangles).all():
-        raise FileFormatError(path, "", "holds a corner that is not finite", "finite coordinates")
-    return triangles
+        points, faces = np.asarray(mesh.vertices, dtype=np.float64), np.asarray(mesh.faces)
+        turn, shift = to_model @ transform[:3, :3], to_model @ transform[:3, 3]
+        for start in range(0, len(faces), _FACES_AT_ONCE):
+            progress(0.5 + 0.5 * done / count, "collecting triangles")
+            some = points[faces[start : start + _FACES_AT_ONCE]] @ turn.T + shift
+            if not np.isfinite(some).all():
+                raise FileFormatError(path, "", "holds a corner that is not finite", "finite coordinates")
+            triangles[done : done + len(some)] = some
+            done += len(some)
+    progress(1.0, "collecting triangles")
+    return read_only(triangles)
 
 
 def _cut(triangles: FloatArray, height: float) -> FloatArray:

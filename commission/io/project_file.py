@@ -16,7 +16,7 @@ from commission.io.atomic import write_text
 from commission.io.conversion import convert, convert_setting, keys_of
 from commission.io.map_server import read_floor_map, write_floor_map
 from commission.io.project_text import project_text
-from commission.io.reading import inside
+from commission.io.reading import cannot_read, inside
 from commission.io.reflector_tables import read_reflectors, write_reflectors
 from commission.io.yaml_document import YamlDocument, read_yaml, scalar
 from commission.site.disturbances import Disturbances
@@ -67,6 +67,43 @@ class ProjectDocument:
 def project_file(path: Path) -> Path:
     """Path of the `project.yaml` that `path` (the folder or the file itself) stands for."""
     return path / FILE_NAME if path.is_dir() else path
+
+
+@dataclass(frozen=True, slots=True)
+class OpenedProject:
+    """A project to work on."""
+
+    project: Project
+    """What is edited."""
+    folder: Path
+    """Where it is kept."""
+    is_new: bool
+    """Whether nothing of it is on disk yet."""
+
+
+def open_project(path: Path) -> OpenedProject:
+    """Read a project, or begin one in a folder that holds none or does not exist yet; nothing is written.
+
+    Parameters
+    ----------
+    path : folder of the project, or its `project.yaml`. A new project is called like its folder.
+
+    Raises
+    ------
+    FileFormatError
+        the path is another file, or its project cannot be read.
+    """
+    folder = path.parent if path.name == FILE_NAME else path
+    if path.is_file() and path.name != FILE_NAME:
+        raise FileFormatError(path, "", "is a file", f"the folder of a project, or of one to begin, or its {FILE_NAME}")
+    try:
+        is_new = not (folder / FILE_NAME).exists()
+        if is_new and folder.exists() and not folder.is_dir():
+            raise FileFormatError(folder, "", "is no folder", "the folder of a project, or of one to begin")
+        name = folder.resolve().name or "Unnamed"
+    except (OSError, ValueError) as error:
+        raise cannot_read(path, error) from error
+    return OpenedProject(Project(name=name) if is_new else load_project(folder), folder, is_new)
 
 
 def load_project(path: Path) -> Project:

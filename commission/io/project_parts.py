@@ -163,27 +163,30 @@ def _list_applied(old: Sequence[Any], part: dict[str, Any], elements: Sequence[A
 
 
 def _map_change(old: FloorMap | None, new: FloorMap | None, whole: bool) -> dict[str, Any] | None:
-    """Rectangle of cells that differ, or the whole map where the frame does; None when the maps are equal."""
+    """Rectangle of cells that differ, or the whole map where its size does; None when the maps are equal."""
     if new is None:
         return {"removed": True} if whole or old is not None else None
     origin = [float(value) for value in new.origin]
     frame = {"resolution": float(new.resolution), "origin": origin, "shape": list(new.cells.shape)}
-    same_frame = (
-        old is not None
-        and not whole
-        and old.resolution == new.resolution
-        and old.cells.shape == new.cells.shape
-        and np.array_equal(old.origin, new.origin)
-    )
-    if old is None or not same_frame:
+    if old is None or whole or old.cells.shape != new.cells.shape:
         return {**frame, "at": [0, 0], "size": frame["shape"], "cells": _packed(new.cells)}
-    differs = old.cells != new.cells
-    rows, columns = np.flatnonzero(differs.any(axis=1)), np.flatnonzero(differs.any(axis=0))
-    if len(rows) == 0:
+    top, bottom, left, right = (0, 0, 0, 0) if old.cells is new.cells else _changed_part(old.cells, new.cells)
+    is_same_frame = old.resolution == new.resolution and np.array_equal(old.origin, new.origin)
+    if top == bottom and is_same_frame:
         return None
-    top, bottom, left, right = int(rows[0]), int(rows[-1]) + 1, int(columns[0]), int(columns[-1]) + 1
     part = new.cells[top:bottom, left:right]
     return {**frame, "at": [top, left], "size": list(part.shape), "cells": _packed(part)}
+
+
+def _changed_part(old: np.ndarray, new: np.ndarray) -> tuple[int, int, int, int]:
+    """First and end row, first and end column of the cells that differ; zeros when none does."""
+    differs = old != new
+    rows = np.flatnonzero(differs.any(axis=1))
+    if len(rows) == 0:
+        return 0, 0, 0, 0
+    top, bottom = int(rows[0]), int(rows[-1]) + 1
+    columns = np.flatnonzero(differs[top:bottom].any(axis=0))
+    return top, bottom, int(columns[0]), int(columns[-1]) + 1
 
 
 def _map_applied(old: FloorMap | None, part: dict[str, Any]) -> FloorMap | None:

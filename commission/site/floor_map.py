@@ -15,6 +15,8 @@ UNKNOWN = -1
 FREE = 0
 OCCUPIED = 100
 """Values of a cell, as in ROS nav_msgs/OccupancyGrid."""
+MOST_CELLS = 64_000_000
+"""Cells that a map may have: 400 x 400 m at 0.05 m."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

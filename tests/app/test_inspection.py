@@ -11,7 +11,7 @@ from commission.app.actions import Action
 from commission.app.editing import actions
 from commission.app.editing.editor import ControlPoint
 from commission.app.inspection import Inspection
-from commission.app.jobs import JobReport
+from commission.app.jobs import JobReport, Jobs
 from commission.app.store import AppState
 from commission.site.vehicle import TricycleVehicle
 from commission.studies.violations import ViolationKind
@@ -27,7 +27,7 @@ class Watch:
     def __init__(self) -> None:
         project = room()
         self.reports: queue.SimpleQueue[JobReport] = queue.SimpleQueue()
-        self.inspection = Inspection(self.reports.put)
+        self.inspection = Inspection(Jobs(self.reports.put))
         self.state = AppState(project, project)
         self.do(actions.Join(ME), actions.Join(OTHER))
 

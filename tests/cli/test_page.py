@@ -80,5 +80,22 @@ def test_what_cannot_be_served_is_refused_at_once(words, said, refused, project)
     assert said in refused("serve", project, "--no-open", *words)
 
 
-def test_a_project_that_does_not_exist_is_refused(refused, tmp_path):
-    assert "nowhere" in refused("serve", tmp_path / "nowhere", "--no-open")
+@pytest.mark.parametrize("exists", [False, True])
+def test_a_folder_without_a_project_begins_one_and_nothing_is_written(tmp_path, exists):
+    folder = tmp_path / "new hall"
+    if exists:
+        folder.mkdir()
+        (folder / "notes.txt").write_text("of somebody else")
+    process, line = serve("serve", folder)
+    code, err = closed(process)
+    assert line.startswith("page at http://127.0.0.1:"), line
+    assert (code, err) == (0, "")
+    assert [path.name for path in tmp_path.rglob("*")] == (["new hall", "notes.txt"] if exists else [])
+
+
+def test_a_file_that_is_no_project_is_refused(refused, tmp_path):
+    (tmp_path / "notes.txt").write_text("name: hall")
+    assert "notes.txt: is a file; expected the folder of a project" in refused(
+        "serve", tmp_path / "notes.txt", "--no-open"
+    )
+    assert "is no folder" in refused("serve", tmp_path / "notes.txt" / "project.yaml", "--no-open")

@@ -53,6 +53,12 @@ def test_a_small_edit_is_a_small_change():
     cells[3:5, 7] = OCCUPIED
     drawn = replace(many, floor_map=replace(HALL, cells=cells))
     assert change(many, drawn)["floor_map"]["size"] == [2, 1]
+    turned = replace(drawn, floor_map=replace(drawn.floor_map, origin=np.array([5.0, 6.0, 0.7])))
+    assert change(drawn, turned)["floor_map"]["size"] == [0, 0]
+    assert apply(drawn, change(drawn, turned), Path("journal")) == turned
+    both = change(many, turned)
+    assert both["floor_map"]["size"] == [2, 1]
+    assert apply(many, both, Path("journal")) == turned
 
 
 def test_edits_are_restored_and_named_after_the_program_was_killed(tmp_path):

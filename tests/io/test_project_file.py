@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from commission.errors import CommissionError, FileFormatError, UsageError
-from commission.io.project_file import apply_settings, load_project, save_project
+from commission.io.project_file import OpenedProject, apply_settings, load_project, open_project, save_project
 from commission.site.floor_map import FloorMap
 from commission.site.parameters import Parameters
 from commission.site.project import Project
@@ -252,3 +253,22 @@ def test_wrong_setting_says_what_is_known(setting: str, message: str) -> None:
     with pytest.raises(UsageError) as caught:
         apply_settings(Parameters(), [setting])
     assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["Halle 3", "Halle 3/project.yaml"])
+def test_a_folder_without_a_project_begins_an_empty_one_of_its_name(tmp_path: Path, name: str) -> None:
+    opened = open_project(tmp_path / name)
+    assert opened == OpenedProject(Project(name="Halle 3"), tmp_path / "Halle 3", is_new=True)
+    assert list(tmp_path.iterdir()) == []
+    save_project(opened.project, opened.folder)
+    assert open_project(tmp_path / name) == replace(opened, is_new=False)
+
+
+def test_a_broken_project_is_not_taken_for_a_new_one(tmp_path: Path) -> None:
+    (tmp_path / "project.yaml").write_text("schema: 99\n")
+    with pytest.raises(FileFormatError, match="schema: is 99"):
+        open_project(tmp_path)
+    (tmp_path / "project.yaml").unlink()
+    (tmp_path / "project.yaml").mkdir()
+    with pytest.raises(FileFormatError):
+        open_project(tmp_path)

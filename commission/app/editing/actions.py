@@ -181,6 +181,14 @@ class SnapSelected:
 
 
 @dataclass(frozen=True, slots=True)
+class Finish:
+    """Make what the tool in use is for of the points drawn so far."""
+
+    client: int
+    """Number of the browser's connection."""
+
+
+@dataclass(frozen=True, slots=True)
 class FinishRoute:
     """Make a route of the points drawn so far."""
 
@@ -338,6 +346,7 @@ EditAction: TypeAlias = (
     | MirrorSelected
     | RepeatSelected
     | SnapSelected
+    | Finish
     | FinishRoute
     | SelectControlPoint
     | InsertControlPoint

@@ -20,6 +20,17 @@ class Tool(StrEnum):
     STATION = "Station"
     MEASURE = "Measure"
     KEEP_OUT = "Keep out"
+    ERASE = "Erase"
+    WALL = "Wall"
+    OBSTACLE = "Obstacle"
+    ALIGN = "Align"
+    CALIBRATE = "Calibrate"
+
+
+SITE_TOOLS = (Tool.SELECT, Tool.PLACE, Tool.ROUTE, Tool.STATION, Tool.MEASURE)
+"""Tools for what stands and drives on the floor."""
+MAP_TOOLS = (Tool.ERASE, Tool.WALL, Tool.OBSTACLE, Tool.ALIGN)
+"""Tools for the floor map itself. `CALIBRATE` comes with an image that is being placed, `KEEP_OUT` with a layout."""
 
 
 class Grab(StrEnum):
@@ -80,6 +91,42 @@ class Snapping:
 
 
 @dataclass(frozen=True, slots=True)
+class MapPen:
+    """How the floor map's tools draw."""
+
+    thickness: float = 0.1
+    """Thickness of a wall [m]."""
+    to_unknown: bool = False
+    """Whether erased cells become unknown instead of free."""
+
+    def __post_init__(self) -> None:
+        if not 0.001 <= self.thickness <= 10.0:
+            raise ValueError(f"thickness is {self.thickness:g} m; expected 0.001 to 10 m")
+
+
+@dataclass(frozen=True, slots=True)
+class NamedPoint:
+    """A point of the map with its coordinates in the plant."""
+
+    at: Point
+    """Where it was clicked [m]."""
+    plant: Point
+    """Where it lies in the plant's coordinate system [m, m]; where it was clicked until somebody says otherwise."""
+    name: str = ""
+    """What the engineer calls it."""
+
+
+@dataclass(frozen=True, slots=True)
+class AlignmentDraft:
+    """Points by which the map is moved onto the plant's coordinate system."""
+
+    points: tuple[NamedPoint, ...] = ()
+    """At most two: A and B."""
+    everything: bool = False
+    """Whether reflectors, routes and stations go with the map."""
+
+
+@dataclass(frozen=True, slots=True)
 class Editor:
     """How one browser edits."""
 
@@ -94,13 +141,17 @@ class Editor:
     drag: Drag | None = None
     """A drag under way."""
     draft: tuple[Point, ...] = ()
-    """Points of a route that is being drawn [m]."""
+    """Points of a route, a wall or an area that is being drawn [m]."""
     measured: tuple[Point, ...] = ()
     """One or two points of a measurement [m]."""
     last_click: Point | None = None
     """Where the floor was last clicked [m]."""
     snapping: Snapping = Snapping()
     """What attracts."""
+    pen: MapPen = MapPen()
+    """How the floor map's tools draw."""
+    alignment: AlignmentDraft = AlignmentDraft()
+    """Points to align the floor map by."""
     reach: float = 0.1
     """How near a click has to be to mean something, at the zoom of the newest gesture [m]."""
 

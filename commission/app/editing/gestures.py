@@ -12,7 +12,7 @@ from commission.app.editing.station_gestures import grabbed_of_station, station_
 from commission.geometry import se2
 from commission.geometry.occupancy import OccupancyGrid
 from commission.site.editing import reflectors as edits
-from commission.site.editing.snapping import align, nearest_wall, on_wall, to_grid
+from commission.site.editing.snapping import align, nearest_corner, nearest_wall, on_wall, to_grid
 from commission.site.floor_map import OCCUPIED, FloorMap
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
@@ -37,6 +37,17 @@ def reflectors_in(reflectors: ReflectorMap, corner: Point, opposite: Point) -> t
     low, high = np.minimum(corner, opposite), np.maximum(corner, opposite)
     inside = np.all((reflectors.centers >= low) & (reflectors.centers <= high), axis=1)
     return tuple(r.id for r, chosen in zip(reflectors.reflectors, inside, strict=True) if chosen)
+
+
+def marked_place(project: Project, place: Point, reach: float) -> Point:
+    """Return the point that a click means: a reflector's center, a wall's corner, else the place itself."""
+    found = reflector_at(project.reflectors, place, reach)
+    if found is not None:
+        hit = next(r for r in project.reflectors.reflectors if r.id == found)
+        return hit.x, hit.y
+    grid = None if project.floor_map is None else walls_near(project.floor_map, place, reach)
+    corner = None if grid is None else nearest_corner(grid, place, reach)
+    return place if corner is None else corner
 
 
 def walls_near(floor_map: FloorMap, place: Point, reach: float) -> OccupancyGrid | None:

@@ -5,6 +5,7 @@ It draws from the state only; the project itself is drawn by the layers, for eve
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Coroutine
 from typing import Any
@@ -21,6 +22,7 @@ from commission.app.editing.route_gestures import curve, moved_route
 from commission.app.editing.station_gestures import heading_tip, moved_station
 from commission.app.extent import extent_of
 from commission.app.layers.stations import station_marks
+from commission.app.mapping.tools import AREA_TOOLS
 from commission.app.panels.base import Post
 from commission.geometry.arrays import FloatArray
 from commission.site.editing.routes import segment_of
@@ -36,6 +38,30 @@ def rings(centers: FloatArray, radius: float) -> FloatArray:
     """Return the (N, RING_POINTS, 2) outlines of circles [m]."""
     angles = np.linspace(0.0, 2.0 * np.pi, RING_POINTS, endpoint=False)
     return centers[:, np.newaxis, :] + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+
+
+def map_lines(editor: Editor) -> list[FloatArray]:
+    """Return (N, 2) polylines [m] that show a shape of the floor map while its points are clicked."""
+    points = np.array(editor.draft).reshape(-1, 2)
+    if editor.tool is Tool.ALIGN:
+        return [np.array([point.at for point in editor.alignment.points]).reshape(-1, 2)]
+    if len(points) < 2:
+        return []
+    if editor.tool is Tool.WALL:
+        return [points, *wall_sides(points, editor.pen.thickness)]
+    return [np.concatenate([points, points[:1]])] if editor.tool in AREA_TOOLS else []
+
+
+def wall_sides(points: FloatArray, thickness: float) -> list[FloatArray]:
+    """Return the outlines of the straight pieces of a wall along (N, 2) points [m]."""
+    sides: list[FloatArray] = []
+    for start, end in itertools.pairwise(points):
+        length = float(np.hypot(*(end - start)))
+        if length > 0.0:
+            across = 0.5 * thickness / length * np.array([start[1] - end[1], end[0] - start[0]])
+            corners = (start + across, end + across, end - across, start - across, start + across)
+            sides.append(np.array(corners))
+    return sides
 
 
 def millimeters(editor: Editor) -> str:
@@ -142,15 +168,17 @@ class Overlay:
             for segment in moved_route(project, editor):
                 lines.append(polyline_segments(segment.control_points, height))
                 lines.append(polyline_segments(curve(segment), height))
-        if len(set(editor.draft)) > 1:
+        if editor.tool is Tool.ROUTE and len(set(editor.draft)) > 1:
             lines.append(polyline_segments(curve(segment_of(editor.draft)), height))
+        lines += [polyline_segments(line, height) for line in map_lines(editor)]
         if len(editor.measured) == 2:
             lines.append(polyline_segments(np.array(editor.measured), height))
         return np.concatenate(lines) if lines else NO_SEGMENTS
 
     def _draw_points(self, project: Project, editor: Editor, size: float) -> None:
         """Show the control points of the selected route, or the points drawn or measured so far."""
-        places: list[FloatArray] = [np.array(editor.draft).reshape(-1, 2), np.array(editor.measured).reshape(-1, 2)]
+        aligned = [point.at for point in editor.alignment.points]
+        places = [np.array(points).reshape(-1, 2) for points in (editor.draft, editor.measured, aligned)]
         if editor.point is not None:
             places += [segment.control_points for segment in moved_route(project, editor)]
         station = moved_station(project, editor)

@@ -8,9 +8,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from commission.app.editing import actions
-from commission.app.editing.editor import Drag, Editor, Grab, Tool
+from commission.app.editing.editor import AlignmentDraft, Drag, Editor, Grab, Tool
 from commission.app.editing.gestures import (
     grabbed,
+    marked_place,
     moved,
     reflector_at,
     reflectors_in,
@@ -20,6 +21,8 @@ from commission.app.editing.gestures import (
 from commission.app.editing.route_gestures import route_at
 from commission.app.editing.station_actions import DeleteStation, MoveStation, PlaceStation
 from commission.app.editing.station_gestures import moved_station, station_at
+from commission.app.mapping import tools as map_tools
+from commission.app.mapping.actions import FinishShape
 from commission.app.plan.actions import FreeAreas, KeepOut
 from commission.app.reduction import ApplyParameters, FlyTo, Reduction, Tell, reduce
 from commission.app.store import AppState, Edit, edited
@@ -31,7 +34,7 @@ from commission.site.reflectors import ReflectorMap
 
 def editor_of(state: AppState, client: int) -> Editor:
     """Return how a browser edits."""
-    return state.editors.get(client, Editor())
+    return state.editor(client)
 
 
 def counted(state: AppState, editor: Editor) -> str:
@@ -81,7 +84,9 @@ def _(action: actions.Leave, state: AppState) -> Reduction:
 
 @reduce.register
 def _(action: actions.ChooseTool, state: AppState) -> Reduction:
-    editor = replace(editor_of(state, action.client), tool=action.tool, drag=None, draft=(), measured=())
+    editor = replace(
+        editor_of(state, action.client), tool=action.tool, drag=None, draft=(), measured=(), alignment=AlignmentDraft()
+    )
     return Reduction(state.with_editor(action.client, editor))
 
 
@@ -95,8 +100,8 @@ def _(action: actions.ChooseSnapping, state: AppState) -> Reduction:
 @reduce.register
 def _(action: actions.Cancel, state: AppState) -> Reduction:
     editor = editor_of(state, action.client)
-    if editor.drag is not None or editor.draft or editor.measured:
-        editor = replace(editor, drag=None, draft=(), measured=())
+    if editor.drag is not None or editor.draft or editor.measured or editor.alignment.points:
+        editor = replace(editor, drag=None, draft=(), measured=(), alignment=AlignmentDraft())
     elif editor.tool is not Tool.SELECT:
         editor = replace(editor, tool=Tool.SELECT)
     else:
@@ -105,24 +110,32 @@ def _(action: actions.Cancel, state: AppState) -> Reduction:
 
 
 @reduce.register
+def _(action: actions.Finish, state: AppState) -> Reduction:
+    is_route = editor_of(state, action.client).tool is Tool.ROUTE
+    return reduce(actions.FinishRoute(action.client) if is_route else FinishShape(action.client), state)
+
+
+@reduce.register
 def _(action: actions.ClickFloor, state: AppState) -> Reduction:
     editor = replace(editor_of(state, action.client), reach=action.reach, last_click=action.place, drag=None)
+    if editor.tool in map_tools.TOOLS:
+        return map_tools.clicked(state, editor, action)
+    resting = state.with_editor(action.client, editor)
     match editor.tool:
-        case Tool.SELECT:
-            return Reduction(state.with_editor(action.client, _picked(state, editor, action)))
         case Tool.PLACE:
             return _placed(state, editor, action)
-        case Tool.ROUTE:
-            return Reduction(state.with_editor(action.client, replace(editor, draft=(*editor.draft, action.place))))
         case Tool.STATION:
-            put = PlaceStation(action.client, action.place, action.reach)
-            return reduce(put, state.with_editor(action.client, editor))
+            return reduce(PlaceStation(action.client, action.place, action.reach), resting)
+        case Tool.KEEP_OUT:
+            return reduce(FreeAreas(action.place), resting)
+        case Tool.ROUTE:
+            editor = replace(editor, draft=(*editor.draft, action.place))
         case Tool.MEASURE:
             before = editor.measured if len(editor.measured) == 1 else ()
-            place = _on_something(state, editor, action)
-            return Reduction(state.with_editor(action.client, replace(editor, measured=(*before, place))))
-        case Tool.KEEP_OUT:
-            return reduce(FreeAreas(action.place), state.with_editor(action.client, editor))
+            editor = replace(editor, measured=(*before, marked_place(state.project, action.place, editor.reach)))
+        case _:
+            editor = _picked(state, editor, action)
+    return Reduction(state.with_editor(action.client, editor))
 
 
 def _picked(state: AppState, editor: Editor, action: actions.ClickFloor) -> Editor:
@@ -150,18 +163,11 @@ def _placed(state: AppState, editor: Editor, action: actions.ClickFloor) -> Redu
     return replace(reduction, state=selecting)
 
 
-def _on_something(state: AppState, editor: Editor, action: actions.ClickFloor) -> tuple[float, float]:
-    """Return the center of the reflector that was clicked, or the place itself."""
-    found = reflector_at(state.project.reflectors, action.place, editor.reach)
-    if found is None:
-        return action.place
-    hit = next(r for r in state.project.reflectors.reflectors if r.id == found)
-    return hit.x, hit.y
-
-
 @reduce.register
 def _(action: actions.DragFloor, state: AppState) -> Reduction:
     editor = editor_of(state, action.client)
+    if editor.tool in map_tools.AREA_TOOLS:
+        return map_tools.dragged(state, editor, action)
     if editor.tool not in {Tool.SELECT, Tool.KEEP_OUT}:
         return Reduction(state)
     drag = editor.drag

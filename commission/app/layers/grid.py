@@ -59,7 +59,7 @@ class GridLayer(BaseLayer):
             self._segments("/grid/lines", lines, theme.GRID_METER, 1.0),
             self._segments("/grid/scale", bar, theme.VEHICLE, 2.0),
             self.scene.add_label(
-                "/grid/scale/text",
+                "/grid/text",
                 f"{step:g} m",
                 position=(x + 0.5 * step, y + 0.05 * step, height),
                 anchor="bottom-center",

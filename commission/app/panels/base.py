@@ -52,6 +52,11 @@ def posting(post: Post, make: Callable[[Any], Action]) -> Callable[[GuiEvent[Any
     return callback
 
 
+def client_of(event: GuiEvent[Any]) -> int:
+    """Return the number of the browser whose person did something; `posting` sees to it that there is one."""
+    return -1 if event.client_id is None else event.client_id
+
+
 def write(widget: Any, value: object) -> None:
     """Show a value in an input where it is another one: nothing is sent for what is there already."""
     if widget.value != value:

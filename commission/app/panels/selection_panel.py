@@ -13,9 +13,11 @@ from viser import GuiApi, GuiEvent, GuiInputHandle
 from commission.app import actions as page_actions
 from commission.app import theme
 from commission.app.editing import actions
-from commission.app.editing.editor import Editor, Tool, measurement
+from commission.app.editing.editor import MAP_TOOLS, SITE_TOOLS, Editor, Tool, measurement
 from commission.app.editing.gestures import selected_of
+from commission.app.mapping.tools import FEWEST
 from commission.app.panels.base import BasePanel, Post, escaped, posting, table
+from commission.app.panels.map_tool_fields import MapToolFields
 from commission.app.panels.now_panel import NowPanel
 from commission.app.panels.route_fields import RouteFields
 from commission.app.panels.station_fields import StationFields
@@ -47,6 +49,7 @@ NUMBERS = {
     "sigma": Field("Survey 1σ [mm]", 1000.0, 0.1),
 }
 TEXTS = {"id": "Name", "layer": "Layer", "note": "Note"}
+FINISHED = {Tool.WALL: "wall", Tool.OBSTACLE: "obstacle", Tool.ERASE: "area to erase"}
 ALONE = ("id", "x", "y")
 """Fields that several reflectors cannot share."""
 
@@ -73,10 +76,14 @@ class SelectionPanel(BasePanel):
         self._reflectors: tuple[Reflector, ...] = ()
         self._drawn: tuple[object, ...] = ()
         gui.add_html(theme.WIDE.replace("c-wide", "c-wide c-tools"))
-        tools = gui.add_button_group("", tuple(tool.value for tool in Tool if tool is not Tool.KEEP_OUT))
+        tools = gui.add_button_group("", tuple(tool.value for tool in SITE_TOOLS))
         tools.on_click(posting(post, lambda event: actions.ChooseTool(client, Tool(event.target.value))))
-        self._finish = gui.add_button("Finish the route", visible=False, hint="Make a route of its points (Enter).")
-        self._finish.on_click(posting(post, lambda _event: actions.FinishRoute(client)))
+        gui.add_html(theme.WIDE)
+        map_tools = gui.add_button_group("", tuple(tool.value for tool in MAP_TOOLS))
+        map_tools.on_click(posting(post, lambda event: actions.ChooseTool(client, Tool(event.target.value))))
+        self._finish = gui.add_button("Finish the route", visible=False, hint="Make it of the points clicked (Enter).")
+        self._finish.on_click(posting(post, lambda _event: actions.Finish(client)))
+        self._map_tools = MapToolFields(gui, post, client)
         self._head = gui.add_html("")
         self._fields: dict[str, GuiInputHandle[Any]] = {}
         self._add_fields()
@@ -191,7 +198,10 @@ class SelectionPanel(BasePanel):
             ("Draw a route", "T", None, actions.ChooseTool(client, Tool.ROUTE)),
             ("Place stations", "K", None, actions.ChooseTool(client, Tool.STATION)),
             ("Measure", "M", None, actions.ChooseTool(client, Tool.MEASURE)),
-            ("Finish the route", "enter", None, actions.FinishRoute(client)),
+            ("Erase walls", "X", None, actions.ChooseTool(client, Tool.ERASE)),
+            ("Draw a wall", "L", None, actions.ChooseTool(client, Tool.WALL)),
+            ("Draw an obstacle", "O", None, actions.ChooseTool(client, Tool.OBSTACLE)),
+            ("Finish what is drawn", "enter", None, actions.Finish(client)),
             ("Cancel", "escape", None, actions.Cancel(client)),
             ("Delete the selection", "delete", None, actions.DeleteSelected(client)),
             ("Duplicate the selection", "D", "cmd/ctrl+shift", actions.DuplicateSelected(client)),
@@ -211,7 +221,10 @@ class SelectionPanel(BasePanel):
             return
         self._drawn = drawn
         self._reflectors = selected_of(view.state.project, editor)
-        self._finish.visible = len(editor.draft) > 1
+        self._finish.visible = len(editor.draft) >= FEWEST.get(editor.tool, 2)
+        if self._finish.visible:
+            self._finish.label = f"Finish the {FINISHED.get(editor.tool, 'route')}"
+        self._map_tools.show(editor)
         self._head.content = _head(editor, self._reflectors)
         self._now.visible = not editor.has_selection
         self._buttons.visible = self._copies.visible = bool(self._reflectors)

@@ -6,6 +6,7 @@ from viser import GuiApi
 
 from commission.app.panels.base import BasePanel, Post, escaped, table
 from commission.app.panels.equipment_fields import EquipmentFields
+from commission.app.panels.floor_map_panel import FloorMapPanel
 from commission.app.panels.project_fields import ProjectFields
 from commission.app.view import PageView
 from commission.site.project import Project
@@ -42,18 +43,24 @@ def route_rows(project: Project) -> list[tuple[str, str]]:
 
 
 class SitePanel(BasePanel):
-    """Facts of the project, and the editor of vehicle and scanner."""
+    """Facts of the project, loading of its floor map, and the editor of vehicle and scanner."""
 
     def __init__(self, gui: GuiApi, post: Post, project: Project) -> None:
         self._html = gui.add_html("")
         self._project = ProjectFields(gui, post, project)
+        self._floor_map = FloorMapPanel(gui, post, project)
         self._equipment = EquipmentFields(gui, post, project)
         self._shown: Project | None = None
         self._routes = ""
         self._show(project)
 
+    def draw(self, view: PageView) -> None:
+        """Show how far loading is without delay."""
+        self._floor_map.draw(view)
+
     def draw_slowly(self, view: PageView) -> None:
         """Follow the project."""
+        self._floor_map.draw_slowly(view)
         if view.state.project is not self._shown:
             self._show(view.state.project)
 

@@ -35,7 +35,28 @@ def hint(project: Project, editor: Editor) -> str:
             said = f"Measure: click the {which} point &nbsp; (Esc ends)"
         case Tool.KEEP_OUT:
             said = "Keep out: drag over an area without new reflectors, click one to free it &nbsp; (Esc ends)"
+        case Tool.ERASE | Tool.OBSTACLE:
+            said = f"{editor.tool}: drag a rectangle, or click corners{_so_far(editor, 3)} &nbsp; (Esc ends)"
+        case Tool.WALL:
+            thickness = f"{1000.0 * editor.pen.thickness:g} mm thick"
+            said = f"Wall, {thickness}: click its points{_so_far(editor, 2)} &nbsp; (Esc ends)"
+        case Tool.ALIGN:
+            which = ("A", "B")[len(editor.alignment.points)] if len(editor.alignment.points) < 2 else ""
+            click = (
+                f"click {which}, a corner or a reflector of known plant coordinates" if which else "type coordinates"
+            )
+            said = f"Align: {click} &nbsp; (Esc ends)"
+        case Tool.CALIBRATE:
+            said = "Image: click two points of known distance, far apart; then type it on the left &nbsp; (Esc ends)"
     return said
+
+
+def _so_far(editor: Editor, needed: int) -> str:
+    """Say how many points there are, and what Enter makes of them."""
+    points = len(editor.draft)
+    if points == 0:
+        return ""
+    return f", {points} so far" + (", Enter finishes" if points >= needed else "")
 
 
 def _dragging(project: Project, editor: Editor) -> str:

@@ -96,6 +96,32 @@ def nearest_wall(grid: OccupancyGrid, point: tuple[float, float], reach: float =
     return WallPoint(float(x), float(y), heading, float(np.hypot(*(p - hit))) * cell)
 
 
+def nearest_corner(grid: OccupancyGrid, point: tuple[float, float], reach: float) -> tuple[float, float] | None:
+    """Nearest corner of a wall.
+
+    Parameters
+    ----------
+    grid : the walls.
+    point : [m, m], map frame.
+    reach : how far to look [m].
+
+    Returns
+    -------
+    corner : [m, m], map frame, where a wall's outline turns: one or three of the four cells around are occupied, or two
+        that face each other across. None when there is none within reach.
+    """
+    around = np.pad(grid.occupied, 1)
+    four = (around[:-1, :-1], around[:-1, 1:], around[1:, :-1], around[1:, 1:])
+    odd = four[0] ^ four[1] ^ four[2] ^ four[3]
+    corners = np.argwhere(odd | ((four[0] == four[3]) & (four[0] != four[1]) & (four[1] == four[2])))
+    if len(corners) == 0:
+        return None
+    places = transform_points(grid.origin, corners[:, ::-1] * grid.resolution)
+    gaps = np.hypot(*(places - np.asarray(point)).T)
+    best = int(np.argmin(gaps))
+    return (float(places[best, 0]), float(places[best, 1])) if gaps[best] <= reach else None
+
+
 def on_wall(reflector: Reflector, wall: WallPoint) -> Reflector:
     """Put a reflector against a wall: a cylinder touches it, a flat plate lies on it and faces away from it."""
     is_flat = reflector.kind is ReflectorKind.FLAT

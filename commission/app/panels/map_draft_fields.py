@@ -1,0 +1,253 @@
+"""What a file leaves open before it becomes a floor map: unit, layers, heights; a picture's threshold and scale."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from viser import GuiApi, GuiEvent
+
+from commission.app import actions as page_actions
+from commission.app import theme
+from commission.app.mapping import actions
+from commission.app.mapping.draft import MapDraft, MapOptions, Read, ReadOptions
+from commission.app.panels.base import Post, client_of, escaped, posting, table, write
+from commission.io.dxf import UNITS, Drawing, DrawingLayer
+from commission.io.image_map import Picture
+from commission.io.mesh import Model
+from commission.site.checks import field_hints
+
+DEG = math.degrees(1.0)
+AS_STATED = "as stated"
+DARK, LIGHT = "dark", "light"
+ALONG_X, ALONG_Y, TYPED = "x axis", "y axis", "a heading"
+HEADINGS = {ALONG_X: 0.0, ALONG_Y: 0.5 * math.pi}
+MOST_LAYERS = 40
+"""Layers that can be chosen one by one, those with most lines; the rest is as visible as the drawing says."""
+_LONGEST_LAYER = 26
+
+
+def heights_of(text: str) -> tuple[float, ...]:
+    """Return heights as they are typed, with blanks between [m]; raises ValueError that says what is expected."""
+    try:
+        return tuple(float(word) for word in text.replace(";", " ").replace(", ", " ").split())
+    except ValueError as error:
+        raise ValueError(f"heights are {text!r}; expected numbers like 0.2 1.8") from error
+
+
+def layers_by_size(drawing: Drawing) -> tuple[DrawingLayer, ...]:
+    """Return the layers that can be chosen one by one, the one with most lines first."""
+    return tuple(sorted(drawing.layers, key=lambda layer: -layer.segments)[:MOST_LAYERS])
+
+
+def chosen_layers(draft: MapDraft) -> frozenset[str]:
+    """Return the names of the layers that hold walls."""
+    if not isinstance(draft.read, Drawing):
+        return frozenset()
+    if draft.options.layers is None:
+        return frozenset(layer.name for layer in draft.read.layers if layer.is_visible)
+    return frozenset(draft.options.layers)
+
+
+def facts(draft: MapDraft) -> list[tuple[str, str]]:
+    """Return what was read, line by line; escaped."""
+    read, rows = draft.read, [("File", escaped(draft.file.name))]
+    match read:
+        case Drawing():
+            corners = read.segments.reshape(-1, 2)
+            width, height = np.ptp(corners, axis=0) if len(corners) else (0.0, 0.0)
+            rows += [("Drawn in", escaped(read.unit)), ("Measures", f"{width:.1f} x {height:.1f} m")]
+            rows += [("Lines", f"{len(read.segments):,} on {len(read.layers)} layers")]
+        case Model():
+            low, high = read.bounds
+            width, depth, _ = high - low
+            rows += [("Measures", f"{width:.1f} x {depth:.1f} m"), ("Height", f"{low[2]:.2f} to {high[2]:.2f} m")]
+            rows += [("Triangles", f"{len(read.triangles):,}")]
+        case Picture():
+            placement = draft.placement()
+            width, height = read.size
+            rows += [("Image", f"{width} x {height} pixels")]
+            if placement is None:
+                rows += [("Points", f"click the {'second' if draft.pixels else 'first'} one on the image")]
+            else:
+                edge = placement.resolution
+                rows += [
+                    ("Pixel", f"{1000 * edge:.4g} mm"),
+                    ("Measures", f"{width * edge:.1f} x {height * edge:.1f} m"),
+                ]
+    return rows
+
+
+class MapDraftFields:
+    """Widgets for what a file leaves open; only those that its kind needs are visible."""
+
+    def __init__(self, gui: GuiApi, post: Post) -> None:
+        self._gui, self._post = gui, post
+        self._draft: MapDraft | None = None
+        self._widgets: list[tuple[Any, tuple[type[Read], ...], Callable[[MapDraft], Any] | None]] = []
+        self._hints = field_hints(MapOptions)
+        self._facts = gui.add_html("", visible=False)
+        self._add_reading()
+        self._add_layers()
+        self._number("resolution", "Cell [mm]", 1000.0, (Drawing, Model), step=1.0)
+        self._add_picture()
+        self._make = gui.add_button(
+            "Load as the floor map", visible=False, hint="Replaces the floor map; can be undone."
+        )
+        self._make.on_click(posting(post, lambda event: actions.MakeMap(event.client_id)))
+
+    def _posting(self, make: Callable[[GuiEvent[Any], MapDraft], page_actions.Action]) -> Callable[[Any], None]:
+        """Return a callback that posts while a file is open; what cannot be meant is reported instead."""
+
+        def action(event: GuiEvent[Any]) -> page_actions.Action:
+            if self._draft is None:
+                return page_actions.Report("no file is open to load a floor map from; expected one")
+            try:
+                return make(event, self._draft)
+            except ValueError as error:
+                return page_actions.Report(str(error))
+
+        return posting(self._post, action)
+
+    def _add(self, widget: Any, kinds: tuple[type[Read], ...], shown: Callable[[MapDraft], Any] | None = None) -> Any:
+        """Register a widget for kinds of files; `shown` is its value."""
+        widget.visible = False
+        self._widgets.append((widget, kinds, shown))
+        return widget
+
+    def _number(self, name: str, label: str, scale: float, kinds: tuple[type[Read], ...], step: float) -> None:
+        """Add a number of `MapOptions` that is shown in another unit."""
+        digits = max(0, -math.floor(math.log10(step)))
+        widget = self._gui.add_number(label, 0.0, step=step, hint=self._hints[name])
+        widget.on_update(
+            self._posting(lambda event, _draft: actions.SetMapOption(name, float(event.target.value) / scale))
+        )
+        self._add(widget, kinds, lambda draft: round(getattr(draft.options, name) * scale, digits))
+
+    def _add_reading(self) -> None:
+        gui = self._gui
+        unit = gui.add_dropdown("Unit", (AS_STATED, *UNITS), hint="Unit in which it was made, where the file is wrong.")
+
+        def read_again(event: GuiEvent[Any], draft: MapDraft) -> page_actions.Action:
+            typed = unit.value, up.value
+            words = ["" if word == AS_STATED else word for word in typed]
+            return actions.SetReading(client_of(event), replace(draft.reading, unit=words[0], up=words[1]))
+
+        self._add(unit, (Drawing, Model), lambda draft: draft.reading.unit or AS_STATED)
+        up = gui.add_dropdown("Upward", (AS_STATED, "y", "z"), hint=field_hints(ReadOptions)["up"])
+        self._add(up, (Model,), lambda draft: draft.reading.up or AS_STATED)
+        for widget in (unit, up):
+            widget.on_update(self._posting(read_again))
+        heights = gui.add_text("Cut at [m]", "", hint="Heights of sections, as the scanner sees them: 0.2 1.8")
+        heights.on_update(
+            self._posting(lambda event, _draft: actions.SetMapOption("heights", heights_of(event.target.value)))
+        )
+        self._add(heights, (Model,), lambda draft: " ".join(f"{height:g}" for height in draft.options.heights))
+
+    def _add_layers(self) -> None:
+        gui = self._gui
+        self._layers = self._add(gui.add_folder("Layers with walls"), (Drawing,))
+        self._boxes: list[Any] = []
+        with self._layers:
+            gui.add_html(theme.WIDE)
+            every = gui.add_button_group("", ("All", "None", "Visible"))
+            self._rest = gui.add_html("", visible=False)
+
+        def several(event: GuiEvent[Any], draft: MapDraft) -> page_actions.Action:
+            layers = draft.read.layers if isinstance(draft.read, Drawing) else ()
+            word = event.target.value
+            names = tuple(layer.name for layer in layers if word == "All" or (word == "Visible" and layer.is_visible))
+            return actions.SetMapOption("layers", names)
+
+        every.on_click(self._posting(several))
+
+    def _add_box(self) -> Any:
+        """Add one more layer's check box."""
+        index = len(self._boxes)
+        box = self._gui.add_checkbox(" ", False)
+
+        def toggled(event: GuiEvent[Any], draft: MapDraft) -> page_actions.Action:
+            names = set(chosen_layers(draft))
+            if isinstance(draft.read, Drawing):
+                name = layers_by_size(draft.read)[index].name
+                (names.add if event.target.value else names.discard)(name)
+            return actions.SetMapOption("layers", tuple(sorted(names)))
+
+        box.on_update(self._posting(toggled))
+        return box
+
+    def _add_picture(self) -> None:
+        gui, picture = self._gui, (Picture,)
+        threshold = gui.add_slider("Walls from [%]", 0, 100, 1, 50, hint=self._hints["threshold"])
+        threshold.on_update(
+            self._posting(lambda event, _draft: actions.SetMapOption("threshold", float(event.target.value) / 100.0))
+        )
+        self._add(threshold, picture, lambda draft: round(100.0 * draft.options.threshold))
+        walls = gui.add_dropdown("Walls are", (DARK, LIGHT), hint=self._hints["light_walls"])
+        walls.on_update(
+            self._posting(lambda event, _draft: actions.SetMapOption("light_walls", event.target.value == LIGHT))
+        )
+        self._add(walls, picture, lambda draft: LIGHT if draft.options.light_walls else DARK)
+        again = gui.add_button("Click two points", color="gray", hint="Far apart, of known distance.")
+        again.on_click(posting(self._post, lambda event: actions.ClickPicture(event.client_id)))
+        self._add(again, picture)
+        self._number("distance", "A to B [m]", 1.0, picture, step=0.001)
+        axis = gui.add_dropdown("A to B is", (ALONG_X, ALONG_Y, TYPED), hint="Direction of B as seen from A.")
+        axis.on_update(
+            self._posting(
+                lambda event, draft: actions.SetMapOption(
+                    "direction", HEADINGS.get(event.target.value, draft.options.direction + 1e-9)
+                )
+            )
+        )
+        self._add(axis, picture, lambda draft: axis_of(draft.options.direction))
+        self._number("direction", "Heading of B [°]", DEG, picture, step=0.01)
+        self._number("first_x", "A lies at x [m]", 1.0, picture, step=0.001)
+        self._number("first_y", "A lies at y [m]", 1.0, picture, step=0.001)
+
+    def show(self, draft: MapDraft | None) -> None:
+        """Follow the draft."""
+        self._draft = draft
+        for widget, kinds, shown in self._widgets:
+            visible = draft is not None and isinstance(draft.read, kinds)
+            if widget.visible is not visible:
+                widget.visible = visible
+            if visible and shown is not None and draft is not None:
+                write(widget, shown(draft))
+        self._facts.visible = self._make.visible = draft is not None
+        if draft is None:
+            return
+        self._facts.content = f"<div style='padding:2px 6px;overflow-wrap:anywhere'>{table(facts(draft))}</div>"
+        self._make.disabled = isinstance(draft.read, Picture) and draft.placement() is None
+        if isinstance(draft.read, Drawing):
+            self._show_layers(draft, draft.read)
+
+    def _show_layers(self, draft: MapDraft, drawing: Drawing) -> None:
+        """Show a check box for each layer."""
+        layers, chosen = layers_by_size(drawing), chosen_layers(draft)
+        with self._layers:
+            while len(self._boxes) < len(layers):
+                self._boxes.append(self._add_box())
+        for index, box in enumerate(self._boxes):
+            if box.visible is not (index < len(layers)):
+                box.visible = index < len(layers)
+            if index < len(layers):
+                layer = layers[index]
+                name = layer.name if len(layer.name) <= _LONGEST_LAYER else f"{layer.name[: _LONGEST_LAYER - 1]}…"
+                label = f"{name} ({layer.segments:,})"
+                if box.label != label:
+                    box.label = label
+                write(box, layer.name in chosen)
+        more = len(drawing.layers) - len(layers)
+        self._rest.visible = more > 0
+        self._rest.content = (
+            f"<div class='c-note' style='padding:2px 6px'>and {more} smaller layers</div>" if more else ""
+        )
+
+
+def axis_of(direction: float) -> str:
+    """Return which axis a direction [rad] is, or that it is another heading."""
+    return next((name for name, heading in HEADINGS.items() if heading == direction), TYPED)
