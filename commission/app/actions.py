@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from commission.app.editing.actions import EditAction
+from commission.app.exchange.actions import ExchangeAction
 from commission.app.plan.actions import PlanAction
 from commission.site.project import Project
 
@@ -251,4 +252,5 @@ Action: TypeAlias = (
     | ClearProblems
     | EditAction
     | PlanAction
+    | ExchangeAction
 )

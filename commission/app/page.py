@@ -101,7 +101,8 @@ class Page:
         gui = self._server.gui
         top = TopBar(gui, post, state)
         left = gui.add_panel()
-        with left.add_tab("Site"):
+        site_tab = left.add_tab("Site")
+        with site_tab:
             site = SitePanel(gui, post, state.project)
         with left.add_tab("Plan"):
             plan = PlanPanel(gui, post, state)
@@ -112,7 +113,7 @@ class Page:
         left.dock_left()
         left.set_width(theme.LEFT_PX)
         above = gui.add_panel()
-        self._tabs = DeskTabs(above.add_tab("Selection"), above.add_tab("Reflectors"))
+        self._tabs = DeskTabs(above.add_tab("Selection"), above.add_tab("Reflectors"), site_tab)
         above.dock_right()
         above.set_width(theme.RIGHT_PX)
         below = gui.add_panel()
@@ -199,6 +200,12 @@ class Page:
     def look_at(self, client_id: int, place: tuple[float, float]) -> None:
         """Bring a place into one browser's view."""
         self._cameras.look_at(client_id, place)
+
+    def send_file(self, client_id: int, name: str, content: bytes) -> None:
+        """Let one browser save a file; nothing happens when it has gone."""
+        client = self._server.get_clients().get(client_id)
+        if client is not None:
+            client.send_file_download(name, content, save_immediately=True)
 
     def connected(self, client_id: int) -> None:
         """Set up a new browser's own view and panels."""

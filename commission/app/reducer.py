@@ -9,6 +9,7 @@ from typing import Any
 from commission.app import actions
 from commission.app.actions import ParameterValue
 from commission.app.editing import site_reducer
+from commission.app.exchange import reducer as exchange_reducer
 from commission.app.plan import reducer as plan
 from commission.app.plan.actions import ReadFloor, SetPlan
 from commission.app.reduction import (
@@ -29,7 +30,8 @@ from commission.site.parameters import Parameters
 
 PROBLEMS_KEPT = 20
 
-__all__ = ["parameter", "reduce", "site_reducer", "with_parameter"]  # site_reducer registers what editing means
+# The other reducers register what their actions mean.
+__all__ = ["exchange_reducer", "parameter", "reduce", "site_reducer", "with_parameter"]
 
 
 def parameter(parameters: Parameters, key: str) -> ParameterValue:

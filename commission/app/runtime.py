@@ -18,6 +18,7 @@ from commission.app import actions, reducer, reduction
 from commission.app.actions import Action, Source, View
 from commission.app.checking import Checker
 from commission.app.editing import actions as editing
+from commission.app.exchange.work import Exchanger
 from commission.app.jobs import Job, JobReport, Jobs, JobState, Progress
 from commission.app.plan.planner import Planner
 from commission.app.plan.view import PlanView
@@ -78,6 +79,9 @@ class PageLike(Protocol):
     def look_at(self, client_id: int, place: tuple[float, float]) -> None:
         """Bring a place into one browser's view."""
 
+    def send_file(self, client_id: int, name: str, content: bytes) -> None:
+        """Let one browser save a file."""
+
     def connected(self, client_id: int) -> None:
         """Set up a browser."""
 
@@ -128,6 +132,7 @@ class Runtime:
         # Checks take milliseconds and do not wait for a simulation.
         self._checks = Jobs(self._queue.put)
         self._checker = Checker()
+        self._exchanger = Exchanger(self._queue.put)
         self._checked: Project | None = None
         self._found: tuple[Problem, ...] = ()
         self._shown_jobs: dict[int, Job] = {}
@@ -156,6 +161,7 @@ class Runtime:
         self._stopped.set()
         self._jobs.close()
         self._checks.close()
+        self._exchanger.close()
         self._thread.join(timeout=2.0)
         self._work.close()
 
@@ -254,9 +260,10 @@ class Runtime:
             case reduction.ProcessOneScan():
                 if session is not None:
                     session.step()
-            case reduction.Tell() | reduction.PlaceCamera() | reduction.FlyTo():
-                if self._page is not None:
-                    _show(self._page, effect)
+            case reduction.ReadFile() | reduction.StopReading() | reduction.ExportProject():
+                self._exchanger.carry_out(effect)
+            case reduction.Tell() | reduction.PlaceCamera() | reduction.FlyTo() | reduction.SendFile():
+                _show(self._page, effect)
 
     def _hear(self, report: JobReport) -> None:
         """Follow a job; take its result or its error."""
@@ -371,8 +378,10 @@ def _name_of(action: Action, before: AppState, after: AppState) -> str:
             return after.undo[-1].name if after.undo else "edit"
 
 
-def _show(page: PageLike, effect: reduction.Tell | reduction.PlaceCamera | reduction.FlyTo) -> None:
-    """Do what only the page can do."""
+def _show(page: PageLike | None, effect: reduction.PageEffect) -> None:
+    """Do what only the page can do; nothing happens while there is none."""
+    if page is None:
+        return
     match effect:
         case reduction.Tell(text, failed):
             page.tell(text, failed=failed)
@@ -380,6 +389,8 @@ def _show(page: PageLike, effect: reduction.Tell | reduction.PlaceCamera | reduc
             page.show_view(client, view)
         case reduction.FlyTo(client, place):
             page.look_at(client, place)
+        case reduction.SendFile(client, name, content):
+            page.send_file(client, name, content)
 
 
 def _is_outdated(message: Message, following: Message | None) -> bool:

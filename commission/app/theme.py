@@ -151,5 +151,7 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 .c-table td:first-child{{opacity:.65;padding-right:10px;white-space:nowrap}}
 .c-table td:last-child{{text-align:right}}
 @media (max-width:1500px){{.c-beside{{display:none}}}}
+.c-list{{margin:1px 0 2px;padding-left:15px;font-size:12px;line-height:1.4;overflow-wrap:anywhere;
+ font-variant-numeric:tabular-nums}}
 .c-note{{font-size:11.5px;opacity:.7;line-height:1.35}}
 </style>"""

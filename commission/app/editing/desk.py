@@ -10,6 +10,7 @@ from commission.app.editing.editor import Editor
 from commission.app.editing.overlay import Overlay
 from commission.app.editing.pointer import take_clicks
 from commission.app.panels.base import Panel, Post
+from commission.app.panels.exchange_panel import ExchangePanel
 from commission.app.panels.reflector_table import ReflectorTable
 from commission.app.panels.selection_panel import SelectionPanel
 from commission.app.panels.tool_hint import ToolHint
@@ -24,6 +25,8 @@ class DeskTabs:
     """Tools, and the values of what is selected."""
     reflectors: GuiTabHandle
     """The table of all reflectors."""
+    site: GuiTabHandle
+    """Imports and exports, below what the project is about."""
 
 
 class Desk:
@@ -45,7 +48,9 @@ class Desk:
                 selection = SelectionPanel(gui, post, number)
                 hint = ToolHint(gui, number)
             table = ReflectorTable(gui, post, number, tabs.reflectors)
-        self._panels: tuple[Panel, ...] = (selection, table, hint)
+            with tabs.site:
+                exchange = ExchangePanel(gui, post, number)
+        self._panels: tuple[Panel, ...] = (selection, table, hint, exchange)
         take_clicks(client, post)
 
     def draw(self, view: PageView, *, slowly: bool) -> None:

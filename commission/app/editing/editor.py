@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeAlias
 
+from commission.app.exchange.pending import IDLE, Exchange
+
 Point: TypeAlias = tuple[float, float]
 """A place on the floor [m, m], map frame."""
 
@@ -97,6 +99,8 @@ class Editor:
     """What attracts."""
     reach: float = 0.1
     """How near a click has to be to mean something, at the zoom of the newest gesture [m]."""
+    exchange: Exchange = IDLE
+    """Files that this browser imports and exports."""
 
 
 @dataclass(frozen=True, slots=True)
