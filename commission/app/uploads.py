@@ -61,21 +61,22 @@ class Uploads:
         *,
         limit: int,
         endings: tuple[str, ...] = (),
-        hint: str = "",
+        note: str = "",
     ) -> GuiUploadButtonHandle:
-        """Add a button.
+        """Add a button with a note under it that states the limit; viser shows no hint at such a button.
 
         Parameters
         ----------
         label : text on it.
         on_file : takes the number of the browser's connection, the file's name and its content; it only posts. The
             name is whatever a stranger wrote: text to show, never a path.
-        limit : largest file [bytes]; the hint states it.
+        limit : largest file [bytes].
         endings : endings that the browser's dialog offers, with their dots; all when empty. Nothing is sure of them.
-        hint : one line about the file.
+        note : one line about the file, written by us: it is shown as html.
         """
-        stated = f"{hint} At most {megabytes(limit)}.".strip()
-        button = self._gui.add_upload_button(label, mime_type=",".join(endings) or "*/*", hint=stated)
+        button = self._gui.add_upload_button(label, mime_type=",".join(endings) or "*/*")
+        stated = f"{note} At most {megabytes(limit)}.".strip()
+        self._gui.add_html(f"<div class='c-note' style='padding:0 14px 4px 8px'>{stated}</div>")
         self._limits[button._impl.uuid] = limit
 
         async def uploaded(event: GuiEvent[Any]) -> None:
@@ -95,11 +96,11 @@ class Uploads:
         if limit is None or message.transfer_uuid in self._transfers:
             return
         size, parts = message.size_bytes, message.part_count
-        if not (isinstance(size, int) and isinstance(parts, int) and 0 <= parts <= size):
-            self._refuse(client_id, message, "the upload announces no size; expected one")
-        elif size > limit:
-            text = f"the file has {megabytes(size)} ({size} bytes); expected at most {megabytes(limit)}"
+        if size > limit:
+            text = f"the file has {megabytes(size)} ({size:,} bytes); expected at most {megabytes(limit)}"
             self._refuse(client_id, message, text)
+        elif not 0 <= parts <= size:
+            self._refuse(client_id, message, f"the upload announces {parts} parts of {size} bytes; expected a file")
         else:
             self._forget_others(client_id, message.source_component_uuid)
             self._transfers[message.transfer_uuid] = _Transfer(client_id, message.source_component_uuid, size)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from commission.errors import UsageError
+from commission.errors import FileFormatError, UsageError
 from commission.io.findings import Progress, silent
 from commission.io.imk import write_imk
 from commission.io.lif_writer import write_lif
@@ -29,6 +29,14 @@ class Format(StrEnum):
     IMK = ".imk"
     LIF = "LIF"
     PROJECT = "Project"
+
+
+_ENDINGS = {
+    Format.TABLE: "_reflectors.csv",
+    Format.IMK: ".imk",
+    Format.LIF: ".lif",
+    Format.PROJECT: ".zip",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,23 +78,30 @@ def export(project: Project, wanted: Format, *, progress: Progress = silent) -> 
     if wanted is Format.LIF and not (project.routes or project.stations):
         raise UsageError("there are no routes to write; expected one or more")
     stem = safe_stem(project.name)
-    losses: tuple[str, ...] = ()
+    name = f"{stem}{_ENDINGS[wanted]}"
     with tempfile.TemporaryDirectory(prefix="commission.") as folder:
         path = Path(folder) / "file"
         progress(0.1, "writing")
-        match wanted:
-            case Format.TABLE:
-                write_reflectors(project.reflectors, path)
-                return Exported(f"{stem}_reflectors.csv", path.read_bytes(), losses)
-            case Format.IMK:
-                losses = write_imk(project.reflectors, path)
-                return Exported(f"{stem}.imk", path.read_bytes(), losses)
-            case Format.LIF:
-                losses = write_lif(project, path)
-                return Exported(f"{stem}.lif", path.read_bytes(), losses)
-            case Format.PROJECT:
-                save_project(project, path)
-                return Exported(f"{stem}.zip", _zipped(path, stem, progress))
+        try:
+            losses = _written(project, wanted, path)
+        except FileFormatError as error:
+            raise FileFormatError(name, error.where, error.problem, error.remedy) from error
+        content = _zipped(path, stem, progress) if wanted is Format.PROJECT else path.read_bytes()
+    return Exported(name, content, losses)
+
+
+def _written(project: Project, wanted: Format, path: Path) -> tuple[str, ...]:
+    """Write a file, or the folder of a project; returns what is lost."""
+    match wanted:
+        case Format.TABLE:
+            write_reflectors(project.reflectors, path)
+        case Format.IMK:
+            return write_imk(project.reflectors, path)
+        case Format.LIF:
+            return write_lif(project, path)
+        case Format.PROJECT:
+            save_project(project, path)
+    return ()
 
 
 def _zipped(folder: Path, stem: str, progress: Progress) -> bytes:

@@ -132,7 +132,7 @@ def _read(path: Path, choice: LayoutChoice) -> Imported:
 
 def _table(path: Path) -> ReflectorImport:
     """Read a table: by the strict rules when it has the columns of `reflectors.csv`, otherwise as a spreadsheet's."""
-    lines = read_text(path, SIZE_LIMIT).splitlines()
+    lines = read_text(path, SIZE_LIMIT).replace("\r", "\n").split("\n")
     header = next((line for line in lines if is_row(line)), "")
     names = {cell.strip(' "').lower() for cell in header.split(";" if ";" in header else ",")}
     if not names.issuperset(REQUIRED):

@@ -26,6 +26,7 @@ from commission.io.recordings.base import open_recording
 from commission.io.recordings.csv_writer import write_recording
 from commission.io.reflector_tables import read_reflectors, write_reflectors
 from commission.io.vda5050 import read_order
+from commission.site import network_diff
 from commission.site.floor_map import FloorMap
 from commission.site.project import Project
 from commission.site.reflector_diff import difference, merged
@@ -166,14 +167,17 @@ def _from_routes(source: Path, target: Path, wanted: Kind, options: ConvertOptio
     if wanted is Kind.LIF:
         return (*imported.warnings, *write_lif(_network(source, imported), target))
     project = _existing(target)
-    names = {route.name for route in imported.routes}
-    kept = tuple(route for route in project.routes if route.name not in names)
-    places = {station.name for station in imported.stations}
-    stations = (*(s for s in project.stations if s.name not in places), *imported.stations)
-    changed = dataclasses.replace(project, routes=(*kept, *imported.routes), stations=stations)
+    routes = network_diff.difference(project.routes, imported.routes)
+    accurate = network_diff.keeping_accuracy(project.stations, imported.stations)
+    stations = network_diff.difference(project.stations, accurate)
+    changed = dataclasses.replace(
+        project,
+        routes=network_diff.merged(project.routes, routes, remove=False),
+        stations=network_diff.merged(project.stations, stations, remove=False),
+    )
     save_project(changed, _folder(target))
-    report = f"{len(imported.routes)} routes and {len(places)} stations read, {len(kept)} other routes kept"
-    return (*imported.warnings, report)
+    read = f"{len(imported.routes)} routes and {len(imported.stations)} stations read"
+    return (*imported.warnings, f"{read}, {len(routes.removed)} other routes kept")
 
 
 def _routes(source: Path, options: ConvertOptions) -> RouteImport:

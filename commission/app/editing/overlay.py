@@ -18,6 +18,7 @@ from commission.app.editing import actions
 from commission.app.editing.editor import Editor, Grab, Tool, measurement
 from commission.app.editing.gestures import moved, selected_of
 from commission.app.editing.route_gestures import curve, moved_route
+from commission.app.exchange.ghosts import ghosts_of
 from commission.app.extent import extent_of
 from commission.app.panels.base import Post
 from commission.geometry.arrays import FloatArray
@@ -135,6 +136,9 @@ class Overlay:
                 lines.append(polyline_segments(curve(segment), height))
         if len(set(editor.draft)) > 1:
             lines.append(polyline_segments(curve(segment_of(editor.draft)), height))
+        ghosts = ghosts_of(project, editor.exchange.pending)
+        lines.append(outline_segments(rings(ghosts.centers, size), height))
+        lines += [polyline_segments(line, height) for line in ghosts.lines]
         if len(editor.measured) == 2:
             lines.append(polyline_segments(np.array(editor.measured), height))
         return np.concatenate(lines) if lines else NO_SEGMENTS

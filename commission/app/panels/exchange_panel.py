@@ -13,7 +13,7 @@ from commission.app.exchange import actions
 from commission.app.exchange.pending import IDLE, Exchange, LayoutChoice, Pasted, Pending, ServerFile, Upload
 from commission.app.exchange.preview import preview
 from commission.app.exchange.words import as_list, counts, details
-from commission.app.panels.base import BasePanel, Post, escaped, posting
+from commission.app.panels.base import BasePanel, Post, escaped, posting, write
 from commission.app.uploads import Uploads
 from commission.app.view import PageView
 from commission.io.edges import RouteImport
@@ -21,7 +21,6 @@ from commission.io.exports import Format
 from commission.io.imports import ENDINGS, SIZE_LIMIT
 from commission.site.project import Project
 
-MERGE, REPLACE = "Merge", "Replace"
 ACCEPT, CANCEL = "Accept", "Cancel"
 ANY, ALL = "(most edges)", "(all)"
 MOST_CHOICES = 50
@@ -45,19 +44,22 @@ class ExchangePanel(BasePanel):
         with gui.add_folder("Exchange", expand_by_default=False):
             self._state = gui.add_html("")
             self._add_preview()
-            self._inputs = self._add_inputs()
+            # A folder, because an upload button cannot be hidden by itself.
+            self._inputs = gui.add_folder("Import")
+            with self._inputs:
+                self._add_inputs()
             self._add_exports()
 
-    def _add_inputs(self) -> tuple[Any, ...]:
-        """Add the three ways in; returns their widgets."""
+    def _add_inputs(self) -> None:
+        """Add the three ways in."""
         gui, post, client = self._gui, self._post, self._client
         uploads = Uploads(gui, lambda _client, text: post(actions.ExchangeFailed(client, text)))
-        upload = uploads.add(
+        uploads.add(
             "Upload reflectors or routes",
             lambda _client, name, content: post(actions.ReadImport(client, Upload(name, content))),
             limit=SIZE_LIMIT,
             endings=ENDINGS,
-            hint="Reflectors (.csv, SICK .imk), routes (VDMA LIF, VDA 5050 order).",
+            note="CSV, SICK .imk; VDMA LIF, VDA 5050 order.",
         )
         path = gui.add_text("Server file", "", hint="Path, on the computer that serves this page, of such a file.")
         read = gui.add_button("Read it", color="gray", hint="Show what the file would change.")
@@ -67,7 +69,6 @@ class ExchangePanel(BasePanel):
         )
         take = gui.add_button("Read pasted", color="gray", hint="Show what the pasted table would change.")
         take.on_click(posting(post, lambda _event: self._pasted(text.value)))
-        return upload, path, read, text, take
 
     def _named(self, typed: str) -> page_actions.Action:
         if not typed.strip():
@@ -90,10 +91,10 @@ class ExchangePanel(BasePanel):
         )
         for widget in (self._vehicle, self._layout):
             widget.on_update(posting(post, lambda _event: actions.ChooseLayout(client, self._choice())))
-        self._mode = gui.add_button_group(
-            "Others", (MERGE, REPLACE), visible=False, hint="Keep what is not in the file, or remove it."
+        self._remove = gui.add_checkbox(
+            "Remove others", False, visible=False, hint="Replace: remove what is not in the file. Otherwise it stays."
         )
-        self._mode.on_click(posting(post, lambda event: actions.RemoveAbsent(client, event.target.value == REPLACE)))
+        self._remove.on_update(posting(post, lambda event: actions.RemoveAbsent(client, bool(event.target.value))))
         gui.add_html(theme.WIDE)
         self._answer = gui.add_button_group("", (ACCEPT, CANCEL), visible=False)
         self._answer.on_click(posting(post, self._answered))
@@ -128,12 +129,12 @@ class ExchangePanel(BasePanel):
         self._state.content = _state(exchange)
         self._sent.content = _sent(exchange)
         pending = exchange.pending if exchange.reading is None else None
-        for widget in self._inputs:
-            widget.visible = pending is None
-        for widget in (self._mode, self._answer, self._details):
+        self._inputs.visible = pending is None
+        for widget in (self._remove, self._answer, self._details):
             widget.visible = pending is not None
         self._offer_choices(pending)
         if pending is not None:
+            write(self._remove, pending.remove)
             found = preview(view.state.project, pending)
             self._state.content = _head(pending, counts(found, remove=pending.remove))
             notes = as_list("Notes", pending.imported.warnings, str)
