@@ -17,6 +17,7 @@ from commission.errors import FileFormatError, UsageError
 from commission.geometry.arrays import FloatArray, frozen
 from commission.io.dxf import UNITS
 from commission.io.findings import Progress, silent
+from commission.io.glb_header import check_announced
 from commission.io.outline import outline_map
 from commission.io.reading import cannot_read, check_size
 from commission.site.floor_map import FloorMap
@@ -36,6 +37,7 @@ _GARBAGE = (
     LookupError,
     TypeError,
     AttributeError,
+    NameError,
     ArithmeticError,
     AssertionError,
     NotImplementedError,
@@ -113,6 +115,8 @@ def read_model(path: Path, *, unit: str = "m", y_up: bool | None = None, progres
     check_size(path, SIZE_LIMIT)
     try:
         with path.open("rb") as file:
+            if kind == "glb":
+                check_announced(path, file, FACE_LIMIT)
             source = _Reported(file, path.stat().st_size, progress)
             # No resolver: a model refers to no other files. No materials: pictures are not decoded.
             loaded = trimesh.load(source, file_type=kind, process=False, skip_materials=True)  # type: ignore[arg-type]
