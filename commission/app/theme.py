@@ -138,7 +138,7 @@ div:has(>div>.c-bottom)>:nth-child(n+7){{grid-column:span 4}}
 div:has(>div>.c-bottom)>:nth-child(-n+3) [style*="7.25em"]{{display:none}}
 div:has(>div>.c-bottom)>:nth-child(5) [style*="7.25em"]{{display:none}}
 div:has(>.c-wide){{display:none}}
-div:has(>.c-wide)+* [style*="flex-shrink: 0"]{{display:none}}
+div:has(>.c-wide)+*>.mantine-Flex-root>[style*="flex-shrink: 0"]{{display:none}}
 div:has(>.c-rows){{display:none}}
 div:has(>.c-rows)~div{{padding-top:0!important;padding-bottom:1px!important}}
 div:has(>.c-rows)~div button{{height:auto!important;min-height:22px;padding:2px 6px!important;

@@ -95,7 +95,7 @@ class ExchangePanel(BasePanel):
             "Remove others", False, visible=False, hint="Replace: remove what is not in the file. Otherwise it stays."
         )
         self._remove.on_update(posting(post, lambda event: actions.RemoveAbsent(client, bool(event.target.value))))
-        gui.add_html(theme.WIDE)
+        self._wide = gui.add_html(theme.WIDE, visible=False)
         self._answer = gui.add_button_group("", (ACCEPT, CANCEL), visible=False)
         self._answer.on_click(posting(post, self._answered))
         self._details = gui.add_html("", visible=False)
@@ -130,7 +130,7 @@ class ExchangePanel(BasePanel):
         self._sent.content = _sent(exchange)
         pending = exchange.pending if exchange.reading is None else None
         self._inputs.visible = pending is None
-        for widget in (self._remove, self._answer, self._details):
+        for widget in (self._remove, self._wide, self._answer, self._details):
             widget.visible = pending is not None
         self._offer_choices(pending)
         if pending is not None:
