@@ -1,4 +1,4 @@
-"""From what a person uploads, names or pastes to reflectors or routes: which format it is, and its limits.
+"""From what a person uploads, names or pastes to reflectors, routes or a project: which format it is, and its limits.
 
 The name that a browser gives to a file tells its format and stands in messages; it never becomes a path.
 """
@@ -12,15 +12,15 @@ from pathlib import Path
 from typing import TypeAlias
 
 from commission.errors import FileFormatError
-from commission.io.csv_table import is_row, read_table
 from commission.io.edges import RouteImport
-from commission.io.findings import Progress, silent
+from commission.io.findings import Findings, Progress, silent
 from commission.io.imk import ReflectorImport, read_imk
-from commission.io.interchange import Kind, kind_of_source
+from commission.io.json_document import read_json
 from commission.io.lif import read_lif
 from commission.io.pasted_table import parse_table
-from commission.io.reading import read_bytes, read_text
-from commission.io.reflector_tables import OPTIONAL, REQUIRED, reflectors_of
+from commission.io.project_archive import ProjectImport, read_project_archive
+from commission.io.reading import read_bytes
+from commission.io.table_import import read_any_table
 from commission.io.vda5050 import read_order
 
 SIZE_LIMIT = 32_000_000
@@ -33,13 +33,14 @@ NAME_LIMIT = 60
 PASTED = "pasted text"
 """What text is called that has no file name."""
 
-Imported: TypeAlias = ReflectorImport | RouteImport
+Imported: TypeAlias = ReflectorImport | RouteImport | ProjectImport
 
 _FORMATS = {
     **dict.fromkeys((".csv", ".tsv", ".txt"), "table.csv"),
     ".imk": "layout.imk",
     ".lif": "layout.lif",
     ".json": "order.json",
+    ".zip": "project.zip",
 }
 """Name under which a file of each ending is kept while it is read."""
 ENDINGS = tuple(_FORMATS)
@@ -66,7 +67,7 @@ def shown_name(name: str) -> str:
 
 
 def read_import(name: str, content: bytes, choice: LayoutChoice = WHOLE, *, progress: Progress = silent) -> Imported:
-    """Read reflectors or routes from the content of a file.
+    """Read reflectors, routes or a whole project from the content of a file.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ def read_import(name: str, content: bytes, choice: LayoutChoice = WHOLE, *, prog
         path.write_bytes(content)
         try:
             progress(0.1, "reading")
-            imported = _read(path, choice)
+            imported = _read(path, choice, progress)
         except FileFormatError as error:
             raise FileFormatError(title, error.where, error.problem, error.remedy) from error
     progress(0.9, "comparing")
@@ -120,27 +121,16 @@ def read_named(path: Path, choice: LayoutChoice = WHOLE, *, progress: Progress =
     return read_import(path.name, read_bytes(path, SIZE_LIMIT), choice, progress=progress)
 
 
-def _read(path: Path, choice: LayoutChoice) -> Imported:
+def _read(path: Path, choice: LayoutChoice, progress: Progress) -> Imported:
+    if path.suffix == ".zip":
+        return read_project_archive(path, progress=progress)
     if path.suffix == ".imk":
         return read_imk(path)
     if path.suffix == ".csv":
-        return _table(path)
-    if kind_of_source(path) is Kind.ORDER:
-        return read_order(path)
-    return read_lif(path, vehicle_type=choice.vehicle_type, layout=choice.layout)
-
-
-def _table(path: Path) -> ReflectorImport:
-    """Read a table: by the strict rules when it has the columns of `reflectors.csv`, otherwise as a spreadsheet's."""
-    lines = read_text(path, SIZE_LIMIT).replace("\r", "\n").split("\n")
-    header = next((line for line in lines if is_row(line)), "")
-    names = {cell.strip(' "').lower() for cell in header.split(";" if ";" in header else ",")}
-    if not names.issuperset(REQUIRED):
-        return parse_table("\n".join(line if is_row(line) else "" for line in lines))
-    blocks = list(read_table(path, REQUIRED, OPTIONAL, size_limit=SIZE_LIMIT))
-    # What the table has no column for, it says nothing about.
-    fields = tuple(blocks[0].columns) if blocks else REQUIRED
-    return ReflectorImport(reflectors_of(blocks), (), fields)
+        return read_any_table(path)
+    if path.suffix == ".lif" or "layouts" in read_json(path, Findings()).values:
+        return read_lif(path, vehicle_type=choice.vehicle_type, layout=choice.layout)
+    return read_order(path)
 
 
 def _bounded(title: str, imported: Imported) -> Imported:

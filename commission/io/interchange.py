@@ -24,7 +24,8 @@ from commission.io.map_server import write_floor_map
 from commission.io.project_file import FILE_NAME, load_project, project_file, save_project
 from commission.io.recordings.base import open_recording
 from commission.io.recordings.csv_writer import write_recording
-from commission.io.reflector_tables import read_reflectors, write_reflectors
+from commission.io.reflector_tables import write_reflectors
+from commission.io.table_import import read_any_table
 from commission.io.vda5050 import read_order
 from commission.site import network_diff
 from commission.site.floor_map import FloorMap
@@ -155,11 +156,8 @@ def _from_project(source: Path, target: Path, wanted: Kind, _: ConvertOptions) -
 
 
 def _from_reflectors(source: Path, target: Path, wanted: Kind, _: ConvertOptions) -> tuple[str, ...]:
-    if source.suffix.lower() == ".imk":
-        imported = read_imk(source)
-        written = _written_reflectors(imported.reflectors, target, wanted, imported.fields)
-        return (*imported.warnings, *written)
-    return _written_reflectors(read_reflectors(source), target, wanted)
+    imported = read_imk(source) if source.suffix.lower() == ".imk" else read_any_table(source)
+    return (*imported.warnings, *_written_reflectors(imported.reflectors, target, wanted, imported.fields))
 
 
 def _from_routes(source: Path, target: Path, wanted: Kind, options: ConvertOptions) -> tuple[str, ...]:

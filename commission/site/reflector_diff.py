@@ -71,12 +71,14 @@ def difference(
     same_place : reflectors that share no id with the other map are still one reflector, renamed, when each is the
         other's nearest and they are at most so far apart [m]; 0 compares by id alone.
     fields : fields that `after` speaks of, for a format that knows no others: what it is silent about stays as it
-        is. All when None.
+        is. Without `id` its ids are made up: reflectors are then compared by their places. All when None.
 
     Returns
     -------
     difference : added and changed in the order of `after`, removed in the order of `before`.
     """
+    if fields is not None and "id" not in fields:
+        after = with_own_ids(before, after, same_place=same_place)
     partners = _partners(before, after, same_place)
     silent = [f.name for f in dataclasses.fields(Reflector) if fields is not None and f.name not in (*fields, "id")]
     pairs = [_pair(partners.get(reflector.id), reflector, silent) for reflector in after.reflectors]

@@ -7,12 +7,24 @@ from dataclasses import dataclass, replace
 from commission.app.exchange.pending import Pending
 from commission.io.edges import RouteImport
 from commission.io.imk import ReflectorImport
+from commission.io.project_archive import ProjectImport
 from commission.site import network_diff, reflector_diff
 from commission.site.network_diff import NamedDiff
 from commission.site.project import Project
 from commission.site.reflector_diff import ReflectorDiff
+from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route
 from commission.site.stations import Station
+
+PARTS = {
+    "name": "name of the project",
+    "floor_map": "floor map",
+    "vehicle": "vehicle",
+    "scanner": "scanner",
+    "parameters": "parameters of the localizer",
+    "disturbances": "disturbances of virtual drives",
+}
+"""Parts of a project that are replaced as a whole."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +39,8 @@ class Preview:
     """Of the routes."""
     stations: NamedDiff[Station] | None = None
     """Of the stations."""
+    others: tuple[str, ...] = ()
+    """Other parts of the project that are replaced as a whole, in the words of the page."""
 
     @property
     def parts(self) -> tuple[ReflectorDiff | NamedDiff[Route] | NamedDiff[Station], ...]:
@@ -35,15 +49,26 @@ class Preview:
 
     def changes(self, *, remove: bool) -> bool:
         """Whether accepting would change anything."""
-        return any(part.added or part.changed or (remove and part.removed) for part in self.parts)
+        found = any(part.added or part.changed or (remove and part.removed) for part in self.parts)
+        return found or bool(self.others)
 
 
 def preview(project: Project, pending: Pending) -> Preview:
     """Compare what was read with a project."""
-    imported = pending.imported
-    if isinstance(imported, RouteImport):
-        return _network(project, imported)
-    return _reflectors(project, imported)
+    match pending.imported:
+        case ReflectorImport(reflectors, _, fields):
+            return _reflectors(project, reflectors, fields)
+        case RouteImport() as imported:
+            return _network(project, imported)
+        case ProjectImport(other):
+            found = _reflectors(project, other.reflectors, None)
+            replaced = tuple(text for part, text in PARTS.items() if getattr(other, part) != getattr(project, part))
+            return replace(
+                found,
+                routes=network_diff.difference(project.routes, other.routes),
+                stations=network_diff.difference(project.stations, other.stations),
+                others=replaced,
+            )
 
 
 def accepted(project: Project, pending: Pending) -> Project:
@@ -51,21 +76,19 @@ def accepted(project: Project, pending: Pending) -> Project:
     found, remove = preview(project, pending), pending.remove
     if not found.changes(remove=remove):
         return project
+    reflectors, routes, stations = project.reflectors, project.routes, project.stations
     if found.reflectors is not None:
-        return replace(project, reflectors=reflector_diff.merged(project.reflectors, found.reflectors, remove=remove))
-    routes, stations = project.routes, project.stations
+        reflectors = reflector_diff.merged(reflectors, found.reflectors, remove=remove)
     if found.routes is not None:
         routes = network_diff.merged(routes, found.routes, remove=remove)
     if found.stations is not None:
         stations = network_diff.merged(stations, found.stations, remove=remove)
-    return replace(project, routes=routes, stations=stations)
+    base = pending.imported.project if isinstance(pending.imported, ProjectImport) else project
+    return replace(base, reflectors=reflectors, routes=routes, stations=stations)
 
 
-def _reflectors(project: Project, imported: ReflectorImport) -> Preview:
-    after = imported.reflectors
-    if "id" not in imported.fields:
-        after = reflector_diff.with_own_ids(project.reflectors, after)
-    diff = reflector_diff.difference(project.reflectors, after, fields=imported.fields)
+def _reflectors(project: Project, after: ReflectorMap, fields: tuple[str, ...] | None) -> Preview:
+    diff = reflector_diff.difference(project.reflectors, after, fields=fields)
     locked = {r.id for r in project.reflectors.reflectors if r.locked}
     touched = (*(change.before.id for change in diff.changed), *(r.id for r in diff.removed))
     free = replace(

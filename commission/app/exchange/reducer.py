@@ -20,6 +20,7 @@ from commission.app.reduction import (
 )
 from commission.app.store import AppState, Edit, edited
 from commission.errors import UsageError
+from commission.io.project_archive import ProjectImport
 
 PROBLEM_LIMIT = 500
 """Characters of a problem that are shown."""
@@ -73,7 +74,9 @@ def _(action: actions.ImportRead, state: AppState) -> Reduction:
     exchange = _exchange(state, action.client)
     if exchange.reading is None or action.number != exchange.number:
         return Reduction(state)
-    pending = Pending(exchange.reading.source, action.choice, action.imported)
+    # A table is usually one of several, a project is usually wanted as it is.
+    whole = isinstance(action.imported, ProjectImport)
+    pending = Pending(exchange.reading.source, action.choice, action.imported, remove=whole)
     return Reduction(_with(state, action.client, Exchange(exchange.number, pending=pending)))
 
 

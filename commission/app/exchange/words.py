@@ -116,7 +116,7 @@ def counts(preview: Preview, *, remove: bool) -> str:
 def details(preview: Preview, *, remove: bool) -> str:
     """List what is added, changed and removed, as html."""
     gone = "Removed" if remove else "Not in the file, kept"
-    html = ""
+    html = as_list("Replaced", preview.others, str)
     if preview.reflectors is not None:
         diff = preview.reflectors
         html += as_list("Added", diff.added, reflector_line)

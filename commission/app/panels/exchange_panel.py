@@ -55,11 +55,11 @@ class ExchangePanel(BasePanel):
         gui, post, client = self._gui, self._post, self._client
         uploads = Uploads(gui, lambda _client, text: post(actions.ExchangeFailed(client, text)))
         uploads.add(
-            "Upload reflectors or routes",
+            "Upload a file",
             lambda _client, name, content: post(actions.ReadImport(client, Upload(name, content))),
             limit=SIZE_LIMIT,
             endings=ENDINGS,
-            note="CSV, SICK .imk; VDMA LIF, VDA 5050 order.",
+            note="Reflectors: CSV, SICK .imk. Routes: VDMA LIF, VDA 5050. A project: .zip.",
         )
         path = gui.add_text("Server file", "", hint="Path, on the computer that serves this page, of such a file.")
         read = gui.add_button("Read it", color="gray", hint="Show what the file would change.")

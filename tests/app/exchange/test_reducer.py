@@ -28,6 +28,7 @@ from commission.io.edges import RouteImport
 from commission.io.exports import Exported, Format
 from commission.io.imk import ReflectorImport
 from commission.io.imports import WHOLE, Imported, LayoutChoice
+from commission.io.project_archive import ProjectImport
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
 from commission.site.stations import Station
@@ -218,3 +219,13 @@ def test_answers_to_a_browser_that_has_left_change_nothing(state: AppState) -> N
 )
 def test_each_source_has_a_title(source: Upload | ServerFile | Pasted, title: str) -> None:
     assert source.title == title
+
+
+def test_whole_project_replaces_all_in_one_step_that_is_undone_at_once(state: AppState) -> None:
+    other = replace(room(), name="Other", reflectors=ReflectorMap((NORTH,)), routes=(DETOUR,))
+    result = after(looking_at(state, ProjectImport(other)), actions.AcceptImport(ME)).state
+    assert result.project == other
+    merged = after(looking_at(state, ProjectImport(other)), actions.RemoveAbsent(ME, False), actions.AcceptImport(ME))
+    assert ids(merged.state) == ["R1", "R2", "R3", "R4", "N"]
+    assert merged.state.project.name == "Other"
+    assert after(result, page.Undo(ME)).state.project is state.project
