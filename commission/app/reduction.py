@@ -108,6 +108,8 @@ class ReadFile:
     """Which file."""
     choice: LayoutChoice
     """Which part of it."""
+    project: Project
+    """What it is compared with."""
 
 
 @dataclass(frozen=True, slots=True)

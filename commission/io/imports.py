@@ -25,8 +25,8 @@ from commission.io.vda5050 import read_order
 
 SIZE_LIMIT = 32_000_000
 """Bytes of a file: a layout of about 50,000 edges, a table of about 400,000 rows."""
-REFLECTOR_LIMIT = 20_000
-"""Reflectors of one import: a NAV350 stores 12,000."""
+REFLECTOR_LIMIT = 12_000
+"""Reflectors of one import: what a NAV350 stores, compared within half a second."""
 ROUTE_LIMIT = 5_000
 """Routes of one import."""
 NAME_LIMIT = 60
@@ -97,7 +97,6 @@ def read_import(name: str, content: bytes, choice: LayoutChoice = WHOLE, *, prog
             imported = _read(path, choice, progress)
         except FileFormatError as error:
             raise FileFormatError(title, error.where, error.problem, error.remedy) from error
-    progress(0.9, "comparing")
     return _bounded(title, imported)
 
 

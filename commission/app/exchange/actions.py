@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from commission.app.exchange.pending import ImportSource
+from commission.app.exchange.preview import Preview
 from commission.io.exports import Exported, Format
 from commission.io.imports import WHOLE, Imported, LayoutChoice
 
@@ -94,6 +95,8 @@ class ImportRead:
     """Which part of the file."""
     imported: Imported
     """What it holds."""
+    found: Preview
+    """What it would change."""
 
 
 @dataclass(frozen=True, slots=True)

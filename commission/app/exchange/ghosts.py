@@ -8,7 +8,6 @@ import numpy as np
 
 from commission.app.editing.route_gestures import curve
 from commission.app.exchange.pending import Pending
-from commission.app.exchange.preview import preview
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
 
@@ -33,7 +32,7 @@ def ghosts_of(project: Project, pending: Pending | None) -> Ghosts:
     """Return what is drawn of an import that waits; nothing when there is none."""
     if pending is None:
         return NOTHING
-    found = preview(project, pending)
+    found = pending.preview(project)
     places: list[tuple[float, float]] = []
     lines: list[FloatArray] = []
     if found.reflectors is not None:

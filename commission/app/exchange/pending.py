@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
+from commission.app.exchange.preview import Preview, compare
 from commission.io.imports import PASTED, WHOLE, Imported, LayoutChoice, shown_name
+from commission.site.project import Project
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +76,15 @@ class Pending:
     choice: LayoutChoice
     """Which part of it was read."""
     imported: Imported
-    """Reflectors or routes."""
+    """Reflectors, routes or a project."""
+    found: Preview
+    """What it would change of the project that it was compared with."""
     remove: bool = False
     """Whether what is in the project and not in the file is removed."""
+
+    def preview(self, project: Project) -> Preview:
+        """Return what it would change; compared anew where the project is another one by now."""
+        return self.found if self.found.project is project else compare(project, self.imported)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from commission.app.exchange.pending import Pending
 from commission.io.edges import RouteImport
 from commission.io.imk import ReflectorImport
+from commission.io.imports import Imported
 from commission.io.project_archive import ProjectImport
 from commission.site import network_diff, reflector_diff
 from commission.site.network_diff import NamedDiff
@@ -24,13 +24,17 @@ PARTS = {
     "parameters": "parameters of the localizer",
     "disturbances": "disturbances of virtual drives",
 }
-"""Parts of a project that are replaced as a whole."""
+"""Parts of a project that are replaced as a whole, in the words of the page."""
 
 
 @dataclass(frozen=True, slots=True)
 class Preview:
     """Differences, part by part; a part that the file does not speak of is None and stays."""
 
+    project: Project
+    """What the file is compared with."""
+    base: Project
+    """The same, with what is replaced as a whole."""
     reflectors: ReflectorDiff | None = None
     """Of the reflector map."""
     locked: tuple[str, ...] = ()
@@ -40,69 +44,65 @@ class Preview:
     stations: NamedDiff[Station] | None = None
     """Of the stations."""
     others: tuple[str, ...] = ()
-    """Other parts of the project that are replaced as a whole, in the words of the page."""
-
-    @property
-    def parts(self) -> tuple[ReflectorDiff | NamedDiff[Route] | NamedDiff[Station], ...]:
-        """Those that the file speaks of."""
-        return tuple(part for part in (self.reflectors, self.routes, self.stations) if part is not None)
+    """What is replaced as a whole, in the words of the page."""
 
     def changes(self, *, remove: bool) -> bool:
         """Whether accepting would change anything."""
-        found = any(part.added or part.changed or (remove and part.removed) for part in self.parts)
-        return found or bool(self.others)
+        parts = (part for part in (self.reflectors, self.routes, self.stations) if part is not None)
+        return bool(self.others) or any(part.added or part.changed or (remove and part.removed) for part in parts)
+
+    def accepted(self, *, remove: bool) -> Project:
+        """Return the project with what was read; it is the same object when nothing changes.
+
+        Parameters
+        ----------
+        remove : whether what is not in the file goes.
+        """
+        if not self.changes(remove=remove):
+            return self.project
+        reflectors, routes, stations = self.project.reflectors, self.project.routes, self.project.stations
+        if self.reflectors is not None:
+            reflectors = reflector_diff.merged(reflectors, self.reflectors, remove=remove)
+        if self.routes is not None:
+            routes = network_diff.merged(routes, self.routes, remove=remove)
+        if self.stations is not None:
+            stations = network_diff.merged(stations, self.stations, remove=remove)
+        return replace(self.base, reflectors=reflectors, routes=routes, stations=stations)
 
 
-def preview(project: Project, pending: Pending) -> Preview:
+def compare(project: Project, imported: Imported) -> Preview:
     """Compare what was read with a project."""
-    match pending.imported:
+    same = Preview(project, project)
+    match imported:
         case ReflectorImport(reflectors, _, fields):
-            return _reflectors(project, reflectors, fields)
-        case RouteImport() as imported:
-            return _network(project, imported)
+            return _with_reflectors(same, reflectors, fields)
+        case RouteImport():
+            # An order has no stations: it says nothing about those of the project.
+            return _with_network(same, imported.routes, imported.stations if imported.layouts else None)
         case ProjectImport(other):
-            found = _reflectors(project, other.reflectors, None)
-            replaced = tuple(text for part, text in PARTS.items() if getattr(other, part) != getattr(project, part))
-            return replace(
-                found,
-                routes=network_diff.difference(project.routes, other.routes),
-                stations=network_diff.difference(project.stations, other.stations),
-                others=replaced,
-            )
+            others = tuple(text for part, text in PARTS.items() if getattr(other, part) != getattr(project, part))
+            whole = _with_reflectors(replace(same, base=other, others=others), other.reflectors, None)
+            found = _with_network(whole, other.routes, None)
+            return replace(found, stations=network_diff.difference(project.stations, other.stations))
 
 
-def accepted(project: Project, pending: Pending) -> Project:
-    """Return the project with what was read; it is the same object when nothing changes."""
-    found, remove = preview(project, pending), pending.remove
-    if not found.changes(remove=remove):
-        return project
-    reflectors, routes, stations = project.reflectors, project.routes, project.stations
-    if found.reflectors is not None:
-        reflectors = reflector_diff.merged(reflectors, found.reflectors, remove=remove)
-    if found.routes is not None:
-        routes = network_diff.merged(routes, found.routes, remove=remove)
-    if found.stations is not None:
-        stations = network_diff.merged(stations, found.stations, remove=remove)
-    base = pending.imported.project if isinstance(pending.imported, ProjectImport) else project
-    return replace(base, reflectors=reflectors, routes=routes, stations=stations)
-
-
-def _reflectors(project: Project, after: ReflectorMap, fields: tuple[str, ...] | None) -> Preview:
-    diff = reflector_diff.difference(project.reflectors, after, fields=fields)
-    locked = {r.id for r in project.reflectors.reflectors if r.locked}
+def _with_reflectors(found: Preview, after: ReflectorMap, fields: tuple[str, ...] | None) -> Preview:
+    before = found.project.reflectors
+    diff = reflector_diff.difference(before, after, fields=fields)
+    locked = {r.id for r in before.reflectors if r.locked}
     touched = (*(change.before.id for change in diff.changed), *(r.id for r in diff.removed))
     free = replace(
         diff,
         changed=tuple(change for change in diff.changed if change.before.id not in locked),
         removed=tuple(r for r in diff.removed if r.id not in locked),
     )
-    return Preview(free, tuple(name for name in touched if name in locked))
+    return replace(found, reflectors=free, locked=tuple(name for name in touched if name in locked))
 
 
-def _network(project: Project, imported: RouteImport) -> Preview:
-    routes = network_diff.difference(project.routes, imported.routes)
-    # An order has no stations: it says nothing about those of the project.
-    if not imported.layouts:
-        return Preview(routes=routes)
-    stations = network_diff.keeping_accuracy(project.stations, imported.stations)
-    return Preview(routes=routes, stations=network_diff.difference(project.stations, stations))
+def _with_network(found: Preview, routes: tuple[Route, ...], stations: tuple[Station, ...] | None) -> Preview:
+    """Compare routes, and stations of a format that carries no required accuracy."""
+    found = replace(found, routes=network_diff.difference(found.project.routes, routes))
+    if stations is None:
+        return found
+    accurate = network_diff.keeping_accuracy(found.project.stations, stations)
+    return replace(found, stations=network_diff.difference(found.project.stations, accurate))

@@ -7,7 +7,6 @@ from dataclasses import replace
 from commission.app.editing.editor import Editor
 from commission.app.exchange import actions
 from commission.app.exchange.pending import Exchange, Pending, Reading, Sent
-from commission.app.exchange.preview import accepted
 from commission.app.reduction import (
     ApplyParameters,
     ExportProject,
@@ -50,7 +49,8 @@ def _(action: actions.ReadImport, state: AppState) -> Reduction:
     number = exchange.number + 1
     reading = Exchange(number, Reading(action.source), exchange.pending)
     return Reduction(
-        _with(state, action.client, reading), (ReadFile(action.client, number, action.source, action.choice),)
+        _with(state, action.client, reading),
+        (ReadFile(action.client, number, action.source, action.choice, state.project),),
     )
 
 
@@ -76,7 +76,7 @@ def _(action: actions.ImportRead, state: AppState) -> Reduction:
         return Reduction(state)
     # A table is usually one of several, a project is usually wanted as it is.
     whole = isinstance(action.imported, ProjectImport)
-    pending = Pending(exchange.reading.source, action.choice, action.imported, remove=whole)
+    pending = Pending(exchange.reading.source, action.choice, action.imported, action.found, remove=whole)
     return Reduction(_with(state, action.client, Exchange(exchange.number, pending=pending)))
 
 
@@ -89,7 +89,7 @@ def _(action: actions.RemoveAbsent, state: AppState) -> Reduction:
 @reduce.register
 def _(action: actions.AcceptImport, state: AppState) -> Reduction:
     pending = _pending(state, action.client)
-    project = accepted(state.project, pending)
+    project = pending.preview(state.project).accepted(remove=pending.remove)
     done = _with(state, action.client, Exchange(_exchange(state, action.client).number))
     title = pending.source.title
     if project is state.project:

@@ -17,6 +17,8 @@ from commission.site.stations import Station
 
 LIST_LIMIT = 12
 """Lines of one list; the rest is counted."""
+NOTES_LIMIT = 40
+"""Lines of notes: each names another kind of trouble."""
 TEXT_LIMIT = 160
 """Characters of one line."""
 
@@ -134,13 +136,18 @@ def details(preview: Preview, *, remove: bool) -> str:
     return html
 
 
-def as_list(title: str, values: Sequence[T], line: Callable[[T], str]) -> str:
+def notes(warnings: Sequence[str], title: str = "Notes") -> str:
+    """List what a reader or a writer had to say, as html."""
+    return as_list(title, warnings, str, NOTES_LIMIT)
+
+
+def as_list(title: str, values: Sequence[T], line: Callable[[T], str], limit: int = LIST_LIMIT) -> str:
     """Return a list with its title as html, empty for no values: the first lines, and how many more there are."""
     if not values:
         return ""
-    shown = [escaped(shortened(line(value))) for value in values[:LIST_LIMIT]]
-    if len(values) > LIST_LIMIT:
-        shown.append(f"and {len(values) - LIST_LIMIT} more")
+    shown = [escaped(shortened(line(value))) for value in values[:limit]]
+    if len(values) > limit:
+        shown.append(f"and {len(values) - limit} more")
     lines = "".join(f"<li>{text}</li>" for text in shown)
     return f"<div class='c-note' style='margin-top:5px'>{escaped(title)}</div><ul class='c-list'>{lines}</ul>"
 

@@ -9,6 +9,7 @@ from typing import TypeAlias, cast
 from commission.app.exchange import actions
 from commission.app.exchange.actions import ExchangeAction
 from commission.app.exchange.pending import ImportSource, Pasted, ServerFile, Upload
+from commission.app.exchange.preview import compare
 from commission.app.jobs import JobReport, Jobs, JobState, Progress
 from commission.app.reduction import ExportProject, ReadFile, StopReading
 from commission.io.exports import export
@@ -36,12 +37,9 @@ class Exchanger:
     def carry_out(self, effect: ReadFile | StopReading | ExportProject) -> None:
         """Start or stop work; called by the owner thread only."""
         match effect:
-            case ReadFile(client, number, source, choice):
+            case ReadFile(client, number):
                 self._stop(client)
-                self._reading[client] = self._start(
-                    (client, number),
-                    lambda progress: actions.ImportRead(client, number, choice, read(source, choice, progress)),
-                )
+                self._reading[client] = self._start((client, number), lambda progress: _answer(effect, progress))
             case ExportProject(client, wanted, project):
                 self._start(
                     (client, None),
@@ -77,6 +75,13 @@ class Exchanger:
             self._post(cast(ExchangeAction, report.result))
         if job.state in (JobState.DONE, JobState.FAILED, JobState.CANCELLED):
             del self._asked[job.name]
+
+
+def _answer(asked: ReadFile, progress: Progress) -> ExchangeAction:
+    """Read a file and compare it."""
+    imported = read(asked.source, asked.choice, progress)
+    progress(0.9, "comparing")
+    return actions.ImportRead(asked.client, asked.number, asked.choice, imported, compare(asked.project, imported))
 
 
 def read(source: ImportSource, choice: LayoutChoice, progress: Progress) -> Imported:

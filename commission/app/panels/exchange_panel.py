@@ -11,8 +11,7 @@ from commission.app import actions as page_actions
 from commission.app import theme
 from commission.app.exchange import actions
 from commission.app.exchange.pending import IDLE, Exchange, LayoutChoice, Pasted, Pending, ServerFile, Upload
-from commission.app.exchange.preview import preview
-from commission.app.exchange.words import as_list, counts, details
+from commission.app.exchange.words import counts, details, notes
 from commission.app.panels.base import BasePanel, Post, escaped, posting, write
 from commission.app.uploads import Uploads
 from commission.app.view import PageView
@@ -43,6 +42,8 @@ class ExchangePanel(BasePanel):
         self._pending: Pending | None = None
         with gui.add_folder("Exchange", expand_by_default=False):
             self._state = gui.add_html("")
+            self._stop = gui.add_button("Stop", color="gray", visible=False, hint="Do not read the file any further.")
+            self._stop.on_click(posting(post, lambda _event: actions.DropImport(client)))
             self._add_preview()
             # A folder, because an upload button cannot be hidden by itself.
             self._inputs = gui.add_folder("Import")
@@ -126,19 +127,20 @@ class ExchangePanel(BasePanel):
         if self._shown[0] is exchange and self._shown[1] is compared:
             return
         self._shown = exchange, compared
-        self._state.content = _state(exchange)
+        said = _state(exchange)
         self._sent.content = _sent(exchange)
         pending = exchange.pending if exchange.reading is None else None
+        self._stop.visible = exchange.reading is not None
         self._inputs.visible = pending is None
         for widget in (self._remove, self._wide, self._answer, self._details):
             widget.visible = pending is not None
         self._offer_choices(pending)
         if pending is not None:
             write(self._remove, pending.remove)
-            found = preview(view.state.project, pending)
-            self._state.content = _head(pending, counts(found, remove=pending.remove))
-            notes = as_list("Notes", pending.imported.warnings, str)
-            self._details.content = _padded(notes + details(found, remove=pending.remove))
+            found = pending.preview(view.state.project)
+            said += _head(pending, counts(found, remove=pending.remove))
+            self._details.content = _padded(notes(pending.imported.warnings) + details(found, remove=pending.remove))
+        self._state.content = said
 
     def _offer_choices(self, pending: Pending | None) -> None:
         """Offer the vehicle types and layouts of a LIF file that has several."""
@@ -178,7 +180,7 @@ def _sent(exchange: Exchange) -> str:
     if exchange.sent is None:
         return ""
     sent = exchange.sent
-    lost = as_list(f"{sent.name} does not hold all:", sent.losses, str)
+    lost = notes(sent.losses, f"{sent.name} does not hold all:")
     return _padded(lost or f"<span class='c-note'>{escaped(sent.name)} was sent.</span>")
 
 

@@ -13,6 +13,7 @@ from commission.app import reducer
 from commission.app.editing.actions import Join, Leave
 from commission.app.exchange import actions
 from commission.app.exchange.pending import IDLE, Exchange, Pasted, ServerFile, Upload
+from commission.app.exchange.preview import compare
 from commission.app.reduction import (
     ApplyParameters,
     ExportProject,
@@ -61,7 +62,12 @@ def table(*reflectors: Reflector, fields: tuple[str, ...] = COLUMNS) -> Reflecto
 def looking_at(state: AppState, imported: Imported) -> AppState:
     """Return the state in which this was read."""
     asked = after(state, actions.ReadImport(ME, FILE)).state
-    return after(asked, actions.ImportRead(ME, exchange(asked).number, WHOLE, imported)).state
+    return after(asked, read(asked, imported)).state
+
+
+def read(state: AppState, imported: Imported) -> actions.ImportRead:
+    """Return the answer to what was asked last."""
+    return actions.ImportRead(ME, exchange(state).number, WHOLE, imported, compare(state.project, imported))
 
 
 def exchange(state: AppState, client: int = ME) -> Exchange:
@@ -74,7 +80,7 @@ def ids(state: AppState) -> list[str]:
 
 def test_reading_is_asked_for_and_changes_nothing(state: AppState) -> None:
     result = after(state, actions.ReadImport(ME, FILE))
-    assert result.effects == (ReadFile(ME, 1, FILE, WHOLE),)
+    assert result.effects == (ReadFile(ME, 1, FILE, WHOLE, state.project),)
     assert result.state.project is state.project
     assert exchange(result.state).reading is not None
     assert exchange(result.state, OTHER) is IDLE
@@ -165,7 +171,7 @@ def test_dropped_import_is_gone_and_an_answer_that_was_on_its_way_is_too_late(st
     asked = after(state, actions.ReadImport(ME, FILE)).state
     dropped = after(asked, actions.DropImport(ME))
     assert dropped.effects == (StopReading(ME),)
-    late = after(dropped.state, actions.ImportRead(ME, 1, WHOLE, table(NORTH)), actions.ExchangeFailed(ME, "no", 1))
+    late = after(dropped.state, read(asked, table(NORTH)), actions.ExchangeFailed(ME, "no", 1))
     assert exchange(late.state).pending is None
     assert exchange(late.state).problem == ""
     with pytest.raises(UsageError, match="no file was read"):
@@ -176,7 +182,7 @@ def test_another_part_of_the_same_layout_is_read_from_the_same_file(state: AppSt
     looking = looking_at(state, RouteImport((DETOUR,), (), (), ("A", "B"), ("hall",)))
     choice = LayoutChoice(vehicle_type="B")
     result = after(looking, actions.ChooseLayout(ME, choice))
-    assert result.effects == (ReadFile(ME, 2, FILE, choice),)
+    assert result.effects == (ReadFile(ME, 2, FILE, choice, state.project),)
 
 
 def test_problem_is_the_browsers_own_on_one_short_line(state: AppState) -> None:
@@ -208,8 +214,9 @@ def test_made_file_goes_to_the_browser_that_asked_and_its_losses_are_kept(state:
 
 
 def test_answers_to_a_browser_that_has_left_change_nothing(state: AppState) -> None:
-    left = after(state, actions.ReadImport(ME, FILE), Leave(ME)).state
-    late = after(left, actions.ImportRead(ME, 1, WHOLE, table(NORTH)), actions.ExchangeFailed(ME, "no")).state
+    asked = after(state, actions.ReadImport(ME, FILE)).state
+    left = after(asked, Leave(ME)).state
+    late = after(left, read(asked, table(NORTH)), actions.ExchangeFailed(ME, "no")).state
     assert late == left
 
 

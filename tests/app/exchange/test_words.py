@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from commission.app.exchange.pending import WHOLE, Pasted, Pending
-from commission.app.exchange.preview import preview
+from commission.app.exchange.preview import compare
 from commission.app.exchange.words import (
     LIST_LIMIT,
     counts,
@@ -27,7 +26,7 @@ HOSTILE = "<img src=x onerror=alert(1)>"
 
 def html_of(*reflectors: Reflector, remove: bool = False) -> str:
     imported = ReflectorImport(ReflectorMap(reflectors), (), ("id", "x", "y", "radius", "note"))
-    found = preview(room(), Pending(Pasted(""), WHOLE, imported))
+    found = compare(room(), imported)
     return counts(found, remove=remove) + details(found, remove=remove)
 
 
