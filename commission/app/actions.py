@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from commission.app.editing.actions import EditAction
+from commission.app.exchange.actions import ExchangeAction
 from commission.app.mapping.actions import MapAction
 from commission.app.plan.actions import PlanAction
 from commission.site.project import Project
@@ -273,4 +274,5 @@ Action: TypeAlias = (
     | EditAction
     | MapAction
     | PlanAction
+    | ExchangeAction
 )

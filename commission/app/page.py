@@ -113,7 +113,8 @@ class Page:
         gui = self._server.gui
         top = TopBar(gui, post, state)
         left = gui.add_panel()
-        with left.add_tab("Site"):
+        site_tab = left.add_tab("Site")
+        with site_tab:
             site = SitePanel(gui, post, state.project)
         with left.add_tab("Plan"):
             plan = PlanPanel(gui, post)
@@ -139,7 +140,7 @@ class Page:
         with bottom.add_tab("Time"):
             time_line = TimeLine(gui, post, state.speed)
             plots = Plots(gui)
-        self._tabs = DeskTabs(selection, reflectors, routes, bottom.add_tab("Route"))
+        self._tabs = DeskTabs(selection, reflectors, routes, bottom.add_tab("Route"), site_tab)
         bottom.float(x=0, y=-1, width=1000, height=theme.BOTTOM_PX)
         return top, site, plan, scales, run, tune, legend, switches, problems, time_line, plots
 
@@ -213,6 +214,12 @@ class Page:
     def look_at(self, client_id: int, place: tuple[float, float]) -> None:
         """Bring a place into one browser's view."""
         self._cameras.look_at(client_id, place)
+
+    def send_file(self, client_id: int, name: str, content: bytes) -> None:
+        """Let one browser save a file; nothing happens when it has gone."""
+        client = self._server.get_clients().get(client_id)
+        if client is not None:
+            client.send_file_download(name, content, save_immediately=True)
 
     def connected(self, client_id: int) -> None:
         """Set up a new browser's own view and panels."""

@@ -9,6 +9,7 @@ from typing import Any
 from commission.app import actions
 from commission.app.actions import ParameterValue
 from commission.app.editing import site_reducer, station_reducer
+from commission.app.exchange import reducer as exchange_reducer
 from commission.app.mapping import reducer as map_reducer
 from commission.app.plan import layout_reducer
 from commission.app.plan import reducer as plan
@@ -32,8 +33,17 @@ from commission.site.parameters import Parameters
 
 PROBLEMS_KEPT = 20
 
-# These reducers are imported because they register what editing, loading and suggested layouts mean.
-__all__ = ["layout_reducer", "map_reducer", "parameter", "reduce", "site_reducer", "station_reducer", "with_parameter"]
+# The other reducers are imported because they register what their actions mean.
+__all__ = [
+    "exchange_reducer",
+    "layout_reducer",
+    "map_reducer",
+    "parameter",
+    "reduce",
+    "site_reducer",
+    "station_reducer",
+    "with_parameter",
+]
 
 
 def parameter(parameters: Parameters, key: str) -> ParameterValue:

@@ -11,8 +11,11 @@ from pathlib import Path
 from typing import TypeAlias
 
 from commission.app.actions import Action, Source, View
+from commission.app.exchange.pending import ImportSource
 from commission.app.mapping.effects import MapEffect
 from commission.app.store import AppState
+from commission.io.exports import Format
+from commission.io.imports import LayoutChoice
 from commission.site.project import Project
 
 
@@ -102,6 +105,56 @@ class FlyTo:
     """Where [m], map frame."""
 
 
+@dataclass(frozen=True, slots=True)
+class ReadFile:
+    """Read what one browser wants to import."""
+
+    client: int
+    """Number of the browser's connection."""
+    number: int
+    """Goes with the answer."""
+    source: ImportSource
+    """Which file."""
+    choice: LayoutChoice
+    """Which part of it."""
+    project: Project
+    """What it is compared with."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopReading:
+    """Stop reading what one browser wanted to import."""
+
+    client: int
+    """Number of the browser's connection."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExportProject:
+    """Make a file of a project for one browser."""
+
+    client: int
+    """Number of the browser's connection."""
+    wanted: Format
+    """In which format."""
+    project: Project
+    """Of what."""
+
+
+@dataclass(frozen=True, slots=True)
+class SendFile:
+    """Let one browser save a file."""
+
+    client: int
+    """Number of the browser's connection."""
+    name: str
+    """Name of the file."""
+    content: bytes
+    """The file."""
+
+
+ExchangeEffect: TypeAlias = ReadFile | StopReading | ExportProject
+PageEffect: TypeAlias = Tell | PlaceCamera | FlyTo | SendFile
 Effect: TypeAlias = (
     LoadSource
     | ApplyParameters
@@ -110,9 +163,8 @@ Effect: TypeAlias = (
     | MoveTo
     | ProcessOneScan
     | CancelJob
-    | Tell
-    | PlaceCamera
-    | FlyTo
+    | PageEffect
+    | ExchangeEffect
     | MapEffect
 )
 

@@ -16,18 +16,14 @@ from typing import Protocol, TypeAlias
 
 from commission.app import actions, reducer, reduction
 from commission.app.actions import Action, Source, View
+from commission.app.background import PREDICT, Background
 from commission.app.editing import actions as editing
-from commission.app.inspection import Inspection
-from commission.app.jobs import Job, JobReport, Jobs, JobState, Progress
+from commission.app.jobs import JobReport, JobState, Progress
 from commission.app.mapping.actions import ImageMissing, MapFailed, MapMade, MapOpened
-from commission.app.mapping.effects import DrawMap, ReadMapFile, StopMapWork
-from commission.app.mapping.work import MapWork
-from commission.app.plan.planner import Planner
 from commission.app.plan.view import PlanView
 from commission.app.session import Drive, Session
 from commission.app.store import AppState
 from commission.app.view import PageView, RunView
-from commission.app.view import Progress as ShownProgress
 from commission.errors import CommissionError
 from commission.localization.setup import LocalizerSetup
 from commission.site.project import Project
@@ -40,7 +36,7 @@ IDLE_S = 0.5
 LOOK_AT_DISK_S = 2.0
 """Time between two looks at the project's folder [s]."""
 
-PREPARE, PREDICT, COMPILE = "Preparing the drive", "Predicting the rest", "Compiling"
+PREPARE, COMPILE = "Preparing the drive", "Compiling"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +75,9 @@ class PageLike(Protocol):
 
     def look_at(self, client_id: int, place: tuple[float, float]) -> None:
         """Bring a place into one browser's view."""
+
+    def send_file(self, client_id: int, name: str, content: bytes) -> None:
+        """Let one browser save a file."""
 
     def connected(self, client_id: int) -> None:
         """Set up a browser."""
@@ -125,14 +124,7 @@ class Runtime:
         self._work = work
         self._clock = clock
         self._queue: SimpleQueue[Message] = SimpleQueue()
-        numbers = itertools.count(1)
-        self._jobs, self._patient_jobs = Jobs(self._queue.put, numbers), Jobs(self._queue.put, numbers)
-        self._planner = Planner(self._jobs, self._patient_jobs)
-        # Looking at the site takes milliseconds and does not wait for a simulation, nor does a file that was just sent.
-        self._inspection = Inspection(Jobs(self._queue.put, numbers))
-        self._reading = Jobs(self._queue.put, numbers)
-        self._map_work = MapWork(self._reading)
-        self._shown_jobs: dict[int, Job] = {}
+        self._background = Background(self._queue.put)
         self._page: PageLike | None = None
         self._shown: Project | None = None
         self._dirty = True
@@ -148,7 +140,7 @@ class Runtime:
     def start(self, page: PageLike) -> None:
         """Begin to own the page."""
         self._page = page
-        self._jobs.start(COMPILE, self._work.compile)
+        self._background.drives.start(COMPILE, self._work.compile)
         if self.state.source is not None:
             self.post(actions.ChooseSource(self.state.source))
         self._thread.start()
@@ -156,8 +148,7 @@ class Runtime:
     def stop(self) -> None:
         """End the loop and the background work."""
         self._stopped.set()
-        for jobs in (self._jobs, self._patient_jobs, self._reading, self._inspection):
-            jobs.close()
+        self._background.close()
         self._thread.join(timeout=2.0)
         self._work.close()
 
@@ -238,29 +229,26 @@ class Runtime:
         match effect:
             case reduction.LoadSource(source):
                 project = self.state.project
-                self._jobs.start(PREPARE, lambda progress: self._work.prepare(project, source, progress))
+                self._background.drives.start(PREPARE, lambda progress: self._work.prepare(project, source, progress))
             case reduction.ReadProject(folder):
                 if self._work.load is not None:
                     self.post(actions.Reloaded(self._work.load(folder)))
             case reduction.WriteProject(project, folder, overwrite):
                 self._work.save(project, folder, overwrite)
                 self.post(actions.ProjectSaved(project, folder, time.strftime("%H:%M")))
-            case reduction.CancelJob(number):
-                for jobs in (self._jobs, self._patient_jobs, self._reading):
-                    jobs.cancel(number)
             case reduction.ApplyParameters() | reduction.MoveTo() | reduction.ProcessOneScan():
                 if self.session is not None:
                     self._act_on_run(self.session, effect)
-            case ReadMapFile() | DrawMap() | StopMapWork():
-                self._map_work.do(effect)
-            case reduction.Tell() | reduction.PlaceCamera() | reduction.FlyTo():
+            case reduction.Tell() | reduction.PlaceCamera() | reduction.FlyTo() | reduction.SendFile():
                 self._show_effect(effect)
+            case _:
+                self._background.carry_out(effect)
 
-    def _show_effect(self, effect: reduction.Tell | reduction.PlaceCamera | reduction.FlyTo) -> None:
+    def _show_effect(self, effect: reduction.PageEffect) -> None:
         """Do what only the page can do; a camera is fitted to the site as it is now, not as it was drawn last."""
         if self._page is None:
             return
-        if not isinstance(effect, reduction.Tell) and self.state.project is not self._shown:
+        if isinstance(effect, reduction.PlaceCamera | reduction.FlyTo) and self.state.project is not self._shown:
             self._show_site()
         _show(self._page, effect)
 
@@ -279,22 +267,17 @@ class Runtime:
 
     def _hear(self, report: JobReport) -> None:
         """Follow a job; take its result or its error."""
-        job = report.job
-        if job.state is JobState.FAILED:
-            self._apply(actions.Report(f"{job.name}: {job.error}"))
-        if self._inspection.hear(report):
-            return
-        if job.state in (JobState.WAITING, JobState.RUNNING):
-            self._shown_jobs[job.number] = job
-            return
-        self._shown_jobs.pop(job.number, None)
-        self._planner.hear(report)
-        if job.state is JobState.DONE and isinstance(report.result, Drive):
-            self._begin(report.result)
-        elif job.state is JobState.DONE and isinstance(report.result, MapOpened | MapMade | ImageMissing | MapFailed):
-            self._apply(report.result)
-        elif job.state is JobState.DONE and isinstance(report.result, tuple) and self.session is not None:
-            self.session.predicted = report.result
+        if report.job.state is JobState.FAILED:
+            self._apply(actions.Report(f"{report.job.name}: {report.job.error}"))
+        match self._background.hear(report):
+            case Drive() as drive:
+                self._begin(drive)
+            case MapOpened() | MapMade() | ImageMissing() | MapFailed() as said:
+                self._apply(said)
+            case tuple() as episodes if self.session is not None:
+                self.session.predicted = episodes
+            case _:
+                pass
 
     def _begin(self, drive: Drive) -> None:
         """Run the localizer over a new drive, playing."""
@@ -313,7 +296,7 @@ class Runtime:
             progress(0.0)
             return self._work.predict(drive, setup)
 
-        self._jobs.start(PREDICT, work)
+        self._background.drives.start(PREDICT, work)
 
     def tick(self) -> None:
         """Let the run go on for the time that has passed, and draw when a picture is due."""
@@ -327,11 +310,11 @@ class Runtime:
             files = self._work.foreign_changes()
             if files is not None:
                 self._apply(actions.ChangedOnDisk(files))
-        if self._planner.follow(self.state):
+        if self._background.planner.follow(self.state):
             self._dirty = self._slow_dirty = True
         if self._page is None:
             return
-        self._inspection.follow(self.state)
+        self._background.inspection.follow(self.state)
         if self.state.project is not self._shown:
             self._show_site()
         slowly = self._slow_dirty and now - self._drawn_slowly_at >= SLOW_FRAME_S
@@ -357,17 +340,13 @@ class Runtime:
     @property
     def plan(self) -> PlanView:
         """What the step Plan has found so far."""
-        return self._planner.view
+        return self._background.planner.view
 
     def view(self, *, whole: bool = True) -> PageView:
         """Return everything the page shows; `whole` with what is drawn slowly, too."""
         run: RunView | None = None if self.session is None else self.session.view(whole=whole)
-        jobs = tuple(
-            ShownProgress(job.number, job.name, job.message, job.fraction)
-            for job in self._shown_jobs.values()
-            if job.state is JobState.RUNNING and job.name != PREDICT
-        )
-        seen = self._inspection
+        seen = self._background.inspection
+        jobs = self._background.progress()
         return PageView(self.state, run, jobs, self.plan, seen.problems, seen.violations, seen.profiles)
 
     def _show_site(self) -> None:
@@ -387,7 +366,7 @@ def _name_of(action: Action, before: AppState, after: AppState) -> str:
             return after.undo[-1].name if after.undo else "edit"
 
 
-def _show(page: PageLike, effect: reduction.Tell | reduction.PlaceCamera | reduction.FlyTo) -> None:
+def _show(page: PageLike, effect: reduction.PageEffect) -> None:
     """Do what only the page can do."""
     match effect:
         case reduction.Tell(text, failed):
@@ -396,6 +375,8 @@ def _show(page: PageLike, effect: reduction.Tell | reduction.PlaceCamera | reduc
             page.show_view(client, view)
         case reduction.FlyTo(client, place):
             page.look_at(client, place)
+        case reduction.SendFile(client, name, content):
+            page.send_file(client, name, content)
 
 
 def _is_outdated(message: Message, following: Message | None) -> bool:

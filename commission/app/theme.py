@@ -170,7 +170,7 @@ div:has(>div>.c-route){{display:grid;grid-template-columns:repeat(3,minmax(0,1fr
 div:has(>div>.c-route)>:nth-child(1){{grid-column:span 3;padding-left:var(--c-tabs)}}
 .c-route{{font-size:12px;height:44px;display:flex;align-items:center;white-space:nowrap;overflow:hidden}}
 div:has(>.c-wide){{display:none}}
-div:has(>.c-wide)+* [style*="7.25em"]{{display:none}}
+div:has(>.c-wide)+*>.mantine-Flex-root>[style*="flex-shrink: 0"]{{display:none}}
 div:has(>.c-tools)+* .mantine-Button-root{{padding:0 3px!important;font-size:11.5px!important}}
 div:has(>.c-rows){{display:none}}
 div:has(>.c-rows)~div{{padding-top:0!important;padding-bottom:1px!important}}
@@ -184,6 +184,8 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 .c-table td:first-child{{opacity:.65;padding-right:10px;white-space:nowrap}}
 .c-table td:last-child{{text-align:right}}
 @media (max-width:1500px){{.c-beside{{display:none}}}}
+.c-list{{margin:1px 0 2px;padding-left:15px;font-size:12px;line-height:1.4;overflow-wrap:anywhere;
+ font-variant-numeric:tabular-nums}}
 @media (max-height:800px){{:root{{--c-bottom:{LOW_BOTTOM_PX}px}}
  div:has(>div>.c-bottom)>:nth-child(n+7){{zoom:.78}}}}
 .c-note{{font-size:11.5px;opacity:.7;line-height:1.35}}

@@ -130,7 +130,7 @@ def read_table(
             for first, text in _chunks(path, file, bytes_at_once):
                 lines, start = text.split("\n"), 0
                 if layout is None:
-                    start = next((index for index, line in enumerate(lines) if _is_row(line)), len(lines))
+                    start = next((index for index, line in enumerate(lines) if is_row(line)), len(lines))
                     if start == len(lines):
                         continue
                     layout = _layout(path, first + start, lines[start], (required, optional, ignore_unknown))
@@ -188,7 +188,7 @@ def _decoded(path: Path, number: int, data: bytes, is_first: bool) -> str:
     return text
 
 
-def _is_row(line: str) -> bool:
+def is_row(line: str) -> bool:
     """Whether a line is neither blank nor a comment."""
     return bool(line) and not line.isspace() and not line.lstrip().startswith("#")
 
@@ -217,7 +217,7 @@ def _block(path: Path, number: int, lines: list[str], layout: _Layout) -> Block 
     else:
         numbers, cells = [], []
         for place, line in enumerate(lines, start=number):
-            if _is_row(line):
+            if is_row(line):
                 row = _cells(path, place, line, delimiter)
                 if len(row) != width:
                     remedy = f"{width} cells, one for each of: {', '.join(layout.names)}"

@@ -40,8 +40,9 @@ class ReflectorImport:
     """In the order of the file."""
     warnings: tuple[str, ...] = ()
     """What was made up or could not be read, one line each."""
-    fields: tuple[str, ...] = ("x", "y", "radius", "kind", "layer")
-    """Fields that the file speaks of, for `reflector_diff.difference`; those of a layout."""
+    fields: tuple[str, ...] = ("id", "x", "y", "radius", "kind", "layer")
+    """Fields that the file speaks of, for `reflector_diff.difference`; those of a layout. Without `id` the ids are
+    made up."""
 
 
 def read_imk(path: Path) -> ReflectorImport:

@@ -24,8 +24,10 @@ from commission.io.map_server import write_floor_map
 from commission.io.project_file import FILE_NAME, load_project, project_file, save_project
 from commission.io.recordings.base import open_recording
 from commission.io.recordings.csv_writer import write_recording
-from commission.io.reflector_tables import read_reflectors, write_reflectors
+from commission.io.reflector_tables import write_reflectors
+from commission.io.table_import import read_any_table
 from commission.io.vda5050 import read_order
+from commission.site import network_diff
 from commission.site.floor_map import FloorMap
 from commission.site.project import Project
 from commission.site.reflector_diff import difference, merged
@@ -154,11 +156,8 @@ def _from_project(source: Path, target: Path, wanted: Kind, _: ConvertOptions) -
 
 
 def _from_reflectors(source: Path, target: Path, wanted: Kind, _: ConvertOptions) -> tuple[str, ...]:
-    if source.suffix.lower() == ".imk":
-        imported = read_imk(source)
-        written = _written_reflectors(imported.reflectors, target, wanted, imported.fields)
-        return (*imported.warnings, *written)
-    return _written_reflectors(read_reflectors(source), target, wanted)
+    imported = read_imk(source) if source.suffix.lower() == ".imk" else read_any_table(source)
+    return (*imported.warnings, *_written_reflectors(imported.reflectors, target, wanted, imported.fields))
 
 
 def _from_routes(source: Path, target: Path, wanted: Kind, options: ConvertOptions) -> tuple[str, ...]:
@@ -166,14 +165,17 @@ def _from_routes(source: Path, target: Path, wanted: Kind, options: ConvertOptio
     if wanted is Kind.LIF:
         return (*imported.warnings, *write_lif(_network(source, imported), target))
     project = _existing(target)
-    names = {route.name for route in imported.routes}
-    kept = tuple(route for route in project.routes if route.name not in names)
-    places = {station.name for station in imported.stations}
-    stations = (*(s for s in project.stations if s.name not in places), *imported.stations)
-    changed = dataclasses.replace(project, routes=(*kept, *imported.routes), stations=stations)
+    routes = network_diff.difference(project.routes, imported.routes)
+    accurate = network_diff.keeping_accuracy(project.stations, imported.stations)
+    stations = network_diff.difference(project.stations, accurate)
+    changed = dataclasses.replace(
+        project,
+        routes=network_diff.merged(project.routes, routes, remove=False),
+        stations=network_diff.merged(project.stations, stations, remove=False),
+    )
     save_project(changed, _folder(target))
-    report = f"{len(imported.routes)} routes and {len(places)} stations read, {len(kept)} other routes kept"
-    return (*imported.warnings, report)
+    read = f"{len(imported.routes)} routes and {len(imported.stations)} stations read"
+    return (*imported.warnings, f"{read}, {len(routes.removed)} other routes kept")
 
 
 def _routes(source: Path, options: ConvertOptions) -> RouteImport:

@@ -17,6 +17,7 @@ from commission.errors import FileFormatError, UsageError
 from commission.geometry.arrays import FloatArray, read_only
 from commission.io.dxf import UNITS
 from commission.io.findings import Progress, silent
+from commission.io.glb_header import check_announced
 from commission.io.outline import outline_map
 from commission.io.reading import cannot_read, check_size
 from commission.site.floor_map import FloorMap
@@ -38,6 +39,7 @@ _GARBAGE = (
     LookupError,
     TypeError,
     AttributeError,
+    NameError,
     ArithmeticError,
     AssertionError,
     NotImplementedError,
@@ -115,6 +117,8 @@ def read_model(path: Path, *, unit: str = "m", y_up: bool | None = None, progres
     check_size(path, SIZE_LIMIT)
     try:
         with path.open("rb") as file:
+            if kind == "glb":
+                check_announced(path, file, FACE_LIMIT)
             loaded = _loaded(_Reported(file, path.stat().st_size), kind, progress)
             is_y_up = kind == "glb" if y_up is None else y_up
             to_model = (_Y_UP if is_y_up else np.eye(3)) * (1.0 if kind == "glb" else UNITS[unit])

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from commission.site.editing.names import fresh_names
 from commission.site.reflectors import Reflector, ReflectorMap
 
 SAME_PLACE = 0.05
@@ -70,12 +71,14 @@ def difference(
     same_place : reflectors that share no id with the other map are still one reflector, renamed, when each is the
         other's nearest and they are at most so far apart [m]; 0 compares by id alone.
     fields : fields that `after` speaks of, for a format that knows no others: what it is silent about stays as it
-        is. All when None.
+        is. Without `id` its ids are made up: reflectors are then compared by their places. All when None.
 
     Returns
     -------
     difference : added and changed in the order of `after`, removed in the order of `before`.
     """
+    if fields is not None and "id" not in fields:
+        after = with_own_ids(before, after, same_place=same_place)
     partners = _partners(before, after, same_place)
     silent = [f.name for f in dataclasses.fields(Reflector) if fields is not None and f.name not in (*fields, "id")]
     pairs = [_pair(partners.get(reflector.id), reflector, silent) for reflector in after.reflectors]
@@ -109,6 +112,26 @@ def merged(before: ReflectorMap, diff: ReflectorDiff, *, remove: bool) -> Reflec
     return ReflectorMap((*kept, *diff.added))
 
 
+def with_own_ids(before: ReflectorMap, after: ReflectorMap, *, same_place: float = SAME_PLACE) -> ReflectorMap:
+    """Return `after` with other ids: for a source without names, whose ids were made up.
+
+    Parameters
+    ----------
+    before, after : the maps.
+    same_place : a reflector of `after` takes the id of the one of `before` within this distance [m]; each is the
+        other's nearest. Others go on with the numbering of `before`.
+    """
+    partners = _by_place(before.reflectors, after.reflectors, same_place)
+    taken = [reflector.id for reflector in before.reflectors]
+    free = iter(fresh_names(taken, len(after) - len(partners), taken[-1] if taken else "R0"))
+    return ReflectorMap(
+        tuple(
+            dataclasses.replace(r, id=partners[i].id if i in partners else next(free))
+            for i, r in enumerate(after.reflectors)
+        )
+    )
+
+
 def _pair(old: Reflector | None, new: Reflector, silent: list[str]) -> tuple[Reflector | None, Reflector]:
     """Reflector before and after, the latter with the earlier values of the fields that nothing is said about."""
     if old is None or not silent:
@@ -120,15 +143,19 @@ def _partners(before: ReflectorMap, after: ReflectorMap, same_place: float) -> d
     """Earlier reflector of each later one that has one, by the later one's id."""
     by_id = {reflector.id: reflector for reflector in before.reflectors}
     partners = {r.id: by_id[r.id] for r in after.reflectors if r.id in by_id}
-    old = [i for i, r in enumerate(before.reflectors) if r.id not in partners]
-    new = [i for i, r in enumerate(after.reflectors) if r.id not in partners]
-    if same_place > 0.0 and old and new:
-        from scipy.spatial import KDTree
+    old = [r for r in before.reflectors if r.id not in partners]
+    new = [r for r in after.reflectors if r.id not in partners]
+    return partners | {new[i].id: partner for i, partner in _by_place(old, new, same_place).items()}
 
-        old_tree, new_tree = KDTree(before.centers[old]), KDTree(after.centers[new])
-        distance, nearest_old = map(np.asarray, old_tree.query(after.centers[new]))
-        nearest_new = np.asarray(new_tree.query(before.centers[old])[1])
-        is_mutual = nearest_new[nearest_old] == np.arange(len(new))
-        for i in np.flatnonzero(is_mutual & (distance <= same_place)):
-            partners[after.reflectors[new[i]].id] = before.reflectors[old[int(nearest_old[i])]]
-    return partners
+
+def _by_place(old: Sequence[Reflector], new: Sequence[Reflector], same_place: float) -> dict[int, Reflector]:
+    """Earlier reflector of each later one whose nearest it is, and the other way round, by the later one's index."""
+    if not (same_place > 0.0 and old and new):
+        return {}
+    from scipy.spatial import KDTree
+
+    old_centers, new_centers = (np.array([(r.x, r.y) for r in several]) for several in (old, new))
+    distance, nearest_old = map(np.asarray, KDTree(old_centers).query(new_centers))
+    nearest_new = np.asarray(KDTree(new_centers).query(old_centers)[1])
+    is_mutual = nearest_new[nearest_old] == np.arange(len(new))
+    return {int(i): old[int(nearest_old[i])] for i in np.flatnonzero(is_mutual & (distance <= same_place))}

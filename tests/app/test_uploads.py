@@ -1,47 +1,164 @@
-"""Files that browsers send: what they are called is never trusted, and what is over the limit never arrives."""
+"""Uploads as a browser sends them, and as a hostile client does: raw messages to a real server."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
+import time
+from collections.abc import Callable, Iterator
 from typing import Any
 
+import msgspec
 import pytest
 import viser
-from viser import _messages as messages
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
 
 from commission.app.server import start_server
-from commission.app.uploads import Upload, add_upload, shown_name, too_large
+from commission.app.uploads import Upload, Uploads, megabytes
 
-LIMIT = 1000
+LIMIT = 1_000_000
+
+
+class Desk:
+    """A server with one upload button, and a client that sends what it likes."""
+
+    def __init__(self) -> None:
+        self.taken: list[tuple[str, bytes]] = []
+        self.refused: list[str] = []
+        self.server: viser.ViserServer = start_server("127.0.0.1", 0)
+        uploads = Uploads(self.server.gui, lambda _client, text: self.refused.append(text))
+        self.button = uploads.add("Upload", self._take, limit=LIMIT)
+        self.slider = self.server.gui.add_slider("Other", 0, 1, 1, 0)
+        address = f"ws://127.0.0.1:{self.server.get_port()}"
+        self._client: ClientConnection = connect(address, subprotocols=[Subprotocol(f"viser-v{viser.__version__}")])
+
+        # A browser counts as connected from its first camera on.
+        self.send(
+            type="ViewerCameraMessage",
+            **{name: (0.0, 0.0, 1.0) for name in ("position", "look_at", "up_direction")},
+            wxyz=(1.0, 0.0, 0.0, 0.0),
+            **dict.fromkeys(("fov", "near", "far"), 1.0),
+            **dict.fromkeys(("image_height", "image_width"), 100),
+        )
+        self.until(lambda: bool(self.server.get_clients()))
+
+    def _take(self, _client: int, upload: Upload) -> None:
+        self.taken.append((upload.name, upload.content))
+
+    def send(self, **message: Any) -> None:
+        self._client.send(msgspec.msgpack.encode(message))
+
+    def begin(
+        self, size: float, parts: int, *, name: str = "hall.csv", transfer: str = "t", widget: Any = None
+    ) -> None:
+        self.send(
+            type="FileTransferStartUpload",
+            source_component_uuid=(widget or self.button)._impl.uuid,
+            transfer_uuid=transfer,
+            filename=name,
+            mime_type="text/csv",
+            part_count=parts,
+            size_bytes=size,
+        )
+
+    def part(self, index: int, content: bytes, *, transfer: str = "t", widget: Any = None) -> None:
+        self.send(
+            type="FileTransferPart",
+            source_component_uuid=(widget or self.button)._impl.uuid,
+            transfer_uuid=transfer,
+            part_index=index,
+            content=content,
+        )
+
+    @property
+    def kept(self) -> int:
+        """Bytes that the server holds of files on their way."""
+        states = self.server.gui._current_file_upload_states.values()
+        return sum(state["transferred_bytes"] for state in states)
+
+    def until(self, reached: Callable[[], bool]) -> None:
+        for _ in range(1000):
+            if reached():
+                return
+            time.sleep(0.01)
+        raise TimeoutError("it did not happen within 10 s")
+
+    def close(self) -> None:
+        self._client.close()
+        self.server.stop()
 
 
 @pytest.fixture
-def server() -> Iterator[viser.ViserServer]:
-    started = start_server("127.0.0.1", 0)
-    yield started
-    started.stop()
+def desk() -> Iterator[Desk]:
+    opened = Desk()
+    yield opened
+    opened.close()
 
 
-@pytest.mark.parametrize(
-    ("sent", "shown"),
-    [
-        ("hall.dxf", "hall.dxf"),
-        ("/etc/passwd", "passwd"),
-        ("..\\..\\hall.stl", "hall.stl"),
-        ("a\x00b\nc.png", "a b c.png"),
-        ("", "unnamed"),
-        ("dir/", "unnamed"),
-    ],
-)
-def test_a_name_is_shown_without_folders_and_control_characters(sent: str, shown: str) -> None:
-    assert shown_name(sent) == shown
+def test_file_arrives_in_parts_and_is_not_kept_afterwards(desk: Desk) -> None:
+    desk.begin(6, 2)
+    desk.part(0, b"abc")
+    desk.part(1, b"def")
+    desk.until(lambda: bool(desk.taken))
+    assert desk.taken == [("hall.csv", b"abcdef")]
+    assert desk.kept == 0
+    assert desk.button.value.content == b""
+    desk.begin(0, 0, transfer="empty")
+    desk.until(lambda: len(desk.taken) == 2)
+    assert desk.refused == []
 
 
-def test_a_long_name_keeps_its_ending() -> None:
-    shown = shown_name("x" * 5000 + ".dxf")
-    assert len(shown) <= 80
-    assert shown.endswith(".dxf")
+def test_file_over_the_limit_is_refused_by_its_announced_size_and_no_byte_of_it_is_kept(desk: Desk) -> None:
+    desk.begin(40_000_000, 80)
+    for index in range(80):
+        desk.part(index, b"x" * 500_000)
+    desk.until(lambda: bool(desk.refused))
+    assert desk.refused == ["the file has 40 MB (40,000,000 bytes); expected at most 1 MB"]
+    # The next file is taken as if nothing had happened, after all parts of the first have been heard.
+    desk.begin(3, 1, transfer="next")
+    desk.part(0, b"abc", transfer="next")
+    desk.until(lambda: bool(desk.taken))
+    assert desk.taken == [("hall.csv", b"abc")]
+    assert desk.kept == 0
+
+
+def test_file_that_is_larger_than_announced_is_dropped(desk: Desk) -> None:
+    desk.begin(LIMIT, 1000)
+    desk.part(0, b"x" * 400_000)
+    desk.until(lambda: desk.kept == 400_000)
+    desk.part(1, b"x" * 900_000)
+    desk.until(lambda: bool(desk.refused))
+    assert desk.refused == ["the upload sends more than it announced; it was dropped"]
+    assert desk.kept == 0
+    assert desk.taken == []
+
+
+@pytest.mark.parametrize(("size", "parts"), [(-1, 1), (10, -1), (10, 10**9), (0, 1), (1e99, 1)])
+def test_nonsense_is_refused(desk: Desk, size: float, parts: int) -> None:
+    desk.begin(size, parts)
+    desk.until(lambda: bool(desk.refused))
+    assert desk.server.gui._current_file_upload_states == {}
+
+
+def test_one_browser_sends_one_file_at_a_time(desk: Desk) -> None:
+    for number in range(20):
+        desk.begin(LIMIT, 3, transfer=f"t{number}")
+        desk.part(0, b"x" * 300_000, transfer=f"t{number}")
+    desk.until(lambda: "t19" in desk.server.gui._current_file_upload_states)
+    desk.until(lambda: desk.kept == 300_000)
+    assert list(desk.server.gui._current_file_upload_states) == ["t19"]
+
+
+def test_files_come_in_through_upload_buttons_only(desk: Desk) -> None:
+    desk.begin(3, 1, widget=desk.slider)
+    desk.part(0, b"abc", widget=desk.slider)
+    desk.begin(3, 1, transfer="next")
+    desk.part(0, b"abc", transfer="next")
+    desk.until(lambda: bool(desk.taken))
+    assert desk.slider.value == 0
+
+
+def test_sizes_are_written_as_people_read_them() -> None:
+    assert [megabytes(size) for size in (12, 250_000, 32_000_000)] == ["12 bytes", "0.25 MB", "32 MB"]
 
 
 @pytest.mark.parametrize("name", ["hall.stl", "../../x.stl", "<b>.stl", "a b.stl"])
@@ -58,72 +175,8 @@ def test_an_odd_ending_is_not_kept(name: str) -> None:
         assert path.name == "upload"
 
 
-def test_what_is_refused_is_named_with_its_size() -> None:
-    assert too_large("/x/hall.stl", 700_000_000) == "hall.stl has 700 MB; expected at most 256 MB to upload"
-
-
-class Browser:
-    """Sends the messages of an upload as viser's page does, to a server without a connection."""
-
-    def __init__(self, server: viser.ViserServer) -> None:
-        self._gui: Any = server.gui
-        self.arrived: list[Upload] = []
-        self.refused: list[str] = []
-        self.button = add_upload(
-            server.gui,
-            "Upload",
-            ".dxf",
-            lambda upload, _client: self.arrived.append(upload),
-            lambda text, _client: self.refused.append(text),
-            limit=LIMIT,
-        )
-
-    def send(self, message: messages.Message) -> None:
-        for handler in list(self._gui._websock_interface._incoming_handlers[type(message)]):
-            handler(7, message)
-
-    def start(self, name: str, size: int, parts: int) -> None:
-        uuid = self.button._impl.uuid
-        self.send(messages.FileTransferStartUpload(uuid, "t", name, "", parts, size))
-
-    def part(self, index: int, content: bytes) -> None:
-        self.send(messages.FileTransferPart(self.button._impl.uuid, "t", index, content))
-
-    @property
-    def held(self) -> int:
-        """Bytes that viser holds of transfers under way."""
-        states = self._gui._current_file_upload_states.values()
-        return sum(len(part) for state in states for part in state["parts"].values())
-
-
-def test_a_file_over_the_limit_is_refused_before_it_arrives(server: viser.ViserServer) -> None:
-    browser = Browser(server)
-    browser.start("hall.dxf", LIMIT + 1, 2)
-    assert browser.refused == [too_large("hall.dxf", LIMIT + 1, LIMIT)]
-    browser.part(0, b"x" * LIMIT)
-    assert (browser.held, browser.arrived) == (0, [])
-
-
-def test_a_file_that_lies_about_its_size_is_dropped_when_it_has_sent_more(server: viser.ViserServer) -> None:
-    browser = Browser(server)
-    browser.start("hall.dxf", 10, 100)
-    browser.part(0, b"x" * 600)
-    assert browser.held == 600
-    browser.part(1, b"x" * 600)
-    assert (browser.held, len(browser.refused)) == (0, 1)
-    browser.part(2, b"x" * 600)
-    assert browser.held == 0
-
-
-def test_an_allowed_file_is_taken(server: viser.ViserServer) -> None:
-    browser = Browser(server)
-    browser.start("hall.dxf", LIMIT, 2)
-    browser.part(0, b"x" * (LIMIT // 2))
-    assert browser.held == LIMIT // 2
-    assert browser.refused == []
-
-
-def test_nothing_of_a_name_is_a_path() -> None:
-    with Upload("/tmp/../x.yaml", b"").as_file() as path:
-        assert path.parent.parent == Path(path.parent.parent).resolve()
-        assert path.name == "upload.yaml"
+def test_a_name_arrives_without_folders(desk: Desk) -> None:
+    desk.begin(3, 1, name="..\\..\\etc/hall.csv")
+    desk.part(0, b"abc")
+    desk.until(lambda: bool(desk.taken))
+    assert desk.taken == [("hall.csv", b"abc")]

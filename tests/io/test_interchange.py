@@ -118,3 +118,14 @@ def test_what_cannot_be_converted_is_one_line(
     with pytest.raises(error, match=message) as caught:
         convert_file(tmp_path / source, tmp_path / target, USUAL)
     assert "\n" not in str(caught.value)
+
+
+def test_table_of_a_spreadsheet_goes_into_a_project_and_leaves_alone_what_it_has_no_column_for(tmp_path: Path) -> None:
+    first, *rest = REFLECTORS.reflectors
+    noted = replace(first, note="pillar 7")
+    save_project(Project(reflectors=ReflectorMap((noted, *rest))), tmp_path / "hall")
+    (tmp_path / "survey.csv").write_text(f"Nr;X [mm];Y [mm]\n{first.id};9000,5;{1000 * first.y:.0f}\n")
+    report = convert_file(tmp_path / "survey.csv", tmp_path / "hall", USUAL)
+    assert "the table has no radius; 40 mm is assumed" in report
+    (kept,) = load_project(tmp_path / "hall").reflectors.reflectors
+    assert kept == replace(noted, x=9.0005)

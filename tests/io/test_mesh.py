@@ -1,7 +1,11 @@
 from __future__ import annotations
 
+import json
 import math
+import struct
+import tracemalloc
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -143,6 +147,62 @@ def test_hostile_file_is_one_line(tmp_path: Path, name: str, content: bytes) -> 
     with pytest.raises(FileFormatError) as caught:
         read_model(path)
     assert "\n" not in str(caught.value)
+
+
+def glb(accessors: list[dict[str, Any]], parts: int = 1, **extra: Any) -> bytes:
+    """A GLB whose parts all use these accessors for corners and triangles; 36 bytes of data."""
+    part = {"attributes": {"POSITION": 0}, "indices": len(accessors) - 1}
+    document = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [part] * parts}],
+        "accessors": accessors,
+        "bufferViews": [{"buffer": 0, "byteOffset": 0, "byteLength": 36}],
+        "buffers": [{"byteLength": 36}],
+        **extra,
+    }
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = b"".join(struct.pack("<II", len(c), k) + c for c, k in ((text, 0x4E4F534A), (bytes(36), 0x004E4942)))
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+CORNERS = {"componentType": 5126, "count": 3, "type": "VEC3", "bufferView": 0}
+TRIANGLES = {"componentType": 5125, "count": 9, "type": "SCALAR", "bufferView": 0}
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        # Zeros without data: 400 bytes that would take 3 GB.
+        (
+            glb([{"componentType": 5126, "count": 30_000_000, "type": "VEC3"}, TRIANGLES]),
+            "accessor of POSITION: has no data",
+        ),
+        (glb([CORNERS, {**TRIANGLES, "count": 10**9}]), "accessors of indices: announces 1000000000 entries"),
+        # The same array for ever more parts.
+        (
+            glb([CORNERS, {**TRIANGLES, "count": 30_000}], parts=1001),
+            "accessors of indices: announces 30030000 entries",
+        ),
+        (glb([CORNERS, TRIANGLES], bufferViews=None), "is no readable GLB"),
+        (b"glTF" + bytes(16), "is no readable GLB"),
+    ],
+)
+def test_model_that_announces_more_than_it_holds_is_refused_before_it_is_read(
+    tmp_path: Path, content: bytes, message: str
+) -> None:
+    path = tmp_path / "hall.glb"
+    path.write_bytes(content)
+    tracemalloc.start()
+    with pytest.raises(FileFormatError) as caught:
+        read_model(path)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert message in str(caught.value)
+    assert peak < 5_000_000
 
 
 @given(kind=st.sampled_from(["stl", "obj", "ply", "glb"]), data=st.data())

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from commission.errors import ProjectError
-from commission.site.reflector_diff import ReflectorChange, ReflectorDiff, difference, merged
+from commission.site.reflector_diff import ReflectorChange, ReflectorDiff, difference, merged, with_own_ids
 from commission.site.reflectors import Reflector, ReflectorMap
 
 A, B, C = Reflector("A", 0.0, 0.0), Reflector("B", 5.0, 0.0), Reflector("C", 0.0, 5.0)
@@ -47,7 +47,7 @@ def test_every_reflector_is_counted_once_and_applying_the_difference_gives_the_l
 
 def test_fields_that_an_import_is_silent_about_stay_as_they_are() -> None:
     before = replace(A, height=1.8, note="pillar", locked=True)
-    diff = difference(ReflectorMap((before, B)), ReflectorMap((replace(A, x=0.5), B)), fields=("x", "y"))
+    diff = difference(ReflectorMap((before, B)), ReflectorMap((replace(A, x=0.5), B)), fields=("id", "x", "y"))
     assert diff.changed == (ReflectorChange(before, replace(before, x=0.5)),)
     assert diff.changed[0].fields == ("x",)
 
@@ -64,3 +64,15 @@ def test_name_that_would_be_used_twice_is_refused() -> None:
     with pytest.raises(ProjectError, match="'A' is used twice"):
         merged(before, diff, remove=False)
     assert merged(before, diff, remove=True).reflectors == (replace(B, id="A"),)
+
+
+def test_made_up_ids_give_way_to_those_of_the_reflectors_at_their_places() -> None:
+    # A spreadsheet without names calls its rows R1, R2: they are not the reflectors of those names.
+    before = ReflectorMap((Reflector("R1", 0.0, 0.0), Reflector("R2", 5.0, 0.0)))
+    unnamed = ReflectorMap((Reflector("R1", 5.01, 0.0), Reflector("R2", 9.0, 9.0)))
+    assert with_own_ids(before, unnamed).reflectors == (Reflector("R2", 5.01, 0.0), Reflector("R3", 9.0, 9.0))
+    assert with_own_ids(ReflectorMap(), unnamed) == unnamed
+    diff = difference(before, unnamed, fields=("x", "y"))
+    assert [change.after.id for change in diff.changed] == ["R2"]
+    assert [reflector.id for reflector in diff.added] == ["R3"]
+    assert merged(before, diff, remove=False).reflectors[0] == before.reflectors[0]

@@ -10,6 +10,7 @@ from commission.app.editing.editor import Editor
 from commission.app.editing.overlay import Overlay
 from commission.app.editing.pointer import take_clicks
 from commission.app.panels.base import Panel, Post
+from commission.app.panels.exchange_panel import ExchangePanel
 from commission.app.panels.reflector_table import ReflectorTable
 from commission.app.panels.route_plots import RoutePlots
 from commission.app.panels.route_table import RouteTable
@@ -30,6 +31,8 @@ class DeskTabs:
     """The table of all routes and stations."""
     route: GuiTabHandle
     """Plots along the selected route."""
+    site: GuiTabHandle
+    """Imports and exports, below what the project is about."""
 
 
 class Desk:
@@ -54,7 +57,9 @@ class Desk:
             routes = RouteTable(gui, post, number, tabs.routes)
             with tabs.route:
                 plots = RoutePlots(gui, number)
-        self._panels: tuple[Panel, ...] = (selection, table, hint, routes, plots)
+            with tabs.site:
+                exchange = ExchangePanel(gui, post, number)
+        self._panels: tuple[Panel, ...] = (selection, table, hint, routes, plots, exchange)
         take_clicks(client, post)
 
     def draw(self, view: PageView, *, slowly: bool) -> None:

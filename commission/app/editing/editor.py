@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TypeAlias
 
+from commission.app.exchange.pending import IDLE, Exchange
+
 Point: TypeAlias = tuple[float, float]
 """A place on the floor [m, m], map frame."""
 
@@ -154,6 +156,8 @@ class Editor:
     """Points to align the floor map by."""
     reach: float = 0.1
     """How near a click has to be to mean something, at the zoom of the newest gesture [m]."""
+    exchange: Exchange = IDLE
+    """Files that this browser imports and exports."""
 
     def selecting(
         self, reflectors: tuple[str, ...] = (), *, point: ControlPoint | None = None, station: str = ""

@@ -20,6 +20,7 @@ from commission.app.editing.editor import Editor, Grab, Tool, measurement
 from commission.app.editing.gestures import moved, selected_of
 from commission.app.editing.route_gestures import curve, moved_route
 from commission.app.editing.station_gestures import heading_tip, moved_station
+from commission.app.exchange.ghosts import ghosts_of
 from commission.app.extent import extent_of
 from commission.app.layers.stations import station_marks
 from commission.app.mapping.tools import AREA_TOOLS
@@ -171,6 +172,9 @@ class Overlay:
         if editor.tool is Tool.ROUTE and len(set(editor.draft)) > 1:
             lines.append(polyline_segments(curve(segment_of(editor.draft)), height))
         lines += [polyline_segments(line, height) for line in map_lines(editor)]
+        ghosts = ghosts_of(project, editor.exchange.pending)
+        lines.append(outline_segments(rings(ghosts.centers, size), height))
+        lines += [polyline_segments(line, height) for line in ghosts.lines]
         if len(editor.measured) == 2:
             lines.append(polyline_segments(np.array(editor.measured), height))
         return np.concatenate(lines) if lines else NO_SEGMENTS

@@ -12,15 +12,17 @@ from commission.app.mapping import actions
 from commission.app.mapping.draft import ENDINGS, MapFile, MapLoading
 from commission.app.panels.base import BasePanel, Post, client_of, escaped, posting
 from commission.app.panels.map_draft_fields import MapDraftFields
-from commission.app.uploads import UPLOAD_LIMIT, add_upload, megabytes
+from commission.app.uploads import Uploads
 from commission.app.view import PageView
 from commission.site.project import Project
 
+UPLOAD_LIMIT = 256_000_000
+"""Bytes of one upload: it is held in memory until it is read."""
 JOBS = ("Reading ", "Loading ")
 """How the names of the jobs of `mapping.effects` begin."""
 KINDS = (
     "<div class='c-note' style='padding:0 6px 4px'>ROS map (.yaml and its image), plain image, CAD drawing (.dxf), "
-    f"3D model (.stl .obj .glb .ply). Uploads: at most {megabytes(UPLOAD_LIMIT)} each.</div>"
+    "3D model (.stl .obj .glb .ply).</div>"
 )
 
 
@@ -41,13 +43,12 @@ class FloorMapPanel(BasePanel):
                 return actions.OpenMap(client_of(event), MapFile(Path(typed).expanduser()))
 
             opened.on_click(posting(post, open_path))
-            add_upload(
-                gui,
+            Uploads(gui, lambda _client, text: post(actions.MapFailed(text))).add(
                 "Upload a file",
-                ",".join(f".{ending}" for ending in ENDINGS),
-                lambda upload, client: post(actions.OpenMap(client, MapFile(upload))),
-                lambda text, _client: post(actions.MapFailed(text)),
-                hint="A file of this browser's computer; of a ROS map the .yaml and its image, one after the other.",
+                lambda client, upload: post(actions.OpenMap(client, MapFile(upload))),
+                limit=UPLOAD_LIMIT,
+                endings=tuple(f".{ending}" for ending in ENDINGS),
+                note="Of a ROS map the .yaml and its image, one after the other.",
             )
             self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
             self._cancel = gui.add_button("Cancel", color="gray", visible=False, hint="Stop reading; nothing changes.")

@@ -147,7 +147,7 @@ def test_progress_and_cancel_appear_while_a_file_is_read(server: viser.ViserServ
     posted: list[Action] = []
     panel = FloorMapPanel(server.gui, posted.append, Project())
     state = AppState(Project(), Project())
-    panel.draw(PageView(state, None, (Progress("Coverage", 0.2), Progress("Reading hall.dxf", 0.4))))
+    panel.draw(PageView(state, None, (Progress(1, "Coverage", "", 0.2), Progress(2, "Reading hall.dxf", "", 0.4))))
     assert (panel._bar.visible, panel._bar.value, panel._cancel.visible) == (True, 40.0, True)
     change(panel._cancel, True)
     assert posted == [actions.StopMapJob()]

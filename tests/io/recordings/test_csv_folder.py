@@ -251,6 +251,42 @@ def test_header_that_promises_more_than_the_archive_holds_is_refused(tmp_path: P
         open_recording(tmp_path)
 
 
+def test_archive_that_would_unpack_into_far_more_than_it_is_is_refused_before_that(tmp_path: Path) -> None:
+    # 400 MB of "nothing came back" in 400 kB, made without ever holding them.
+    rows, beams = 100_000, 1000
+    write_scans(tmp_path)
+    with zipfile.ZipFile(tmp_path / "scans.npz") as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    with zipfile.ZipFile(tmp_path / "scans.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in members.items():
+            if name != "ranges.npy":
+                archive.writestr(name, content)
+        with archive.open("ranges.npy", "w", force_zip64=True) as file:
+            np.lib.format.write_array_header_1_0(file, {"descr": "<f4", "fortran_order": False, "shape": (rows, beams)})
+            zeros = bytes(4 * beams * 1000)
+            for _ in range(rows // 1000):
+                file.write(zeros)
+    tracemalloc.start()
+    with pytest.raises(FileFormatError, match=r"would unpack \d+ bytes into 4\d+; expected at most 200 times its size"):
+        open_recording(tmp_path)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 5_000_000
+
+
+def test_array_whose_header_is_longer_than_any_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    write_scans(tmp_path)
+    with zipfile.ZipFile(tmp_path / "scans.npz") as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    # Version 2 announces the length of its header in 32 bits.
+    members["ranges.npy"] = b"\x93NUMPY\x02\x00" + (2**32 - 1).to_bytes(4, "little") + b"{"
+    with zipfile.ZipFile(tmp_path / "scans.npz", "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    with pytest.raises(FileFormatError, match=r"array ranges: is no array \(version 2\.0 of the npy format\)"):
+        open_recording(tmp_path)
+
+
 @pytest.mark.parametrize("path", ["absent", "empty", "file"])
 def test_what_is_no_recording_is_said_in_one_line(tmp_path: Path, path: str) -> None:
     (tmp_path / "empty").mkdir()

@@ -1,0 +1,1 @@
+"""Interchange in the page: files that come, a preview of what they change, files that go."""

@@ -1,0 +1,42 @@
+"""Reflector tables of any origin: `reflectors.csv` by its strict rules, others as if pasted from a spreadsheet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from commission.errors import FileFormatError
+from commission.io.csv_table import is_row, read_table
+from commission.io.imk import ReflectorImport
+from commission.io.pasted_table import parse_table
+from commission.io.reading import read_text
+from commission.io.reflector_tables import OPTIONAL, REQUIRED, SIZE_LIMIT, reflectors_of
+
+
+def read_any_table(path: Path) -> ReflectorImport:
+    """Read a reflector table.
+
+    Parameters
+    ----------
+    path : file whose cells are separated by commas, semicolons or tabs.
+
+    Returns
+    -------
+    imported : with the columns of `reflectors.csv`, exactly what it says; otherwise what `parse_table` makes of it.
+        Columns that the table lacks are not among the `fields`: about those it says nothing.
+
+    Raises
+    ------
+    FileFormatError
+        names line and column, what was found and what is expected.
+    """
+    lines = read_text(path, SIZE_LIMIT).replace("\r", "\n").split("\n")
+    header = next((line for line in lines if is_row(line)), "")
+    names = {cell.strip(' "').lower() for cell in header.split(";" if ";" in header else ",")}
+    if not names.issuperset(REQUIRED):
+        try:
+            return parse_table("\n".join(line if is_row(line) else "" for line in lines))
+        except FileFormatError as error:
+            raise FileFormatError(path, error.where, error.problem, error.remedy) from error
+    blocks = list(read_table(path, REQUIRED, OPTIONAL, size_limit=SIZE_LIMIT))
+    fields = tuple(blocks[0].columns) if blocks else REQUIRED
+    return ReflectorImport(reflectors_of(blocks), (), fields)

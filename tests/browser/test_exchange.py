@@ -1,0 +1,184 @@
+"""Files that come into the page and go out of it in a real browser; what strangers wrote in them stays text."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from commission.app.launch import open_page
+from commission.app.runtime import Runtime
+from commission.app.server import start_server
+from commission.app.store import AppState
+from commission.io.imports import SIZE_LIMIT, read_import
+from commission.io.project_file import load_project, save_project
+from tests.app.sites import room
+from tests.browser.page import OpenPage
+
+NODES = ("/floor/map", "/reflectors/marks", "/editing/handle")
+IMAGE, SCRIPT = "<img src=x onerror='window.__pwned=1'>", "<script>window.__pwned=2</script>"
+TABLE = f"id;x;y;radius;layer;note\nR1;0,25;2,1;0,04;;{SCRIPT}\n{IMAGE};6;4;0,04;{SCRIPT};{IMAGE}\n"
+LAYOUT: dict[str, Any] = {
+    "metaInformation": {},
+    "layouts": [
+        {
+            "layoutId": SCRIPT,
+            "nodes": [{"nodeId": f"{IMAGE}{i}", "nodePosition": {"x": 2.0 + 3.0 * i, "y": 5.0}} for i in range(2)],
+            "edges": [
+                {
+                    "edgeId": f"{IMAGE}edge",
+                    "startNodeId": f"{IMAGE}0",
+                    "endNodeId": f"{IMAGE}1",
+                    "vehicleTypeEdgeProperties": [{"vehicleTypeId": kind, "maxSpeed": SCRIPT} for kind in (IMAGE, "V")],
+                }
+            ],
+            "stations": [{"stationId": f"{SCRIPT}dock", "interactionNodeIds": [f"{IMAGE}1", f"{SCRIPT}absent"]}],
+        }
+    ],
+}
+
+
+class OpenSite:
+    """A served project in a folder; nothing drives."""
+
+    def __init__(self, folder: Path) -> None:
+        save_project(room(), folder)
+        self.server = start_server("127.0.0.1", 0)
+        self.runtime: Runtime = open_page(self.server, load_project(folder), folder=folder)
+
+    @property
+    def state(self) -> AppState:
+        return self.runtime.state
+
+    @property
+    def ids(self) -> list[str]:
+        return [r.id for r in self.state.project.reflectors.reflectors]
+
+    def until(self, reached: Callable[[], bool], seconds: float = 60.0) -> None:
+        """Wait until something has happened on the server."""
+        end = time.monotonic() + seconds
+        while not reached():
+            assert time.monotonic() < end, f"it did not happen within {seconds} s: {self.state.problems}"
+            time.sleep(0.02)
+
+    def close(self) -> None:
+        self.runtime.stop()
+        self.server.stop()
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Iterator[OpenSite]:
+    opened = OpenSite(tmp_path)
+    yield opened
+    opened.close()
+
+
+def upload(page: OpenPage, name: str, content: bytes) -> None:
+    page.page.locator("input[type=file]").set_input_files(
+        files=[{"name": name, "mimeType": "text/plain", "buffer": content}]
+    )
+
+
+def assert_harmless(page: OpenPage) -> None:
+    """Nothing of what the files hold has become an element, a script that ran, or an error."""
+    assert page.page.evaluate("window.__pwned") is None
+    assert page.page.locator("img[src='x'], [onerror]").count() == 0
+    scripts = page.page.evaluate("[...document.scripts].filter(s => s.textContent.includes('__pwned')).length")
+    assert scripts == 0
+    assert page.errors == []
+
+
+def test_names_of_strangers_are_shown_as_text_wherever_they_appear(
+    site: OpenSite, window: Callable[..., OpenPage]
+) -> None:
+    page = window(site.server)
+    dialogs: list[str] = []
+    page.page.on("dialog", lambda dialog: (dialogs.append(dialog.message), dialog.dismiss()))
+    client = page.open(nodes=NODES).client_id
+    before = site.state.project
+    page.page.get_by_text("Exchange", exact=True).click()
+    upload(page, f"{IMAGE}.csv", TABLE.encode())
+    page.wait_for_text("Nothing has changed yet")
+    page.wait_for_text("1 added, 1 changed, 3 not in the file, 0 as before")
+    page.wait_for_text(f"note (none) → {SCRIPT}")
+    assert_harmless(page)
+    assert site.state.project is before
+    page.press("Accept")
+    site.until(lambda: IMAGE in site.ids)
+    assert site.state.project.reflectors.reflectors[-1].note == IMAGE
+    # The new one stands in the open and far from any wall; two of one place are a problem with both names.
+    page.open_tab("Reflectors")
+    page.page.get_by_role("button", name=IMAGE).first.click()
+    site.until(lambda: site.state.editors[client].selected == (IMAGE,))
+    page.open_tab("Selection")
+    page.wait_for_text(f"Reflector {IMAGE}")
+    assert page.value_of("Note") == IMAGE
+    upload(page, "layout.lif", json.dumps(LAYOUT).encode())
+    page.wait_for_text("Routes: 1 added")
+    page.wait_for_text("Stations: 1 added")
+    page.wait_for_text(f"{IMAGE}edge")
+    assert_harmless(page)
+    page.press("Accept")
+    site.until(lambda: len(site.state.project.routes) == 2)
+    assert site.state.project.routes[-1].name == f"{IMAGE}edge"
+    page.open_tab("Problems")
+    page.wait_for_text(f"{IMAGE}edge")
+    assert_harmless(page)
+    page.press("Undo import layout.lif")
+    site.until(lambda: len(site.state.project.routes) == 1)
+    page.page.keyboard.press("Control+z")
+    site.until(lambda: site.state.project is before)
+    assert_harmless(page)
+    assert dialogs == []
+
+
+def test_upload_over_the_limit_is_refused_with_its_size_and_the_page_lives_on(
+    site: OpenSite, window: Callable[..., OpenPage], tmp_path: Path
+) -> None:
+    page = window(site.server)
+    page.open(nodes=NODES)
+    page.page.get_by_text("Exchange", exact=True).click()
+    page.wait_for_text("At most 32 MB")
+    large = tmp_path / "large.csv"
+    with large.open("wb") as file:
+        file.truncate(SIZE_LIMIT + 1_000_000)
+    page.page.locator("input[type=file]").set_input_files(large)
+    page.wait_for_text("the file has 33 MB (33,000,000 bytes); expected at most 32 MB")
+    upload(page, "hall.csv", b"id,x,y,radius\nN,6,4,0.04\n")
+    page.wait_for_text("1 added, 0 changed, 4 not in the file")
+    page.tick("Remove others")
+    page.wait_for_text("4 removed")
+    page.press("Cancel")
+    page.page.get_by_role("button", name="Accept", exact=True).wait_for(state="detached")
+    assert site.state.undo == ()
+    assert page.errors == []
+
+
+def test_pasted_cells_and_downloaded_files_make_the_round_trip(site: OpenSite, window: Callable[..., OpenPage]) -> None:
+    page = window(site.server)
+    page.open(nodes=NODES)
+    page.page.get_by_text("Exchange", exact=True).click()
+    page.row("Paste a table").locator("textarea").fill("Nr\tX [mm]\tY [mm]\nR1\t250,0\t2100\nN\t6000\t4000")
+    page.press("Read pasted")
+    page.wait_for_text("R1: y 2.000 → 2.100 m, moves 100 mm")
+    page.press("Accept")
+    site.until(lambda: site.ids[-1] == "N")
+    for button, name in ((".imk", "Room.imk"), ("CSV", "Room_reflectors.csv"), ("LIF", "Room.lif")):
+        with page.page.expect_download() as download:
+            page.press(button)
+        assert download.value.suggested_filename == name
+        content = Path(download.value.path()).read_bytes()
+        assert read_import(name, content) is not None
+        if name.endswith(".csv"):
+            upload(page, name, content)
+            page.wait_for_text("0 added, 0 changed, 0 not in the file, 5 as before")
+            page.press("Accept")
+            page.page.get_by_role("button", name="Accept", exact=True).wait_for(state="detached")
+    page.wait_for_text("Room.lif does not hold all:")
+    page.wait_for_text("5 reflectors are not carried: LIF knows no localization")
+    assert len(site.state.undo) == 1
+    assert page.errors == []
