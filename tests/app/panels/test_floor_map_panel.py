@@ -151,7 +151,7 @@ def test_progress_and_cancel_appear_while_a_file_is_read(server: viser.ViserServ
     assert (panel._bar.visible, panel._bar.value, panel._cancel.visible) == (True, 40.0, True)
     change(panel._cancel, True)
     assert posted == [actions.StopMapJob()]
-    panel.draw(PageView(state, None, (Progress("Coverage", 0.2),)))
+    panel.draw(PageView(state, None, (Progress(1, "Coverage", "", 0.2),)))
     assert (panel._bar.visible, panel._cancel.visible) == (False, False)
 
 
