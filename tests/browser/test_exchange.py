@@ -110,7 +110,6 @@ def test_names_of_strangers_are_shown_as_text_wherever_they_appear(
     page.press("Accept")
     site.until(lambda: IMAGE in site.ids)
     assert site.state.project.reflectors.reflectors[-1].note == IMAGE
-    # The new one stands in the open and far from any wall; two of one place are a problem with both names.
     page.open_tab("Reflectors")
     page.page.get_by_role("button", name=IMAGE).first.click()
     site.until(lambda: site.state.editors[client].selected == (IMAGE,))

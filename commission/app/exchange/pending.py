@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from commission.app.exchange.preview import Preview, compare
 from commission.app.uploads import Upload
-from commission.io.imports import PASTED, WHOLE, Imported, LayoutChoice, shown_name
+from commission.io.imports import PASTED, Imported, LayoutChoice, shown_name
 from commission.site.project import Project
 
 
@@ -101,17 +101,3 @@ class Exchange:
 
 IDLE = Exchange()
 """Of a browser that has neither imported nor exported anything."""
-
-__all__ = [
-    "IDLE",
-    "WHOLE",
-    "Exchange",
-    "ImportSource",
-    "LayoutChoice",
-    "Pasted",
-    "Pending",
-    "Reading",
-    "Sent",
-    "ServerFile",
-    "Upload",
-]

@@ -10,14 +10,14 @@ from viser import GuiApi, GuiDropdownHandle, GuiEvent
 from commission.app import actions as page_actions
 from commission.app import theme
 from commission.app.exchange import actions
-from commission.app.exchange.pending import IDLE, Exchange, LayoutChoice, Pasted, Pending, ServerFile
+from commission.app.exchange.pending import IDLE, Exchange, Pasted, Pending, ServerFile
 from commission.app.exchange.words import counts, details, notes
 from commission.app.panels.base import BasePanel, Post, escaped, posting, write
 from commission.app.uploads import Uploads
 from commission.app.view import PageView
 from commission.io.edges import RouteImport
 from commission.io.exports import Format
-from commission.io.imports import ENDINGS, SIZE_LIMIT
+from commission.io.imports import ENDINGS, SIZE_LIMIT, LayoutChoice
 from commission.site.project import Project
 
 ACCEPT, CANCEL = "Accept", "Cancel"
@@ -39,7 +39,6 @@ class ExchangePanel(BasePanel):
     def __init__(self, gui: GuiApi, post: Post, client: int) -> None:
         self._gui, self._post, self._client = gui, post, client
         self._shown: tuple[Exchange, Project | None] = (IDLE, None)
-        self._pending: Pending | None = None
         with gui.add_folder("Exchange", expand_by_default=False):
             self._state = gui.add_html("")
             self._stop = gui.add_button("Stop", color="gray", visible=False, hint="Do not read the file any further.")

@@ -3,11 +3,11 @@ from __future__ import annotations
 import numpy as np
 
 from commission.app.exchange.ghosts import ghosts_of
-from commission.app.exchange.pending import WHOLE, Pasted, Pending
+from commission.app.exchange.pending import Pasted, Pending
 from commission.app.exchange.preview import compare
 from commission.io.edges import RouteImport
 from commission.io.imk import ReflectorImport
-from commission.io.imports import Imported
+from commission.io.imports import WHOLE, Imported
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
 from commission.site.stations import Station
