@@ -32,6 +32,7 @@ REFERENCE: Color = (196, 140, 255)
 SELECTED: Color = (255, 159, 28)
 LINE: Color = (38, 41, 46)
 SELECTED_LINE: Color = (124, 76, 10)
+CHOSEN_LINE: Color = (34, 66, 108)
 WARNING_LINE: Color = (98, 70, 18)
 ERROR_LINE: Color = (112, 34, 32)
 DEPENDENT: Color = (255, 92, 205)
@@ -139,7 +140,7 @@ div:has(>div>.c-bottom)>:nth-child(n+7){{grid-column:span 4}}
 div:has(>div>.c-bottom)>:nth-child(-n+3) [style*="7.25em"]{{display:none}}
 div:has(>div>.c-bottom)>:nth-child(5) [style*="7.25em"]{{display:none}}
 div:has(>.c-wide){{display:none}}
-div:has(>.c-wide)+* [style*="7.25em"]{{display:none}}
+div:has(>.c-wide)+* [style*="em; flex-shrink: 0; position: relative"]{{display:none}}
 div:has(>.c-rows){{display:none}}
 div:has(>.c-rows)~div{{padding-top:0!important;padding-bottom:1px!important}}
 div:has(>.c-rows)~div button{{height:auto!important;min-height:22px;padding:2px 6px!important;

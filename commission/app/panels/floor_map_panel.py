@@ -30,7 +30,7 @@ class FloorMapPanel(BasePanel):
     def __init__(self, gui: GuiApi, post: Post, project: Project) -> None:
         self._shown: MapLoading | None = None
         with gui.add_folder("Floor map", expand_by_default=project.floor_map is None):
-            gui.add_html(KINDS)
+            kinds = gui.add_html(KINDS)
             path = gui.add_text("File", "", hint="Path of a file on the computer that serves this page.")
             opened = gui.add_button("Open", hint="Read the file of this path.")
 
@@ -41,7 +41,7 @@ class FloorMapPanel(BasePanel):
                 return actions.OpenMap(client_of(event), MapFile(Path(typed).expanduser()))
 
             opened.on_click(posting(post, open_path))
-            add_upload(
+            upload = add_upload(
                 gui,
                 "Upload a file",
                 ",".join(f".{ending}" for ending in ENDINGS),
@@ -49,6 +49,7 @@ class FloorMapPanel(BasePanel):
                 lambda text, _client: post(actions.MapFailed(text)),
                 hint="A file of this browser's computer; of a ROS map the .yaml and its image, one after the other.",
             )
+            self._source = (kinds, path, opened, upload)
             self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
             self._cancel = gui.add_button("Cancel", color="gray", visible=False, hint="Stop reading; nothing changes.")
             self._cancel.on_click(posting(post, lambda _event: actions.StopMapJob()))
@@ -74,6 +75,8 @@ class FloorMapPanel(BasePanel):
         self._shown = loading
         self._said.content = said(loading)
         self._said.visible = bool(self._said.content)
+        for widget in self._source:  # a small screen has no room for both
+            widget.visible = loading.draft is None
         self._discard.visible = loading.draft is not None or loading.waiting is not None
         self._fields.show(loading.draft)
 

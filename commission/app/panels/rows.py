@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from viser import GuiApi, GuiTabHandle
+from viser import GuiApi, GuiFolderHandle, GuiTabHandle
 
 from commission.app import theme
 from commission.app.actions import Action
@@ -21,12 +21,14 @@ class Rows:
     Parameters
     ----------
     gui : where the widgets are made.
-    tab : the tab that the lines are at the end of.
+    tab : the tab or folder that the lines are at the end of.
     post : takes the actions.
     make : from a line's index and the number of the browser that clicked on it to the action.
     """
 
-    def __init__(self, gui: GuiApi, tab: GuiTabHandle, post: Post, make: Callable[[int, int], Action]) -> None:
+    def __init__(
+        self, gui: GuiApi, tab: GuiTabHandle | GuiFolderHandle, post: Post, make: Callable[[int, int], Action]
+    ) -> None:
         self._gui, self._tab, self._post, self._make = gui, tab, post, make
         with tab:
             gui.add_html(ROWS)
