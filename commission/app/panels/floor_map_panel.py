@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -38,10 +39,10 @@ class FloorMapPanel(BasePanel):
                 typed = path.value.strip()
                 if not typed:
                     return page_actions.Report("no file was named; expected its path on the server's computer")
-                return actions.OpenMap(client_of(event), MapFile(Path(typed).expanduser()))
+                return actions.OpenMap(client_of(event), MapFile(Path(os.path.expanduser(typed))))
 
             opened.on_click(posting(post, open_path))
-            upload = add_upload(
+            add_upload(
                 gui,
                 "Upload a file",
                 ",".join(f".{ending}" for ending in ENDINGS),
@@ -49,7 +50,7 @@ class FloorMapPanel(BasePanel):
                 lambda text, _client: post(actions.MapFailed(text)),
                 hint="A file of this browser's computer; of a ROS map the .yaml and its image, one after the other.",
             )
-            self._source = (kinds, path, opened, upload)
+            self._source = (kinds, path, opened)
             self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
             self._cancel = gui.add_button("Cancel", color="gray", visible=False, hint="Stop reading; nothing changes.")
             self._cancel.on_click(posting(post, lambda _event: actions.StopMapJob()))

@@ -28,7 +28,7 @@ ALONG_X, ALONG_Y, TYPED = "x axis", "y axis", "a heading"
 HEADINGS = {ALONG_X: 0.0, ALONG_Y: 0.5 * math.pi}
 MOST_LAYERS = 40
 """Layers that can be chosen one by one, those with most lines; the rest is as visible as the drawing says."""
-_LONGEST_LAYER = 32
+_LONGEST_LAYER = 28
 NO_FILE = "no file is open to load a floor map from; expected one"
 
 
