@@ -19,7 +19,8 @@ from commission.app.actions import Action, Source, View
 from commission.app.checking import Checker
 from commission.app.editing import actions as editing
 from commission.app.jobs import Job, JobReport, Jobs, JobState, Progress
-from commission.app.mapping.actions import ImageMissing, MapFailed, MapMade, MapOpened
+from commission.app.keeping import name_of_edit
+from commission.app.mapping.actions import MapResult
 from commission.app.mapping.effects import DrawMap, ReadMapFile, StopMapWork
 from commission.app.mapping.work import MapWork
 from commission.app.plan.planner import Planner
@@ -236,7 +237,7 @@ class Runtime:
         for effect in outcome.effects:
             self._carry_out(effect)
         if outcome.state.project is not before.project:
-            self._work.note(outcome.state.project, _name_of(action, before, outcome.state))
+            self._work.note(outcome.state.project, name_of_edit(action, before, outcome.state))
 
     def _carry_out(self, effect: reduction.Effect) -> None:
         """Do one thing that the reducer asks for."""
@@ -268,11 +269,18 @@ class Runtime:
 
     def _show_effect(self, effect: reduction.Tell | reduction.PlaceCamera | reduction.FlyTo) -> None:
         """Do what only the page can do; a camera is fitted to the site as it is now, not as it was drawn last."""
-        if self._page is None:
+        page = self._page
+        if page is None:
             return
         if not isinstance(effect, reduction.Tell) and self.state.project is not self._shown:
             self._show_site()
-        _show(self._page, effect)
+        match effect:
+            case reduction.Tell(text, failed):
+                page.tell(text, failed=failed)
+            case reduction.PlaceCamera(client, view):
+                page.show_view(client, view)
+            case reduction.FlyTo(client, place):
+                page.look_at(client, place)
 
     def _hear(self, report: JobReport) -> None:
         """Follow a job; take its result or its error."""
@@ -286,7 +294,7 @@ class Runtime:
             self._apply(actions.Report(f"{job.name}: {job.error}"))
         elif job.state is JobState.DONE and isinstance(report.result, Drive):
             self._begin(report.result)
-        elif job.state is JobState.DONE and isinstance(report.result, MapOpened | MapMade | ImageMissing | MapFailed):
+        elif job.state is JobState.DONE and isinstance(report.result, MapResult):
             self._apply(report.result)
         elif job.state is JobState.DONE and isinstance(report.result, Findings):
             self._found = report.result.problems
@@ -376,28 +384,6 @@ class Runtime:
         if self._page is not None:
             self._shown = self.state.project
             self._page.show_site(self.state)
-
-
-def _name_of(action: Action, before: AppState, after: AppState) -> str:
-    """Return what the journal calls an edit: the undo step's name, or which one was taken back or made again."""
-    match action:
-        case actions.Undo() if before.undo:
-            return f"undo {before.undo[-1].name}"
-        case actions.Redo() if before.redo:
-            return f"redo {before.redo[-1].name}"
-        case _:
-            return after.undo[-1].name if after.undo else "edit"
-
-
-def _show(page: PageLike, effect: reduction.Tell | reduction.PlaceCamera | reduction.FlyTo) -> None:
-    """Do what only the page can do."""
-    match effect:
-        case reduction.Tell(text, failed):
-            page.tell(text, failed=failed)
-        case reduction.PlaceCamera(client, view):
-            page.show_view(client, view)
-        case reduction.FlyTo(client, place):
-            page.look_at(client, place)
 
 
 def _is_outdated(message: Message, following: Message | None) -> bool:

@@ -116,21 +116,22 @@ class MapToolFields:
 
 def alignment_text(draft: AlignmentDraft) -> str:
     """Return what the points say, as html."""
-    rows = [
+    clicked = [
         (f"{letter} on the map", f"{point.at[0]:.3f}, {point.at[1]:.3f} m")
         for letter, point in zip(LETTERS, draft.points, strict=False)
     ]
     found = alignment_of(draft)
     if found is None:
         missing = f"click {LETTERS[len(draft.points)]}" if len(draft.points) < 2 else "they are too close to each other"
-        return f"{table(rows)}<div class='c-note'>Points: {missing}</div>"
+        return f"{table(clicked)}<div class='c-note'>Points: {missing}</div>"
     color = "#ff8a80" if found.share > WRONG else "#ffb74d" if found.share > DOUBTFUL else "inherit"
     residual = f"<span style='color:{color}'>{1000.0 * found.residual:+.0f} mm ({100.0 * found.share:.2f} %)</span>"
-    rows += [
+    rows = [
+        ("Difference", residual),
         ("A to B, map", f"{found.on_map:.3f} m"),
         ("A to B, plant", f"{found.in_plant:.3f} m"),
-        ("Difference", residual),
         ("Turns by", f"{math.degrees(float(found.T_plant_map[2])):.3f} °"),
+        *clicked,
     ]
     note = ""
     if found.share > WRONG:
