@@ -8,6 +8,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from commission.app import actions
+from commission.app.actions import Action
+from commission.app.store import AppState
 from commission.io.journal import Journal
 from commission.io.project_file import load_project, save_project
 from commission.site.project import Project
@@ -94,3 +97,14 @@ def _listing(folder: Path | None) -> frozenset[tuple[str, int, int]]:
     with os.scandir(folder) as entries:
         files = [entry for entry in entries if entry.is_file() and not entry.name.startswith(OWN_PREFIX)]
         return frozenset((entry.name, entry.stat().st_mtime_ns, entry.stat().st_size) for entry in files)
+
+
+def name_of_edit(action: Action, before: AppState, after: AppState) -> str:
+    """Return what the journal calls an edit: the undo step's name, or which one was taken back or made again."""
+    match action:
+        case actions.Undo() if before.undo:
+            return f"undo {before.undo[-1].name}"
+        case actions.Redo() if before.redo:
+            return f"redo {before.redo[-1].name}"
+        case _:
+            return after.undo[-1].name if after.undo else "edit"

@@ -19,7 +19,8 @@ from commission.app.actions import Action, Source, View
 from commission.app.background import PREDICT, Background
 from commission.app.editing import actions as editing
 from commission.app.jobs import JobReport, JobState, Progress
-from commission.app.mapping.actions import ImageMissing, MapFailed, MapMade, MapOpened
+from commission.app.keeping import name_of_edit
+from commission.app.mapping.actions import MapResult
 from commission.app.plan.view import PlanView
 from commission.app.session import Drive, Session
 from commission.app.store import AppState
@@ -222,7 +223,7 @@ class Runtime:
         for effect in outcome.effects:
             self._carry_out(effect)
         if outcome.state.project is not before.project:
-            self._work.note(outcome.state.project, _name_of(action, before, outcome.state))
+            self._work.note(outcome.state.project, name_of_edit(action, before, outcome.state))
 
     def _carry_out(self, effect: reduction.Effect) -> None:
         """Do one thing that the reducer asks for."""
@@ -246,11 +247,20 @@ class Runtime:
 
     def _show_effect(self, effect: reduction.PageEffect) -> None:
         """Do what only the page can do; a camera is fitted to the site as it is now, not as it was drawn last."""
-        if self._page is None:
+        page = self._page
+        if page is None:
             return
         if isinstance(effect, reduction.PlaceCamera | reduction.FlyTo) and self.state.project is not self._shown:
             self._show_site()
-        _show(self._page, effect)
+        match effect:
+            case reduction.Tell(text, failed):
+                page.tell(text, failed=failed)
+            case reduction.PlaceCamera(client, view):
+                page.show_view(client, view)
+            case reduction.FlyTo(client, place):
+                page.look_at(client, place)
+            case reduction.SendFile(client, name, content):
+                page.send_file(client, name, content)
 
     def _act_on_run(
         self, session: Session, effect: reduction.ApplyParameters | reduction.MoveTo | reduction.ProcessOneScan
@@ -272,8 +282,8 @@ class Runtime:
         match self._background.hear(report):
             case Drive() as drive:
                 self._begin(drive)
-            case MapOpened() | MapMade() | ImageMissing() | MapFailed() as said:
-                self._apply(said)
+            case result if isinstance(result, MapResult):
+                self._apply(result)
             case tuple() as episodes if self.session is not None:
                 self.session.predicted = episodes
             case _:
@@ -353,30 +363,6 @@ class Runtime:
         if self._page is not None:
             self._shown = self.state.project
             self._page.show_site(self.state)
-
-
-def _name_of(action: Action, before: AppState, after: AppState) -> str:
-    """Return what the journal calls an edit: the undo step's name, or which one was taken back or made again."""
-    match action:
-        case actions.Undo() if before.undo:
-            return f"undo {before.undo[-1].name}"
-        case actions.Redo() if before.redo:
-            return f"redo {before.redo[-1].name}"
-        case _:
-            return after.undo[-1].name if after.undo else "edit"
-
-
-def _show(page: PageLike, effect: reduction.PageEffect) -> None:
-    """Do what only the page can do."""
-    match effect:
-        case reduction.Tell(text, failed):
-            page.tell(text, failed=failed)
-        case reduction.PlaceCamera(client, view):
-            page.show_view(client, view)
-        case reduction.FlyTo(client, place):
-            page.look_at(client, place)
-        case reduction.SendFile(client, name, content):
-            page.send_file(client, name, content)
 
 
 def _is_outdated(message: Message, following: Message | None) -> bool:

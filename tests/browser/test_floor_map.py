@@ -133,6 +133,7 @@ def test_a_map_and_its_image_are_uploaded_and_hostile_files_are_one_line(
     )
     upload(page, tmp_path / "plan.dxf")
     page.wait_for_text("<img src=x onerror=docume")
+    page.press("Discard")
     (tmp_path / "hall.stl").write_bytes(b"solid")
     upload(page, tmp_path / "hall.stl")
     page.wait_for_text("hall.stl: ")
@@ -175,9 +176,10 @@ def test_an_image_is_placed_by_clicks_and_the_map_moved_onto_the_plants_coordina
     points = site.state.editors[client].alignment.points
     origin = site.floor_map.origin
     distance = points[1].at[0] - points[0].at[0]
-    typed = {"A plant x [m]": 100.0, "A plant y [m]": 50.0, "B plant x [m]": 100.0, "B plant y [m]": 50.0 + distance}
-    for label, value in typed.items():
-        page.fill(label, f"{value:.3f}")
+    for label, place in (("A x, y [m]", (100.0, 50.0)), ("B x, y [m]", (100.0, 50.0 + distance))):
+        for field, value in zip(page.row(label).locator("input").all(), place, strict=True):
+            field.fill(f"{value:.3f}")
+            field.press("Tab")
     plants = ((100.0, 50.0), (100.0, round(50.0 + distance, 3)))
     site.until(lambda: tuple(p.plant for p in site.state.editors[client].alignment.points) == plants)
     page.press("Move and turn")

@@ -101,6 +101,7 @@ class Overlay:
             precision="float32",
         )
         self._label: LabelHandle | None = None
+        self._letters: list[LabelHandle] = []
         self._handle = scene.add_transform_controls(
             "/editing/handle",
             active_axes=(True, True, False),
@@ -136,6 +137,7 @@ class Overlay:
         self._preview.points = self._preview_of(project, editor, size)
         self._draw_points(project, editor, size)
         self._write(editor)
+        self._name_points(editor)
         self._draw_handle(centers, editor, size)
 
     def _draw_handle(self, centers: FloatArray, editor: Editor, size: float) -> None:
@@ -204,6 +206,19 @@ class Overlay:
         if self._label is None:
             self._label = self._client.scene.add_label("/editing/label", text, position=place)
         self._label.text, self._label.position = text, place
+
+    def _name_points(self, editor: Editor) -> None:
+        """Write A and B beside the points to align by."""
+        points = editor.alignment.points if editor.tool is Tool.ALIGN else ()
+        while len(self._letters) > len(points):
+            self._letters.pop().remove()
+        for index, point in enumerate(points):
+            place = (*point.at, theme.Height.EDITING)
+            if index < len(self._letters):
+                self._letters[index].position = place
+            else:
+                name = f"/editing/point/{index}"
+                self._letters.append(self._client.scene.add_label(name, "AB"[index], position=place))
 
 
 def _places(station: Station | None) -> FloatArray:

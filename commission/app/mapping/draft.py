@@ -79,10 +79,8 @@ class MapOptions:
     """Distance between the two points that were clicked [m]."""
     direction: float = 0.0
     """Direction from the first to the second point in the map frame [rad]; 0 is along x."""
-    first_x: float = 0.0
-    """Where the first point lies in the map frame, x [m]."""
-    first_y: float = 0.0
-    """Where the first point lies in the map frame, y [m]."""
+    first_in_map: Point = (0.0, 0.0)
+    """Where the first point lies in the map frame: x, y [m]."""
 
     def __post_init__(self) -> None:
         between(self.resolution, (0.001, 1.0), "cell", "m")
@@ -92,9 +90,8 @@ class MapOptions:
             between(height, (-HIGHEST, HIGHEST), "height", "m")
         between(self.threshold, (0.0, 1.0), "threshold")
         above(self.distance, 0.0, "distance", "m")
-        for name in ("direction", "first_x", "first_y"):
-            if not math.isfinite(getattr(self, name)):
-                raise ValueError(f"{name} is {getattr(self, name)}; expected a finite number")
+        if not all(math.isfinite(number) for number in (self.direction, *self.first_in_map)):
+            raise ValueError("direction or place of the first point is not finite; expected numbers")
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +137,7 @@ class MapDraft:
             return None
         first, second = self.pixels
         options = self.options
-        return ImagePlacement(first, second, options.distance, options.direction, (options.first_x, options.first_y))
+        return ImagePlacement(first, second, options.distance, options.direction, options.first_in_map)
 
     def clicked(self, place: Point) -> MapDraft:
         """Return the draft after a click on its picture: the first, then the second point, then the nearer is moved.

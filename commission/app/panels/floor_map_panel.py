@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ class FloorMapPanel(BasePanel):
     def __init__(self, gui: GuiApi, post: Post, project: Project) -> None:
         self._shown: MapLoading | None = None
         with gui.add_folder("Floor map", expand_by_default=project.floor_map is None):
-            gui.add_html(KINDS)
+            kinds = gui.add_html(KINDS)
             path = gui.add_text("File", "", hint="Path of a file on the computer that serves this page.")
             opened = gui.add_button("Open", hint="Read the file of this path.")
 
@@ -40,7 +41,7 @@ class FloorMapPanel(BasePanel):
                 typed = path.value.strip()
                 if not typed:
                     return page_actions.Report("no file was named; expected its path on the server's computer")
-                return actions.OpenMap(client_of(event), MapFile(Path(typed).expanduser()))
+                return actions.OpenMap(client_of(event), MapFile(Path(os.path.expanduser(typed))))
 
             opened.on_click(posting(post, open_path))
             Uploads(gui, lambda _client, text: post(actions.MapFailed(text))).add(
@@ -50,6 +51,7 @@ class FloorMapPanel(BasePanel):
                 endings=tuple(f".{ending}" for ending in ENDINGS),
                 note="Of a ROS map the .yaml and its image, one after the other.",
             )
+            self._source = (kinds, path, opened)
             self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
             self._cancel = gui.add_button("Cancel", color="gray", visible=False, hint="Stop reading; nothing changes.")
             self._cancel.on_click(posting(post, lambda _event: actions.StopMapJob()))
@@ -75,6 +77,8 @@ class FloorMapPanel(BasePanel):
         self._shown = loading
         self._said.content = said(loading)
         self._said.visible = bool(self._said.content)
+        for widget in self._source:  # a small screen has no room for both
+            widget.visible = loading.draft is None
         self._discard.visible = loading.draft is not None or loading.waiting is not None
         self._fields.show(loading.draft)
 

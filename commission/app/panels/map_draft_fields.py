@@ -15,6 +15,7 @@ from commission.app import theme
 from commission.app.mapping import actions
 from commission.app.mapping.draft import MapDraft, MapOptions, Read, ReadOptions
 from commission.app.panels.base import Post, client_of, escaped, posting, table, write
+from commission.app.panels.rows import Rows
 from commission.io.dxf import UNITS, Drawing, DrawingLayer
 from commission.io.image_map import Picture
 from commission.io.mesh import Model
@@ -27,7 +28,8 @@ ALONG_X, ALONG_Y, TYPED = "x axis", "y axis", "a heading"
 HEADINGS = {ALONG_X: 0.0, ALONG_Y: 0.5 * math.pi}
 MOST_LAYERS = 40
 """Layers that can be chosen one by one, those with most lines; the rest is as visible as the drawing says."""
-_LONGEST_LAYER = 26
+_LONGEST_LAYER = 28
+NO_FILE = "no file is open to load a floor map from; expected one"
 
 
 def heights_of(text: str) -> tuple[float, ...]:
@@ -97,14 +99,14 @@ class MapDraftFields:
         self._make = gui.add_button(
             "Load as the floor map", visible=False, hint="Replaces the floor map; can be undone."
         )
-        self._make.on_click(posting(post, lambda event: actions.MakeMap(event.client_id)))
+        self._make.on_click(posting(post, lambda event: actions.MakeMap(client_of(event))))
 
     def _posting(self, make: Callable[[GuiEvent[Any], MapDraft], page_actions.Action]) -> Callable[[Any], None]:
         """Return a callback that posts while a file is open; what cannot be meant is reported instead."""
 
         def action(event: GuiEvent[Any]) -> page_actions.Action:
             if self._draft is None:
-                return page_actions.Report("no file is open to load a floor map from; expected one")
+                return page_actions.Report(NO_FILE)
             try:
                 return make(event, self._draft)
             except ValueError as error:
@@ -118,14 +120,14 @@ class MapDraftFields:
         self._widgets.append((widget, kinds, shown))
         return widget
 
-    def _number(self, name: str, label: str, scale: float, kinds: tuple[type[Read], ...], step: float) -> None:
+    def _number(self, name: str, label: str, scale: float, kinds: tuple[type[Read], ...], step: float) -> Any:
         """Add a number of `MapOptions` that is shown in another unit."""
         digits = max(0, -math.floor(math.log10(step)))
         widget = self._gui.add_number(label, 0.0, step=step, hint=self._hints[name])
         widget.on_update(
             self._posting(lambda event, _draft: actions.SetMapOption(name, float(event.target.value) / scale))
         )
-        self._add(widget, kinds, lambda draft: round(getattr(draft.options, name) * scale, digits))
+        return self._add(widget, kinds, lambda draft: round(getattr(draft.options, name) * scale, digits))
 
     def _add_reading(self) -> None:
         gui = self._gui
@@ -150,11 +152,11 @@ class MapDraftFields:
     def _add_layers(self) -> None:
         gui = self._gui
         self._layers = self._add(gui.add_folder("Layers with walls"), (Drawing,))
-        self._boxes: list[Any] = []
         with self._layers:
             gui.add_html(theme.WIDE)
             every = gui.add_button_group("", ("All", "None", "Visible"))
             self._rest = gui.add_html("", visible=False)
+        self._rows = Rows(gui, self._layers, self._post, self._toggled)
 
         def several(event: GuiEvent[Any], draft: MapDraft) -> page_actions.Action:
             layers = draft.read.layers if isinstance(draft.read, Drawing) else ()
@@ -164,23 +166,34 @@ class MapDraftFields:
 
         every.on_click(self._posting(several))
 
-    def _add_box(self) -> Any:
-        """Add one more layer's check box."""
-        index = len(self._boxes)
-        box = self._gui.add_checkbox(" ", False)
-
-        def toggled(event: GuiEvent[Any], draft: MapDraft) -> page_actions.Action:
-            names = set(chosen_layers(draft))
-            if isinstance(draft.read, Drawing):
-                name = layers_by_size(draft.read)[index].name
-                (names.add if event.target.value else names.discard)(name)
-            return actions.SetMapOption("layers", tuple(sorted(names)))
-
-        box.on_update(self._posting(toggled))
-        return box
+    def _toggled(self, index: int, _client: int) -> page_actions.Action:
+        """Return the action of a click on a layer's line."""
+        draft = self._draft
+        if draft is None or not isinstance(draft.read, Drawing):
+            return page_actions.Report(NO_FILE)
+        name = layers_by_size(draft.read)[index].name
+        return actions.SetMapOption("layers", tuple(sorted(chosen_layers(draft) ^ {name})))
 
     def _add_picture(self) -> None:
         gui, picture = self._gui, (Picture,)
+        self._number("distance", "A to B [m]", 1.0, picture, step=0.001)
+        axis = gui.add_dropdown("A to B is", (ALONG_X, ALONG_Y, TYPED), hint="Direction of B as seen from A.")
+
+        def turned(event: GuiEvent[Any], draft: MapDraft) -> page_actions.Action:
+            # Another heading begins beside the one there is: equal to it, it would be that axis.
+            heading = HEADINGS.get(event.target.value, draft.options.direction + math.radians(1.0))
+            return actions.SetMapOption("direction", heading)
+
+        axis.on_update(self._posting(turned))
+        self._add(axis, picture, lambda draft: axis_of(draft.options.direction))
+        self._heading = self._number("direction", "Heading [°]", DEG, picture, step=0.01)
+        first = gui.add_vector2("A is at [m]", (0.0, 0.0), step=0.001, hint=self._hints["first_in_map"])
+        first.on_update(
+            self._posting(
+                lambda event, _draft: actions.SetMapOption("first_in_map", tuple(float(v) for v in event.target.value))
+            )
+        )
+        self._add(first, picture, lambda draft: draft.options.first_in_map)
         threshold = gui.add_slider("Walls from [%]", 0, 100, 1, 50, hint=self._hints["threshold"])
         threshold.on_update(
             self._posting(lambda event, _draft: actions.SetMapOption("threshold", float(event.target.value) / 100.0))
@@ -191,22 +204,9 @@ class MapDraftFields:
             self._posting(lambda event, _draft: actions.SetMapOption("light_walls", event.target.value == LIGHT))
         )
         self._add(walls, picture, lambda draft: LIGHT if draft.options.light_walls else DARK)
-        again = gui.add_button("Click two points", color="gray", hint="Far apart, of known distance.")
-        again.on_click(posting(self._post, lambda event: actions.ClickPicture(event.client_id)))
+        again = gui.add_button("Click both points anew", color="gray", hint="Far apart, of known distance.")
+        again.on_click(posting(self._post, lambda event: actions.ClickPicture(client_of(event))))
         self._add(again, picture)
-        self._number("distance", "A to B [m]", 1.0, picture, step=0.001)
-        axis = gui.add_dropdown("A to B is", (ALONG_X, ALONG_Y, TYPED), hint="Direction of B as seen from A.")
-        axis.on_update(
-            self._posting(
-                lambda event, draft: actions.SetMapOption(
-                    "direction", HEADINGS.get(event.target.value, draft.options.direction + 1e-9)
-                )
-            )
-        )
-        self._add(axis, picture, lambda draft: axis_of(draft.options.direction))
-        self._number("direction", "Heading of B [°]", DEG, picture, step=0.01)
-        self._number("first_x", "A lies at x [m]", 1.0, picture, step=0.001)
-        self._number("first_y", "A lies at y [m]", 1.0, picture, step=0.001)
 
     def show(self, draft: MapDraft | None) -> None:
         """Follow the draft."""
@@ -224,28 +224,24 @@ class MapDraftFields:
         self._make.disabled = isinstance(draft.read, Picture) and draft.placement() is None
         if isinstance(draft.read, Drawing):
             self._show_layers(draft, draft.read)
+        if isinstance(draft.read, Picture):
+            self._heading.visible = axis_of(draft.options.direction) == TYPED
 
     def _show_layers(self, draft: MapDraft, drawing: Drawing) -> None:
-        """Show a check box for each layer."""
+        """Show a line for each layer, marked where it holds walls."""
         layers, chosen = layers_by_size(drawing), chosen_layers(draft)
-        with self._layers:
-            while len(self._boxes) < len(layers):
-                self._boxes.append(self._add_box())
-        for index, box in enumerate(self._boxes):
-            if box.visible is not (index < len(layers)):
-                box.visible = index < len(layers)
-            if index < len(layers):
-                layer = layers[index]
-                name = layer.name if len(layer.name) <= _LONGEST_LAYER else f"{layer.name[: _LONGEST_LAYER - 1]}…"
-                label = f"{name} ({layer.segments:,})"
-                if box.label != label:
-                    box.label = label
-                write(box, layer.name in chosen)
+        self._rows.show([layer_line(layer, is_chosen=layer.name in chosen) for layer in layers])
         more = len(drawing.layers) - len(layers)
         self._rest.visible = more > 0
         self._rest.content = (
             f"<div class='c-note' style='padding:2px 6px'>and {more} smaller layers</div>" if more else ""
         )
+
+
+def layer_line(layer: DrawingLayer, *, is_chosen: bool) -> tuple[str, theme.Color]:
+    """Return what a layer's line says, as plain text, and its color."""
+    name = layer.name if len(layer.name) <= _LONGEST_LAYER else f"{layer.name[: _LONGEST_LAYER - 1]}…"
+    return f"{'✓' if is_chosen else '·'} {name}  {layer.segments:,}", theme.CHOSEN_LINE if is_chosen else theme.LINE
 
 
 def axis_of(direction: float) -> str:

@@ -67,24 +67,22 @@ class MapToolFields:
             self._align = gui.add_button("Move and turn", hint="The map keeps its scale; can be undone.")
             self._align.on_click(posting(self._post, lambda _event: actions.AlignMap(self._client)))
 
-    def _add_point(self, index: int) -> tuple[Any, Any, Any]:
+    def _add_point(self, index: int) -> tuple[Any, Any]:
         """Add name and plant coordinates of a point."""
         gui, letter = self._gui, LETTERS[index]
-        name = gui.add_text(letter, "", hint="What you call it, such as: column B4.")
-        x = gui.add_number(f"{letter} plant x [m]", 0.0, step=0.001, hint="Where it lies in the plant.")
-        y = gui.add_number(f"{letter} plant y [m]", 0.0, step=0.001, hint="Where it lies in the plant.")
+        name = gui.add_text(f"{letter} is", "", hint="What you call it, such as: column B4.")
+        plant = gui.add_vector2(f"{letter} x, y [m]", (0.0, 0.0), step=0.001, hint="Where it lies in the plant.")
 
         def typed(_event: GuiEvent[Any]) -> page_actions.Action:
             points = list(self._alignment.points)
             if index < len(points):
-                points[index] = replace(
-                    points[index], plant=(float(x.value), float(y.value)), name=str(name.value).strip()[:40]
-                )
+                x, y = (float(value) for value in plant.value)
+                points[index] = replace(points[index], plant=(x, y), name=str(name.value).strip()[:40])
             return actions.SetAlignment(self._client, replace(self._alignment, points=tuple(points)))
 
-        for widget in (name, x, y):
+        for widget in (name, plant):
             widget.on_update(posting(self._post, typed))
-        return name, x, y
+        return name, plant
 
     def show(self, editor: Editor) -> None:
         """Follow the editor."""
@@ -105,7 +103,8 @@ class MapToolFields:
         for index, widgets in enumerate(self._points):
             known = index < len(draft.points)
             point = draft.points[index] if known else NamedPoint((0.0, 0.0), (0.0, 0.0))
-            for widget, value in zip(widgets, (point.name, *(round(v, 4) for v in point.plant)), strict=True):
+            plant = (round(point.plant[0], 4), round(point.plant[1], 4))
+            for widget, value in zip(widgets, (point.name, plant), strict=True):
                 write(widget, value)
                 if widget.disabled is known:
                     widget.disabled = not known
@@ -117,21 +116,22 @@ class MapToolFields:
 
 def alignment_text(draft: AlignmentDraft) -> str:
     """Return what the points say, as html."""
-    rows = [
+    clicked = [
         (f"{letter} on the map", f"{point.at[0]:.3f}, {point.at[1]:.3f} m")
         for letter, point in zip(LETTERS, draft.points, strict=False)
     ]
     found = alignment_of(draft)
     if found is None:
         missing = f"click {LETTERS[len(draft.points)]}" if len(draft.points) < 2 else "they are too close to each other"
-        return f"{table(rows)}<div class='c-note'>Points: {missing}</div>"
+        return f"{table(clicked)}<div class='c-note'>Points: {missing}</div>"
     color = "#ff8a80" if found.share > WRONG else "#ffb74d" if found.share > DOUBTFUL else "inherit"
     residual = f"<span style='color:{color}'>{1000.0 * found.residual:+.0f} mm ({100.0 * found.share:.2f} %)</span>"
-    rows += [
+    rows = [
+        ("Difference", residual),
         ("A to B, map", f"{found.on_map:.3f} m"),
         ("A to B, plant", f"{found.in_plant:.3f} m"),
-        ("Difference", residual),
         ("Turns by", f"{math.degrees(float(found.T_plant_map[2])):.3f} °"),
+        *clicked,
     ]
     note = ""
     if found.share > WRONG:

@@ -9,6 +9,7 @@ from viser import GuiApi
 from commission.app.editing.editor import Editor, Tool
 from commission.app.editing.gestures import moved, selected_of
 from commission.app.editing.station_gestures import moved_station
+from commission.app.mapping.tools import alignment_of
 from commission.app.panels.base import BasePanel, escaped
 from commission.app.view import PageView
 from commission.site.project import Project
@@ -49,6 +50,17 @@ def hint(project: Project, editor: Editor) -> str:
         case Tool.CALIBRATE:
             said = "Image: click two points of known distance, far apart; then type it on the left &nbsp; (Esc ends)"
     return said
+
+
+def _aligning(editor: Editor) -> str:
+    """Say which point comes next, or how well the two fit."""
+    points, found = len(editor.alignment.points), alignment_of(editor.alignment)
+    if points < 2:
+        return f"click {'AB'[points]}, a corner or a reflector of known plant coordinates"
+    if found is None:
+        return "A and B are too close to each other"
+    difference = f"{1000.0 * found.residual:+.0f} mm ({100.0 * found.share:.2f} %)"
+    return f"type the plant's coordinates of A and B; their distances differ by {difference}"
 
 
 def _so_far(editor: Editor, needed: int) -> str:

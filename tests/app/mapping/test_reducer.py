@@ -119,7 +119,7 @@ def test_an_image_is_placed_by_two_clicks_a_distance_and_an_axis(state: AppState
         click(*b),
         actions.SetMapOption("distance", 40.0),
         actions.SetMapOption("direction", math.pi / 2),
-        actions.SetMapOption("first_x", 5.0),
+        actions.SetMapOption("first_in_map", (5.0, 0.0)),
     ).state
     placement = draft(placed).placement()
     assert placement is not None

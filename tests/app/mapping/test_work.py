@@ -128,7 +128,7 @@ def test_an_image_becomes_walls_at_the_place_and_scale_of_its_two_points(tmp_pat
     pixels = np.full((60, 100), 255, np.uint8)
     pixels[50] = 0
     Image.fromarray(pixels).save(tmp_path / "plan.png")
-    options = MapOptions(distance=8.0, direction=math.pi / 2, first_x=3.0, first_y=1.0)
+    options = MapOptions(distance=8.0, direction=math.pi / 2, first_in_map=(3.0, 1.0))
     floor_map = drawn(uploaded(tmp_path / "plan.png"), options, pixels=((10.0, 50.5), (90.0, 50.5)))
     assert floor_map.resolution == pytest.approx(0.1)
     # The dark row runs along y now, from (3, 1) on.
