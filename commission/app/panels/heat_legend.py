@@ -77,10 +77,12 @@ def heat_scale(heat: HeatView, state: AppState) -> str:
 
 def ellipse_note(found: EllipseView) -> str:
     """Say how much larger than they are the ellipses on the heatmap are drawn."""
-    if not len(found.centers) and not found.without_fix:
+    if not len(found.centers) and not found.without_fix and not found.too_large:
         return ""
-    missing = f"; none at {found.without_fix} places without a fix" if found.without_fix else ""
-    return f"<div class='c-ellipses'>ellipses: 1σ of a fix, drawn {found.factor:g}x{missing}</div>"
+    left_out = [f"{found.without_fix} places without a fix"] if found.without_fix else []
+    left_out += [f"{found.too_large} too large for the grid"] if found.too_large else []
+    note = f"; left out: {', '.join(left_out)}" if left_out else ""
+    return f"<div class='c-note'>ellipses: 1σ of a fix, drawn {found.factor:g}x{note}</div>"
 
 
 def cold_start_scale(cold: ColdStartView) -> str:

@@ -16,6 +16,8 @@ from commission.planning.visibility import VisibilityModel
 
 ALONG = 14
 """Ellipses along the longer side of a grid of them."""
+LARGEST = 0.06
+"""Half the length of the largest ellipse of a grid, as drawn, in lengths of the longer side."""
 
 
 def ellipses(covered: Covered, places: tuple[Place, ...], factor: float, *, grid: bool) -> EllipseView:
@@ -29,13 +31,18 @@ def ellipses(covered: Covered, places: tuple[Place, ...], factor: float, *, grid
     grid : whether to add a coarse grid of them.
     """
     lattice, options = covered.live.coverage.lattice, covered.live.coverage.options
-    near = [index for index in (lattice.index_near(*place) for place in places) if index is not None]
-    chosen = np.unique(np.concatenate([np.array(near, np.int64), _coarse(covered) if grid else np.empty(0, np.int64)]))
+    near = np.array([index for index in (lattice.index_near(*place) for place in places) if index is not None], int)
+    chosen = np.unique(np.concatenate([near, _coarse(covered) if grid else near]))
     chosen = chosen[covered.floor[chosen]]
     points = lattice.points()[chosen]
     covariances = _covariances(covered.live.model, points, options)
     known = np.isfinite(covariances).all(axis=(1, 2))
-    return EllipseView(points[known], covariances[known], factor, int((~known).sum()))
+    lengths = np.full(len(points), np.inf)
+    lengths[known] = factor * ellipse_axes(covariances[known])[0].max(axis=-1, initial=0.0)
+    # Who asks for one sees it; of a grid, a few huge ones would hide all others.
+    most = LARGEST * lattice.spacing * max(lattice.rows, lattice.columns)
+    shown = known & (np.isin(chosen, near) | (lengths <= most))
+    return EllipseView(points[shown], covariances[shown], factor, int((~known).sum()), int((known & ~shown).sum()))
 
 
 def _coarse(covered: Covered) -> IntArray:

@@ -61,6 +61,8 @@ class EllipseView:
     """At which they are drawn."""
     without_fix: int
     """Number of chosen points where there is no fix, and so no ellipse."""
+    too_large: int
+    """Number of those on the grid that would hide the others, and are not drawn."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

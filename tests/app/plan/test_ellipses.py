@@ -48,7 +48,7 @@ def after(project: Project, *wishes: Action) -> PlanSettings:
 def test_an_ellipse_is_as_long_as_the_heatmap_says(project: Project, heading: Heading) -> None:
     narrow = Scanner(field_of_view_deg=(-120.0, 120.0), mounting=np.array([0.4, 0.1, 0.3]))
     found = covered(replace(project, scanner=narrow), heading)
-    drawn = ellipses(found, SPOTS, 100.0, grid=True)
+    drawn = ellipses(found, SPOTS, 1.0, grid=True)
     lattice, sigma = found.live.coverage.lattice, found.live.coverage.fixes.position_sigma
     assert len(drawn.centers) > 20
     at = [lattice.index_near(x, y) for x, y in drawn.centers]
@@ -61,7 +61,15 @@ def test_where_there_is_no_fix_there_is_no_ellipse_and_it_is_said(project: Proje
     drawn = ellipses(covered(alone, Heading.ALL_ROUND), SPOTS, 100.0, grid=False)
     assert not len(drawn.centers)
     assert drawn.without_fix == len(SPOTS)
-    assert "none at 3 places" in ellipse_note(drawn)
+    assert "3 places without a fix" in ellipse_note(drawn)
+
+
+def test_of_a_grid_those_are_left_out_that_would_hide_the_others(project: Project) -> None:
+    found = covered(project, Heading.ALL_ROUND)
+    small, large = (ellipses(found, (), factor, grid=True) for factor in (10.0, 3000.0))
+    assert small.too_large == 0
+    assert large.too_large == len(small.centers) - len(large.centers) > 0
+    assert len(ellipses(found, SPOTS, 3000.0, grid=False).centers) == len(SPOTS)
 
 
 def test_ellipses_follow_a_moved_reflector(bench: Bench) -> None:
