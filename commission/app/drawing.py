@@ -42,6 +42,12 @@ def stroke_segments(strokes: FloatArray, height: float) -> Points:
     return lift(strokes.reshape(-1, 2), height).reshape(-1, 2, 3) if len(strokes) else NO_SEGMENTS
 
 
+def crosses(places: FloatArray, size: float) -> FloatArray:
+    """Return the (2 N, 2, 2) strokes of a cross on each of N places [m]."""
+    arm = size * np.array([[(-1.0, -1.0), (1.0, 1.0)], [(-1.0, 1.0), (1.0, -1.0)]])
+    return (places[:, np.newaxis, np.newaxis] + arm).reshape(-1, 2, 2)
+
+
 def thinned(points: FloatArray, at_most: int) -> FloatArray:
     """Return about every k-th of (N, ...) points so that at most `at_most` remain; the last one always does."""
     if len(points) <= at_most:

@@ -20,6 +20,7 @@ from commission.app.layers.base import Layer
 from commission.app.layers.detections import DetectionLayer
 from commission.app.layers.events import EventLayer
 from commission.app.layers.failing import FailingLayer
+from commission.app.layers.fix_ellipses import FixEllipseLayer
 from commission.app.layers.floor import FloorLayer
 from commission.app.layers.gates import GateLayer
 from commission.app.layers.grid import GridLayer
@@ -58,6 +59,7 @@ LAYERS = (
     AmbiguityLayer,
     GridLayer,
     RouteLayer,
+    FixEllipseLayer,
     ViolationLayer,
     StationLayer,
     RibbonLayer,

@@ -9,11 +9,13 @@ from typing import Any
 from commission.app import actions
 from commission.app.actions import ParameterValue
 from commission.app.editing import site_reducer, station_reducer
+from commission.app.editing.editor import Tool
+from commission.app.editing.reducer import editor_of
 from commission.app.exchange import reducer as exchange_reducer
 from commission.app.mapping import reducer as map_reducer
 from commission.app.plan import layout_reducer
 from commission.app.plan import reducer as plan
-from commission.app.plan.actions import ReadFloor, SetPlan
+from commission.app.plan.actions import AlsoFails, ClearEllipses, ReadFloor, SetPlan
 from commission.app.reduction import (
     ApplyParameters,
     CancelJob,
@@ -262,4 +264,16 @@ def _(action: SetPlan, state: AppState) -> Reduction:
 
 @reduce.register
 def _(action: ReadFloor, state: AppState) -> Reduction:
+    if action.client is not None and editor_of(state, action.client).tool is not Tool.SELECT:
+        return Reduction(state)
     return Reduction(replace(state, plan=plan.clicked(action, state.plan, state.project)))
+
+
+@reduce.register
+def _(_action: ClearEllipses, state: AppState) -> Reduction:
+    return Reduction(replace(state, plan=replace(state.plan, spots=())))
+
+
+@reduce.register
+def _(action: AlsoFails, state: AppState) -> Reduction:
+    return Reduction(replace(state, plan=plan.also_fails(action, state.plan, state.project)))

@@ -194,6 +194,11 @@ class LiveCoverage:
         return self._coverage
 
     @property
+    def model(self) -> VisibilityModel:
+        """The current reflectors, scanner and walls; its shadow maps change with the next `move`."""
+        return self._model
+
+    @property
     def reflectors(self) -> ReflectorMap:
         """The current reflectors."""
         return self._model.reflectors

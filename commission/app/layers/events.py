@@ -47,7 +47,7 @@ def events(route: RouteView) -> tuple[Event, ...]:
     going_on = [(f"may go on at {m:.0f} m", float(m), theme.RECOVERY) for m in prediction.recoveries()]
     stations = [
         (
-            f"{each.station}: {1000 * each.two_sigma:.0f} of {1000 * each.required:.0f} mm"
+            f"{each.station}: {1000 * each.two_sigma:.1f} of {1000 * each.required:.0f} mm"
             f"{'' if each.is_met else ', not met'}",
             each.metre,
             theme.RECOVERY if each.is_met else theme.OVER_LIMIT,

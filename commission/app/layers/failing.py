@@ -1,4 +1,4 @@
-"""What fails with one reflector: a ring around it and the metres of the routes that depend on it."""
+"""What fails with one reflector: a ring around it, the metres that depend on it, crosses on what failed before."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app import theme
-from commission.app.drawing import NO_SEGMENTS, outline_segments, polyline_segments
+from commission.app.drawing import NO_SEGMENTS, crosses, outline_segments, polyline_segments, stroke_segments
 from commission.app.extent import extent_of
 from commission.app.layers.base import BaseLayer
 from commission.app.plan.view import FailureView, PlanView
@@ -29,11 +29,11 @@ class FailingLayer(BaseLayer):
         super().__init__(scene)
         self._mark = 0.1
         self._shown: FailureView | None = None
-        self._metres, self._ring = (
+        self._metres, self._ring, self._fallen = (
             scene.add_line_segments(
                 f"/plan/failing/{name}", NO_SEGMENTS, theme.DEPENDENT, thickness=width, thickness_units="screen"
             )
-            for name, width in (("metres", 8.0), ("ring", 3.0))
+            for name, width in (("metres", 8.0), ("ring", 3.0), ("fallen", 2.5))
         )
 
     def show_site(self, project: Project) -> None:
@@ -48,6 +48,8 @@ class FailingLayer(BaseLayer):
         lines = () if plan.failures is None else plan.failures.failing
         height = theme.Height.REFERENCE
         self._metres.points = np.concatenate([NO_SEGMENTS, *(polyline_segments(line, height) for line in lines)])
+        fallen = np.empty((0, 2)) if plan.failures is None else plan.failures.fallen_places
+        self._fallen.points = stroke_segments(crosses(fallen, 1.5 * self._mark), theme.Height.LABEL)
         place = None if plan.failures is None else plan.failures.place
         if place is None:
             self._ring.points = NO_SEGMENTS
@@ -57,9 +59,9 @@ class FailingLayer(BaseLayer):
         self._ring.points = outline_segments(circle[np.newaxis], theme.Height.LABEL)
 
     def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - the protocol's
-        """Whether a reflector's failure is shown."""
-        return plan.failures is not None and plan.failures.place is not None
+        """Whether a reflector's failure is shown, or one that came before."""
+        return plan.failures is not None and (plan.failures.place is not None or bool(plan.failures.fallen))
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
-        """Return ring and metres."""
-        return self._metres, self._ring
+        """Return ring, metres and crosses."""
+        return self._metres, self._ring, self._fallen

@@ -10,6 +10,7 @@ from commission.app.drawing import (
     NO_POINTS,
     NO_SEGMENTS,
     Points,
+    crosses,
     lift,
     outline_segments,
     polyline_segments,
@@ -28,12 +29,6 @@ RING_MARKS = 1.3
 """Radius of the ring around a new reflector, in sizes of a mark."""
 HATCH_MARKS = 8.0
 """Distance between the strokes in an area without reflectors, in sizes of a mark."""
-
-
-def crosses(places: FloatArray, size: float) -> FloatArray:
-    """Return the (2 N, 2, 2) strokes of a cross on each of N places [m]."""
-    arm = size * np.array([[(-1.0, -1.0), (1.0, 1.0)], [(-1.0, 1.0), (1.0, -1.0)]])
-    return (places[:, np.newaxis, np.newaxis] + arm).reshape(-1, 2, 2)
 
 
 def hatch(area: Rectangle, gap: float) -> FloatArray:

@@ -13,7 +13,7 @@ from commission.app.plan.cold_start import EVERY, SOME, TOO_FEW, UNIQUE
 from commission.app.plan.loads import BOUNDS, palette
 from commission.app.plan.scale import NO_FIX_COLORS
 from commission.app.plan.settings import Figure, PlanSettings
-from commission.app.plan.view import ColdStartView, HeatView, Reading, RouteView
+from commission.app.plan.view import ColdStartView, EllipseView, HeatView, Reading, RouteView
 from commission.app.plan.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES, number_text, value_text
 from commission.app.store import AppState
 from commission.app.view import PageView
@@ -40,6 +40,7 @@ class HeatLegend(BasePanel):
         heat, cold, route = view.plan.heat, view.plan.cold_start, view.plan.route
         content = "" if heat is None else heat_scale(heat, view.state)
         content += "" if cold is None or not cold.is_drawn else cold_start_scale(cold)
+        content += "" if view.plan.ellipses is None or heat is None else ellipse_note(view.plan.ellipses)
         content += "" if view.plan.reading is None else reading_table(view.plan.reading, view.state.plan)
         content += "" if route is None else load_scale(route)
         if content != self._shown:
@@ -72,6 +73,16 @@ def heat_scale(heat: HeatView, state: AppState) -> str:
     if heat.outdated:
         lines.append("<div class='c-note'>computing anew …</div>")
     return head + "".join(lines)
+
+
+def ellipse_note(found: EllipseView) -> str:
+    """Say how much larger than they are the ellipses on the heatmap are drawn."""
+    if not len(found.centers) and not found.without_fix and not found.too_large:
+        return ""
+    left_out = [f"{found.without_fix} places without a fix"] if found.without_fix else []
+    left_out += [f"{found.too_large} too large for the grid"] if found.too_large else []
+    note = f"; left out: {', '.join(left_out)}" if left_out else ""
+    return f"<div class='c-note'>ellipses: 1σ of a fix, drawn {found.factor:g}x{note}</div>"
 
 
 def cold_start_scale(cold: ColdStartView) -> str:

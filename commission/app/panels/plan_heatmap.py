@@ -6,14 +6,17 @@ import math
 
 from viser import GuiApi
 
-from commission.app.panels.base import BasePanel, Post
+from commission.app.panels.base import BasePanel, Post, posting
 from commission.app.panels.inputs import Inputs, WorkBar, show
-from commission.app.plan.actions import SetPlan
+from commission.app.plan.actions import ClearEllipses, SetPlan
 from commission.app.plan.planner import COVERAGE
 from commission.app.plan.settings import Figure
 from commission.app.plan.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES
 from commission.app.view import PageView
 from commission.planning.dilution import Heading, Measurement
+
+FACTORS = (1.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
+"""Factors at which ellipses can be drawn."""
 
 
 class HeatmapPanel(BasePanel):
@@ -39,10 +42,27 @@ class HeatmapPanel(BasePanel):
         hint = "Beams that must hit a reflector for certain, so that it passes the detector filter (equation 3)."
         inputs.count("min_beams", gui.add_number("Beams at least", 1, min=1, max=20, step=1, hint=hint))
 
+        with gui.add_folder("Ellipses of a fix", expand_by_default=False):
+            self._add_ellipses(gui, post)
+
+    def _add_ellipses(self, gui: GuiApi, post: Post) -> None:
+        note = "Each click on the heatmap leaves the 1σ ellipse of a fix there."
+        gui.add_html(f"<div class='c-note' style='padding:2px 6px'>{note}</div>")
+        self._inputs.switch("ellipse_grid", "On a grid", "Ellipses all over the floor, too.")
+        meant = {f"{factor:g}x": factor for factor in FACTORS}
+        hint = "Factor at which the ellipses are drawn; true to scale is 1x."
+        drawn = gui.add_dropdown("Drawn", tuple(meant), hint=hint)
+        self._inputs.connect(
+            "ellipse_factor", drawn, lambda text: meant[text], lambda state: f"{state.plan.ellipse_factor:g}x"
+        )
+        self._clear = gui.add_button("Clear", color="gray", hint="Drop the ellipses of clicks.")
+        self._clear.on_click(posting(post, lambda _event: ClearEllipses()))
+
     def draw_slowly(self, view: PageView) -> None:
         """Follow settings and progress."""
         plan = view.state.plan
         self._inputs.follow(view.state)
         self._work.follow(view)
+        self._clear.disabled = not plan.spots
         show(self._given, visible=plan.heading is Heading.GIVEN)
         show(self._odometry, visible=plan.measurement is Measurement.RANGE_BEARING_PRIOR)

@@ -28,6 +28,21 @@ class ReadFloor:
     """Where it was clicked [m], map frame."""
     reach: float
     """How near to a reflector counts as on it [m]: some pixels at the browser's zoom."""
+    client: int | None = None
+    """Number of the browser's connection; none: nobody in particular."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClearEllipses:
+    """Drop the ellipses that were asked for by clicks."""
+
+
+@dataclass(frozen=True, slots=True)
+class AlsoFails:
+    """Let a reflector fail beside those that have failed already, and rank the others again."""
+
+    name: str
+    """Its id."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,5 +102,15 @@ class AcceptLayout:
 
 
 PlanAction: TypeAlias = (
-    SetPlan | ReadFloor | SetLayout | CountRoute | KeepOut | FreeAreas | AskLayout | DiscardLayout | AcceptLayout
+    SetPlan
+    | ReadFloor
+    | ClearEllipses
+    | AlsoFails
+    | SetLayout
+    | CountRoute
+    | KeepOut
+    | FreeAreas
+    | AskLayout
+    | DiscardLayout
+    | AcceptLayout
 )

@@ -83,14 +83,23 @@ def failure_view(ranked: Ranked, failed: str, *, outdated: bool) -> FailureView:
     reflectors = ranked.reflectors
     names = tuple(reflectors.reflectors[each.reflector].id for each in ranked.ranking)
     chosen = ranked.ranking[names.index(failed)] if failed in names else None
-    place, failing = None, list[FloatArray]()
+    places = {reflector.id: (reflector.x, reflector.y) for reflector in reflectors.reflectors}
+    failing = list[FloatArray]()
     if chosen is not None:
-        reflector = reflectors.reflectors[chosen.reflector]
-        place = (reflector.x, reflector.y)
         for planned, part in zip(ranked.planned, chosen.routes, strict=True):
             fails = np.isin(planned.drive.metres.astype(np.int64), part.metres)
             failing.extend(stretches(planned.drive.poses[:, :2], fails))
-    return FailureView(ranked.ranking, names, chosen, place, tuple(failing), outdated)
+    return FailureView(
+        ranked.ranking,
+        names,
+        tuple(reflectors.reflectors[index].id for index in ranked.fallen),
+        reflectors.centers[list(ranked.fallen)],
+        failed,
+        chosen,
+        places.get(failed),
+        tuple(failing),
+        outdated,
+    )
 
 
 def cold_start_view(ambiguity: Ambiguity, plan: PlanSettings, *, outdated: bool) -> ColdStartView:

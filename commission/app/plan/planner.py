@@ -13,14 +13,15 @@ from commission.app.editing.gestures import moved
 from commission.app.jobs import JobReport, Jobs
 from commission.app.plan import work
 from commission.app.plan.cold_start import Ambiguity, look_alike
-from commission.app.plan.keys import changed_reflectors, cold_start_key, floor_key, ranking_key, route_key
+from commission.app.plan.ellipses import ellipses
+from commission.app.plan.keys import changed_reflectors, cold_start_key, floor_key, ranking_key, route_key, site_key
 from commission.app.plan.layout import Suggestion, suggest
 from commission.app.plan.looks import cold_start_view, failure_view, heat_view, layout_view, reading_of, route_view
 from commission.app.plan.remembered import Remembered
 from commission.app.plan.scale import Scale, scale_for
 from commission.app.plan.settings import PlanSettings
 from commission.app.plan.upkeep import Upkeep, is_same
-from commission.app.plan.view import ColdStartView, FailureView, HeatView, LayoutView, PlanView, RouteView
+from commission.app.plan.view import ColdStartView, EllipseView, FailureView, HeatView, LayoutView, PlanView, RouteView
 from commission.app.plan.work import Covered, Predicted, Ranked
 from commission.app.store import AppState
 from commission.site.project import Project
@@ -49,6 +50,7 @@ class Planner:
         self._layout = Upkeep(LAYOUT, Suggestion, patient)
         self._scale: Scale | None = None
         self._view = PlanView()
+        self._ellipse_view = Remembered[EllipseView]()
         self._route_view = Remembered[RouteView]()
         self._failure_view = Remembered[FailureView]()
         self._cold_start_view = Remembered[ColdStartView]()
@@ -133,7 +135,10 @@ class Planner:
     def _keep_ranking(self, project: Project, plan: PlanSettings) -> None:
         """Rank once; after an edit the ranking is outdated until it is asked for again, since it takes long."""
         if self._ranking.result is None or self._ranking.key[-2:] != (plan.failure.value, plan.ranking):
-            self._ranking.keep(ranking_key(project, plan), lambda progress: work.rank(project, plan, progress))
+            before = self._ranking.result
+            still = before is not None and is_same(self._ranking.key[:-2], site_key(project, plan))
+            planned = before.planned if before is not None and still else None
+            self._ranking.keep(ranking_key(project, plan), lambda progress: work.rank(project, plan, progress, planned))
 
     def _keep_patiently(self, state: AppState) -> None:
         """Do what takes long once: other wishes and other sites wait until it is asked for again."""
@@ -157,24 +162,28 @@ class Planner:
         old_ranking = not is_same(self._ranking.key[:-1], ranking_key(project, plan)[:-1])
         old_places = not is_same(self._cold_start.key[1:], cold_start_key(project, plan))
         return PlanView(
-            None if covered is None or not plan.figure else self._heat(covered, floor, plan),
-            None if covered is None or plan.probe is None else reading_of(covered, plan.probe),
-            self._route_view.of(
+            heat=None if covered is None or not plan.figure else self._heat(covered, floor, plan),
+            reading=None if covered is None or plan.probe is None else reading_of(covered, plan.probe),
+            ellipses=self._ellipse_view.of(
+                (covered, self._moves, plan.spots, plan.ellipse_grid, plan.ellipse_factor),
+                lambda: covered and ellipses(covered, plan.spots, plan.ellipse_factor, grid=plan.ellipse_grid),
+            ),
+            route=self._route_view.of(
                 (predicted, old_route), lambda: predicted and route_view(predicted, outdated=old_route)
             ),
-            self._failure_view.of(
+            failures=self._failure_view.of(
                 (ranked, plan.failed, old_ranking),
                 lambda: ranked and failure_view(ranked, plan.failed, outdated=old_ranking),
             ),
-            self._cold_start_view.of(
+            cold_start=self._cold_start_view.of(
                 (ambiguity, plan.pair, bool(plan.figure), old_places),
                 lambda: ambiguity and cold_start_view(ambiguity, plan, outdated=old_places),
             ),
-            self._layout_view.of(
+            layout=self._layout_view.of(
                 (suggestion, project, state.layout),
                 lambda: suggestion and layout_view(suggestion, project, state.layout),
             ),
-            any(each.is_running for each in self._all()),
+            waiting=any(each.is_running for each in self._all()),
         )
 
     def _heat(self, covered: Covered, floor: Project, plan: PlanSettings) -> HeatView:

@@ -15,6 +15,6 @@ def read_clicks(server: ViserServer, post: Post) -> None:
     def clicked(event: SceneClickEvent) -> None:
         place = on_floor(event.ray_origin, event.ray_direction)
         if place is not None:
-            post(ReadFloor(place, reach_of(event.client)))
+            post(ReadFloor(place, reach_of(event.client), event.client_id))
 
     server.scene.on_click()(clicked)

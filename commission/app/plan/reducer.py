@@ -6,9 +6,8 @@ import dataclasses
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from commission.app.plan.actions import ReadFloor, SetPlan
+from commission.app.editing.gestures import reflector_at
+from commission.app.plan.actions import AlsoFails, ReadFloor, SetPlan
 from commission.app.plan.settings import Figure, PlanSettings
 from commission.errors import UsageError
 from commission.planning.dependence import Failure
@@ -22,6 +21,8 @@ CHOICES: dict[str, type[Figure] | type[Heading] | type[Measurement] | type[Failu
     "failure": Failure,
 }
 
+MOST_SPOTS = 60
+"""Ellipses that are kept: nobody tells more apart."""
 COUNTED = ("ranking", "cold_start")
 """Settings that are requests: each true value is one more."""
 
@@ -50,15 +51,33 @@ def changed(action: SetPlan, plan: PlanSettings, project: Project) -> PlanSettin
         changes["pair"] = -1
     if action.name == "failure" or (action.name == "ranking" and not action.value):
         changes["failed"] = ""
+    if action.name == "ranking":
+        changes["fallen"] = ()
     return replace(plan, **changes)
 
 
 def clicked(action: ReadFloor, plan: PlanSettings, project: Project) -> PlanSettings:
-    """Return the settings after a click: on a ranked reflector it asks for its dependents, elsewhere for values."""
-    reflectors = project.reflectors
-    if plan.ranking and len(reflectors):
-        distances = np.hypot(*(reflectors.centers - action.place).T)
-        nearest = int(np.argmin(distances))
-        if distances[nearest] <= action.reach:
-            return replace(plan, failed=reflectors.reflectors[nearest].id)
-    return replace(plan, probe=action.place if plan.figure else None)
+    """Return the settings after a click: on a ranked reflector it asks for its dependents, elsewhere for values.
+
+    Where there is a heatmap, each click beside the reflectors leaves an ellipse.
+    """
+    reflector = reflector_at(project.reflectors, action.place, action.reach)
+    if plan.ranking and reflector is not None:
+        return replace(plan, failed=reflector)
+    if not plan.figure:
+        return replace(plan, probe=None)
+    spots = plan.spots if reflector is not None else (*plan.spots, action.place)[-MOST_SPOTS:]
+    return replace(plan, probe=action.place, spots=spots)
+
+
+def also_fails(action: AlsoFails, plan: PlanSettings, project: Project) -> PlanSettings:
+    """Return the settings with one more failure to go on from.
+
+    Raises
+    ------
+    UsageError
+        there is no such reflector.
+    """
+    if all(reflector.id != action.name for reflector in project.reflectors.reflectors):
+        raise UsageError(f"no reflector is called {action.name!r}")
+    return replace(plan, fallen=(*plan.fallen, action.name), failed="", ranking=plan.ranking + 1)

@@ -53,12 +53,20 @@ class PlanSettings:
     """Beams that a reflector must get for certain to count as visible [beams]."""
     probe: Place | None = None
     """Where the floor was clicked last [m]; its values are read out."""
+    spots: tuple[Place, ...] = ()
+    """Where ellipses of a fix were asked for [m]."""
+    ellipse_grid: bool = False
+    """Whether ellipses are drawn on a coarse grid, too."""
+    ellipse_factor: float = 100.0
+    """Factor at which ellipses of a fix are drawn [1..10000]."""
     route: str = ""
     """Route whose prediction is shown; empty: none."""
     failure: Failure = Failure.BLOCKED
     """What happens to each reflector in turn."""
     ranking: int = 0
     """Number of times a ranking by what depends on each reflector was asked for; 0: it is not wanted."""
+    fallen: tuple[str, ...] = ()
+    """Ids of reflectors that have failed already when the others are ranked, in the order of failing."""
     failed: str = ""
     """Id of the reflector whose failure is shown on the floor; empty: none."""
 
@@ -71,6 +79,7 @@ class PlanSettings:
 
     def __post_init__(self) -> None:
         above(self.tolerance, 0.0, "tolerance", "m")
+        between(self.ellipse_factor, (1.0, 1e4), "magnification of ellipses")
         between(self.opacity, (0.0, 1.0), "opacity")
         between(self.blocked_per_m, (0.0, 1.0), "blocked", "per metre")
         above(self.on_odometry, 0.0, "way on odometry", "m")

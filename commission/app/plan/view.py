@@ -50,6 +50,22 @@ class HeatView:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class EllipseView:
+    """Ellipses of a fix."""
+
+    centers: FloatArray
+    """(N, 2) where [m], map frame."""
+    covariances: FloatArray
+    """(N, 2, 2) of the position [m^2]."""
+    factor: float
+    """At which they are drawn."""
+    without_fix: int
+    """Number of chosen points where there is no fix, and so no ellipse."""
+    too_large: int
+    """Number of those on the grid that would hide the others, and are not drawn."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class RiskView:
     """A reflector that may be taken for a neighbor inside its gate."""
 
@@ -97,10 +113,16 @@ class FailureView:
     """The one on which most depends first."""
     names: tuple[str, ...]
     """Id of the reflector of each."""
+    fallen: tuple[str, ...]
+    """Ids of those that have failed before, in their order."""
+    fallen_places: FloatArray
+    """(N, 2) where they stand [m]."""
+    failed: str
+    """Id of the reflector that is shown on the floor; empty: none."""
     chosen: Dependence | None
-    """The one that is shown on the floor."""
+    """What depends on it; none when no route sees it."""
     place: tuple[float, float] | None
-    """Where the chosen reflector stands [m]."""
+    """Where it stands [m]."""
     failing: tuple[FloatArray, ...]
     """Stretches of the routes that fail with it, (N, 2) points each [m]."""
     outdated: bool
@@ -151,6 +173,8 @@ class PlanView:
     """The heatmap."""
     reading: Reading | None = None
     """Values at the place that was clicked."""
+    ellipses: EllipseView | None = None
+    """Ellipses on the heatmap."""
     route: RouteView | None = None
     """The prediction."""
     failures: FailureView | None = None

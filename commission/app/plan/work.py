@@ -13,7 +13,13 @@ from commission.planning.association_risk import NeighborRisk, neighbor_risks
 from commission.planning.coverage import Lattice, LiveCoverage, lattice_of
 from commission.planning.dependence import Dependence, FailureOptions
 from commission.planning.dilution import FixOptions, fix_options, odometry_prior
-from commission.planning.route_prediction import PlannedRoute, PredictionOptions, RoutePrediction, StationAccuracy
+from commission.planning.route_prediction import (
+    Damage,
+    PlannedRoute,
+    PredictionOptions,
+    RoutePrediction,
+    StationAccuracy,
+)
 from commission.planning.visibility import VisibilityModel, VisibilityOptions, visibility_model
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -61,6 +67,8 @@ class Ranked:
     """The reflectors that were ranked."""
     planned: tuple[PlannedRoute, ...]
     """The routes, in the order of each dependence's parts."""
+    fallen: tuple[int, ...]
+    """Indices of the reflectors that have failed before, in their order."""
     ranking: tuple[Dependence, ...]
     """The one on which most depends first."""
 
@@ -119,19 +127,37 @@ def predict(project: Project, settings: PlanSettings, progress: Progress) -> Pre
     )
 
 
-def rank(project: Project, settings: PlanSettings, progress: Progress) -> Ranked:
-    """Let each reflector in turn fail on every route."""
+def rank(
+    project: Project, settings: PlanSettings, progress: Progress, planned: tuple[PlannedRoute, ...] | None = None
+) -> Ranked:
+    """Let each reflector in turn fail on every route, beside those that have failed already.
+
+    Parameters
+    ----------
+    project, settings : the site, and which failure.
+    progress : told how far it is.
+    planned : the routes of this very site, where they are at hand.
+    """
     progress(0.0, "compiling")
     route_prediction.warm_up()
-    progress(0.05, "sight of each reflector")
+    planned = planned or _planned(project, settings, _part(progress, 0.05, 0.3))
+    names = [reflector.id for reflector in project.reflectors.reflectors]
+    blocked = tuple(names.index(name) for name in settings.fallen if name in names)
+    options = FailureOptions(settings.failure, given=Damage(blocked=blocked))
+    ranking = dependence.dependences(planned, options, _part(progress, 0.3, 1.0))
+    return Ranked(project.reflectors, planned, blocked, ranking)
+
+
+def _planned(project: Project, settings: PlanSettings, progress: Progress) -> tuple[PlannedRoute, ...]:
+    """Plan all routes of a site."""
+    progress(0.0, "sight of each reflector")
     options = PredictionOptions(blocked_per_m=settings.blocked_per_m)
     model = _model(project, settings)
     planned: list[PlannedRoute] = []
     for number, route in enumerate(project.routes):
-        progress(0.1 + 0.2 * number / len(project.routes), "routes")
+        progress(0.2 + 0.8 * number / len(project.routes), "routes")
         planned.append(route_prediction.plan_route(project, route.name, options, model))
-    ranking = dependence.dependences(planned, FailureOptions(settings.failure), _part(progress, 0.3, 1.0))
-    return Ranked(project.reflectors, tuple(planned), ranking)
+    return tuple(planned)
 
 
 def _model(project: Project, settings: PlanSettings) -> VisibilityModel:

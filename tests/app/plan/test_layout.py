@@ -8,9 +8,10 @@ import pytest
 
 from commission.app import reducer
 from commission.app.actions import Action, Undo
+from commission.app.drawing import crosses
 from commission.app.editing.actions import ChooseTool, ClickFloor, DragFloor
 from commission.app.editing.editor import Tool
-from commission.app.layers.suggestion import crosses, hatch
+from commission.app.layers.suggestion import hatch
 from commission.app.panels.plan_layout import found_text
 from commission.app.plan.actions import (
     AcceptLayout,
