@@ -12,7 +12,7 @@ from commission.app.editing.station_gestures import grabbed_of_station, station_
 from commission.geometry import se2
 from commission.geometry.occupancy import OccupancyGrid
 from commission.site.editing import reflectors as edits
-from commission.site.editing.snapping import align, nearest_wall, on_wall, to_grid
+from commission.site.editing.snapping import align, nearest_corner, nearest_wall, on_wall, to_grid
 from commission.site.floor_map import OCCUPIED, FloorMap
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
@@ -60,6 +60,13 @@ def walls_near(floor_map: FloorMap, place: Point, reach: float) -> OccupancyGrid
         floor_map.resolution,
         se2.compose(floor_map.origin, corner),
     )
+
+
+def corner_at(project: Project, place: Point, reach: float) -> Point | None:
+    """Return the nearest corner of a wall within reach [m] of a place; none when there is none."""
+    grid = None if project.floor_map is None else walls_near(project.floor_map, place, reach)
+    corner = None if grid is None else nearest_corner(grid, place, reach)
+    return None if corner is None else (float(corner[0]), float(corner[1]))
 
 
 def snapped(project: Project, reflector: Reflector, editor: Editor, ignored: tuple[str, ...] = ()) -> Reflector:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from commission.app.editing import actions
 from commission.app.editing.editor import Drag, Editor, Grab, Tool
 from commission.app.editing.gestures import (
+    corner_at,
     grabbed,
     moved,
     reflector_at,
@@ -148,12 +149,17 @@ def _placed(state: AppState, editor: Editor, action: actions.ClickFloor) -> Redu
 
 
 def _on_something(state: AppState, editor: Editor, action: actions.ClickFloor) -> tuple[float, float]:
-    """Return the center of the reflector that was clicked, or the place itself."""
-    found = reflector_at(state.project.reflectors, action.place, editor.reach)
-    if found is None:
-        return action.place
-    hit = next(r for r in state.project.reflectors.reflectors if r.id == found)
-    return hit.x, hit.y
+    """Return the center of the reflector or station, or the corner, that was clicked; else the place itself."""
+    project = state.project
+    found = reflector_at(project.reflectors, action.place, editor.reach)
+    if found is not None:
+        hit = next(r for r in project.reflectors.reflectors if r.id == found)
+        return hit.x, hit.y
+    name = station_at(project, action.place, editor.reach)
+    if name is not None:
+        station = next(station for station in project.stations if station.name == name)
+        return station.x, station.y
+    return corner_at(project, action.place, editor.reach) or action.place
 
 
 @reduce.register
