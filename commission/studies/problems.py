@@ -14,11 +14,16 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from commission.geometry.angles import difference
 from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
 from commission.planning.route_check import FloorDistances, Way, outline_points, room_along
+from commission.planning.route_prediction import AT_STATION, FACING_STATION
+from commission.site.editing.stations import on_route
 from commission.site.project import Project
 from commission.site.reflectors import Reflector
+from commission.site.routes import Route
+from commission.site.stations import Station
 from commission.studies.violations import Violation, ViolationKind, route_violations
 
 MOST_OF_A_KIND = 50
@@ -78,6 +83,18 @@ class CheckLimits:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Passed:
+    """Stations that are passed, of one state of routes and stations."""
+
+    routes: tuple[Route, ...]
+    """The routes."""
+    stations: tuple[Station, ...]
+    """The stations."""
+    names: frozenset[str]
+    """Names of the stations that a route passes, near enough and looking their way."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Findings:
     """Problems of a project, and what the next check needs not find again."""
 
@@ -91,6 +108,8 @@ class Findings:
     """What was expected."""
     by_route: tuple[tuple[Violation, ...], ...]
     """Where each of its routes asks too much."""
+    passed: Passed
+    """Which of its stations its routes pass."""
 
 
 def find_problems(
@@ -117,17 +136,19 @@ def find_problems(
         known[id(route)] if id(route) in known else route_violations(route, project.vehicle, floor, limits.clearance)
         for route in project.routes
     )
+    passed = _passed(project, None if previous is None else previous.passed)
     found = [
         *_map_problems(project, floor),
         *_scanner_problems(project),
         *_close_reflectors(project),
         *_reflectors_and_walls(project, floor),
         *_station_problems(project, floor),
+        *_missed_stations(project, passed),
         *(problem for violations in by_route for problem in route_problems(violations)),
     ]
     order = list(Severity)
     found.sort(key=lambda problem: order.index(problem.severity))
-    return Findings(tuple(found), project, floor, limits, by_route)
+    return Findings(tuple(found), project, floor, limits, by_route, passed)
 
 
 def route_problems(violations: Iterable[Violation]) -> Iterable[Problem]:
@@ -324,6 +345,40 @@ def _limited(found: Iterable[Problem], count: int | None = None) -> list[Problem
         )
         return [*problems[:MOST_OF_A_KIND], rest]
     return problems
+
+
+def _passed(project: Project, before: Passed | None) -> Passed:
+    """Look which stations are passed, unless that is known."""
+    routes, stations = project.routes, project.stations
+    if before is not None and before.routes is routes and before.stations is stations:
+        return before
+    names = {station.name for station in stations if any(_passes(route, station) for route in routes)}
+    return Passed(routes, stations, frozenset(names))
+
+
+def _passes(route: Route, station: Station) -> bool:
+    """Whether one of a route's segments comes by where prediction and report will look at the station."""
+    for segment in route.segments:
+        pose = on_route((Route(route.name, (segment,)),), (station.x, station.y), AT_STATION)
+        if pose is not None and abs(float(difference(pose[2], station.heading))) < FACING_STATION:
+            return True
+    return False
+
+
+def _missed_stations(project: Project, passed: Passed) -> Iterable[Problem]:
+    """Stations whose accuracy nobody checks, since no route passes them."""
+    return _limited(
+        Problem(
+            Severity.WARNING,
+            f"Station {station.name!r}: no route passes it; expected one within {1000 * AT_STATION:.0f} mm that looks "
+            f"its way to {math.degrees(FACING_STATION):.0f} deg, else its accuracy is not checked",
+            Subject.STATION,
+            (station.name,),
+            (station.x, station.y),
+        )
+        for station in project.stations
+        if station.name not in passed.names
+    )
 
 
 def _inside(point: FloatArray, outline: FloatArray) -> bool:
