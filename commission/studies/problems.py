@@ -19,12 +19,10 @@ from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
 from commission.planning.route_check import FloorDistances, Way, outline_points, room_along
 from commission.planning.route_prediction import AT_STATION, FACING_STATION
-from commission.site.editing.stations import on_route
 from commission.site.project import Project
 from commission.site.reflectors import Reflector
-from commission.site.routes import Route
 from commission.site.stations import Station
-from commission.studies.violations import Violation, ViolationKind, route_violations
+from commission.studies.violations import CheckedRoute, Violation, ViolationKind, check_route
 
 MOST_OF_A_KIND = 50
 """Problems of one kind that are listed; the rest is counted."""
@@ -86,7 +84,7 @@ class CheckLimits:
 class Passed:
     """Stations that are passed, of one state of routes and stations."""
 
-    routes: tuple[Route, ...]
+    routes: tuple[CheckedRoute, ...]
     """The routes."""
     stations: tuple[Station, ...]
     """The stations."""
@@ -106,8 +104,8 @@ class Findings:
     """Its walls."""
     limits: CheckLimits
     """What was expected."""
-    by_route: tuple[tuple[Violation, ...], ...]
-    """Where each of its routes asks too much."""
+    by_route: tuple[CheckedRoute, ...]
+    """Each of its routes."""
     passed: Passed
     """Which of its stations its routes pass."""
 
@@ -129,14 +127,14 @@ def find_problems(
     """
     limits = limits or CheckLimits()
     floor = floor if floor is not None and floor.floor_map is project.floor_map else None
-    known: dict[int, tuple[Violation, ...]] = {}
+    known: dict[int, CheckedRoute] = {}
     if previous is not None and _same_conditions(previous, project, floor, limits):
         known = dict(zip(map(id, previous.project.routes), previous.by_route, strict=True))
     by_route = tuple(
-        known[id(route)] if id(route) in known else route_violations(route, project.vehicle, floor, limits.clearance)
+        known[id(route)] if id(route) in known else check_route(route, project.vehicle, floor, limits.clearance)
         for route in project.routes
     )
-    passed = _passed(project, None if previous is None else previous.passed)
+    passed = _passed(project.stations, by_route, None if previous is None else previous.passed)
     found = [
         *_map_problems(project, floor),
         *_scanner_problems(project),
@@ -144,7 +142,7 @@ def find_problems(
         *_reflectors_and_walls(project, floor),
         *_station_problems(project, floor),
         *_missed_stations(project, passed),
-        *(problem for violations in by_route for problem in route_problems(violations)),
+        *(problem for route in by_route for problem in route_problems(route.violations)),
     ]
     order = list(Severity)
     found.sort(key=lambda problem: order.index(problem.severity))
@@ -347,22 +345,21 @@ def _limited(found: Iterable[Problem], count: int | None = None) -> list[Problem
     return problems
 
 
-def _passed(project: Project, before: Passed | None) -> Passed:
+def _passed(stations: tuple[Station, ...], routes: tuple[CheckedRoute, ...], before: Passed | None) -> Passed:
     """Look which stations are passed, unless that is known."""
-    routes, stations = project.routes, project.stations
-    if before is not None and before.routes is routes and before.stations is stations:
+    if before is not None and before.stations is stations and before.routes == routes:
         return before
-    names = {station.name for station in stations if any(_passes(route, station) for route in routes)}
+    names: set[str] = set()
+    if stations:
+        from scipy.spatial import KDTree
+
+        wanted = np.array([station.pose for station in stations])
+        for route in routes:
+            near = KDTree(route.poses[:, :2]).query_ball_point(wanted[:, :2], AT_STATION)
+            for station, heading, indices in zip(stations, wanted[:, 2], near, strict=True):
+                if np.any(np.abs(difference(route.poses[indices, 2], heading)) < FACING_STATION):
+                    names.add(station.name)
     return Passed(routes, stations, frozenset(names))
-
-
-def _passes(route: Route, station: Station) -> bool:
-    """Whether one of a route's segments comes by where prediction and report will look at the station."""
-    for segment in route.segments:
-        pose = on_route((Route(route.name, (segment,)),), (station.x, station.y), AT_STATION)
-        if pose is not None and abs(float(difference(pose[2], station.heading))) < FACING_STATION:
-            return True
-    return False
 
 
 def _missed_stations(project: Project, passed: Passed) -> Iterable[Problem]:

@@ -193,7 +193,7 @@ def test_only_what_changed_is_checked_again_with_the_same_result(monkeypatch):
     moved = replace(SITE, routes=(routes[0], line((1.5, 6), (4.5, 6), name="b")))
     again = find_problems(moved, FLOOR, before)
     assert again.problems == find_problems(moved, FLOOR).problems
-    monkeypatch.setattr("commission.studies.problems.route_violations", None)
+    monkeypatch.setattr("commission.studies.problems.check_route", None)
     assert find_problems(replace(moved, name="x"), FLOOR, again).problems == again.problems
     with pytest.raises(TypeError):
         find_problems(replace(moved, vehicle=TricycleVehicle()), FLOOR, again)
