@@ -74,7 +74,7 @@ class Inspection:
             return False
         if self._check.hear(report) and self._check.result is not None:
             self.problems = self._check.result.problems
-            self.violations = tuple(violation for found in self._check.result.by_route for violation in found)
+            self.violations = tuple(found for route in self._check.result.by_route for found in route.violations)
         if self._profile.hear(report) and self._profile.result is not None:
             profiles = self._profile.result
             named = zip(profiles.routes, profiles.profiles, strict=True)

@@ -116,7 +116,11 @@ def _is_anothers(step: Step, client: int | None, state: AppState) -> bool:
 
 
 def _in_the_way(step: Step, what: str) -> Tell:
-    return Tell(f"nothing to {what} here: the last edit, {step.name}, is browser {step.client}'s own", failed=False)
+    return Tell(
+        f"nothing to {what} here: the newest step, {step.name}, is that of browser {step.client}; "
+        f"{what} it there, or here once that browser is closed",
+        failed=False,
+    )
 
 
 @reduce.register

@@ -14,12 +14,15 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from commission.geometry.angles import difference
 from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
 from commission.planning.route_check import FloorDistances, Way, outline_points, room_along
+from commission.planning.route_prediction import AT_STATION, FACING_STATION
 from commission.site.project import Project
 from commission.site.reflectors import Reflector
-from commission.studies.violations import Violation, ViolationKind, route_violations
+from commission.site.stations import Station
+from commission.studies.violations import CheckedRoute, Violation, ViolationKind, check_route
 
 MOST_OF_A_KIND = 50
 """Problems of one kind that are listed; the rest is counted."""
@@ -78,6 +81,18 @@ class CheckLimits:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Passed:
+    """Stations that are passed, of one state of routes and stations."""
+
+    routes: tuple[CheckedRoute, ...]
+    """The routes."""
+    stations: tuple[Station, ...]
+    """The stations."""
+    names: frozenset[str]
+    """Names of the stations that a route passes, near enough and looking their way."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Findings:
     """Problems of a project, and what the next check needs not find again."""
 
@@ -89,8 +104,10 @@ class Findings:
     """Its walls."""
     limits: CheckLimits
     """What was expected."""
-    by_route: tuple[tuple[Violation, ...], ...]
-    """Where each of its routes asks too much."""
+    by_route: tuple[CheckedRoute, ...]
+    """Each of its routes."""
+    passed: Passed
+    """Which of its stations its routes pass."""
 
 
 def find_problems(
@@ -110,24 +127,26 @@ def find_problems(
     """
     limits = limits or CheckLimits()
     floor = floor if floor is not None and floor.floor_map is project.floor_map else None
-    known: dict[int, tuple[Violation, ...]] = {}
+    known: dict[int, CheckedRoute] = {}
     if previous is not None and _same_conditions(previous, project, floor, limits):
         known = dict(zip(map(id, previous.project.routes), previous.by_route, strict=True))
     by_route = tuple(
-        known[id(route)] if id(route) in known else route_violations(route, project.vehicle, floor, limits.clearance)
+        known[id(route)] if id(route) in known else check_route(route, project.vehicle, floor, limits.clearance)
         for route in project.routes
     )
+    passed = _passed(project.stations, by_route, None if previous is None else previous.passed)
     found = [
         *_map_problems(project, floor),
         *_scanner_problems(project),
         *_close_reflectors(project),
         *_reflectors_and_walls(project, floor),
         *_station_problems(project, floor),
-        *(problem for violations in by_route for problem in route_problems(violations)),
+        *_missed_stations(project, passed),
+        *(problem for route in by_route for problem in route_problems(route.violations)),
     ]
     order = list(Severity)
     found.sort(key=lambda problem: order.index(problem.severity))
-    return Findings(tuple(found), project, floor, limits, by_route)
+    return Findings(tuple(found), project, floor, limits, by_route, passed)
 
 
 def route_problems(violations: Iterable[Violation]) -> Iterable[Problem]:
@@ -324,6 +343,39 @@ def _limited(found: Iterable[Problem], count: int | None = None) -> list[Problem
         )
         return [*problems[:MOST_OF_A_KIND], rest]
     return problems
+
+
+def _passed(stations: tuple[Station, ...], routes: tuple[CheckedRoute, ...], before: Passed | None) -> Passed:
+    """Look which stations are passed, unless that is known."""
+    if before is not None and before.stations is stations and before.routes == routes:
+        return before
+    names: set[str] = set()
+    if stations:
+        from scipy.spatial import KDTree
+
+        wanted = np.array([station.pose for station in stations])
+        for route in routes:
+            near = KDTree(route.poses[:, :2]).query_ball_point(wanted[:, :2], AT_STATION)
+            for station, heading, indices in zip(stations, wanted[:, 2], near, strict=True):
+                if np.any(np.abs(difference(route.poses[indices, 2], heading)) < FACING_STATION):
+                    names.add(station.name)
+    return Passed(routes, stations, frozenset(names))
+
+
+def _missed_stations(project: Project, passed: Passed) -> Iterable[Problem]:
+    """Stations whose accuracy nobody checks, since no route passes them."""
+    return _limited(
+        Problem(
+            Severity.WARNING,
+            f"Station {station.name!r}: no route passes it; expected one within {1000 * AT_STATION:.0f} mm that looks "
+            f"its way to {math.degrees(FACING_STATION):.0f} deg, else its accuracy is not checked",
+            Subject.STATION,
+            (station.name,),
+            (station.x, station.y),
+        )
+        for station in project.stations
+        if station.name not in passed.names
+    )
 
 
 def _inside(point: FloatArray, outline: FloatArray) -> bool:

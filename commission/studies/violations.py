@@ -73,6 +73,16 @@ class Violation:
     """Whether the vehicle cannot drive it at all."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class CheckedRoute:
+    """One route as it was looked along."""
+
+    poses: FloatArray
+    """(N, 3) `T_map_base` along it, at most `route_check.STEP` apart [m, m, rad]."""
+    violations: tuple[Violation, ...]
+    """One for each stretch: curves, corners, walls, little room, each in order of driving."""
+
+
 class _Walk(NamedTuple):
     """A way with its length."""
 
@@ -86,9 +96,7 @@ class _Walk(NamedTuple):
         return Stretch(self.way.poses[first : last + 1], metres, worst - first)
 
 
-def route_violations(
-    route: Route, vehicle: Vehicle, floor: FloorDistances | None, clearance: float
-) -> tuple[Violation, ...]:
+def check_route(route: Route, vehicle: Vehicle, floor: FloorDistances | None, clearance: float) -> CheckedRoute:
     """Look along one route.
 
     Parameters
@@ -97,10 +105,6 @@ def route_violations(
     vehicle : its outline and the tightest curve it can drive.
     floor : the walls; None: room is not asked for.
     clearance : smallest room between the vehicle's outline and a wall [m].
-
-    Returns
-    -------
-    violations : one for each stretch: curves, corners, walls, little room, each in order of driving.
     """
     way = way_of(route)
     steps = np.hypot(*np.diff(way.poses[:, :2], axis=0).T)
@@ -108,7 +112,7 @@ def route_violations(
     found = [*_curves(walk, vehicle), *_corners(walk, vehicle)]
     if floor is not None:
         found.extend(_room(walk, room_along(way, vehicle.outline, floor, clearance), clearance))
-    return tuple(found)
+    return CheckedRoute(way.poses, tuple(found))
 
 
 def _curves(walk: _Walk, vehicle: Vehicle) -> Iterable[Violation]:

@@ -4,13 +4,16 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 import viser
 
 from commission.app import actions
 from commission.app.actions import Action
+from commission.app.layers.vehicle import VehicleLayer
 from commission.app.page import Page
 from commission.app.panels.base import clock, escaped, posting
+from commission.app.panels.equipment_fields import source_html
 from commission.app.panels.now_panel import rows
 from commission.app.panels.run_panel import NO_ROUTE, RunPanel
 from commission.app.panels.time_line import strip
@@ -23,6 +26,7 @@ from commission.app.store import AppState, LastEdit
 from commission.app.view import PageView, Progress
 from commission.localization.estimate import Mode
 from commission.localization.setup import LocalizerSetup
+from commission.site.presets import SCANNERS, ScannerPreset
 from commission.site.project import Project
 
 NASTY = "<script>alert('hall')</script>"
@@ -155,3 +159,29 @@ def test_a_route_that_was_drawn_can_be_driven(server: viser.ViserServer, project
     assert (offered.options, offered.disabled) == (NO_ROUTE, True)
     panel.draw_slowly(PageView(AppState(project, project), None))
     assert (offered.options, offered.disabled) == (("There and back",), False)
+
+
+def test_before_a_run_the_vehicle_waits_at_the_start_of_the_first_route_with_its_field_of_view(
+    server: viser.ViserServer, project: Project
+) -> None:
+    layer = VehicleLayer(server.scene)
+    half = replace(project, scanner=replace(project.scanner, mounting=[0.4, 0.1, 0.0], field_of_view_deg=(-90.0, 90.0)))
+    layer.show_site(half)
+    assert layer._frame.visible
+    assert tuple(layer._frame.position[:2]) == (2.0, 2.0)
+    # The outer fan reaches as far as reflectors are told apart, from the scanner and not behind it.
+    strokes = layer._far.points[:, :, :2] - np.array([0.4, 0.1])
+    assert np.hypot(*strokes.reshape(-1, 2).T).max() == pytest.approx(project.scanner.reflector_range, rel=1e-6)
+    assert strokes[..., 0].min() == pytest.approx(0.0, abs=1e-5)
+    layer.show_site(replace(half, routes=()))
+    assert not layer._frame.visible
+
+
+@pytest.mark.parametrize("preset", SCANNERS, ids=lambda preset: preset.name)
+def test_the_page_says_which_figures_of_a_preset_are_the_makers_and_which_are_ours(preset: ScannerPreset) -> None:
+    text = source_html(preset)
+    assert escaped(preset.source) in text
+    ours = text.split("Ours, without a source; measure it: ")[1]
+    assert "bearing 1σ" in ours
+    assert "resolution" not in ours
+    assert source_html(None) == ""

@@ -14,14 +14,14 @@ from commission.app.view import PageView
 from commission.planning.route_profile import route_profile
 from commission.site.routes import Route
 from commission.site.vehicle import TricycleVehicle
-from commission.studies.violations import Violation, ViolationKind, route_violations
+from commission.studies.violations import Violation, ViolationKind, check_route
 from tests.app.sites import room
 
 ME = 1
 ROOM = replace(room(), vehicle=TricycleVehicle(wheelbase=3.0, max_steering_deg=20.0))
 ROUTE = ROOM.routes[0]
 PROFILE = route_profile(ROUTE, ROOM.vehicle)
-VIOLATIONS = route_violations(ROUTE, ROOM.vehicle, None, 0.1)
+VIOLATIONS = check_route(ROUTE, ROOM.vehicle, None, 0.1).violations
 
 
 @pytest.fixture

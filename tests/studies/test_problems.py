@@ -148,7 +148,25 @@ def test_reflectors_that_no_ray_reaches_are_inside_a_wall():
 
 def test_a_station_without_room_is_an_error():
     site = replace(SITE, stations=(Station("Dock", 0.6, 4.0), Station("Gate", 3.0, 4.0)))
-    assert [p.ids for p in find_problems(site, FLOOR).problems] == [("Dock",)]
+    assert [p.ids for p in find_problems(site, FLOOR).problems if p.severity is Severity.ERROR] == [("Dock",)]
+
+
+def test_a_station_that_no_route_passes_is_told_since_nobody_would_check_its_accuracy():
+    there, back = line((1.5, 6.0), (10.5, 6.0), name="a"), line((1.5, 5.0), (10.5, 5.0), direction=Direction.REVERSE)
+    stations = (
+        Station("on", 3.0, 6.1),
+        Station("beside", 3.0, 6.3),
+        Station("against", 3.0, 6.0, math.pi),
+        # A vehicle that reverses to the east looks to the west.
+        Station("reverse", 3.0, 5.0, math.pi),
+        Station("across", 3.0, 5.0, 0.0),
+    )
+    site = replace(SITE, routes=(there, back), stations=stations)
+    first = find_problems(site, FLOOR)
+    assert [p.ids[0] for p in first.problems if "no route passes it" in p.text] == ["beside", "against", "across"]
+    again = find_problems(replace(site, name="x"), FLOOR, first)
+    assert again.passed is first.passed
+    assert find_problems(replace(site, routes=(back,)), FLOOR, first).passed.names == {"reverse"}
 
 
 def test_beams_into_the_vehicle_are_counted_with_their_bearings():
@@ -175,7 +193,7 @@ def test_only_what_changed_is_checked_again_with_the_same_result(monkeypatch):
     moved = replace(SITE, routes=(routes[0], line((1.5, 6), (4.5, 6), name="b")))
     again = find_problems(moved, FLOOR, before)
     assert again.problems == find_problems(moved, FLOOR).problems
-    monkeypatch.setattr("commission.studies.problems.route_violations", None)
+    monkeypatch.setattr("commission.studies.problems.check_route", None)
     assert find_problems(replace(moved, name="x"), FLOOR, again).problems == again.problems
     with pytest.raises(TypeError):
         find_problems(replace(moved, vehicle=TricycleVehicle()), FLOOR, again)

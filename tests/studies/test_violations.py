@@ -8,8 +8,8 @@ import pytest
 from commission.planning.route_check import FloorDistances
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.routes import Route, Segment
-from commission.site.vehicle import DifferentialVehicle, TricycleVehicle
-from commission.studies.violations import ViolationKind, route_violations
+from commission.site.vehicle import DifferentialVehicle, TricycleVehicle, Vehicle
+from commission.studies.violations import Violation, ViolationKind, check_route
 
 BOX = DifferentialVehicle(outline=((0.5, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.5, -0.3)))
 
@@ -23,6 +23,12 @@ def corridor() -> FloorDistances:
 
 
 FLOOR = corridor()
+
+
+def route_violations(
+    route: Route, vehicle: Vehicle, floor: FloorDistances | None, room: float
+) -> tuple[Violation, ...]:
+    return check_route(route, vehicle, floor, room).violations
 
 
 def line(*points: tuple[float, float]) -> Route:

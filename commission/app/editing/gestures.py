@@ -39,17 +39,6 @@ def reflectors_in(reflectors: ReflectorMap, corner: Point, opposite: Point) -> t
     return tuple(r.id for r, chosen in zip(reflectors.reflectors, inside, strict=True) if chosen)
 
 
-def marked_place(project: Project, place: Point, reach: float) -> Point:
-    """Return the point that a click means: a reflector's center, a wall's corner, else the place itself."""
-    found = reflector_at(project.reflectors, place, reach)
-    if found is not None:
-        hit = next(r for r in project.reflectors.reflectors if r.id == found)
-        return hit.x, hit.y
-    grid = None if project.floor_map is None else walls_near(project.floor_map, place, reach)
-    corner = None if grid is None else nearest_corner(grid, place, reach)
-    return place if corner is None else corner
-
-
 def walls_near(floor_map: FloorMap, place: Point, reach: float) -> OccupancyGrid | None:
     """Return the part of the walls around a place that snapping looks at; none when the place is far outside."""
     column, row = (
@@ -71,6 +60,26 @@ def walls_near(floor_map: FloorMap, place: Point, reach: float) -> OccupancyGrid
         floor_map.resolution,
         se2.compose(floor_map.origin, corner),
     )
+
+
+def corner_at(project: Project, place: Point, reach: float) -> Point | None:
+    """Return the nearest corner of a wall within reach [m] of a place; none when there is none."""
+    grid = None if project.floor_map is None else walls_near(project.floor_map, place, reach)
+    corner = None if grid is None else nearest_corner(grid, place, reach)
+    return None if corner is None else (float(corner[0]), float(corner[1]))
+
+
+def marked_place(project: Project, place: Point, reach: float) -> Point:
+    """Return the point that a click means: the center of a reflector, a station, a wall's corner, else the place."""
+    found = reflector_at(project.reflectors, place, reach)
+    if found is not None:
+        hit = next(r for r in project.reflectors.reflectors if r.id == found)
+        return hit.x, hit.y
+    name = station_at(project, place, reach)
+    if name is not None:
+        station = next(station for station in project.stations if station.name == name)
+        return station.x, station.y
+    return corner_at(project, place, reach) or place
 
 
 def snapped(project: Project, reflector: Reflector, editor: Editor, ignored: tuple[str, ...] = ()) -> Reflector:

@@ -216,8 +216,8 @@ class SelectionPanel(BasePanel):
         self._editor = editor
         if not editor.has_selection:
             self._now.draw_slowly(view)
-        drawn = (view.state.project, editor)
-        if self._drawn and self._drawn[0] is drawn[0] and self._drawn[1] == drawn[1]:
+        drawn = (view.state.project, editor, len(view.state.editors))
+        if self._drawn and self._drawn[0] is drawn[0] and self._drawn[1:] == drawn[1:]:
             return
         self._drawn = drawn
         self._reflectors = selected_of(view.state.project, editor)
@@ -225,7 +225,7 @@ class SelectionPanel(BasePanel):
         if self._finish.visible:
             self._finish.label = f"Finish the {FINISHED.get(editor.tool, 'route')}"
         self._map_tools.show(editor)
-        self._head.content = _head(editor, self._reflectors)
+        self._head.content = _company(self._client, len(view.state.editors)) + _head(editor, self._reflectors)
         self._now.visible = not editor.has_selection
         self._buttons.visible = self._copies.visible = bool(self._reflectors)
         for name, widget in self._fields.items():
@@ -248,6 +248,13 @@ class SelectionPanel(BasePanel):
             value = value.value
         if widget.value != value:
             widget.value = value
+
+
+def _company(client: int, browsers: int) -> str:
+    """Say which browser this is where there are others: an undo that is another's names that one by its number."""
+    if browsers < 2:
+        return ""
+    return f"<div class='c-note' style='padding:0 6px 4px'>This is browser {client}; {browsers} edit this site.</div>"
 
 
 def _head(editor: Editor, reflectors: tuple[Reflector, ...]) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from commission.errors import UsageError
 from commission.geometry.angles import wrap_scalar
@@ -27,6 +27,8 @@ PLATE_DEPTH = 0.01
 """A flat plate on a wall has its reflecting face this far in front of it [m]."""
 _FIT_RADIUS = 0.4
 """Part of a wall that says which way it faces [m]: wider than the steps of a slanted wall, narrower than a pillar."""
+_ARM = 3
+"""Cells over which both edges of a corner are straight."""
 _STRAIGHT = 0.5
 """A wall is straight when its faces lie this close to a line, root mean square [cells]; steps of cells reach 0.35."""
 
@@ -96,32 +98,6 @@ def nearest_wall(grid: OccupancyGrid, point: tuple[float, float], reach: float =
     return WallPoint(float(x), float(y), heading, float(np.hypot(*(p - hit))) * cell)
 
 
-def nearest_corner(grid: OccupancyGrid, point: tuple[float, float], reach: float) -> tuple[float, float] | None:
-    """Nearest corner of a wall.
-
-    Parameters
-    ----------
-    grid : the walls.
-    point : [m, m], map frame.
-    reach : how far to look [m].
-
-    Returns
-    -------
-    corner : [m, m], map frame, where a wall's outline turns: one or three of the four cells around are occupied, or two
-        that face each other across. None when there is none within reach.
-    """
-    around = np.pad(grid.occupied, 1)
-    four = (around[:-1, :-1], around[:-1, 1:], around[1:, :-1], around[1:, 1:])
-    odd = four[0] ^ four[1] ^ four[2] ^ four[3]
-    corners = np.argwhere(odd | ((four[0] == four[3]) & (four[0] != four[1]) & (four[1] == four[2])))
-    if len(corners) == 0:
-        return None
-    places = transform_points(grid.origin, corners[:, ::-1] * grid.resolution)
-    gaps = np.hypot(*(places - np.asarray(point)).T)
-    best = int(np.argmin(gaps))
-    return (float(places[best, 0]), float(places[best, 1])) if gaps[best] <= reach else None
-
-
 def on_wall(reflector: Reflector, wall: WallPoint) -> Reflector:
     """Put a reflector against a wall: a cylinder touches it, a flat plate lies on it and faces away from it."""
     is_flat = reflector.kind is ReflectorKind.FLAT
@@ -185,6 +161,43 @@ def align(
         is_near = best >= 0 and gaps[best] <= reach
         found.append((float(centers[best, axis]), names[best]) if is_near else (float(point[axis]), None))
     return Alignment(found[0][0], found[1][0], found[0][1], found[1][1])
+
+
+def nearest_corner(grid: OccupancyGrid, point: tuple[float, float], reach: float) -> FloatArray | None:
+    """Find the corner of a wall that is nearest to a point.
+
+    Parameters
+    ----------
+    grid : the walls.
+    point : where to look [m, m], map frame.
+    reach : how far to look [m].
+
+    Returns
+    -------
+    corner : (2,) array [m], map frame; None: none is near. A corner is where two edges meet that are straight over
+        three cells each: the steps of a slanted wall are none.
+    """
+    cells = np.pad(np.asarray(grid.occupied, dtype=np.int8), _ARM)
+    # Quadrants around each node of the lattice between the cells: below and above, to the left and to the right.
+    quadrants = np.stack((cells[:-1, :-1], cells[:-1, 1:], cells[1:, :-1], cells[1:, 1:]))
+    rows, columns = np.nonzero(quadrants.sum(axis=0) % 2)
+    local = np.column_stack((columns, rows)) + 1.0 - _ARM
+    places = transform_points(grid.origin, grid.resolution * local)
+    gaps = np.hypot(*(places - np.asarray(point)).T)
+    for index in np.argsort(gaps, kind="stable"):
+        if gaps[index] > reach:
+            return None
+        if _has_arms(cells, int(rows[index]) + 1, int(columns[index]) + 1):
+            return places[index]
+    return None
+
+
+def _has_arms(cells: NDArray[np.int8], row: int, column: int) -> bool:
+    """Whether the two edges that meet at a node are straight for `_ARM` cells each."""
+    right, left = cells[row - 1 : row + 1, column:], cells[row - 1 : row + 1, column - 1 :: -1]
+    above, below = cells[row:, column - 1 : column + 1].T, cells[row - 1 :: -1, column - 1 : column + 1].T
+    arms = [arm[:, :_ARM] for arm in (right, left, above, below) if arm[0, 0] != arm[1, 0]]
+    return all(arm.shape[1] == _ARM and bool((arm == arm[:, :1]).all()) for arm in arms)
 
 
 def _faces(grid: OccupancyGrid, p: FloatArray, reach: float) -> tuple[FloatArray, FloatArray]:

@@ -120,3 +120,25 @@ def test_a_reach_or_spacing_of_nothing_is_refused():
         snapping.to_grid([1.0, 1.0], 0.0)
     with pytest.raises(UsageError, match="no reflector is called 'Z'"):
         snapping.snap_to_grid(ReflectorMap(), ["Z"], 0.5)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 0.7])
+def test_corners_of_a_block_are_met_exactly_from_inside_and_outside(yaw: float):
+    occupied = np.zeros((100, 100), dtype=bool)
+    occupied[40:60, 30:70] = True
+    # A notch of 5 x 5 cells makes a corner that points inward.
+    occupied[55:60, 65:70] = False
+    grid = OccupancyGrid(occupied, CELL, [1.0, 2.0, yaw])
+    c, s = math.cos(yaw), math.sin(yaw)
+    for x, y in ((1.5, 2.0), (3.5, 2.0), (1.5, 3.0), (3.25, 3.0), (3.25, 2.75), (3.5, 2.75)):
+        corner = np.array([1.0 + c * x - s * y, 2.0 + s * x + c * y])
+        for off in ((0.08, 0.03), (-0.05, 0.09)):
+            found = snapping.nearest_corner(grid, tuple(corner + off), 0.15)
+            assert found is not None
+            np.testing.assert_allclose(found, corner, atol=1e-9)
+    assert snapping.nearest_corner(grid, (1.0 + c * 2.5 - s * 2.0, 2.0 + s * 2.5 + c * 2.0), 0.5) is None
+
+
+@pytest.mark.parametrize("angle", [0.1, 0.5, math.pi / 4, 1.2])
+def test_the_steps_of_a_slanted_wall_are_no_corners(angle: float):
+    assert snapping.nearest_corner(half_plane(angle), (5.0, 5.0), 0.5) is None

@@ -1,0 +1,68 @@
+"""Time from a click in one browser until another one has the edit in its scene: two real browsers, one server.
+
+Run as `python -m tests.benchmarks.bench_two_browsers`. It needs chromium and playwright. Both browsers and the server
+share this machine and draw without a graphics card, which takes most of the time; the way to the server is told apart.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from playwright.sync_api import sync_playwright
+
+from commission.app.editing.editor import Tool
+from commission.app.launch import open_page
+from commission.app.server import start_server
+from commission.io.project_file import load_project, save_project
+from tests.app.sites import room
+from tests.browser.page import CHROMIUM, FLAGS, SMALL, OpenPage
+
+EDITS, REQUIRED_S = 20, 0.5
+
+
+def main() -> int:
+    """Print the times and return 1 when one of them is longer than required."""
+    with tempfile.TemporaryDirectory() as name, sync_playwright() as playwright:
+        save_project(room(), Path(name))
+        server = start_server("127.0.0.1", 0)
+        runtime = open_page(server, load_project(Path(name)), folder=Path(name))
+        browsers = [playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS)) for _ in range(2)]
+        one, other = (OpenPage(browser, server, SMALL) for browser in browsers)
+        client = one.open(nodes=("/floor/map",)).client_id
+        other.open(nodes=("/floor/map",))
+        one.press(Tool.PLACE.value)
+        while runtime.state.editors[client].tool is not Tool.PLACE or len(runtime.state.editors) < 2:
+            time.sleep(0.05)
+        to_server: list[float] = []
+        to_other: list[float] = []
+        for number in range(EDITS):
+            x, y = one.pixel_of((1.5 + 0.4 * number, 4.5))
+            node = f"/reflector_names/{f'R{5 + number}'.encode().hex()}"
+            begun = time.perf_counter()
+            one.page.mouse.click(x, y)
+            while len(runtime.state.project.reflectors) < 5 + number:
+                time.sleep(0.001)
+            to_server.append(time.perf_counter() - begun)
+            other.page.wait_for_function(
+                "name => name in window.__viserMutable.nodeRefFromName", arg=node, polling=5, timeout=10_000
+            )
+            to_other.append(time.perf_counter() - begun)
+        for browser in browsers:
+            browser.close()
+        runtime.stop()
+        server.stop()
+    for what, spent in (("the server's project", to_server), ("the other's scene", to_other)):
+        sys.stdout.write(
+            f"from a click in one browser to {what}: median {1e3 * np.median(spent):.0f} ms, "
+            f"longest {1e3 * max(spent):.0f} ms\n"
+        )
+    sys.stdout.write(f"required: {1e3 * REQUIRED_S:.0f} ms\n")
+    return int(max(to_other) > REQUIRED_S)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

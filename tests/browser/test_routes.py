@@ -1,0 +1,119 @@
+"""Routes and stations as an engineer edits them: clicks and drags on the floor, seen by a second engineer."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commission.app.editing.editor import Tool
+from commission.app.launch import open_page
+from commission.app.runtime import Runtime
+from commission.app.server import start_server
+from commission.app.store import AppState
+from commission.io.project_file import load_project, save_project
+from commission.studies.violations import ViolationKind
+from tests.app.sites import room
+from tests.browser.page import SMALL, OpenPage
+
+NODES = ("/floor/map", "/routes", "/stations/marks", "/violations/fatal")
+
+
+class OpenSite:
+    """A served project in a folder; nothing drives."""
+
+    def __init__(self, folder: Path) -> None:
+        save_project(room(), folder)
+        self.server = start_server("127.0.0.1", 0)
+        self.runtime: Runtime = open_page(self.server, load_project(folder), folder=folder)
+
+    @property
+    def state(self) -> AppState:
+        return self.runtime.state
+
+    def until(self, reached: Callable[[], bool]) -> None:
+        """Wait until something has happened on the server."""
+        end = time.monotonic() + 60.0
+        while not reached():
+            assert time.monotonic() < end, f"it did not happen within a minute: {self.state.problems}"
+            time.sleep(0.02)
+
+    def close(self) -> None:
+        self.runtime.stop()
+        self.server.stop()
+
+
+@pytest.fixture
+def site(tmp_path: Path) -> Iterator[OpenSite]:
+    opened = OpenSite(tmp_path)
+    yield opened
+    opened.close()
+
+
+def test_a_station_is_placed_typed_dragged_and_seen_by_another_browser(
+    site: OpenSite, window: Callable[..., OpenPage]
+) -> None:
+    page, other = window(site.server, SMALL), window(site.server, SMALL)
+    client = page.open(nodes=NODES).client_id
+    theirs = other.open(nodes=NODES).client_id
+    page.press(Tool.STATION.value)
+    site.until(lambda: site.state.editors[client].tool is Tool.STATION)
+    page.click_at((3.0, 2.1))
+    site.until(lambda: len(site.state.project.stations) == 1)
+    # It stands on the route, which passes 0.1 m below the click, and looks along it.
+    station = site.state.project.stations[0]
+    curve = site.state.project.routes[0].segments[0].spline()
+    foot = curve.point(curve.closest((station.x, station.y), 0.5))
+    np.testing.assert_allclose((station.x, station.y), foot, atol=1e-6)
+    assert abs(station.heading) < math.radians(30.0)
+    label = f"/station_names/{station.name.encode().hex()}"
+    other.wait_until_drawn((label,))
+    assert site.state.editors[theirs].station == ""
+    assert site.state.editors[theirs].tool is Tool.SELECT
+    other.open_tab("Routes")
+    other.wait_for_text(f"{station.name}   100 mm")
+    assert other.errors == []
+    # Without a graphics card two windows draw too slowly for the drag that follows.
+    other.close()
+    page.press(Tool.SELECT.value)
+    page.fill("Name", "Dock <b>1</b>")
+    site.until(lambda: site.state.project.stations[0].name == "Dock <b>1</b>")
+    page.fill("Within [mm]", "12")
+    site.until(lambda: site.state.project.stations[0].required_accuracy == 0.012)
+    page.drag((station.x, station.y), (3.0, 5.0))
+    site.until(lambda: site.state.project.stations[0].y > 4.5)
+    page.wait_for_text("Undo move Dock <b>1</b>")
+    page.open_tab("Routes")
+    page.wait_for_text("Dock <b>1</b>   12 mm")
+    assert page.errors == []
+    assert site.state.problems == ()
+
+
+def test_a_route_that_is_bent_into_a_wall_is_marked_plotted_and_found_from_its_problem(
+    site: OpenSite, window: Callable[..., OpenPage]
+) -> None:
+    page = window(site.server)
+    client = page.open(nodes=NODES).client_id
+    page.open_tab("Route")
+    page.wait_for_text("Select a route on the floor")
+    page.click_at((4.0, 2.1))
+    site.until(lambda: site.state.editors[client].point is not None)
+    page.wait_for_text("nothing violated")
+    assert page.page.locator(".uplot:visible").count() == 3
+    # The end of the route, onto the pillar that begins at x 7.5 m, y 3.5 m.
+    page.drag((6.0, 3.0), (7.7, 3.7))
+    site.until(lambda: ViolationKind.WALL in {v.kind for v in site.runtime.view().violations})
+    page.wait_for_text("cuts walls")
+    page.page.keyboard.press("Escape")
+    site.until(lambda: site.state.editors[client].point is None)
+    page.wait_for_text("Select a route on the floor")
+    page.open_tab("Problems")
+    page.page.get_by_role("button", name="cuts a wall").first.click()
+    site.until(lambda: site.state.editors[client].point is not None)
+    page.page.keyboard.press("Control+z")
+    site.until(lambda: site.runtime.view().violations == ())
+    assert page.errors == []
