@@ -132,15 +132,21 @@ def _filled(
     weights = np.ones(len(taken)) if rng is None else 1.0 + 1e-3 * rng.random(len(taken))
     if dear is not None:
         weights[dear] *= 0.5
+    is_open = counts < goal
+    gains = is_open.astype(np.float32) @ problem.covers
     while True:
-        gains = ((counts < goal).astype(np.float32) @ problem.covers) * allowed * weights
-        column = int(np.argmax(gains)) if len(gains) else 0
-        if len(gains) == 0 or gains[column] <= 0.0:
+        worth = gains * allowed * weights
+        column = int(np.argmax(worth)) if len(worth) else 0
+        if len(worth) == 0 or worth[column] <= 0.0:
             return taken
         taken[column] = True
         allowed[column] = False
         allowed[problem.conflicts[column]] = False
         counts += problem.covers[:, column].astype(np.int64)
+        # Each row closes once, so that keeping the gains costs as much as summing them up once. They are whole numbers.
+        closed = is_open & (counts >= goal)
+        gains -= problem.covers[closed].sum(axis=0)
+        is_open &= ~closed
 
 
 def _reduced(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> BoolArray:
@@ -180,10 +186,18 @@ def _exchanges(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> Itera
                 continue
             without = taken.copy()
             without[[first, second]] = False
-            whole = problem.allowed(without) & (problem.covers[lost > 0.0] > 0.0).all(axis=0)
-            whole[[first, second]] = False
-            if whole.any():
-                yield int(first), int(second), int(np.argmax(whole))
+            allowed = problem.allowed(without)
+            allowed[[first, second]] = False
+            whole = _covering_all(problem, np.flatnonzero(lost > 0.0), np.flatnonzero(allowed))
+            if len(whole):
+                yield int(first), int(second), int(whole[0])
+
+
+def _covering_all(problem: CoverProblem, rows: IntArray, columns: IntArray) -> IntArray:
+    """Those of some columns that cover all of some rows; a few rows leave few columns to look at closely."""
+    for some in (rows[:: max(1, len(rows) // 16)], rows):
+        columns = columns[(problem.covers[np.ix_(some, columns)] > 0.0).all(axis=0)]
+    return columns
 
 
 def _shortfall(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> int:
