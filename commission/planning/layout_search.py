@@ -66,6 +66,18 @@ class PlacementOptions:
         at_least(self.seed, 0, "placement.seed")
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _State:
+    """What a layout achieves; another one is as good when it achieves as much everywhere."""
+
+    seen: list[IntArray]
+    """Per route and for the places, reflectors that each scan or pose sees, as far as demanded."""
+    over: list[BoolArray]
+    """Per route, which scans pass a limit."""
+    rivals: IntArray
+    """How often each place is ambiguous."""
+
+
 class LayoutSearch:
     """State of one search: what is asked for grows until predictions and places are as demanded.
 
@@ -112,7 +124,7 @@ class LayoutSearch:
             if not any([self._raise_needs(self._over(taken)), self._tell_apart(taken)]):
                 break
             asked_more = True
-        return self._fewer(taken) if asked_more else taken
+        return self._fewer(self._cleared(taken)) if asked_more else taken
 
     def bound(self) -> int:
         """Fewest new reflectors that the need for visible ones alone leaves possible.
@@ -131,8 +143,8 @@ class LayoutSearch:
                 metres = np.unique(route.drive.metres[mask].astype(np.int64))
                 if len(metres):
                     found.append(Unmet(route.name, tuple(metres.tolist()), reason))
-        for place, is_ambiguous in zip(self._places, self._distinction.ambiguous(taken).tolist(), strict=True):
-            if is_ambiguous:
+        for place, rivals in zip(self._places, self._distinction.rivals(taken).tolist(), strict=True):
+            if rivals:
                 found.append(self._ambiguous_at(place))
         return tuple(found)
 
@@ -190,39 +202,65 @@ class LayoutSearch:
         self._apart += fresh.values()
         return bool(fresh)
 
+    def _cleared(self, taken: BoolArray) -> BoolArray:
+        """Add what leaves the chosen places fewer rivals where covering has not done; its rows do not say all."""
+        state = self._state(taken)
+        while state.rivals.any():
+            wanted = np.logical_or.reduce(self._distinction.rows(taken) or [np.zeros_like(taken)])
+            best = taken
+            for column in np.flatnonzero(wanted & ~taken):
+                self._report(COVERING, "telling places apart")
+                tried = taken.copy()
+                tried[self._conflicts[column]] = False
+                tried[column] = True
+                if np.any(self._fixed & ~tried):
+                    continue
+                rivals = self._distinction.rivals(tried)
+                if rivals.sum() < state.rivals.sum() and self._is_as_good(tried, replace(state, rivals=rivals)):
+                    best, state = tried, replace(state, rivals=rivals)
+            if best is taken:
+                break
+            taken = best
+        return taken
+
     def _fewer(self, taken: BoolArray) -> BoolArray:
         """Take out what was asked for and the demands can do without: one of them, or two for another one."""
-        checks = self._options.checks
-        places = self._distinction
-        covers = [*self._covers, places.sees]
-        goals = [np.full(len(each), self._base) for each in self._covers] + [np.full(len(places.sees), places.need)]
-        # What cannot be met need not be met with fewer.
-        goals = [np.minimum(goal, each[:, taken].sum(axis=1)) for goal, each in zip(goals, covers, strict=True)]
-        allowed, ambiguous = self._over(taken), places.ambiguous(taken)
-        found = True
+        checks, state, found = self._options.checks, self._state(taken), True
         while found and checks > 0:
             found = False
             for tried in _smaller(taken, self._fixed, self._conflicts):
-                if not all(
-                    np.all(each[:, tried].sum(axis=1) >= goal) for each, goal in zip(covers, goals, strict=True)
-                ):
+                if not self._sees_enough(tried, state):
                     continue
                 checks -= 1
                 self._report(1.0 - (1.0 - COVERING) * checks / self._options.checks, "doing with fewer")
-                if self._is_as_good(tried, allowed, ambiguous):
+                if self._is_as_good(tried, state):
                     taken, found = tried, True
                     break
                 if checks <= 0:
                     break
         return taken
 
-    def _is_as_good(self, taken: BoolArray, allowed: list[BoolArray], ambiguous: BoolArray) -> bool:
-        """Whether a layout passes no limit where another one does not, and leaves no further place ambiguous."""
-        for index, before in enumerate(allowed):
+    def _state(self, taken: BoolArray) -> _State:
+        """What a layout achieves."""
+        covers = [*self._covers, self._distinction.sees]
+        needs = [self._base] * len(self._covers) + [self._distinction.need]
+        seen = [np.minimum(need, each[:, taken].sum(axis=1)) for need, each in zip(needs, covers, strict=True)]
+        return _State(seen, self._over(taken), self._distinction.rivals(taken))
+
+    def _sees_enough(self, taken: BoolArray, state: _State) -> bool:
+        """Whether scans and places see as many reflectors as in another layout, as far as demanded."""
+        covers = [*self._covers, self._distinction.sees]
+        return all(np.all(each[:, taken].sum(axis=1) >= seen) for each, seen in zip(covers, state.seen, strict=True))
+
+    def _is_as_good(self, taken: BoolArray, state: _State) -> bool:
+        """Whether a layout sees enough, passes no further limit and leaves no place more ambiguous than another one."""
+        if not self._sees_enough(taken, state):
+            return False
+        for index, before in enumerate(state.over):
             # The first damage that is too much decides.
             if any(np.any(over & ~before) for over in self._over_on(index, taken)):
                 return False
-        return not np.any(self._distinction.ambiguous(taken) & ~ambiguous)
+        return bool(np.all(self._distinction.rivals(taken) <= state.rivals))
 
     def _step(self, number: int) -> Callable[[float], None]:
         return lambda done: self._report(COVERING * (number + done) / ROUNDS, "covering")

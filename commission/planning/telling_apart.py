@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
-from commission.geometry.arrays import BoolArray, FloatArray
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.geometry.se2 import compose, inverse, transform_points
 from commission.planning.ambiguity import AmbiguityOptions, ambiguous_poses, headings_tried
 from commission.planning.demands import Demands
@@ -83,17 +83,20 @@ class Distinction:
         self.apart = 1 + int(survive_failure)
         """Reflectors that must tell a place from a rival."""
 
-    def ambiguous(self, taken: BoolArray) -> BoolArray:
-        """Whether each of the places is ambiguous with a layout (M,), or with one less of its reflectors."""
-        result = np.zeros(self._count, dtype=np.bool_)
+    def rivals(self, taken: BoolArray) -> IntArray:
+        """How often each of the places is ambiguous with a layout (M,): its poses, and what may fail, counted."""
+        result = np.zeros(self._count, dtype=np.int64)
         for blocked in self._failures(taken):
             poses = self._affected(blocked)
             found = ambiguous_poses(self._model.restricted(_without(taken, blocked)), self._poses[poses], self._options)
-            result[self._place[poses[found.ambiguous]]] = True
+            np.add.at(result, self._place[poses[found.ambiguous]], 1)
         return result
 
     def rows(self, taken: BoolArray) -> list[BoolArray]:
-        """Ask for what tells the places from their rivals under a layout (M,): a row (M,) for each rival found."""
+        """Ask for what tells the places from their rivals under a layout (M,): a row (M,) for each rival found.
+
+        Two that the row asks for may be each other's image, and tell nothing when both are taken.
+        """
         rows: list[BoolArray] = []
         for blocked in self._failures(taken):
             layout, poses = _without(taken, blocked), self._affected(blocked)
