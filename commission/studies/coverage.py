@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commission.geometry.arrays import BoolArray
-from commission.planning.coverage import Coverage, coverage, lattice_of
+from commission.planning.coverage import Coverage, Lattice, coverage, lattice_of
 from commission.planning.dilution import FixOptions
 from commission.planning.visibility import VisibilityOptions, visibility_model
 from commission.site.floor_map import FREE
@@ -44,10 +44,15 @@ def coverage_of(
 
 def drivable(project: Project, found: Coverage) -> BoolArray:
     """Whether each point lies on floor that the map knows to be free: (N,) array; all of it without a map."""
+    return known_floor(project, found.lattice)
+
+
+def known_floor(project: Project, lattice: Lattice) -> BoolArray:
+    """Whether each of the N points of a lattice lies on floor that the map knows to be free: (N,) array."""
     if project.floor_map is None:
-        return np.array(found.floor)
+        return np.ones(len(lattice), dtype=np.bool_)
     grid = project.floor_map.occupancy()
-    cells = grid.cells_at(found.lattice.points())
+    cells = grid.cells_at(lattice.points())
     inside = np.all((cells >= 0) & (cells < project.floor_map.cells.shape), axis=-1)
     row, column = np.where(inside[:, np.newaxis], cells, 0).T
     return inside & (project.floor_map.cells[row, column] == FREE)
