@@ -40,7 +40,8 @@ class CoverProblem:
 
     def counts(self, taken: BoolArray) -> IntArray:
         """(R,) columns of a set that cover each row."""
-        return (self.covers @ taken.astype(np.float32)).astype(np.int64)
+        # A set is a small part of the columns: they are gathered, rather than all multiplied by mostly zeros.
+        return self.covers[:, np.flatnonzero(taken)].sum(axis=1).astype(np.int64)
 
     def allowed(self, taken: BoolArray) -> BoolArray:
         """(C,) columns that may still be added to a set."""
@@ -163,18 +164,33 @@ def _reduced(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> BoolArr
 
 def _two_for_one(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> BoolArray:
     """Replace two columns by one wherever that covers as well."""
-    taken = taken.copy()
     while True:
-        found = next(_exchanges(problem, goal, taken), None)
+        found = next(_exchanged(problem, goal, taken), None)
         if found is None:
             return taken
-        first, second, column = found
-        taken[[first, second]] = False
-        taken[column] = True
+        taken = found
 
 
-def _exchanges(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> Iterator[tuple[int, int, int]]:
-    """Pairs of columns, each with one that can stand for both."""
+def smaller_covers(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> Iterator[BoolArray]:
+    """All sets (C,) of one column less than a set that cover as well: without one, then without two and with another.
+
+    Parameters
+    ----------
+    problem : columns and their conflicts.
+    goal : (R,) how often each row must be covered, where the set does so.
+    taken : (C,) the set.
+    """
+    counts = problem.counts(taken)
+    for out in np.flatnonzero(taken & ~problem.fixed):
+        if np.all(counts - problem.covers[:, out] >= np.minimum(goal, counts)):
+            tried = taken.copy()
+            tried[out] = False
+            yield tried
+    yield from _exchanged(problem, goal, taken)
+
+
+def _exchanged(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> Iterator[BoolArray]:
+    """Sets with one column in place of two."""
     counts = problem.counts(taken)
     open_now = np.maximum(goal - counts, 0)
     movable = np.flatnonzero(taken & ~problem.fixed)
@@ -188,9 +204,10 @@ def _exchanges(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> Itera
             without[[first, second]] = False
             allowed = problem.allowed(without)
             allowed[[first, second]] = False
-            whole = _covering_all(problem, np.flatnonzero(lost > 0.0), np.flatnonzero(allowed))
-            if len(whole):
-                yield int(first), int(second), int(whole[0])
+            for column in _covering_all(problem, np.flatnonzero(lost > 0.0), np.flatnonzero(allowed)):
+                tried = without.copy()
+                tried[column] = True
+                yield tried
 
 
 def _covering_all(problem: CoverProblem, rows: IntArray, columns: IntArray) -> IntArray:

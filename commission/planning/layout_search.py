@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.planning.ambiguity import AmbiguityOptions
 from commission.planning.candidates import CandidateOptions
-from commission.planning.cover import CoverProblem, cover, lower_bound, merged
+from commission.planning.cover import CoverProblem, cover, lower_bound, merged, smaller_covers
 from commission.planning.demands import Demands, Unmet
 from commission.planning.route_prediction import (
     NO_DAMAGE,
@@ -119,7 +119,7 @@ class LayoutSearch:
         taken, asked_more = self._fixed, False
         for number in range(ROUNDS):
             self._report(COVERING * number / ROUNDS, "covering")
-            taken = cover(self._problem(self._needs), rng, self._options.exchanges, self._step(number))
+            taken = cover(self._problem(self._needs, self._apart), rng, self._options.exchanges, self._step(number))
             # Both, so that one round asks for all that is missing.
             if not any([self._raise_needs(self._over(taken)), self._tell_apart(taken)]):
                 break
@@ -131,8 +131,7 @@ class LayoutSearch:
 
         Every layout that keeps to limits and clears places meets these needs as well, so that the bound holds for it.
         """
-        base = [np.full_like(needs, self._base) for needs in self._needs]
-        return lower_bound(self._problem(base, with_rivals=False))
+        return lower_bound(self._base_problem())
 
     def unmet(self, taken: BoolArray) -> tuple[Unmet, ...]:
         """Metres of the routes and places where a demand does not hold with a layout (M,)."""
@@ -152,14 +151,16 @@ class LayoutSearch:
         route, metres = nearest_on_routes(place.poses[0, :2], self._planned)
         return Unmet(route, metres, "ambiguous", place.name)
 
-    def _problem(self, needs: list[IntArray], *, with_rivals: bool = True) -> CoverProblem:
+    def _base_problem(self) -> CoverProblem:
+        """What must be visible whatever the predictions and the places come to."""
+        return self._problem([np.full_like(needs, self._base) for needs in self._needs], [])
+
+    def _problem(self, needs: list[IntArray], apart: list[BoolArray]) -> CoverProblem:
+        """Covering of the routes' scans with their needs, of the places, and of rows that tell places from rivals."""
         places = self._distinction
-        covers = [*self._covers, places.sees]
-        needs = [*needs, np.full(len(places.sees), places.need, dtype=np.int64)]
-        if with_rivals and self._apart:
-            covers.append(np.array(self._apart))
-            needs.append(np.full(len(self._apart), places.apart, dtype=np.int64))
-        rows, greatest = merged(np.concatenate(covers), np.concatenate(needs))
+        covers = [*self._covers, places.sees, *(row[np.newaxis] for row in apart)]
+        counts = [*needs, np.full(len(places.sees), places.need), np.full(len(apart), places.apart)]
+        rows, greatest = merged(np.concatenate(covers), np.concatenate(counts))
         return CoverProblem(rows.astype(np.float32), greatest, self._fixed, self._conflicts)
 
     def _over(self, taken: BoolArray) -> list[BoolArray]:
@@ -225,12 +226,10 @@ class LayoutSearch:
 
     def _fewer(self, taken: BoolArray) -> BoolArray:
         """Take out what was asked for and the demands can do without: one of them, or two for another one."""
-        checks, state, found = self._options.checks, self._state(taken), True
+        problem, checks, state, found = self._base_problem(), self._options.checks, self._state(taken), True
         while found and checks > 0:
             found = False
-            for tried in _smaller(taken, self._fixed, self._conflicts):
-                if not self._sees_enough(tried, state):
-                    continue
+            for tried in smaller_covers(problem, np.minimum(problem.needs, problem.counts(taken)), taken):
                 checks -= 1
                 self._report(1.0 - (1.0 - COVERING) * checks / self._options.checks, "doing with fewer")
                 if self._is_as_good(tried, state):
@@ -271,24 +270,6 @@ class LayoutSearch:
             self._fraction = fraction
         if self._progress is not None:
             self._progress(self._fraction, what)
-
-
-def _smaller(taken: BoolArray, fixed: BoolArray, conflicts: tuple[IntArray, ...]) -> Iterator[BoolArray]:
-    """Sets of one reflector less: without one, then without two and with another."""
-    movable = np.flatnonzero(taken & ~fixed)
-    for out in movable:
-        tried = taken.copy()
-        tried[out] = False
-        yield tried
-    for i, first in enumerate(movable):
-        for second in movable[i + 1 :]:
-            without = taken.copy()
-            without[[first, second]] = False
-            for other in np.flatnonzero(~taken):
-                if not without[conflicts[other]].any():
-                    tried = without.copy()
-                    tried[other] = True
-                    yield tried
 
 
 def _conflicts(centers: FloatArray, spacing: float) -> tuple[IntArray, ...]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commission.localization.estimate import Mode
+from commission.planning.candidates import CandidateOptions
 from commission.planning.placement import Demands, Placement, PlacementOptions, place
 from commission.planning.route_prediction import NO_DAMAGE, Damage, plan_route, predict_route
 from commission.planning.visibility import visibility_model
@@ -41,9 +42,9 @@ def demands_met_by(project: Project) -> Demands:
     return Demands(min(visible) - 1, survive_failure=True, position_limit=position, heading_limit=heading)
 
 
-def suggested(project: Project, demands: Demands) -> tuple[Project, Placement]:
-    """The project with a layout from nothing in place of its own, and the layout."""
-    found = place(project, options=PlacementOptions(demands, extend=False))
+def suggested(project: Project, demands: Demands, spacing: float = 1.0) -> tuple[Project, Placement]:
+    """The project with a layout from nothing in place of its own, and the layout; candidates at a spacing [m]."""
+    found = place(project, options=PlacementOptions(demands, CandidateOptions(spacing=spacing), extend=False))
     return replace(project, reflectors=found.reflectors), found
 
 

@@ -41,13 +41,14 @@ def test_the_shop_floor_needs_fewer_reflectors_than_drawn_by_hand_to_be_as_accur
     assert demands.position_limit < 0.02
     placed, found = suggested(project, demands)
     assert fewer_than_by_hand(project, found)
-    check(placed, demands, range(4))
+    check(placed, demands, range(2))
 
 
 def test_the_warehouse_needs_less_than_half_of_those_drawn_by_hand_to_keep_within_limits(repository: Path) -> None:
     project = load_project(repository / "maps" / "warehouse")
     demands = replace(demands_met_by(project), position_limit=None, heading_limit=None)
-    placed, found = suggested(project, demands)
+    # Half of the places in half of the time; the benchmark takes a place per metre.
+    placed, found = suggested(project, demands, spacing=2.0)
     assert fewer_than_by_hand(project, found)
     assert found.added < 0.5 * len(project.reflectors)
     check(placed, demands, range(1))
