@@ -95,7 +95,9 @@ def _report(name: str, prediction: RoutePrediction) -> list[str]:
     """Lines for a person; millimetres and degrees as is the habit."""
     x, y, heading = prediction.two_sigma.max(axis=0)
     limits = prediction.limits
-    stops = ", ".join(f"{metre:.1f} m" for metre in prediction.trips()) or "none"
+    stops, starts = (
+        ", ".join(f"{metre:.1f} m" for metre in metres) for metres in (prediction.trips(), prediction.recoveries())
+    )
     return [
         f"Route        {name!r}, {prediction.drive.length:.1f} m in "
         f"{prediction.drive.stamps_ns[-1] * 1e-9:.1f} s, {len(prediction.drive)} scans",
@@ -103,7 +105,8 @@ def _report(name: str, prediction: RoutePrediction) -> list[str]:
         f"heading {math.degrees(heading):.2f} deg (limit {math.degrees(limits.heading_limit):.2f}) at most",
         f"Reflectors   {prediction.seen.min()} seen at least, {prediction.seen.mean():.1f} on average; "
         f"at most {prediction.on_odometry.max():.1f} m on odometry alone",
-        f"Supervisor   stops at: {stops}; metres over a limit: {len(prediction.failing_metres())}",
+        f"Supervisor   stops at: {stops or 'none'}{f'; drives on at: {starts}' if starts else ''}; "
+        f"metres over a limit: {len(prediction.failing_metres())}",
     ]
 
 

@@ -66,6 +66,20 @@ def test_the_reflectors_that_hurt_most_together_are_blocked_one_after_the_other(
         assert next(csv.DictReader(file))["reflector_id"] == rows[0]["reflector_id"]
 
 
+def test_where_the_vehicle_stops_and_drives_on_is_told(commission, project, tmp_path):
+    # Reflectors at both ends, and three metres between them from which none is seen.
+    text = (project / "project.yaml").read_text(encoding="utf-8")
+    (project / "project.yaml").write_text(text.replace("rate: 5.0", "rate: 5.0\n  reflector_range: 1.5") + CARELESS)
+    rows = ["id,x,y,radius", "A,0.6,1,0.04", "B,0.6,-1,0.04", "C,5.4,1,0.04", "D,5.4,-1,0.04"]
+    (project / "reflectors.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    code, told, err = commission("predict", project, "--out", tmp_path / "out")
+    assert (code, err) == (0, "")
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    (stop,), (start,) = summary["trips_m"], summary["recoveries_m"]
+    assert 1.0 < stop < 3.0 < start < 5.5
+    assert f"stops at: {stop:.1f} m; drives on at: {start:.1f} m" in told
+
+
 def test_failures_may_count_on_every_route(commission, project, tmp_path):
     text = (project / "project.yaml").read_text(encoding="utf-8")
     back = "  - {name: Back, segments: [{direction: forward, degree: 1, control_points: [[6, 0], [0, 0]]}]}\n"
