@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from commission.cli import converting, covering, localizing, page, parsing, placing, predicting, simulating
+from commission.cli import confusing, converting, covering, localizing, page, parsing, placing, predicting, simulating
 from commission.cli.parsing import Command
 from commission.cli.versions import Version
 from commission.errors import CommissionError
@@ -27,6 +27,7 @@ COMMANDS: dict[str, type[Command]] = {
     "localize": localizing.Localize,
     "coverage": covering.Coverage,
     "predict": predicting.Predict,
+    "ambiguity": confusing.Ambiguity,
     "place": placing.Place,
     "convert": converting.Convert,
     "version": Version,

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from commission.planning.dependence import Dependence
-    from commission.planning.route_prediction import RoutePrediction, StationAccuracy
+    from commission.planning.route_prediction import PlannedRoute, PredictionOptions, RoutePrediction, StationAccuracy
+    from commission.site.project import Project
     from commission.site.reflectors import ReflectorMap
 
 MOST_NEEDED = 5
@@ -37,43 +38,66 @@ class Predict:
     """Probability per metre of ray that a person blocks it [1/m]."""
     what_if: Annotated[Literal["blocked", "dirty", "moved"] | None, arg(metavar="{blocked,dirty,moved}")] = None
     """Let each reflector in turn fail so (moved: by 5 cm), and write dependents.csv, what depends on most first."""
+    failures: int = 0
+    """Block this many reflectors, each time the one on which most depends then, and write failures.csv [reflectors]."""
+    every_route: bool = False
+    """Whether --what-if and --failures ask about all routes of the project; the prediction is that of one."""
 
     def run(self) -> None:
         """Predict, write, and tell in a few lines what is to be expected."""
         if not 0.0 <= self.blocked_per_m <= 1.0:
             raise UsageError(f"--blocked-per-m is {self.blocked_per_m:g}; expected 0 to 1 per metre")
+        if self.failures < 0:
+            raise UsageError(f"--failures is {self.failures}; expected 0 or more reflectors")
 
-        from commission.io.prediction_files import write_dependents, write_prediction
+        from commission.io.prediction_files import write_prediction
         from commission.io.project_file import load_project
-        from commission.planning.dependence import Failure, FailureOptions, dependences
-        from commission.planning.route_prediction import (
-            PredictionOptions,
-            plan_route,
-            predict_route,
-            station_accuracies,
-        )
+        from commission.planning.route_prediction import plan_route, predict_route, station_accuracies
 
         project = load_project(self.project)
         if self.route is None and not project.routes:
             raise UsageError("the project has no route; expected one to predict along")
         name = project.routes[0].name if self.route is None else self.route
-        planned = plan_route(project, name, PredictionOptions(blocked_per_m=self.blocked_per_m))
+        planned = plan_route(project, name, self._options())
         prediction = predict_route(planned)
         stations = station_accuracies(prediction, project.stations)
         lines = [*_report(name, prediction), *_at_stations(stations)]
-        if self.what_if is not None:
-            ranked = dependences([planned], FailureOptions(Failure(self.what_if)))
-            write_dependents(self.out, ranked, project.reflectors)
-            lines += _most_needed(ranked, project.reflectors)
+        lines += self._what_if(project, planned)
         write_prediction(self.out, name, prediction, stations)
         sys.stdout.write("\n".join([*lines, f"Written to   {self.out}"]) + "\n")
+
+    def _options(self) -> PredictionOptions:
+        from commission.planning.route_prediction import PredictionOptions
+
+        return PredictionOptions(blocked_per_m=self.blocked_per_m)
+
+    def _what_if(self, project: Project, planned: PlannedRoute) -> list[str]:
+        """Let reflectors fail as the options ask for, write what that does, and tell it."""
+        from commission.io.prediction_files import write_dependents, write_failures
+        from commission.planning.dependence import Failure, FailureOptions, dependences, worst_failures
+        from commission.planning.route_prediction import plan_route
+
+        routes, lines = [planned], list[str]()
+        if self.every_route and (self.what_if is not None or self.failures):
+            routes = [plan_route(project, route.name, self._options()) for route in project.routes]
+        if self.what_if is not None:
+            ranked = dependences(routes, FailureOptions(Failure(self.what_if)))
+            write_dependents(self.out, ranked, project.reflectors)
+            lines += _most_needed(ranked, project.reflectors)
+        if self.failures:
+            worst = worst_failures(routes, self.failures)
+            write_failures(self.out, worst, project.reflectors)
+            lines += _one_after_the_other(worst, project.reflectors)
+        return lines
 
 
 def _report(name: str, prediction: RoutePrediction) -> list[str]:
     """Lines for a person; millimetres and degrees as is the habit."""
     x, y, heading = prediction.two_sigma.max(axis=0)
     limits = prediction.limits
-    stops = ", ".join(f"{metre:.1f} m" for metre in prediction.trips()) or "none"
+    stops, starts = (
+        ", ".join(f"{metre:.1f} m" for metre in metres) for metres in (prediction.trips(), prediction.recoveries())
+    )
     return [
         f"Route        {name!r}, {prediction.drive.length:.1f} m in "
         f"{prediction.drive.stamps_ns[-1] * 1e-9:.1f} s, {len(prediction.drive)} scans",
@@ -81,7 +105,8 @@ def _report(name: str, prediction: RoutePrediction) -> list[str]:
         f"heading {math.degrees(heading):.2f} deg (limit {math.degrees(limits.heading_limit):.2f}) at most",
         f"Reflectors   {prediction.seen.min()} seen at least, {prediction.seen.mean():.1f} on average; "
         f"at most {prediction.on_odometry.max():.1f} m on odometry alone",
-        f"Supervisor   stops at: {stops}; metres over a limit: {len(prediction.failing_metres())}",
+        f"Supervisor   stops at: {stops or 'none'}{f'; drives on at: {starts}' if starts else ''}; "
+        f"metres over a limit: {len(prediction.failing_metres())}",
     ]
 
 
@@ -106,3 +131,13 @@ def _most_needed(ranked: Sequence[Dependence], reflectors: ReflectorMap) -> list
         if each.failing_metres
     ]
     return [f"What if      metres that fail with one reflector: {', '.join(needed) or 'none'}"]
+
+
+def _one_after_the_other(worst: Sequence[Dependence], reflectors: ReflectorMap) -> list[str]:
+    """Line that names the reflectors blocked, and the metres that fail with all of them."""
+    names = ", then ".join(
+        f"{reflectors.reflectors[each.reflector].id} (+{each.failing_metres} m)" for each in worst[:MOST_NEEDED]
+    )
+    more = f" and {len(worst) - MOST_NEEDED} more" if len(worst) > MOST_NEEDED else ""
+    metres = sum(each.failing_metres for each in worst)
+    return [f"Failures     {metres} m fail with all {len(worst)} blocked: {names or 'no reflector is seen'}{more}"]

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from commission.io.atomic import atomic_file, write_text
+from commission.io.atomic import write_text
+from commission.io.table_writer import write_table
 from commission.planning.dependence import Dependence
 from commission.planning.route_prediction import RoutePrediction, StationAccuracy
 from commission.site.reflectors import ReflectorMap
 
 PREDICTION = "prediction.csv"
 DEPENDENTS = "dependents.csv"
+FAILURES = "failures.csv"
 SUMMARY = "summary.json"
 COLUMNS = (
     *("metre", "x", "y", "theta", "two_sigma_x", "two_sigma_y", "two_sigma_theta"),
     *("visible", "on_odometry", "over_limit", "mode"),
 )
+FAILURE_COLUMNS = ("blocked", "reflector_id", "route", "failing_metres", "load", "metres")
 DEPENDENT_COLUMNS = ("reflector_id", "failure", "route", "failing_metres", "load", "metres")
 
 
@@ -52,7 +53,7 @@ def write_prediction(
         np.isin(metres.metre, prediction.failing_metres()).astype(np.int64),
         np.where(metres.fails, "fail", "operational"),
     ]
-    _write_table(folder / PREDICTION, COLUMNS, zip(*(column.tolist() for column in columns), strict=True))
+    write_table(folder / PREDICTION, COLUMNS, zip(*(column.tolist() for column in columns), strict=True))
     entries = {**summary(route, prediction), "stations": [_station_entry(station) for station in stations]}
     write_text(folder / SUMMARY, json.dumps(entries, indent=2, allow_nan=False) + "\n")
 
@@ -109,13 +110,27 @@ def write_dependents(folder: Path, ranked: Sequence[Dependence], reflectors: Ref
         for part in each.routes
         for metres in (" ".join(map(str, part.metres.tolist())),)
     )
-    _write_table(folder / DEPENDENTS, DEPENDENT_COLUMNS, rows)
+    write_table(folder / DEPENDENTS, DEPENDENT_COLUMNS, rows)
 
 
-def _write_table(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:
-    with atomic_file(path) as file:
-        text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(rows)
-        text.detach()
+def write_failures(folder: Path, failures: Sequence[Dependence], reflectors: ReflectorMap) -> None:
+    """Write `failures.csv`: a row per failure and route, in the order of failing.
+
+    Parameters
+    ----------
+    folder : made when missing.
+    failures : each with the metres that fail beside those that failed before; numbered from 1 in the file.
+    reflectors : the map that names them.
+
+    Raises
+    ------
+    FileFormatError
+        the file cannot be written.
+    """
+    rows = (
+        (number, reflectors.reflectors[each.reflector].id, part.route, len(part.metres), part.load, metres)
+        for number, each in enumerate(failures, start=1)
+        for part in each.routes
+        for metres in (" ".join(map(str, part.metres.tolist())),)
+    )
+    write_table(folder / FAILURES, FAILURE_COLUMNS, rows)

@@ -175,10 +175,16 @@ def cold_start(
     options = options or AmbiguityOptions()
     points = lattice.points()
     points = points[~model.caster.grid.is_occupied(points)]
-    count = 1 if _sees_all_around(model.scanner) else options.headings
-    headings = 2.0 * math.pi / count * np.arange(count)
+    headings = headings_tried(model.scanner, options)
+    count = len(headings)
     poses = np.column_stack((np.tile(points, (count, 1)), np.repeat(headings, len(points))))
     return ambiguous_poses(model, poses, options, progress)
+
+
+def headings_tried(scanner: Scanner, options: AmbiguityOptions) -> FloatArray:
+    """Headings [rad] that stand for all at a spot: evenly spaced ones, or one where the heading does not matter."""
+    count = 1 if _sees_all_around(scanner) else options.headings
+    return np.arange(count, dtype=np.float64) * (2.0 * math.pi / count)
 
 
 def ambiguous_poses(

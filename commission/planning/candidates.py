@@ -8,12 +8,32 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
-from commission.geometry.arrays import BoolArray, FloatArray
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.geometry.occupancy import OccupancyGrid
 from commission.site.checks import above, at_least
 
 Rectangle = tuple[float, float, float, float]
 """x and y of the lower-left corner, x and y of the upper-right one [m], map frame."""
+EVERYWHERE: Rectangle = (-math.inf, -math.inf, math.inf, math.inf)
+
+
+@dataclass(frozen=True, slots=True)
+class AllowedHeights:
+    """At which heights a reflector may be put up in a part of the hall."""
+
+    lowest: float
+    """Least height of its middle above the floor [m]."""
+    highest: float
+    """Greatest one [m]."""
+    area: Rectangle = EVERYWHERE
+    """The part of the hall, by x and y of two opposite corners [m]."""
+
+    def __post_init__(self) -> None:
+        at_least(self.lowest, 0.0, "allowed_heights.lowest", "m")
+        if not self.lowest <= self.highest < math.inf:
+            raise ValueError(f"allowed_heights are {self.lowest:g} to {self.highest:g} m; expected lowest <= highest")
+        if any(math.isnan(value) for value in self.area):
+            raise ValueError(f"allowed_heights.area is {self.area}; expected metres")
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,17 +41,21 @@ class CandidateOptions:
     """Where reflectors may be put up, and which kind."""
 
     spacing: float = 1.0
-    """Distance between neighboring candidates [m]."""
+    """Distance between neighboring candidates on one face of a wall or pillar [m]."""
     radius: float = 0.04
     """Radius of the reflectors to be put up [m]."""
     height: float = 0.2
-    """Height of their middle above the floor [m]; the scanner's."""
+    """Height of the scanner's beams above the floor [m]: that of the middle of a reflector, where it is allowed."""
     gap: float = 0.02
     """Distance left between a reflector's surface and the wall [m]."""
     clearance: float = 0.3
     """Distance left between a reflector and the vehicle on its routes [m]."""
     keep_out: tuple[Rectangle, ...] = ()
     """Areas without reflectors: x and y of two opposite corners each [m]."""
+    length: float = 0.2
+    """Length of the reflectors [m]: a beam must still meet one whose middle is higher or lower than the beams."""
+    allowed_heights: tuple[AllowedHeights, ...] = ()
+    """Heights that are allowed for the middle of a reflector; of several for one place all count."""
 
     def __post_init__(self) -> None:
         above(self.spacing, 0.0, "candidates.spacing", "m")
@@ -39,21 +63,25 @@ class CandidateOptions:
         at_least(self.height, 0.0, "candidates.height", "m")
         at_least(self.gap, 0.0, "candidates.gap", "m")
         at_least(self.clearance, 0.0, "candidates.clearance", "m")
+        above(self.length, 0.0, "candidates.length", "m")
         if not all(math.isfinite(value) for rectangle in self.keep_out for value in rectangle):
             raise ValueError(f"candidates.keep_out is {self.keep_out}; expected finite metres")
 
 
 def wall_candidates(grid: OccupancyGrid, options: CandidateOptions) -> FloatArray:
-    """Places on the free side of walls, a gap and a radius off them.
+    """Places on the free side of walls and pillars, a gap and a radius off them.
+
+    Both faces of a thin wall and all faces of a pillar have places of their own: from one the other cannot be seen.
 
     Parameters
     ----------
     grid : the floor.
-    options : spacing, radius, gap and keep-out areas; its clearance is `clear_of`'s business.
+    options : spacing, radius, gap, heights and keep-out areas; its clearance is `clear_of`'s business.
 
     Returns
     -------
-    centers : (C, 2) array [m], map frame; no two nearer than the spacing, none farther than it from where it could be.
+    centers : (C, 2) array [m], map frame; of those that face the same way no two are nearer than the spacing, and none
+        is farther than it from where one could be.
     """
     # From center to center of cells: half a cell of it belongs to the wall.
     wanted = 0.5 * grid.resolution + options.gap + options.radius
@@ -62,11 +90,33 @@ def wall_candidates(grid: OccupancyGrid, options: CandidateOptions) -> FloatArra
     if len(cells) == 0:
         return np.empty((0, 2))
     centers = grid.cell_centers(cells)
-    allowed = np.ones(len(centers), dtype=np.bool_)
-    for x_a, y_a, x_b, y_b in options.keep_out:
-        low, high = (min(x_a, x_b), min(y_a, y_b)), (max(x_a, x_b), max(y_a, y_b))
-        allowed &= ~((centers >= low) & (centers <= high)).all(axis=1)
-    return _thinned(centers[allowed], options.spacing)
+    allowed = np.isfinite(mounting_heights(centers, options))
+    for rectangle in options.keep_out:
+        allowed &= ~_inside(centers, rectangle)
+    centers, facing = centers[allowed], _facing(distance, cells[allowed])
+    return np.concatenate([_thinned(centers[facing == side], options.spacing) for side in range(4)])
+
+
+def mounting_heights(centers: FloatArray, options: CandidateOptions) -> FloatArray:
+    """Height at which the middle of a reflector is put up at each place.
+
+    Parameters
+    ----------
+    centers : (C, 2) places [m], map frame.
+    options : allowed heights, and how far from the scanner's beams the middle may be.
+
+    Returns
+    -------
+    heights : (C,) the allowed height nearest to the beams [m]; NaN where no reflector of that length is met by them.
+    """
+    lowest, highest = np.zeros(len(centers)), np.full(len(centers), np.inf)
+    for rule in options.allowed_heights:
+        here = _inside(centers, rule.area)
+        lowest[here] = np.maximum(lowest[here], rule.lowest)
+        highest[here] = np.minimum(highest[here], rule.highest)
+    heights = np.clip(options.height, lowest, highest)
+    met = (lowest <= highest) & (np.abs(heights - options.height) <= 0.5 * options.length)
+    return np.where(met, heights, np.nan)
 
 
 def clear_of(centers: FloatArray, path: FloatArray, distance: float) -> BoolArray:
@@ -77,8 +127,27 @@ def clear_of(centers: FloatArray, path: FloatArray, distance: float) -> BoolArra
     return np.asarray(nearest > distance, dtype=np.bool_)
 
 
+def _inside(centers: FloatArray, rectangle: Rectangle) -> BoolArray:
+    """Whether places (C, 2) lie in a rectangle, given by any two opposite corners."""
+    x_a, y_a, x_b, y_b = rectangle
+    low, high = (min(x_a, x_b), min(y_a, y_b)), (max(x_a, x_b), max(y_a, y_b))
+    return np.asarray(((centers >= low) & (centers <= high)).all(axis=1), dtype=np.bool_)
+
+
+def _facing(distance: FloatArray, cells: IntArray) -> IntArray:
+    """Which of four ways leads away from the wall at (C, 2) cells: 0 right, 1 up, 2 left, 3 down on the grid."""
+    # Repeated at the edges, so that a grid of one row has slopes too.
+    around = np.pad(distance, 1, mode="edge")
+    row, column = cells.T + 1
+    up = around[row + 1, column] - around[row - 1, column]
+    right = around[row, column + 1] - around[row, column - 1]
+    return np.round(np.arctan2(up, right) / (0.5 * math.pi)).astype(np.int64) % 4
+
+
 def _thinned(points: FloatArray, spacing: float) -> FloatArray:
     """Keep points, in their order, that are at least the spacing from all kept before."""
+    if len(points) == 0:
+        return points
     tree = cKDTree(points)
     free = np.ones(len(points), dtype=np.bool_)
     kept: list[int] = []

@@ -40,7 +40,8 @@ class CoverProblem:
 
     def counts(self, taken: BoolArray) -> IntArray:
         """(R,) columns of a set that cover each row."""
-        return (self.covers @ taken.astype(np.float32)).astype(np.int64)
+        # A set is a small part of the columns: they are gathered, rather than all multiplied by mostly zeros.
+        return self.covers[:, np.flatnonzero(taken)].sum(axis=1).astype(np.int64)
 
     def allowed(self, taken: BoolArray) -> BoolArray:
         """(C,) columns that may still be added to a set."""
@@ -132,15 +133,21 @@ def _filled(
     weights = np.ones(len(taken)) if rng is None else 1.0 + 1e-3 * rng.random(len(taken))
     if dear is not None:
         weights[dear] *= 0.5
+    is_open = counts < goal
+    gains = is_open.astype(np.float32) @ problem.covers
     while True:
-        gains = ((counts < goal).astype(np.float32) @ problem.covers) * allowed * weights
-        column = int(np.argmax(gains)) if len(gains) else 0
-        if len(gains) == 0 or gains[column] <= 0.0:
+        worth = gains * allowed * weights
+        column = int(np.argmax(worth)) if len(worth) else 0
+        if len(worth) == 0 or worth[column] <= 0.0:
             return taken
         taken[column] = True
         allowed[column] = False
         allowed[problem.conflicts[column]] = False
         counts += problem.covers[:, column].astype(np.int64)
+        # Each row closes once, so that keeping the gains costs as much as summing them up once. They are whole numbers.
+        closed = is_open & (counts >= goal)
+        gains -= problem.covers[closed].sum(axis=0)
+        is_open &= ~closed
 
 
 def _reduced(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> BoolArray:
@@ -157,18 +164,33 @@ def _reduced(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> BoolArr
 
 def _two_for_one(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> BoolArray:
     """Replace two columns by one wherever that covers as well."""
-    taken = taken.copy()
     while True:
-        found = next(_exchanges(problem, goal, taken), None)
+        found = next(_exchanged(problem, goal, taken), None)
         if found is None:
             return taken
-        first, second, column = found
-        taken[[first, second]] = False
-        taken[column] = True
+        taken = found
 
 
-def _exchanges(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> Iterator[tuple[int, int, int]]:
-    """Pairs of columns, each with one that can stand for both."""
+def smaller_covers(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> Iterator[BoolArray]:
+    """All sets (C,) of one column less than a set that cover as well: without one, then without two and with another.
+
+    Parameters
+    ----------
+    problem : columns and their conflicts.
+    goal : (R,) how often each row must be covered, where the set does so.
+    taken : (C,) the set.
+    """
+    counts = problem.counts(taken)
+    for out in np.flatnonzero(taken & ~problem.fixed):
+        if np.all(counts - problem.covers[:, out] >= np.minimum(goal, counts)):
+            tried = taken.copy()
+            tried[out] = False
+            yield tried
+    yield from _exchanged(problem, goal, taken)
+
+
+def _exchanged(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> Iterator[BoolArray]:
+    """Sets with one column in place of two."""
     counts = problem.counts(taken)
     open_now = np.maximum(goal - counts, 0)
     movable = np.flatnonzero(taken & ~problem.fixed)
@@ -180,10 +202,19 @@ def _exchanges(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> Itera
                 continue
             without = taken.copy()
             without[[first, second]] = False
-            whole = problem.allowed(without) & (problem.covers[lost > 0.0] > 0.0).all(axis=0)
-            whole[[first, second]] = False
-            if whole.any():
-                yield int(first), int(second), int(np.argmax(whole))
+            allowed = problem.allowed(without)
+            allowed[[first, second]] = False
+            for column in _covering_all(problem, np.flatnonzero(lost > 0.0), np.flatnonzero(allowed)):
+                tried = without.copy()
+                tried[column] = True
+                yield tried
+
+
+def _covering_all(problem: CoverProblem, rows: IntArray, columns: IntArray) -> IntArray:
+    """Those of some columns that cover all of some rows; a few rows leave few columns to look at closely."""
+    for some in (rows[:: max(1, len(rows) // 16)], rows):
+        columns = columns[(problem.covers[np.ix_(some, columns)] > 0.0).all(axis=0)]
+    return columns
 
 
 def _shortfall(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> int:

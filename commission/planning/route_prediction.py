@@ -162,6 +162,11 @@ class RoutePrediction:
         return 2.0 * np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
 
     @property
+    def error_two_sigma(self) -> FloatArray:
+        """(K, 3) 2-sigma of the true error of x [m], y [m] and heading [rad]."""
+        return 2.0 * np.sqrt(np.diagonal(self.error_covariances, axis1=1, axis2=2))
+
+    @property
     def bias(self) -> FloatArray:
         """(K, 3) expected error of x [m], y [m] and heading [rad]."""
         deviations = self.means - self.drive.poses

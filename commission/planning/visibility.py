@@ -7,11 +7,12 @@ the rays unnecessary. What the sight is worth for localization is in `dilution`.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from commission.compiled import compiled
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
@@ -60,6 +61,12 @@ class VisibleReflectors(NamedTuple):
     def counts(self) -> IntArray:
         """Return the number of visible reflectors of each pose: (N,) array."""
         return np.diff(self.offsets)
+
+    def incidence(self, reflectors: int) -> BoolArray:
+        """Whether each pose sees each of the M reflectors of the map: (N, M) array."""
+        sees = np.zeros((len(self.offsets) - 1, reflectors), dtype=np.bool_)
+        sees[np.repeat(np.arange(len(sees)), self.counts()), self.indices] = True
+        return sees
 
 
 def promised_range(radius: float, resolution: float, min_beams: int, beam_width: float = 0.0) -> float:
@@ -154,6 +161,12 @@ class VisibilityModel:
         replace_target(targets, index, reflector, self)
         return replace(self, reflectors=reflectors, targets=targets)
 
+    def restricted(self, kept: BoolArray) -> VisibilityModel:
+        """Return the model of some of its reflectors: those of a mask (M,), in their order. No shadow is cast anew."""
+        chosen = zip(self.reflectors.reflectors, kept.tolist(), strict=True)
+        reflectors = ReflectorMap(tuple(reflector for reflector, is_kept in chosen if is_kept))
+        return replace(self, reflectors=reflectors, targets=_each_array(self.targets, lambda array: array[kept]))
+
     def bins_for(self, reflector: Reflector) -> int:
         """Bins of direction that a reflector needs; one that is seen from farther away needs more."""
         return _bins(_limits(reflector, self.scanner, self.options)[1], self.caster.grid)
@@ -209,19 +222,13 @@ def build_visibility(
 
 def copied(targets: Targets) -> Targets:
     """Targets with arrays of their own, to be written into."""
-    return Targets(
-        centers=targets.centers.copy(),
-        radii=targets.radii.copy(),
-        normals=targets.normals.copy(),
-        nearest=targets.nearest.copy(),
-        farthest=targets.farthest.copy(),
-        promised=targets.promised.copy(),
-        cosine_limit=targets.cosine_limit,
-        clear=targets.clear.copy(),
-        hidden=targets.hidden.copy(),
-        clear_blocks=targets.clear_blocks.copy(),
-        hidden_blocks=targets.hidden_blocks.copy(),
-    )
+    return _each_array(targets, np.copy)
+
+
+def _each_array(targets: Targets, changed: Callable[[NDArray[Any]], NDArray[Any]]) -> Targets:
+    """Targets with each array changed; its first axis is that of the reflectors."""
+    arrays = {name: changed(value) for name, value in targets._asdict().items() if isinstance(value, np.ndarray)}
+    return targets._replace(**arrays)
 
 
 def replace_target(targets: Targets, index: int, reflector: Reflector, model: VisibilityModel) -> None:

@@ -3,6 +3,8 @@ import pytest
 from PIL import Image
 
 from commission.io.project_file import load_project
+from commission.planning.ambiguity import ambiguous_poses
+from commission.planning.visibility import visibility_model
 
 
 @pytest.fixture
@@ -40,6 +42,34 @@ def test_reflectors_that_are_enough_stay_alone(commission, project, tmp_path):
     assert load_project(tmp_path / "placed").reflectors == load_project(project).reflectors
 
 
+def test_chosen_places_are_told_from_all_others(commission, walled, tmp_path):
+    with (walled / "project.yaml").open("a", encoding="utf-8") as file:
+        file.write("stations:\n  - {name: Dock, x: 6.0, y: 0.0}\n")
+    words = ("--no-extend", "--visible", 1, "--no-survive-failure")
+    words += ("--unambiguous", "stations", "--unambiguous", "starts", "--unambiguous", "3,1.5,90")
+    code, told, err = commission("place", walled, "--out", tmp_path / "placed", *words)
+    assert (code, err) == (0, "")
+    assert "Not met" not in told
+    poses = [(6.0, 0.0, 0.0), (0.0, 0.0, 0.0), (3.0, 1.5, np.pi / 2)]
+    assert not ambiguous_poses(visibility_model(load_project(tmp_path / "placed")), poses).ambiguous.any()
+
+
+def test_a_place_that_nothing_clears_is_named(commission, walled, tmp_path):
+    words = ("--no-extend", "--keep-out", "-9,-9,9,9", "--unambiguous", "starts")
+    code, told, _ = commission("place", walled, "--out", tmp_path / "placed", *words)
+    assert code == 0
+    assert "Not met      start of 'Straight'" in told
+
+
+def test_reflectors_are_put_up_at_the_heights_that_are_allowed(commission, walled, tmp_path):
+    # Below the route's middle only above 0.25 m, where a reflector of 0.2 m is still met at 0.2 m; beyond it nowhere.
+    words = ("--no-extend", "--visible", 1, "--heights", "0.25,2", "--heights", "0.5,2,4,-3,9,3")
+    assert commission("place", walled, "--out", tmp_path / "placed", *words)[0] == 0
+    placed = load_project(tmp_path / "placed").reflectors
+    assert {each.height for each in placed.reflectors} == {0.25}
+    assert placed.centers[:, 0].max() < 4.0
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -48,6 +78,11 @@ def test_reflectors_that_are_enough_stay_alone(commission, project, tmp_path):
         (["--spacing", "0"], "candidates.spacing is 0"),
         (["--position-limit", "-1"], "demands.position_limit is -1"),
         (["--route", "Loop"], "no route is called 'Loop'"),
+        (["--unambiguous", "everywhere"], "--unambiguous is 'everywhere'; expected stations, starts, X,Y"),
+        (["--heights", "2,1"], "allowed_heights are 2 to 1 m; expected lowest <= highest"),
+        (["--heights", "1"], "--heights is '1'; expected LOW,HIGH"),
+        (["--length", "0"], "candidates.length is 0"),
+        (["--blocked-per-m", "2"], "prediction.blocked_per_m is 2"),
     ],
 )
 def test_a_bad_option_is_refused_by_name(words, said, refused, project, tmp_path):

@@ -1,6 +1,8 @@
 import csv
 import json
 
+import pytest
+
 
 def test_a_route_is_predicted_metre_by_metre(commission, project, tmp_path):
     code, told, err = commission("predict", project, "--route", "Straight", "--out", tmp_path / "out")
@@ -12,7 +14,8 @@ def test_a_route_is_predicted_metre_by_metre(commission, project, tmp_path):
     assert [row["metre"] for row in rows] == ["0", "1", "2", "3", "4", "5", "6"]
     assert {row["mode"] for row in rows} == {"operational"}
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
-    assert summary["length_m"] == 6.0
+    # A sum of steps.
+    assert summary["length_m"] == pytest.approx(6.0, abs=1e-9)
     assert summary["visible_min"] == 5
     assert summary["trips_m"] == []
     assert max(float(row["two_sigma_x"]) for row in rows) == summary["two_sigma_x_max_m"]
@@ -37,6 +40,60 @@ def test_what_if_ranks_the_reflectors(commission, project, tmp_path):
     assert sorted(row["reflector_id"] for row in rows) == ["R0", "R1", "R2", "R3", "R4"]
     loads = [float(row["load"]) for row in rows]
     assert loads == sorted(loads, reverse=True)
+
+
+CARELESS = "\n  odometry: {heading_per_sqrt_m: 0.5, forward_per_sqrt_m: 0.3, lateral_per_sqrt_m: 0.3}\n"
+"""Odometry so poor that a few metres on it alone pass the limits."""
+
+
+def test_the_reflectors_that_hurt_most_together_are_blocked_one_after_the_other(commission, project, tmp_path):
+    with (project / "project.yaml").open("a", encoding="utf-8") as file:
+        file.write(CARELESS)
+    code, told, err = commission("predict", project, "--failures", "9", "--out", tmp_path / "out")
+    assert (code, err) == (0, "")
+    with (tmp_path / "out" / "failures.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    # There are five; with the last one everything fails that did not fail before.
+    assert [row["blocked"] for row in rows] == ["1", "2", "3", "4", "5"]
+    assert sorted(row["reflector_id"] for row in rows) == ["R0", "R1", "R2", "R3", "R4"]
+    failing = [{int(metre) for metre in row["metres"].split()} for row in rows]
+    assert sum(map(len, failing)) == len(set.union(*failing))
+    assert f"Failures     {sum(map(len, failing))} m fail with all 5 blocked: {rows[0]['reflector_id']} (" in told
+    assert len(set.union(*failing)) >= 5
+    # The first one is the one on which most depends alone.
+    assert commission("predict", project, "--what-if", "blocked", "--out", tmp_path / "single")[0] == 0
+    with (tmp_path / "single" / "dependents.csv").open(encoding="utf-8") as file:
+        assert next(csv.DictReader(file))["reflector_id"] == rows[0]["reflector_id"]
+
+
+def test_where_the_vehicle_stops_and_drives_on_is_told(commission, project, tmp_path):
+    # Reflectors at both ends, and three metres between them from which none is seen.
+    text = (project / "project.yaml").read_text(encoding="utf-8")
+    (project / "project.yaml").write_text(text.replace("rate: 5.0", "rate: 5.0\n  reflector_range: 1.5") + CARELESS)
+    rows = ["id,x,y,radius", "A,0.6,1,0.04", "B,0.6,-1,0.04", "C,5.4,1,0.04", "D,5.4,-1,0.04"]
+    (project / "reflectors.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    code, told, err = commission("predict", project, "--out", tmp_path / "out")
+    assert (code, err) == (0, "")
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    (stop,), (start,) = summary["trips_m"], summary["recoveries_m"]
+    assert 1.0 < stop < 3.0 < start < 5.5
+    assert f"stops at: {stop:.1f} m; drives on at: {start:.1f} m" in told
+
+
+def test_failures_may_count_on_every_route(commission, project, tmp_path):
+    text = (project / "project.yaml").read_text(encoding="utf-8")
+    back = "  - {name: Back, segments: [{direction: forward, degree: 1, control_points: [[6, 0], [0, 0]]}]}\n"
+    (project / "project.yaml").write_text(text.replace("parameters:", back + "parameters:"), encoding="utf-8")
+    words = ("--what-if", "blocked", "--failures", "2", "--every-route", "--out", tmp_path / "out")
+    code, _, err = commission("predict", project, *words)
+    assert (code, err) == (0, "")
+    for name in ("dependents.csv", "failures.csv"):
+        with (tmp_path / "out" / name).open(encoding="utf-8") as file:
+            assert {row["route"] for row in csv.DictReader(file)} == {"Straight", "Back"}
+
+
+def test_a_negative_number_of_failures_is_refused(refused, project, tmp_path):
+    assert "--failures is -1" in refused("predict", project, "--failures", "-1", "--out", tmp_path / "out")
 
 
 def test_stations_on_the_route_are_met_or_named(commission, project, tmp_path):

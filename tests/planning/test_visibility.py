@@ -21,6 +21,7 @@ from commission.planning.visibility import (
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
 from commission.site.scanner import Scanner
+from tests.planning.sites import reflectors_at, room
 
 SHARP = Scanner(range=(0.05, 20.0), resolution_deg=0.02)
 """So fine a scanner that only range and walls limit it."""
@@ -208,3 +209,17 @@ def test_a_moved_reflector_gives_the_model_that_would_be_built_anew(seed):
 def test_min_beams_below_one_is_refused():
     with pytest.raises(ValueError, match="expected 1 beams or more"):
         VisibilityOptions(min_beams=0)
+
+
+def test_a_restricted_model_equals_one_built_of_those_reflectors_alone():
+    places = [(1.0, 1.0), (5.0, 0.2), (9.0, 4.0), (3.0, 5.8), (11.0, 5.8)]
+    project = Project(floor_map=room(12.0, 6.0), reflectors=reflectors_at(places))
+    kept = np.array([True, False, True, False, True])
+    alone = ReflectorMap(tuple(np.array(project.reflectors.reflectors, dtype=object)[kept]))
+    restricted = visibility_model(project).restricted(kept)
+    anew = visibility_model(replace(project, reflectors=alone))
+    assert restricted.reflectors == anew.reflectors
+    poses = np.random.default_rng(2).uniform((0.2, 0.2, -3.0), (11.8, 5.8, 3.0), (300, 3))
+    seen, expected = restricted.visible_from_poses(poses), anew.visible_from_poses(poses)
+    assert np.array_equal(seen.incidence(3), expected.incidence(3))
+    assert seen.incidence(3).sum() == len(seen.indices) > 100
