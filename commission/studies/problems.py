@@ -14,14 +14,13 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.geometry.angles import difference
 from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
 from commission.planning.route_check import FloorDistances, Way, outline_points, room_along
 from commission.planning.route_prediction import AT_STATION, FACING_STATION
 from commission.site.project import Project
 from commission.site.reflectors import Reflector
-from commission.site.stations import Station
+from commission.studies.passed_stations import Passed, passed_stations
 from commission.studies.violations import CheckedRoute, Violation, ViolationKind, check_route
 
 MOST_OF_A_KIND = 50
@@ -81,18 +80,6 @@ class CheckLimits:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Passed:
-    """Stations that are passed, of one state of routes and stations."""
-
-    routes: tuple[CheckedRoute, ...]
-    """The routes."""
-    stations: tuple[Station, ...]
-    """The stations."""
-    names: frozenset[str]
-    """Names of the stations that a route passes, near enough and looking their way."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
 class Findings:
     """Problems of a project, and what the next check needs not find again."""
 
@@ -134,7 +121,7 @@ def find_problems(
         known[id(route)] if id(route) in known else check_route(route, project.vehicle, floor, limits.clearance)
         for route in project.routes
     )
-    passed = _passed(project.stations, by_route, None if previous is None else previous.passed)
+    passed = passed_stations(project.stations, by_route, None if previous is None else previous.passed)
     found = [
         *_map_problems(project, floor),
         *_scanner_problems(project),
@@ -343,23 +330,6 @@ def _limited(found: Iterable[Problem], count: int | None = None) -> list[Problem
         )
         return [*problems[:MOST_OF_A_KIND], rest]
     return problems
-
-
-def _passed(stations: tuple[Station, ...], routes: tuple[CheckedRoute, ...], before: Passed | None) -> Passed:
-    """Look which stations are passed, unless that is known."""
-    if before is not None and before.stations is stations and before.routes == routes:
-        return before
-    names: set[str] = set()
-    if stations:
-        from scipy.spatial import KDTree
-
-        wanted = np.array([station.pose for station in stations])
-        for route in routes:
-            near = KDTree(route.poses[:, :2]).query_ball_point(wanted[:, :2], AT_STATION)
-            for station, heading, indices in zip(stations, wanted[:, 2], near, strict=True):
-                if np.any(np.abs(difference(route.poses[indices, 2], heading)) < FACING_STATION):
-                    names.add(station.name)
-    return Passed(routes, stations, frozenset(names))
 
 
 def _missed_stations(project: Project, passed: Passed) -> Iterable[Problem]:

@@ -12,7 +12,9 @@ from PIL import Image
 from playwright.sync_api import Browser
 
 from commission.app.launch import open_page
+from commission.app.plan.layout_reducer import ACCEPT
 from commission.app.plan.scale import FIRST
+from commission.app.plan.settings import Figure
 from commission.app.plan.view import HeatView
 from commission.app.runtime import Runtime
 from commission.app.server import start_server
@@ -108,7 +110,38 @@ def test_the_heatmap_follows_a_dragged_reflector(page: OpenPage, site: OpenSite)
 
 
 def test_a_route_is_predicted_over_its_metres(page: OpenPage, site: OpenSite) -> None:
+    page.page.get_by_text("Along a route").first.click()
     page.choose("Route", site.project.routes[0].name)
     page.wait_for_text("Supervisor stops")
     assert site.runtime.plan.route is not None
+    assert page.errors == []
+
+
+def test_a_layout_is_suggested_accepted_and_taken_back(page: OpenPage, site: OpenSite) -> None:
+    page.choose("Show", "Position dilution (DOP)")
+    site.until(lambda: site.heat is not None and site.heat.scale.figure is Figure.POSITION_DOP)
+    before, project = site.heat, site.runtime.state.project
+    page.page.get_by_text("Along a route").first.click()
+    page.page.get_by_text("Suggested layout").first.click()
+    page.tick("Keep present")
+    page.page.get_by_text("Routes that count").first.click()
+    for route in site.project.routes[1:]:
+        page.tick(route.name)
+    site.until(lambda: len(site.runtime.state.layout.ignored) == len(site.project.routes) - 1)
+    page.press("Suggest reflectors")
+    page.wait_for_text("Fewest possible")
+    found = site.runtime.plan.layout
+    assert found is not None
+    placement = found.suggestion.placement
+    assert 0 < placement.at_least <= placement.added < len(project.reflectors)
+    assert site.runtime.state.project is project
+    page.page.get_by_text(f"{placement.added} new").first.wait_for(state="visible")
+    page.press("Accept")
+    site.until(lambda: site.runtime.state.project is not project)
+    assert site.runtime.state.project.reflectors == placement.reflectors
+    assert site.runtime.state.undo[-1].name == ACCEPT
+    site.until(lambda: site.runtime.plan.layout is None)
+    site.until(lambda: site.heat is not None and site.heat is not before and not site.heat.outdated)
+    page.page.get_by_role("button", name="Undo").first.click()
+    site.until(lambda: site.runtime.state.project is project)
     assert page.errors == []
