@@ -59,9 +59,7 @@ class Loading:
 def loading() -> Iterator[Loading]:
     started = Loading()
     yield started
-    started.runtime._reading.close()
-    started.runtime._jobs.close()
-    started.runtime._checks.close()
+    started.runtime._background.close()
 
 
 @pytest.fixture
@@ -104,9 +102,8 @@ def test_a_stopped_job_shows_nothing_and_the_next_file_loads(loading: Loading, h
     write_drawing(tmp_path / "large.dxf", 20_000)
     write_floor_map(hall, tmp_path / "hall.yaml")
     loading.open(tmp_path / "large.dxf")
-    loading.until(
-        lambda: any(job.name == "Reading large.dxf: reading the drawing" for job in loading.runtime.view().jobs)
-    )
+    under_way = ("Reading large.dxf", "reading the drawing")
+    loading.until(lambda: any((job.name, job.message) == under_way for job in loading.runtime.view().jobs))
     loading.runtime.handle(actions.StopMapJob())
     loading.until(lambda: not loading.runtime.view().jobs)
     assert loading.state.mapping.draft is None
