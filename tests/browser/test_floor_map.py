@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -11,47 +10,28 @@ import pytest
 from PIL import Image
 
 from commission.app.editing.editor import Tool
-from commission.app.launch import open_page
-from commission.app.runtime import Runtime
-from commission.app.server import start_server
-from commission.app.store import AppState
 from commission.io.map_server import read_floor_map, write_floor_map
 from commission.io.project_file import load_project, open_project
 from commission.site.floor_map import OCCUPIED, FloorMap
 from tests.app.sites import room
 from tests.browser.page import OpenPage
+from tests.browser.serving import Served
 
 FLOOR = ("/floor/map",)
 
 
-class NewSite:
+class NewSite(Served):
     """The page on a folder that does not exist yet."""
 
     def __init__(self, folder: Path) -> None:
         opened = open_project(folder)
         self.folder = folder
-        self.server = start_server("127.0.0.1", 0)
-        self.runtime: Runtime = open_page(self.server, opened.project, folder=folder, is_new=opened.is_new)
-
-    @property
-    def state(self) -> AppState:
-        return self.runtime.state
+        super().__init__(opened.project, folder, is_new=opened.is_new)
 
     @property
     def floor_map(self) -> FloorMap:
         assert self.state.project.floor_map is not None
         return self.state.project.floor_map
-
-    def until(self, reached: Callable[[], bool], seconds: float = 60.0) -> None:
-        """Wait until something has happened on the server."""
-        end = time.monotonic() + seconds
-        while not reached():
-            assert time.monotonic() < end, f"it did not happen within {seconds} s: {self.state.problems}"
-            time.sleep(0.02)
-
-    def close(self) -> None:
-        self.runtime.stop()
-        self.server.stop()
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
@@ -12,25 +11,22 @@ from playwright.sync_api import Browser
 
 from commission.app import actions
 from commission.app.actions import VirtualDrive
-from commission.app.launch import open_page
 from commission.app.panels.base import clock
 from commission.app.reducer import with_parameter
-from commission.app.runtime import Runtime
-from commission.app.server import start_server
 from commission.app.session import Session
 from commission.site.project import Project
 from tests.app.sites import room
 from tests.browser.page import SMALL, OpenPage
+from tests.browser.serving import Served
 
 NODES = ("/floor/map", "/vehicle/outline", "/run/gates", "/run/scan", "/reflectors/marks", "/routes")
 
 
-class OpenRun:
+class OpenRun(Served):
     """A served project whose virtual vehicle drives."""
 
     def __init__(self, project: Project) -> None:
-        self.server = start_server("127.0.0.1", 0)
-        self.runtime: Runtime = open_page(self.server, project, source=VirtualDrive(project.routes[0].name))
+        super().__init__(project, source=VirtualDrive(project.routes[0].name))
         self.until(lambda: self.runtime.session is not None)
 
     @property
@@ -38,17 +34,6 @@ class OpenRun:
         session = self.runtime.session
         assert session is not None
         return session
-
-    def until(self, reached: Callable[[], bool], seconds: float = 60.0) -> None:
-        """Wait until something has happened on the server."""
-        end = time.monotonic() + seconds
-        while not reached():
-            assert time.monotonic() < end, f"it did not happen within {seconds} s: {self.runtime.state.problems}"
-            time.sleep(0.02)
-
-    def close(self) -> None:
-        self.runtime.stop()
-        self.server.stop()
 
 
 @pytest.fixture(scope="module")

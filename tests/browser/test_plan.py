@@ -3,50 +3,35 @@
 from __future__ import annotations
 
 import io
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 from PIL import Image
 from playwright.sync_api import Browser
 
-from commission.app.launch import open_page
 from commission.app.plan.layout_reducer import ACCEPT
 from commission.app.plan.scale import FIRST
 from commission.app.plan.settings import Figure
 from commission.app.plan.view import HeatView
-from commission.app.runtime import Runtime
-from commission.app.server import start_server
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
 from tests.browser.page import SMALL, OpenPage
+from tests.browser.serving import Served
 
 SPOT = (20.0, 35.0)
 
 
-class OpenSite:
+class OpenSite(Served):
     """The warehouse, served."""
 
     def __init__(self) -> None:
         self.project = load_project(bundled_folder("maps") / "warehouse")
-        self.server = start_server("127.0.0.1", 0)
-        self.runtime: Runtime = open_page(self.server, self.project)
-
-    def until(self, reached: Callable[[], bool]) -> None:
-        """Wait until something has happened on the server, at most two minutes: compilation included."""
-        end = time.monotonic() + 120.0
-        while not reached():
-            assert time.monotonic() < end, f"it did not happen: {self.runtime.state.problems}"
-            time.sleep(0.05)
+        super().__init__(self.project)
 
     @property
     def heat(self) -> HeatView | None:
         return self.runtime.plan.heat
-
-    def close(self) -> None:
-        self.runtime.stop()
-        self.server.stop()
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -11,40 +10,21 @@ import numpy as np
 import pytest
 
 from commission.app.editing.editor import Tool
-from commission.app.launch import open_page
-from commission.app.runtime import Runtime
-from commission.app.server import start_server
-from commission.app.store import AppState
 from commission.io.project_file import load_project, save_project
 from commission.studies.violations import ViolationKind
 from tests.app.sites import room
 from tests.browser.page import SMALL, OpenPage
+from tests.browser.serving import Served
 
 NODES = ("/floor/map", "/routes", "/stations/marks", "/violations/fatal")
 
 
-class OpenSite:
+class OpenSite(Served):
     """A served project in a folder; nothing drives."""
 
     def __init__(self, folder: Path) -> None:
         save_project(room(), folder)
-        self.server = start_server("127.0.0.1", 0)
-        self.runtime: Runtime = open_page(self.server, load_project(folder), folder=folder)
-
-    @property
-    def state(self) -> AppState:
-        return self.runtime.state
-
-    def until(self, reached: Callable[[], bool]) -> None:
-        """Wait until something has happened on the server."""
-        end = time.monotonic() + 60.0
-        while not reached():
-            assert time.monotonic() < end, f"it did not happen within a minute: {self.state.problems}"
-            time.sleep(0.02)
-
-    def close(self) -> None:
-        self.runtime.stop()
-        self.server.stop()
+        super().__init__(load_project(folder), folder)
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -10,45 +9,26 @@ import numpy as np
 import pytest
 
 from commission.app.editing.editor import Tool
-from commission.app.launch import open_page
-from commission.app.runtime import Runtime
-from commission.app.server import start_server
-from commission.app.store import AppState
 from commission.io.project_file import load_project, save_project
 from tests.app.sites import room
 from tests.browser.page import OpenPage
+from tests.browser.serving import Served
 
 NODES = ("/floor/map", "/reflectors/marks", "/editing/handle")
 WALL, RADIUS = 0.15, 0.04
 
 
-class OpenSite:
+class OpenSite(Served):
     """A served project in a folder; nothing drives."""
 
     def __init__(self, folder: Path) -> None:
         save_project(room(), folder)
         self.folder = folder
-        self.server = start_server("127.0.0.1", 0)
-        self.runtime: Runtime = open_page(self.server, load_project(folder), folder=folder)
-
-    @property
-    def state(self) -> AppState:
-        return self.runtime.state
+        super().__init__(load_project(folder), folder)
 
     @property
     def centers(self) -> np.ndarray:
         return self.state.project.reflectors.centers
-
-    def until(self, reached: Callable[[], bool], seconds: float = 60.0) -> None:
-        """Wait until something has happened on the server."""
-        end = time.monotonic() + seconds
-        while not reached():
-            assert time.monotonic() < end, f"it did not happen within {seconds} s: {self.state.problems}"
-            time.sleep(0.02)
-
-    def close(self) -> None:
-        self.runtime.stop()
-        self.server.stop()
 
 
 @pytest.fixture

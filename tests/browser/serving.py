@@ -1,0 +1,41 @@
+"""A served page and its runtime, for tests that look at both sides."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from commission.app.actions import Source
+from commission.app.launch import open_page
+from commission.app.runtime import Runtime
+from commission.app.server import start_server
+from commission.app.store import AppState
+from commission.site.project import Project
+
+
+class Served:
+    """The page of a project; parameters as for `open_page`."""
+
+    def __init__(
+        self, project: Project, folder: Path | None = None, *, source: Source | None = None, is_new: bool = False
+    ) -> None:
+        self.server = start_server("127.0.0.1", 0)
+        self.runtime: Runtime = open_page(self.server, project, folder=folder, source=source, is_new=is_new)
+
+    @property
+    def state(self) -> AppState:
+        """What the owner thread has made of all that happened."""
+        return self.runtime.state
+
+    def until(self, reached: Callable[[], bool], seconds: float = 120.0) -> None:
+        """Wait until something has happened on the server; compilation may be included."""
+        end = time.monotonic() + seconds
+        while not reached():
+            assert time.monotonic() < end, f"it did not happen within {seconds} s: {self.state.problems}"
+            time.sleep(0.02)
+
+    def close(self) -> None:
+        """End the page."""
+        self.runtime.stop()
+        self.server.stop()

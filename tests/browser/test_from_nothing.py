@@ -1,0 +1,110 @@
+"""From an empty folder to a driving vehicle with nothing but the browser: a real map, and what an engineer does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commission.app import actions
+from commission.app.editing.editor import Tool
+from commission.io.project_file import load_project
+from tests.browser.page import OpenPage
+from tests.browser.test_floor_map import NewSite, choose, click
+
+MIDDLE = (9.0, 9.5)
+"""Of the hall in the east of the building, 7 x 16 m [m]."""
+NEAR_WALLS = tuple((x, y + shift) for x, shift in ((6.0, 0.0), (12.4, 0.6)) for y in (3.0, 5.2, 8.3, 10.5, 13.2, 15.5))
+AROUND = ((8.0, 3.5), (8.0, 6.0), (8.0, 9.0), (8.3, 12.0), (9.3, 14.0), (10.5, 12.0), (10.6, 9.0), (10.6, 6.0))
+PIXELS_PER_M = 25.0
+"""Zoom at which a click is good for a few centimetres."""
+
+
+def zoom_to(page: OpenPage, place: tuple[float, float], pixels_per_m: float) -> None:
+    """Turn the mouse wheel over a place until the floor is large enough."""
+    for _ in range(60):
+        left, right = page.pixel_of(place), page.pixel_of((place[0] + 1.0, place[1]))
+        if right[0] - left[0] >= pixels_per_m:
+            return
+        page.page.mouse.move(*left)
+        page.page.mouse.wheel(0, -200)
+        page.page.wait_for_timeout(100)
+    raise TimeoutError("the wheel does not zoom")
+
+
+@pytest.mark.slow
+def test_a_site_is_built_from_an_empty_folder_and_a_vehicle_drives_in_it(
+    tmp_path: Path, shared_data: Path, window: Callable[..., OpenPage]
+) -> None:
+    site = NewSite(tmp_path / "hall")
+    try:
+        page = window(site.server)
+        client = page.open().client_id
+        load_the_map(site, page, shared_data / "maps" / "utexas_gdc_3" / "3.yaml")
+        choose_the_equipment(site, page)
+        zoom_to(page, MIDDLE, PIXELS_PER_M)
+        page.wait_until_drawn()
+        place_the_reflectors(site, page, client)
+        draw_the_route(site, page, client)
+        page.press("Save")
+        page.wait_for_text("saved ")
+        assert load_project(tmp_path / "hall") == site.state.project
+        drive(site, page)
+        assert page.errors == []
+        assert site.state.problems == ()
+    finally:
+        site.close()
+
+
+def load_the_map(site: NewSite, page: OpenPage, path: Path) -> None:
+    page.open_tab("Site")
+    page.fill("File", str(path))
+    page.press("Open")
+    site.until(lambda: site.state.project.floor_map is not None)
+    page.wait_until_drawn()
+
+
+def choose_the_equipment(site: NewSite, page: OpenPage) -> None:
+    for folder in ("Scanner", "Vehicle"):
+        page.page.get_by_text(folder, exact=True).last.click()
+    page.choose("Preset", "SICK TiM781")
+    site.until(lambda: site.state.project.scanner.rate == 15.0)
+    page.choose("Kind", "tricycle")
+    site.until(lambda: site.state.project.vehicle.kind == "tricycle")
+
+
+def place_the_reflectors(site: NewSite, page: OpenPage, client: int) -> None:
+    choose(site, page, client, Tool.PLACE)
+    for place in NEAR_WALLS:
+        click(site, page, client, place, lambda: len(site.state.project.reflectors))
+    reflectors = site.state.project.reflectors
+    distances = site.floor_map.occupancy().distance_field()
+    cells = site.floor_map.occupancy().cells_at(reflectors.centers)
+    gaps = distances[cells[:, 0], cells[:, 1]] - reflectors.radii
+    assert len(reflectors) == 12
+    assert np.all(np.abs(gaps) < site.floor_map.resolution), "each one touches a wall"
+
+
+def draw_the_route(site: NewSite, page: OpenPage, client: int) -> None:
+    choose(site, page, client, Tool.ROUTE)
+    for place in AROUND:
+        click(site, page, client, place, lambda: len(site.state.editors[client].draft))
+    page.press("Finish the route")
+    site.until(lambda: len(site.state.project.routes) == 1)
+
+
+def drive(site: NewSite, page: OpenPage) -> None:
+    page.open_tab("Run")
+    page.press("Drive")
+    site.until(lambda: site.runtime.session is not None)
+    site.runtime.post(actions.SetSpeed(50.0))
+    site.until(lambda: site.runtime.session is not None and site.runtime.session.at_end)
+    page.wait_for_text("OPERATIONAL")
+    session = site.runtime.session
+    assert session is not None
+    series = session.view().series
+    assert len(series) > 500
+    assert not series.failed.any()
+    assert series.error.max() < 0.1
