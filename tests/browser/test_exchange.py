@@ -58,7 +58,7 @@ def site(tmp_path: Path) -> Iterator[OpenSite]:
 
 
 def upload(page: OpenPage, name: str, content: bytes) -> None:
-    page.page.locator("input[type=file]").set_input_files(
+    page.page.locator("input[type=file][accept*='.csv']").set_input_files(
         files=[{"name": name, "mimeType": "text/plain", "buffer": content}]
     )
 
@@ -125,7 +125,7 @@ def test_upload_over_the_limit_is_refused_with_its_size_and_the_page_lives_on(
     large = tmp_path / "large.csv"
     with large.open("wb") as file:
         file.truncate(SIZE_LIMIT + 1_000_000)
-    page.page.locator("input[type=file]").set_input_files(large)
+    page.page.locator("input[type=file][accept*='.csv']").set_input_files(large)
     page.wait_for_text("the file has 33 MB (33,000,000 bytes); expected at most 32 MB")
     upload(page, "hall.csv", b"id,x,y,radius\nN,6,4,0.04\n")
     page.wait_for_text("1 added, 0 changed, 4 not in the file")

@@ -57,7 +57,7 @@ def upload(page: OpenPage, *paths: Path) -> None:
     """Choose files for the upload button, one after the other."""
     for path in paths:
         with page.page.expect_file_chooser() as chooser:
-            page.press("Upload a file")
+            page.press("Upload a map")
         chooser.value.set_files(path)
 
 

@@ -45,7 +45,7 @@ class FloorMapPanel(BasePanel):
 
             opened.on_click(posting(post, open_path))
             Uploads(gui, lambda _client, text: post(actions.MapFailed(text))).add(
-                "Upload a file",
+                "Upload a map",
                 lambda client, upload: post(actions.OpenMap(client, MapFile(upload))),
                 limit=UPLOAD_LIMIT,
                 endings=tuple(f".{ending}" for ending in ENDINGS),
