@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.angles import TURN, wrap_scalar
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
+from commission.localization.beam_echo import BeamModel
 from commission.localization.estimate import Status
 from commission.localization.reflector_center import central_beam, circle_fit, plate
 from commission.site.parameters import DetectorParameters
@@ -43,6 +44,10 @@ class DetectorModel(NamedTuple):
     range_jump: float
     circle: bool
     """Whether the center is a fitted circle rather than the paper's central beam."""
+    half_width: float
+    """Half of a beam's divergence [rad]. A `BeamModel` laid out flat: parallel kernels take no nested tuples."""
+    bearing_sigma: float
+    """1-sigma noise of a beam's bearing [rad]."""
     range_sigma: float
     """1-sigma noise of a beam's range [m]."""
 
@@ -84,6 +89,8 @@ def detector_model(reflectors: ReflectorMap, scanner: Scanner, parameters: Detec
         int(parameters.max_model_error),
         float(parameters.range_jump),
         parameters.center == "circle",
+        0.5 * math.radians(scanner.beam_width_deg),
+        math.radians(scanner.bearing_sigma_deg),
         max(float(scanner.range_sigma), 1e-3),
     )
 
@@ -258,7 +265,8 @@ def _judge(  # noqa: PLR0917 - a scan and a cluster in it
                 beams.angle_min,
                 beams.increment,
                 radius,
-                model.range_sigma,
+                BeamModel(model.half_width, model.bearing_sigma, model.range_sigma),
+                beams.full_turn,
             )
         else:
             r, b = central_beam(ranges, flags, beams.used, first, last, beams.angle_min, beams.increment, radius)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +11,7 @@ from commission.compiled import compiled, compiled_inline
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.se2 import compose_scalars, inverse_scalars
-from commission.localization.kalman import correct, corrected_covariance, gain, innovation, squared_distance
+from commission.localization.kalman import correct, innovation, squared_distance
 from commission.localization.observation import ObservationModel, expect, scanner_offset
 from commission.localization.odometry import OdometryNoise, predict
 from commission.localization.pose_gaussian import PoseGaussian
@@ -31,12 +30,6 @@ class PredictionModel(NamedTuple):
     """Probability that a detection of a visible reflector passes the association filter."""
     free_per_m: float
     """Probability per metre of ray that nobody is in the way."""
-    beam_range_variance: float
-    """True noise of one beam's range [m^2]."""
-    bearing_variance: float
-    """True noise of a detection's bearing [rad^2]."""
-    increment: float
-    """Step between beams [rad]."""
 
 
 class PredictionColumns(NamedTuple):
@@ -45,7 +38,6 @@ class PredictionColumns(NamedTuple):
     prior_covariances: FloatArray
     means: FloatArray
     covariances: FloatArray
-    error_covariances: FloatArray
     modes: NDArray[np.int8]
     seen: IntArray
     on_odometry: FloatArray
@@ -71,21 +63,20 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
     ----------
     stamps_ns, poses, metres : the K scans of a drive.
     offsets, indices : visible reflectors of each scan.
-    places : (M, 4) x, y, variance and radius of each reflector as the map has it.
+    places : (M, 3) x, y and variance of each reflector as the map has it.
     shifts : (M, 2) what the reflectors have moved since [m].
     reach : (M,) distance up to which each is seen [m]; negative: never.
     belief : at the first scan, before its detections.
     columns : outputs.
     """
-    prior_covariances, means, covariances, error_covariances, modes, seen, on_odometry = columns
-    mode, last_seen_at, error = 0, metres[0], belief
+    prior_covariances, means, covariances, modes, seen, on_odometry = columns
+    mode, last_seen_at = 0, metres[0]
     for k in range(len(stamps_ns)):
         x, y, theta = poses[k, 0], poses[k, 1], poses[k, 2]
         if k > 0:
             back_x, back_y, back_theta = inverse_scalars(poses[k - 1, 0], poses[k - 1, 1], poses[k - 1, 2])
             dx, dy, dtheta = compose_scalars(back_x, back_y, back_theta, x, y, theta)
             seconds = 1e-9 * (stamps_ns[k] - stamps_ns[k - 1])
-            error = predict(_with_mean(error, belief), dx, dy, dtheta, seconds, model.odometry)
             belief = predict(belief, dx, dy, dtheta, seconds, model.odometry)
         _store_covariance(belief, k, prior_covariances)
         prior = belief
@@ -103,14 +94,12 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
                 belief, truth.range, truth.bearing, places[m, 0], places[m, 1], places[m, 2], model.observation
             )
             probability = model.inside_gate * model.free_per_m**truth.range
-            error = _mixed(error, _actual_error(error, belief, truth.range, places, m, model), probability)
-            belief = _mixed(belief, corrected, probability)
+            belief = mixed(belief, corrected, probability)
         mode = supervise(mode, belief, model.limits)
         if found > 0:
             last_seen_at = metres[k]
         means[k, 0], means[k, 1], means[k, 2] = belief.x, belief.y, belief.theta
         _store_covariance(belief, k, covariances)
-        _store_covariance(error, k, error_covariances)
         modes[k], seen[k], on_odometry[k] = mode, found, metres[k] - last_seen_at
 
 
@@ -130,7 +119,7 @@ def separations(  # noqa: PLR0917 - the columns of a drive
     Parameters
     ----------
     scans : (n,) rows of `poses` and `prior_covariances`.
-    places : (M, 4) x, y, variance and radius of each reflector.
+    places : (M, 3) as in `predict_covariances`.
     reflector, neighbor : rows of `places`; the covariance is that of the reflector's innovation.
     squared : (n,) output.
     """
@@ -160,35 +149,7 @@ def _inside_gate(  # noqa: PLR0917 - a measurement, number by number
 
 
 @compiled_inline
-def _actual_error(  # noqa: PLR0917 - a measurement, number by number
-    error: PoseGaussian, belief: PoseGaussian, distance: float, places: FloatArray, m: int, model: PredictionModel
-) -> PoseGaussian:
-    """Covariance of the true error after a correction: the filter's gain, the scanner's noise.
-
-    The range of a reflector is the mean of its beams, so that its noise falls with their number.
-    """
-    offset_x, offset_y = scanner_offset(belief.theta, model.observation)
-    mount = model.observation.mount_theta
-    e = expect(belief.x, belief.y, belief.theta, offset_x, offset_y, places[m, 0], places[m, 1], mount)
-    v = innovation(belief, e, e.range, e.bearing, places[m, 2], model.observation)
-    beams = max(1.0, 2.0 * math.asin(min(1.0, places[m, 3] / max(distance, places[m, 3]))) / model.increment)
-    surveyed_range = v.range_noise - model.observation.range_variance
-    surveyed_bearing = v.bearing_noise - model.observation.bearing_variance
-    range_noise = model.beam_range_variance / beams + surveyed_range
-    bearing_noise = model.bearing_variance + surveyed_bearing
-    xx, xy, xt, yy, yt, tt = corrected_covariance(error, e, gain(v), range_noise, bearing_noise)
-    return PoseGaussian(error.x, error.y, error.theta, xx, xy, xt, yy, yt, tt)
-
-
-@compiled_inline
-def _with_mean(spread: PoseGaussian, center: PoseGaussian) -> PoseGaussian:
-    """Covariance of one belief around the mean of another."""
-    s = spread
-    return PoseGaussian(center.x, center.y, center.theta, s.xx, s.xy, s.xt, s.yy, s.yt, s.tt)
-
-
-@compiled_inline
-def _mixed(before: PoseGaussian, after: PoseGaussian, probability: float) -> PoseGaussian:
+def mixed(before: PoseGaussian, after: PoseGaussian, probability: float) -> PoseGaussian:
     """Mean of a belief with a detection and without it, by the probability of the detection.
 
     Of the covariances alone (Sinopoli et al. 2004, the modified Riccati equation): the filter knows whether it was

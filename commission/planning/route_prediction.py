@@ -85,9 +85,11 @@ class PlannedRoute:
     visible: VisibleReflectors
     """Reflectors visible at each scan."""
     places: FloatArray
-    """(M, 4) x, y [m], map frame, variance of the surveyed place [m^2] and radius [m] of each reflector."""
+    """(M, 3) x, y [m], map frame, and variance of the surveyed place [m^2] of each reflector."""
     farthest: FloatArray
     """(M,) largest distance from which each reflector is seen [m]."""
+    reflectors: ReflectorMap
+    """The M reflectors."""
     scanner: Scanner
     """Mounting, and noise of its beams."""
     parameters: Parameters
@@ -107,9 +109,6 @@ class PlannedRoute:
             chi_square_gate(association.gate_probability, 2) if association.enabled else math.inf,
             association.gate_probability if association.enabled else 1.0,
             1.0 - self.options.blocked_per_m,
-            self.scanner.range_sigma**2,
-            detection_bearing_variance(self.scanner),
-            self.scanner.angle_increment,
         )
 
 
@@ -145,10 +144,8 @@ class RoutePrediction:
     means: FloatArray
     """(K, 3) expected `T_map_base` [m, m, rad]: the drive's own pose unless a reflector has moved."""
     covariances: FloatArray
-    """(K, 3, 3) of x [m], y [m] and heading [rad]: what the filter will say."""
-    error_covariances: FloatArray
-    """(K, 3, 3) of the true error of the means, with the scanner's own noise in place of the parameters': what it will
-    be. The two agree where the parameters fit the scanner."""
+    """(K, 3, 3) of x [m], y [m] and heading [rad]: what the filter will say. Its true error is in
+    `true_error`."""
     modes: NDArray[np.int8]
     """(K,) a `Mode` each."""
     seen: IntArray
@@ -256,28 +253,19 @@ def plan_route(
     options = options or PredictionOptions()
     model = model or visibility_model(project)
     drive = nominal_drive(project.route(route_name), project.vehicle, project.scanner, options.plan)
-    rest = [(reflector.sigma**2, reflector.radius) for reflector in model.reflectors.reflectors]
-    places = np.concatenate((model.reflectors.centers, np.array(rest).reshape(-1, 2)), axis=1)
+    surveyed = np.array([reflector.sigma**2 for reflector in model.reflectors.reflectors])
+    places = np.column_stack((model.reflectors.centers, surveyed))
     return PlannedRoute(
         route_name,
         drive,
         model.visible_from_poses(drive.poses),
         read_only(places),
         read_only(model.targets.farthest),
+        model.reflectors,
         project.scanner,
         project.parameters,
         options,
     )
-
-
-def detection_bearing_variance(scanner: Scanner) -> float:
-    """Variance of the bearing of a detected reflector [rad^2], from the scanner's resolution and noise.
-
-    The middle of two edges, each of which lies anywhere between two beams: resolution^2 / 24; and the noise of the two
-    beams that meet them. Against simulated detections it is within a tenth for steps of 0.25 deg, a fifth too much of
-    sigma for 0.36 deg.
-    """
-    return scanner.angle_increment**2 / 24.0 + 0.5 * math.radians(scanner.bearing_sigma_deg) ** 2
 
 
 def station_scans(drive: NominalDrive, stations: Sequence[Station]) -> Iterator[tuple[Station, IntArray]]:
@@ -341,7 +329,6 @@ def predict_route(planned: PlannedRoute, damage: Damage = NO_DAMAGE) -> RoutePre
         np.empty((count, 3, 3)),
         np.empty((count, 3)),
         np.empty((count, 3, 3)),
-        np.empty((count, 3, 3)),
         np.empty(count, np.int8),
         np.empty(count, np.int64),
         np.empty(count),
@@ -366,7 +353,6 @@ def predict_route(planned: PlannedRoute, damage: Damage = NO_DAMAGE) -> RoutePre
         read_only(columns.prior_covariances),
         read_only(columns.means),
         read_only(columns.covariances),
-        read_only(columns.error_covariances),
         read_only(columns.modes),
         read_only(columns.seen),
         read_only(columns.on_odometry),

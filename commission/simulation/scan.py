@@ -49,7 +49,9 @@ class VirtualScanner:
         hall = _hall(RayCaster(grid), project.reflectors, project.disturbances, wall_depth)
         return VirtualScanner(project.scanner, project.disturbances, hall, _beams(project.scanner))
 
-    def scan(self, T_map_base: FloatArray, circles: FloatArray, rng: np.random.Generator) -> Echoes:
+    def scan(
+        self, T_map_base: FloatArray, circles: FloatArray, rng: np.random.Generator, *, whole: bool = True
+    ) -> Echoes:
         """One scan, taken at one instant.
 
         Parameters
@@ -57,6 +59,8 @@ class VirtualScanner:
         T_map_base : (3,) true pose of the vehicle [m, m, rad].
         circles : (K, 3) x, y and radius of legs and other moving things [m], map frame.
         rng : draws the noise of each beam, then the glints; the number of draws depends on neither pose nor hall.
+        whole : False leaves out the beams that can meet no reflector (unless there are glints): what a detector finds
+            is the same to the last bit, in a third of the time.
 
         Returns
         -------
@@ -67,7 +71,8 @@ class VirtualScanner:
         ranges, flags = np.empty(count, np.float32), np.empty(count, np.bool_)
         noise = rng.standard_normal((count, 2))
         T_map_scanner = compose(T_map_base, self.scanner.mounting)
-        moment = Moment(T_map_scanner, self.range_limit(T_map_base), circles, noise)
+        glinting = self.disturbances.glints_per_scan > 0.0
+        moment = Moment(T_map_scanner, self.range_limit(T_map_base), circles, noise, whole or glinting)
         cast_scan(self.hall, self.beams, moment, ranges, flags)
         self._glint(ranges, flags, rng)
         return ranges, flags

@@ -16,13 +16,14 @@ from commission.compiled import compiled
 from commission.geometry.angles import TURN, wrap_scalar
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.geometry.ray_kernels import RayTables, cast_ray
+from commission.localization.beam_echo import cylinder_echo, is_flagged, lit_part
 
 FLAT_COSINE = math.cos(math.radians(65.0))
 """Cosine of the angle of incidence beyond which a flat reflector returns no more than a wall does."""
-LIT_SHARE = 0.2
-"""Share of a beam (or, if narrower, of the object) that must meet for a flag: less returns too weak an echo."""
 BEARING_MARGIN = 5.0
 """Sigmas of bearing noise by which the interval of beams of an object is widened before each beam is checked."""
+NEIGHBORS = 2
+"""Beams beside those that can meet a reflector which a detector also looks at, to see where a cluster ends."""
 
 
 class Beams(NamedTuple):
@@ -74,6 +75,8 @@ class Moment(NamedTuple):
     """(K, 3) x, y and radius of legs and other moving things [m], map frame."""
     noise: FloatArray
     """(B, 2) standard normal draws for bearing and range of each beam."""
+    whole: bool
+    """Whether all beams are cast, or only those that can meet a reflective object, and their neighbors."""
 
 
 class Echoes(NamedTuple):
@@ -89,8 +92,12 @@ class Echoes(NamedTuple):
 
 @compiled
 def cast_scan(hall: Hall, beams: Beams, moment: Moment, ranges: NDArray[np.float32], flags: BoolArray) -> None:
-    """Fill `ranges` (B,) and `flags` (B,) with one scan."""
+    """Fill `ranges` (B,) and `flags` (B,) with one scan; beams that are not cast return nothing."""
     count = len(ranges)
+    wanted = np.full(count, moment.whole)
+    if not moment.whole:
+        for k in range(len(hall.radii)):
+            _want(hall, beams, moment, k, wanted)
     x, y, heading = moment.pose[0], moment.pose[1], moment.pose[2]
     reach = min(beams.farthest + 4.0 * beams.range_sigma, moment.range_limit)
     echoes = Echoes(np.empty(count), np.empty(count), flags)
@@ -98,7 +105,7 @@ def cast_scan(hall: Hall, beams: Beams, moment: Moment, ranges: NDArray[np.float
         bearing = beams.angle_min + i * beams.increment + beams.bearing_sigma * moment.noise[i, 0]
         c, s = math.cos(heading + bearing), math.sin(heading + bearing)
         echoes.bearings[i] = bearing
-        echoes.distances[i] = cast_ray(hall.tables, x, y, c, s, reach)[0]
+        echoes.distances[i] = cast_ray(hall.tables, x, y, c, s, reach)[0] if wanted[i] else math.inf
         flags[i] = False
     for k in range(len(moment.circles)):
         _meet_circle(beams, moment, k, echoes)
@@ -124,6 +131,36 @@ def _first_beam(beams: Beams, bearing: float, count: int) -> tuple[int, int]:
 
 
 @compiled
+def _interval(
+    hall: Hall, beams: Beams, moment: Moment, index: int, count: int
+) -> tuple[int, int, int, float, float, float]:
+    """Beams that can meet a reflective object: first, last and number per turn; its range, bearing and half its size.
+
+    First and last are unclipped; the last is before the first where no beam can.
+    """
+    dx, dy = hall.centers[index, 0] - moment.pose[0], hall.centers[index, 1] - moment.pose[1]
+    distance, radius = math.hypot(dx, dy), hall.radii[index]
+    if distance <= radius or distance - radius > min(beams.farthest, beams.reflector_range):
+        return 0, -1, 1, distance, 0.0, 0.0
+    bearing = wrap_scalar(math.atan2(dy, dx) - moment.pose[2])
+    middle, turn = _first_beam(beams, bearing, count)
+    high = math.asin(radius / distance)
+    reach = int((high + beams.half_width + BEARING_MARGIN * beams.bearing_sigma) / beams.increment) + 1
+    return middle - reach, middle + reach, turn, distance, bearing, high
+
+
+@compiled
+def _want(hall: Hall, beams: Beams, moment: Moment, index: int, wanted: BoolArray) -> None:
+    """Mark the beams that can meet a reflective object, and their neighbors."""
+    first, last, turn, _, _, _ = _interval(hall, beams, moment, index, len(wanted))
+    if last < first:
+        return
+    for k in range(first - NEIGHBORS, last + NEIGHBORS + 1):
+        if k % turn < len(wanted):
+            wanted[k % turn] = True
+
+
+@compiled
 def _meet_circle(beams: Beams, moment: Moment, index: int, echoes: Echoes) -> None:
     """Shorten every beam whose middle meets a dull circle."""
     radius = moment.circles[index, 2]
@@ -141,9 +178,7 @@ def _meet_circle(beams: Beams, moment: Moment, index: int, echoes: Echoes) -> No
             continue
         off = wrap_scalar(echoes.bearings[i] - bearing)
         if abs(off) <= half:
-            across = distance * math.sin(off)
-            echo = distance * math.cos(off) - math.sqrt(max(radius * radius - across * across, 0.0))
-            echoes.distances[i] = min(echoes.distances[i], echo)
+            echoes.distances[i] = min(echoes.distances[i], cylinder_echo(distance, radius, off))
 
 
 @compiled
@@ -153,37 +188,26 @@ def _meet_reflective(hall: Hall, beams: Beams, moment: Moment, index: int, echoe
     Retroreflecting tape outshines what the rest of the beam meets, so the echo is that of the lit part of the object:
     its middle gives the range. Counts of equation 3 or up to two more follow (beams no wider than their step).
     """
-    radius = hall.radii[index]
-    dx, dy = hall.centers[index, 0] - moment.pose[0], hall.centers[index, 1] - moment.pose[1]
-    distance = math.hypot(dx, dy)
-    if distance <= radius or distance - radius > min(beams.farthest, beams.reflector_range):
-        return
-    toward = math.atan2(dy, dx)
-    high = math.asin(radius / distance)
+    first, last, turn, distance, bearing, high = _interval(hall, beams, moment, index, len(echoes.flags))
     low, facing = -high, 0.0
-    if hall.flat[index]:
-        facing = wrap_scalar(hall.headings[index] - toward)
+    if last >= first and hall.flat[index]:
+        facing = wrap_scalar(hall.headings[index] - bearing - moment.pose[2])
         if -math.cos(facing) < FLAT_COSINE:
             return
-        low, high = _plate_edges(distance, radius, facing)
-    bearing = wrap_scalar(toward - moment.pose[2])
-    middle, turn = _first_beam(beams, bearing, len(echoes.flags))
-    widest = max(-low, high) + beams.half_width + BEARING_MARGIN * beams.bearing_sigma
-    reach = int(widest / beams.increment) + 1
-    for k in range(middle - reach, middle + reach + 1):
+        low, high = _plate_edges(distance, hall.radii[index], facing)
+    for k in range(first, last + 1):
         i = k % turn
         if i >= len(echoes.flags):
             continue
         off = wrap_scalar(echoes.bearings[i] - bearing)
-        upper, lower = min(off + beams.half_width, high), max(off - beams.half_width, low)
-        if upper - lower < LIT_SHARE * min(2.0 * beams.half_width, high - low):
+        lower, upper = lit_part(off, beams.half_width, low, high)
+        if not is_flagged(lower, upper, beams.half_width, high - low):
             continue
         lit = 0.5 * (upper + lower)
         if hall.flat[index]:
             echo = distance * math.cos(facing) / math.cos(facing - lit)
         else:
-            across = distance * math.sin(lit)
-            echo = distance * math.cos(lit) - math.sqrt(max(radius * radius - across * across, 0.0))
+            echo = cylinder_echo(distance, hall.radii[index], lit)
         if echo < echoes.distances[i] + hall.wall_depth:
             echoes.distances[i], echoes.flags[i] = echo, True
 

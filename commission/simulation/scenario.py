@@ -82,7 +82,7 @@ def records(
     )
     stamps = np.arange(0, motion.duration_ns + 1, project.scanner.period_ns, dtype=np.int64)
     poses = motion.poses_at(stamps)
-    scans = _scans(project, seed, stamps, poses)
+    scans = _scans(project, seed, stamps, poses, options.whole_scans)
     done = 0
     for index, (stamp, pose) in enumerate(zip(stamps.tolist(), poses, strict=True)):
         if progress is not None:
@@ -117,7 +117,7 @@ def _odometry(motion: Motion, displacements: FloatArray, first: int, last: int) 
         yield Odometry(int(motion.stamps_ns[row]), displacements[row])
 
 
-def _scans(project: Project, seed: int, stamps: IntArray, poses: FloatArray) -> Iterator[Scan | None]:
+def _scans(project: Project, seed: int, stamps: IntArray, poses: FloatArray, whole: bool) -> Iterator[Scan | None]:
     """One scan per stamp, None where it is lost."""
     disturbances = project.disturbances
     scanner = VirtualScanner.of(project)
@@ -130,7 +130,7 @@ def _scans(project: Project, seed: int, stamps: IntArray, poses: FloatArray) -> 
     for stamp, pose in zip(stamps.tolist(), poses, strict=True):
         if crowd is not None:
             crowd.step(seconds, pose)
-        ranges, flags = scanner.scan(pose, nobody if crowd is None else crowd.legs(), beams)
+        ranges, flags = scanner.scan(pose, nobody if crowd is None else crowd.legs(), beams, whole=whole)
         if any(0.0 <= 1e-9 * stamp - period.start < period.duration for period in disturbances.covered):
             flags[:] = False
         record = Scan(stamp, ranges, project.scanner.angle_min, project.scanner.angle_increment, None, flags)

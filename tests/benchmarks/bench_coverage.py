@@ -136,6 +136,17 @@ def move_times(model: VisibilityModel, options: FixOptions) -> tuple[list[float]
     return times, same(live.coverage, coverage(anew, LATTICE, options))
 
 
+def time_per_point(model: VisibilityModel, caster: RayCaster, times: int) -> float:
+    """Processor time per point on a floor that repeats the plant side by side [s]; the same reflectors to the area."""
+    places = model.reflectors.reflectors
+    wide = OccupancyGrid(np.tile(caster.grid.occupied, (1, times)), RESOLUTION)
+    width = caster.grid.occupied.shape[1] * RESOLUTION
+    repeated = [replace(r, id=f"{k}-{r.id}", x=r.x + k * width) for k in range(times) for r in places]
+    larger = build_visibility(ReflectorMap(tuple(repeated)), SCANNER, RayCaster(wide), VisibilityOptions())
+    lattice = replace(LATTICE, columns=times * LATTICE.columns)
+    return timed(lambda: coverage(larger, lattice, ALL_ROUND))[0] / len(lattice)
+
+
 def main() -> int:
     """Print times and ratios; return the exit code."""
     coverage_module.warm_up()
@@ -173,6 +184,8 @@ def main() -> int:
     print(f"    of which shadow maps                {shadows:8.2f} s")
     for name, times in (("one reflector moved", moves), ("the same with 16 headings", moves_headings)):
         print(f"{name:39} {1e3 * np.median(times):8.2f} ms   {1e3 * max(times):6.1f} ms at most")
+    one, four = (time_per_point(model, caster, times) for times in (1, 4))
+    print(f"four times the area, time per point     {four / one:8.2f} x    (1 is linear)")
     print(f"pairs of the sample that differ         {differing:8d} of {expected.size:,}")
     print(f"moves equal a full computation          {equal and equal_headings!s:>8}")
     good = (

@@ -32,23 +32,29 @@ def cast(
 ) -> Scan:
     """A scan from -180 degrees on that meets one post at (range, bearing) and a wall 15 m away.
 
-    A beam is flagged when any part of its width touches the post; beyond the silhouette it measures that.
+    A beam is flagged when any part of its width touches the post; it measures to the middle of that part.
     """
     angle_min = -0.5 * STEP * beams
     bearings = angle_min + STEP * np.arange(beams)
     distance, bearing = center
     turn = np.arctan2(np.sin(bearings - bearing), np.cos(bearings - bearing))
-    flags = np.abs(turn) < math.asin(radius / distance) + 0.5 * beam_width
-    depth = np.sqrt(np.maximum(radius**2 - (distance * np.sin(turn)) ** 2, 0.0))
-    ranges = np.where(flags, distance * np.cos(turn) - depth, 15.0)
+    half = math.asin(radius / distance)
+    flags = np.abs(turn) < half + 0.5 * beam_width
+    ends = np.clip(turn + 0.5 * beam_width * np.array([[-1.0], [1.0]]), -half, half)
+    lit = ends.mean(axis=0)
+    depth = np.sqrt(np.maximum(radius**2 - (distance * np.sin(lit)) ** 2, 0.0))
+    ranges = np.where(flags, distance * np.cos(lit) - depth, 15.0)
     if noise is not None:
         ranges = ranges + noise.normal(0.0, 0.01, beams)
     return Scan(0, ranges.astype(np.float32), angle_min, STEP, None, flags)
 
 
-def found(scan: Scan, reflectors: ReflectorMap = POSTS, **changes: object) -> DetectedReflectors:
+def found(
+    scan: Scan, reflectors: ReflectorMap = POSTS, beam_width: float = 0.0, **changes: object
+) -> DetectedReflectors:
     parameters = dataclasses.replace(DetectorParameters(), **changes)
-    return detect(scan, detector_model(reflectors, Scanner(), parameters), parameters)
+    scanner = Scanner(beam_width_deg=math.degrees(beam_width))
+    return detect(scan, detector_model(reflectors, scanner, parameters), parameters)
 
 
 @pytest.mark.parametrize(
@@ -170,7 +176,7 @@ def test_fitted_circle_is_better_than_the_central_beam(distance: float, beam_wid
         truth = (distance, float(rng.uniform(-3.0, 3.0)))
         scan = cast(truth, noise=rng, beam_width=math.radians(beam_width_deg))
         for center, list_of_errors in errors.items():
-            detected = found(scan, center=center, enabled=False)
+            detected = found(scan, beam_width=math.radians(beam_width_deg), center=center, enabled=False)
             nearest = np.argmin(np.abs(detected.range_bearing[:, 1] - truth[1]))
             list_of_errors.append(detected.range_bearing[nearest] - truth)
     circle, central = np.array(errors["circle"]), np.array(errors["central_beam"])

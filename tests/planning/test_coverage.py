@@ -1,6 +1,8 @@
 """Coverage: the lattice, tiles, and that a dragged reflector leaves no trace but its own."""
 
 import math
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -176,3 +178,37 @@ def test_a_lattice_without_points_is_refused():
         Lattice(0.0, 0.0, 0.25, 0, 5)
     with pytest.raises(ValueError, match="spacing"):
         Lattice(0.0, 0.0, math.inf, 5, 5)
+
+
+PEAK = """
+import resource, sys
+from commission.geometry.occupancy import OccupancyGrid
+from commission.geometry.raycast import RayCaster
+from commission.planning.coverage import Lattice, coverage
+from commission.planning.dilution import FixOptions
+from commission.planning.visibility import VisibilityOptions, build_visibility
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.scanner import Scanner
+import numpy as np
+places = np.random.default_rng(0).uniform(0.0, 100.0, (200, 2))
+reflectors = ReflectorMap(tuple(Reflector(str(i), float(x), float(y)) for i, (x, y) in enumerate(places)))
+grid = OccupancyGrid(np.zeros((200, 200), dtype=np.bool_), 0.5)
+model = build_visibility(reflectors, Scanner(), RayCaster(grid), VisibilityOptions())
+coverage(model, Lattice(0.0, 0.0, 1.0, 4, 4), FixOptions())
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+rows = int(sys.argv[1])
+coverage(model, Lattice(0.0, 0.0, 100.0 / 1000, rows, 1000), FixOptions())
+print(1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="ru_maxrss counts kilobytes on Linux only")
+def test_memory_of_a_large_floor_is_a_hundred_bytes_a_point_and_one_tile():
+    peaks = []
+    for rows in (400, 1600):
+        done = subprocess.run([sys.executable, "-c", PEAK, str(rows)], capture_output=True, text=True, check=True)
+        peaks.append(int(done.stdout))
+    # A tile of 131,072 points: 40 bytes each, and 8 for every 64 of the 200 reflectors; and what the allocator keeps.
+    tile = coverage_module.POINTS_PER_TILE * (40 + 8 * 4)
+    for rows, peak in zip((400, 1600), peaks, strict=True):
+        assert peak < 110 * 1000 * rows + 2 * tile, (rows, peak)

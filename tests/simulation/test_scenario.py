@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from commission.errors import UsageError
+from commission.localization.detection_log import extract_detections
+from commission.localization.setup import LocalizerSetup
 from commission.simulation.drive import DriveOptions
 from commission.simulation.scenario import records, start_of, virtual_drive
 from commission.site.disturbances import CoveredPeriod, Disturbances
@@ -132,3 +134,15 @@ def test_progress_ends_at_one_and_may_cancel() -> None:
 def test_unknown_route_is_an_error_that_lists_the_routes() -> None:
     with pytest.raises(UsageError, match="Out and back"):
         virtual_drive(project(), "Nowhere", 0)
+
+
+def test_scans_without_the_beams_that_meet_no_reflector_give_the_same_detections() -> None:
+    site = hall()
+    whole, partial = (virtual_drive(site, ROUTE, 3, options=DriveOptions(whole_scans=whole)) for whole in (True, False))
+    assert whole.scans is not None
+    assert partial.scans is not None
+    assert np.isnan(partial.scans.ranges).mean() > 0.5 > np.isnan(whole.scans.ranges).mean()
+    one, other = (extract_detections(log, LocalizerSetup.of(site)) for log in (whole, partial))
+    assert len(one.status) > 100
+    for name in ("offsets", "range_bearing", "beams", "status"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name))

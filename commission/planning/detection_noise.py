@@ -1,0 +1,199 @@
+"""What a detection is worth: bias and noise of a reflector's detected center by its distance, found by detecting it.
+
+One reflector stands at a distance, as often at any place between two beams as at any other; it is scanned with the
+scanner's own noise and handed to the localizer's own detector. Walls, people and the vehicle's motion are not in it.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from commission.compiled import compiled, compiled_inline
+from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.localization.beam_echo import BeamModel, cylinder_echo, is_flagged, lit_part
+from commission.localization.detector import INLIER, Beams, DetectorModel, detect_clusters, detector_model
+from commission.site.parameters import DetectorParameters
+from commission.site.reflectors import ReflectorMap
+from commission.site.scanner import Scanner
+
+NEAREST = 0.3
+"""Smallest distance that is looked at [m]; nearer ones count as this one."""
+DISTANCES = 64
+"""Distances that are looked at, evenly in their logarithm."""
+SCANS = 1024
+"""Scans at each: a sigma is then known to 2 %, and what lies between two distances averages both."""
+MARGIN = 5.0
+"""Sigmas of bearing noise by which the interval of beams that may meet the reflector is widened."""
+
+
+class Worth(NamedTuple):
+    """What the detections of one reflector at one distance are like."""
+
+    probability: float
+    """That it is detected and passes the detector filter while it is in sight [0..1]."""
+    range_bias: float
+    """Mean error of the range [m]."""
+    range_variance: float
+    """[m^2]."""
+    bearing_variance: float
+    """[rad^2]."""
+    range_wave: float
+    """What of it repeats where the reflector stands alike between two beams: a mean error a cos(psi) of the range, psi
+    being a turn from beam to beam and 0 on a beam; its amplitude a [m]. The variances include it, a^2 / 2."""
+    bearing_wave: float
+    """The same of the bearing, a sin(psi): the cluster's edges jump from beam to beam [rad]."""
+
+
+class DetectionNoise(NamedTuple):
+    """`Worth` by class of reflector and distance, for kernels."""
+
+    columns: FloatArray
+    """(C, DISTANCES, 6) rows of `Worth`."""
+    per_log: float
+    """Rows per e-fold of the distance."""
+
+
+class _Optics(NamedTuple):
+    """What matters of a scanner."""
+
+    increment: float
+    beam: BeamModel
+    farthest: float
+
+
+def detection_noise(reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorParameters) -> DetectionNoise:
+    """Find out what detections of the reflectors of a map are worth, out to the scanner's range.
+
+    Parameters
+    ----------
+    reflectors : their distinct radii and kinds are looked at; a plate is taken to face the scanner.
+    scanner : beams and their noise.
+    parameters : of the detector: its window rejects, and its rule for the center has a noise of its own.
+    """
+    optics = _Optics(
+        scanner.angle_increment,
+        BeamModel(
+            0.5 * math.radians(scanner.beam_width_deg), math.radians(scanner.bearing_sigma_deg), scanner.range_sigma
+        ),
+        max(min(scanner.range[1], scanner.reflector_range), 2.0 * NEAREST),
+    )
+    radii, flat, *rest = detector_model(reflectors, scanner, parameters)
+    return _experiment(tuple(radii.tolist()), tuple(flat.tolist()), tuple(rest), optics)
+
+
+def classes_of(reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorParameters) -> IntArray:
+    """(M,) row of `DetectionNoise.columns` of each reflector."""
+    model = detector_model(reflectors, scanner, parameters)
+    rows = {pair: row for row, pair in enumerate(zip(model.radii.tolist(), model.flat.tolist(), strict=True))}
+    pairs = zip(reflectors.radii.tolist(), reflectors.is_flat.tolist(), strict=True)
+    return np.array([rows[pair] for pair in pairs], dtype=np.int64)
+
+
+@compiled_inline
+def worth(noise: DetectionNoise, kind: int, distance: float) -> Worth:
+    """Look up a class of reflectors at a distance, linearly between the distances that were looked at."""
+    place = noise.per_log * math.log(max(distance, NEAREST) / NEAREST)
+    row = min(int(place), noise.columns.shape[1] - 2)
+    b = min(place - row, 1.0)
+    a = 1.0 - b
+    c = noise.columns
+    return Worth(
+        a * c[kind, row, 0] + b * c[kind, row + 1, 0],
+        a * c[kind, row, 1] + b * c[kind, row + 1, 1],
+        a * c[kind, row, 2] + b * c[kind, row + 1, 2],
+        a * c[kind, row, 3] + b * c[kind, row + 1, 3],
+        a * c[kind, row, 4] + b * c[kind, row + 1, 4],
+        a * c[kind, row, 5] + b * c[kind, row + 1, 5],
+    )
+
+
+# The same site is predicted again and again while the engineer drags a reflector.
+@functools.lru_cache(maxsize=16)
+def _experiment(
+    radii: tuple[float, ...], flat: tuple[bool, ...], rest: tuple[float, ...], optics: _Optics
+) -> DetectionNoise:
+    """Detect each class of reflectors at each distance; `rest` are the other fields of a `DetectorModel`."""
+    model = DetectorModel(read_only(np.array(radii, np.float64)), read_only(np.array(flat, np.bool_)), *rest)  # type: ignore[arg-type]
+    columns = np.zeros((len(radii), DISTANCES, len(Worth._fields)))
+    for kind, radius in enumerate(radii):
+        for row, distance in enumerate(np.geomspace(NEAREST, optics.farthest, DISTANCES).tolist()):
+            columns[kind, row] = _judge(max(distance, 2.0 * radius), radius, flat[kind], optics, model, row)
+    return DetectionNoise(read_only(columns), (DISTANCES - 1) / math.log(optics.farthest / NEAREST))
+
+
+def _judge(  # noqa: PLR0917 - one reflector
+    distance: float, radius: float, flat: bool, optics: _Optics, model: DetectorModel, seed: int
+) -> Worth:
+    """Scan a reflector often and gather what the detector makes of it."""
+    beam = optics.beam
+    widest = math.asin(radius / distance) + beam.half_width + MARGIN * beam.bearing_sigma
+    reach = int(widest / optics.increment) + 2
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_normal((SCANS, 2 * reach + 1, 2))
+    errors = np.empty((SCANS, 2))
+    _detect_often(distance, radius, flat, optics, model, _places(SCANS), noise, errors)
+    detected = ~np.isnan(errors[:, 0])
+    if detected.sum() < 2:
+        return Worth(0.0, 0.0, beam.range_sigma**2, optics.increment**2, 0.0, 0.0)
+    psi = 2.0 * math.pi * _places(SCANS)[detected]
+    ranges, bearings = errors[detected].T
+    return Worth(
+        float(detected.mean()),
+        float(ranges.mean()),
+        float(ranges.var()),
+        float(np.square(bearings).mean()),
+        float(2.0 * np.mean(ranges * np.cos(psi))),
+        float(2.0 * np.mean(bearings * np.sin(psi))),
+    )
+
+
+def _places(count: int) -> FloatArray:
+    """Places evenly between two beams, in steps from a beam [-0.5..0.5]."""
+    return (np.arange(count, dtype=np.float64) + 0.5) / count - 0.5
+
+
+@compiled
+def _detect_often(  # noqa: PLR0917 - one reflector
+    distance: float,
+    radius: float,
+    flat: bool,
+    optics: _Optics,
+    model: DetectorModel,
+    places: FloatArray,
+    noise: FloatArray,
+    errors: FloatArray,
+) -> None:
+    """Error of range [m] and bearing [rad] in each of S scans, NaN where nothing passes the detector filter.
+
+    Parameters
+    ----------
+    places : (S,) bearing of the reflector in each scan [steps between beams], from the middle beam.
+    noise : (S, B, 2) standard normal draws for bearing and range of each of B beams; the middle one is straight ahead.
+    errors : (S, 2) output.
+    """
+    count = noise.shape[1]
+    beams = Beams(count, -(count // 2) * optics.increment, optics.increment, False)
+    ranges, flags = np.empty(count, np.float32), np.empty(count, np.bool_)
+    range_bearing, widths = np.empty((count, 2)), np.empty(count, np.int64)
+    status = np.empty(count, np.int8)
+    half_width = optics.beam.half_width
+    high = math.atan(radius / distance) if flat else math.asin(radius / distance)
+    for k in range(len(noise)):
+        bearing = places[k] * optics.increment
+        for i in range(count):
+            off = beams.angle_min + i * beams.increment + optics.beam.bearing_sigma * noise[k, i, 0] - bearing
+            lower, upper = lit_part(off, half_width, -high, high)
+            flags[i] = is_flagged(lower, upper, half_width, 2.0 * high)
+            lit = 0.5 * (lower + upper)
+            echo = distance / math.cos(lit) if flat else cylinder_echo(distance, radius, lit)
+            ranges[i] = echo + optics.beam.range_sigma * noise[k, i, 1] if flags[i] else math.nan
+        found = detect_clusters(ranges, flags, beams, model, 0, range_bearing, widths, status)
+        errors[k, 0], errors[k, 1] = math.nan, math.nan
+        for i in range(found):
+            if status[i] == INLIER:
+                errors[k, 0], errors[k, 1] = range_bearing[i, 0] - distance, range_bearing[i, 1] - bearing
+                break

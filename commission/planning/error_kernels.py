@@ -1,0 +1,291 @@
+"""Compiled recursion of the true error along a planned drive; its kinds are told in `true_error`."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from commission.compiled import compiled, compiled_inline
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.geometry.se2 import compose_scalars, inverse_scalars
+from commission.localization.kalman import Gain, Innovation, correct, corrected_covariance, gain, innovation
+from commission.localization.observation import Expected, ObservationModel, expect, scanner_offset
+from commission.localization.odometry import OdometryNoise, predict
+from commission.localization.pose_gaussian import PoseGaussian
+from commission.planning.detection_noise import DetectionNoise, Worth, worth
+from commission.planning.prediction_kernels import mixed
+
+FORGOTTEN = 1e-16
+"""Squared response below which a reflector is no longer followed [m^2, rad^2]."""
+
+
+class ErrorModel(NamedTuple):
+    """What the recursion reads besides the drive."""
+
+    odometry: OdometryNoise
+    observation: ObservationModel
+    """What the filter believes of its detections."""
+    noise: DetectionNoise
+    """What they are truly worth."""
+    gate_d2: float
+    """Largest squared Mahalanobis distance of an inlier; infinite without the filter."""
+    inside_gate: float
+    """Probability of that, by the filter's own belief."""
+    free_per_m: float
+    """Probability per metre of ray that nobody is in the way."""
+    angle_min: float
+    """Bearing of the first beam [rad]."""
+    increment: float
+    """Step between beams [rad]."""
+
+
+class _Passing(NamedTuple):
+    """What the association filter does to true detections."""
+
+    probability: float
+    """That one passes."""
+    smaller: float
+    """Factor of the innovation's covariance of those that pass."""
+    larger: float
+    """The same of those that do not."""
+
+
+@compiled
+def propagate_errors(  # noqa: PLR0917 - the columns of a drive
+    stamps_ns: IntArray,
+    poses: FloatArray,
+    offsets: IntArray,
+    indices: IntArray,
+    places: FloatArray,
+    kinds: IntArray,
+    priors: FloatArray,
+    start_sigmas: FloatArray,
+    model: ErrorModel,
+    squares: FloatArray,
+) -> None:
+    """Second moments of the error after each scan.
+
+    Parameters
+    ----------
+    stamps_ns, poses : the K scans of a drive.
+    offsets, indices : visible reflectors of each scan.
+    places : (M, 3) x, y and variance of the surveyed place of each reflector.
+    kinds : (M,) row of `model.noise` of each.
+    priors : (K, 3, 3) what the filter believes before the detections of each scan.
+    start_sigmas : (3,) of the start pose.
+    squares : (K, 3, 3) output.
+    """
+    # Per reflector, what one unit of its error moves the pose by: two quarters of its wave, two axes of its place.
+    responses = np.zeros((len(places), 3, 4))
+    followed, is_followed, count = np.empty(len(places), np.int64), np.zeros(len(places), np.bool_), 0
+    bias = np.zeros(3)
+    x, y, theta = poses[0, 0], poses[0, 1], poses[0, 2]
+    sx, sy, st = start_sigmas[0], start_sigmas[1], start_sigmas[2]
+    error = PoseGaussian(x, y, theta, sx * sx, 0.0, 0.0, sy * sy, 0.0, st * st)
+    for k in range(len(stamps_ns)):
+        x, y, theta = poses[k, 0], poses[k, 1], poses[k, 2]
+        if k > 0:
+            seconds = 1e-9 * (stamps_ns[k] - stamps_ns[k - 1])
+            error = _moved(error, x, y, theta, seconds, model.odometry)
+            _turn(responses, followed[:count], bias, x - poses[k - 1, 0], y - poses[k - 1, 1])
+        belief = _at(x, y, theta, priors[k])
+        offset_x, offset_y = scanner_offset(theta, model.observation)
+        for i in range(offsets[k], offsets[k + 1]):
+            m = indices[i]
+            mount = model.observation.mount_theta
+            e = expect(x, y, theta, offset_x, offset_y, places[m, 0], places[m, 1], mount)
+            true = worth(model.noise, int(kinds[m]), e.range)
+            says = innovation(belief, e, e.range, e.bearing, places[m, 2], model.observation)
+            k_says = gain(says)
+            passing = _passing(belief, e, says, true, places[m, 2], model)
+            seen = true.probability * model.free_per_m**e.range
+            error = _after(error, e, k_says, true, passing, seen, model.observation)
+            if not is_followed[m]:
+                followed[count], is_followed[m] = m, True
+                count += 1
+            share = seen * passing.probability
+            _respond(responses, followed[:count], bias, e, k_says, share)
+            _disturb(responses, m, bias, e, k_says, share, true, model)
+            corrected = correct(belief, e.range, e.bearing, places[m, 0], places[m, 1], places[m, 2], model.observation)
+            belief = mixed(belief, corrected, model.inside_gate * model.free_per_m**e.range)
+        count = _forget(responses, followed, is_followed, count)
+        _gather(error, responses, followed[:count], places, bias, squares[k])
+
+
+@compiled_inline
+def _moved(  # noqa: PLR0917 - a pose, number by number
+    error: PoseGaussian, x: float, y: float, theta: float, seconds: float, noise: OdometryNoise
+) -> PoseGaussian:
+    """Error after the motion to a pose."""
+    back_x, back_y, back_theta = inverse_scalars(error.x, error.y, error.theta)
+    dx, dy, dtheta = compose_scalars(back_x, back_y, back_theta, x, y, theta)
+    moved = predict(error, dx, dy, dtheta, seconds, noise)
+    return PoseGaussian(x, y, theta, moved.xx, moved.xy, moved.xt, moved.yy, moved.yt, moved.tt)
+
+
+@compiled_inline
+def _at(x: float, y: float, theta: float, c: FloatArray) -> PoseGaussian:
+    """Belief of a covariance (3, 3) at a pose."""
+    return PoseGaussian(x, y, theta, c[0, 0], c[0, 1], c[0, 2], c[1, 1], c[1, 2], c[2, 2])
+
+
+@compiled_inline
+def _passing(  # noqa: PLR0917 - a detection, number by number
+    belief: PoseGaussian, e: Expected, says: Innovation, true: Worth, surveyed: float, model: ErrorModel
+) -> _Passing:
+    """What the gate g does when the filter says S of innovations whose covariance is T.
+
+    For T = l S, with u = g / 2l: 1 - exp(-u) pass, with the covariance T (1 - u exp(-u) / (1 - exp(-u))). l is half the
+    trace of S^-1 T. T has the true noise, but the pose's covariance is the filter's: with the true one, the few drives
+    that are rejected would widen it until all drives seemed to be.
+    """
+    o = model.observation
+    actual = ObservationModel(o.mount_x, o.mount_y, o.mount_theta, true.range_variance, true.bearing_variance, 0.0)
+    is_so = innovation(belief, e, e.range, e.bearing, surveyed, actual)
+    across = is_so.w - says.w
+    trace = is_so.s_rr / says.s_rr + (is_so.schur + across * across * is_so.s_rr) / says.schur
+    u = model.gate_d2 / trace
+    outside = math.exp(-u)
+    # Without a gate, or far inside it, nothing is rejected.
+    if outside < 1e-12:
+        return _Passing(1.0, 1.0, 1.0)
+    smaller = 1.0 - u * outside / (1.0 - outside)
+    # All of them together have the factor 1.
+    return _Passing(1.0 - outside, smaller, (1.0 - (1.0 - outside) * smaller) / outside)
+
+
+@compiled_inline
+def _after(  # noqa: PLR0917 - a detection, number by number
+    error: PoseGaussian,
+    e: Expected,
+    k: Gain,
+    true: Worth,
+    passing: _Passing,
+    seen: float,
+    observation: ObservationModel,
+) -> PoseGaussian:
+    """Covariance of what is new in every scan, after a detection that may be missing or rejected.
+
+    Given the innovation v, the error before is L v and a rest of covariance P - L T L^T, with L the gain of a filter
+    that knew P and T. So afterwards it is (L - K) v or, when rejected, L v, besides that same rest.
+    """
+    o = observation
+    range_noise = max(true.range_variance - 0.5 * true.range_wave * true.range_wave, 1e-12)
+    bearing_noise = max(true.bearing_variance - 0.5 * true.bearing_wave * true.bearing_wave, 1e-12)
+    white = ObservationModel(o.mount_x, o.mount_y, o.mount_theta, range_noise, bearing_noise, 0.0)
+    is_so = innovation(error, e, e.range, e.bearing, 0.0, white)
+    rest = _corrected(error, e, gain(is_so), is_so)
+    taken = mixed(rest, _corrected(error, e, k, is_so), passing.smaller)
+    rejected = mixed(rest, error, passing.larger)
+    return mixed(error, mixed(rejected, taken, passing.probability), seen)
+
+
+@compiled_inline
+def _corrected(error: PoseGaussian, e: Expected, k: Gain, is_so: Innovation) -> PoseGaussian:
+    """Error after a correction by a gain."""
+    xx, xy, xt, yy, yt, tt = corrected_covariance(error, e, k, is_so.range_noise, is_so.bearing_noise)
+    return PoseGaussian(error.x, error.y, error.theta, xx, xy, xt, yy, yt, tt)
+
+
+@compiled
+def _turn(responses: FloatArray, followed: IntArray, bias: FloatArray, mx: float, my: float) -> None:
+    """A motion by (mx, my) [m] turns an error of the heading into one of the position."""
+    bias[0] -= my * bias[2]
+    bias[1] += mx * bias[2]
+    for m in followed:
+        for column in range(4):
+            responses[m, 0, column] -= my * responses[m, 2, column]
+            responses[m, 1, column] += mx * responses[m, 2, column]
+
+
+@compiled
+def _respond(  # noqa: PLR0917 - a detection, number by number
+    responses: FloatArray, followed: IntArray, bias: FloatArray, e: Expected, k: Gain, share: float
+) -> None:
+    """A correction takes a share of every error back: B -= share K H B."""
+    bias[0], bias[1], bias[2] = _less(bias[0], bias[1], bias[2], e, k, share)
+    for m in followed:
+        b = responses[m]
+        for c in range(4):
+            b[0, c], b[1, c], b[2, c] = _less(b[0, c], b[1, c], b[2, c], e, k, share)
+
+
+@compiled_inline
+def _less(  # noqa: PLR0917 - an error, number by number
+    x: float, y: float, theta: float, e: Expected, k: Gain, share: float
+) -> tuple[float, float, float]:
+    """An error of the pose after a correction that knows nothing else."""
+    r = share * (e.range_x * x + e.range_y * y + e.range_theta * theta)
+    b = share * (e.bearing_x * x + e.bearing_y * y + e.bearing_theta * theta)
+    return x - k.xr * r - k.xb * b, y - k.yr * r - k.yb * b, theta - k.tr * r - k.tb * b
+
+
+@compiled
+def _disturb(  # noqa: PLR0917 - a detection, number by number
+    responses: FloatArray,
+    m: int,
+    bias: FloatArray,
+    e: Expected,
+    k: Gain,
+    share: float,
+    true: Worth,
+    model: ErrorModel,
+) -> None:
+    """Add what a detection brings in: its mean error, its wave, and one metre of survey error along each axis."""
+    psi = 2.0 * math.pi * (e.bearing - model.angle_min) / model.increment
+    c, s = math.cos(psi), math.sin(psi)
+    # A wave of unknown phase is a cosine and a sine of independent amplitudes, each with half of the square.
+    in_range = (math.sqrt(0.5) * true.range_wave * c, -math.sqrt(0.5) * true.range_wave * s, -e.range_x, -e.range_y)
+    in_bearing = (
+        math.sqrt(0.5) * true.bearing_wave * s,
+        math.sqrt(0.5) * true.bearing_wave * c,
+        -e.bearing_x,
+        -e.bearing_y,
+    )
+    for column in range(4):
+        r, b = share * in_range[column], share * in_bearing[column]
+        responses[m, 0, column] += k.xr * r + k.xb * b
+        responses[m, 1, column] += k.yr * r + k.yb * b
+        responses[m, 2, column] += k.tr * r + k.tb * b
+    bias[0] += k.xr * share * true.range_bias
+    bias[1] += k.yr * share * true.range_bias
+    bias[2] += k.tr * share * true.range_bias
+
+
+@compiled
+def _forget(responses: FloatArray, followed: IntArray, is_followed: np.ndarray, count: int) -> int:
+    """Follow no longer what has faded; return how many are left."""
+    left = 0
+    for i in range(count):
+        m = followed[i]
+        if np.abs(responses[m]).max() ** 2 < FORGOTTEN:
+            responses[m] = 0.0
+            is_followed[m] = False
+        else:
+            followed[left] = m
+            left += 1
+    return left
+
+
+@compiled
+def _gather(  # noqa: PLR0917 - all kinds of error
+    error: PoseGaussian,
+    responses: FloatArray,
+    followed: IntArray,
+    places: FloatArray,
+    bias: FloatArray,
+    square: FloatArray,
+) -> None:
+    """Add up the four kinds of error into a (3, 3) second moment."""
+    square[0, 0], square[0, 1], square[0, 2] = error.xx, error.xy, error.xt
+    square[1, 0], square[1, 1], square[1, 2] = error.xy, error.yy, error.yt
+    square[2, 0], square[2, 1], square[2, 2] = error.xt, error.yt, error.tt
+    for i in range(3):
+        for j in range(3):
+            square[i, j] += bias[i] * bias[j]
+            for m in followed:
+                b = responses[m]
+                square[i, j] += b[i, 0] * b[j, 0] + b[i, 1] * b[j, 1]
+                square[i, j] += places[m, 2] * (b[i, 2] * b[j, 2] + b[i, 3] * b[j, 3])

@@ -1,0 +1,76 @@
+"""Prediction of the true error along a route: the filter's gains, and the noise that detections really have.
+
+`route_prediction` tells what the filter will say of itself; this tells how far off it will be. The two agree where the
+filter's parameters fit the scanner and nothing repeats from scan to scan.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from commission.geometry.arrays import FloatArray, read_only
+from commission.planning.detection_noise import classes_of, detection_noise
+from commission.planning.error_kernels import ErrorModel, propagate_errors
+from commission.planning.route_prediction import PlannedRoute, RoutePrediction
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PredictedErrors:
+    """Expected error of the filter's poses after each of K scans. Read-only."""
+
+    squares: FloatArray
+    """(K, 3, 3) second moments of the error of x [m], y [m] and heading [rad]: over many drives, biases included."""
+
+    @property
+    def sigmas(self) -> FloatArray:
+        """(K, 3) expected RMS error of x [m], y [m] and heading [rad]."""
+        return np.sqrt(np.diagonal(self.squares, axis1=1, axis2=2))
+
+
+def predict_errors(planned: PlannedRoute, prediction: RoutePrediction) -> PredictedErrors:
+    """Predict the error along a planned drive on which all reflectors are as in the map but for their survey.
+
+    Parameters
+    ----------
+    planned : drive and visible reflectors.
+    prediction : of that drive, without damage.
+
+    Returns
+    -------
+    errors : one row per scan.
+
+    Notes
+    -----
+    Four kinds of error, with a law of their own each. What is new in every scan (odometry, noise of the beams) adds to
+    a covariance. A detection's mean error adds to a mean. What repeats where a reflector stands alike between two beams
+    comes and goes with the bearing: a wave whose relative phase along the drive is known and whose absolute phase, a
+    tenth of a degree of heading, is not. An error of the survey stays. The last two are carried as the response of the
+    pose to each reflector; taken as new in every scan, as the filter takes them, they would average out.
+    """
+    site = planned.reflectors, planned.scanner, planned.parameters.detector
+    squares = np.empty((len(planned.drive), 3, 3))
+    model = planned.model()
+    propagate_errors(
+        planned.drive.stamps_ns,
+        planned.drive.poses,
+        read_only(planned.visible.offsets),
+        read_only(planned.visible.indices),
+        planned.places,
+        classes_of(*site),
+        prediction.prior_covariances,
+        np.array(planned.options.start_sigmas),
+        ErrorModel(
+            model.odometry,
+            model.observation,
+            detection_noise(*site),
+            model.gate_d2,
+            model.inside_gate,
+            model.free_per_m,
+            planned.scanner.angle_min,
+            planned.scanner.angle_increment,
+        ),
+        squares,
+    )
+    return PredictedErrors(read_only(squares))
