@@ -18,16 +18,10 @@ from commission.planning.ambiguity import AmbiguityOptions
 from commission.planning.candidates import CandidateOptions
 from commission.planning.cover import CoverProblem, cover, lower_bound, merged, smaller_covers
 from commission.planning.demands import Demands, Unmet
-from commission.planning.route_prediction import (
-    NO_DAMAGE,
-    Damage,
-    PlannedRoute,
-    PredictionOptions,
-    predict_route,
-    station_scans,
-)
+from commission.planning.route_prediction import PlannedRoute, PredictionOptions, restricted, station_scans
 from commission.planning.telling_apart import ChosenPlace, Distinction, chosen_places, nearest_on_routes
-from commission.planning.visibility import VisibilityModel, VisibleReflectors
+from commission.planning.true_error import two_sigma_of
+from commission.planning.visibility import VisibilityModel
 from commission.site.checks import at_least
 from commission.site.project import Project
 
@@ -178,13 +172,14 @@ class LayoutSearch:
 
         Neither what the filter will say nor what its error will be may pass it.
         """
-        route = _restricted(self._planned[index], taken)
+        route = restricted(self._planned[index], taken)
         blocked = np.unique(route.visible.indices).tolist() if self._options.demands.survive_failure else []
-        for damage in (NO_DAMAGE, *(Damage(blocked=(reflector,)) for reflector in blocked)):
+        for gone in ([], *([reflector] for reflector in blocked)):
             self._report(None, "predicting")
-            prediction = predict_route(route, damage)
-            two_sigma = np.maximum(prediction.two_sigma, prediction.error_two_sigma)
-            yield np.asarray((two_sigma > self._limits[index]).any(axis=1), dtype=np.bool_)
+            left = taken.copy()
+            left[gone] = False
+            over = two_sigma_of(restricted(route, left)) > self._limits[index]
+            yield np.asarray(over.any(axis=1), dtype=np.bool_)
 
     def _raise_needs(self, over: list[BoolArray]) -> bool:
         """Ask the scans over a limit for one reflector more; False when none can see one more."""
@@ -276,13 +271,6 @@ def _conflicts(centers: FloatArray, spacing: float) -> tuple[IntArray, ...]:
     """For each reflector those that are too near to be taken beside it."""
     near = cKDTree(centers).query_ball_point(centers, spacing) if len(centers) else []
     return tuple(np.array([b for b in others if b != a], dtype=np.int64) for a, others in enumerate(near))
-
-
-def _restricted(route: PlannedRoute, taken: BoolArray) -> PlannedRoute:
-    """Drop from a planned route all reflectors but some; they keep their indices."""
-    kept = taken[route.visible.indices]
-    offsets = np.concatenate(([0], np.cumsum(kept, dtype=np.int64)))[route.visible.offsets]
-    return replace(route, visible=VisibleReflectors(offsets, route.visible.indices[kept]))
 
 
 def _limits(route: PlannedRoute, project: Project, demands: Demands) -> FloatArray:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -159,11 +159,6 @@ class RoutePrediction:
         return 2.0 * np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
 
     @property
-    def error_two_sigma(self) -> FloatArray:
-        """(K, 3) 2-sigma of the true error of x [m], y [m] and heading [rad]."""
-        return 2.0 * np.sqrt(np.diagonal(self.error_covariances, axis1=1, axis2=2))
-
-    @property
     def bias(self) -> FloatArray:
         """(K, 3) expected error of x [m], y [m] and heading [rad]."""
         deviations = self.means - self.drive.poses
@@ -266,6 +261,13 @@ def plan_route(
         project.parameters,
         options,
     )
+
+
+def restricted(planned: PlannedRoute, kept: BoolArray) -> PlannedRoute:
+    """Drop from a planned route all reflectors but those of a mask (M,); they keep their indices."""
+    stays = kept[planned.visible.indices]
+    offsets = np.concatenate(([0], np.cumsum(stays, dtype=np.int64)))[planned.visible.offsets]
+    return replace(planned, visible=VisibleReflectors(offsets, planned.visible.indices[stays]))
 
 
 def station_scans(drive: NominalDrive, stations: Sequence[Station]) -> Iterator[tuple[Station, IntArray]]:

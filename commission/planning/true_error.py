@@ -13,7 +13,7 @@ import numpy as np
 from commission.geometry.arrays import FloatArray, read_only
 from commission.planning.detection_noise import classes_of, detection_noise
 from commission.planning.error_kernels import ErrorModel, propagate_errors
-from commission.planning.route_prediction import PlannedRoute, RoutePrediction
+from commission.planning.route_prediction import PlannedRoute, RoutePrediction, predict_route
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,3 +74,9 @@ def predict_errors(planned: PlannedRoute, prediction: RoutePrediction) -> Predic
         squares,
     )
     return PredictedErrors(read_only(squares))
+
+
+def two_sigma_of(planned: PlannedRoute) -> FloatArray:
+    """(K, 3) 2-sigma of x [m], y [m] and heading [rad]: the larger of the filter's own and of its error."""
+    prediction = predict_route(planned)
+    return np.maximum(prediction.two_sigma, 2.0 * predict_errors(planned, prediction).sigmas)

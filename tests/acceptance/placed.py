@@ -11,7 +11,8 @@ import numpy as np
 from commission.localization.estimate import Mode
 from commission.planning.candidates import CandidateOptions
 from commission.planning.placement import Demands, Placement, PlacementOptions, place
-from commission.planning.route_prediction import NO_DAMAGE, Damage, plan_route, predict_route
+from commission.planning.route_prediction import plan_route, restricted
+from commission.planning.true_error import two_sigma_of
 from commission.planning.visibility import visibility_model
 from commission.simulation.scenario import virtual_drive
 from commission.site.disturbances import Disturbances
@@ -32,10 +33,9 @@ def demands_met_by(project: Project) -> Demands:
     for route in project.routes:
         planned = plan_route(project, route.name, model=model)
         visible.append(int(planned.visible.counts().min()))
-        damages = [NO_DAMAGE, *(Damage(blocked=(each,)) for each in np.unique(planned.visible.indices).tolist())]
-        for damage in damages:
-            prediction = predict_route(planned, damage)
-            worst = np.maximum(worst, np.maximum(prediction.two_sigma, prediction.error_two_sigma).max(axis=0))
+        everyone = np.arange(len(project.reflectors))
+        for gone in (-1, *np.unique(planned.visible.indices).tolist()):
+            worst = np.maximum(worst, two_sigma_of(restricted(planned, everyone != gone)).max(axis=0))
     assert min(visible) >= 2, "the hand-made layout does not survive a failure"
     position = math.ceil(1e4 * worst[:2].max()) / 1e4
     heading = math.radians(math.ceil(1e3 * math.degrees(worst[2])) / 1e3)

@@ -10,7 +10,8 @@ import numpy as np
 from commission.planning.ambiguity import ambiguous_poses
 from commission.planning.demands import Demands
 from commission.planning.placement import Placement, PlacementOptions, choose
-from commission.planning.route_prediction import Damage, PlannedRoute, plan_route, predict_route, station_scans
+from commission.planning.route_prediction import PlannedRoute, plan_route, restricted, station_scans
+from commission.planning.true_error import two_sigma_of
 from commission.planning.visibility import visibility_model
 from commission.site.parameters import OdometryParameters, Parameters
 from commission.site.project import Project
@@ -66,9 +67,8 @@ class SmallCase:
         )
         for station, scans in station_scans(planned.drive, site.stations):
             limits[scans, :2] = np.minimum(limits[scans, :2], station.required_accuracy)
-        gone = tuple(i for i in range(len(self.centers)) if i not in left)
-        prediction = predict_route(planned, Damage(blocked=gone))
-        return bool(np.all(np.maximum(prediction.two_sigma, prediction.error_two_sigma) <= limits))
+        kept = np.isin(np.arange(len(self.centers)), list(left))
+        return bool(np.all(two_sigma_of(restricted(planned, kept)) <= limits))
 
     def _clear(self, site: Project, left: set[int]) -> bool:
         poses = [plan_route(site, ROUTE).drive.poses[0]] if self.demands.unambiguous_starts else []

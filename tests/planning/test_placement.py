@@ -9,7 +9,8 @@ from commission.errors import UsageError
 from commission.planning.ambiguity import ambiguous_poses
 from commission.planning.candidates import CandidateOptions
 from commission.planning.placement import Demands, PlacementOptions, place
-from commission.planning.route_prediction import Damage, plan_route, predict_route
+from commission.planning.route_prediction import plan_route, restricted
+from commission.planning.true_error import two_sigma_of
 from commission.planning.visibility import visibility_model
 from commission.site.parameters import OdometryParameters, Parameters
 from commission.site.project import Project
@@ -34,15 +35,11 @@ def holds(project: Project, reflectors: ReflectorMap, demands: Demands) -> bool:
     planned = plan_route(site, project.routes[0].name)
     if planned.visible.counts().min() < demands.visible + demands.survive_failure:
         return False
-    damages = [Damage(), *(Damage(blocked=(i,)) for i in range(len(reflectors)) if demands.survive_failure)]
     limit = demands.position_limit or project.parameters.supervisor.position_limit
     heading = demands.heading_limit or project.parameters.supervisor.heading_limit
-    predicted = [predict_route(planned, each) for each in damages]
-    return all(
-        bool(np.all(two_sigma <= (limit, limit, heading)))
-        for each in predicted
-        for two_sigma in (each.two_sigma, each.error_two_sigma)
-    )
+    everyone = np.arange(len(reflectors))
+    left = [everyone >= 0, *(everyone != gone for gone in everyone if demands.survive_failure)]
+    return all(bool(np.all(two_sigma_of(restricted(planned, kept)) <= (limit, limit, heading))) for kept in left)
 
 
 def test_a_suggested_layout_meets_its_demands_and_its_spacing():
