@@ -67,7 +67,7 @@ def test_a_real_map_is_loaded_into_an_empty_folder_drawn_on_saved_and_read_again
     page = window(site.server)
     client = page.open().client_id
     source = shared_data / "maps" / "utexas_gdc_3" / "3.yaml"
-    page.fill("File", str(source))
+    page.fill("Map file", str(source))
     page.press("Open")
     site.until(lambda: site.state.project.floor_map is not None)
     loaded = site.state.project

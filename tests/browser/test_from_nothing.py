@@ -60,7 +60,7 @@ def test_a_site_is_built_from_an_empty_folder_and_a_vehicle_drives_in_it(
 
 def load_the_map(site: NewSite, page: OpenPage, path: Path) -> None:
     page.open_tab("Site")
-    page.fill("File", str(path))
+    page.fill("Map file", str(path))
     page.press("Open")
     site.until(lambda: site.state.project.floor_map is not None)
     page.wait_until_drawn()

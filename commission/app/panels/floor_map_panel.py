@@ -34,7 +34,7 @@ class FloorMapPanel(BasePanel):
         self._shown: MapLoading | None = None
         with gui.add_folder("Floor map", expand_by_default=project.floor_map is None):
             kinds = gui.add_html(KINDS)
-            path = gui.add_text("File", "", hint="Path of a file on the computer that serves this page.")
+            path = gui.add_text("Map file", "", hint="Path of a file on the computer that serves this page.")
             opened = gui.add_button("Open", hint="Read the file of this path.")
 
             def open_path(event: GuiEvent[Any]) -> page_actions.Action:

@@ -157,7 +157,7 @@ def test_a_typed_path_is_opened_and_an_empty_one_told(server: viser.ViserServer)
     posted: list[Action] = []
     FloorMapPanel(server.gui, posted.append, Project())
     change(labelled(server, "Open"), True)
-    change(labelled(server, "File"), " /halls/3.yaml ")
+    change(labelled(server, "Map file"), " /halls/3.yaml ")
     change(labelled(server, "Open"), True)
     assert isinstance(posted[0], Report)
     assert posted[-1] == actions.OpenMap(1, MapFile(Path("/halls/3.yaml")))
