@@ -115,7 +115,7 @@ class LayoutSearch:
             self._report(COVERING * number / ROUNDS, "covering")
             taken = cover(self._problem(self._needs, self._apart), rng, self._options.exchanges, self._step(number))
             # Both, so that one round asks for all that is missing.
-            if not any([self._raise_needs(self._over(taken)), self._tell_apart(taken)]):
+            if not any([self._raise_needs(self._over(taken), taken), self._tell_apart(taken)]):
                 break
             asked_more = True
         return self._fewer(self._cleared(taken)) if asked_more else taken
@@ -181,12 +181,13 @@ class LayoutSearch:
             over = two_sigma_of(restricted(route, left)) > self._limits[index]
             yield np.asarray(over.any(axis=1), dtype=np.bool_)
 
-    def _raise_needs(self, over: list[BoolArray]) -> bool:
-        """Ask the scans over a limit for one reflector more; False when none can see one more."""
+    def _raise_needs(self, over: list[BoolArray], taken: BoolArray) -> bool:
+        """Ask the scans over a limit for one reflector more than they see; False when none can see one more."""
         any_raised = False
         for needs, covers, mask in zip(self._needs, self._covers, over, strict=True):
-            more = mask & (covers.sum(axis=1) > needs)
-            needs[more] += 1
+            now = np.maximum(needs, covers[:, taken].sum(axis=1))
+            more = mask & (covers.sum(axis=1) > now)
+            needs[more] = now[more] + 1
             any_raised |= bool(more.any())
         return any_raised
 
