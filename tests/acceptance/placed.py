@@ -14,6 +14,7 @@ from commission.planning.placement import Demands, Placement, PlacementOptions, 
 from commission.planning.route_prediction import plan_route, restricted
 from commission.planning.true_error import two_sigma_of
 from commission.planning.visibility import visibility_model
+from commission.simulation.drive import DriveOptions
 from commission.simulation.scenario import virtual_drive
 from commission.site.disturbances import Disturbances
 from commission.site.project import Project
@@ -79,7 +80,7 @@ def blocked_drive(project: Project, route: str, seed: int, disturbances: Disturb
         reflectors=ReflectorMap(reflectors[:gone] + reflectors[gone + 1 :]),
         disturbances=disturbances or Disturbances(),
     )
-    log = virtual_drive(hall, route, seed)
+    log = virtual_drive(hall, route, seed, options=DriveOptions(whole_scans=False))
     judged = judge(project, route, log)
     truth = reference_at(judged.run.stamps_ns, log.reference_stamps_ns, log.reference_poses)
     steps = np.hypot(*np.diff(truth[:, :2], axis=0, prepend=truth[:1, :2]).T)

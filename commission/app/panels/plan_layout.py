@@ -24,7 +24,7 @@ from commission.app.view import PageView
 DEG, MM = math.degrees(1.0), 1000.0
 POSITION, HEADING = "demands.position_limit", "demands.heading_limit"
 MOST_UNMET = 12
-REASONS = {"visible": "too few visible", "uncertainty": "2σ over its limit"}
+REASONS = {"visible": "too few visible", "uncertainty": "2σ over its limit", "ambiguous": "place not told apart"}
 DRAW, CLEAR = "Draw area", "Clear areas"
 
 
@@ -80,6 +80,10 @@ class LayoutPanel(BasePanel):
         inputs.number(POSITION, MM, limit)
         hint = "Largest 2-sigma of the heading on the routes; the supervisor's limit unless changed here."
         inputs.number(HEADING, DEG, gui.add_number("2σ heading [°]", 1, min=0.01, max=90, step=0.01, hint=hint))
+        hint = "Whether a vehicle that is switched on at the start of a route must see which place it is."
+        inputs.switch("demands.unambiguous_starts", "Unique starts", hint)
+        hint = "Whether a vehicle that is switched on at a station must see which place it is."
+        inputs.switch("demands.unambiguous_stations", "Unique stations", hint)
 
     def _add_candidates(self) -> None:
         gui, inputs = self._gui, self._inputs
