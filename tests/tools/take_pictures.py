@@ -14,18 +14,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-import viser
 from playwright.sync_api import Browser, sync_playwright
 
 from commission.app import actions
 from commission.app.actions import VirtualDrive
 from commission.app.editing.editor import Tool
-from commission.app.launch import open_page
+from commission.app.plan.actions import SetLayout
 from commission.app.runtime import Runtime
-from commission.app.server import start_server
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
 from tests.browser.page import CHROMIUM, FLAGS, SMALL, WIDE, OpenPage
+from tests.browser.serving import Served
 
 Steps = Callable[[OpenPage, Runtime], None]
 
@@ -118,8 +117,59 @@ def heatmap(page: OpenPage, runtime: Runtime) -> None:
 def predicted(page: OpenPage, runtime: Runtime) -> None:
     """What the filter will say along a route."""
     page.open_tab("Plan")
+    unfold(page, "Along a route")
     page.choose("Route", runtime.state.project.routes[1].name)
     until(lambda: runtime.plan.route is not None)
+
+
+def suggested(page: OpenPage, runtime: Runtime) -> None:
+    """A layout from nothing, before it is accepted."""
+    page.open_tab("Plan")
+    fold(page, "Heatmap of the floor")
+    unfold(page, "Suggested layout")
+    runtime.post(SetLayout("extend", value=False))
+    page.press("Suggest reflectors")
+    until(lambda: runtime.plan.layout is not None)
+
+
+def ambiguous(page: OpenPage, runtime: Runtime) -> None:
+    """Where a cold start may go wrong."""
+    page.open_tab("Plan")
+    fold(page, "Heatmap of the floor")
+    unfold(page, "Ambiguous places")
+    page.press("Find ambiguous places")
+    until(lambda: runtime.plan.cold_start is not None)
+
+
+def along(page: OpenPage, runtime: Runtime) -> None:
+    """The selected route over its metres."""
+    on_route(page, runtime)
+    page.open_tab("Route")
+    page.open_tab("Routes")
+
+
+def files(page: OpenPage, _runtime: Runtime) -> None:
+    """Loading a floor map, imports and exports."""
+    page.open_tab("Site")
+    unfold(page, "Floor map")
+    unfold(page, "Exchange")
+
+
+def drawing(page: OpenPage, runtime: Runtime) -> None:
+    """An obstacle is being drawn."""
+    page.press(Tool.OBSTACLE.value)
+    until(lambda: any(editor.tool is Tool.OBSTACLE for editor in runtime.state.editors.values()))
+    for count, place in enumerate(((9.0, 4.0), (11.0, 4.0), (10.0, 5.5)), start=1):
+        page.click_at(place)
+        until(lambda count=count: any(len(editor.draft) == count for editor in runtime.state.editors.values()))
+
+
+def unfold(page: OpenPage, folder: str) -> None:
+    """Press a folder's head; one that is open is closed by it."""
+    page.page.get_by_text(folder, exact=True).first.click()
+
+
+fold = unfold
 
 
 PICTURES = (
@@ -134,6 +184,11 @@ PICTURES = (
     Picture("measured", "laboratory", measured),
     Picture("page_plan", "shop_floor", heatmap),
     Picture("plan_route", "warehouse", predicted),
+    Picture("page_suggested", "shop_floor", suggested),
+    Picture("ambiguous", "laboratory", ambiguous),
+    Picture("along", "shop_floor", along),
+    Picture("files", "shop_floor", files),
+    Picture("drawing", "shop_floor", drawing),
 )
 
 
@@ -143,36 +198,32 @@ def _is_at(runtime: Runtime, seconds: float) -> bool:
 
 
 @contextmanager
-def served(site: str) -> Iterator[tuple[viser.ViserServer, Runtime]]:
+def served(site: str) -> Iterator[Served]:
     """A page of a bundled site, as `commission demo` opens it."""
     project = load_project(bundled_folder("maps") / site)
-    server = start_server("127.0.0.1", 0)
-    runtime = open_page(server, project, source=VirtualDrive(project.routes[0].name))
-    until(lambda: runtime.session is not None)
+    page = Served(project, source=VirtualDrive(project.routes[0].name))
+    page.until(lambda: page.runtime.session is not None)
     try:
-        yield server, runtime
+        yield page
     finally:
-        runtime.stop()
-        server.stop()
+        page.close()
 
 
-def take(browser: Browser, picture: Picture, folder: Path) -> None:
-    """Take one picture at both sizes."""
-    for size in (WIDE, SMALL):
-        with served(picture.site) as (server, runtime):
-            page = OpenPage(browser, server, size)
-            page.page.set_default_timeout(60_000)
-            page.open(nodes=("/floor/map", "/vehicle/outline"))
-            runtime.post(actions.Play(playing=False))
-            runtime.post(actions.Seek(picture.time))
-            until(lambda: _is_at(runtime, picture.time))
-            picture.steps(page, runtime)
-            page.page.wait_for_timeout(1500)
-            page.wait_until_drawn()
-            path = folder / f"{picture.name}_{size[0]}x{size[1]}.png"
-            page.screenshot(path)
-            page.close()
-            sys.stdout.write(f"{path}\n")
+def take(browser: Browser, picture: Picture, size: tuple[int, int], path: Path) -> None:
+    """Take one picture with a window of a size [pixels]."""
+    with served(picture.site) as site:
+        runtime, page = site.runtime, OpenPage(browser, site.server, size)
+        page.page.set_default_timeout(60_000)
+        page.open(nodes=("/floor/map", "/vehicle/outline"))
+        runtime.post(actions.Play(playing=False))
+        runtime.post(actions.Seek(picture.time))
+        until(lambda: _is_at(runtime, picture.time))
+        picture.steps(page, runtime)
+        page.page.wait_for_timeout(1500)
+        page.wait_until_drawn()
+        page.screenshot(path)
+        page.close()
+    sys.stdout.write(f"{path}\n")
 
 
 if __name__ == "__main__":
@@ -180,5 +231,6 @@ if __name__ == "__main__":
     with sync_playwright() as playwright:
         chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
         for each in chosen:
-            take(chromium, each, Path(sys.argv[1]))
+            for width, height in (WIDE, SMALL):
+                take(chromium, each, (width, height), Path(sys.argv[1]) / f"{each.name}_{width}x{height}.png")
         chromium.close()
