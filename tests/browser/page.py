@@ -6,6 +6,7 @@ the tests.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -138,6 +139,11 @@ class OpenPage:
     def open_tab(self, name: str) -> None:
         """Bring this tab of a panel to the front."""
         self.page.get_by_role("tab", name=name, exact=True).click()
+
+    def fold(self, name: str) -> None:
+        """Press the head of a folder: it opens, or closes."""
+        whole = re.compile(rf"^{re.escape(name)}$")
+        self.page.locator(".mantine-Paper-root").filter(has_text=whole, visible=True).first.click()
 
     def row(self, label: str) -> Locator:
         """The row of widgets behind this label."""

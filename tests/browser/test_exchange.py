@@ -80,7 +80,7 @@ def test_names_of_strangers_are_shown_as_text_wherever_they_appear(
     page.page.on("dialog", lambda dialog: (dialogs.append(dialog.message), dialog.dismiss()))
     client = page.open(nodes=NODES).client_id
     before = site.state.project
-    page.page.get_by_text("Exchange", exact=True).click()
+    page.fold("Exchange")
     upload(page, f"{IMAGE}.csv", TABLE.encode())
     page.wait_for_text("Nothing has changed yet")
     page.wait_for_text("1 added, 1 changed, 3 not in the file, 0 as before")
@@ -120,7 +120,7 @@ def test_upload_over_the_limit_is_refused_with_its_size_and_the_page_lives_on(
 ) -> None:
     page = window(site.server)
     page.open(nodes=NODES)
-    page.page.get_by_text("Exchange", exact=True).click()
+    page.fold("Exchange")
     page.wait_for_text("At most 32 MB")
     large = tmp_path / "large.csv"
     with large.open("wb") as file:
@@ -140,7 +140,7 @@ def test_upload_over_the_limit_is_refused_with_its_size_and_the_page_lives_on(
 def test_pasted_cells_and_downloaded_files_make_the_round_trip(site: OpenSite, window: Callable[..., OpenPage]) -> None:
     page = window(site.server)
     page.open(nodes=NODES)
-    page.page.get_by_text("Exchange", exact=True).click()
+    page.fold("Exchange")
     page.row("Paste a table").locator("textarea").fill("Nr\tX [mm]\tY [mm]\nR1\t250,0\t2100\nN\t6000\t4000")
     page.press("Read pasted")
     page.wait_for_text("R1: y 2.000 → 2.100 m, moves 100 mm")

@@ -68,7 +68,7 @@ def load_the_map(site: NewSite, page: OpenPage, path: Path) -> None:
 
 def choose_the_equipment(site: NewSite, page: OpenPage) -> None:
     for folder in ("Scanner", "Vehicle"):
-        page.page.get_by_text(folder, exact=True).last.click()
+        page.fold(folder)
     page.choose("Preset", "SICK TiM781")
     site.until(lambda: site.state.project.scanner.rate == 15.0)
     page.choose("Kind", "tricycle")

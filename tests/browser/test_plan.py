@@ -95,7 +95,7 @@ def test_the_heatmap_follows_a_dragged_reflector(page: OpenPage, site: OpenSite)
 
 
 def test_a_route_is_predicted_over_its_metres(page: OpenPage, site: OpenSite) -> None:
-    page.page.get_by_text("Along a route").first.click()
+    page.fold("Along a route")
     page.choose("Route", site.project.routes[0].name)
     page.wait_for_text("Supervisor stops")
     assert site.runtime.plan.route is not None
@@ -106,10 +106,10 @@ def test_a_layout_is_suggested_accepted_and_taken_back(page: OpenPage, site: Ope
     page.choose("Show", "Position dilution (DOP)")
     site.until(lambda: site.heat is not None and site.heat.scale.figure is Figure.POSITION_DOP)
     before, project = site.heat, site.runtime.state.project
-    page.page.get_by_text("Along a route").first.click()
-    page.page.get_by_text("Suggested layout").first.click()
+    page.fold("Along a route")
+    page.fold("Suggested layout")
     page.tick("Keep present")
-    page.page.get_by_text("Routes that count").first.click()
+    page.fold("Routes that count")
     for route in site.project.routes[1:]:
         page.tick(route.name)
     site.until(lambda: len(site.runtime.state.layout.ignored) == len(site.project.routes) - 1)

@@ -117,7 +117,7 @@ def heatmap(page: OpenPage, runtime: Runtime) -> None:
 def predicted(page: OpenPage, runtime: Runtime) -> None:
     """What the filter will say along a route."""
     page.open_tab("Plan")
-    unfold(page, "Along a route")
+    page.fold("Along a route")
     page.choose("Route", runtime.state.project.routes[1].name)
     until(lambda: runtime.plan.route is not None)
 
@@ -125,8 +125,8 @@ def predicted(page: OpenPage, runtime: Runtime) -> None:
 def suggested(page: OpenPage, runtime: Runtime) -> None:
     """A layout from nothing, before it is accepted."""
     page.open_tab("Plan")
-    fold(page, "Heatmap of the floor")
-    unfold(page, "Suggested layout")
+    page.fold("Heatmap of the floor")
+    page.fold("Suggested layout")
     runtime.post(SetLayout("extend", value=False))
     page.press("Suggest reflectors")
     until(lambda: runtime.plan.layout is not None)
@@ -135,8 +135,8 @@ def suggested(page: OpenPage, runtime: Runtime) -> None:
 def ambiguous(page: OpenPage, runtime: Runtime) -> None:
     """Where a cold start may go wrong."""
     page.open_tab("Plan")
-    fold(page, "Heatmap of the floor")
-    unfold(page, "Ambiguous places")
+    page.fold("Heatmap of the floor")
+    page.fold("Ambiguous places")
     page.press("Find ambiguous places")
     until(lambda: runtime.plan.cold_start is not None)
 
@@ -151,8 +151,8 @@ def along(page: OpenPage, runtime: Runtime) -> None:
 def files(page: OpenPage, _runtime: Runtime) -> None:
     """Loading a floor map, imports and exports."""
     page.open_tab("Site")
-    unfold(page, "Floor map")
-    unfold(page, "Exchange")
+    page.fold("Floor map")
+    page.fold("Exchange")
 
 
 def drawing(page: OpenPage, runtime: Runtime) -> None:
@@ -162,14 +162,6 @@ def drawing(page: OpenPage, runtime: Runtime) -> None:
     for count, place in enumerate(((9.0, 4.0), (11.0, 4.0), (10.0, 5.5)), start=1):
         page.click_at(place)
         until(lambda count=count: any(len(editor.draft) == count for editor in runtime.state.editors.values()))
-
-
-def unfold(page: OpenPage, folder: str) -> None:
-    """Press a folder's head; one that is open is closed by it."""
-    page.page.get_by_text(folder, exact=True).first.click()
-
-
-fold = unfold
 
 
 PICTURES = (
