@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from commission.app.editing.editor import AlignmentDraft, MapPen
+from commission.app.editing.editor import MapPen, Point
 from commission.app.mapping.draft import MapFile, Read, ReadOptions
 from commission.site.floor_map import FloorMap
 
@@ -87,13 +87,27 @@ class FinishShape:
 
 
 @dataclass(frozen=True, slots=True)
-class SetAlignment:
-    """Name the points to align by, and say where they lie in the plant."""
+class SetPlantPoint:
+    """Name one of the points to align by, and say where it lies in the plant."""
 
     client: int
     """Number of the browser's connection."""
-    alignment: AlignmentDraft
-    """The points."""
+    index: int
+    """Which point, 0 or 1: the other one stays as it is, for who types quickly is ahead of what is shown."""
+    plant: Point
+    """Where it lies [m], plant coordinates."""
+    name: str = ""
+    """What it is called."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetAligned:
+    """Choose what moves with the floor map."""
+
+    client: int
+    """Number of the browser's connection."""
+    everything: bool
+    """Whether reflectors, routes and stations do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +176,8 @@ MapAction: TypeAlias = (
     | DiscardMap
     | SetPen
     | FinishShape
-    | SetAlignment
+    | SetPlantPoint
+    | SetAligned
     | AlignMap
     | MapOpened
     | MapMade

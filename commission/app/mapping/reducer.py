@@ -146,8 +146,23 @@ def _(action: actions.FinishShape, state: AppState) -> Reduction:
 
 
 @reduce.register
-def _(action: actions.SetAlignment, state: AppState) -> Reduction:
-    return Reduction(state.with_editor(action.client, replace(state.editor(action.client), alignment=action.alignment)))
+def _(action: actions.SetPlantPoint, state: AppState) -> Reduction:
+    points = list(state.editor(action.client).alignment.points)
+    if action.index < len(points):
+        points[action.index] = replace(points[action.index], plant=action.plant, name=action.name)
+    return _aligning(state, action.client, points=tuple(points))
+
+
+@reduce.register
+def _(action: actions.SetAligned, state: AppState) -> Reduction:
+    return _aligning(state, action.client, everything=action.everything)
+
+
+def _aligning(state: AppState, client: int, **changes: Any) -> Reduction:
+    """Change what one browser aligns by."""
+    editor = state.editor(client)
+    alignment = replace(editor.alignment, **changes)
+    return Reduction(state.with_editor(client, replace(editor, alignment=alignment)))
 
 
 @reduce.register

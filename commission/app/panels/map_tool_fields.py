@@ -18,6 +18,8 @@ from commission.site.editing.alignment import DOUBTFUL, WRONG
 FREE, UNKNOWN = "free", "unknown"
 MAP_ONLY, EVERYTHING = "the map alone", "what is on it, too"
 LETTERS = "AB"
+LONGEST_NAME = 40
+"""Letters of a point's name that are kept."""
 
 
 class MapToolFields:
@@ -25,7 +27,7 @@ class MapToolFields:
 
     def __init__(self, gui: GuiApi, post: Post, client: int) -> None:
         self._gui, self._post, self._client = gui, post, client
-        self._pen, self._alignment = MapPen(), AlignmentDraft()
+        self._pen = MapPen()
         self._thickness = gui.add_number(
             "Thickness [mm]",
             100.0,
@@ -56,12 +58,7 @@ class MapToolFields:
                 "Moves", (MAP_ONLY, EVERYTHING), hint="Reflectors, routes, stations: where they are, or with the map."
             )
             self._moves.on_update(
-                posting(
-                    self._post,
-                    lambda event: actions.SetAlignment(
-                        self._client, replace(self._alignment, everything=event.target.value == EVERYTHING)
-                    ),
-                )
+                posting(self._post, lambda event: actions.SetAligned(self._client, event.target.value == EVERYTHING))
             )
             self._said = gui.add_html("")
             self._align = gui.add_button("Move and turn", hint="The map keeps its scale; can be undone.")
@@ -74,11 +71,8 @@ class MapToolFields:
         plant = gui.add_vector2(f"{letter} x, y [m]", (0.0, 0.0), step=0.001, hint="Where it lies in the plant.")
 
         def typed(_event: GuiEvent[Any]) -> page_actions.Action:
-            points = list(self._alignment.points)
-            if index < len(points):
-                x, y = (float(value) for value in plant.value)
-                points[index] = replace(points[index], plant=(x, y), name=str(name.value).strip()[:40])
-            return actions.SetAlignment(self._client, replace(self._alignment, points=tuple(points)))
+            x, y = (float(value) for value in plant.value)
+            return actions.SetPlantPoint(self._client, index, (x, y), str(name.value).strip()[:LONGEST_NAME])
 
         for widget in (name, plant):
             widget.on_update(posting(self._post, typed))
@@ -86,7 +80,7 @@ class MapToolFields:
 
     def show(self, editor: Editor) -> None:
         """Follow the editor."""
-        self._pen, self._alignment = editor.pen, editor.alignment
+        self._pen = editor.pen
         for widget, tool in (
             (self._thickness, Tool.WALL),
             (self._becomes, Tool.ERASE),

@@ -9,7 +9,7 @@ import numpy as np
 from commission.app import actions as page
 from commission.app import reducer
 from commission.app.editing import actions as editing
-from commission.app.editing.editor import AlignmentDraft, NamedPoint, Tool
+from commission.app.editing.editor import Tool
 from commission.app.keeping import Keeping
 from commission.app.mapping import actions
 from commission.app.mapping.draft import MapFile
@@ -38,10 +38,11 @@ WISHES: tuple[page.Action, ...] = (
     editing.ChooseTool(ME, Tool.PLACE),
     editing.ClickFloor(ME, (3.0, 6.0), REACH),
     editing.ChooseTool(ME, Tool.ALIGN),
-    actions.SetAlignment(
-        ME,
-        AlignmentDraft((NamedPoint((0.0, 0.0), (50.0, 7.0)), NamedPoint((10.0, 0.0), (50.0, 17.0))), everything=True),
-    ),
+    editing.ClickFloor(ME, (1.0, 1.0), REACH),
+    editing.ClickFloor(ME, (11.0, 1.0), REACH),
+    actions.SetPlantPoint(ME, 0, (50.0, 7.0)),
+    actions.SetPlantPoint(ME, 1, (50.0, 17.0)),
+    actions.SetAligned(ME, everything=True),
     actions.AlignMap(ME),
     editing.ChooseTool(ME, Tool.OBSTACLE),
     editing.DragFloor(ME, "end", (45.0, 10.0), (46.0, 11.0), REACH),

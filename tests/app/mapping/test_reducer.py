@@ -13,7 +13,7 @@ from commission.app import actions as page
 from commission.app import reducer
 from commission.app.actions import View
 from commission.app.editing import actions as editing
-from commission.app.editing.editor import AlignmentDraft, MapPen, NamedPoint, Tool
+from commission.app.editing.editor import MapPen, Tool
 from commission.app.mapping import actions
 from commission.app.mapping.draft import MapDraft, MapFile, ReadOptions
 from commission.app.mapping.effects import DrawMap, ReadMapFile, StopMapWork
@@ -237,12 +237,16 @@ def test_points_to_align_by_snap_to_reflectors_and_to_corners_of_walls(state: Ap
 
 def aligning(state: AppState, *, everything: bool, stretch: float = 1.0) -> Reduction:
     """Turn the room by a quarter about R1, which comes to lie at (100, 50)."""
-    points = (
-        NamedPoint((0.25, 2.0), (100.0, 50.0), "column B4"),
-        NamedPoint((10.25, 2.0), (100.0, 50.0 + 10.0 * stretch)),
-    )
     return after(
-        state, use(Tool.ALIGN), actions.SetAlignment(ME, AlignmentDraft(points, everything)), actions.AlignMap(ME)
+        state,
+        use(Tool.ALIGN),
+        click(0.25, 2.0),
+        click(10.25, 2.0),
+        # In any order: nothing that was typed gets lost behind what is typed next.
+        actions.SetPlantPoint(ME, 1, (100.0, 50.0 + 10.0 * stretch)),
+        actions.SetPlantPoint(ME, 0, (100.0, 50.0), "column B4"),
+        actions.SetAligned(ME, everything),
+        actions.AlignMap(ME),
     )
 
 
