@@ -114,7 +114,7 @@ LOW_BOTTOM_PX = 200
 """The same where the window is low."""
 TABS_PX = 138
 LEFT_PX = 300
-RIGHT_PX = 270
+RIGHT_PX = 290
 
 WIDE = "<div class='c-wide'></div>"
 """An html element that lets the widget behind it, which has no label, take the label's room, too."""
@@ -172,7 +172,8 @@ div:has(>div>.c-route)>:nth-child(1){{grid-column:span 3;padding-left:var(--c-ta
 .c-route{{font-size:12px;height:44px;display:flex;align-items:center;white-space:nowrap;overflow:hidden}}
 div:has(>.c-wide){{display:none}}
 div:has(>.c-wide)+*>.mantine-Flex-root>[style*="flex-shrink: 0"]{{display:none}}
-div:has(>.c-tools)+* .mantine-Button-root{{padding:0 3px!important;font-size:11.5px!important}}
+div:has(>.c-tools)+* .mantine-Button-root{{padding:0!important;font-size:11px!important;min-width:0!important;
+ flex:1 1 0!important}}
 div:has(>.c-rows){{display:none}}
 div:has(>.c-rows)~div{{padding-top:0!important;padding-bottom:1px!important}}
 div:has(>.c-rows)~div button{{height:auto!important;min-height:22px;padding:2px 6px!important;
@@ -188,6 +189,6 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 .c-list{{margin:1px 0 2px;padding-left:15px;font-size:12px;line-height:1.4;overflow-wrap:anywhere;
  font-variant-numeric:tabular-nums}}
 @media (max-height:800px){{:root{{--c-bottom:{LOW_BOTTOM_PX}px}}
- div:has(>div>.c-bottom)>:nth-child(n+7){{zoom:.78}}}}
+ div:has(>div>.c-bottom)>:nth-child(n+7),div:has(>div>.c-route)>:nth-child(n+2){{zoom:.78}}}}
 .c-note{{font-size:11.5px;opacity:.7;line-height:1.35}}
 </style>"""

@@ -9,6 +9,8 @@ from commission.app import theme
 from commission.app.drawing import NO_SEGMENTS, outline_segments
 from commission.app.extent import extent_of
 from commission.app.layers.base import BaseLayer
+from commission.app.plan.view import PlanView
+from commission.app.store import AppState
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
@@ -34,6 +36,10 @@ class StationLayer(BaseLayer):
     name = "Stations"
     reads: tuple[str, ...] = ("floor_map", "stations", "vehicle")
     legend = (theme.Legend("station, with its required accuracy", theme.STATION, theme.Mark.LINE),)
+
+    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - the protocol's
+        """Whether the project has stations."""
+        return bool(state.project.stations)
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)

@@ -11,6 +11,8 @@ from commission.app import theme
 from commission.app.drawing import NO_SEGMENTS, Points, outline_segments, polyline_segments, thinned
 from commission.app.extent import extent_of
 from commission.app.layers.base import BaseLayer
+from commission.app.plan.view import PlanView
+from commission.app.store import AppState
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
@@ -66,6 +68,10 @@ class ViolationLayer(BaseLayer):
             se2.transform_points(violation.where.worst_pose, self._outline) for violation in violations[:MOST_GHOSTS]
         ]
         self._ghosts.points = outline_segments(np.array(ghosts), theme.Height.ACCUMULATED)
+
+    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - the protocol's
+        """Whether a route asks too much."""
+        return bool(self._shown)
 
     def _stretches(self, violations: Iterable[Violation]) -> Points:
         lines = [

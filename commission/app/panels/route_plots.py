@@ -63,7 +63,8 @@ def summary(name: str, profile: RouteProfile, violations: Sequence[Violation]) -
     tightest = float(np.abs(profile.curvatures).max())
     parts = [
         f"{profile.length:.1f} m",
-        f"{clock(profile.seconds)} min" + (f" and {profile.stops} stops" if profile.stops else ""),
+        f"{clock(profile.seconds)} min"
+        + (f" and {profile.stops} stop{'s' if profile.stops > 1 else ''}" if profile.stops else ""),
         "straight" if tightest < 1e-6 else f"tightest curve {1.0 / tightest:.2f} m radius",
     ]
     if math.isfinite(profile.largest_curvature):
