@@ -361,8 +361,13 @@ def predict_route(planned: PlannedRoute, damage: Damage = NO_DAMAGE) -> RoutePre
     )
 
 
-def warm_up() -> None:
-    """Compile the recursion."""
+def smallest_route() -> PlannedRoute:
+    """Plan a drive of 0.1 m past one reflector: something to compile the kernels with."""
     route = Route("Line", (Segment(np.array([[0.0, 0.0], [0.1, 0.0]]), degree=1),))
     project = Project(reflectors=ReflectorMap((Reflector("1", 2.0, 0.0),)), routes=(route,))
-    predict_route(plan_route(project, "Line"))
+    return plan_route(project, "Line")
+
+
+def warm_up() -> None:
+    """Compile the recursion."""
+    predict_route(smallest_route())

@@ -13,7 +13,7 @@ import numpy as np
 from commission.geometry.arrays import FloatArray, read_only
 from commission.planning.detection_noise import classes_of, detection_noise
 from commission.planning.error_kernels import ErrorModel, propagate_errors
-from commission.planning.route_prediction import PlannedRoute, RoutePrediction, predict_route
+from commission.planning.route_prediction import PlannedRoute, RoutePrediction, predict_route, smallest_route
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,3 +80,8 @@ def two_sigma_of(planned: PlannedRoute) -> FloatArray:
     """(K, 3) 2-sigma of x [m], y [m] and heading [rad]: the larger of the filter's own and of its error."""
     prediction = predict_route(planned)
     return np.maximum(prediction.two_sigma, 2.0 * predict_errors(planned, prediction).sigmas)
+
+
+def warm_up() -> None:
+    """Compile the propagation of errors, and what finds out how good detections are."""
+    two_sigma_of(smallest_route())

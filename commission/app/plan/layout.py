@@ -10,6 +10,7 @@ import numpy as np
 
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
+from commission.planning import true_error
 from commission.planning.candidates import Rectangle
 from commission.planning.nominal_drive import nominal_drive
 from commission.planning.placement import Placement, PlacementOptions, Unmet, place
@@ -139,6 +140,8 @@ def suggest(project: Project, wish: LayoutWish, progress: Callable[[float, str],
     site = project
     if not wish.options.extend:
         site = replace(project, reflectors=ReflectorMap(tuple(r for r in project.reflectors.reflectors if r.locked)))
+    progress(0.0, "compiling")
+    true_error.warm_up()
     found = place(site, routes, replace(wish.options, extend=True), progress)
     return Suggestion(wish, project, found, tuple(_stretches(project, wish, found.unmet)))
 
