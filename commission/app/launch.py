@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import logging
+import signal
 import threading
 import webbrowser
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Generator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from types import FrameType
 from urllib.parse import quote
 
 import numpy as np
@@ -76,10 +78,34 @@ def serve(
         runtime = open_page(server, loaded, folder=folder, source=source, is_new=opened.is_new)
         open_things.callback(runtime.stop)
         address = f"http://{host}:{server.get_port()}/" + (f"?token={quote(token)}" if token else "")
+        interrupted = open_things.enter_context(interruption())
         log.info("page at %s", address)
         if open_browser:
             webbrowser.open(address)
-        threading.Event().wait()
+        interrupted.wait()
+
+
+@contextmanager
+def interruption() -> Generator[threading.Event]:
+    """Give an event that the first Ctrl-C sets; the second one interrupts as usual.
+
+    Raised as an exception, Ctrl-C could come in the middle of a callback from compiled code, which drops it.
+    """
+    event = threading.Event()
+
+    def handle(_signal: int, _frame: FrameType | None) -> None:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        event.set()
+
+    # Who has it ignored (a job in the background of a shell) keeps it so.
+    before = signal.getsignal(signal.SIGINT)
+    if before is signal.default_int_handler and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, handle)
+    try:
+        yield event
+    finally:
+        if signal.getsignal(signal.SIGINT) is handle:
+            signal.signal(signal.SIGINT, before)
 
 
 def first_source(project: Project, recording: Path | None, demo: bool) -> Source | None:

@@ -1,3 +1,4 @@
+import functools
 import os
 import signal
 import socket
@@ -19,6 +20,8 @@ def serve(*words):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        # A suite that runs in the background of a shell ignores Ctrl-C, and what it starts would inherit that.
+        preexec_fn=functools.partial(signal.signal, signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509 - no threads here
     )
     too_late = threading.Timer(FIRST_ANSWER, process.kill)
     too_late.start()
