@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import signal
 import threading
 import webbrowser
@@ -39,6 +40,8 @@ from commission.site.project import Project
 
 log = logging.getLogger(__name__)
 
+END_AFTER_S = 8.0
+"""Time after Ctrl-C in which all background work has to end [s]: each of its threads is waited for up to 2 s."""
 SEEN_SHARE = 0.02
 """Size of a validation area, as a share of the site's, from which it is seen."""
 
@@ -83,6 +86,14 @@ def serve(
         if open_browser:
             webbrowser.open(address)
         interrupted.wait()
+        end_at_last()
+
+
+def end_at_last() -> None:
+    """End the program even where a thread of a library does not; every edit has been journaled when it was made."""
+    last = threading.Timer(END_AFTER_S, os._exit, (0,))
+    last.daemon = True
+    last.start()
 
 
 @contextmanager
