@@ -167,10 +167,10 @@ def drawing(page: OpenPage, runtime: Runtime) -> None:
 PICTURES = (
     Picture("page_laboratory", "laboratory", tab("Run", "Legend")),
     Picture("page_3d", "shop_floor", three_d),
-    Picture("page_shop_floor", "shop_floor", covered),
+    Picture("covered", "shop_floor", covered),
     Picture("site", "shop_floor", tab("Site", "Problems")),
     Picture("tune", "shop_floor", tab("Tune", "Reflectors")),
-    Picture("selected", "shop_floor", selected),
+    Picture("page_shop_floor", "shop_floor", selected),
     Picture("folded", "shop_floor", folded),
     Picture("route", "shop_floor", on_route),
     Picture("measured", "laboratory", measured),
