@@ -16,25 +16,21 @@ from pathlib import Path
 
 import numpy as np
 
-from commission.app import actions, reducer
+from commission.app import actions
 from commission.app.editing import actions as editing
 from commission.app.editing.editor import Tool
 from commission.app.jobs import JobReport, Jobs, JobState
-from commission.app.keeping import Keeping
 from commission.app.mapping.actions import FinishShape, MapOpened
 from commission.app.mapping.draft import MapDraft, MapFile
 from commission.app.mapping.effects import DrawMap, MapEffect, ReadMapFile, StopMapWork
 from commission.app.mapping.work import MapWork
-from commission.app.page import Page
-from commission.app.server import start_server
-from commission.app.store import AppState
 from commission.geometry import rasterize
-from commission.io.project_file import save_project
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.project import Project
+from tests.benchmarks.edited_page import ME, EditedPage
 from tests.io.large_files import write_drawing, write_obj, write_stl
 
-ME, REACH, ROUNDS, LIMIT_MS, STOP_S = 1, 0.5, 12, 100.0, 1.0
+REACH, ROUNDS, LIMIT_MS, STOP_S = 0.5, 12, 100.0, 1.0
 ENTITIES, MODEL_BYTES = 200_000, 100_000_000
 
 
@@ -55,23 +51,8 @@ def edit() -> bool:
     rng = np.random.default_rng(2)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        save_project(project, folder)
-        keeping = Keeping(folder, project)
-        server = start_server("127.0.0.1", 0)
-        state = reducer.reduce(editing.Join(ME), AppState(project, project, folder=folder)).state
-        page = Page(server, lambda _action: None, state)
-        page.show_site(state)
-
-        def done(*wishes: actions.Action) -> float:
-            nonlocal state
-            begun = time.process_time()
-            for wish in wishes:
-                before = state.project
-                state = reducer.reduce(wish, state).state
-                if state.project is not before:
-                    keeping.note(state.project, "edit")
-                    page.show_site(state)
-            return time.process_time() - begun
+        page = EditedPage(project, folder, time.process_time)
+        done = page.do
 
         def wall(reach: float) -> Callable[[], float]:
             def draw() -> float:
@@ -106,8 +87,7 @@ def edit() -> bool:
             passed &= spent[ROUNDS // 2] < LIMIT_MS
             print(f"  {gesture:>22}: median {spent[ROUNDS // 2]:6.1f} ms, longest {spent[-1]:6.1f} ms")
         print(f"  journal {(folder / '.commission.journal').stat().st_size / 1e6:.2f} MB")
-        keeping.close()
-        server.stop()
+        page.close()
     return passed
 
 

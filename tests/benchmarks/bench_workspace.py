@@ -13,21 +13,17 @@ from pathlib import Path
 
 import numpy as np
 
-from commission.app import actions, reducer
+from commission.app import actions
 from commission.app.editing import actions as editing
 from commission.app.editing.editor import Tool
-from commission.app.keeping import Keeping
-from commission.app.page import Page
-from commission.app.server import start_server
-from commission.app.store import AppState
-from commission.io.project_file import save_project
 from commission.site.editing import reflectors as edits
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
+from tests.benchmarks.edited_page import ME, EditedPage
 
-ME, REACH, ROUNDS = 1, 0.5, 10
+REACH, ROUNDS = 0.5, 10
 
 
 def large_site() -> Project:
@@ -46,26 +42,11 @@ def main() -> None:
     project = large_site()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        save_project(project, folder)
-        keeping = Keeping(folder, project)
-        server = start_server("127.0.0.1", 0)
-        state = reducer.reduce(editing.Join(ME), AppState(project, project, folder=folder)).state
-        page = Page(server, lambda _action: None, state)
-        page.show_site(state)
-
-        def done(*wishes: actions.Action) -> float:
-            nonlocal state
-            begun = time.perf_counter()
-            for wish in wishes:
-                before = state.project
-                state = reducer.reduce(wish, state).state
-                if state.project is not before:
-                    keeping.note(state.project, "edit")
-                    page.show_site(state)
-            return time.perf_counter() - begun
+        page = EditedPage(project, folder, time.perf_counter)
+        done = page.do
 
         def drag() -> float:
-            r = state.project.reflectors.reflectors[7]
+            r = page.state.project.reflectors.reflectors[7]
             start, end = (r.x, r.y), (r.x + 1.0, r.y + 1.0)
             return done(
                 editing.DragFloor(ME, "start", start, start, REACH), editing.DragFloor(ME, "end", start, end, REACH)
@@ -85,8 +66,7 @@ def main() -> None:
         for gesture, run in gestures.items():
             spent = [run() * 1e3 for _ in range(ROUNDS)]
             sys.stdout.write(f"{gesture:>6}: median {np.median(spent):.1f} ms, longest {max(spent):.1f} ms\n")
-        keeping.close()
-        server.stop()
+        page.close()
 
 
 if __name__ == "__main__":

@@ -1,0 +1,53 @@
+"""A page without a browser whose edits are drawn and journaled, for benchmarks that time them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from commission.app import actions, reducer
+from commission.app.editing import actions as editing
+from commission.app.keeping import Keeping
+from commission.app.page import Page
+from commission.app.server import start_server
+from commission.app.store import AppState
+from commission.io.project_file import save_project
+from commission.site.project import Project
+
+ME = 1
+"""Number of the browser that edits."""
+
+
+class EditedPage:
+    """The page of a project that is kept in a folder.
+
+    Parameters
+    ----------
+    project, folder : what is edited, and where it is saved first.
+    clock : returns seconds: what time counts.
+    """
+
+    def __init__(self, project: Project, folder: Path, clock: Callable[[], float]) -> None:
+        save_project(project, folder)
+        self._clock = clock
+        self._keeping = Keeping(folder, project)
+        self._server = start_server("127.0.0.1", 0)
+        self.state = reducer.reduce(editing.Join(ME), AppState(project, project, folder=folder)).state
+        self._page = Page(self._server, lambda _action: None, self.state)
+        self._page.show_site(self.state)
+
+    def do(self, *wishes: actions.Action) -> float:
+        """Do what a person wishes; returns how long that took, journal and picture included [s]."""
+        begun = self._clock()
+        for wish in wishes:
+            before = self.state.project
+            self.state = reducer.reduce(wish, self.state).state
+            if self.state.project is not before:
+                self._keeping.note(self.state.project, "edit")
+                self._page.show_site(self.state)
+        return self._clock() - begun
+
+    def close(self) -> None:
+        """Bring the journal to the disk and end the page."""
+        self._keeping.close()
+        self._server.stop()
