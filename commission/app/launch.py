@@ -10,6 +10,7 @@ import webbrowser
 from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from queue import SimpleQueue
 from types import FrameType
 from urllib.parse import quote
 
@@ -81,11 +82,11 @@ def serve(
         runtime = open_page(server, loaded, folder=folder, source=source, is_new=opened.is_new)
         open_things.callback(runtime.stop)
         address = f"http://{host}:{server.get_port()}/" + (f"?token={quote(token)}" if token else "")
-        interrupted = open_things.enter_context(interruption())
+        wait_for_interruption = open_things.enter_context(interruption())
         log.info("page at %s", address)
         if open_browser:
             webbrowser.open(address)
-        interrupted.wait()
+        wait_for_interruption()
         end_at_last()
 
 
@@ -97,23 +98,25 @@ def end_at_last() -> None:
 
 
 @contextmanager
-def interruption() -> Generator[threading.Event]:
-    """Give an event that the first Ctrl-C sets; the second one interrupts as usual.
+def interruption() -> Generator[Callable[[], object]]:
+    """Give a function that waits for the first Ctrl-C, also for one that has come before; the second one is as usual.
 
     Raised as an exception, Ctrl-C could come in the middle of a callback from compiled code, which drops it.
     """
-    event = threading.Event()
+    # An event would not do: one that is set by a signal while the same thread is about to wait for it is a deadlock.
+    # A simple queue may be put to at any moment of its own `get`.
+    arrived: SimpleQueue[int] = SimpleQueue()
 
-    def handle(_signal: int, _frame: FrameType | None) -> None:
+    def handle(number: int, _frame: FrameType | None) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-        event.set()
+        arrived.put(number)
 
     # Who has it ignored (a job in the background of a shell) keeps it so.
     before = signal.getsignal(signal.SIGINT)
     if before is signal.default_int_handler and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, handle)
     try:
-        yield event
+        yield arrived.get
     finally:
         if signal.getsignal(signal.SIGINT) is handle:
             signal.signal(signal.SIGINT, before)
