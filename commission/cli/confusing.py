@@ -14,7 +14,7 @@ from commission.errors import UsageError
 
 if TYPE_CHECKING:
     from commission.site.reflectors import ReflectorMap
-    from commission.studies.ambiguity import RouteRisks, SiteAmbiguity
+    from commission.studies.ambiguity import FloorAmbiguity, RouteRisks
 
 NAMED = 3
 """Pairs that the report names; the files have all."""
@@ -58,17 +58,15 @@ class Ambiguity:
         except ValueError as error:
             raise UsageError(str(error)) from None
         write_ambiguity(self.out, found, project.reflectors, summary(found))
-        lines = [*_cold_start(found, project.reflectors), *_tracking(found.routes, project.reflectors)]
+        lines = [*_cold_start(found.floor, project.reflectors), *_tracking(found.routes, project.reflectors)]
         sys.stdout.write("\n".join([*lines, f"Written to   {self.out}"]) + "\n")
 
 
-def _cold_start(found: SiteAmbiguity, reflectors: ReflectorMap) -> list[str]:
+def _cold_start(found: FloorAmbiguity, reflectors: ReflectorMap) -> list[str]:
     """Lines about the floor, and the pairs that most poses confuse."""
-    import numpy as np
-
     on, area = found.drivable, found.lattice.spacing**2
     share = 100.0 * found.ambiguous.sum() / max(on.sum(), 1)
-    rival, few = np.isfinite(found.partners[on, 0]).sum() * area, (found.visible[on] < 2).sum() * area
+    rival, few = found.has_twin.sum() * area, (found.visible[on] < 2).sum() * area
     lines = [
         f"Cold start   {found.ambiguous.sum() * area:.1f} of {on.sum() * area:.1f} m2 ambiguous in some heading "
         f"({share:.1f} %): {rival:.1f} m2 look like another place, {few:.1f} m2 see fewer than two reflectors",

@@ -13,7 +13,7 @@ from commission.io.atomic import atomic_file, write_text
 from commission.io.lattice_image import NO_FLOOR, lattice_image, shades
 from commission.io.table_writer import write_table
 from commission.site.reflectors import ReflectorMap
-from commission.studies.ambiguity import SiteAmbiguity
+from commission.studies.ambiguity import FloorAmbiguity, SiteAmbiguity
 
 ARRAYS = "ambiguity.npz"
 TABLE = "ambiguity.csv"
@@ -47,7 +47,7 @@ def write_ambiguity(
     FileFormatError
         a file cannot be written.
     """
-    lattice = found.lattice
+    floor, lattice = found.floor, found.floor.lattice
     shape = (lattice.rows, lattice.columns)
     with atomic_file(folder / ARRAYS) as file:
         np.savez_compressed(
@@ -55,21 +55,21 @@ def write_ambiguity(
             allow_pickle=False,
             x=lattice.x + lattice.spacing * np.arange(lattice.columns),
             y=lattice.y + lattice.spacing * np.arange(lattice.rows),
-            drivable=found.drivable.reshape(shape),
-            ambiguous_share=found.share.reshape(shape),
-            visible=found.visible.reshape(shape),
-            partner=found.partners.reshape(*shape, 3),
+            drivable=floor.drivable.reshape(shape),
+            ambiguous_share=floor.share.reshape(shape),
+            visible=floor.visible.reshape(shape),
+            partner=floor.partners.reshape(*shape, 3),
         )
     ids = [reflector.id for reflector in reflectors.reflectors]
-    write_table(folder / TABLE, COLUMNS, _points(found))
-    write_table(folder / PAIRS, PAIR_COLUMNS, _pairs(found, ids))
+    write_table(folder / TABLE, COLUMNS, _points(floor))
+    write_table(folder / PAIRS, PAIR_COLUMNS, _pairs(floor, ids))
     write_table(folder / NEIGHBORS, NEIGHBOR_COLUMNS, _neighbors(found, ids))
     with atomic_file(folder / IMAGE) as file:
-        ambiguity_image(found).save(file, format="PNG")
+        ambiguity_image(floor).save(file, format="PNG")
     write_text(folder / SUMMARY, json.dumps(dict(summary), indent=2, allow_nan=False) + "\n")
 
 
-def ambiguity_image(found: SiteAmbiguity) -> Image.Image:
+def ambiguity_image(found: FloorAmbiguity) -> Image.Image:
     """Share of ambiguous headings as a picture, north up: dark is clear, red has too few reflectors in sight."""
     colors = np.empty((len(found.lattice), 3), dtype=np.uint8)
     colors[:] = NO_FLOOR
@@ -78,7 +78,7 @@ def ambiguity_image(found: SiteAmbiguity) -> Image.Image:
     return lattice_image(found.lattice, colors)
 
 
-def _points(found: SiteAmbiguity) -> Iterator[tuple[str, ...]]:
+def _points(found: FloorAmbiguity) -> Iterator[tuple[str, ...]]:
     """One row per drivable point; the partner is empty where there is none."""
     points = found.lattice.points()
     for n in np.flatnonzero(found.drivable).tolist():
@@ -86,7 +86,7 @@ def _points(found: SiteAmbiguity) -> Iterator[tuple[str, ...]]:
         yield *map(_text, points[n].tolist()), _text(float(found.share[n])), str(found.visible[n]), *partner
 
 
-def _pairs(found: SiteAmbiguity, ids: list[str]) -> Iterator[tuple[str, ...]]:
+def _pairs(found: FloorAmbiguity, ids: list[str]) -> Iterator[tuple[str, ...]]:
     """One row per pair of constellations, the one that most poses see first."""
     for pair in found.cold.pairs:
         groups = (" ".join(ids[index] for index in group) for group in (pair.constellation, pair.image))

@@ -21,7 +21,7 @@ def hall(scanner=ALL_AROUND) -> Project:
 
 
 def test_walls_have_no_figures_and_the_floor_has_all():
-    found = ambiguity_of(hall(), spacing=0.05)
+    found = ambiguity_of(hall(), spacing=0.05).floor
     edge = found.share.reshape(found.lattice.rows, found.lattice.columns)[0]
     assert np.isnan(edge).all()
     assert found.visible.reshape(found.lattice.rows, -1)[0].max() == -1
@@ -31,7 +31,7 @@ def test_walls_have_no_figures_and_the_floor_has_all():
 def test_the_share_is_that_of_the_headings_that_are_ambiguous():
     # Half a turn of sight sees two corners of one wall in some headings, and one corner or none in others.
     narrow = replace(ALL_AROUND, field_of_view_deg=(-60.0, 60.0))
-    found = ambiguity_of(hall(narrow), AmbiguityOptions(headings=4), spacing=1.0)
+    found = ambiguity_of(hall(narrow), AmbiguityOptions(headings=4), spacing=1.0).floor
     assert set(np.unique(found.share[found.drivable] * 4)) <= {0.0, 1.0, 2.0, 3.0, 4.0}
     assert found.share[found.drivable].max() > 0.0
     count = len(found.cold.poses) // 4

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from commission.app.plan.settings import PlanSettings
 from commission.geometry.arrays import FloatArray
-from commission.planning.ambiguity import AmbiguityOptions, AmbiguousPair, ColdStart, cold_start
+from commission.planning.ambiguity import AmbiguityOptions, AmbiguousPair
 from commission.planning.coverage import Lattice, lattice_of
-from commission.planning.visibility import VisibilityModel, VisibilityOptions, visibility_model
+from commission.planning.visibility import VisibilityOptions, visibility_model
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
-from commission.studies.coverage import free_floor
+from commission.studies.ambiguity import FloorAmbiguity, both_ways, floor_ambiguity
 
 NOTHING, UNIQUE, TOO_FEW, SOME, EVERY = range(5)
 """Classes: beside the floor; each heading tells its place; fewer than two visible somewhere, no twin; a twin at some
@@ -60,32 +60,15 @@ def look_alike(project: Project, settings: PlanSettings, progress: Callable[[flo
     """Ask for every free spot of the floor, heading by heading, whether another pose sees the same."""
     progress(0.0, "sight of each reflector")
     model = visibility_model(project, VisibilityOptions(min_beams=settings.min_beams))
-    lattice = spots_of(project)
     options = AmbiguityOptions(tolerance=settings.tolerance)
-    found = cold_start(model, lattice, options, progress)
-    return Ambiguity(project.reflectors, lattice, _classes(project, model, lattice, found), both_ways(found.pairs))
+    found = floor_ambiguity(project, model, spots_of(project), options, progress)
+    return Ambiguity(project.reflectors, found.lattice, _classes(found), both_ways(found.cold.pairs))
 
 
-def both_ways(pairs: tuple[AmbiguousPair, ...]) -> tuple[AmbiguousPair, ...]:
-    """Merge pairs of the same two groups, whichever is taken for the other; the most frequent come first."""
-    merged: dict[frozenset[tuple[int, ...]], AmbiguousPair] = {}
-    for pair in pairs:
-        key = frozenset((pair.constellation, tuple(sorted(pair.image))))
-        first = merged.get(key)
-        merged[key] = pair if first is None else replace(first, poses=first.poses + pair.poses)
-    return tuple(sorted(merged.values(), key=lambda pair: -pair.poses))
-
-
-def _classes(project: Project, model: VisibilityModel, lattice: Lattice, found: ColdStart) -> NDArray[np.uint8]:
-    """Sort the spots; `found` holds heading by heading those that are not in a wall."""
-    points = lattice.points()
-    asked = ~model.caster.grid.is_occupied(points)
-    ambiguous = found.ambiguous.reshape(-1, int(asked.sum()))
-    twins = np.isfinite(found.partners[:, 0]).reshape(ambiguous.shape).any(axis=0)
-    kinds = np.where(ambiguous.any(axis=0), TOO_FEW, UNIQUE)
-    kinds = np.where(twins, SOME, kinds)
-    kinds = np.where(ambiguous.all(axis=0), EVERY, kinds)
-    classes = np.full(len(points), NOTHING, np.uint8)
-    classes[asked] = kinds
-    classes[~free_floor(project, points)] = NOTHING
-    return classes.reshape(lattice.rows, lattice.columns)
+def _classes(found: FloorAmbiguity) -> NDArray[np.uint8]:
+    """Sort the spots."""
+    kinds = np.where(found.ambiguous, TOO_FEW, UNIQUE)
+    kinds = np.where(found.has_twin, SOME, kinds)
+    kinds = np.where(found.share == 1.0, EVERY, kinds)
+    kinds = np.where(found.drivable, kinds, NOTHING).astype(np.uint8)
+    return kinds.reshape(found.lattice.rows, found.lattice.columns)
