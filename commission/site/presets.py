@@ -116,9 +116,11 @@ SCANNERS: tuple[ScannerPreset, ...] = (
             beam_width_deg=0.49,
             reflector_range=20.0,
         ),
-        "811 beams over 270 deg at 15 Hz, 0.05 to 25 m: data sheet of part 1096807 and operating instructions 8024231, "
-        "as quoted. Beam width: that of the smaller TiM3xx, 8.6 mrad (8024851, section 3.6.4).",
-        _GEOMETRY,
+        "270 deg in steps of 0.33 deg: operating instructions TiM781 (8024231, 2019), section 7.3. 811 beams at 15 Hz, "
+        "0.05 to 25 m: data sheet of part 1096807, as quoted. Beam width: that of the smaller TiM3xx, 8.6 mrad "
+        "(8024851, section 3.6.4).",
+        frozenset({"rate", "range"}),
+        frozenset({"field_of_view_deg", "resolution_deg"}),
     ),
     ScannerPreset(
         "SICK NAV350",
