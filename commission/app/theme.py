@@ -172,8 +172,8 @@ div:has(>div>.c-route)>:nth-child(1){{grid-column:span 3;padding-left:var(--c-ta
 .c-route{{font-size:12px;height:44px;display:flex;align-items:center;white-space:nowrap;overflow:hidden}}
 div:has(>.c-wide){{display:none}}
 div:has(>.c-wide)+*>.mantine-Flex-root>[style*="flex-shrink: 0"]{{display:none}}
-div:has(>.c-tools)+* .mantine-Button-root{{padding:0!important;font-size:11px!important;min-width:0!important;
- flex:1 1 0!important}}
+div:has(>.c-tools)+* .mantine-Button-root{{padding:0 4px!important;font-size:11px!important;min-width:0!important;
+ flex:1 1 auto!important}}
 div:has(>.c-rows){{display:none}}
 div:has(>.c-rows)~div{{padding-top:0!important;padding-bottom:1px!important}}
 div:has(>.c-rows)~div button{{height:auto!important;min-height:22px;padding:2px 6px!important;

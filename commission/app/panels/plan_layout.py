@@ -55,17 +55,19 @@ class LayoutPanel(BasePanel):
         self._shown: LayoutView | None = None
         self._routes: dict[str, Any] = {}
         with folder:
-            self._add_demands()
-            self._counted = gui.add_folder("Routes that count", expand_by_default=False)
-            with gui.add_folder("Where they may stand", expand_by_default=False):
-                self._add_candidates()
+            # What was found stands above the demands: below them, it would be out of sight on a small screen.
             self._ask = gui.add_button("Suggest reflectors", hint="Fewest reflectors on walls that meet the demands.")
             self._ask.on_click(posting(post, lambda _event: AskLayout()))
             self._work = WorkBar(gui, post, LAYOUT, DiscardLayout())
             self._found = Text(gui)
             self._decide = gui.add_button_group("", ("Accept", "Discard"), visible=False)
             self._decide.on_click(posting(post, self._decided))
-        self._unmet = Rows(gui, folder, post, self._showing)
+            self._not_met = gui.add_folder("Not met", visible=False)
+            self._add_demands()
+            self._counted = gui.add_folder("Routes that count", expand_by_default=False)
+            with gui.add_folder("Where they may stand", expand_by_default=False):
+                self._add_candidates()
+        self._unmet = Rows(gui, self._not_met, post, self._showing)
 
     def _add_demands(self) -> None:
         gui, inputs = self._gui, self._inputs
@@ -135,7 +137,9 @@ class LayoutPanel(BasePanel):
         self._shown, self._suggestion = found, None if found is None else found.suggestion
         self._found.write((found,), lambda: "" if found is None else found_text(found))
         show(self._decide, visible=found is not None)
-        self._unmet.show([] if found is None else _unmet_lines(found.suggestion))
+        unmet = [] if found is None else _unmet_lines(found.suggestion)
+        self._unmet.show(unmet)
+        show(self._not_met, visible=bool(unmet))
 
     def _follow_routes(self, state: AppState) -> None:
         """A check box for each route of the project."""

@@ -19,6 +19,8 @@ from commission.site.parameters import Parameters
 
 BINS = 400
 HEIGHT_PX = 150
+ROOM_PX = 44
+"""Room for the numbers beside a vertical axis: five figures and a comma."""
 TURQUOISE, ORANGE = "#4dc4ff", "#ffb454"
 LIMIT = theme.css(theme.POSE)
 
@@ -61,6 +63,11 @@ def _constant(series: Series, value: float) -> FloatArray:
     return np.full(len(series), value)
 
 
+def _decade_below(value: float) -> float:
+    """The power of ten below: where a logarithmic axis has a label anyway."""
+    return 10.0 ** math.floor(math.log10(value))
+
+
 CHARTS = (
     Chart(
         "2σ of x, y [mm]",
@@ -79,7 +86,7 @@ CHARTS = (
             Line("limit", LIMIT, lambda s, p: _constant(s, math.degrees(p.supervisor.heading_limit)), is_limit=True),
         ),
         lambda p: (
-            0.005 * math.degrees(p.supervisor.heading_limit),
+            _decade_below(0.005 * math.degrees(p.supervisor.heading_limit)),
             3.0 * math.degrees(p.supervisor.heading_limit),
         ),
         is_logarithmic=True,
@@ -101,6 +108,8 @@ CHARTS = (
                 theme.css(theme.OUTLIER_ASSOCIATION),
                 lambda s, _p: s.counts[:, Status.OUTLIER_DETECTOR :].sum(axis=1).astype(float),
             ),
+            # The axis reaches up to this at least: uPlot would give curves of zeros one up to 100.
+            Line("", "transparent", lambda s, _p: _constant(s, 4.0), is_limit=True),
         ),
     ),
     Chart(
@@ -167,7 +176,7 @@ class Plots(BasePanel):
                     _series(chart),
                     title=chart.title,
                     scales=_scales(1.0, None, chart),
-                    axes=(axis_style(20), axis_style(36)),
+                    axes=(axis_style(20), axis_style(ROOM_PX)),
                     legend={"show": False},
                     cursor={"sync": {"key": "run"}, "drag": {"x": True, "y": False}},
                     height=HEIGHT_PX,

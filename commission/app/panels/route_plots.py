@@ -17,7 +17,7 @@ from commission.app import theme
 from commission.app.editing.editor import Editor
 from commission.app.editing.route_gestures import route_of
 from commission.app.panels.base import BasePanel, clock, escaped
-from commission.app.panels.plots import HEIGHT_PX, LIMIT, TURQUOISE, axis_style
+from commission.app.panels.plots import HEIGHT_PX, LIMIT, ROOM_PX, TURQUOISE, axis_style
 from commission.app.view import PageView
 from commission.geometry.arrays import FloatArray
 from commission.planning.route_profile import RouteProfile
@@ -173,7 +173,7 @@ def _plot(gui: GuiApi, chart: Chart) -> GuiUplotHandle:
         _series(chart),
         title=chart.title,
         scales=_scales(1.0, (0.0, 1.0)),
-        axes=(axis_style(20), axis_style(36)),
+        axes=(axis_style(20), axis_style(ROOM_PX)),
         legend={"show": False},
         cursor={"sync": {"key": "route"}, "drag": {"x": True, "y": False}},
         height=HEIGHT_PX,
