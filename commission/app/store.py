@@ -104,7 +104,7 @@ class AppState:
     plan: PlanSettings = field(default_factory=PlanSettings)
     """What the step Plan shows."""
     layout: LayoutWish = field(default_factory=LayoutWish)
-    """What a suggested layout must achieve."""
+    """Whether a suggested layout is wanted."""
     mapping: MapLoading = field(default_factory=MapLoading)
     """The floor map that is being loaded."""
     problems: tuple[str, ...] = field(default=())

@@ -7,16 +7,17 @@ import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, UseAppendAction, arg
 
 from commission.errors import UsageError
 
 if TYPE_CHECKING:
-    from commission.planning.candidates import AllowedHeights
-    from commission.planning.demands import Spot, Unmet
     from commission.planning.placement import Placement, PlacementOptions
+    from commission.planning.unmet import Unmet
+    from commission.site.layout_brief import AllowedHeights, CandidateOptions, Demands, Spot
+    from commission.site.project import Project
 
 STATIONS = "stations"
 STARTS = "starts"
@@ -26,45 +27,53 @@ HEIGHTS_FORM = "LOW,HIGH or LOW,HIGH,X1,Y1,X2,Y2 (metres)"
 
 @dataclass(frozen=True, kw_only=True)
 class Place:
-    """Suggest few reflectors on walls and pillars, so that the routes are driven within limits; writes a project."""
+    """Suggest few reflectors on walls and pillars, so that the routes are driven within limits; writes a project.
+
+    What is not given here is as the project asks for it.
+    """
 
     project: Positional[Path]
     """Folder of the project (holds project.yaml)."""
     out: Annotated[Path, arg(metavar="PROJECT2")]
     """Folder for the project with the suggested reflectors; made when it does not exist."""
     route: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = ()
-    """Route that counts. None: all."""
+    """Route that counts. None: those that count in the project."""
     extend: bool = True
     """Whether the project's reflectors stay; with --no-extend the layout starts empty, with the locked ones alone."""
-    visible: int = 2
-    """Reflectors that must be visible everywhere on the routes."""
+    visible: int | None = None
+    """Reflectors that must be visible everywhere on the routes. None: as in the project (2 unless changed)."""
     survive_failure: bool = True
-    """Whether everything must hold as well with any single reflector blocked."""
+    """Whether everything must hold as well with any single reflector blocked; with --no-survive-failure it need not,
+    whatever the project says."""
     position_limit: float | None = None
-    """Largest 2-sigma of x and y on the routes [m]. None: the supervisor's."""
+    """Largest 2-sigma of x and y on the routes [m]. None: the project's, or else the supervisor's."""
     heading_limit: float | None = None
-    """Largest 2-sigma of the heading on the routes [deg]. None: the supervisor's."""
-    min_spacing: float = 0.5
-    """Smallest distance between two reflectors [m]."""
+    """Largest 2-sigma of the heading on the routes [deg]. None: the project's, or else the supervisor's."""
+    min_spacing: float | None = None
+    """Smallest distance between two reflectors [m]. None: as in the project (0.5 unless changed)."""
     unambiguous: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="stations|starts|X,Y|X,Y,HEADING")] = ()
     """Where a vehicle that is switched on must see which place it is: at the stations, at the starts of the routes, or
-    at a spot [m, m, deg]; a spot without a heading counts with all."""
+    at a spot [m, m, deg]; a spot without a heading counts with all. Beside those of the project."""
     blocked_per_m: float = 0.0
     """Probability per metre of ray that a person blocks it [1/m]."""
-    spacing: float = 1.0
-    """Distance between places along the walls that are considered [m]."""
-    radius: float = 0.04
-    """Radius of the reflectors [m]."""
-    height: float = 0.2
-    """Height of the scanner's beams above the floor, and of the middle of the reflectors where it is allowed [m]."""
-    length: float = 0.2
-    """Length of the reflectors: one whose middle is not at the height of the beams must still be met by them [m]."""
+    spacing: float | None = None
+    """Distance between places along the walls that are considered [m]. None: as in the project (1 unless changed)."""
+    radius: float | None = None
+    """Radius of the reflectors [m]. None: as in the project (0.04 unless changed)."""
+    height: float | None = None
+    """Height of the scanner's beams above the floor, and of the middle of the reflectors where it is allowed [m].
+    None: as in the project (0.2 unless changed)."""
+    length: float | None = None
+    """Length of the reflectors: one whose middle is not at the height of the beams must still be met by them [m].
+    None: as in the project (0.2 unless changed)."""
     heights: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="LOW,HIGH[,X1,Y1,X2,Y2]")] = ()
-    """Heights that are allowed for the middle of a reflector, everywhere or in a rectangle, map frame [m]."""
-    clearance: float = 0.3
-    """Distance left between a reflector and the vehicle on its routes [m]."""
+    """Heights that are allowed for the middle of a reflector, everywhere or in a rectangle, map frame [m]. Beside
+    those of the project."""
+    clearance: float | None = None
+    """Distance left between a reflector and the vehicle on its routes [m].
+    None: as in the project (0.3 unless changed)."""
     keep_out: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="X1,Y1,X2,Y2")] = ()
-    """Rectangle without reflectors, by two opposite corners, map frame [m]."""
+    """Rectangle without reflectors, by two opposite corners, map frame [m]. Beside those of the project."""
     seed: int = 1
     """Seed of the search: the same seed gives the same layout."""
 
@@ -75,46 +84,67 @@ class Place:
 
         if self.out.resolve() == self.project.resolve():
             raise UsageError(f"--out is the project itself, {self.out}; expected another folder")
+        project = load_project(self.project)
         try:
-            options = self._options()
+            options = self._options(project)
         except ValueError as error:
             raise UsageError(str(error)) from None
-        project = load_project(self.project)
-        if not project.routes:
-            raise UsageError("the project has no route; expected one to place reflectors for")
-        found = place(project, self.route or None, options)
+        counted = project.layout.counted(project.routes)
+        if not counted:
+            raise UsageError("the project has no route that counts; expected one to place reflectors for")
+        found = place(project, self.route or counted, options)
         save_project(dataclasses.replace(project, reflectors=found.reflectors), self.out)
         sys.stdout.write("\n".join([*_report(found), f"Written to   {self.out}"]) + "\n")
 
-    def _options(self) -> PlacementOptions:
+    def _options(self, project: Project) -> PlacementOptions:
         """Options of the search; raises ValueError for a number out of range."""
-        from commission.planning.candidates import CandidateOptions
-        from commission.planning.demands import Demands
         from commission.planning.placement import PlacementOptions
         from commission.planning.route_prediction import PredictionOptions
 
+        return PlacementOptions(
+            self._demands(project.layout.demands),
+            self._candidates(project.layout.candidates),
+            PredictionOptions(blocked_per_m=self.blocked_per_m),
+            extend=self.extend,
+            seed=self.seed,
+        )
+
+    def _demands(self, given: Demands) -> Demands:
+        """Those of the project, with what the command line says."""
         spots = [text for text in self.unambiguous if text not in {STATIONS, STARTS}]
-        demands = Demands(
-            self.visible,
-            self.survive_failure,
-            self.position_limit,
-            None if self.heading_limit is None else math.radians(self.heading_limit),
-            self.min_spacing,
-            unambiguous_stations=STATIONS in self.unambiguous,
-            unambiguous_starts=STARTS in self.unambiguous,
-            unambiguous_spots=tuple(_spot(text) for text in spots),
+        return dataclasses.replace(
+            given,
+            survive_failure=self.survive_failure and given.survive_failure,
+            unambiguous_stations=STATIONS in self.unambiguous or given.unambiguous_stations,
+            unambiguous_starts=STARTS in self.unambiguous or given.unambiguous_starts,
+            unambiguous_spots=(*given.unambiguous_spots, *map(_spot, spots)),
+            **_said(
+                visible=self.visible,
+                position_limit=self.position_limit,
+                heading_limit=None if self.heading_limit is None else math.radians(self.heading_limit),
+                spacing=self.min_spacing,
+            ),
         )
-        candidates = CandidateOptions(
-            spacing=self.spacing,
-            radius=self.radius,
-            height=self.height,
-            clearance=self.clearance,
-            keep_out=tuple(_rectangle(text) for text in self.keep_out),
-            length=self.length,
-            allowed_heights=tuple(_heights(text) for text in self.heights),
+
+    def _candidates(self, given: CandidateOptions) -> CandidateOptions:
+        """Those of the project, with what the command line says."""
+        return dataclasses.replace(
+            given,
+            keep_out=(*given.keep_out, *map(_rectangle, self.keep_out)),
+            allowed_heights=(*given.allowed_heights, *map(_heights, self.heights)),
+            **_said(
+                spacing=self.spacing,
+                radius=self.radius,
+                height=self.height,
+                clearance=self.clearance,
+                length=self.length,
+            ),
         )
-        prediction = PredictionOptions(blocked_per_m=self.blocked_per_m)
-        return PlacementOptions(demands, candidates, prediction, extend=self.extend, seed=self.seed)
+
+
+def _said(**options: float | None) -> dict[str, Any]:
+    """Options that the command line gives."""
+    return {name: value for name, value in options.items() if value is not None}
 
 
 def _numbers(text: str, option: str, counts: tuple[int, ...], form: str) -> list[float]:
@@ -142,7 +172,7 @@ def _spot(text: str) -> Spot:
 
 def _heights(text: str) -> AllowedHeights:
     """Read `LOW,HIGH` or `LOW,HIGH,X1,Y1,X2,Y2`; raises ValueError for heights out of order."""
-    from commission.planning.candidates import AllowedHeights
+    from commission.site.layout_brief import AllowedHeights
 
     low, high, *corners = _numbers(text, "--heights", (2, 6), HEIGHTS_FORM)
     if not corners:

@@ -165,7 +165,7 @@ def _note_losses(project: Project, found: Findings) -> None:
         found.add("", f"{len(project.reflectors)} reflectors are not carried: LIF knows no localization")
     if project.floor_map is not None:
         found.add("", "the floor map is not carried")
-    found.add("", "vehicle, scanner, parameters and disturbances are not carried")
+    found.add("", "vehicle, scanner, parameters, disturbances and demands on the layout are not carried")
     if project.stations:
         found.add("", f"the required accuracy of {len(project.stations)} stations is not carried")
     if any(segment.speed is not None for route in project.routes for segment in route.segments):

@@ -21,6 +21,7 @@ from commission.io.reflector_tables import read_reflectors, write_reflectors
 from commission.io.yaml_document import YamlDocument, read_yaml, scalar
 from commission.site.disturbances import Disturbances
 from commission.site.floor_map import FloorMap
+from commission.site.layout_brief import LayoutBrief
 from commission.site.parameters import Parameters
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -62,6 +63,8 @@ class ProjectDocument:
     """What a virtual drive suffers."""
     stations: tuple[Station, ...] = ()
     """Places where the vehicle has to stand accurately."""
+    layout: LayoutBrief = field(default_factory=LayoutBrief)
+    """What is asked of a suggested layout of reflectors."""
 
 
 def project_file(path: Path) -> Path:
@@ -133,6 +136,7 @@ def load_project(path: Path) -> Project:
             keys.parameters,
             keys.disturbances,
             keys.stations,
+            keys.layout,
         )
     except ProjectError as error:
         problem, _, remedy = str(error).partition("; expected ")

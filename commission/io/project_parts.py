@@ -23,6 +23,7 @@ from commission.io.project_file import VEHICLES
 from commission.io.yaml_document import YamlDocument
 from commission.site.disturbances import Disturbances
 from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
+from commission.site.layout_brief import LayoutBrief
 from commission.site.parameters import Parameters
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -32,7 +33,7 @@ from commission.site.stations import Station
 
 _LISTS = {"reflectors": "id", "routes": "name", "stations": "name"}
 """Parts that are lists, and the field that tells their elements apart."""
-_WHOLE = ("name", "scanner", "parameters", "disturbances")
+_WHOLE = ("name", "scanner", "parameters", "disturbances", "layout")
 """Parts that are written as they are."""
 
 
@@ -44,6 +45,7 @@ class _Parts:
     scanner: Scanner = field(default_factory=Scanner)
     parameters: Parameters = field(default_factory=Parameters)
     disturbances: Disturbances = field(default_factory=Disturbances)
+    layout: LayoutBrief = field(default_factory=LayoutBrief)
     reflectors: tuple[Reflector, ...] = ()
     routes: tuple[Route, ...] = ()
     stations: tuple[Station, ...] = ()

@@ -17,6 +17,7 @@ import yaml
 
 from commission.io.yaml_document import scalar
 from commission.site.checks import field_hints
+from commission.site.layout_brief import LayoutBrief
 from commission.site.project import Project
 
 _PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_./ ()-]*")
@@ -50,6 +51,7 @@ def project_text(project: Project, schema: int, floor_map: str | None, reflector
         *_fields(project.parameters, "  "),
         "disturbances:",
         *_fields(project.disturbances, "  "),
+        *(_entry("layout", project.layout, "", "") if project.layout != LayoutBrief() else ()),
     ]
     return "\n".join(lines) + "\n"
 

@@ -3,69 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.geometry.occupancy import OccupancyGrid
-from commission.site.checks import above, at_least
-
-Rectangle = tuple[float, float, float, float]
-"""x and y of the lower-left corner, x and y of the upper-right one [m], map frame."""
-EVERYWHERE: Rectangle = (-math.inf, -math.inf, math.inf, math.inf)
-
-
-@dataclass(frozen=True, slots=True)
-class AllowedHeights:
-    """At which heights a reflector may be put up in a part of the hall."""
-
-    lowest: float
-    """Least height of its middle above the floor [m]."""
-    highest: float
-    """Greatest one [m]."""
-    area: Rectangle = EVERYWHERE
-    """The part of the hall, by x and y of two opposite corners [m]."""
-
-    def __post_init__(self) -> None:
-        at_least(self.lowest, 0.0, "allowed_heights.lowest", "m")
-        if not self.lowest <= self.highest < math.inf:
-            raise ValueError(f"allowed_heights are {self.lowest:g} to {self.highest:g} m; expected lowest <= highest")
-        if any(math.isnan(value) for value in self.area):
-            raise ValueError(f"allowed_heights.area is {self.area}; expected metres")
-
-
-@dataclass(frozen=True, slots=True)
-class CandidateOptions:
-    """Where reflectors may be put up, and which kind."""
-
-    spacing: float = 1.0
-    """Distance between neighboring candidates on one face of a wall or pillar [m]."""
-    radius: float = 0.04
-    """Radius of the reflectors to be put up [m]."""
-    height: float = 0.2
-    """Height of the scanner's beams above the floor [m]: that of the middle of a reflector, where it is allowed."""
-    gap: float = 0.02
-    """Distance left between a reflector's surface and the wall [m]."""
-    clearance: float = 0.3
-    """Distance left between a reflector and the vehicle on its routes [m]."""
-    keep_out: tuple[Rectangle, ...] = ()
-    """Areas without reflectors: x and y of two opposite corners each [m]."""
-    length: float = 0.2
-    """Length of the reflectors [m]: a beam must still meet one whose middle is higher or lower than the beams."""
-    allowed_heights: tuple[AllowedHeights, ...] = ()
-    """Heights that are allowed for the middle of a reflector; of several for one place all count."""
-
-    def __post_init__(self) -> None:
-        above(self.spacing, 0.0, "candidates.spacing", "m")
-        above(self.radius, 0.0, "candidates.radius", "m")
-        at_least(self.height, 0.0, "candidates.height", "m")
-        at_least(self.gap, 0.0, "candidates.gap", "m")
-        at_least(self.clearance, 0.0, "candidates.clearance", "m")
-        above(self.length, 0.0, "candidates.length", "m")
-        if not all(math.isfinite(value) for rectangle in self.keep_out for value in rectangle):
-            raise ValueError(f"candidates.keep_out is {self.keep_out}; expected finite metres")
+from commission.site.layout_brief import CandidateOptions, Rectangle
 
 
 def wall_candidates(grid: OccupancyGrid, options: CandidateOptions) -> FloatArray:
@@ -111,7 +55,7 @@ def mounting_heights(centers: FloatArray, options: CandidateOptions) -> FloatArr
     """
     lowest, highest = np.zeros(len(centers)), np.full(len(centers), np.inf)
     for rule in options.allowed_heights:
-        here = _inside(centers, rule.area)
+        here = np.ones(len(centers), dtype=np.bool_) if rule.area is None else _inside(centers, rule.area)
         lowest[here] = np.maximum(lowest[here], rule.lowest)
         highest[here] = np.minimum(highest[here], rule.highest)
     heights = np.clip(options.height, lowest, highest)

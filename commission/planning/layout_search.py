@@ -15,14 +15,14 @@ from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.planning.ambiguity import AmbiguityOptions
-from commission.planning.candidates import CandidateOptions
 from commission.planning.cover import CoverProblem, cover, lower_bound, merged, smaller_covers
-from commission.planning.demands import Demands, Unmet
 from commission.planning.route_prediction import PlannedRoute, PredictionOptions, restricted, station_scans
 from commission.planning.telling_apart import ChosenPlace, Distinction, chosen_places, nearest_on_routes
 from commission.planning.true_error import two_sigma_of
+from commission.planning.unmet import Unmet
 from commission.planning.visibility import VisibilityModel
 from commission.site.checks import at_least
+from commission.site.layout_brief import CandidateOptions, Demands
 from commission.site.project import Project
 
 ROUNDS = 20

@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commission.geometry.arrays import FloatArray
-from commission.planning.candidates import CandidateOptions, clear_of, mounting_heights, wall_candidates
-from commission.planning.demands import Demands, Unmet
+from commission.planning.candidates import clear_of, mounting_heights, wall_candidates
 from commission.planning.layout_search import LayoutSearch, PlacementOptions, Progress
 from commission.planning.route_prediction import plan_route
+from commission.planning.unmet import Unmet
 from commission.planning.visibility import visibility_model
+from commission.site.layout_brief import CandidateOptions, Demands
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 

@@ -16,9 +16,9 @@ from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.geometry.se2 import compose, inverse, transform_points
 from commission.planning.ambiguity import AmbiguityOptions, ambiguous_poses, headings_tried
-from commission.planning.demands import Demands
 from commission.planning.route_prediction import PlannedRoute
 from commission.planning.visibility import VisibilityModel
+from commission.site.layout_brief import Demands
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from commission.errors import ProjectError, UsageError
 from commission.site.disturbances import Disturbances
 from commission.site.floor_map import FloorMap
+from commission.site.layout_brief import LayoutBrief
 from commission.site.parameters import Parameters
 from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route
@@ -37,6 +38,8 @@ class Project:
     """What a virtual drive suffers."""
     stations: tuple[Station, ...] = ()
     """Places where the vehicle has to stand accurately; names are unique."""
+    layout: LayoutBrief = field(default_factory=LayoutBrief)
+    """What is asked of a suggested layout of reflectors."""
 
     def __post_init__(self) -> None:
         for kind, named in (("route", self.routes), ("station", self.stations)):

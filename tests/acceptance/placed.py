@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commission.localization.estimate import Mode
-from commission.planning.candidates import CandidateOptions
 from commission.planning.placement import Demands, Placement, PlacementOptions, place
 from commission.planning.route_prediction import plan_route, restricted
 from commission.planning.true_error import two_sigma_of
@@ -17,6 +16,7 @@ from commission.planning.visibility import visibility_model
 from commission.simulation.drive import DriveOptions
 from commission.simulation.scenario import virtual_drive
 from commission.site.disturbances import Disturbances
+from commission.site.layout_brief import CandidateOptions
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.studies.metrics import reference_at

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from commission.io.project_file import load_project
-from commission.planning.demands import Demands
 from commission.planning.placement import Placement
+from commission.site.layout_brief import Demands
 from commission.site.project import Project
 from tests.acceptance.placed import blocked_drive, demands_met_by, suggested, verdict
 

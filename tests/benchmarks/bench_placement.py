@@ -17,8 +17,8 @@ import numpy as np
 
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
-from commission.planning.demands import Demands
 from commission.site.disturbances import Disturbances
+from commission.site.layout_brief import Demands
 from commission.site.project import Project
 from tests.acceptance.placed import blocked_drive, demands_met_by, suggested, verdict
 from tests.planning.small_cases import judged, small_case

@@ -114,20 +114,21 @@ def test_a_route_is_predicted_over_its_metres(page: OpenPage, site: OpenSite) ->
 def test_a_layout_is_suggested_accepted_and_taken_back(page: OpenPage, site: OpenSite) -> None:
     page.choose("Show", "Position dilution (DOP)")
     site.until(lambda: site.heat is not None and site.heat.scale.figure is Figure.POSITION_DOP)
-    before, project = site.heat, site.runtime.state.project
+    before, whole = site.heat, site.runtime.state.project
     page.fold("Along a route")
     page.fold("Suggested layout")
     page.tick("Keep present")
     page.fold("Routes that count")
     for route in site.project.routes[1:]:
         page.tick(route.name)
-    site.until(lambda: len(site.runtime.state.layout.ignored) == len(site.project.routes) - 1)
+    site.until(lambda: len(site.runtime.state.project.layout.ignored_routes) == len(site.project.routes) - 1)
+    project = site.runtime.state.project
     page.press("Suggest reflectors")
     page.wait_for_text("Fewest possible")
     found = site.runtime.plan.layout
     assert found is not None
     placement = found.suggestion.placement
-    assert 0 < placement.at_least <= placement.added < len(project.reflectors)
+    assert 0 < placement.at_least <= placement.added < len(whole.reflectors)
     assert site.runtime.state.project is project
     page.page.get_by_text(f"{placement.added} new").first.wait_for(state="visible")
     page.press("Accept")

@@ -35,6 +35,30 @@ def test_a_layout_is_suggested_as_a_project_that_loads(commission, walled, tmp_p
     assert not ((placed.reflectors.centers <= (3.0, 0.0)).all(axis=1)).any()
 
 
+def test_what_the_project_asks_for_holds_unless_the_command_says_otherwise(commission, walled, tmp_path):
+    with (walled / "project.yaml").open("a", encoding="utf-8") as file:
+        file.write(
+            "layout:\n  demands: {visible: 3}\n  candidates:\n    radius: 0.03\n    keep_out: [[-1, -3, 3, 0]]\n"
+        )
+    assert commission("place", walled, "--out", tmp_path / "placed", "--no-extend")[0] == 0
+    placed = load_project(tmp_path / "placed")
+    assert len(placed.reflectors) >= 4
+    assert {each.radius for each in placed.reflectors.reflectors} == {0.03}
+    assert not ((placed.reflectors.centers <= (3.0, 0.0)).all(axis=1)).any()
+    assert placed.layout == load_project(walled).layout
+    words = ("--no-extend", "--visible", 1, "--no-survive-failure", "--radius", 0.05, "--position-limit", 1.0)
+    assert commission("place", walled, "--out", tmp_path / "fewer", *words)[0] == 0
+    fewer = load_project(tmp_path / "fewer").reflectors
+    assert len(fewer) < len(placed.reflectors)
+    assert {each.radius for each in fewer.reflectors} == {0.05}
+
+
+def test_a_project_without_a_route_that_counts_is_refused(refused, walled, tmp_path):
+    with (walled / "project.yaml").open("a", encoding="utf-8") as file:
+        file.write("layout: {ignored_routes: [Straight]}\n")
+    assert "no route that counts" in refused("place", walled, "--out", tmp_path / "placed")
+
+
 def test_reflectors_that_are_enough_stay_alone(commission, project, tmp_path):
     code, told, _ = commission("place", project, "--out", tmp_path / "placed")
     assert code == 0

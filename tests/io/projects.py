@@ -10,6 +10,7 @@ from hypothesis.extra import numpy as hnp
 
 from commission.site.disturbances import CoveredPeriod, Disturbances, ShinyObject, TiltedStretch
 from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
+from commission.site.layout_brief import AllowedHeights, CandidateOptions, Demands, LayoutBrief
 from commission.site.parameters import (
     AssociationParameters,
     DetectorParameters,
@@ -110,6 +111,29 @@ def disturbances() -> st.SearchStrategy[Disturbances]:
     )
 
 
+def layouts() -> st.SearchStrategy[LayoutBrief]:
+    area = st.tuples(METRES, METRES, METRES, METRES)
+    heights = st.builds(AllowedHeights, lowest=st.floats(0.0, 1.0), highest=st.floats(1.0, 3.0), area=st.none() | area)
+    spots = st.lists(POINT | st.tuples(METRES, METRES, st.floats(-math.pi, math.pi)), max_size=2).map(tuple)
+    return st.builds(
+        LayoutBrief,
+        demands=st.builds(
+            Demands,
+            visible=st.integers(1, 9),
+            survive_failure=st.booleans(),
+            position_limit=st.none() | POSITIVE,
+            unambiguous_spots=spots,
+        ),
+        candidates=st.builds(
+            CandidateOptions,
+            radius=POSITIVE,
+            keep_out=st.lists(area, max_size=2).map(tuple),
+            allowed_heights=st.lists(heights, max_size=2).map(tuple),
+        ),
+        ignored_routes=st.lists(NAME, max_size=2).map(tuple),
+    )
+
+
 def floor_maps() -> st.SearchStrategy[FloorMap]:
     cells = hnp.arrays(np.int8, (4, 5), elements=st.sampled_from([FREE, OCCUPIED, UNKNOWN]))
     origin = st.tuples(METRES, METRES, st.floats(-3.0, 3.0)).map(np.array)
@@ -132,4 +156,5 @@ def projects() -> st.SearchStrategy[Project]:
         parameters=parameters(),
         disturbances=disturbances(),
         stations=st.lists(stations(), max_size=2, unique_by=lambda s: s.name).map(tuple),
+        layout=layouts(),
     )

@@ -126,7 +126,7 @@ def test_what_lif_cannot_carry_is_said(tmp_path: Path) -> None:
     for said in (
         "1 reflectors are not carried: LIF knows no localization",
         "the floor map is not carried",
-        "vehicle, scanner, parameters and disturbances are not carried",
+        "vehicle, scanner, parameters, disturbances and demands on the layout are not carried",
         "route 'Loop': knots are scaled to 0 to 1",
         "edge Loop/2: its trajectory starts 5 mm from its node",
         "each edge carries its speed",

@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commission.planning.ambiguity import ambiguous_poses
-from commission.planning.demands import Demands
 from commission.planning.placement import Placement, PlacementOptions, choose
 from commission.planning.route_prediction import PlannedRoute, plan_route, restricted, station_scans
 from commission.planning.true_error import two_sigma_of
 from commission.planning.visibility import visibility_model
+from commission.site.layout_brief import Demands
 from commission.site.parameters import OdometryParameters, Parameters
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap

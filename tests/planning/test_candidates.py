@@ -6,13 +6,8 @@ import numpy as np
 import pytest
 
 from commission.geometry.occupancy import OccupancyGrid
-from commission.planning.candidates import (
-    AllowedHeights,
-    CandidateOptions,
-    clear_of,
-    mounting_heights,
-    wall_candidates,
-)
+from commission.planning.candidates import clear_of, mounting_heights, wall_candidates
+from commission.site.layout_brief import AllowedHeights, CandidateOptions
 
 
 def pillar() -> OccupancyGrid:

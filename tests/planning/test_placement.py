@@ -7,11 +7,11 @@ import pytest
 
 from commission.errors import UsageError
 from commission.planning.ambiguity import ambiguous_poses
-from commission.planning.candidates import CandidateOptions
 from commission.planning.placement import Demands, PlacementOptions, place
 from commission.planning.route_prediction import plan_route, restricted
 from commission.planning.true_error import two_sigma_of
 from commission.planning.visibility import visibility_model
+from commission.site.layout_brief import CandidateOptions
 from commission.site.parameters import OdometryParameters, Parameters
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap

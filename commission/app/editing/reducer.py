@@ -127,7 +127,7 @@ def _(action: actions.ClickFloor, state: AppState) -> Reduction:
         case Tool.STATION:
             return reduce(PlaceStation(action.client, action.place, action.reach), resting)
         case Tool.KEEP_OUT:
-            return reduce(FreeAreas(action.place), resting)
+            return reduce(FreeAreas(action.place, action.client), resting)
         case Tool.ROUTE:
             editor = replace(editor, draft=(*editor.draft, action.place))
         case Tool.MEASURE:
@@ -238,7 +238,7 @@ def _enclosed(state: AppState, editor: Editor, resting: AppState, client: int) -
     if drag is None:
         return Reduction(resting)
     if editor.tool is Tool.KEEP_OUT:
-        return reduce(KeepOut((*drag.start, *drag.now)), resting)
+        return reduce(KeepOut((*drag.start, *drag.now), client), resting)
     inside = reflectors_in(state.project.reflectors, drag.start, drag.now)
     kept = editor.selected if drag.add else ()
     chosen = (*kept, *(name for name in inside if name not in kept))

@@ -14,14 +14,22 @@ from commission.app.reduction import ApplyParameters, FlyTo, Reduction, Tell, re
 from commission.app.store import AppState, Edit, edited
 from commission.errors import UsageError
 from commission.site.editing import routes as edits
+from commission.site.layout_brief import LayoutBrief
 from commission.site.routes import Route, Segment
 from commission.studies.problems import Subject
 
 
-def _with_routes(state: AppState, routes: tuple[Route, ...], edit: Edit, point: ControlPoint | None) -> Reduction:
+def _with_routes(
+    state: AppState,
+    routes: tuple[Route, ...],
+    edit: Edit,
+    point: ControlPoint | None,
+    layout: LayoutBrief | None = None,
+) -> Reduction:
     """Return what follows from other routes: one undo step, and `point` is selected."""
     client = edit.client
-    after = edited(state, replace(state.project, routes=routes), edit)
+    project = replace(state.project, routes=routes, layout=layout or state.project.layout)
+    after = edited(state, project, edit)
     if client is not None:
         after = after.with_editor(client, editor_of(after, client).selecting(point=point))
     return Reduction(after)
@@ -112,14 +120,17 @@ def _(action: actions.RenameRoute, state: AppState) -> Reduction:
     if action.name == route.name:
         return Reduction(state)
     routes = edits.put(state.project.routes, replace(route, name=action.name), route.name)
-    return _with_routes(state, routes, Edit(f"rename {route.name}", action.client), replace(point, route=action.name))
+    edit = Edit(f"rename {route.name}", action.client)
+    layout = state.project.layout.renamed(route.name, action.name)
+    return _with_routes(state, routes, edit, replace(point, route=action.name), layout)
 
 
 @reduce.register
 def _(action: actions.DeleteRoute, state: AppState) -> Reduction:
     _, route, _, _ = _selected(state, action.client)
     routes = edits.remove(state.project.routes, route.name)
-    return _with_routes(state, routes, Edit(f"delete {route.name}", action.client), None)
+    layout = state.project.layout.renamed(route.name, None)
+    return _with_routes(state, routes, Edit(f"delete {route.name}", action.client), None, layout)
 
 
 def _where(editor: Editor, segment: Segment, point: ControlPoint) -> Point:

@@ -23,6 +23,7 @@ PARTS = {
     "scanner": "scanner",
     "parameters": "parameters of the localizer",
     "disturbances": "disturbances of virtual drives",
+    "layout": "demands on a suggested layout",
 }
 """Parts of a project that are replaced as a whole, in the words of the page."""
 

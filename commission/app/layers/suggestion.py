@@ -21,7 +21,7 @@ from commission.app.layers.base import BaseLayer
 from commission.app.plan.view import LayoutView, PlanView
 from commission.app.store import AppState
 from commission.geometry.arrays import FloatArray
-from commission.planning.candidates import Rectangle
+from commission.site.layout_brief import Rectangle
 from commission.site.project import Project
 
 RING_POINTS = 20
@@ -33,7 +33,7 @@ HATCH_MARKS = 8.0
 
 def hatch(area: Rectangle, gap: float) -> FloatArray:
     """Return the (N, 2, 2) slanting strokes that fill a rectangle [m], a gap apart along x."""
-    x_low, y_low, x_high, y_high = area
+    (x_low, x_high), (y_low, y_high) = sorted(area[::2]), sorted(area[1::2])
     # A stroke is where x - y is constant; both ends are cut off at the rectangle.
     slants = np.arange(x_low - y_high, x_high - y_low, gap)[1:]
     starts = np.maximum(x_low, slants + y_low)
@@ -82,8 +82,9 @@ class SuggestionLayer(BaseLayer):
 
     def draw_plan(self, plan: PlanView, state: AppState) -> None:
         """Draw what has changed."""
-        if state.layout.keep_out != self._areas:
-            self._areas = state.layout.keep_out
+        areas = state.project.layout.candidates.keep_out
+        if areas != self._areas:
+            self._areas = areas
             self._keep_outs.points = self._outlined(self._areas)
         if plan.layout is self._shown:
             return
@@ -114,7 +115,7 @@ class SuggestionLayer(BaseLayer):
 
     def is_used(self, plan: PlanView, state: AppState) -> bool:
         """Whether there is a suggestion, or an area without reflectors."""
-        return plan.layout is not None or bool(state.layout.keep_out)
+        return plan.layout is not None or bool(state.project.layout.candidates.keep_out)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return ghosts, marks and areas."""

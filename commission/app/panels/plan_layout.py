@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from typing import Any
 
 from viser import GuiApi, GuiFolderHandle
@@ -30,9 +31,8 @@ DRAW, CLEAR = "Draw area", "Clear areas"
 
 def option_of(state: AppState, name: str) -> Any:
     """Return an option of the suggested layout by its name; a limit that is not set is the supervisor's."""
-    value: Any = state.layout.options
-    for part in name.split("."):
-        value = getattr(value, part)
+    group, _, inner = name.rpartition(".")
+    value: Any = getattr(getattr(state.project.layout, group), inner) if group else getattr(state.layout, name)
     limits = state.project.parameters.supervisor
     if value is None and name == POSITION:
         return limits.position_limit
@@ -50,7 +50,7 @@ class LayoutPanel(BasePanel):
 
     def __init__(self, gui: GuiApi, post: Post, folder: GuiFolderHandle) -> None:
         self._gui, self._post = gui, post
-        self._inputs = Inputs(gui, post, SetLayout, option_of)
+        self._inputs = Inputs(gui, post, lambda name, value: SetLayout(name, value, at=time.monotonic()), option_of)
         self._suggestion: Suggestion | None = None
         self._shown: LayoutView | None = None
         self._routes: dict[str, Any] = {}
@@ -107,7 +107,11 @@ class LayoutPanel(BasePanel):
         areas.on_click(
             posting(
                 self._post,
-                lambda event: ChooseTool(event.client_id, Tool.KEEP_OUT) if event.target.value == DRAW else FreeAreas(),
+                lambda event: (
+                    ChooseTool(event.client_id, Tool.KEEP_OUT)
+                    if event.target.value == DRAW
+                    else FreeAreas(None, event.client_id)
+                ),
             )
         )
 
@@ -129,7 +133,7 @@ class LayoutPanel(BasePanel):
         state, found = view.state, view.plan.layout
         self._inputs.follow(state)
         self._follow_routes(state)
-        count = len(state.layout.keep_out)
+        count = len(state.project.layout.candidates.keep_out)
         self._areas.write((count,), lambda: f"<div class='c-note' style='padding:2px 6px'>{_areas_text(count)}</div>")
         self._ask.disabled = self._work.follow(view)
         if found is self._shown:
@@ -150,13 +154,13 @@ class LayoutPanel(BasePanel):
             with self._counted:
                 self._routes = {name: self._route_switch(name) for name in names}
         for name, widget in self._routes.items():
-            counts = name not in state.layout.ignored
+            counts = name not in state.project.layout.ignored_routes
             if widget.value is not counts:
                 widget.value = counts
 
     def _route_switch(self, name: str) -> Any:
         widget = self._gui.add_checkbox(name, True, hint="Whether the demands must hold on this route.")
-        widget.on_update(posting(self._post, lambda event: CountRoute(name, bool(event.target.value))))
+        widget.on_update(posting(self._post, lambda event: CountRoute(name, bool(event.target.value), event.client_id)))
         return widget
 
 

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from commission.app.plan.layout import Suggestion
 from commission.app.plan.settings import Place, PlanValue
-from commission.planning.candidates import Rectangle
+from commission.site.layout_brief import Rectangle
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +50,13 @@ class SetLayout:
     """Change one option of the suggested layout."""
 
     name: str
-    """Field of `PlacementOptions`, or `group.name` of its demands or candidates."""
+    """`extend`, or `group.name` of the demands or candidates of `LayoutBrief`."""
     value: PlanValue
     """New value, SI and radians."""
+    client: int | None = None
+    """Number of the browser's connection; none: nobody in particular."""
+    at: float = 0.0
+    """When it was asked for [s, any monotonic clock]: changes that follow quickly are one undo step."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +67,8 @@ class CountRoute:
     """Name of the route."""
     counts: bool
     """Whether it counts."""
+    client: int | None = None
+    """Number of the browser's connection; none: nobody in particular."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +77,8 @@ class KeepOut:
 
     area: Rectangle
     """Two opposite corners [m], map frame."""
+    client: int | None = None
+    """Number of the browser's connection; none: nobody in particular."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +87,8 @@ class FreeAreas:
 
     place: Place | None = None
     """In the areas around this place [m]; none: everywhere."""
+    client: int | None = None
+    """Number of the browser's connection; none: nobody in particular."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,9 @@ import numpy as np
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
 from commission.planning import true_error
-from commission.planning.candidates import Rectangle
 from commission.planning.nominal_drive import nominal_drive
 from commission.planning.placement import Placement, PlacementOptions, Unmet, place
+from commission.site.layout_brief import LayoutBrief
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 
@@ -23,51 +23,38 @@ SMALLEST_AREA = 0.05
 
 @dataclass(frozen=True, slots=True)
 class LayoutWish:
-    """What a suggested layout must achieve, and whether one is wanted."""
+    """Whether a suggested layout is wanted, and from what it starts; what it must achieve is part of the project."""
 
-    options: PlacementOptions = field(default_factory=PlacementOptions)
-    """Demands, candidates and search, as `planning.placement` has them; `extend` says whether reflectors stay."""
-    ignored: frozenset[str] = frozenset()
-    """Names of the routes that do not count."""
+    extend: bool = True
+    """Whether the present reflectors stay; if not, only the locked ones do."""
     wanted: bool = False
     """Whether a layout is looked for, or shown."""
     asked: int = 0
     """Number of times a layout was asked for: asking again is told apart from having asked."""
 
-    def routes_of(self, project: Project) -> tuple[str, ...]:
-        """Return the names of the routes that count."""
-        return tuple(route.name for route in project.routes if route.name not in self.ignored)
 
-    @property
-    def keep_out(self) -> tuple[Rectangle, ...]:
-        """Areas without new reflectors [m]."""
-        return self.options.candidates.keep_out
+def with_option(brief: LayoutBrief, name: str, value: object) -> LayoutBrief:
+    """Return what is asked of a layout with one option changed.
 
-    def with_keep_out(self, areas: tuple[Rectangle, ...]) -> LayoutWish:
-        """Return the wish with other areas without new reflectors."""
-        return replace(self, options=replace(self.options, candidates=replace(self.options.candidates, keep_out=areas)))
+    Parameters
+    ----------
+    brief : what is asked.
+    name : `group.name` of one of its demands or candidates.
+    value : new value, SI and radians.
 
-    def with_option(self, name: str, value: object) -> LayoutWish:
-        """Return the wish with one option changed.
-
-        Parameters
-        ----------
-        name : of a field of `PlacementOptions`, or `group.name` of one of its demands or candidates.
-        value : new value, SI and radians.
-
-        Raises
-        ------
-        UsageError
-            there is no such option.
-        ValueError
-            the value is out of range.
-        """
-        group, _, inner = name.rpartition(".")
-        holder: Any = getattr(self.options, group, None) if group else self.options
-        if not hasattr(holder, inner) or not inner.isidentifier():
-            raise UsageError(f"a suggested layout has no option {name!r}")
-        changed: Any = replace(holder, **{inner: value})
-        return replace(self, options=replace(self.options, **{group: changed}) if group else changed)
+    Raises
+    ------
+    UsageError
+        there is no such option.
+    ValueError
+        the value is out of range.
+    """
+    group, _, inner = name.rpartition(".")
+    holder: Any = getattr(brief, group, None)
+    if holder is None or not hasattr(holder, inner):
+        raise UsageError(f"a suggested layout has no option {name!r}")
+    changed: Any = replace(holder, **{inner: value})
+    return replace(brief, **{group: changed})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +99,7 @@ class Suggestion:
     @property
     def removed(self) -> FloatArray:
         """(M, 2) places of the reflectors that would go [m]: all that are not locked, where the layout starts empty."""
-        if self.wish.options.extend:
+        if self.wish.extend:
             return np.empty((0, 2))
         return np.array([(r.x, r.y) for r in self.site.reflectors.reflectors if not r.locked]).reshape(-1, 2)
 
@@ -132,25 +119,26 @@ def suggest(project: Project, wish: LayoutWish, progress: Callable[[float, str],
     UsageError
         no route counts, or there is no wall to put a reflector on.
     """
-    routes = wish.routes_of(project)
+    brief = project.layout
+    routes = brief.counted(project.routes)
     if not routes:
         raise UsageError("no route counts for the suggested layout; expected one or more")
     if project.floor_map is None:
         raise UsageError("the project has no floor map, so no wall to put reflectors on; expected one")
     site = project
-    if not wish.options.extend:
+    if not wish.extend:
         site = replace(project, reflectors=ReflectorMap(tuple(r for r in project.reflectors.reflectors if r.locked)))
     progress(0.0, "compiling")
     true_error.warm_up()
-    found = place(site, routes, replace(wish.options, extend=True), progress)
-    return Suggestion(wish, project, found, tuple(_stretches(project, wish, found.unmet)))
+    found = place(site, routes, PlacementOptions(brief.demands, brief.candidates), progress)
+    return Suggestion(wish, project, found, tuple(_stretches(project, found.unmet)))
 
 
-def _stretches(project: Project, wish: LayoutWish, unmet: tuple[Unmet, ...]) -> list[UnmetStretch]:
+def _stretches(project: Project, unmet: tuple[Unmet, ...]) -> list[UnmetStretch]:
     """Metres where demands do not hold, those in a row together, in the order of their routes."""
     found: list[UnmetStretch] = []
     for each in unmet:
-        drive = nominal_drive(project.route(each.route), project.vehicle, project.scanner, wish.options.prediction.plan)
+        drive = nominal_drive(project.route(each.route), project.vehicle, project.scanner)
         metres = np.array(each.metres)
         for part in np.split(metres, np.flatnonzero(np.diff(metres) > 1) + 1):
             first, last = int(part[0]), int(part[-1]) + 1

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 from commission.app.editing.reducer import with_reflectors
 from commission.app.plan import actions
-from commission.app.plan.layout import SMALLEST_AREA, LayoutWish
+from commission.app.plan.layout import SMALLEST_AREA, LayoutWish, with_option
 from commission.app.reduction import Reduction, Tell, reduce
-from commission.app.store import AppState, Edit
+from commission.app.store import AppState, Edit, edited
 from commission.errors import UsageError
-from commission.planning.candidates import Rectangle
+from commission.site.layout_brief import LayoutBrief, Rectangle
 
 ACCEPT = "accept suggested layout"
 """Name of the undo step."""
@@ -20,16 +20,34 @@ def _wishing(state: AppState, wish: LayoutWish) -> Reduction:
     return Reduction(replace(state, layout=wish))
 
 
+def _asking(state: AppState, brief: LayoutBrief, edit: Edit) -> Reduction:
+    """Ask something else of the layout: one undo step."""
+    if brief == state.project.layout:
+        return Reduction(state)
+    return Reduction(edited(state, replace(state.project, layout=brief), edit))
+
+
 @reduce.register
 def _(action: actions.SetLayout, state: AppState) -> Reduction:
-    return _wishing(state, state.layout.with_option(action.name, action.value))
+    if action.name == "extend":
+        return _wishing(state, replace(state.layout, extend=bool(action.value)))
+    words = action.name.rpartition(".")[2].replace("_", " ")
+    edit = Edit(f"set {words} of the layout", action.client, f"layout.{action.name}", action.at)
+    return _asking(state, with_option(state.project.layout, action.name, action.value), edit)
 
 
 @reduce.register
 def _(action: actions.CountRoute, state: AppState) -> Reduction:
     state.project.route(action.name)
-    ignored = state.layout.ignored - {action.name} if action.counts else state.layout.ignored | {action.name}
-    return _wishing(state, replace(state.layout, ignored=ignored))
+    brief = state.project.layout
+    others = tuple(name for name in brief.ignored_routes if name != action.name)
+    ignored = others if action.counts else (*others, action.name)
+    edit = Edit(f"{'count' if action.counts else 'ignore'} {action.name}", action.client)
+    return _asking(state, replace(brief, ignored_routes=ignored), edit)
+
+
+def _keeping_out(state: AppState, areas: tuple[Rectangle, ...], edit: Edit) -> Reduction:
+    return _asking(state, with_option(state.project.layout, "candidates.keep_out", areas), edit)
 
 
 @reduce.register
@@ -38,19 +56,21 @@ def _(action: actions.KeepOut, state: AppState) -> Reduction:
     if min(abs(x_b - x_a), abs(y_b - y_a)) < SMALLEST_AREA:
         return Reduction(state)
     area = (min(x_a, x_b), min(y_a, y_b), max(x_a, x_b), max(y_a, y_b))
-    return _wishing(state, state.layout.with_keep_out((*state.layout.keep_out, area)))
+    areas = (*state.project.layout.candidates.keep_out, area)
+    return _keeping_out(state, areas, Edit("keep an area free of reflectors", action.client))
 
 
 @reduce.register
 def _(action: actions.FreeAreas, state: AppState) -> Reduction:
     place = action.place
-    left = () if place is None else tuple(area for area in state.layout.keep_out if not _contains(area, place))
-    return _wishing(state, state.layout.with_keep_out(left))
+    areas = state.project.layout.candidates.keep_out
+    left = () if place is None else tuple(area for area in areas if not _contains(area, place))
+    return _keeping_out(state, left, Edit("allow reflectors again", action.client))
 
 
 def _contains(area: Rectangle, place: tuple[float, float]) -> bool:
-    x_low, y_low, x_high, y_high = area
-    return x_low <= place[0] <= x_high and y_low <= place[1] <= y_high
+    x_a, y_a, x_b, y_b = area
+    return min(x_a, x_b) <= place[0] <= max(x_a, x_b) and min(y_a, y_b) <= place[1] <= max(y_a, y_b)
 
 
 @reduce.register

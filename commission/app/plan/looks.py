@@ -118,5 +118,5 @@ def layout_view(suggestion: Suggestion, project: Project, wish: LayoutWish) -> L
     return LayoutView(
         suggestion,
         outdated=not suggestion.is_of(project),
-        wished_otherwise=suggestion.wish != wish,
+        wished_otherwise=suggestion.wish != wish or suggestion.site.layout != project.layout,
     )

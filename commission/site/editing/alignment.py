@@ -16,6 +16,7 @@ from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray
 from commission.site.disturbances import Disturbances
 from commission.site.floor_map import FloorMap
+from commission.site.layout_brief import LayoutBrief, Rectangle, Spot
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route
@@ -99,8 +100,8 @@ def aligned(project: Project, alignment: Alignment, *, everything: bool) -> Proj
     project : the site.
     alignment : how.
     everything : whether what was placed on the map goes with it: reflectors (locked ones, too: they stay where they are
-        on the map), routes, stations, and where virtual drives are disturbed. Otherwise they are in the plant's
-        coordinates already.
+        on the map), routes, stations, where virtual drives are disturbed, and where new reflectors may stand. Otherwise
+        they are in the plant's coordinates already.
 
     Raises
     ------
@@ -124,6 +125,7 @@ def aligned(project: Project, alignment: Alignment, *, everything: bool) -> Proj
         routes=tuple(_route(route, T) for route in project.routes),
         stations=tuple(_station(station, T) for station in project.stations),
         disturbances=_disturbances(project.disturbances, T),
+        layout=_layout(project.layout, T),
     )
 
 
@@ -151,4 +153,28 @@ def _disturbances(disturbances: Disturbances, T: FloatArray) -> Disturbances:
         disturbances,
         shiny_objects=tuple(replace(each, **place(each.x, each.y)) for each in disturbances.shiny_objects),
         tilted_stretches=tuple(replace(each, **place(each.x, each.y)) for each in disturbances.tilted_stretches),
+    )
+
+
+def _layout(layout: LayoutBrief, T: FloatArray) -> LayoutBrief:
+    """Areas and spots; a rectangle that is turned becomes the smallest upright one around it."""
+
+    def area(rectangle: Rectangle) -> Rectangle:
+        x_a, y_a, x_b, y_b = rectangle
+        corners = se2.transform_points(T, np.array([(x_a, y_a), (x_b, y_a), (x_b, y_b), (x_a, y_b)]))
+        (x_low, y_low), (x_high, y_high) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        return x_low, y_low, x_high, y_high
+
+    def spot(place: Spot) -> Spot:
+        moved = se2.compose(T, np.array([*place, 0.0][:3]))
+        return tuple(moved.tolist()[: len(place)])
+
+    candidates, demands = layout.candidates, layout.demands
+    heights = (
+        each if each.area is None else replace(each, area=area(each.area)) for each in candidates.allowed_heights
+    )
+    return replace(
+        layout,
+        candidates=replace(candidates, keep_out=tuple(map(area, candidates.keep_out)), allowed_heights=tuple(heights)),
+        demands=replace(demands, unambiguous_spots=tuple(map(spot, demands.unambiguous_spots))),
     )

@@ -9,8 +9,15 @@ import pytest
 from commission.app import reducer
 from commission.app.actions import Action, Undo
 from commission.app.drawing import crosses
-from commission.app.editing.actions import ChooseTool, ClickFloor, DragFloor
-from commission.app.editing.editor import Tool
+from commission.app.editing.actions import (
+    ChooseTool,
+    ClickFloor,
+    DeleteRoute,
+    DragFloor,
+    RenameRoute,
+    SelectControlPoint,
+)
+from commission.app.editing.editor import ControlPoint, Tool
 from commission.app.layers.suggestion import hatch
 from commission.app.panels.plan_layout import found_text
 from commission.app.plan.actions import (
@@ -22,17 +29,17 @@ from commission.app.plan.actions import (
     KeepOut,
     SetLayout,
 )
-from commission.app.plan.layout import LayoutWish, Suggestion, suggest
+from commission.app.plan.layout import LayoutWish, Suggestion, suggest, with_option
 from commission.app.plan.layout_reducer import ACCEPT
 from commission.app.plan.view import LayoutView
 from commission.app.reduction import ApplyParameters
 from commission.app.store import AppState
 from commission.errors import UsageError
-from commission.planning.placement import PlacementOptions
+from commission.site.layout_brief import Rectangle
 from commission.site.project import Project
 from tests.app.plan.test_planner import Bench
 
-EMPTY = LayoutWish(PlacementOptions(extend=False))
+EMPTY = LayoutWish(extend=False)
 
 
 def quietly(_fraction: float, _message: str) -> None:
@@ -43,6 +50,14 @@ def after(state: AppState, *wishes: Action) -> AppState:
     for wish in wishes:
         state = reducer.reduce(wish, state).state
     return state
+
+
+def asking(project: Project, name: str, value: object) -> Project:
+    return replace(project, layout=with_option(project.layout, name, value))
+
+
+def kept_out(state: AppState) -> tuple[Rectangle, ...]:
+    return state.project.layout.candidates.keep_out
 
 
 @pytest.fixture(scope="module")
@@ -65,10 +80,30 @@ def test_demands_are_set_by_the_names_they_have_in_planning(project: Project) ->
         SetLayout("candidates.spacing", 2.0),
         SetLayout("extend", value=False),
     )
-    options = state.layout.options
-    assert (options.demands.visible, options.demands.position_limit) == (3, 0.05)
-    assert (options.candidates.spacing, options.extend) == (2.0, False)
-    assert not state.undo
+    brief = state.project.layout
+    assert (brief.demands.visible, brief.demands.position_limit) == (3, 0.05)
+    assert (brief.candidates.spacing, state.layout.extend) == (2.0, False)
+    assert [step.name for step in state.undo] == [
+        "set visible of the layout",
+        "set position limit of the layout",
+        "set spacing of the layout",
+    ]
+    assert after(state, Undo(1), Undo(1), Undo(1)).project is project
+
+
+def test_a_slide_over_many_values_is_one_undo_step(project: Project) -> None:
+    slide = [SetLayout("candidates.spacing", 0.1 * step, at=10.0 + 0.1 * step) for step in range(1, 9)]
+    assert len(after(AppState(project, project), *slide).undo) == 1
+
+
+def test_a_route_that_does_not_count_keeps_to_it_under_another_name(project: Project) -> None:
+    route = project.routes[0].name
+    state = after(AppState(project, project), CountRoute(route, counts=False, client=1))
+    assert state.project.layout.ignored_routes == (route,)
+    state = after(state, SelectControlPoint(1, ControlPoint(route)), RenameRoute(1, "Round"))
+    assert state.project.layout.ignored_routes == ("Round",)
+    assert after(state, DeleteRoute(1)).project.layout.ignored_routes == ()
+    assert after(state, CountRoute("Round", counts=True)).project.layout == project.layout
 
 
 @pytest.mark.parametrize(
@@ -89,23 +124,24 @@ def test_demands_that_do_not_exist_or_are_out_of_range_are_refused(project: Proj
 def test_an_area_is_drawn_by_a_drag_and_freed_by_a_click_in_it(project: Project) -> None:
     drag = [DragFloor(1, phase, (4.0, 5.0), (2.0, 7.0), 0.1) for phase in ("start", "update", "end")]
     state = after(AppState(project, project), ChooseTool(1, Tool.KEEP_OUT), *drag)
-    assert state.layout.keep_out == ((2.0, 5.0, 4.0, 7.0),)
+    assert kept_out(state) == ((2.0, 5.0, 4.0, 7.0),)
+    assert [step.name for step in state.undo] == ["keep an area free of reflectors"]
     assert state.editors[1].selected == ()
-    assert after(state, ClickFloor(1, (8.0, 6.0), 0.1)).layout.keep_out == state.layout.keep_out
-    assert after(state, ClickFloor(1, (3.0, 6.0), 0.1)).layout.keep_out == ()
+    assert kept_out(after(state, ClickFloor(1, (8.0, 6.0), 0.1))) == kept_out(state)
+    assert kept_out(after(state, ClickFloor(1, (3.0, 6.0), 0.1))) == ()
 
 
 def test_a_click_is_no_area_and_all_areas_are_freed_together(project: Project) -> None:
     state = after(AppState(project, project), KeepOut((1.0, 1.0, 1.01, 3.0)), KeepOut((1.0, 1.0, 2.0, 3.0)))
-    assert len(state.layout.keep_out) == 1
-    assert after(state, FreeAreas()).layout.keep_out == ()
+    assert len(kept_out(state)) == 1
+    assert kept_out(after(state, FreeAreas())) == ()
 
 
 def test_a_suggestion_keeps_out_of_the_areas_and_clear_of_what_stays(project: Project, suggestion: Suggestion) -> None:
     assert len(suggestion.added) == suggestion.placement.added > 0
     x, y = suggestion.added[0]
     area = (x - 1.0, y - 1.0, x + 1.0, y + 1.0)
-    elsewhere = suggest(project, EMPTY.with_keep_out((area,)), quietly).added
+    elsewhere = suggest(asking(project, "candidates.keep_out", (area,)), EMPTY, quietly).added
     assert not np.any(np.all(np.abs(elsewhere - (x, y)) < 1.0, axis=1))
 
 
@@ -119,8 +155,8 @@ def test_starting_empty_takes_down_all_but_the_locked_ones(project: Project, sug
 
 
 def test_what_is_not_met_is_told_by_its_metres_and_its_place(project: Project) -> None:
-    wish = EMPTY.with_option("demands.visible", 9).with_option("candidates.spacing", 8.0)
-    found = suggest(project, wish, quietly)
+    wanting = asking(asking(project, "demands.visible", 9), "candidates.spacing", 8.0)
+    found = suggest(wanting, EMPTY, quietly)
     assert found.unmet
     for stretch in found.unmet:
         assert stretch.first < stretch.last
@@ -130,9 +166,9 @@ def test_what_is_not_met_is_told_by_its_metres_and_its_place(project: Project) -
 
 
 def test_without_a_route_or_a_wall_it_is_said_what_is_missing(project: Project) -> None:
-    ignoring = replace(EMPTY, ignored=frozenset(route.name for route in project.routes))
+    ignoring = replace(project.layout, ignored_routes=tuple(route.name for route in project.routes))
     with pytest.raises(UsageError, match="no route counts"):
-        suggest(project, ignoring, quietly)
+        suggest(replace(project, layout=ignoring), EMPTY, quietly)
     with pytest.raises(UsageError, match="no floor map"):
         suggest(replace(project, floor_map=None), EMPTY, quietly)
 

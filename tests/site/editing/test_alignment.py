@@ -14,6 +14,7 @@ from commission.errors import UsageError
 from commission.geometry import se2
 from commission.site.disturbances import Disturbances, ShinyObject, TiltedStretch
 from commission.site.editing.alignment import WRONG, KnownPoint, align, aligned
+from commission.site.layout_brief import AllowedHeights, CandidateOptions, Demands, LayoutBrief
 from commission.site.project import Project
 from commission.site.stations import Station
 from tests.app.sites import room
@@ -89,6 +90,20 @@ def test_everything_that_was_placed_on_the_map_goes_with_it() -> None:
     probe = np.random.default_rng(1).uniform((0.0, 0.0), (12.0, 8.0), (200, 2))
     there = se2.transform_points(TURNED.T_plant_map, probe)
     np.testing.assert_array_equal(after.floor_map.occupancy().is_occupied(there), walls.is_occupied(probe))
+
+
+def test_areas_and_spots_of_a_suggested_layout_go_with_the_map() -> None:
+    heights = (AllowedHeights(0.1, 0.3), AllowedHeights(0.1, 0.5, (0.0, 0.0, 2.0, 1.0)))
+    candidates = CandidateOptions(keep_out=((1.0, 2.0, 4.0, 3.0),), allowed_heights=heights)
+    demands = Demands(unambiguous_spots=((1.0, 2.0), (3.0, 4.0, 0.5)))
+    layout = aligned(replace(site(), layout=LayoutBrief(demands, candidates)), TURNED, everything=True).layout
+    assert layout.candidates.keep_out[0] == pytest.approx((97.0, 51.0, 98.0, 54.0))
+    everywhere, there = layout.candidates.allowed_heights
+    assert everywhere.area is None
+    assert there.area == pytest.approx((99.0, 50.0, 100.0, 52.0))
+    place, pose = layout.demands.unambiguous_spots
+    assert place == pytest.approx((98.0, 51.0))
+    assert pose == pytest.approx((96.0, 53.0, 0.5 + math.pi / 2))
 
 
 def test_there_and_back_again_is_where_it_began() -> None:
