@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Coverage:
-    """Compute what the scanner sees over the floor; writes coverage.npz, .csv, .png and summary.json."""
+    """Compute what the scanner sees over the floor; writes coverage.npz, .csv, .png, summary.json, and ellipses.csv."""
 
     project: Positional[Path]
     """Folder of the project (holds project.yaml)."""
@@ -40,14 +40,18 @@ class Coverage:
     """Beams that a reflector must get for certain to count as visible [beams]."""
     max_incidence: float = 60.0
     """Largest angle between a flat reflector's normal and the ray [deg]."""
+    ellipses: float | None = None
+    """Distance between the points whose 1-sigma ellipses are written to ellipses.csv [m]. None: no ellipses."""
 
     def run(self) -> None:
         """Compute, write, and tell in a few lines what was found."""
-        from commission.io.coverage_files import write_coverage
+        from commission.io.coverage_files import write_coverage, write_ellipses
         from commission.io.project_file import load_project
         from commission.planning.visibility import VisibilityOptions
-        from commission.studies.coverage import coverage_of, drivable, summary
+        from commission.studies.coverage import coverage_of, drivable, ellipses_of, summary
 
+        if self.ellipses is not None and not 0.0 < self.ellipses < math.inf:
+            raise UsageError(f"--ellipses is {self.ellipses}; expected metres greater than 0")
         project = load_project(self.project)
         try:
             options = self._options(project)
@@ -57,6 +61,8 @@ class Coverage:
             raise UsageError(str(error)) from None
         entries = summary(project, found)
         write_coverage(self.out, found, drivable(project, found), entries)
+        if self.ellipses is not None:
+            write_ellipses(self.out, ellipses_of(project, found, self.ellipses, visibility))
         sys.stdout.write("\n".join([*_report(entries), f"Written to   {self.out}"]) + "\n")
 
     def _options(self, project: Project) -> FixOptions:

@@ -15,11 +15,14 @@ from commission.io.atomic import atomic_file, write_text
 from commission.io.lattice_image import NO_FLOOR, lattice_image, shades
 from commission.io.table_writer import write_table
 from commission.planning.coverage import Coverage
+from commission.studies.coverage import Ellipses
 
 ARRAYS = "coverage.npz"
 TABLE = "coverage.csv"
 IMAGE = "coverage.png"
 SUMMARY = "summary.json"
+ELLIPSES = "ellipses.csv"
+ELLIPSE_COLUMNS = ("x", "y", "semi_major_m", "semi_minor_m", "angle_rad")
 
 UNITS = {
     "visible": "",
@@ -67,6 +70,18 @@ def write_coverage(folder: Path, found: Coverage, drivable: BoolArray, summary: 
     with atomic_file(folder / IMAGE) as file:
         heat_image(found, drivable).save(file, format="PNG")
     write_text(folder / SUMMARY, json.dumps(dict(summary), indent=2, allow_nan=False) + "\n")
+
+
+def write_ellipses(folder: Path, found: Ellipses) -> None:
+    """Write `ellipses.csv`: center [m], semi-axes of 1-sigma [m] and direction of the longer one [rad] of each.
+
+    Raises
+    ------
+    FileFormatError
+        the file cannot be written.
+    """
+    columns = (*found.points.T, *found.semi_axes.T, found.angles)
+    write_table(folder / ELLIPSES, ELLIPSE_COLUMNS, zip(*map(_texts, columns), strict=True))
 
 
 def heat_image(found: Coverage, drivable: BoolArray) -> Image.Image:

@@ -5,14 +5,18 @@ The figures themselves come from `planning`; files and images are elsewhere.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from commission.geometry.arrays import BoolArray, FloatArray
+from commission.geometry.gaussian import ellipse_axes
 from commission.planning.coverage import Coverage, coverage, lattice_of
 from commission.planning.dilution import FixOptions
+from commission.planning.fix_ellipses import every_nth, position_covariances
 from commission.planning.visibility import VisibilityOptions, visibility_model
 from commission.site.floor_map import FREE
 from commission.site.parameters import SupervisorParameters
@@ -40,6 +44,33 @@ def coverage_of(
     progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
     """
     return coverage(visibility_model(project, visibility), lattice_of(project, spacing), options, progress)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ellipses:
+    """1-sigma ellipses of a fix at N points of drivable floor that have one."""
+
+    points: FloatArray
+    """(N, 2) their centers [m], map frame."""
+    semi_axes: FloatArray
+    """(N, 2) half their lengths [m], the longer one first."""
+    angles: FloatArray
+    """(N,) direction of the longer axis [rad], map frame."""
+
+
+def ellipses_of(project: Project, found: Coverage, spacing: float, visibility: VisibilityOptions) -> Ellipses:
+    """Ellipses at points of the lattice of a coverage, under its conditions.
+
+    Parameters
+    ----------
+    project, found, visibility : of `coverage_of`.
+    spacing : least distance between two of them [m].
+    """
+    chosen = every_nth(found.lattice, max(1, math.ceil(spacing / found.lattice.spacing - 1e-9)))
+    points = found.lattice.points()[chosen[drivable(project, found)[chosen]]]
+    covariances = position_covariances(visibility_model(project, visibility), points, found.options)
+    known = np.isfinite(covariances).all(axis=(1, 2))
+    return Ellipses(points[known], *ellipse_axes(covariances[known]))
 
 
 def drivable(project: Project, found: Coverage) -> BoolArray:

@@ -22,6 +22,19 @@ def test_coverage_writes_its_files_and_tells_what_it_found(commission, project, 
     assert 0.5 < entries["share_with_fix"] <= 1.0
 
 
+@pytest.mark.parametrize("heading", ["all-round", "worst", "best", "30"])
+def test_ellipses_are_as_long_as_the_position_error_of_their_points(commission, project, tmp_path, heading):
+    words = ("--ellipses", "1.2", "--spacing", "0.5", "--heading", heading)
+    assert commission("coverage", project, "--out", tmp_path / "out", *words)[0] == 0
+    x, y, major, minor, angle = np.loadtxt(tmp_path / "out" / "ellipses.csv", delimiter=",", skiprows=1).T
+    with np.load(tmp_path / "out" / "coverage.npz") as found:
+        column, row = np.searchsorted(found["x"], x - 0.01), np.searchsorted(found["y"], y - 0.01)
+        assert major == pytest.approx(found["position_sigma_m"][row, column], rel=1e-5)
+    assert np.diff(np.unique(x)).min() == pytest.approx(1.5)
+    assert (minor <= major).all()
+    assert (np.abs(angle) <= np.pi / 2).all()
+
+
 def test_triangulation_is_worse_than_ranges_and_a_prior_is_better(commission, project, tmp_path):
     for name in ("range-bearing", "bearing-only", "range-bearing-prior"):
         assert commission("coverage", project, "--out", tmp_path / name, "--measurement", name)[0] == 0
@@ -48,6 +61,7 @@ def test_headings_are_words_or_degrees(commission, project, tmp_path, heading):
         (("--blocked-per-m", "2"), "blocked_per_m"),
         (("--min-beams", "0"), "min_beams"),
         (("--odometry", "-1"), "odometry"),
+        (("--ellipses", "0"), "--ellipses is 0.0; expected metres greater than 0"),
         (("--measurement", "guess"), "measurement"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
