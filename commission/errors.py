@@ -52,10 +52,6 @@ class SourceError(CommissionError):
     """A live source of records misbehaves."""
 
 
-class SourceTimeout(SourceError):
-    """A live source has been silent for too long."""
-
-
 class DecodeError(SourceError):
     """A telegram cannot be decoded; `offset` is the byte at which decoding stopped."""
 

@@ -106,14 +106,6 @@ class Picture:
         return FloorMap(cells, placement.resolution, placement.origin(len(cells)))
 
 
-def read_image_map(
-    path: Path, placement: ImagePlacement, *, threshold: float = 0.5, light_walls: bool = False
-) -> FloorMap:
-    """Read an image as a floor map: `read_picture`, then `Picture.floor_map`."""
-    between(threshold, (0.0, 1.0), "threshold")
-    return read_picture(path).floor_map(placement, threshold=threshold, light_walls=light_walls)
-
-
 def read_picture(path: Path) -> Picture:
     """Read an image.
 

@@ -11,7 +11,7 @@ from PIL import Image
 
 from commission.errors import CommissionError, FileFormatError
 from commission.geometry.se2 import transform_points
-from commission.io.image_map import ImagePlacement, read_image_map
+from commission.io.image_map import ImagePlacement, read_picture
 from commission.site.floor_map import FREE, OCCUPIED
 
 PIXEL = st.tuples(st.floats(0, 400), st.floats(0, 300))
@@ -53,12 +53,12 @@ def test_dark_pixels_are_walls_the_right_way_up(tmp_path: Path) -> None:
     Image.fromarray(gray).save(tmp_path / "plan.png")
     # 20 pixels are 2 m; the upper left corner lies at (0, 3).
     placement = ImagePlacement((0, 0), (20, 0), 2.0, first_in_map=(0.0, 3.0))
-    floor_map = read_image_map(tmp_path / "plan.png", placement)
+    floor_map = read_picture(tmp_path / "plan.png").floor_map(placement)
     assert floor_map.resolution == pytest.approx(0.1)
     np.testing.assert_allclose(floor_map.origin, [0, 0, 0], atol=1e-12)
     assert np.argwhere(floor_map.cells == OCCUPIED).tolist() == [[24, 8]]
     assert floor_map.occupancy().is_occupied([[0.85, 2.45]]).all()
-    dark = read_image_map(tmp_path / "plan.png", placement, light_walls=True)
+    dark = read_picture(tmp_path / "plan.png").floor_map(placement, light_walls=True)
     assert (dark.cells == FREE).sum() == 1
 
 
@@ -67,12 +67,15 @@ def test_transparent_pixels_are_free_and_colors_and_deep_images_are_read(tmp_pat
     rgba = np.zeros((2, 2, 4), dtype=np.uint8)
     rgba[0, 0, 3] = 255
     Image.fromarray(rgba).save(tmp_path / "clear.png")
-    assert read_image_map(tmp_path / "clear.png", placement).cells.tolist() == [[FREE, FREE], [OCCUPIED, FREE]]
+    assert read_picture(tmp_path / "clear.png").floor_map(placement).cells.tolist() == [[FREE, FREE], [OCCUPIED, FREE]]
     deep = np.array([[0, 65535], [20000, 40000]], dtype=np.uint16)
     Image.fromarray(deep).save(tmp_path / "deep.png")
-    assert read_image_map(tmp_path / "deep.png", placement).cells.tolist() == [[OCCUPIED, FREE], [OCCUPIED, FREE]]
+    assert read_picture(tmp_path / "deep.png").floor_map(placement).cells.tolist() == [
+        [OCCUPIED, FREE],
+        [OCCUPIED, FREE],
+    ]
     Image.new("RGB", (2, 2), (250, 250, 0)).save(tmp_path / "color.jpg")
-    assert (read_image_map(tmp_path / "color.jpg", placement).cells == FREE).all()
+    assert (read_picture(tmp_path / "color.jpg").floor_map(placement).cells == FREE).all()
 
 
 @pytest.mark.parametrize(
@@ -93,7 +96,7 @@ def test_image_over_the_limit_is_refused_before_it_is_unpacked(tmp_path: Path) -
     # 10,000 x 10,000 white pixels are 12 kB as a file and 100 MB unpacked.
     Image.new("1", (10_000, 10_000), 1).save(tmp_path / "bomb.png")
     with pytest.raises(FileFormatError, match="has 10000 x 10000 pixels; expected 1 to 64000000 pixels"):
-        read_image_map(tmp_path / "bomb.png", ImagePlacement((0, 0), (9, 0), 1.0))
+        read_picture(tmp_path / "bomb.png")
 
 
 @given(data=st.data(), kind=st.sampled_from(["PNG", "JPEG", "BMP", "GIF", "TIFF", "PPM"]))
@@ -107,6 +110,6 @@ def test_damaged_image_is_one_line_or_a_map(
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
     path.write_bytes(content[: data.draw(st.integers(0, len(content)))])
     try:
-        read_image_map(path, ImagePlacement((0, 0), (8, 0), 1.0))
+        read_picture(path)
     except CommissionError as error:
         assert "\n" not in str(error)

@@ -164,14 +164,6 @@ def split_segment(route: Route, segment: int, near: tuple[float, float]) -> Rout
     return replace(route, segments=(*route.segments[:segment], before, after, *route.segments[segment + 1 :]))
 
 
-def delete_segment(route: Route, segment: int) -> Route:
-    """Delete the first or the last segment; one in the middle would tear the route apart."""
-    _segment_at(route, segment)
-    if segment not in (0, len(route.segments) - 1) or len(route.segments) == 1:
-        raise UsageError("only the first or the last of several segments can be deleted; expected one of these")
-    return replace(route, segments=route.segments[1:] if segment == 0 else route.segments[:-1])
-
-
 def set_direction(route: Route, segment: int, direction: Direction) -> Route:
     """Drive a segment with the vehicle's front or its rear ahead."""
     return _with_segment(route, segment, replace(_segment_at(route, segment), direction=direction))

@@ -127,14 +127,6 @@ def to_grid(points: ArrayLike, spacing: float) -> FloatArray:
     return np.round(np.asarray(points, dtype=np.float64) / spacing) * spacing
 
 
-def snap_to_grid(reflectors: ReflectorMap, ids: Collection[str], spacing: float) -> ReflectorMap:
-    """Put the selection on multiples of `spacing` [m]; what is locked stays."""
-    chosen = frozenset(ids)
-    centers = to_grid(reflectors.centers, spacing)
-    at = {r.id: (float(x), float(y)) for r, (x, y) in zip(reflectors.reflectors, centers, strict=True)}
-    return edits.place(reflectors, {name: at.get(name, (0.0, 0.0)) for name in chosen})
-
-
 def align(
     reflectors: ReflectorMap, point: tuple[float, float], reach: float, ignored: Collection[str] = ()
 ) -> Alignment:

@@ -81,7 +81,6 @@ def test_a_split_route_drives_the_same_way_and_takes_other_speeds():
     assert [(s.direction, s.speed) for s in route.segments] == [("forward", None), ("reverse", 0.2)]
     whole = edits.new_route("r", WAY).segments[0].spline().length
     assert sum(s.spline().length for s in route.segments) == pytest.approx(whole, rel=1e-9)
-    assert len(edits.delete_segment(route, 1).segments) == 1
 
 
 @pytest.mark.parametrize("point", [0, 3, 6, 9])
@@ -117,7 +116,6 @@ def test_routes_are_put_renamed_and_removed_by_name():
         (lambda r: edits.delete_point(r, 0, 99), "control point 99 of segment 0; expected 0 to 9"),
         (lambda r: edits.move_point(r, 0, -1, (0, 0)), "control point -1"),
         (lambda r: edits.move_point(r, 3, 0, (0, 0)), "segment 3 of route 'r'; expected 0 to 0"),
-        (lambda r: edits.delete_segment(r, 0), "only the first or the last of several"),
         (lambda r: edits.delete_point(edits.new_route("r", WAY[:2]), 0, 0), "needs two points"),
         (lambda r: edits.delete_point(edits.append(r, [(9, 9)], "forward"), 0, 9), "shared by two segments"),
         (lambda r: edits.put((r,), r), "'r' is used already"),
