@@ -16,7 +16,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from commission.planning.dependence import Dependence
-    from commission.planning.route_prediction import PlannedRoute, PredictionOptions, RoutePrediction, StationAccuracy
+    from commission.planning.route_prediction import PlannedRoute, PredictionOptions, RoutePrediction
+    from commission.planning.station_accuracy import StationAccuracy
+    from commission.planning.true_error import PredictedErrors
     from commission.site.project import Project
     from commission.site.reflectors import ReflectorMap
 
@@ -26,7 +28,10 @@ MOST_NEEDED = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Predict:
-    """Predict the uncertainty of the localizer along a route; writes prediction.csv and summary.json."""
+    """Predict what the localizer will say of itself along a route, and its true error.
+
+    Writes prediction.csv and summary.json.
+    """
 
     project: Positional[Path]
     """Folder of the project (holds project.yaml)."""
@@ -52,7 +57,9 @@ class Predict:
 
         from commission.io.prediction_files import write_prediction
         from commission.io.project_file import load_project
-        from commission.planning.route_prediction import plan_route, predict_route, station_accuracies
+        from commission.planning.route_prediction import plan_route, predict_route
+        from commission.planning.station_accuracy import station_accuracies
+        from commission.planning.true_error import predict_errors
 
         project = load_project(self.project)
         if self.route is None and not project.routes:
@@ -60,10 +67,11 @@ class Predict:
         name = project.routes[0].name if self.route is None else self.route
         planned = plan_route(project, name, self._options())
         prediction = predict_route(planned)
-        stations = station_accuracies(prediction, project.stations)
-        lines = [*_report(name, prediction), *_at_stations(stations)]
+        errors = predict_errors(planned, prediction)
+        stations = station_accuracies(prediction, errors, project.stations)
+        lines = [*_report(name, prediction, errors), *_at_stations(stations)]
         lines += self._what_if(project, planned)
-        write_prediction(self.out, name, prediction, stations)
+        write_prediction(self.out, name, prediction, errors, stations)
         sys.stdout.write("\n".join([*lines, f"Written to   {self.out}"]) + "\n")
 
     def _options(self) -> PredictionOptions:
@@ -91,9 +99,10 @@ class Predict:
         return lines
 
 
-def _report(name: str, prediction: RoutePrediction) -> list[str]:
+def _report(name: str, prediction: RoutePrediction, errors: PredictedErrors) -> list[str]:
     """Lines for a person; millimetres and degrees as is the habit."""
     x, y, heading = prediction.two_sigma.max(axis=0)
+    error_x, error_y, error_heading = errors.two_sigma.max(axis=0)
     limits = prediction.limits
     stops, starts = (
         ", ".join(f"{metre:.1f} m" for metre in metres) for metres in (prediction.trips(), prediction.recoveries())
@@ -103,6 +112,8 @@ def _report(name: str, prediction: RoutePrediction) -> list[str]:
         f"{prediction.drive.stamps_ns[-1] * 1e-9:.1f} s, {len(prediction.drive)} scans",
         f"2-sigma      x {x * 1e3:.1f} mm, y {y * 1e3:.1f} mm (limit {limits.position_limit * 1e3:.0f}), "
         f"heading {math.degrees(heading):.2f} deg (limit {math.degrees(limits.heading_limit):.2f}) at most",
+        f"True error   2-sigma x {error_x * 1e3:.1f} mm, y {error_y * 1e3:.1f} mm, "
+        f"heading {math.degrees(error_heading):.2f} deg at most",
         f"Reflectors   {prediction.seen.min()} seen at least, {prediction.seen.mean():.1f} on average; "
         f"at most {prediction.on_odometry.max():.1f} m on odometry alone",
         f"Supervisor   stops at: {stops or 'none'}{f'; drives on at: {starts}' if starts else ''}; "
@@ -115,7 +126,7 @@ def _at_stations(stations: Sequence[StationAccuracy]) -> list[str]:
     if not stations:
         return []
     missed = [
-        f"{each.station} {each.two_sigma * 1e3:.1f} mm (allowed {each.required * 1e3:.0f})"
+        f"{each.station} {each.expected * 1e3:.1f} mm (allowed {each.required * 1e3:.0f})"
         for each in stations
         if not each.is_met
     ]

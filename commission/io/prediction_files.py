@@ -11,7 +11,9 @@ import numpy as np
 from commission.io.atomic import write_text
 from commission.io.table_writer import write_table
 from commission.planning.dependence import Dependence
-from commission.planning.route_prediction import RoutePrediction, StationAccuracy
+from commission.planning.route_prediction import RoutePrediction
+from commission.planning.station_accuracy import StationAccuracy
+from commission.planning.true_error import PredictedErrors
 from commission.site.reflectors import ReflectorMap
 
 PREDICTION = "prediction.csv"
@@ -21,13 +23,18 @@ SUMMARY = "summary.json"
 COLUMNS = (
     *("metre", "x", "y", "theta", "two_sigma_x", "two_sigma_y", "two_sigma_theta"),
     *("visible", "on_odometry", "over_limit", "mode"),
+    *("error_two_sigma_x", "error_two_sigma_y", "error_two_sigma_theta"),
 )
 FAILURE_COLUMNS = ("blocked", "reflector_id", "route", "failing_metres", "load", "metres")
 DEPENDENT_COLUMNS = ("reflector_id", "failure", "route", "failing_metres", "load", "metres")
 
 
 def write_prediction(
-    folder: Path, route: str, prediction: RoutePrediction, stations: Sequence[StationAccuracy] = ()
+    folder: Path,
+    route: str,
+    prediction: RoutePrediction,
+    errors: PredictedErrors,
+    stations: Sequence[StationAccuracy] = (),
 ) -> None:
     """Write `prediction.csv` (the worst of each metre) and `summary.json`; each is replaced whole or not at all.
 
@@ -35,7 +42,7 @@ def write_prediction(
     ----------
     folder : made when missing.
     route : name of the route.
-    prediction : of that route.
+    prediction, errors : of that route.
     stations : uncertainty at the stations on it; a list in the summary.
 
     Raises
@@ -52,15 +59,19 @@ def write_prediction(
         metres.on_odometry,
         np.isin(metres.metre, prediction.failing_metres()).astype(np.int64),
         np.where(metres.fails, "fail", "operational"),
+        *errors.per_metre(metres).T,
     ]
     write_table(folder / PREDICTION, COLUMNS, zip(*(column.tolist() for column in columns), strict=True))
-    entries = {**summary(route, prediction), "stations": [_station_entry(station) for station in stations]}
+    entries = {**summary(route, prediction, errors), "stations": [_station_entry(station) for station in stations]}
     write_text(folder / SUMMARY, json.dumps(entries, indent=2, allow_nan=False) + "\n")
 
 
-def summary(route: str, prediction: RoutePrediction) -> dict[str, str | int | float | list[float]]:
+def summary(
+    route: str, prediction: RoutePrediction, errors: PredictedErrors
+) -> dict[str, str | int | float | list[float]]:
     """Return what a prediction comes to; metres, seconds and radians."""
     x, y, theta = (float(value) for value in prediction.two_sigma.max(axis=0))
+    error_x, error_y, error_theta = (float(value) for value in errors.two_sigma.max(axis=0))
     return {
         "route": route,
         "length_m": prediction.drive.length,
@@ -69,6 +80,9 @@ def summary(route: str, prediction: RoutePrediction) -> dict[str, str | int | fl
         "two_sigma_x_max_m": x,
         "two_sigma_y_max_m": y,
         "two_sigma_theta_max_rad": theta,
+        "error_two_sigma_x_max_m": error_x,
+        "error_two_sigma_y_max_m": error_y,
+        "error_two_sigma_theta_max_rad": error_theta,
         "position_limit_m": prediction.limits.position_limit,
         "heading_limit_rad": prediction.limits.heading_limit,
         "metres_over_limit": len(prediction.failing_metres()),
@@ -85,6 +99,7 @@ def _station_entry(station: StationAccuracy) -> dict[str, str | float | bool]:
         "station": station.station,
         "metre": station.metre,
         "two_sigma_m": station.two_sigma,
+        "error_two_sigma_m": station.error,
         "required_m": station.required,
         "met": station.is_met,
     }

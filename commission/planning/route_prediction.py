@@ -206,25 +206,6 @@ class RoutePrediction:
         return self.drive.metres[(self.modes == mode) & (before != mode)]
 
 
-@dataclass(frozen=True, slots=True)
-class StationAccuracy:
-    """Predicted uncertainty at a station."""
-
-    station: str
-    """Name of the station."""
-    metre: float
-    """Way driven until there [m]."""
-    two_sigma: float
-    """Largest predicted 2-sigma of x or y while there [m]."""
-    required: float
-    """Largest 2-sigma that the station allows [m]."""
-
-    @property
-    def is_met(self) -> bool:
-        """Whether the prediction keeps to it."""
-        return self.two_sigma <= self.required
-
-
 def plan_route(
     project: Project,
     route_name: str,
@@ -281,26 +262,6 @@ def station_scans(drive: NominalDrive, stations: Sequence[Station]) -> Iterator[
         scans = np.flatnonzero((distance <= AT_STATION) & (turned < FACING_STATION))
         if len(scans):
             yield station, scans
-
-
-def station_accuracies(prediction: RoutePrediction, stations: Sequence[Station]) -> tuple[StationAccuracy, ...]:
-    """Compare the predicted uncertainty with what each station on the route requires.
-
-    Parameters
-    ----------
-    prediction : along a route.
-    stations : of the project; those beside the route are left out.
-    """
-    position = prediction.two_sigma[:, :2].max(axis=1)
-    return tuple(
-        StationAccuracy(
-            station.name,
-            float(prediction.drive.metres[scans[0]]),
-            float(position[scans].max()),
-            station.required_accuracy,
-        )
-        for station, scans in station_scans(prediction.drive, stations)
-    )
 
 
 def predict_route(planned: PlannedRoute, damage: Damage = NO_DAMAGE) -> RoutePrediction:

@@ -13,7 +13,7 @@ import numpy as np
 from commission.geometry.arrays import FloatArray, read_only
 from commission.planning.detection_noise import classes_of, detection_noise
 from commission.planning.error_kernels import ErrorModel, propagate_errors
-from commission.planning.route_prediction import PlannedRoute, RoutePrediction, predict_route, smallest_route
+from commission.planning.route_prediction import PerMetre, PlannedRoute, RoutePrediction, predict_route, smallest_route
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,6 +27,15 @@ class PredictedErrors:
     def sigmas(self) -> FloatArray:
         """(K, 3) expected RMS error of x [m], y [m] and heading [rad]."""
         return np.sqrt(np.diagonal(self.squares, axis1=1, axis2=2))
+
+    @property
+    def two_sigma(self) -> FloatArray:
+        """(K, 3) twice the expected RMS error of x [m], y [m] and heading [rad]: as the filter's own is told."""
+        return 2.0 * self.sigmas
+
+    def per_metre(self, metres: PerMetre) -> FloatArray:
+        """(B, 3) the largest `two_sigma` of each metre of the prediction."""
+        return np.maximum.reduceat(self.two_sigma, metres.first, axis=0)
 
 
 def predict_errors(planned: PlannedRoute, prediction: RoutePrediction) -> PredictedErrors:
@@ -79,7 +88,7 @@ def predict_errors(planned: PlannedRoute, prediction: RoutePrediction) -> Predic
 def two_sigma_of(planned: PlannedRoute) -> FloatArray:
     """(K, 3) 2-sigma of x [m], y [m] and heading [rad]: the larger of the filter's own and of its error."""
     prediction = predict_route(planned)
-    return np.maximum(prediction.two_sigma, 2.0 * predict_errors(planned, prediction).sigmas)
+    return np.maximum(prediction.two_sigma, predict_errors(planned, prediction).two_sigma)
 
 
 def warm_up() -> None:

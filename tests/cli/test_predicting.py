@@ -19,6 +19,8 @@ def test_a_route_is_predicted_metre_by_metre(commission, project, tmp_path):
     assert summary["visible_min"] == 5
     assert summary["trips_m"] == []
     assert max(float(row["two_sigma_x"]) for row in rows) == summary["two_sigma_x_max_m"]
+    assert max(float(row["error_two_sigma_y"]) for row in rows) == summary["error_two_sigma_y_max_m"]
+    assert f"True error   2-sigma x {1e3 * summary['error_two_sigma_x_max_m']:.1f} mm" in told
 
 
 def test_an_unknown_route_and_an_impossible_crowd_are_refused(refused, project, tmp_path):
@@ -40,6 +42,26 @@ def test_what_if_ranks_the_reflectors(commission, project, tmp_path):
     assert sorted(row["reflector_id"] for row in rows) == ["R0", "R1", "R2", "R3", "R4"]
     loads = [float(row["load"]) for row in rows]
     assert loads == sorted(loads, reverse=True)
+
+
+def test_a_station_is_reached_when_both_the_filter_and_its_error_keep_to_what_it_requires(
+    commission, project, tmp_path
+):
+    def at_the_dock(required, observation):
+        text = f"stations:\n  - {{name: Dock, x: 5.9, y: 0.0, required_accuracy: {required}}}\n"
+        before = (project / "project.yaml").read_text(encoding="utf-8")
+        (project / "project.yaml").write_text(before + observation + text, encoding="utf-8")
+        assert commission("predict", project, "--out", tmp_path / "out")[0] == 0
+        (project / "project.yaml").write_text(before, encoding="utf-8")
+        return json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["stations"][0]
+
+    # A filter that is told of far better detections than the scanner makes believes to stand better than it does.
+    said = "\n  observation: {range_sigma: 0.001, bearing_sigma: 0.0001}\n"
+    vain = at_the_dock(1.0, said)
+    assert vain["two_sigma_m"] < 0.8 * vain["error_two_sigma_m"]
+    assert vain["met"]
+    between = 0.5 * (vain["two_sigma_m"] + vain["error_two_sigma_m"])
+    assert not at_the_dock(between, said)["met"]
 
 
 CARELESS = "\n  odometry: {heading_per_sqrt_m: 0.5, forward_per_sqrt_m: 0.3, lateral_per_sqrt_m: 0.3}\n"

@@ -12,7 +12,7 @@ from commission.app.panels.plan_tracks import Axis, Limited, Plain, limited, pla
 from commission.app.plan.loads import load_classes, palette
 from commission.app.plan.overlay import Driven
 from commission.app.plan.view import RouteView
-from commission.planning.route_prediction import StationAccuracy
+from commission.planning.station_accuracy import StationAccuracy
 
 MOST_BARS = 120
 MOST_STOPS = 6
@@ -29,17 +29,19 @@ def chart(route: RouteView, run: Driven | None) -> str:
     metres, limits = route.metres, route.prediction.limits
     starts = np.arange(0, len(metres.metre), max(1, -(-len(metres.metre) // MOST_BARS)))
     axis = _axis(route, starts)
-    worst = np.maximum.reduceat(metres.two_sigma, starts, axis=0)
+    worst, errors = (np.maximum.reduceat(values, starts, axis=0) for values in (metres.two_sigma, route.errors))
     position = Limited(
         "2σ of position [mm]",
         1000.0 * worst[:, :2].max(axis=1),
         1000.0 * limits.position_limit,
+        1000.0 * errors[:, :2].max(axis=1),
         None if run is None else (run.metres, 1000.0 * run.two_sigma[:, :2].max(axis=1)),
     )
     heading = Limited(
         "2σ of heading [°]",
         np.degrees(worst[:, 2]),
         math.degrees(limits.heading_limit),
+        np.degrees(errors[:, 2]),
         None if run is None else (run.metres, np.degrees(run.two_sigma[:, 2])),
     )
     seen = np.minimum.reduceat(metres.seen, starts)
@@ -71,7 +73,7 @@ def _axis(route: RouteView, starts: np.ndarray) -> Axis:
 def _note(route: RouteView, run: Driven | None) -> str:
     if route.outdated:
         return "predicting anew …"
-    lines = ["color: share of the limit"]
+    lines = ["color: share of the limit", "violet: 2σ of the true error"]
     if len(route.prediction.trips()):
         lines.append("red line: stops, green line: may drive again")
     lines.append("white line: the run that is loaded" if run is not None else "a run along this route is laid over it")
@@ -81,7 +83,7 @@ def _note(route: RouteView, run: Driven | None) -> str:
 def _numbers(route: RouteView) -> list[tuple[str, str]]:
     """What matters most, in numbers."""
     prediction, metres, limits = route.prediction, route.metres, route.prediction.limits
-    largest = metres.two_sigma.max(axis=0)
+    largest, error = metres.two_sigma.max(axis=0), route.errors.max(axis=0)
     rows = [
         ("Length", f"{prediction.drive.length:.1f} m"),
         (
@@ -92,6 +94,7 @@ def _numbers(route: RouteView) -> list[tuple[str, str]]:
             "Largest 2σ heading / limit",
             f"{math.degrees(largest[2]):.2f} / {math.degrees(limits.heading_limit):.1f} °",
         ),
+        ("Largest true error, 2σ", f"{1000 * error[:2].max():.1f} mm, {math.degrees(error[2]):.2f} °"),
         ("Fewest reflectors seen", str(int(metres.seen.min()))),
         ("Longest on odometry", f"{metres.on_odometry.max():.1f} m"),
         ("Supervisor stops", _places(prediction.trips())),
@@ -108,14 +111,14 @@ def _places(metres: np.ndarray) -> str:
 
 
 def _stations(stations: tuple[StationAccuracy, ...]) -> str:
-    """Each station on the route: the predicted 2-sigma against what it requires."""
+    """Each station on the route: the larger one of the filter's and of the true 2-sigma against what it requires."""
     if not stations:
         return ""
     good, bad = theme.css(theme.RECOVERY), theme.css(theme.OVER_LIMIT)
     rows = [
         (
             f"{escaped(each.station)}, {each.metre:.0f} m",
-            f"{1000 * each.two_sigma:.1f} / {1000 * each.required:.0f} mm "
+            f"{1000 * each.expected:.1f} / {1000 * each.required:.0f} mm "
             f"<span style='color:{good if each.is_met else bad}'>{'met' if each.is_met else 'not met'}</span>",
         )
         for each in stations

@@ -58,6 +58,8 @@ class Limited:
     """(B,) the worst of each stretch, in the page's unit."""
     limit: float
     """The limit, in the page's unit."""
+    errors: FloatArray
+    """(B,) the same of the true error."""
     driven: tuple[FloatArray, FloatArray] | None = None
     """(N,) metres of a run and (N,) the same quantity of it."""
 
@@ -75,7 +77,7 @@ class Plain:
 
 
 def limited(track: Limited, axis: Axis) -> str:
-    """Draw bars up to a logarithmic level, the limit, and a run."""
+    """Draw bars up to a logarithmic level, the limit, the true error, and a run."""
     low, high = math.log10(track.limit / BELOW), math.log10(track.limit * ABOVE)
 
     def y(values: FloatArray) -> FloatArray:
@@ -86,6 +88,7 @@ def limited(track: Limited, axis: Axis) -> str:
     parts = [part for tick in ticks for part in _tick(float(y(np.array(tick))), f"{tick:g}")]
     parts += _bars(axis, y(track.levels), TALL)
     parts.append(_line(float(y(np.array(track.limit))), theme.css(theme.POSE), "5 4"))
+    parts.append(_steps(axis, y(track.errors), theme.css(theme.REFERENCE)))
     if track.driven is not None:
         metres, values = track.driven
         points = " ".join(f"{px:.1f},{py:.1f}" for px, py in zip(axis.x(metres), y(values), strict=True))
@@ -134,6 +137,13 @@ def _bars(axis: Axis, tops: FloatArray, bottom: float) -> list[str]:
         f"height='{max(bottom - top, 1.0):.1f}' fill='{fill}'/>"
         for left, right, top, fill in zip(edges[:-1], edges[1:], tops, axis.fills, strict=True)
     ]
+
+
+def _steps(axis: Axis, tops: FloatArray, color: str) -> str:
+    """Draw a line that is level over each bar."""
+    places = np.column_stack((np.repeat(axis.edges(), 2)[1:-1], np.repeat(tops, 2)))
+    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in places.tolist())
+    return f"<polyline class='c-error' points='{points}' fill='none' stroke='{color}' stroke-width='1.2'/>"
 
 
 def _events(axis: Axis, bottom: float) -> list[str]:

@@ -56,6 +56,7 @@ def route_view(predicted: Predicted, *, outdated: bool) -> RouteView:
         predicted.name,
         prediction,
         metres,
+        predicted.errors.per_metre(metres),
         np.maximum.reduceat(prediction.load, metres.first),
         np.maximum.reduceat(chances, metres.first),
         tuple(_risk_view(predicted, risk) for risk in predicted.risks),

@@ -15,7 +15,8 @@ from commission.app.plan.settings import Figure, Place
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.planning.coverage import Lattice
 from commission.planning.dependence import Dependence
-from commission.planning.route_prediction import PerMetre, RoutePrediction, StationAccuracy
+from commission.planning.route_prediction import PerMetre, RoutePrediction
+from commission.planning.station_accuracy import StationAccuracy
 
 Pose: TypeAlias = tuple[float, float, float]
 """x, y and heading of base, map frame [m, m, rad]."""
@@ -93,6 +94,8 @@ class RouteView:
     """Scan by scan."""
     metres: PerMetre
     """The worst of each metre."""
+    errors: FloatArray
+    """(B, 3) largest 2-sigma of the true error of x [m], y [m] and heading [rad] in each metre."""
     loads: FloatArray
     """(B,) largest share of the supervisor's limit in each metre [1]."""
     risk: FloatArray

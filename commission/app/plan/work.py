@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 from commission.app.plan.settings import PlanSettings
 from commission.geometry.arrays import BoolArray
-from commission.planning import coverage, dependence, route_prediction
+from commission.planning import coverage, dependence, route_prediction, true_error
 from commission.planning.association_risk import NeighborRisk, neighbor_risks
 from commission.planning.coverage import Lattice, LiveCoverage, lattice_of
 from commission.planning.dependence import Dependence, FailureOptions
@@ -18,8 +18,9 @@ from commission.planning.route_prediction import (
     PlannedRoute,
     PredictionOptions,
     RoutePrediction,
-    StationAccuracy,
 )
+from commission.planning.station_accuracy import StationAccuracy, station_accuracies
+from commission.planning.true_error import PredictedErrors, predict_errors
 from commission.planning.visibility import VisibilityModel, VisibilityOptions, visibility_model
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -52,7 +53,9 @@ class Predicted:
     reflectors: ReflectorMap
     """The reflectors that were there."""
     prediction: RoutePrediction
-    """Scan by scan."""
+    """What the filter will say, scan by scan."""
+    errors: PredictedErrors
+    """How far off it will be, scan by scan."""
     stations: tuple[StationAccuracy, ...]
     """The stations on it."""
     risks: tuple[NeighborRisk, ...]
@@ -110,19 +113,22 @@ def cover(project: Project, settings: PlanSettings, progress: Progress) -> Cover
 def predict(project: Project, settings: PlanSettings, progress: Progress) -> Predicted:
     """Predict the localizer along the chosen route."""
     progress(0.0, "compiling")
-    route_prediction.warm_up()
+    true_error.warm_up()
     progress(0.2, "sight of each reflector")
     options = PredictionOptions(blocked_per_m=settings.blocked_per_m)
     model = _model(project, settings)
     progress(0.5, "route")
     planned = route_prediction.plan_route(project, settings.route, options, model)
     prediction = route_prediction.predict_route(planned)
+    progress(0.7, "true error")
+    errors = predict_errors(planned, prediction)
     progress(0.9, "neighbors")
     return Predicted(
         settings.route,
         project.reflectors,
         prediction,
-        route_prediction.station_accuracies(prediction, project.stations),
+        errors,
+        station_accuracies(prediction, errors, project.stations),
         neighbor_risks(planned, prediction),
     )
 

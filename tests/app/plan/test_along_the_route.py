@@ -18,6 +18,7 @@ from commission.app.plan.work import predict
 from commission.app.session import Drive, Session
 from commission.localization.setup import LocalizerSetup
 from commission.planning.route_prediction import RoutePrediction, plan_route, predict_route
+from commission.planning.true_error import predict_errors
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.site.stations import Station
@@ -98,6 +99,16 @@ def test_the_chart_says_where_the_supervisor_stops_and_draws_it(project: Project
     # One line in each of the four drawings.
     assert drawn.count("class='c-stop'") == 4 * len(route.prediction.trips()) > 0
     assert drawn.count("class='c-recovery'") == 4 * len(route.prediction.recoveries()) > 0
+
+
+def test_the_chart_draws_the_true_error_that_the_command_writes(project: Project) -> None:
+    route = expected(project)
+    planned = plan_route(project, project.routes[0].name)
+    errors = predict_errors(planned, predict_route(planned)).two_sigma
+    np.testing.assert_array_equal(route.errors.max(axis=0), errors.max(axis=0))
+    drawn = chart(route, None)
+    assert drawn.count("class='c-error'") == 2
+    assert f"{1000 * errors[:, :2].max():.1f} mm, {np.degrees(errors[:, 2].max()):.2f} °" in drawn
 
 
 def test_the_floor_is_marked_where_the_supervisor_stops_and_lets_go_on(project: Project) -> None:

@@ -1,0 +1,59 @@
+"""How accurately the vehicle stands at the stations of a route, against what each of them requires."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from commission.planning.route_prediction import RoutePrediction, station_scans
+from commission.planning.true_error import PredictedErrors
+from commission.site.stations import Station
+
+
+@dataclass(frozen=True, slots=True)
+class StationAccuracy:
+    """What is predicted at a station."""
+
+    station: str
+    """Name of the station."""
+    metre: float
+    """Way driven until there [m]."""
+    two_sigma: float
+    """Largest 2-sigma of x or y that the filter says while there [m]."""
+    error: float
+    """Largest 2-sigma of the true error of x or y while there [m]."""
+    required: float
+    """Largest 2-sigma that the station allows [m]."""
+
+    @property
+    def expected(self) -> float:
+        """The larger one of what the filter says and of its error [m]."""
+        return max(self.two_sigma, self.error)
+
+    @property
+    def is_met(self) -> bool:
+        """Whether both keep to what is required."""
+        return self.expected <= self.required
+
+
+def station_accuracies(
+    prediction: RoutePrediction, errors: PredictedErrors, stations: Sequence[Station]
+) -> tuple[StationAccuracy, ...]:
+    """Compare what is predicted with what each station on the route requires.
+
+    Parameters
+    ----------
+    prediction, errors : along a route.
+    stations : of the project; those beside the route are left out.
+    """
+    said, true = (values[:, :2].max(axis=1) for values in (prediction.two_sigma, errors.two_sigma))
+    return tuple(
+        StationAccuracy(
+            station.name,
+            float(prediction.drive.metres[scans[0]]),
+            float(said[scans].max()),
+            float(true[scans].max()),
+            station.required_accuracy,
+        )
+        for station, scans in station_scans(prediction.drive, stations)
+    )
