@@ -6,14 +6,12 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import msgspec
 import pytest
 import viser
-from websockets.sync.client import ClientConnection, connect
-from websockets.typing import Subprotocol
 
 from commission.app.server import start_server
 from commission.app.uploads import Upload, Uploads, megabytes
+from tests.app.raw_client import RawClient
 
 LIMIT = 1_000_000
 
@@ -28,24 +26,14 @@ class Desk:
         uploads = Uploads(self.server.gui, lambda _client, text: self.refused.append(text))
         self.button = uploads.add("Upload", self._take, limit=LIMIT)
         self.slider = self.server.gui.add_slider("Other", 0, 1, 1, 0)
-        address = f"ws://127.0.0.1:{self.server.get_port()}"
-        self._client: ClientConnection = connect(address, subprotocols=[Subprotocol(f"viser-v{viser.__version__}")])
-
-        # A browser counts as connected from its first camera on.
-        self.send(
-            type="ViewerCameraMessage",
-            **{name: (0.0, 0.0, 1.0) for name in ("position", "look_at", "up_direction")},
-            wxyz=(1.0, 0.0, 0.0, 0.0),
-            **dict.fromkeys(("fov", "near", "far"), 1.0),
-            **dict.fromkeys(("image_height", "image_width"), 100),
-        )
+        self._client = RawClient(self.server)
         self.until(lambda: bool(self.server.get_clients()))
 
     def _take(self, _client: int, upload: Upload) -> None:
         self.taken.append((upload.name, upload.content))
 
     def send(self, **message: Any) -> None:
-        self._client.send(msgspec.msgpack.encode(message))
+        self._client.send(**message)
 
     def begin(
         self, size: float, parts: int, *, name: str = "hall.csv", transfer: str = "t", widget: Any = None
