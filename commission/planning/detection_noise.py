@@ -93,6 +93,21 @@ def classes_of(reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorP
     return np.array([rows[pair] for pair in pairs], dtype=np.int64)
 
 
+class DetectionQuality(NamedTuple):
+    """What detections of each reflector of a map are worth."""
+
+    classes: IntArray
+    """(M,) row of `noise.columns` of each reflector."""
+    noise: DetectionNoise
+    """By class and distance."""
+
+
+def detection_quality(reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorParameters) -> DetectionQuality:
+    """Gather `classes_of` and `detection_noise`; parameters as there."""
+    site = reflectors, scanner, parameters
+    return DetectionQuality(classes_of(*site), detection_noise(*site))
+
+
 @compiled_inline
 def worth(noise: DetectionNoise, kind: int, distance: float) -> Worth:
     """Look up a class of reflectors at a distance, linearly between the distances that were looked at."""

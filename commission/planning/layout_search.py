@@ -7,7 +7,9 @@ where a place has a rival, a reflector that only one of the two sees is asked fo
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -18,7 +20,7 @@ from commission.planning.ambiguity import AmbiguityOptions
 from commission.planning.cover import CoverProblem, cover, lower_bound, merged, smaller_covers
 from commission.planning.route_prediction import PlannedRoute, PredictionOptions, restricted, station_scans
 from commission.planning.telling_apart import ChosenPlace, Distinction, chosen_places, nearest_on_routes
-from commission.planning.true_error import two_sigma_of
+from commission.planning.true_error import quality_of, two_sigma_of
 from commission.planning.unmet import Unmet
 from commission.planning.visibility import VisibilityModel
 from commission.site.checks import at_least
@@ -27,6 +29,7 @@ from commission.site.project import Project
 
 ROUNDS = 20
 """How often scans over a limit are asked to see one reflector more, and places to be told from their rivals."""
+CORES = os.cpu_count() or 1
 COVERING = 0.9
 """Share of the progress that these rounds take; the rest is doing with fewer."""
 
@@ -99,6 +102,7 @@ class LayoutSearch:
         count, demands = len(project.reflectors), options.demands
         self._fixed = np.arange(count) < kept
         self._covers = [route.visible.incidence(count) for route in planned]
+        self._seen = [covers.any(axis=0) for covers in self._covers]
         self._base = demands.visible + int(demands.survive_failure)
         self._needs = [np.full(len(route.drive), self._base, dtype=np.int64) for route in planned]
         self._limits = [_limits(route, project, demands) for route in planned]
@@ -106,6 +110,7 @@ class LayoutSearch:
         self._places = chosen_places(demands, planned, project.stations, project.scanner, options.ambiguity)
         self._distinction = Distinction(model, self._places, demands.survive_failure, options.ambiguity)
         self._apart: list[BoolArray] = []
+        self._quality = quality_of(planned[0]) if planned else None
 
     def run(self) -> BoolArray:
         """Return which reflectors to take: (M,) array."""
@@ -167,19 +172,32 @@ class LayoutSearch:
             result.append(over)
         return result
 
-    def _over_on(self, index: int, taken: BoolArray) -> Iterator[BoolArray]:
+    def _over_on(self, index: int, taken: BoolArray, changed: BoolArray | None = None) -> Iterator[BoolArray]:
         """Which scans of a route pass a limit, for one damage after the other.
 
-        Neither what the filter will say nor what its error will be may pass it.
+        Neither what the filter will say nor what its error will be may pass it. Damages near to what has changed since
+        a layout that was good come first: they are the likeliest to be too much.
         """
         route = restricted(self._planned[index], taken)
         blocked = np.unique(route.visible.indices).tolist() if self._options.demands.survive_failure else []
-        for gone in ([], *([reflector] for reflector in blocked)):
-            self._report(None, "predicting")
+
+        def passed(gone: int) -> BoolArray:
             left = taken.copy()
-            left[gone] = False
-            over = two_sigma_of(restricted(route, left)) > self._limits[index]
-            yield np.asarray(over.any(axis=1), dtype=np.bool_)
+            left[[gone] if gone >= 0 else []] = False
+            over = two_sigma_of(restricted(route, left), self._quality) > self._limits[index]
+            return np.asarray(over.any(axis=1), dtype=np.bool_)
+
+        # Some at a time: the kernels run side by side, and whoever has seen enough asks for no more of them.
+        damages = [-1, *(sorted(blocked, key=self._gaps(changed).__getitem__) if changed is not None else blocked)]
+        with ThreadPoolExecutor(CORES) as pool:
+            for start in range(0, len(damages), CORES):
+                self._report(None, "predicting")
+                yield from pool.map(passed, damages[start : start + CORES])
+
+    def _gaps(self, changed: BoolArray) -> FloatArray:
+        """(M,) distance of each reflector to the nearest one of a mask [m]."""
+        centers = self._planned[0].places[:, :2]
+        return np.asarray(cKDTree(centers[changed]).query(centers)[0], dtype=np.float64)
 
     def _raise_needs(self, over: list[BoolArray], taken: BoolArray) -> bool:
         """Ask the scans over a limit for one reflector more than they see; False when none can see one more."""
@@ -223,12 +241,14 @@ class LayoutSearch:
     def _fewer(self, taken: BoolArray) -> BoolArray:
         """Take out what was asked for and the demands can do without: one of them, or two for another one."""
         problem, checks, state, found = self._base_problem(), self._options.checks, self._state(taken), True
+        # Most layouts are tried a few reflectors apart: what the other routes see of them has been judged before.
+        judged: dict[tuple[int, bytes], bool] = {}
         while found and checks > 0:
             found = False
             for tried in smaller_covers(problem, np.minimum(problem.needs, problem.counts(taken)), taken):
                 checks -= 1
                 self._report(1.0 - (1.0 - COVERING) * checks / self._options.checks, "doing with fewer")
-                if self._is_as_good(tried, state):
+                if self._is_as_good(tried, state, judged=judged, changed=tried ^ taken):
                     taken, found = tried, True
                     break
                 if checks <= 0:
@@ -247,13 +267,28 @@ class LayoutSearch:
         covers = [*self._covers, self._distinction.sees]
         return all(np.all(each[:, taken].sum(axis=1) >= seen) for each, seen in zip(covers, state.seen, strict=True))
 
-    def _is_as_good(self, taken: BoolArray, state: _State) -> bool:
-        """Whether a layout sees enough, passes no further limit and leaves no place more ambiguous than another one."""
+    def _is_as_good(
+        self,
+        taken: BoolArray,
+        state: _State,
+        *,
+        judged: dict[tuple[int, bytes], bool] | None = None,
+        changed: BoolArray | None = None,
+    ) -> bool:
+        """Whether a layout sees enough, passes no further limit and leaves no place more ambiguous than another one.
+
+        What is found of each route is kept in `judged`, by the route and what of the layout it sees, for as long as the
+        state's `over` stays; `changed` are the reflectors by which it differs from a layout that was good.
+        """
         if not self._sees_enough(taken, state):
             return False
+        judged = {} if judged is None else judged
         for index, before in enumerate(state.over):
-            # The first damage that is too much decides.
-            if any(np.any(over & ~before) for over in self._over_on(index, taken)):
+            key = index, taken[self._seen[index]].tobytes()
+            if key not in judged:
+                # The first damage that is too much decides.
+                judged[key] = not any(np.any(over & ~before) for over in self._over_on(index, taken, changed))
+            if not judged[key]:
                 return False
         return bool(np.all(self._distinction.rivals(taken) <= state.rivals))
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import FloatArray, read_only
-from commission.planning.detection_noise import classes_of, detection_noise
+from commission.planning.detection_noise import DetectionQuality, detection_quality
 from commission.planning.error_kernels import ErrorModel, propagate_errors
 from commission.planning.route_prediction import PerMetre, PlannedRoute, RoutePrediction, predict_route, smallest_route
 
@@ -38,13 +38,16 @@ class PredictedErrors:
         return np.maximum.reduceat(self.two_sigma, metres.first, axis=0)
 
 
-def predict_errors(planned: PlannedRoute, prediction: RoutePrediction) -> PredictedErrors:
+def predict_errors(
+    planned: PlannedRoute, prediction: RoutePrediction, quality: DetectionQuality | None = None
+) -> PredictedErrors:
     """Predict the error along a planned drive on which all reflectors are as in the map but for their survey.
 
     Parameters
     ----------
     planned : drive and visible reflectors.
     prediction : of that drive, without damage.
+    quality : of `quality_of` the route, for who predicts it often; found out here when None.
 
     Returns
     -------
@@ -58,7 +61,7 @@ def predict_errors(planned: PlannedRoute, prediction: RoutePrediction) -> Predic
     tenth of a degree of heading, is not. An error of the survey stays. The last two are carried as the response of the
     pose to each reflector; taken as new in every scan, as the filter takes them, they would average out.
     """
-    site = planned.reflectors, planned.scanner, planned.parameters.detector
+    quality = quality or quality_of(planned)
     squares = np.empty((len(planned.drive), 3, 3))
     model = planned.model()
     propagate_errors(
@@ -67,13 +70,13 @@ def predict_errors(planned: PlannedRoute, prediction: RoutePrediction) -> Predic
         read_only(planned.visible.offsets),
         read_only(planned.visible.indices),
         planned.places,
-        classes_of(*site),
+        quality.classes,
         prediction.prior_covariances,
         np.array(planned.options.start_sigmas),
         ErrorModel(
             model.odometry,
             model.observation,
-            detection_noise(*site),
+            quality.noise,
             model.gate_d2,
             model.inside_gate,
             model.free_per_m,
@@ -85,10 +88,15 @@ def predict_errors(planned: PlannedRoute, prediction: RoutePrediction) -> Predic
     return PredictedErrors(read_only(squares))
 
 
-def two_sigma_of(planned: PlannedRoute) -> FloatArray:
+def quality_of(planned: PlannedRoute) -> DetectionQuality:
+    """Find out what detections on a route are worth; the same for all routes of a site, and with fewer reflectors."""
+    return detection_quality(planned.reflectors, planned.scanner, planned.parameters.detector)
+
+
+def two_sigma_of(planned: PlannedRoute, quality: DetectionQuality | None = None) -> FloatArray:
     """(K, 3) 2-sigma of x [m], y [m] and heading [rad]: the larger of the filter's own and of its error."""
     prediction = predict_route(planned)
-    return np.maximum(prediction.two_sigma, predict_errors(planned, prediction).two_sigma)
+    return np.maximum(prediction.two_sigma, predict_errors(planned, prediction, quality).two_sigma)
 
 
 def warm_up() -> None:
