@@ -72,6 +72,7 @@ class FloorMapPanel(BasePanel):
     def draw_slowly(self, view: PageView) -> None:
         """Show what is under way and what came of it."""
         loading = view.state.mapping
+        self._fields.refresh()
         if loading is self._shown:
             return
         self._shown = loading

@@ -15,6 +15,7 @@ from commission.app import theme
 from commission.app.mapping import actions
 from commission.app.mapping.draft import MapDraft, MapOptions, Read, ReadOptions
 from commission.app.panels.base import Post, client_of, escaped, posting, table, write
+from commission.app.panels.inputs import write_html
 from commission.app.panels.rows import Rows
 from commission.io.dxf import UNITS, Drawing, DrawingLayer
 from commission.io.image_map import Picture
@@ -27,7 +28,7 @@ DARK, LIGHT = "dark", "light"
 ALONG_X, ALONG_Y, TYPED = "x axis", "y axis", "a heading"
 HEADINGS = {ALONG_X: 0.0, ALONG_Y: 0.5 * math.pi}
 MOST_LAYERS = 40
-"""Layers that can be chosen one by one, those with most lines; the rest is as visible as the drawing says."""
+"""Layers that are listed at a time, those with most lines; the others are found by their names."""
 _LONGEST_LAYER = 28
 NO_FILE = "no file is open to load a floor map from; expected one"
 
@@ -40,9 +41,10 @@ def heights_of(text: str) -> tuple[float, ...]:
         raise ValueError(f"heights are {text!r}; expected numbers like 0.2 1.8") from error
 
 
-def layers_by_size(drawing: Drawing) -> tuple[DrawingLayer, ...]:
-    """Return the layers that can be chosen one by one, the one with most lines first."""
-    return tuple(sorted(drawing.layers, key=lambda layer: -layer.segments)[:MOST_LAYERS])
+def layers_by_size(drawing: Drawing, sought: str = "") -> tuple[DrawingLayer, ...]:
+    """Return the layers whose names hold a text, upper or lower case; the one with most lines first."""
+    found = (layer for layer in drawing.layers if sought.strip().lower() in layer.name.lower())
+    return tuple(sorted(found, key=lambda layer: -layer.segments))
 
 
 def chosen_layers(draft: MapDraft) -> frozenset[str]:
@@ -155,8 +157,11 @@ class MapDraftFields:
         with self._layers:
             gui.add_html(theme.WIDE)
             every = gui.add_button_group("", ("All", "None", "Visible"))
+            self._find = gui.add_text("Find", "", hint="Part of a layer's name.")
             self._rest = gui.add_html("", visible=False)
         self._rows = Rows(gui, self._layers, self._post, self._toggled)
+        self._listed: tuple[DrawingLayer, ...] = ()
+        self._sought = ""
 
         def several(event: GuiEvent[Any], draft: MapDraft) -> page_actions.Action:
             layers = draft.read.layers if isinstance(draft.read, Drawing) else ()
@@ -168,10 +173,12 @@ class MapDraftFields:
 
     def _toggled(self, index: int, _client: int) -> page_actions.Action:
         """Return the action of a click on a layer's line."""
-        draft = self._draft
+        draft, listed = self._draft, self._listed
         if draft is None or not isinstance(draft.read, Drawing):
             return page_actions.Report(NO_FILE)
-        name = layers_by_size(draft.read)[index].name
+        if index >= len(listed):
+            return page_actions.Report("that layer is not listed any more; expected one that is")
+        name = listed[index].name
         return actions.SetMapOption("layers", tuple(sorted(chosen_layers(draft) ^ {name})))
 
     def _add_picture(self) -> None:
@@ -227,15 +234,29 @@ class MapDraftFields:
         if isinstance(draft.read, Picture):
             self._heading.visible = axis_of(draft.options.direction) == TYPED
 
+    def refresh(self) -> None:
+        """Follow what is typed to find a layer, which is no part of the draft."""
+        draft = self._draft
+        if draft is not None and isinstance(draft.read, Drawing) and self._find.value != self._sought:
+            self._show_layers(draft, draft.read)
+
     def _show_layers(self, draft: MapDraft, drawing: Drawing) -> None:
-        """Show a line for each layer, marked where it holds walls."""
-        layers, chosen = layers_by_size(drawing), chosen_layers(draft)
-        self._rows.show([layer_line(layer, is_chosen=layer.name in chosen) for layer in layers])
-        more = len(drawing.layers) - len(layers)
-        self._rest.visible = more > 0
-        self._rest.content = (
-            f"<div class='c-note' style='padding:2px 6px'>and {more} smaller layers</div>" if more else ""
-        )
+        """Show a line for each layer that is sought, marked where it holds walls."""
+        self._sought = self._find.value
+        found, chosen = layers_by_size(drawing, self._sought), chosen_layers(draft)
+        self._listed = found[:MOST_LAYERS]
+        self._rows.show([layer_line(layer, is_chosen=layer.name in chosen) for layer in self._listed])
+        write_html(self._rest, rest_text(len(found), len(drawing.layers)))
+
+
+def rest_text(found: int, layers: int) -> str:
+    """Say what is not listed, and how to come to it."""
+    text = ""
+    if not found and layers:
+        text = "no layer's name holds this text"
+    elif found > MOST_LAYERS:
+        text = f"the {MOST_LAYERS} with most lines of {found} layers; Find lists others"
+    return f"<div class='c-note' style='padding:2px 6px'>{text}</div>" if text else ""
 
 
 def layer_line(layer: DrawingLayer, *, is_chosen: bool) -> tuple[str, theme.Color]:

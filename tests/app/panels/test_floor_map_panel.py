@@ -18,7 +18,7 @@ from commission.app.layers.map_draft import INK, PAPER, MapDraftLayer, preview
 from commission.app.mapping import actions
 from commission.app.mapping.draft import MapDraft, MapFile, MapLoading, MapOptions, Stage, WaitingMap
 from commission.app.panels.floor_map_panel import FloorMapPanel, said
-from commission.app.panels.map_draft_fields import MapDraftFields, facts, layers_by_size
+from commission.app.panels.map_draft_fields import MOST_LAYERS, MapDraftFields, facts, layers_by_size
 from commission.app.panels.map_tool_fields import alignment_text
 from commission.app.plan.view import PlanView
 from commission.app.server import start_server
@@ -111,6 +111,26 @@ def test_layers_are_chosen_one_by_one_by_their_plain_names(server: viser.ViserSe
     assert posted[-1] == actions.SetMapOption("layers", tuple(sorted((NASTY, "TEXT"))))
     fields.show(replace(DRAFTS["drawing"], options=MapOptions(layers=("TEXT",))))
     assert [line.label for line in lines] == [f"· {NASTY}  2", "✓ TEXT  1"]
+
+
+def test_a_layer_among_hundreds_is_found_by_a_part_of_its_name(server: viser.ViserServer) -> None:
+    posted: list[Action] = []
+    fields = MapDraftFields(server.gui, posted.append)
+    hatches = (DrawingLayer(f"HATCH {n}", True, 1000 - n) for n in range(200))
+    layers = (*hatches, DrawingLayer("A-Wall", False, 3))
+    drawing = Drawing(Path("a.dxf"), "mm", layers, SEGMENTS, np.array([200, 200, 0], np.int32), ())
+    fields.show(MapDraft(MapFile(Path("a.dxf")), drawing))
+    assert sum(line.visible for line in fields._rows._buttons) == MOST_LAYERS
+    assert "of 201 layers" in fields._rest.content
+    change(labelled(server, "Find"), "wall")
+    fields.refresh()
+    assert [line.label for line in fields._rows._buttons if line.visible] == ["· A-Wall  3"]
+    change(fields._rows._buttons[0], True)
+    visible = tuple(layer.name for layer in layers[:200])
+    assert posted[-1] == actions.SetMapOption("layers", tuple(sorted((*visible, "A-Wall"))))
+    change(labelled(server, "Find"), "door")
+    fields.refresh()
+    assert "no layer" in fields._rest.content
 
 
 def test_names_of_files_are_shown_as_text() -> None:
