@@ -10,7 +10,8 @@ from commission.geometry import se2
 from commission.site.project import Project
 
 MARGIN = 0.6
-SMALLEST = 4.0
+SMALLEST, SMALLEST_FIELD = 4.0, 12.0
+"""Least width and height of a hall, and of an open field: one that is empty has room for a site [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +50,7 @@ def extent_of(project: Project) -> Extent:
     points.extend(segment.control_points for route in project.routes for segment in route.segments)
     every = np.concatenate(points)
     low, high = every.min(axis=0) - MARGIN, every.max(axis=0) + MARGIN
-    middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 0.5 * SMALLEST)
+    smallest = SMALLEST_FIELD if project.floor_map is None else SMALLEST
+    middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 0.5 * smallest)
     low, high = middle - half, middle + half
     return Extent((float(low[0]), float(low[1])), (float(high[0]), float(high[1])))

@@ -169,7 +169,7 @@ class Plots(BasePanel):
         self._spans: tuple[tuple[float, float] | None, ...] = ()
         self._axis = np.linspace(0.0, 1.0, BINS)
         for chart in CHARTS:
-            empty = tuple(np.zeros(2) for _ in range(len(chart.lines) + 4))
+            empty = tuple(np.full(2, np.nan) for _ in range(len(chart.lines) + 4))
             self._plots.append(
                 gui.add_uplot(
                     (np.array([0.0, 1.0]), *empty[1:]),

@@ -167,7 +167,7 @@ class RoutePlots(BasePanel):
 
 
 def _plot(gui: GuiApi, chart: Chart) -> GuiUplotHandle:
-    empty = np.zeros(2)
+    empty = np.full(2, np.nan)
     return gui.add_uplot(
         (np.array([0.0, 1.0]), *(empty for _ in range(6))),
         _series(chart),
