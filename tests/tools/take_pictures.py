@@ -18,8 +18,9 @@ from playwright.sync_api import Browser, sync_playwright
 
 from commission.app import actions
 from commission.app.actions import VirtualDrive
+from commission.app.editing.actions import SelectReflectors
 from commission.app.editing.editor import Tool
-from commission.app.plan.actions import SetLayout
+from commission.app.plan.actions import SetLayout, SetPlan
 from commission.app.runtime import Runtime
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
@@ -164,6 +165,57 @@ def drawing(page: OpenPage, runtime: Runtime) -> None:
         until(lambda count=count: any(len(editor.draft) == count for editor in runtime.state.editors.values()))
 
 
+def failing(page: OpenPage, runtime: Runtime) -> None:
+    """What depends on each reflector; the first of the list has failed."""
+    page.open_tab("Plan")
+    page.fold("Heatmap of the floor")
+    page.fold("What if one reflector fails")
+    page.press("Rank reflectors")
+    until(lambda: runtime.plan.failures is not None)
+    failures = runtime.plan.failures
+    if failures is not None:
+        runtime.post(SetPlan("failed", failures.names[0]))
+    until(lambda: runtime.plan.failures is not None and runtime.plan.failures.chosen is not None)
+
+
+def equipment(page: OpenPage, _runtime: Runtime) -> None:
+    """Vehicle and scanner, with the plots out of the way."""
+    page.open_tab("Site")
+    page.fold("Vehicle")
+    page.fold("Scanner")
+    page.open_tab("Layers")
+    page.page.locator(".c-fold").click()
+
+
+def at_station(page: OpenPage, runtime: Runtime) -> None:
+    """A station has been placed, and is selected."""
+    page.press(Tool.STATION.value)
+    until(lambda: any(editor.tool is Tool.STATION for editor in runtime.state.editors.values()))
+    page.click_at((9.0, 6.5))
+    until(lambda: len(runtime.state.project.stations) == 1)
+    page.page.locator(".c-fold").click()
+
+
+def several(page: OpenPage, runtime: Runtime) -> None:
+    """Some reflectors are selected together."""
+    ids = tuple(reflector.id for reflector in runtime.state.project.reflectors.reflectors[:4])
+    client = next(iter(runtime.state.editors))
+    runtime.post(SelectReflectors(client, ids))
+    until(lambda: any(editor.selected == ids for editor in runtime.state.editors.values()))
+    page.page.locator(".c-fold").click()
+    page.fold("Mirror, repeat")
+    page.fold("Snapping")
+
+
+def importing(page: OpenPage, _runtime: Runtime) -> None:
+    """What a pasted table would change."""
+    page.open_tab("Site")
+    page.fold("Exchange")
+    page.row("Paste a table").locator("textarea").fill("Nr\tX [mm]\tY [mm]\nS01\t3900\t9400\nNew\t6000\t4000")
+    page.press("Read pasted")
+    page.wait_for_text("Nothing has changed yet")
+
+
 PICTURES = (
     Picture("page_laboratory", "laboratory", tab("Run", "Legend")),
     Picture("page_3d", "shop_floor", three_d),
@@ -181,6 +233,11 @@ PICTURES = (
     Picture("along", "shop_floor", along),
     Picture("files", "shop_floor", files),
     Picture("drawing", "shop_floor", drawing),
+    Picture("failing", "warehouse", failing),
+    Picture("equipment", "shop_floor", equipment),
+    Picture("station", "shop_floor", at_station),
+    Picture("several", "shop_floor", several),
+    Picture("importing", "shop_floor", importing),
 )
 
 

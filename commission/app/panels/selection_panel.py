@@ -276,7 +276,8 @@ def _head(editor: Editor, reflectors: tuple[Reflector, ...]) -> str:
     elif editor.point is not None:
         title = f"Route {escaped(editor.point.route)}"
     elif editor.station:
-        title = f"Station {escaped(editor.station)}"
+        named = editor.station.lower().startswith("station")
+        title = escaped(editor.station) if named else f"Station {escaped(editor.station)}"
     else:
         title = "Vehicle"
     return f"<div style='padding:2px 14px 2px 6px'>{table(rows)}<div class='c-selected'><b>{title}</b></div></div>"
