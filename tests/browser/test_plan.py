@@ -78,7 +78,7 @@ def test_a_heatmap_is_switched_on_seen_and_read(page: OpenPage, site: OpenSite) 
     x, y = (round(value) for value in page.pixel_of(spot))
     without, seen = before.getpixel((x, y)), shot_of(page).getpixel((x, y))
     assert seen != without
-    # The floor's own dark shines through, and light falls on the picture: nearest of the scale, not equal to it.
+    # The floor's own dark shines through: nearest of the scale, not equal to it.
     ramp = 0.8 * heat.scale.colors().astype(float) + 0.2 * np.array(without)
     nearest = int(np.argmin(np.linalg.norm(ramp - np.array(seen), axis=1)))
     assert nearest == int(heat.classes.ravel()[index]) - FIRST, (seen, ramp.tolist())
