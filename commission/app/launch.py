@@ -10,7 +10,6 @@ import webbrowser
 from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from queue import SimpleQueue
 from types import FrameType
 from urllib.parse import quote
 
@@ -98,28 +97,38 @@ def end_at_last() -> None:
 
 
 @contextmanager
-def interruption() -> Generator[Callable[[], object]]:
+def interruption() -> Generator[Callable[[], None]]:
     """Give a function that waits for the first Ctrl-C, also for one that has come before; the second one is as usual.
 
-    Raised as an exception, Ctrl-C could come in the middle of a callback from compiled code, which drops it.
+    Raised as an exception, Ctrl-C could come in the middle of a callback from compiled code, which drops it. Told by an
+    event or a queue, it could come when the main thread has looked for signals the last time before it sleeps, and be
+    heard of with the next one only. So the interpreter's own handler writes it into a pipe.
     """
-    # An event would not do: one that is set by a signal while the same thread is about to wait for it is a deadlock.
-    # A simple queue may be put to at any moment of its own `get`.
-    arrived: SimpleQueue[int] = SimpleQueue()
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
 
-    def handle(number: int, _frame: FrameType | None) -> None:
+    def handle(_number: int, _frame: FrameType | None) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-        arrived.put(number)
+
+    def wait() -> None:
+        while os.read(reader, 1) != bytes([signal.SIGINT]):
+            pass
 
     # Who has it ignored (a job in the background of a shell) keeps it so.
     before = signal.getsignal(signal.SIGINT)
-    if before is signal.default_int_handler and threading.current_thread() is threading.main_thread():
+    is_ours = before is signal.default_int_handler and threading.current_thread() is threading.main_thread()
+    pipe_before = -1
+    if is_ours:
+        pipe_before = signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
         signal.signal(signal.SIGINT, handle)
     try:
-        yield arrived.get
+        yield wait
     finally:
-        if signal.getsignal(signal.SIGINT) is handle:
+        if is_ours:
             signal.signal(signal.SIGINT, before)
+            signal.set_wakeup_fd(pipe_before)
+        os.close(writer)
+        os.close(reader)
 
 
 def first_source(project: Project, recording: Path | None, demo: bool) -> Source | None:

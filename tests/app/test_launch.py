@@ -3,7 +3,6 @@ import sys
 
 INTERRUPT_EVERY_MOMENT = """
 import itertools
-import os
 import signal
 import sys
 import threading
@@ -26,7 +25,8 @@ def is_interrupted_at(moment):
 
     def interrupt_the_wait():
         is_late.set()
-        os.kill(os.getpid(), signal.SIGINT)
+        # In this thread: the other one sleeps on, as when a signal comes just before it falls asleep.
+        signal.raise_signal(signal.SIGINT)
 
     def come_to_wait():
         return wait()

@@ -88,6 +88,8 @@ def test_a_real_map_is_loaded_into_an_empty_folder_drawn_on_saved_and_read_again
     site.until(lambda: site.state.undo[-1].name == "draw wall")
     assert site.floor_map.occupancy().is_occupied([(-5.0, 12.5), (3.0, 15.0)]).all()
     page.press("Save")
+    # The page says "unsaved" until then.
+    site.until(lambda: site.state.saved is site.state.project)
     page.wait_for_text("saved ")
     assert load_project(site.folder) == site.state.project
     assert page.errors == []

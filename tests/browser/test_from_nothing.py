@@ -57,6 +57,8 @@ def test_a_site_is_built_from_an_empty_folder_and_a_vehicle_drives_in_it(
         place_the_reflectors(site, page, client)
         draw_the_route(site, page, client)
         page.press("Save")
+        # The page says "unsaved" until then.
+        site.until(lambda: site.state.saved is site.state.project)
         page.wait_for_text("saved ")
         assert load_project(tmp_path / "hall") == site.state.project
         drive(site, page)

@@ -71,6 +71,8 @@ def test_reflectors_are_placed_dragged_undone_redone_and_saved(site: OpenSite, w
     site.until(lambda: site.state.project is moved)
     page.wait_for_text("unsaved")
     page.press("Save")
+    # The page says "unsaved" until then.
+    site.until(lambda: site.state.saved is site.state.project)
     page.wait_for_text("saved ")
     assert load_project(site.folder) == moved
     assert page.errors == []
