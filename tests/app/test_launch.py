@@ -9,6 +9,9 @@ import threading
 
 from commission.app.launch import interruption
 
+# A suite that runs in the background of a shell ignores Ctrl-C, and this program would inherit that.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
 
 def is_interrupted_at(moment):
     passed = 0
