@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Coverage:
-    """Compute what the scanner sees over the floor; writes coverage.npz, .csv, .png, summary.json, and ellipses.csv."""
+    """Compute what the scanner sees over the floor; writes coverage.npz, .csv, .png and summary.json."""
 
     project: Positional[Path]
     """Folder of the project (holds project.yaml)."""

@@ -89,10 +89,10 @@ class Place:
             options = self._options(project)
         except ValueError as error:
             raise UsageError(str(error)) from None
-        counted = project.layout.counted(project.routes)
-        if not counted:
+        routes = self.route or project.layout.counted(project.routes)
+        if not routes:
             raise UsageError("the project has no route that counts; expected one to place reflectors for")
-        found = place(project, self.route or counted, options)
+        found = place(project, routes, options)
         save_project(dataclasses.replace(project, reflectors=found.reflectors), self.out)
         sys.stdout.write("\n".join([*_report(found), f"Written to   {self.out}"]) + "\n")
 

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.geometry.occupancy import OccupancyGrid
-from commission.site.layout_brief import CandidateOptions, Rectangle
+from commission.site.layout_brief import CandidateOptions, Rectangle, low_high
 
 
 def wall_candidates(grid: OccupancyGrid, options: CandidateOptions) -> FloatArray:
@@ -73,8 +73,7 @@ def clear_of(centers: FloatArray, path: FloatArray, distance: float) -> BoolArra
 
 def _inside(centers: FloatArray, rectangle: Rectangle) -> BoolArray:
     """Whether places (C, 2) lie in a rectangle, given by any two opposite corners."""
-    x_a, y_a, x_b, y_b = rectangle
-    low, high = (min(x_a, x_b), min(y_a, y_b)), (max(x_a, x_b), max(y_a, y_b))
+    low, high = low_high(rectangle)
     return np.asarray(((centers >= low) & (centers <= high)).all(axis=1), dtype=np.bool_)
 
 

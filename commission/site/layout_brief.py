@@ -18,6 +18,12 @@ Spot = tuple[float, ...]
 """x [m], y [m] of base in the map, and its heading [rad] where it matters; without one every heading counts."""
 
 
+def low_high(area: Rectangle) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Lower-left and upper-right corner of a rectangle that any two opposite corners give [m]."""
+    x_a, y_a, x_b, y_b = area
+    return (min(x_a, x_b), min(y_a, y_b)), (max(x_a, x_b), max(y_a, y_b))
+
+
 @dataclass(frozen=True, slots=True)
 class AllowedHeights:
     """At which heights a reflector may be put up in a part of the hall."""

@@ -21,7 +21,7 @@ from commission.app.layers.base import BaseLayer
 from commission.app.plan.view import LayoutView, PlanView
 from commission.app.store import AppState
 from commission.geometry.arrays import FloatArray
-from commission.site.layout_brief import Rectangle
+from commission.site.layout_brief import Rectangle, low_high
 from commission.site.project import Project
 
 RING_POINTS = 20
@@ -33,7 +33,7 @@ HATCH_MARKS = 8.0
 
 def hatch(area: Rectangle, gap: float) -> FloatArray:
     """Return the (N, 2, 2) slanting strokes that fill a rectangle [m], a gap apart along x."""
-    (x_low, x_high), (y_low, y_high) = sorted(area[::2]), sorted(area[1::2])
+    (x_low, y_low), (x_high, y_high) = low_high(area)
     # A stroke is where x - y is constant; both ends are cut off at the rectangle.
     slants = np.arange(x_low - y_high, x_high - y_low, gap)[1:]
     starts = np.maximum(x_low, slants + y_low)

@@ -10,7 +10,7 @@ from commission.app.plan.layout import SMALLEST_AREA, LayoutWish, with_option
 from commission.app.reduction import Reduction, Tell, reduce
 from commission.app.store import AppState, Edit, edited
 from commission.errors import UsageError
-from commission.site.layout_brief import LayoutBrief, Rectangle
+from commission.site.layout_brief import LayoutBrief, Rectangle, low_high
 
 ACCEPT = "accept suggested layout"
 """Name of the undo step."""
@@ -52,11 +52,10 @@ def _keeping_out(state: AppState, areas: tuple[Rectangle, ...], edit: Edit) -> R
 
 @reduce.register
 def _(action: actions.KeepOut, state: AppState) -> Reduction:
-    x_a, y_a, x_b, y_b = action.area
-    if min(abs(x_b - x_a), abs(y_b - y_a)) < SMALLEST_AREA:
+    low, high = low_high(action.area)
+    if min(high[0] - low[0], high[1] - low[1]) < SMALLEST_AREA:
         return Reduction(state)
-    area = (min(x_a, x_b), min(y_a, y_b), max(x_a, x_b), max(y_a, y_b))
-    areas = (*state.project.layout.candidates.keep_out, area)
+    areas = (*state.project.layout.candidates.keep_out, (*low, *high))
     return _keeping_out(state, areas, Edit("keep an area free of reflectors", action.client))
 
 
@@ -69,8 +68,8 @@ def _(action: actions.FreeAreas, state: AppState) -> Reduction:
 
 
 def _contains(area: Rectangle, place: tuple[float, float]) -> bool:
-    x_a, y_a, x_b, y_b = area
-    return min(x_a, x_b) <= place[0] <= max(x_a, x_b) and min(y_a, y_b) <= place[1] <= max(y_a, y_b)
+    low, high = low_high(area)
+    return low[0] <= place[0] <= high[0] and low[1] <= place[1] <= high[1]
 
 
 @reduce.register
