@@ -9,8 +9,8 @@ import pytest
 
 from commission import cli
 from commission.cli import parsing
-from commission.cli.localizing import Localize
-from commission.cli.simulating import Simulate
+from commission.cli.localize import Localize
+from commission.cli.simulate import Simulate
 from tests.conftest import REPOSITORY
 
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")

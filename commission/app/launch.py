@@ -17,18 +17,18 @@ import numpy as np
 import viser
 
 from commission import compiled
-from commission.app.actions import Recording, Source, VirtualDrive
-from commission.app.drives import prepare
+from commission.app.base.actions import Recording, Source, VirtualDrive
+from commission.app.base.extent import extent_of
+from commission.app.base.server import start_server
+from commission.app.base.state import MAGNIFICATIONS, NOTHING_SAVED, AppState
 from commission.app.editing.actions import Restored
-from commission.app.extent import extent_of
-from commission.app.history import episodes
-from commission.app.keeping import Keeping
-from commission.app.layers.accumulated import AccumulatedLayer
 from commission.app.page import Page
+from commission.app.project.project_folder import Keeping
+from commission.app.run.accumulated_layer import AccumulatedLayer
+from commission.app.run.drives import prepare
+from commission.app.run.history import episodes
+from commission.app.run.session import Drive
 from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
-from commission.app.server import start_server
-from commission.app.session import Drive
-from commission.app.store import MAGNIFICATIONS, NOTHING_SAVED, AppState
 from commission.geometry import rasterize, se2, spline_kernels
 from commission.io.journal import restore
 from commission.io.project_file import OpenedProject, load_project, open_project

@@ -8,49 +8,49 @@ from __future__ import annotations
 import numpy as np
 import viser
 
-from commission.app import theme
-from commission.app.actions import View
-from commission.app.cameras import Cameras
-from commission.app.editing.desk import Desk, DeskTabs
+from commission.app.ambiguity.ambiguity_layer import AmbiguityLayer
+from commission.app.base import theme
+from commission.app.base.actions import View
+from commission.app.base.cameras import Cameras
+from commission.app.base.extent import extent_of
+from commission.app.base.grid_layer import GridLayer
+from commission.app.base.layer import Layer
+from commission.app.base.layers_panel import LayersPanel, LegendPanel
+from commission.app.base.panel import Panel, Post
+from commission.app.base.state import AppState
+from commission.app.base.view import PageView
+from commission.app.coverage.ellipse_layer import FixEllipseLayer
+from commission.app.coverage.heat_layer import HeatLayer
+from commission.app.coverage.heat_legend import HeatLegend
+from commission.app.coverage.pointer import read_clicks
+from commission.app.editing.browser_panels import Desk, DeskTabs
 from commission.app.editing.pointer import floor_drag
-from commission.app.extent import extent_of
-from commission.app.layers.accumulated import AccumulatedLayer
-from commission.app.layers.ambiguity import AmbiguityLayer
-from commission.app.layers.base import Layer
-from commission.app.layers.detections import DetectionLayer
-from commission.app.layers.events import EventLayer
-from commission.app.layers.failing import FailingLayer
-from commission.app.layers.fix_ellipses import FixEllipseLayer
-from commission.app.layers.floor import FloorLayer
-from commission.app.layers.gates import GateLayer
-from commission.app.layers.grid import GridLayer
-from commission.app.layers.heatmap import HeatLayer
-from commission.app.layers.map_draft import MapDraftLayer
-from commission.app.layers.prediction import RibbonLayer
-from commission.app.layers.reflectors import ReflectorLayer, ReflectorNameLayer
-from commission.app.layers.routes import RouteLayer
-from commission.app.layers.scan import ScanLayer
-from commission.app.layers.stations import StationLayer
-from commission.app.layers.suggestion import SuggestionLayer
-from commission.app.layers.trails import ReferenceLayer, TrailLayer
-from commission.app.layers.uncertainty import UncertaintyLayer
-from commission.app.layers.vehicle import VehicleLayer
-from commission.app.layers.violations import ViolationLayer
-from commission.app.layers.walls import WallLayer
-from commission.app.panels.base import Panel, Post
-from commission.app.panels.heat_legend import HeatLegend
-from commission.app.panels.layers_panel import LayersPanel, LegendPanel
-from commission.app.panels.plan_panel import PlanPanel
-from commission.app.panels.plots import Plots
-from commission.app.panels.problems_panel import ProblemsPanel
-from commission.app.panels.run_panel import RunPanel
-from commission.app.panels.site_panel import SitePanel
-from commission.app.panels.time_line import TimeLine
-from commission.app.panels.top_bar import TopBar
-from commission.app.panels.tune_panel import TunePanel
-from commission.app.plan.pointer import read_clicks
-from commission.app.store import AppState
-from commission.app.view import PageView
+from commission.app.editing.reflector_layer import ReflectorLayer, ReflectorNameLayer
+from commission.app.editing.route_layer import RouteLayer
+from commission.app.editing.station_layer import StationLayer
+from commission.app.failures.failure_layer import FailingLayer
+from commission.app.floor_map.draft_layer import MapDraftLayer
+from commission.app.floor_map.floor_layer import FloorLayer
+from commission.app.floor_map.wall_layer import WallLayer
+from commission.app.placement.suggestion_layer import SuggestionLayer
+from commission.app.plan.plan_panel import PlanPanel
+from commission.app.prediction.event_layer import EventLayer
+from commission.app.prediction.ribbon_layer import RibbonLayer
+from commission.app.problems.problems_panel import ProblemsPanel
+from commission.app.problems.violation_layer import ViolationLayer
+from commission.app.project.site_panel import SitePanel
+from commission.app.project.top_bar import TopBar
+from commission.app.run.accumulated_layer import AccumulatedLayer
+from commission.app.run.detection_layer import DetectionLayer
+from commission.app.run.gate_layer import GateLayer
+from commission.app.run.plots import Plots
+from commission.app.run.run_panel import RunPanel
+from commission.app.run.scan_layer import ScanLayer
+from commission.app.run.time_line import TimeLine
+from commission.app.run.trail_layers import ReferenceLayer, TrailLayer
+from commission.app.run.uncertainty_layer import UncertaintyLayer
+from commission.app.run.vehicle_layer import VehicleLayer
+from commission.app.tune.tune_panel import TunePanel
 from commission.site.project import Project
 
 LAYERS = (

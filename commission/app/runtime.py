@@ -14,17 +14,17 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Protocol, TypeAlias
 
-from commission.app import actions, reducer, reduction
-from commission.app.actions import Action, Source, View
-from commission.app.background import PREDICT, Background
+from commission.app.base import actions, reducer, reduction
+from commission.app.base.actions import Action, Source, View
+from commission.app.base.background import PREDICT, Background
+from commission.app.base.jobs import JobReport, JobState, Progress
+from commission.app.base.state import AppState
+from commission.app.base.view import PageView, RunView
 from commission.app.editing import actions as editing
-from commission.app.jobs import JobReport, JobState, Progress
-from commission.app.keeping import name_of_edit
-from commission.app.mapping.actions import MapResult
+from commission.app.floor_map.actions import MapResult
 from commission.app.plan.view import PlanView
-from commission.app.session import Drive, Session
-from commission.app.store import AppState
-from commission.app.view import PageView, RunView
+from commission.app.project.project_folder import name_of_edit
+from commission.app.run.session import Drive, Session
 from commission.errors import CommissionError
 from commission.localization.setup import LocalizerSetup
 from commission.site.project import Project

@@ -11,7 +11,15 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from commission.cli import confusing, converting, covering, localizing, page, parsing, placing, predicting, simulating
+from commission.cli import ambiguity as confusing
+from commission.cli import convert as converting
+from commission.cli import coverage as covering
+from commission.cli import localize as localizing
+from commission.cli import parsing
+from commission.cli import place as placing
+from commission.cli import predict as predicting
+from commission.cli import serve as page
+from commission.cli import simulate as simulating
 from commission.cli.parsing import Command
 from commission.cli.versions import Version
 from commission.errors import CommissionError

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TypeAlias
 
 from commission.errors import FileFormatError
-from commission.io.edges import RouteImport
 from commission.io.findings import Findings, Progress, silent
 from commission.io.imk import ReflectorImport, read_imk
 from commission.io.json_document import read_json
@@ -20,6 +19,7 @@ from commission.io.lif import read_lif
 from commission.io.pasted_table import parse_table
 from commission.io.project_archive import ProjectImport, read_project_archive
 from commission.io.reading import read_bytes
+from commission.io.route_edges import RouteImport
 from commission.io.table_import import read_any_table
 from commission.io.vda5050 import read_order
 

@@ -14,7 +14,6 @@ from pathlib import Path
 from commission.errors import FileFormatError, UsageError
 from commission.io import mesh
 from commission.io.dxf import read_drawing
-from commission.io.edges import RouteImport
 from commission.io.findings import Findings
 from commission.io.imk import read_imk, write_imk
 from commission.io.json_document import read_json
@@ -25,6 +24,7 @@ from commission.io.project_file import FILE_NAME, load_project, project_file, sa
 from commission.io.recordings.base import open_recording
 from commission.io.recordings.csv_writer import write_recording
 from commission.io.reflector_tables import write_reflectors
+from commission.io.route_edges import RouteImport
 from commission.io.table_import import read_any_table
 from commission.io.vda5050 import read_order
 from commission.site import network_diff

@@ -14,7 +14,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from commission.errors import UsageError
-from commission.io.edges import (
+from commission.io.findings import Findings, shown
+from commission.io.json_document import Fields, read_json
+from commission.io.route_edges import (
     CORNER,
     Angles,
     Edge,
@@ -29,8 +31,6 @@ from commission.io.edges import (
     turn,
     unique,
 )
-from commission.io.findings import Findings, shown
-from commission.io.json_document import Fields, read_json
 from commission.site.routes import Route
 from commission.site.stations import Station
 

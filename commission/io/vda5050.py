@@ -6,7 +6,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from commission.io.edges import (
+from commission.io.findings import Findings, shown
+from commission.io.json_document import Fields, read_json
+from commission.io.route_edges import (
     Angles,
     Edge,
     RouteImport,
@@ -19,8 +21,6 @@ from commission.io.edges import (
     speed_in,
     unique,
 )
-from commission.io.findings import Findings, shown
-from commission.io.json_document import Fields, read_json
 
 VERSIONS = ("2.0", "2.1", "3.0")
 _SPEEDS = ("maxSpeed", "maximumSpeed")

@@ -2,9 +2,9 @@ from collections.abc import Callable
 
 import pytest
 
-from commission.app.actions import VirtualDrive
-from commission.app.drives import prepare
-from commission.app.session import Drive
+from commission.app.base.actions import VirtualDrive
+from commission.app.run.drives import prepare
+from commission.app.run.session import Drive
 from commission.site.project import Project
 from tests.app.sites import room
 

@@ -8,22 +8,22 @@ import numpy as np
 import pytest
 import viser
 
-from commission.app import actions
-from commission.app.actions import Action
-from commission.app.layers.vehicle import VehicleLayer
+from commission.app.base import actions
+from commission.app.base.actions import Action
+from commission.app.base.panel import clock, escaped, posting
+from commission.app.base.reducer import parameter, with_parameter
+from commission.app.base.server import start_server
+from commission.app.base.state import AppState, LastEdit
+from commission.app.base.view import PageView, Progress
+from commission.app.editing.equipment_fields import source_html
 from commission.app.page import Page
-from commission.app.panels.base import clock, escaped, posting
-from commission.app.panels.equipment_fields import source_html
-from commission.app.panels.now_panel import rows
-from commission.app.panels.run_panel import NO_ROUTE, RunPanel
-from commission.app.panels.time_line import strip
-from commission.app.panels.top_bar import badge_text, title
-from commission.app.panels.tune_panel import KNOBS, SWITCHES, TunePanel, meant, shown
-from commission.app.reducer import parameter, with_parameter
-from commission.app.server import start_server
-from commission.app.session import Drive, Session
-from commission.app.store import AppState, LastEdit
-from commission.app.view import PageView, Progress
+from commission.app.project.top_bar import badge_text, title
+from commission.app.run.now_panel import rows
+from commission.app.run.run_panel import NO_ROUTE, RunPanel
+from commission.app.run.session import Drive, Session
+from commission.app.run.time_line import strip
+from commission.app.run.vehicle_layer import VehicleLayer
+from commission.app.tune.tune_panel import KNOBS, SWITCHES, TunePanel, meant, shown
 from commission.localization.estimate import Mode
 from commission.localization.setup import LocalizerSetup
 from commission.site.presets import SCANNERS, ScannerPreset

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from commission.app import actions
-from commission.app.actions import Action, Source, View
+from commission.app.base import actions
+from commission.app.base.actions import Action, Source, View
+from commission.app.base.state import AppState
+from commission.app.base.view import PageView
+from commission.app.run.session import Drive
 from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
-from commission.app.session import Drive
-from commission.app.store import AppState
-from commission.app.view import PageView
 from commission.errors import FileFormatError
 from commission.localization.setup import LocalizerSetup
 from commission.site.project import Project

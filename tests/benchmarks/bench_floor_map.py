@@ -16,14 +16,14 @@ from pathlib import Path
 
 import numpy as np
 
-from commission.app import actions
+from commission.app.base import actions
+from commission.app.base.jobs import JobReport, Jobs, JobState
 from commission.app.editing import actions as editing
 from commission.app.editing.editor import Tool
-from commission.app.jobs import JobReport, Jobs, JobState
-from commission.app.mapping.actions import FinishShape, MapOpened
-from commission.app.mapping.draft import MapDraft, MapFile
-from commission.app.mapping.effects import DrawMap, MapEffect, ReadMapFile, StopMapWork
-from commission.app.mapping.work import MapWork
+from commission.app.floor_map.actions import FinishShape, MapOpened
+from commission.app.floor_map.draft import MapDraft, MapFile
+from commission.app.floor_map.effects import DrawMap, MapEffect, ReadMapFile, StopMapWork
+from commission.app.floor_map.work import MapWork
 from commission.geometry import rasterize
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.project import Project

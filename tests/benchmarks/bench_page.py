@@ -15,9 +15,9 @@ import viser
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
-from commission.app.actions import Repeat, VirtualDrive
+from commission.app.base.actions import Repeat, VirtualDrive
+from commission.app.base.server import start_server
 from commission.app.launch import open_page
-from commission.app.server import start_server
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
 

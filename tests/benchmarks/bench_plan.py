@@ -14,16 +14,16 @@ from collections.abc import Callable
 import numpy as np
 from playwright.sync_api import sync_playwright
 
+from commission.app.base.jobs import Jobs
+from commission.app.base.server import start_server
+from commission.app.base.state import AppState
+from commission.app.coverage.scale import picture
 from commission.app.editing.actions import DragFloor, Join
 from commission.app.editing.editor import Drag, Editor, Grab
-from commission.app.jobs import Jobs
 from commission.app.launch import open_page
 from commission.app.plan.actions import SetPlan
 from commission.app.plan.planner import Planner
-from commission.app.plan.scale import picture
 from commission.app.plan.settings import Figure, PlanSettings
-from commission.app.server import start_server
-from commission.app.store import AppState
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
 from commission.planning.dilution import Heading

@@ -19,9 +19,9 @@ import viser
 from playwright.sync_api import sync_playwright
 from websockets.exceptions import ConnectionClosed
 
+from commission.app.base.server import start_server
 from commission.app.editing.editor import Tool
 from commission.app.launch import open_page
-from commission.app.server import start_server
 from commission.io.project_file import load_project, save_project
 from tests.app.raw_client import RawClient
 from tests.app.sites import room

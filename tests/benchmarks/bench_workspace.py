@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from commission.app import actions
+from commission.app.base import actions
 from commission.app.editing import actions as editing
 from commission.app.editing.editor import Tool
 from commission.site.editing import reflectors as edits

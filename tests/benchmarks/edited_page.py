@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from commission.app import actions, reducer
+from commission.app.base import actions, reducer
+from commission.app.base.server import start_server
+from commission.app.base.state import AppState
 from commission.app.editing import actions as editing
-from commission.app.keeping import Keeping
 from commission.app.page import Page
-from commission.app.server import start_server
-from commission.app.store import AppState
+from commission.app.project.project_folder import Keeping
 from commission.io.project_file import save_project
 from commission.site.project import Project
 

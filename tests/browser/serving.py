@@ -6,11 +6,11 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from commission.app.actions import Source
+from commission.app.base.actions import Source
+from commission.app.base.server import start_server
+from commission.app.base.state import AppState
 from commission.app.launch import open_page
 from commission.app.runtime import Runtime
-from commission.app.server import start_server
-from commission.app.store import AppState
 from commission.site.project import Project
 
 

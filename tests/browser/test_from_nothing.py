@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commission.app import actions
+from commission.app.base import actions
 from commission.app.editing.editor import Tool
 from commission.io.project_file import load_project
 from tests.browser.page import OpenPage

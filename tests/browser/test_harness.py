@@ -11,7 +11,7 @@ import pytest
 import viser
 from PIL import Image
 
-from commission.app.server import start_server
+from commission.app.base.server import start_server
 from tests.browser.page import SMALL, WIDE, OpenPage
 
 Window = Callable[..., OpenPage]

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from commission.app import actions
-from commission.app.actions import VirtualDrive
-from commission.app.panels.base import clock
-from commission.app.reducer import with_parameter
-from commission.app.session import Session
+from commission.app.base import actions
+from commission.app.base.actions import VirtualDrive
+from commission.app.base.panel import clock
+from commission.app.base.reducer import with_parameter
+from commission.app.run.session import Session
 from commission.site.project import Project
 from tests.app.sites import room
 from tests.browser.page import SMALL, OpenPage

@@ -11,8 +11,8 @@ from PIL import Image
 from playwright.sync_api import Browser
 from scipy.ndimage import maximum_filter, minimum_filter
 
-from commission.app.plan.layout_reducer import ACCEPT
-from commission.app.plan.scale import FIRST
+from commission.app.coverage.scale import FIRST
+from commission.app.placement.reducer import ACCEPT
 from commission.app.plan.settings import Figure
 from commission.app.plan.view import HeatView
 from commission.io.bundled import bundled_folder

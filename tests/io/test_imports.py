@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from commission.errors import CommissionError, FileFormatError, UsageError
 from commission.io import imports
-from commission.io.edges import RouteImport
 from commission.io.exports import Format, export
 from commission.io.imk import ReflectorImport
 from commission.io.imports import LayoutChoice, read_import, read_named, read_pasted, shown_name
+from commission.io.route_edges import RouteImport
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment

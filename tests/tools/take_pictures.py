@@ -16,8 +16,8 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, sync_playwright
 
-from commission.app import actions
-from commission.app.actions import VirtualDrive
+from commission.app.base import actions
+from commission.app.base.actions import VirtualDrive
 from commission.app.editing.actions import SelectReflectors
 from commission.app.editing.editor import Tool
 from commission.app.plan.actions import SetLayout, SetPlan

@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 from viser import ClientHandle, LabelHandle, TransformControlsEvent
 
-from commission.app import theme
-from commission.app.drawing import NO_POINTS, NO_SEGMENTS, lift, outline_segments, polyline_segments
+from commission.app.base import theme
+from commission.app.base.drawing import NO_POINTS, NO_SEGMENTS, lift, outline_segments, polyline_segments
+from commission.app.base.extent import extent_of
+from commission.app.base.panel import Post
 from commission.app.editing import actions
 from commission.app.editing.editor import Editor, Grab, Tool, measurement
 from commission.app.editing.gestures import moved, selected_of
 from commission.app.editing.route_gestures import curve, moved_route
 from commission.app.editing.station_gestures import heading_tip, moved_station
-from commission.app.exchange.ghosts import ghosts_of
-from commission.app.extent import extent_of
-from commission.app.layers.stations import station_marks
-from commission.app.mapping.tools import AREA_TOOLS
-from commission.app.panels.base import Post
+from commission.app.editing.station_layer import station_marks
+from commission.app.exchange.outlines import ghosts_of
+from commission.app.floor_map.tools import AREA_TOOLS
 from commission.geometry.arrays import FloatArray
 from commission.site.editing.routes import segment_of
 from commission.site.project import Project

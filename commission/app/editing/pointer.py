@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from viser import ClientHandle, SceneClickEvent, SceneNodeDragEvent
 
-from commission.app.cameras import OnDrag
+from commission.app.base.cameras import OnDrag
+from commission.app.base.panel import Post
 from commission.app.editing import actions
 from commission.app.editing.editor import Point
-from commission.app.panels.base import Post
 
 REACH_SHARE = 0.016
 """How near to something a click has to be, as a share of the visible height: about 10 pixels."""

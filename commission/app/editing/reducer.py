@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from commission.app.base.reduction import ApplyParameters, FlyTo, Reduction, Tell, reduce
+from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing import actions
 from commission.app.editing.editor import AlignmentDraft, Drag, Editor, Grab, Tool
 from commission.app.editing.gestures import (
@@ -21,11 +23,9 @@ from commission.app.editing.gestures import (
 from commission.app.editing.route_gestures import route_at
 from commission.app.editing.station_actions import DeleteStation, MoveStation, PlaceStation
 from commission.app.editing.station_gestures import moved_station, station_at
-from commission.app.mapping import tools as map_tools
-from commission.app.mapping.actions import FinishShape
+from commission.app.floor_map import tools as map_tools
+from commission.app.floor_map.actions import FinishShape
 from commission.app.plan.actions import FreeAreas, KeepOut
-from commission.app.reduction import ApplyParameters, FlyTo, Reduction, Tell, reduce
-from commission.app.store import AppState, Edit, edited
 from commission.errors import UsageError
 from commission.site.editing import reflectors as edits
 from commission.site.editing.snapping import snap_to_wall

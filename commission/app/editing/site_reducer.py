@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from commission.app.base.reduction import ApplyParameters, FlyTo, Reduction, Tell, reduce
+from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing import actions
 from commission.app.editing.editor import ControlPoint, Editor, Point, Tool
 from commission.app.editing.reducer import editor_of
 from commission.app.editing.route_gestures import control_point_at, route_of, segment_of
-from commission.app.reduction import ApplyParameters, FlyTo, Reduction, Tell, reduce
-from commission.app.store import AppState, Edit, edited
 from commission.errors import UsageError
 from commission.site.editing import routes as edits
 from commission.site.layout_brief import LayoutBrief

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from commission.app.base.extent import extent_of
 from commission.app.editing.editor import Editor, Grab, Point
-from commission.app.extent import extent_of
 from commission.site.editing.stations import aligned, on_route
 from commission.site.project import Project
 from commission.site.stations import Station

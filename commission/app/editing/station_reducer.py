@@ -6,11 +6,11 @@ import math
 from dataclasses import replace
 from typing import Any
 
+from commission.app.base.reduction import FlyTo, Reduction, reduce
+from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing import station_actions as actions
 from commission.app.editing.reducer import editor_of
 from commission.app.editing.station_gestures import station_of
-from commission.app.reduction import FlyTo, Reduction, reduce
-from commission.app.store import AppState, Edit, edited
 from commission.errors import UsageError
 from commission.site.editing import stations as edits
 from commission.site.stations import Station

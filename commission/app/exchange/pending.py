@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
+from commission.app.base.uploads import Upload
 from commission.app.exchange.preview import Preview, compare
-from commission.app.uploads import Upload
 from commission.io.imports import PASTED, Imported, LayoutChoice, shown_name
 from commission.site.project import Project
 

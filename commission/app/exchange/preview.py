@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from commission.io.edges import RouteImport
 from commission.io.imk import ReflectorImport
 from commission.io.imports import Imported
 from commission.io.project_archive import ProjectImport
+from commission.io.route_edges import RouteImport
 from commission.site import network_diff, reflector_diff
 from commission.site.network_diff import NamedDiff
 from commission.site.project import Project

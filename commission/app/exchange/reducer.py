@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from commission.app.editing.editor import Editor
-from commission.app.exchange import actions
-from commission.app.exchange.pending import Exchange, Pending, Reading, Sent
-from commission.app.reduction import (
+from commission.app.base.reduction import (
     ApplyParameters,
     ExportProject,
     ReadFile,
@@ -17,7 +14,10 @@ from commission.app.reduction import (
     Tell,
     reduce,
 )
-from commission.app.store import AppState, Edit, edited
+from commission.app.base.state import AppState, Edit, edited
+from commission.app.editing.editor import Editor
+from commission.app.exchange import actions
+from commission.app.exchange.pending import Exchange, Pending, Reading, Sent
 from commission.errors import UsageError
 from commission.io.project_archive import ProjectImport
 

@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
+from commission.app.base.panel import escaped
 from commission.app.exchange.preview import Preview
-from commission.app.panels.base import escaped
 from commission.geometry.angles import wrap_scalar
 from commission.site.network_diff import course_shift, length_of
 from commission.site.reflector_diff import ReflectorChange

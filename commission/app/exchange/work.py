@@ -6,13 +6,13 @@ import itertools
 from collections.abc import Callable
 from typing import TypeAlias, cast
 
+from commission.app.base.jobs import JobReport, Jobs, JobState, Progress
+from commission.app.base.reduction import ExportProject, ReadFile, StopReading
+from commission.app.base.uploads import Upload
 from commission.app.exchange import actions
 from commission.app.exchange.actions import ExchangeAction
 from commission.app.exchange.pending import ImportSource, Pasted, ServerFile
 from commission.app.exchange.preview import compare
-from commission.app.jobs import JobReport, Jobs, JobState, Progress
-from commission.app.reduction import ExportProject, ReadFile, StopReading
-from commission.app.uploads import Upload
 from commission.io.exports import export
 from commission.io.imports import Imported, LayoutChoice, read_import, read_named, read_pasted
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from commission.app.plan.layout import Suggestion
+from commission.app.placement.suggestion import Suggestion
 from commission.app.plan.settings import Place, PlanValue
 from commission.site.layout_brief import Rectangle
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from commission.app.plan.cold_start import Ambiguity
-from commission.app.plan.layout import LayoutWish, Suggestion
-from commission.app.plan.scale import FIRST, NO_FIX, QUANTITIES, Scale
+from commission.app.ambiguity.cold_start import Ambiguity
+from commission.app.coverage.scale import FIRST, NO_FIX, QUANTITIES, Scale
+from commission.app.placement.suggestion import LayoutWish, Suggestion
 from commission.app.plan.settings import PlanSettings
 from commission.app.plan.view import (
     ColdStartView,

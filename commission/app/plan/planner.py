@@ -8,22 +8,22 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from commission.app.ambiguity.cold_start import Ambiguity, look_alike
+from commission.app.base.jobs import JobReport, Jobs
+from commission.app.base.state import AppState
+from commission.app.coverage.ellipses import ellipses
+from commission.app.coverage.scale import Scale, scale_for
 from commission.app.editing.editor import Editor, Grab
 from commission.app.editing.gestures import moved
-from commission.app.jobs import JobReport, Jobs
+from commission.app.placement.suggestion import Suggestion, suggest
 from commission.app.plan import work
-from commission.app.plan.cold_start import Ambiguity, look_alike
-from commission.app.plan.ellipses import ellipses
 from commission.app.plan.keys import changed_reflectors, cold_start_key, floor_key, ranking_key, route_key, site_key
-from commission.app.plan.layout import Suggestion, suggest
 from commission.app.plan.looks import cold_start_view, failure_view, heat_view, layout_view, reading_of, route_view
 from commission.app.plan.remembered import Remembered
-from commission.app.plan.scale import Scale, scale_for
 from commission.app.plan.settings import PlanSettings
 from commission.app.plan.upkeep import Upkeep, is_same
 from commission.app.plan.view import ColdStartView, EllipseView, FailureView, HeatView, LayoutView, PlanView, RouteView
 from commission.app.plan.work import Covered, Predicted, Ranked
-from commission.app.store import AppState
 from commission.site.project import Project
 
 COVERAGE, PREDICTION, RANKING = "Coverage", "Route prediction", "What if one fails"

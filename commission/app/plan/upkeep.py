@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Generic, TypeAlias, TypeVar
 
-from commission.app.jobs import JobReport, Jobs, JobState, Progress
+from commission.app.base.jobs import JobReport, Jobs, JobState, Progress
 
 Result = TypeVar("Result")
 Key: TypeAlias = tuple[object, ...]

@@ -8,9 +8,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.app.plan.cold_start import Ambiguity
-from commission.app.plan.layout import Suggestion
-from commission.app.plan.scale import Scale
+from commission.app.ambiguity.cold_start import Ambiguity
+from commission.app.coverage.scale import Scale
+from commission.app.placement.suggestion import Suggestion
 from commission.app.plan.settings import Figure, Place
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.planning.coverage import Lattice

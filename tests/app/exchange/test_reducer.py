@@ -8,13 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commission.app import actions as page
-from commission.app import reducer
-from commission.app.editing.actions import Join, Leave
-from commission.app.exchange import actions
-from commission.app.exchange.pending import IDLE, Exchange, Pasted, ServerFile
-from commission.app.exchange.preview import compare
-from commission.app.reduction import (
+from commission.app.base import actions as page
+from commission.app.base import reducer
+from commission.app.base.reduction import (
     ApplyParameters,
     ExportProject,
     ReadFile,
@@ -23,14 +19,18 @@ from commission.app.reduction import (
     StopReading,
     Tell,
 )
-from commission.app.store import AppState
-from commission.app.uploads import Upload
+from commission.app.base.state import AppState
+from commission.app.base.uploads import Upload
+from commission.app.editing.actions import Join, Leave
+from commission.app.exchange import actions
+from commission.app.exchange.pending import IDLE, Exchange, Pasted, ServerFile
+from commission.app.exchange.preview import compare
 from commission.errors import UsageError
-from commission.io.edges import RouteImport
 from commission.io.exports import Exported, Format
 from commission.io.imk import ReflectorImport
 from commission.io.imports import WHOLE, Imported, LayoutChoice
 from commission.io.project_archive import ProjectImport
+from commission.io.route_edges import RouteImport
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
 from commission.site.stations import Station

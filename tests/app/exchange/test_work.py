@@ -8,16 +8,16 @@ from queue import Queue
 
 import pytest
 
-from commission.app import reducer
+from commission.app.base import reducer
+from commission.app.base.reduction import ExportProject, ReadFile, StopReading
+from commission.app.base.state import AppState
+from commission.app.base.uploads import Upload
 from commission.app.editing.editor import Editor
 from commission.app.exchange import actions
 from commission.app.exchange.actions import ExchangeAction
 from commission.app.exchange.pending import ImportSource, Pasted, ServerFile
 from commission.app.exchange.words import notes
 from commission.app.exchange.work import Exchanger
-from commission.app.reduction import ExportProject, ReadFile, StopReading
-from commission.app.store import AppState
-from commission.app.uploads import Upload
 from commission.io.exports import Format
 from commission.io.imk import ReflectorImport
 from commission.io.imports import WHOLE

@@ -8,13 +8,13 @@ from queue import SimpleQueue
 import numpy as np
 import pytest
 
+from commission.app.base.jobs import JobReport, Jobs
+from commission.app.base.state import AppState
 from commission.app.editing.editor import Drag, Editor, Grab, Snapping
-from commission.app.jobs import JobReport, Jobs
 from commission.app.plan import work
 from commission.app.plan.planner import Planner
 from commission.app.plan.settings import Figure, PlanSettings
 from commission.app.plan.view import PlanView
-from commission.app.store import AppState
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 

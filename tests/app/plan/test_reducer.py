@@ -3,11 +3,11 @@ from dataclasses import replace
 
 import pytest
 
-from commission.app import reducer
-from commission.app.actions import Action
+from commission.app.base import reducer
+from commission.app.base.actions import Action
+from commission.app.base.state import AppState
 from commission.app.plan.actions import ReadFloor, SetPlan
 from commission.app.plan.settings import Figure, PlanSettings
-from commission.app.store import AppState
 from commission.errors import UsageError
 from commission.planning.dilution import Heading
 from commission.site.project import Project

@@ -1,0 +1,1 @@
+"""Where a vehicle that is switched on could take its place for another one."""

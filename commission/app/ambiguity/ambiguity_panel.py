@@ -1,0 +1,86 @@
+"""The step Plan: where a vehicle that is switched on could take its place for another one."""
+
+from __future__ import annotations
+
+from viser import GuiApi, GuiFolderHandle
+
+from commission.app.base import theme
+from commission.app.base.inputs import Inputs, Text, WorkBar
+from commission.app.base.panel import BasePanel, Post, posting
+from commission.app.base.rows import Rows
+from commission.app.base.view import PageView
+from commission.app.plan.actions import SetPlan
+from commission.app.plan.planner import COLD_START
+from commission.app.plan.view import ColdStartView
+
+MOST_PAIRS = 15
+MOST_NAMES = 6
+
+
+class ColdStartPanel(BasePanel):
+    """Widgets of the ambiguous places.
+
+    Parameters
+    ----------
+    gui, post : where the widgets are made, what takes their actions.
+    folder : the folder that holds them.
+    """
+
+    def __init__(self, gui: GuiApi, post: Post, folder: GuiFolderHandle) -> None:
+        self._inputs = Inputs(gui, post, SetPlan, lambda state, name: getattr(state.plan, name))
+        with folder:
+            hint = "Largest distance at which a reflector still counts as standing where its look-alike does."
+            tolerance = gui.add_number("Tolerance [mm]", 100, min=5, max=2000, step=5, hint=hint)
+            self._inputs.number("tolerance", 1000.0, tolerance)
+            hint = "Look for places from which the reflectors look as they do from somewhere else."
+            ask = gui.add_button("Find ambiguous places", hint=hint)
+            ask.on_click(posting(post, lambda _event: SetPlan("cold_start", value=True)))
+            self._work = WorkBar(gui, post, COLD_START, SetPlan("cold_start", value=False))
+            self._text = Text(gui)
+        self._pairs = Rows(gui, folder, post, lambda index, _client: SetPlan("pair", index))
+        self._shown: tuple[ColdStartView | None, int] | None = None
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Follow settings, progress and result."""
+        found, chosen = view.plan.cold_start, view.state.plan.pair
+        self._inputs.follow(view.state)
+        self._work.follow(view)
+        if self._shown == (found, chosen):
+            return
+        self._shown = found, chosen
+        self._text.write((found,), lambda: "" if found is None else _summary(found))
+        self._pairs.show([] if found is None else _lines(found, chosen))
+
+
+def _summary(found: ColdStartView) -> str:
+    """Say how many pairs there are, and whether they are those of now."""
+    count = len(found.ambiguity.pairs)
+    if count:
+        listed = f", the {MOST_PAIRS} most frequent listed" if count > MOST_PAIRS else ""
+        notes = [f"{count} pairs of look-alikes{listed}; a click shows one."]
+    else:
+        notes = ["No two places look alike."]
+    if found.outdated:
+        notes.append("The site or the tolerance has changed since: look again.")
+    if not found.is_drawn:
+        notes.append("The map is under the heatmap: switch that off to see it.")
+    return "".join(f"<div class='c-note' style='padding:2px 6px'>{note}</div>" for note in notes)
+
+
+def _lines(found: ColdStartView, chosen: int) -> list[tuple[str, theme.Color]]:
+    """A line for each of the most frequent pairs."""
+    ambiguity = found.ambiguity
+    return [
+        (
+            f"{_names(ambiguity.names(pair.constellation))} like {_names(ambiguity.names(pair.image))}: "
+            f"{pair.poses} poses",
+            theme.SELECTED_LINE if index == chosen else theme.LINE,
+        )
+        for index, pair in enumerate(ambiguity.pairs[:MOST_PAIRS])
+    ]
+
+
+def _names(names: tuple[str, ...]) -> str:
+    """Names of a group, cut where they would fill the panel. They are labels of buttons, which show no html."""
+    more = f" +{len(names) - MOST_NAMES}" if len(names) > MOST_NAMES else ""
+    return " ".join(names[:MOST_NAMES]) + more

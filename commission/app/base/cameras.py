@@ -1,0 +1,261 @@
+"""What each browser looks at: plan (north up, as good as orthographic) or 3D, fitted to the site or on the vehicle.
+
+All browsers share one scene; the camera, and what only plan or 3D needs, belong to one browser.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Coroutine, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+import viser
+from viser import CameraHandle, ClientHandle, SceneNodeHandle
+
+from commission.app.base.actions import View
+from commission.app.base.extent import Extent
+from commission.app.base.layer import Layer
+from commission.app.base.view import RunView
+
+PLAN_FOV = 0.02
+"""Vertical opening of the camera in the plan [rad]: from so far away that heights do not shift anything."""
+THREE_D_FOV = 0.85
+ASPECT_AT_START = 1.7
+FOLLOWED_HEIGHT = 6.0
+"""Visible height when the vehicle is first followed in the plan [m]."""
+NEAREST_FLIGHT = 8.0
+"""Visible height when a place is flown to from farther away [m]."""
+STRAIGHT_DOWN = np.array([0.0, 1.0, 0.0, 0.0])
+LOCK = "/lock"
+SETTLING = 4.0
+"""Time after a browser came during which its panels still take their places and change the shape of the floor [s]."""
+
+OnDrag: TypeAlias = Callable[[Any], Coroutine[Any, Any, None]]
+"""Takes viser's drag events of the floor; `async`, since only those keep their order."""
+
+
+@dataclass(slots=True)
+class ClientView:
+    """What one browser looks at."""
+
+    client: ClientHandle
+    """The browser."""
+    three_d: bool = False
+    """Whether it is the 3D view."""
+    follow: bool = False
+    """Whether the camera goes with the vehicle."""
+    furniture: dict[str, tuple[SceneNodeHandle, ...]] = field(default_factory=dict)
+    """Its own nodes by layer."""
+    aspect: float = 0.0
+    """Shape of the floor, width over height, that the plan was fitted to."""
+    fitted: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where the camera was put to show the whole site [m]."""
+    came_at: float = field(default_factory=time.monotonic)
+    """When it came, on the clock of this computer [s]."""
+
+
+class Cameras:
+    """The views of all browsers; called by the owner thread alone."""
+
+    def __init__(
+        self, server: viser.ViserServer, layers: Sequence[Layer], extent: Extent, on_drag: OnDrag | None = None
+    ) -> None:
+        self._on_drag = on_drag or _ignore
+        self._server = server
+        self._layers = layers
+        self._extent = extent
+        self._views: dict[int, ClientView] = {}
+        self._target: tuple[float, float] | None = None
+        height = _visible_height(extent, ASPECT_AT_START) / PLAN_FOV
+        start = server.initial_camera
+        x, y = extent.center
+        start.position, start.look_at, start.up = (x, y, height), (x, y, 0.0), (0.0, 1.0, 0.0)
+        start.fov, start.near, start.far = PLAN_FOV, _nearest(height), 6.0 * height
+
+    def connected(self, client: ClientHandle) -> None:
+        """Begin with the plan of the whole site."""
+        self._views[client.client_id] = ClientView(client)
+        client.camera.on_update(self._watch)
+        self._furnish(self._views[client.client_id])
+        self.show(client.client_id, View.FIT)
+
+    def disconnected(self, client_id: int) -> None:
+        """Forget a browser; its nodes went with it."""
+        self._views.pop(client_id, None)
+
+    def show(self, client_id: int, view: View) -> None:
+        """Change what a browser looks at; one that is gone is ignored."""
+        own = self._views.get(client_id)
+        if own is None:
+            return
+        if view is View.FOLLOW:
+            own.follow = not own.follow
+            if own.follow and self._target is not None and not own.three_d:
+                self._look_down(own.client, self._target, FOLLOWED_HEIGHT)
+            return
+        own.follow = False
+        if view is not View.FIT and own.three_d is not (view is View.THREE_D):
+            own.three_d = view is View.THREE_D
+            self._furnish(own)
+        if own.three_d:
+            self._look_from_the_south(own.client)
+        else:
+            self._fit(own)
+
+    def look_at(self, client_id: int, place: tuple[float, float]) -> None:
+        """Bring a place into the middle of a browser's view, near enough to see it."""
+        own = self._views.get(client_id)
+        if own is None:
+            return
+        own.follow, own.came_at = False, -SETTLING
+        camera = own.client.camera
+        distance = float(np.linalg.norm(camera.position - camera.look_at))
+        if not own.three_d:
+            self._look_down(own.client, place, min(distance * PLAN_FOV, NEAREST_FLIGHT))
+            return
+        target = np.array([*place, 0.0])
+        away = camera.position - camera.look_at
+        with own.client.atomic():
+            camera.position = target + away * min(1.0, NEAREST_FLIGHT / max(distance, 1e-6))
+            camera.look_at = target
+
+    def show_layer(self, name: str, *, visible: bool) -> None:
+        """Show or hide a layer's nodes in the browsers that have some of their own."""
+        for own in self._views.values():
+            for node in own.furniture.get(name, ()):
+                node.visible = visible
+
+    def refurnish(self, changed: frozenset[str], extent: Extent, hidden: frozenset[str]) -> None:
+        """Make the browsers' own nodes of these layers anew, after the project changed."""
+        self._extent = extent
+        for own in self._views.values():
+            self._furnish_layers(own, changed)
+        for name in hidden & changed:
+            self.show_layer(name, visible=False)
+
+    def follow(self, run: RunView) -> None:
+        """Move the cameras that follow the vehicle."""
+        self._target = (float(run.pose[0]), float(run.pose[1]))
+        target = np.array([*self._target, 0.0])
+        for own in self._views.values():
+            if own.follow:
+                camera = own.client.camera
+                shift = target - camera.look_at
+                with own.client.atomic():
+                    camera.position = camera.position + shift
+                    camera.look_at = target
+
+    def _furnish(self, own: ClientView) -> None:
+        """Replace all of a browser's own nodes."""
+        self._furnish_layers(own, frozenset(layer.name for layer in self._layers))
+        for node in own.furniture.pop(LOCK, ()):
+            node.remove()
+        if not own.three_d:
+            own.furniture[LOCK] = (_rotation_lock(own.client, self._on_drag),)
+
+    def _furnish_layers(self, own: ClientView, names: frozenset[str]) -> None:
+        """Replace a browser's own nodes of some layers."""
+        for layer in self._layers:
+            if layer.name in names:
+                for node in own.furniture.get(layer.name, ()):
+                    node.remove()
+                own.furniture[layer.name] = layer.furnish(own.client.scene, three_d=own.three_d)
+
+    def _fit(self, own: ClientView) -> None:
+        """Show the plan of the whole site."""
+        own.aspect = _aspect(own.client)
+        height = _visible_height(self._extent, own.aspect)
+        own.fitted = (*self._extent.center, height / PLAN_FOV)
+        self._look_down(own.client, self._extent.center, height)
+
+    def _look_down(self, client: ClientHandle, center: tuple[float, float], visible_height: float) -> None:
+        distance = visible_height / PLAN_FOV
+        camera = client.camera
+        with client.atomic():
+            fitted = _visible_height(self._extent, _aspect(client)) / PLAN_FOV
+            camera.fov, camera.near, camera.far = PLAN_FOV, _nearest(fitted), 6.0 * fitted
+            camera.min_orbit_distance, camera.max_orbit_distance = 2.0 * _nearest(fitted), 4.0 * fitted
+            camera.up_direction = (0.0, 1.0, 0.0)
+            camera.position = (*center, distance)
+            camera.look_at = (*center, 0.0)
+
+    def _look_from_the_south(self, client: ClientHandle) -> None:
+        x, y = self._extent.center
+        reach = _visible_height(self._extent, _aspect(client))
+        camera = client.camera
+        with client.atomic():
+            camera.fov, camera.near, camera.far = THREE_D_FOV, 0.05, 50.0 * reach
+            camera.min_orbit_distance, camera.max_orbit_distance = 0.5, 20.0 * reach
+            camera.up_direction = (0.0, 0.0, 1.0)
+            camera.position = (x, y - 0.85 * reach, 0.85 * reach)
+            camera.look_at = (x, y, 0.0)
+
+    async def _watch(self, camera: CameraHandle) -> None:
+        """Fit anew while the page still builds up, and keep north up afterwards.
+
+        A browser reports the camera that it began with, and the floor takes its shape when the panels have come: a plan
+        fitted before that shows a corner of the site. Later the floor changes its shape with the window, or when the
+        plots are folded: who had the whole site in view keeps it.
+        """
+        own = self._views.get(camera.client.client_id)
+        if own is None or own.three_d or own.follow:
+            return
+        shift = float(np.hypot(*(camera.look_at[:2] - self._extent.center)))
+        is_reshaped = abs(_aspect(own.client) - own.aspect) > 0.01
+        if time.monotonic() - own.came_at < SETTLING:
+            is_due = is_reshaped or shift > 0.01 * max(self._extent.size)
+        else:
+            is_due = is_reshaped and np.allclose(camera.position, own.fitted, rtol=1e-3)
+        if is_due:
+            self._fit(own)
+            return
+        self._keep_north_up(camera)
+
+    def _keep_north_up(self, camera: CameraHandle) -> None:
+        """Undo a turn by the arrow keys, which cannot be switched off."""
+        if abs(abs(float(camera.wxyz @ STRAIGHT_DOWN)) - 1.0) < 1e-6:
+            return
+        distance = float(np.linalg.norm(camera.position - camera.look_at))
+        x, y = (float(value) for value in camera.look_at[:2])
+        with camera.client.atomic():
+            camera.up_direction = (0.0, 1.0, 0.0)
+            camera.position = (x, y, distance)
+            camera.look_at = (x, y, 0.0)
+
+
+def _visible_height(extent: Extent, aspect: float) -> float:
+    """Height of the floor [m] that shows the whole rectangle."""
+    width, height = extent.size
+    return 1.04 * max(height, width / aspect)
+
+
+def _nearest(fitted_distance: float) -> float:
+    """Distance before which the plan draws nothing [m]: as far as zooming allows, for the sake of depth."""
+    return fitted_distance / 50.0
+
+
+def _aspect(client: ClientHandle) -> float:
+    """Width of a browser's floor over its height."""
+    aspect = float(client.camera.aspect)
+    return aspect if 0.2 < aspect < 8.0 else ASPECT_AT_START
+
+
+def _rotation_lock(client: ClientHandle, on_drag: OnDrag) -> SceneNodeHandle:
+    """Put a sheet under everything that takes left drags: the camera would turn by them, and north not stay up."""
+    sheet = client.scene.add_box(
+        LOCK,
+        dimensions=(20_000.0, 20_000.0, 0.01),
+        position=(0.0, 0.0, -1.0),
+        opacity=0.0,
+        cast_shadow=False,
+        receive_shadow=False,
+    )
+    sheet.on_drag("left")(on_drag)
+    sheet.on_drag("left", modifier="shift")(on_drag)
+    return sheet
+
+
+async def _ignore(_event: object) -> None:
+    """Take a drag of the floor so that the camera does not."""

@@ -1,0 +1,145 @@
+"""Inputs that post one setting each and follow it, the progress of a job with its cancel button, and changing text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from enum import StrEnum
+from typing import Any, TypeAlias, TypeVar
+
+from viser import GuiApi, GuiInputHandle
+
+from commission.app.base.actions import Action
+from commission.app.base.panel import Post, posting, write
+from commission.app.base.state import AppState
+from commission.app.base.view import PageView
+from commission.app.plan.settings import PlanValue
+
+Choice = TypeVar("Choice", bound=StrEnum)
+Read: TypeAlias = Callable[[AppState, str], Any]
+Make: TypeAlias = Callable[[str, PlanValue], Action]
+
+
+class Inputs:
+    """Widgets of named settings; what a person changes is posted, what the state says is shown.
+
+    Parameters
+    ----------
+    gui, post : where the widgets are made, what takes their actions.
+    make : from a setting's name and its new value (SI) to the action.
+    read : a setting's value (SI) in a state.
+    """
+
+    def __init__(self, gui: GuiApi, post: Post, make: Make, read: Read) -> None:
+        self._gui, self._post, self._make, self._read = gui, post, make, read
+        self._widgets: list[tuple[GuiInputHandle[Any], Callable[[AppState], Any]]] = []
+        self._followed: dict[int, object] = {}
+
+    def connect(
+        self,
+        name: str,
+        widget: GuiInputHandle[Any],
+        meant: Callable[[Any], PlanValue],
+        shown: Callable[[AppState], Any],
+    ) -> None:
+        """Connect a widget.
+
+        Parameters
+        ----------
+        name : of the setting.
+        widget : shows it.
+        meant : from what the widget shows to the setting's value, SI.
+        shown : from a state to what the widget shows.
+        """
+        widget.on_update(posting(self._post, lambda event: self._make(name, meant(event.target.value))))
+        self._widgets.append((widget, shown))
+
+    def choice(self, name: str, label: str, names: Mapping[Choice, str], hint: str) -> GuiInputHandle[Any]:
+        """Add a list of choices."""
+        meant = {text: choice.value for choice, text in names.items()}
+        widget = self._gui.add_dropdown(label, tuple(meant), hint=hint)
+        self.connect(name, widget, lambda text: meant[text], lambda state: names[self._read(state, name)])
+        return widget
+
+    def number(self, name: str, scale: float, widget: GuiInputHandle[Any]) -> GuiInputHandle[Any]:
+        """Connect a number that is shown in another unit: `scale` is the number on the page for one SI unit."""
+        self.connect(
+            name,
+            widget,
+            lambda value: float(value) / scale,
+            lambda state: round(float(self._read(state, name)) * scale, 3),
+        )
+        return widget
+
+    def count(self, name: str, widget: GuiInputHandle[Any]) -> GuiInputHandle[Any]:
+        """Connect a whole number."""
+        self.connect(name, widget, int, lambda state: int(self._read(state, name)))
+        return widget
+
+    def switch(self, name: str, label: str, hint: str) -> GuiInputHandle[Any]:
+        """Add a check box."""
+        widget = self._gui.add_checkbox(label, False, hint=hint)
+        self.connect(name, widget, bool, lambda state: bool(self._read(state, name)))
+        return widget
+
+    def follow(self, state: AppState) -> None:
+        """Set widgets to what the state says, each where that has changed: what is being typed is not yet in it."""
+        for index, (widget, shown) in enumerate(self._widgets):
+            value = shown(state)
+            if index not in self._followed or self._followed[index] != value:
+                self._followed[index] = value
+                write(widget, value)
+
+
+class WorkBar:
+    """Progress of a job while it runs, with a button that cancels it.
+
+    Parameters
+    ----------
+    gui, post : where the widgets are made, what takes the action.
+    name : of the job.
+    cancel : the action that cancels it, by not wanting its result any more.
+    """
+
+    def __init__(self, gui: GuiApi, post: Post, name: str, cancel: Action) -> None:
+        self.name = name
+        self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
+        self._cancel = gui.add_button("Cancel", color="gray", visible=False)
+        self._cancel.on_click(posting(post, lambda _event: cancel))
+
+    def follow(self, view: PageView) -> bool:
+        """Show how far the job is; return whether it runs."""
+        job = next((job for job in view.jobs if job.name.startswith(self.name)), None)
+        for widget in (self._bar, self._cancel):
+            show(widget, visible=job is not None)
+        if job is not None:
+            write(self._bar, 100.0 * job.fraction)
+        return job is not None
+
+
+class Text:
+    """Html that is made anew only where what it is made from has changed, and hidden while there is none."""
+
+    def __init__(self, gui: GuiApi) -> None:
+        self._html = gui.add_html("", visible=False)
+        self._source: object = None
+
+    def write(self, source: object, make: Callable[[], str]) -> None:
+        """Write what `make` returns, unless it was made from the same source before."""
+        if self._source is not None and self._source == source:
+            return
+        self._source = source
+        content = make()
+        write_html(self._html, content)
+
+
+def write_html(widget: Any, content: str) -> None:
+    """Exchange the content of an html element where it is another one; an empty one takes no room."""
+    if widget.content != content:
+        widget.content = content
+    show(widget, visible=bool(content))
+
+
+def show(widget: Any, *, visible: bool) -> None:
+    """Show or hide a widget where it is not so already."""
+    if widget.visible is not visible:
+        widget.visible = visible

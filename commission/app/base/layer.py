@@ -1,0 +1,91 @@
+"""What every layer has: a name, entries in the legend, nodes in the shared scene and in a browser's own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from viser import SceneApi, SceneNodeHandle
+
+from commission.app.base.state import AppState
+from commission.app.base.theme import Legend
+from commission.app.base.view import RunView
+from commission.app.plan.view import PlanView
+from commission.site.project import Project
+from commission.studies.violations import Violation
+
+
+class Layer(Protocol):
+    """One drawn thing that can be switched off."""
+
+    name: str
+    """Shown beside its switch; unique."""
+    legend: tuple[Legend, ...]
+    """Its entries in the legend."""
+    reads: tuple[str, ...]
+    """Parts of the project that it draws from: it is drawn anew when one of them is another value."""
+
+    def show_site(self, project: Project) -> None:
+        """Draw what depends on the project alone."""
+
+    def draw(self, run: RunView, state: AppState) -> None:
+        """Draw what changes with each scan."""
+
+    def draw_slowly(self, run: RunView, state: AppState) -> None:
+        """Draw what may lag some scans behind: whatever grows with the drive."""
+
+    def draw_plan(self, plan: PlanView, state: AppState) -> None:
+        """Draw what the step Plan has found."""
+
+    def is_used(self, plan: PlanView, state: AppState) -> bool:
+        """Whether there is something that the legend has to explain."""
+        ...
+
+    def draw_violations(self, violations: Sequence[Violation]) -> None:
+        """Mark where routes ask too much of the vehicle."""
+
+    def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:
+        """Add what only one browser's view needs; the caller removes it when the view changes."""
+        ...
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the layer's nodes in the shared scene, to show or hide."""
+        ...
+
+
+class BaseLayer:
+    """A layer that draws nothing: each one overrides what it needs."""
+
+    name = ""
+    legend: tuple[Legend, ...] = ()
+    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes", "vehicle", "scanner")
+
+    def __init__(self, scene: SceneApi) -> None:
+        self.scene = scene
+
+    def show_site(self, project: Project) -> None:
+        """Draw what depends on the project alone."""
+
+    def draw(self, run: RunView, state: AppState) -> None:
+        """Draw what changes with each scan."""
+
+    def draw_slowly(self, run: RunView, state: AppState) -> None:
+        """Draw what may lag some scans behind."""
+
+    def draw_plan(self, plan: PlanView, state: AppState) -> None:
+        """Draw what the step Plan has found."""
+
+    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - a default
+        """Whether there is something that the legend has to explain."""
+        return True
+
+    def draw_violations(self, violations: Sequence[Violation]) -> None:
+        """Mark where routes ask too much of the vehicle."""
+
+    def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:  # noqa: ARG002 - a default
+        """Add what only one browser's view needs."""
+        return ()
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the layer's nodes in the shared scene."""
+        return ()

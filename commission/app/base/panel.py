@@ -1,0 +1,81 @@
+"""What every panel is given and has to do; text made safe for html; callbacks that only post."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable, Iterable
+from typing import Any, Protocol, TypeAlias
+
+from viser import GuiEvent
+
+from commission.app.base.actions import Action
+from commission.app.base.view import PageView
+
+Post: TypeAlias = Callable[[Action], None]
+
+
+class Panel(Protocol):
+    """Widgets for one purpose."""
+
+    def draw(self, view: PageView) -> None:
+        """Show what changes with each scan."""
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Show what may lag some scans behind."""
+
+
+class BasePanel:
+    """A panel that shows nothing live: each one overrides what it needs."""
+
+    def draw(self, view: PageView) -> None:
+        """Show what changes with each scan."""
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Show what may lag some scans behind."""
+
+
+def posting(post: Post, make: Callable[[Any], Action]) -> Callable[[GuiEvent[Any]], None]:
+    """Return a callback that posts what a person asked for.
+
+    The server's own writes to a widget fire its callbacks too, without a client; they are nobody's wish.
+
+    Parameters
+    ----------
+    post : takes the action.
+    make : from the widget's event to the action.
+    """
+
+    def callback(event: GuiEvent[Any]) -> None:
+        if event.client is not None:
+            post(make(event))
+
+    return callback
+
+
+def client_of(event: GuiEvent[Any]) -> int:
+    """Return the number of the browser whose person did something; `posting` sees to it that there is one."""
+    return -1 if event.client_id is None else event.client_id
+
+
+def write(widget: Any, value: object) -> None:
+    """Show a value in an input where it is another one: nothing is sent for what is there already."""
+    if widget.value != value:
+        widget.value = value
+
+
+def escaped(text: object) -> str:
+    """Return text of a file or a person as html shows it, never as html reads it."""
+    return html.escape(str(text), quote=True)
+
+
+def table(rows: Iterable[tuple[str, str]]) -> str:
+    """Return a table of two columns; the caller escapes what is not its own."""
+    body = "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in rows)
+    return f'<table class="c-table">{body}</table>'
+
+
+def clock(seconds: float) -> str:
+    """Return a time as 02:05 or 1:02:05."""
+    whole = int(seconds)
+    hours, minutes = divmod(whole // 60, 60)
+    return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes:02d}:{whole % 60:02d}"

@@ -1,0 +1,85 @@
+"""The heatmap of the step Plan: one small picture on the floor, and a mark where its values are read."""
+
+from __future__ import annotations
+
+from viser import ImageHandle, LabelHandle, SceneApi, SceneNodeHandle
+
+from commission.app.base import theme
+from commission.app.base.layer import BaseLayer
+from commission.app.base.state import AppState
+from commission.app.coverage.scale import picture
+from commission.app.coverage.words import value_text
+from commission.app.plan.view import HeatView, PlanView, Reading
+from commission.planning.dilution import Measurement
+
+
+class HeatLayer(BaseLayer):
+    """Coverage of the floor."""
+
+    name = "Heatmap"
+    reads: tuple[str, ...] = ()
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._image: ImageHandle | None = None
+        self._label: LabelHandle | None = None
+        self._shown: tuple[HeatView | None, float] = (None, 0.0)
+        self._read: tuple[Reading | None, HeatView | None] = (None, None)
+
+    def draw_plan(self, plan: PlanView, state: AppState) -> None:
+        """Draw the picture anew where it or its opacity has changed."""
+        visible = self.name not in state.hidden
+        if (plan.heat, state.plan.opacity) != self._shown:
+            before, self._shown = self._shown[0], (plan.heat, state.plan.opacity)
+            self._draw(plan.heat, before, state.plan.opacity, visible=visible)
+        if (plan.reading, plan.heat) != self._read:
+            self._read = (plan.reading, plan.heat)
+            self._write(plan.reading, plan.heat, state.plan.measurement, visible=visible)
+
+    def _draw(self, heat: HeatView | None, before: HeatView | None, opacity: float, *, visible: bool) -> None:
+        """Exchange the picture's content, or the picture itself where its place is another one."""
+        if self._image is not None and (heat is None or before is None or heat.lattice != before.lattice):
+            self._image.remove()
+            self._image = None
+        if heat is None:
+            return
+        image = picture(heat.classes, heat.scale, opacity)
+        if self._image is not None:
+            self._image.image = image
+            return
+        lattice = heat.lattice
+        self._image = self.scene.add_image(
+            "/plan/heat",
+            image,
+            render_width=lattice.columns * lattice.spacing,
+            render_height=lattice.rows * lattice.spacing,
+            format="png",
+            position=(*lattice.middle, theme.Height.HEAT),
+            cast_shadow=False,
+            receive_shadow=False,
+            visible=visible,
+        )
+
+    def _write(
+        self, reading: Reading | None, heat: HeatView | None, measurement: Measurement, *, visible: bool
+    ) -> None:
+        """Write the value where the floor was clicked."""
+        if self._label is not None:
+            self._label.remove()
+            self._label = None
+        if reading is None or heat is None:
+            return
+        figure = heat.scale.figure
+        text = value_text(figure, reading.values[figure], measurement) if reading.on_floor else "no floor here"
+        self._label = self.scene.add_label(
+            "/plan/reading",
+            text,
+            position=(*reading.place, theme.Height.LABEL),
+            anchor="bottom-center",
+            font_screen_scale=0.9,
+            visible=visible,
+        )
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the picture and the value on it."""
+        return tuple(node for node in (self._image, self._label) if node is not None)

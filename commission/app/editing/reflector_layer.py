@@ -1,0 +1,124 @@
+"""The reflector map: a mark and a name in the plan, cylinders and plates in 3D."""
+
+from __future__ import annotations
+
+import numpy as np
+from viser import LabelHandle, SceneApi, SceneNodeHandle
+
+from commission.app.base import theme
+from commission.app.base.drawing import NO_POINTS, lift
+from commission.app.base.extent import extent_of
+from commission.app.base.layer import BaseLayer
+from commission.site.project import Project
+from commission.site.reflectors import ReflectorKind
+
+MOST_LABELS = 60
+SHOWN_HEIGHT = 0.4
+PLATE_THICKNESS = 0.02
+
+
+class ReflectorLayer(BaseLayer):
+    """Where the map says that reflectors are."""
+
+    name = "Reflectors"
+    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
+    legend = (theme.Legend("reflector (paper: dark blue)", theme.REFLECTOR, theme.Mark.DOT),)
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._project = Project()
+        self._marks = scene.add_point_cloud(
+            "/reflectors/marks",
+            NO_POINTS,
+            theme.REFLECTOR,
+            point_size=0.1,
+            point_shape="circle",
+            point_shading="flat",
+            precision="float32",
+        )
+
+    def show_site(self, project: Project) -> None:
+        """Draw a mark at each reflector's center."""
+        self._project = project
+        reflectors = project.reflectors
+        smallest = 1.2 * extent_of(project).mark_size()
+        self._marks.point_size = max(smallest, 2.0 * float(reflectors.radii.max(initial=0.0)))
+        self._marks.points = lift(reflectors.centers, theme.Height.REFLECTOR)
+
+    def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:
+        """Add bodies in 3D; they would hide the marks' surroundings in the plan."""
+        return _bodies(scene, self._project) if three_d else ()
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the marks."""
+        return (self._marks,)
+
+
+class ReflectorNameLayer(BaseLayer):
+    """Names of the reflectors, where they are few enough to be read."""
+
+    name = "Reflector names"
+    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._labels: dict[str, LabelHandle] = {}
+
+    def show_site(self, project: Project) -> None:
+        """Write each name beside its reflector; labels that stay are moved, not made anew."""
+        shown = project.reflectors.reflectors if len(project.reflectors) <= MOST_LABELS else ()
+        offset = extent_of(project).mark_size()
+        names = {reflector.id for reflector in shown}
+        for name in [name for name in self._labels if name not in names]:
+            self._labels.pop(name).remove()
+        for reflector in shown:
+            position = (reflector.x + offset, reflector.y + offset, theme.Height.LABEL)
+            label = self._labels.get(reflector.id)
+            if label is not None:
+                label.position = position
+                continue
+            self._labels[reflector.id] = self.scene.add_label(
+                f"/reflector_names/{reflector.id.encode().hex()}",
+                reflector.id,
+                position=position,
+                font_screen_scale=0.7,
+                anchor="bottom-left",
+            )
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the names."""
+        return tuple(self._labels.values())
+
+
+def _bodies(scene: SceneApi, project: Project) -> tuple[SceneNodeHandle, ...]:
+    """Add all cylinders as one batch and all plates as another."""
+    import trimesh
+
+    every = project.reflectors.reflectors
+    nodes: list[SceneNodeHandle] = []
+    unit_cylinder = trimesh.creation.cylinder(radius=1.0, height=1.0, sections=20)
+    unit_box = trimesh.creation.box(extents=(1.0, 1.0, 1.0))
+    for kind, mesh in ((ReflectorKind.CYLINDER, unit_cylinder), (ReflectorKind.FLAT, unit_box)):
+        chosen = [r for r in every if r.kind is kind]
+        if not chosen:
+            continue
+        round_one = kind is ReflectorKind.CYLINDER
+        sizes = [
+            (r.radius, r.radius, SHOWN_HEIGHT) if round_one else (PLATE_THICKNESS, 2 * r.radius, SHOWN_HEIGHT)
+            for r in chosen
+        ]
+        headings = np.array([0.0 if round_one else r.heading for r in chosen])
+        wxyzs = np.zeros((len(chosen), 4))
+        wxyzs[:, 0], wxyzs[:, 3] = np.cos(0.5 * headings), np.sin(0.5 * headings)
+        nodes.append(
+            scene.add_batched_meshes_simple(
+                f"/reflectors/bodies/{kind.value}",
+                np.asarray(mesh.vertices, np.float32),
+                np.asarray(mesh.faces, np.uint32),
+                batched_wxyzs=wxyzs,
+                batched_positions=np.array([(r.x, r.y, max(r.height, 0.5 * SHOWN_HEIGHT)) for r in chosen]),
+                batched_scales=np.array(sizes),
+                batched_colors=theme.REFLECTOR,
+            )
+        )
+    return tuple(nodes)

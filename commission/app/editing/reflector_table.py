@@ -1,0 +1,75 @@
+"""All reflectors as a table, sorted as wished, a page of rows at a time. A row selects its reflector and goes there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from viser import GuiApi, GuiTabHandle
+
+from commission.app.base import theme
+from commission.app.base.panel import BasePanel, Post
+from commission.app.base.rows import Rows
+from commission.app.base.view import PageView
+from commission.app.editing import actions
+from commission.app.editing.editor import Editor
+from commission.site.reflectors import Reflector
+
+ROWS = 40
+"""Rows that are shown at once."""
+ORDERS: dict[str, Callable[[Reflector], Any]] = {
+    "name": lambda r: (len(r.id), r.id),
+    "x": lambda r: r.x,
+    "y": lambda r: r.y,
+    "radius": lambda r: r.radius,
+    "kind": lambda r: (r.kind.value, r.id),
+    "layer": lambda r: (r.layer, r.id),
+}
+
+
+def row_text(reflector: Reflector) -> str:
+    """Return a reflector on one line."""
+    kind = "" if reflector.kind.value == "cylinder" else "  flat"
+    rest = "  ".join(text for text in (reflector.layer, "locked" if reflector.locked else "") if text)
+    return f"{reflector.id}   {reflector.x:.3f}  {reflector.y:.3f} m   r {reflector.radius * 1000:.0f} mm{kind}  {rest}"
+
+
+class ReflectorTable(BasePanel):
+    """The table of one browser."""
+
+    def __init__(self, gui: GuiApi, post: Post, client: int, tab: GuiTabHandle) -> None:
+        self._client = client
+        with tab:
+            self._order = gui.add_dropdown("Sort by", tuple(ORDERS))
+            self._find = gui.add_text("Find", "", hint="Part of a name, layer or note.")
+            self._page = gui.add_number("Page", 1, min=1, step=1, visible=False)
+            self._count = gui.add_html("")
+        self._ids: tuple[str, ...] = ()
+        self._rows = Rows(gui, tab, post, self._selecting)
+        self._drawn: tuple[object, ...] = ()
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Show the reflectors in their order."""
+        reflectors = view.state.project.reflectors
+        editor = view.state.editors.get(self._client, Editor())
+        asked = (self._order.value, self._find.value, self._page.value, editor.selected)
+        if self._drawn and self._drawn[0] is reflectors and self._drawn[1] == asked:
+            return
+        self._drawn = (reflectors, asked)
+        sought = self._find.value.strip().lower()
+        found = [r for r in reflectors.reflectors if sought in f"{r.id} {r.layer} {r.note}".lower()]
+        found.sort(key=ORDERS[self._order.value])
+        pages = max(1, -(-len(found) // ROWS))
+        first = ROWS * (min(int(self._page.value), pages) - 1)
+        self._page.visible = pages > 1
+        self._count.content = (
+            f"<div class='c-note' style='padding:2px 6px'>{len(found)} of {len(reflectors)} reflectors"
+            f"{f', page {first // ROWS + 1} of {pages}' if pages > 1 else ''}</div>"
+        )
+        shown, selected = found[first : first + ROWS], frozenset(editor.selected)
+        self._ids = tuple(r.id for r in shown)
+        self._rows.show([(row_text(r), theme.SELECTED_LINE if r.id in selected else theme.LINE) for r in shown])
+
+    def _selecting(self, index: int, client: int) -> actions.SelectReflectors:
+        """Return the action of a row."""
+        return actions.SelectReflectors(client, self._ids[index : index + 1], fly=True)

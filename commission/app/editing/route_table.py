@@ -1,0 +1,108 @@
+"""All routes and stations as a table of one browser. A row selects what it is about and goes there."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from viser import GuiApi, GuiTabHandle
+
+from commission.app.base import actions as page_actions
+from commission.app.base import theme
+from commission.app.base.panel import BasePanel, Post
+from commission.app.base.rows import Rows
+from commission.app.base.view import PageView
+from commission.app.editing import actions
+from commission.app.editing.editor import ControlPoint, Editor
+from commission.app.editing.station_actions import SelectStation
+from commission.site.project import Project
+from commission.site.routes import Direction, Route
+from commission.site.stations import Station
+
+MOST_ROWS = 60
+"""Rows that are shown; the others are found by a part of their name."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of the table."""
+
+    text: str
+    """What it says."""
+    route: str = ""
+    """Name of the route that it is about; empty: a station."""
+    station: str = ""
+    """Name of the station that it is about; empty: a route."""
+
+
+def route_row(route: Route, violations: int) -> Row:
+    """Return a route on one line."""
+    speeds = sorted({route.speed_of(segment) for segment in route.segments})
+    speed = f"{speeds[0]:g}" + (f" to {speeds[-1]:g}" if len(speeds) > 1 else "")
+    reverse = sum(segment.direction is Direction.REVERSE for segment in route.segments)
+    parts = [f"{speed} m/s", *([f"{reverse} of {len(route.segments)} reverse"] if reverse else [])]
+    if violations:
+        parts.append(f"{violations} violation{'s' if violations > 1 else ''}")
+    return Row(f"{route.name}   {'  '.join(parts)}", route=route.name)
+
+
+def station_row(station: Station) -> Row:
+    """Return a station on one line."""
+    accuracy = f"{1000.0 * station.required_accuracy:g} mm"
+    return Row(f"{station.name}   {accuracy}  {station.x:.2f}  {station.y:.2f} m", station=station.name)
+
+
+def rows(project: Project, violations: Counter[str], sought: str) -> list[Row]:
+    """Return the table's lines: routes, then stations, whose names contain what is sought."""
+    routes = [route_row(route, violations[route.name]) for route in project.routes if sought in route.name.lower()]
+    return routes + [station_row(station) for station in project.stations if sought in station.name.lower()]
+
+
+class RouteTable(BasePanel):
+    """The table of one browser."""
+
+    def __init__(self, gui: GuiApi, post: Post, client: int, tab: GuiTabHandle) -> None:
+        self._client = client
+        with tab:
+            self._find = gui.add_text("Find", "", hint="Part of the name of a route or a station.")
+            self._count = gui.add_html("")
+        self._shown: list[Row] = []
+        self._rows = Rows(gui, tab, post, self._selecting)
+        self._drawn: tuple[object, ...] = ()
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Show routes and stations in the order of the project."""
+        project, editor = view.state.project, view.state.editors.get(self._client, Editor())
+        chosen = "" if editor.point is None else editor.point.route
+        drawn = (project.routes, project.stations, view.violations)
+        asked = (self._find.value, chosen, editor.station)
+        if self._drawn and self._drawn[-1] == asked and all(a is b for a, b in zip(self._drawn, drawn, strict=False)):
+            return
+        self._drawn = (*drawn, asked)
+        violations = Counter(violation.route for violation in view.violations)
+        found = rows(project, violations, self._find.value.strip().lower())
+        self._shown = found[:MOST_ROWS]
+        more = f", the first {MOST_ROWS} shown" if len(found) > MOST_ROWS else ""
+        self._count.content = (
+            f"<div class='c-note' style='padding:2px 6px'>{len(project.routes)} routes, "
+            f"{len(project.stations)} stations{more}</div>"
+        )
+        fatal = {violation.route for violation in view.violations if violation.is_fatal}
+        self._rows.show([(row.text, _color(row, chosen, editor.station, violations, fatal)) for row in self._shown])
+
+    def _selecting(self, index: int, client: int) -> page_actions.Action:
+        """Return the action of a row; the table may have become shorter since it was drawn."""
+        if index >= len(self._shown):
+            return page_actions.Report("this row is gone", failed=False)
+        row = self._shown[index]
+        if row.station:
+            return SelectStation(client, row.station, fly=True)
+        return actions.SelectControlPoint(client, ControlPoint(row.route), fly=True)
+
+
+def _color(row: Row, route: str, station: str, violations: Counter[str], fatal: set[str]) -> theme.Color:
+    if (row.route and row.route == route) or (row.station and row.station == station):
+        return theme.SELECTED_LINE
+    if row.route in fatal:
+        return theme.ERROR_LINE
+    return theme.WARNING_LINE if violations[row.route] else theme.LINE

@@ -1,0 +1,85 @@
+"""Stations: a mark that points where the vehicle looks, its outline as it has to stand there, name and accuracy."""
+
+from __future__ import annotations
+
+import numpy as np
+from viser import LabelHandle, SceneApi, SceneNodeHandle
+
+from commission.app.base import theme
+from commission.app.base.drawing import NO_SEGMENTS, outline_segments
+from commission.app.base.extent import extent_of
+from commission.app.base.layer import BaseLayer
+from commission.app.base.state import AppState
+from commission.app.plan.view import PlanView
+from commission.geometry import se2
+from commission.geometry.arrays import FloatArray
+from commission.site.project import Project
+from commission.site.stations import Station
+
+MOST_LABELS = 60
+MARK = np.array([(1.6, 0.0), (0.6, 1.0), (-1.0, 1.0), (-1.0, -1.0), (0.6, -1.0)])
+"""Outline of the mark, in its own size; x points ahead."""
+MARK_SIZE = 1.6
+"""Size of the mark, in sizes of a mark on the floor."""
+
+
+def station_marks(stations: tuple[Station, ...], size: float) -> FloatArray:
+    """Return the (N, 5, 2) outlines of the marks of stations [m]; `size` is that of a mark on the floor [m]."""
+    shape = MARK_SIZE * size * MARK
+    marks = [se2.transform_points(station.pose, shape) for station in stations]
+    return np.array(marks).reshape(-1, len(MARK), 2)
+
+
+class StationLayer(BaseLayer):
+    """All stations of the project."""
+
+    name = "Stations"
+    reads: tuple[str, ...] = ("floor_map", "stations", "vehicle")
+    legend = (theme.Legend("station, with its required accuracy", theme.STATION, theme.Mark.LINE),)
+
+    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - the protocol's
+        """Whether the project has stations."""
+        return bool(state.project.stations)
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._marks, self._outlines = (
+            scene.add_line_segments(
+                f"/stations/{name}", NO_SEGMENTS, theme.STATION, thickness=width, thickness_units="screen"
+            )
+            for name, width in (("marks", 2.0), ("outlines", 1.0))
+        )
+        self._labels: dict[str, LabelHandle] = {}
+
+    def show_site(self, project: Project) -> None:
+        """Draw every station; labels that stay are moved, not made anew."""
+        size = extent_of(project).mark_size()
+        outline = np.asarray(project.vehicle.outline, dtype=np.float64)
+        outlines = [se2.transform_points(station.pose, outline) for station in project.stations]
+        self._marks.points = outline_segments(station_marks(project.stations, size), theme.Height.REFERENCE)
+        self._outlines.points = outline_segments(np.array(outlines), theme.Height.REFERENCE)
+        shown = project.stations if len(project.stations) <= MOST_LABELS else ()
+        for name in self._labels.keys() - {station.name for station in shown}:
+            self._labels.pop(name).remove()
+        for station in shown:
+            self._write(station, 2.0 * MARK_SIZE * size)
+
+    def _write(self, station: Station, below: float) -> None:
+        """Write name and accuracy under a station."""
+        position = (station.x, station.y - below, theme.Height.LABEL)
+        text = f"{station.name}  {1000.0 * station.required_accuracy:g} mm"
+        label = self._labels.get(station.name)
+        if label is None:
+            self._labels[station.name] = self.scene.add_label(
+                f"/station_names/{station.name.encode().hex()}",
+                text,
+                position=position,
+                font_screen_scale=0.7,
+                anchor="top-center",
+            )
+        else:
+            label.position, label.text = position, text
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return marks, outlines and names."""
+        return self._marks, self._outlines, *self._labels.values()

@@ -1,0 +1,1 @@
+"""What fails with one reflector, and which reflectors matter most."""

@@ -1,0 +1,67 @@
+"""What fails with one reflector: a ring around it, the metres that depend on it, crosses on what failed before."""
+
+from __future__ import annotations
+
+import numpy as np
+from viser import SceneApi, SceneNodeHandle
+
+from commission.app.base import theme
+from commission.app.base.drawing import NO_SEGMENTS, crosses, outline_segments, polyline_segments, stroke_segments
+from commission.app.base.extent import extent_of
+from commission.app.base.layer import BaseLayer
+from commission.app.base.state import AppState
+from commission.app.plan.view import FailureView, PlanView
+from commission.site.project import Project
+
+RING_POINTS = 32
+RING_MARKS = 2.2
+"""Radius of the ring, in sizes of a mark."""
+
+
+class FailingLayer(BaseLayer):
+    """The chosen reflector and its dependents."""
+
+    name = "What if one fails"
+    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
+    legend = (theme.Legend("fails without the chosen reflector", theme.DEPENDENT, theme.Mark.LINE),)
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._mark = 0.1
+        self._shown: FailureView | None = None
+        self._metres, self._ring, self._fallen = (
+            scene.add_line_segments(
+                f"/plan/failing/{name}", NO_SEGMENTS, theme.DEPENDENT, thickness=width, thickness_units="screen"
+            )
+            for name, width in (("metres", 8.0), ("ring", 3.0), ("fallen", 2.5))
+        )
+
+    def show_site(self, project: Project) -> None:
+        """Adapt the size of the ring to the site's."""
+        self._mark = extent_of(project).mark_size()
+
+    def draw_plan(self, plan: PlanView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+        """Draw what depends on the chosen reflector."""
+        if plan.failures is self._shown:
+            return
+        self._shown = plan.failures
+        lines = () if plan.failures is None else plan.failures.failing
+        height = theme.Height.REFERENCE
+        self._metres.points = np.concatenate([NO_SEGMENTS, *(polyline_segments(line, height) for line in lines)])
+        fallen = np.empty((0, 2)) if plan.failures is None else plan.failures.fallen_places
+        self._fallen.points = stroke_segments(crosses(fallen, 1.5 * self._mark), theme.Height.LABEL)
+        place = None if plan.failures is None else plan.failures.place
+        if place is None:
+            self._ring.points = NO_SEGMENTS
+            return
+        angles = np.linspace(0.0, 2.0 * np.pi, RING_POINTS, endpoint=False)
+        circle = np.array(place) + RING_MARKS * self._mark * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        self._ring.points = outline_segments(circle[np.newaxis], theme.Height.LABEL)
+
+    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - the protocol's
+        """Whether a reflector's failure is shown, or one that came before."""
+        return plan.failures is not None and (plan.failures.place is not None or bool(plan.failures.fallen))
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return ring, metres and crosses."""
+        return self._metres, self._ring, self._fallen

@@ -1,0 +1,96 @@
+"""Loading a floor map: from the server's computer or from the browser's; progress, cancel, what came of it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from viser import GuiApi, GuiEvent
+
+from commission.app.base import actions as page_actions
+from commission.app.base.panel import BasePanel, Post, client_of, escaped, posting
+from commission.app.base.uploads import Uploads
+from commission.app.base.view import PageView
+from commission.app.floor_map import actions
+from commission.app.floor_map.draft import ENDINGS, MapFile, MapLoading
+from commission.app.floor_map.draft_fields import MapDraftFields
+from commission.site.project import Project
+
+UPLOAD_LIMIT = 256_000_000
+"""Bytes of one upload: it is held in memory until it is read."""
+JOBS = ("Reading ", "Loading ")
+"""How the names of the jobs of `mapping.effects` begin."""
+KINDS = (
+    "<div class='c-note' style='padding:0 6px 4px'>ROS map (.yaml and its image), plain image, CAD drawing (.dxf), "
+    "3D model (.stl .obj .glb .ply).</div>"
+)
+
+
+class FloorMapPanel(BasePanel):
+    """The folder with which a floor map is loaded."""
+
+    def __init__(self, gui: GuiApi, post: Post, project: Project) -> None:
+        self._shown: MapLoading | None = None
+        with gui.add_folder("Floor map", expand_by_default=project.floor_map is None):
+            kinds = gui.add_html(KINDS)
+            path = gui.add_text("Map file", "", hint="Path of a file on the computer that serves this page.")
+            opened = gui.add_button("Open", hint="Read the file of this path.")
+
+            def open_path(event: GuiEvent[Any]) -> page_actions.Action:
+                typed = path.value.strip()
+                if not typed:
+                    return page_actions.Report("no file was named; expected its path on the server's computer")
+                return actions.OpenMap(client_of(event), MapFile(Path(os.path.expanduser(typed))))
+
+            opened.on_click(posting(post, open_path))
+            Uploads(gui, lambda _client, text: post(actions.MapFailed(text))).add(
+                "Upload a map",
+                lambda client, upload: post(actions.OpenMap(client, MapFile(upload))),
+                limit=UPLOAD_LIMIT,
+                endings=tuple(f".{ending}" for ending in ENDINGS),
+                note="Of a ROS map the .yaml and its image, one after the other.",
+            )
+            self._source = (kinds, path, opened)
+            self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
+            self._cancel = gui.add_button("Cancel", color="gray", visible=False, hint="Stop reading; nothing changes.")
+            self._cancel.on_click(posting(post, lambda _event: actions.StopMapJob()))
+            self._said = gui.add_html("", visible=False)
+            self._fields = MapDraftFields(gui, post)
+            self._discard = gui.add_button("Discard", color="gray", visible=False, hint="Forget the file.")
+            self._discard.on_click(posting(post, lambda _event: actions.DiscardMap()))
+
+    def draw(self, view: PageView) -> None:
+        """Show how far a job is without delay."""
+        job = next((job for job in view.jobs if job.name.startswith(JOBS)), None)
+        for widget in (self._bar, self._cancel):
+            if widget.visible is not (job is not None):
+                widget.visible = job is not None
+        if job is not None:
+            self._bar.value = 100.0 * job.fraction
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Show what is under way and what came of it."""
+        loading = view.state.mapping
+        self._fields.refresh()
+        if loading is self._shown:
+            return
+        self._shown = loading
+        self._said.content = said(loading)
+        self._said.visible = bool(self._said.content)
+        for widget in self._source:  # a small screen has no room for both
+            widget.visible = loading.draft is None
+        self._discard.visible = loading.draft is not None or loading.waiting is not None
+        self._fields.show(loading.draft)
+
+
+def said(loading: MapLoading) -> str:
+    """Return what there is to say, as html: trouble first."""
+    lines: list[str] = []
+    if loading.trouble:
+        lines.append(f"<div style='color:#ff8a80'>{escaped(loading.trouble)}</div>")
+    if loading.waiting is not None:
+        name, image = escaped(loading.waiting.file.name), escaped(loading.waiting.image)
+        lines.append(f"<div><b>{name}</b> needs its image: upload <b>{image}</b>, too.</div>")
+    lines += [f"<div class='c-note'>{escaped(note)}</div>" for note in loading.notes]
+    return f"<div style='font-size:12px;padding:2px 6px;overflow-wrap:anywhere'>{''.join(lines)}</div>" if lines else ""

@@ -1,0 +1,136 @@
+"""Reads floor maps in the background: a file in, an action out, progress and cancel in between."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+from commission.app.base.jobs import Jobs, Progress
+from commission.app.floor_map.actions import ImageMissing, MapFailed, MapMade, MapOpened, MapResult
+from commission.app.floor_map.draft import DRAWING_ENDINGS, ENDINGS, MAP_ENDINGS, PICTURE_ENDINGS, MapFile, Read
+from commission.app.floor_map.effects import DrawMap, MapEffect, ReadMapFile, StopMapWork
+from commission.errors import CommissionError, FileFormatError, JobError
+from commission.io.dxf import Drawing, read_drawing
+from commission.io.image_map import Picture, read_picture
+from commission.io.map_server import image_name, read_floor_map
+from commission.io.mesh import Model, read_model
+from commission.site.floor_map import FloorMap
+
+
+class MapWork:
+    """Does what loading a floor map asks for, one thing at a time: a new wish ends the one before.
+
+    Parameters
+    ----------
+    jobs : a runner of its own, so that no file waits for a simulation.
+    """
+
+    def __init__(self, jobs: Jobs) -> None:
+        self._jobs = jobs
+
+    def do(self, effect: MapEffect) -> None:
+        """Start or stop the work; its outcome is the job's result."""
+        for job in self._jobs.unfinished():
+            self._jobs.cancel(job.number)
+        match effect:
+            case ReadMapFile():
+                self._jobs.start(effect.job, lambda progress: read(effect, progress))
+            case DrawMap():
+                self._jobs.start(effect.job, lambda progress: draw(effect, progress))
+            case StopMapWork():
+                pass
+
+
+def read(effect: ReadMapFile, progress: Progress) -> MapResult:
+    """Read a file; what a person can mend comes back as `MapFailed`.
+
+    Parameters
+    ----------
+    effect : which file, and how.
+    progress : told how far the reading is; raises to cancel.
+    """
+    file = effect.file
+    progress(0.0, "")
+    try:
+        with _path_of(file) as path:
+            if file.ending in MAP_ENDINGS:
+                return _read_map(effect, path)
+            return MapOpened(effect.client, file, _read(effect, path, progress), effect.reading)
+    except JobError:
+        raise
+    except FileFormatError as error:
+        return MapFailed(str(_as_named(error, file)))
+    except (CommissionError, ValueError) as error:
+        return MapFailed(f"{file.name}: {error}")
+
+
+def draw(effect: DrawMap, progress: Progress) -> MapResult:
+    """Make the floor map; what a person can mend comes back as `MapFailed`."""
+    draft, file = effect.draft, effect.draft.file
+    notes = draft.read.warnings if isinstance(draft.read, Drawing) else ()
+    progress(0.0, "")
+    try:
+        return MapMade(effect.client, file, _drawn(effect, progress), notes)
+    except JobError:
+        raise
+    except FileFormatError as error:
+        return MapFailed(str(_as_named(error, file)))
+    except (CommissionError, ValueError) as error:
+        return MapFailed(f"{file.name}: {error}")
+
+
+def _drawn(effect: DrawMap, progress: Progress) -> FloorMap:
+    draft, options = effect.draft, effect.draft.options
+    match draft.read:
+        case Drawing():
+            return draft.read.floor_map(options.resolution, options.layers, progress)
+        case Model():
+            return draft.read.floor_map(options.heights, options.resolution, progress)
+        case Picture():
+            placement = draft.placement()
+            if placement is None:
+                raise ValueError("its scale is not known; expected two points, clicked on the image")
+            return draft.read.floor_map(placement, threshold=options.threshold, light_walls=options.light_walls)
+
+
+def _read(effect: ReadMapFile, path: Path, progress: Progress) -> Read:
+    file, reading = effect.file, effect.reading
+    if file.ending in DRAWING_ENDINGS:
+        return read_drawing(path, unit=reading.unit or None, progress=progress)
+    if file.ending in PICTURE_ENDINGS:
+        return read_picture(path)
+    if file.ending in ENDINGS:
+        up = None if not reading.up else reading.up == "y"
+        return read_model(path, unit=reading.unit or "m", y_up=up, progress=progress)
+    known = ", ".join(f".{ending}" for ending in ENDINGS)
+    raise FileFormatError(path, "", f"ends in {path.suffix!r}", f"a floor map: {known}")
+
+
+def _read_map(effect: ReadMapFile, path: Path) -> MapResult:
+    """Read a `map_server` map: its image lies beside it, or was sent, too."""
+    file, image = effect.file, effect.image
+    if isinstance(file.source, Path):
+        return MapMade(effect.client, file, read_floor_map(path))
+    name = image_name(path)
+    if image is None or image.name != name:
+        return ImageMissing(file, name)
+    with _path_of(image) as image_path:
+        return MapMade(effect.client, file, read_floor_map(path, image=image_path))
+
+
+@contextmanager
+def _path_of(file: MapFile) -> Generator[Path]:
+    """Give a path to read a file from."""
+    if isinstance(file.source, Path):
+        yield file.source
+        return
+    with file.source.as_file() as path:
+        yield path
+
+
+def _as_named(error: FileFormatError, file: MapFile) -> FileFormatError:
+    """Return the error with the name that the person knows: not that of a temporary file."""
+    if isinstance(file.source, Path):
+        return error
+    return FileFormatError(file.name, error.where, error.problem, error.remedy)

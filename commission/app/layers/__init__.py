@@ -1,1 +1,0 @@
-"""What is drawn on the floor, one file per thing. Layers draw frozen views; they decide nothing."""

@@ -1,0 +1,1 @@
+"""A suggested layout: demands, search, preview, acceptance."""

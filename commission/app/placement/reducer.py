@@ -1,0 +1,97 @@
+"""What the actions about a suggested layout mean. Pure; importing it registers them with `reduce`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from commission.app.base.reduction import Reduction, Tell, reduce
+from commission.app.base.state import AppState, Edit, edited
+from commission.app.editing.reducer import with_reflectors
+from commission.app.placement.suggestion import SMALLEST_AREA, LayoutWish, with_option
+from commission.app.plan import actions
+from commission.errors import UsageError
+from commission.site.layout_brief import LayoutBrief, Rectangle, low_high
+
+ACCEPT = "accept suggested layout"
+"""Name of the undo step."""
+
+
+def _wishing(state: AppState, wish: LayoutWish) -> Reduction:
+    return Reduction(replace(state, layout=wish))
+
+
+def _asking(state: AppState, brief: LayoutBrief, edit: Edit) -> Reduction:
+    """Ask something else of the layout: one undo step."""
+    if brief == state.project.layout:
+        return Reduction(state)
+    return Reduction(edited(state, replace(state.project, layout=brief), edit))
+
+
+@reduce.register
+def _(action: actions.SetLayout, state: AppState) -> Reduction:
+    if action.name == "extend":
+        return _wishing(state, replace(state.layout, extend=bool(action.value)))
+    words = action.name.rpartition(".")[2].replace("_", " ")
+    edit = Edit(f"set {words} of the layout", action.client, f"layout.{action.name}", action.at)
+    return _asking(state, with_option(state.project.layout, action.name, action.value), edit)
+
+
+@reduce.register
+def _(action: actions.CountRoute, state: AppState) -> Reduction:
+    state.project.route(action.name)
+    brief = state.project.layout
+    others = tuple(name for name in brief.ignored_routes if name != action.name)
+    ignored = others if action.counts else (*others, action.name)
+    edit = Edit(f"{'count' if action.counts else 'ignore'} {action.name}", action.client)
+    return _asking(state, replace(brief, ignored_routes=ignored), edit)
+
+
+def _keeping_out(state: AppState, areas: tuple[Rectangle, ...], edit: Edit) -> Reduction:
+    return _asking(state, with_option(state.project.layout, "candidates.keep_out", areas), edit)
+
+
+@reduce.register
+def _(action: actions.KeepOut, state: AppState) -> Reduction:
+    low, high = low_high(action.area)
+    if min(high[0] - low[0], high[1] - low[1]) < SMALLEST_AREA:
+        return Reduction(state)
+    areas = (*state.project.layout.candidates.keep_out, (*low, *high))
+    return _keeping_out(state, areas, Edit("keep an area free of reflectors", action.client))
+
+
+@reduce.register
+def _(action: actions.FreeAreas, state: AppState) -> Reduction:
+    place = action.place
+    areas = state.project.layout.candidates.keep_out
+    left = () if place is None else tuple(area for area in areas if not _contains(area, place))
+    return _keeping_out(state, left, Edit("allow reflectors again", action.client))
+
+
+def _contains(area: Rectangle, place: tuple[float, float]) -> bool:
+    low, high = low_high(area)
+    return low[0] <= place[0] <= high[0] and low[1] <= place[1] <= high[1]
+
+
+@reduce.register
+def _(_action: actions.AskLayout, state: AppState) -> Reduction:
+    return _wishing(state, replace(state.layout, wanted=True, asked=state.layout.asked + 1))
+
+
+@reduce.register
+def _(_action: actions.DiscardLayout, state: AppState) -> Reduction:
+    return _wishing(state, replace(state.layout, wanted=False))
+
+
+@reduce.register
+def _(action: actions.AcceptLayout, state: AppState) -> Reduction:
+    suggestion = action.suggestion
+    if suggestion.site.reflectors is not state.project.reflectors:
+        raise UsageError("the reflectors have changed since the layout was suggested; suggest it again")
+    dropped = replace(state, layout=replace(state.layout, wanted=False))
+    accepted = with_reflectors(dropped, suggestion.placement.reflectors, Edit(ACCEPT, action.client))
+    return replace(accepted, effects=(*accepted.effects, Tell(_told(action), failed=False)))
+
+
+def _told(action: actions.AcceptLayout) -> str:
+    added, removed = action.suggestion.placement.added, len(action.suggestion.removed)
+    return f"{added} reflectors put up" + (f", {removed} taken down" if removed else "") + "; Ctrl+Z takes it back"

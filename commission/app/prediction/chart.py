@@ -1,0 +1,128 @@
+"""What is expected along a route: in numbers, then over its metres in the colors of the ribbon on the floor."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from commission.app.base import theme
+from commission.app.base.panel import escaped, table
+from commission.app.plan.view import RouteView
+from commission.app.prediction.driven import Driven
+from commission.app.prediction.load_colors import load_classes, palette
+from commission.app.prediction.tracks import Axis, Limited, Plain, limited, plain, round_up
+from commission.planning.station_accuracy import StationAccuracy
+
+MOST_BARS = 120
+MOST_STOPS = 6
+
+
+def chart(route: RouteView, run: Driven | None) -> str:
+    """Return what is expected along a route.
+
+    Parameters
+    ----------
+    route : the prediction.
+    run : a run to lay over it; none where there is none.
+    """
+    metres, limits = route.metres, route.prediction.limits
+    starts = np.arange(0, len(metres.metre), max(1, -(-len(metres.metre) // MOST_BARS)))
+    axis = _axis(route, starts)
+    worst, errors = (np.maximum.reduceat(values, starts, axis=0) for values in (metres.two_sigma, route.errors))
+    position = Limited(
+        "2σ of position [mm]",
+        1000.0 * worst[:, :2].max(axis=1),
+        1000.0 * limits.position_limit,
+        1000.0 * errors[:, :2].max(axis=1),
+        None if run is None else (run.metres, 1000.0 * run.two_sigma[:, :2].max(axis=1)),
+    )
+    heading = Limited(
+        "2σ of heading [°]",
+        np.degrees(worst[:, 2]),
+        math.degrees(limits.heading_limit),
+        np.degrees(errors[:, 2]),
+        None if run is None else (run.metres, np.degrees(run.two_sigma[:, 2])),
+    )
+    seen = np.minimum.reduceat(metres.seen, starts)
+    alone = np.maximum.reduceat(metres.on_odometry, starts)
+    risk = np.maximum.reduceat(route.risk, starts)
+    drawn = [
+        limited(position, axis),
+        limited(heading, axis),
+        plain(Plain("Fewest reflectors seen", seen, (2.0, float(max(4, seen.max())))), axis),
+        plain(Plain("On odometry alone [m]", alone, (round_up(max(0.5, float(alone.max()))),)), axis),
+    ]
+    if route.risks:
+        drawn.append(plain(Plain("Chance of a wrong association [%]", 100.0 * risk, (50.0,)), axis))
+    return (
+        f"<div class='c-prediction' style='padding:2px 6px'>{table(_numbers(route))}{_stations(route.stations)}"
+        f"{''.join(drawn)}<div class='c-note'>{_note(route, run)}</div></div>"
+    )
+
+
+def _axis(route: RouteView, starts: np.ndarray) -> Axis:
+    """The bars begin at these metres; their color is that of the ribbon."""
+    prediction = route.prediction
+    shades = [theme.css(color) for color in palette()]
+    fills = tuple(shades[index] for index in load_classes(np.maximum.reduceat(route.loads, starts)))
+    metres = route.metres.metre[starts].astype(float)
+    return Axis(prediction.drive.length, metres, fills, prediction.trips(), prediction.recoveries())
+
+
+def _note(route: RouteView, run: Driven | None) -> str:
+    if route.outdated:
+        return "predicting anew …"
+    lines = ["color: share of the limit", "violet: 2σ of the true error"]
+    if len(route.prediction.trips()):
+        lines.append("red line: stops, green line: may drive again")
+    lines.append("white line: the run that is loaded" if run is not None else "a run along this route is laid over it")
+    return "; ".join(lines)
+
+
+def _numbers(route: RouteView) -> list[tuple[str, str]]:
+    """What matters most, in numbers."""
+    prediction, metres, limits = route.prediction, route.metres, route.prediction.limits
+    largest, error = metres.two_sigma.max(axis=0), route.errors.max(axis=0)
+    rows = [
+        ("Length", f"{prediction.drive.length:.1f} m"),
+        (
+            "Largest 2σ x, y / limit",
+            f"{1000 * largest[:2].max():.1f} / {1000 * limits.position_limit:.0f} mm",
+        ),
+        (
+            "Largest 2σ heading / limit",
+            f"{math.degrees(largest[2]):.2f} / {math.degrees(limits.heading_limit):.1f} °",
+        ),
+        ("True error, 2σ x, y", f"{1000 * error[:2].max():.1f} mm"),
+        ("True error, 2σ heading", f"{math.degrees(error[2]):.2f} °"),
+        ("Fewest reflectors seen", str(int(metres.seen.min()))),
+        ("Longest on odometry", f"{metres.on_odometry.max():.1f} m"),
+        ("Supervisor stops", _places(prediction.trips())),
+    ]
+    if len(prediction.trips()):
+        rows.append(("May drive again", _places(prediction.recoveries())))
+    return rows
+
+
+def _places(metres: np.ndarray) -> str:
+    """Write metres of the way."""
+    shown = ", ".join(f"{metre:.0f}" for metre in metres[:MOST_STOPS]) + (" …" if len(metres) > MOST_STOPS else "")
+    return f"at {shown} m" if len(metres) else "nowhere"
+
+
+def _stations(stations: tuple[StationAccuracy, ...]) -> str:
+    """Each station on the route: the larger one of the filter's and of the true 2-sigma against what it requires."""
+    if not stations:
+        return ""
+    good, bad = theme.css(theme.RECOVERY), theme.css(theme.OVER_LIMIT)
+    rows = [
+        (
+            f"{escaped(each.station)}, {each.metre:.0f} m",
+            f"{1000 * each.expected:.1f} / {1000 * each.required:.0f} mm "
+            f"<span style='color:{good if each.is_met else bad}'>{'met' if each.is_met else 'not met'}</span>",
+        )
+        for each in stations
+    ]
+    title = "<div style='font-size:11px;opacity:.75;padding-top:5px'>Stations: 2σ x, y / required</div>"
+    return f"<div class='c-stations'>{title}{table(rows)}</div>"

@@ -1,0 +1,135 @@
+"""What is expected to happen along a route: stops and recoveries, stations met or not, wrong associations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from viser import LabelHandle, PointCloudHandle, SceneApi, SceneNodeHandle
+
+from commission.app.base import theme
+from commission.app.base.drawing import NO_POINTS, lift, thinned
+from commission.app.base.extent import extent_of
+from commission.app.base.layer import BaseLayer
+from commission.app.base.state import AppState
+from commission.app.plan.view import PlanView, RouteView
+from commission.geometry.arrays import FloatArray
+from commission.planning.route_prediction import RoutePrediction
+from commission.site.project import Project
+
+MOST_RISKY = 600
+MOST_LABELS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something at one place of the route."""
+
+    text: str
+    """What it is; written beside it."""
+    place: tuple[float, float]
+    """Where [m]."""
+    kind: theme.Color
+    """Color of its mark."""
+
+
+def place_at(prediction: RoutePrediction, metre: float) -> tuple[float, float]:
+    """Return where the vehicle is at a metre of the way [m]."""
+    drive = prediction.drive
+    index = min(int(np.searchsorted(drive.metres, metre)), len(drive) - 1)
+    return float(drive.poses[index, 0]), float(drive.poses[index, 1])
+
+
+def events(route: RouteView) -> tuple[Event, ...]:
+    """Return what happens along a route: where the supervisor stops and lets go on, and each station."""
+    prediction = route.prediction
+    stops = [(f"stops at {m:.0f} m", float(m), theme.OVER_LIMIT) for m in prediction.trips()]
+    going_on = [(f"may go on at {m:.0f} m", float(m), theme.RECOVERY) for m in prediction.recoveries()]
+    stations = [
+        (
+            f"{each.station}: {1000 * each.two_sigma:.1f} of {1000 * each.required:.0f} mm"
+            f"{'' if each.is_met else ', not met'}",
+            each.metre,
+            theme.RECOVERY if each.is_met else theme.OVER_LIMIT,
+        )
+        for each in route.stations
+    ]
+    return tuple(Event(text, place_at(prediction, m), kind) for text, m, kind in (*stops, *going_on, *stations))
+
+
+class EventLayer(BaseLayer):
+    """Marks and names along the predicted route."""
+
+    name = "Stops, stations, risks"
+    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
+    legend = (
+        theme.Legend("supervisor stops; station not met", theme.OVER_LIMIT, theme.Mark.DOT),
+        theme.Legend("may go on; station met", theme.RECOVERY, theme.Mark.DOT),
+        theme.Legend("wrong association possible", theme.RISK, theme.Mark.DOT),
+    )
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._mark = 0.1
+        self._shown: RouteView | None = None
+        self._labels: tuple[LabelHandle, ...] = ()
+        self._clouds: dict[theme.Color, PointCloudHandle] = {
+            color: scene.add_point_cloud(
+                f"/plan/events/{name}",
+                NO_POINTS,
+                color,
+                point_size=0.1,
+                point_shape="circle",
+                point_shading="flat",
+                precision="float32",
+            )
+            for name, color in (("risks", theme.RISK), ("going_on", theme.RECOVERY), ("stops", theme.OVER_LIMIT))
+        }
+
+    def show_site(self, project: Project) -> None:
+        """Adapt the size of the marks to the site's."""
+        self._mark = extent_of(project).mark_size()
+
+    def draw_plan(self, plan: PlanView, state: AppState) -> None:
+        """Draw the marks anew where the prediction has changed."""
+        if plan.route is self._shown:
+            return
+        self._shown = plan.route
+        found = () if plan.route is None else events(plan.route)
+        for color, cloud in self._clouds.items():
+            places = np.array([event.place for event in found if event.kind == color]).reshape(-1, 2)
+            if color == theme.RISK and plan.route is not None:
+                places = _risky(plan.route)
+            cloud.point_size = (1.0 if color == theme.RISK else 2.0) * self._mark
+            cloud.points = lift(places, theme.Height.TRAIL)
+        for label in self._labels:
+            label.remove()
+        self._labels = self._write(found[:MOST_LABELS], visible=self.name not in state.hidden)
+
+    def _write(self, found: tuple[Event, ...], *, visible: bool) -> tuple[LabelHandle, ...]:
+        return tuple(
+            self.scene.add_label(
+                f"/plan/events/label/{number}",
+                event.text,
+                position=(*event.place, theme.Height.LABEL),
+                anchor="bottom-center",
+                font_screen_scale=0.8,
+                visible=visible,
+            )
+            for number, event in enumerate(found)
+        )
+
+    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - the protocol's
+        """Whether something happens on the route."""
+        route = plan.route
+        return route is not None and bool(route.risks or route.stations or len(route.prediction.trips()))
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return marks and names."""
+        return *self._clouds.values(), *self._labels
+
+
+def _risky(route: RouteView) -> FloatArray:
+    """(N, 2) places from which a reflector may be taken for another one [m]."""
+    points = np.concatenate([np.empty((0, 2)), *(risk.points for risk in route.risks)])
+    return thinned(points, MOST_RISKY)

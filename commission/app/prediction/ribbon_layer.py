@@ -1,0 +1,78 @@
+"""What the step Plan expects along a route: a ribbon in the colors of its load. What happens on it is in `events`."""
+
+from __future__ import annotations
+
+import numpy as np
+from viser import LineSegmentsHandle, SceneApi, SceneNodeHandle
+
+from commission.app.base import theme
+from commission.app.base.drawing import NO_SEGMENTS, stroke_segments
+from commission.app.base.layer import BaseLayer
+from commission.app.base.state import AppState
+from commission.app.plan.view import PlanView
+from commission.app.prediction.load_colors import load_classes, palette
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.planning.route_prediction import RoutePrediction
+
+MOST_PIECES = 1500
+WIDTH, RIM = 6.0, 9.0
+
+
+def pieces(points: FloatArray, loads: FloatArray, at_most: int) -> tuple[FloatArray, IntArray]:
+    """Thin a colored line without losing its worst spots.
+
+    Parameters
+    ----------
+    points : (K, 2) array [m].
+    loads : (K,) load at each point [1].
+    at_most : about how many pieces remain.
+
+    Returns
+    -------
+    lines : (N, 2, 2) pieces [m], end to end.
+    classes : (N,) class of the largest load of each.
+    """
+    step = max(1, -(-len(points) // at_most))
+    starts = np.arange(0, len(points) - 1, step)
+    ends = np.minimum(starts + step, len(points) - 1)
+    return np.stack([points[starts], points[ends]], axis=1), load_classes(np.maximum.reduceat(loads, starts))
+
+
+class RibbonLayer(BaseLayer):
+    """Predicted uncertainty along the chosen route."""
+
+    name = "Route prediction"
+    reads: tuple[str, ...] = ()
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        # A dark rim keeps the ribbon apart from a heatmap in the same colors. One node for each color: colors of
+        # single vertices come out lighter in the browser than the same color of a whole node.
+        self._rim = self._lines("rim", (0, 0, 0), RIM)
+        self._ribbon = tuple(self._lines(f"ribbon/{index}", color, WIDTH) for index, color in enumerate(palette()))
+        self._shown: RoutePrediction | None = None
+
+    def _lines(self, name: str, color: theme.Color, width: float) -> LineSegmentsHandle:
+        return self.scene.add_line_segments(
+            f"/plan/{name}", NO_SEGMENTS, color, thickness=width, thickness_units="screen"
+        )
+
+    def draw_plan(self, plan: PlanView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+        """Draw the ribbon anew where the prediction has changed."""
+        prediction = None if plan.route is None else plan.route.prediction
+        if prediction is self._shown:
+            return
+        self._shown = prediction
+        points, loads = (np.empty((0, 2)), np.empty(0))
+        if prediction is not None:
+            points, loads = prediction.drive.poses[:, :2], prediction.load
+        lines, classes = pieces(points, loads, MOST_PIECES) if len(points) > 1 else (points.reshape(0, 2, 2), loads)
+        self._rim.points = stroke_segments(lines, theme.Height.ROUTE)
+        for index, node in enumerate(self._ribbon):
+            chosen = lines[classes == index]
+            if len(chosen) or len(node.points) > 1:
+                node.points = stroke_segments(chosen, theme.Height.ACCUMULATED)
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return ribbon and rim."""
+        return self._rim, *self._ribbon

@@ -1,0 +1,107 @@
+"""The step Plan, second part: the localizer predicted along a route."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from viser import GuiApi, GuiDropdownHandle, GuiFolderHandle
+
+from commission.app.base import theme
+from commission.app.base.actions import Action, Report
+from commission.app.base.inputs import Inputs, Text, WorkBar
+from commission.app.base.panel import BasePanel, Post
+from commission.app.base.rows import Rows
+from commission.app.base.view import PageView
+from commission.app.coverage.words import metres_text
+from commission.app.editing.actions import LookAt
+from commission.app.plan.actions import SetPlan
+from commission.app.plan.planner import PREDICTION
+from commission.app.plan.view import RiskView, RouteView
+from commission.app.prediction.chart import chart
+from commission.app.prediction.driven import driven
+
+NO_ROUTE = "Off"
+MOST_RISKS = 12
+CYCLES_PER_CHART = 20
+"""Scans between two drawings of a run over the chart: it is long, and nobody reads it faster."""
+
+
+class RoutePanel(BasePanel):
+    """Widgets of the prediction.
+
+    Parameters
+    ----------
+    gui, post : where the widgets are made, what takes their actions.
+    folder : the folder that holds them.
+    """
+
+    def __init__(self, gui: GuiApi, post: Post, folder: GuiFolderHandle) -> None:
+        self._inputs = Inputs(gui, post, SetPlan, lambda state, name: getattr(state.plan, name))
+        self._risks: tuple[RiskView, ...] = ()
+        with folder:
+            self._add(gui, post)
+        self._rows = Rows(gui, folder, post, self._showing)
+
+    def _add(self, gui: GuiApi, post: Post) -> None:
+        self._route: GuiDropdownHandle[Any] = gui.add_dropdown(
+            "Route", (NO_ROUTE,), hint="Route along which the localizer is predicted."
+        )
+        self._inputs.connect(
+            "route",
+            self._route,
+            lambda name: "" if name == NO_ROUTE else name,
+            lambda state: state.plan.route if state.plan.route in self._route.options else NO_ROUTE,
+        )
+        self._work = WorkBar(gui, post, PREDICTION, SetPlan("route", ""))
+        self._chart = Text(gui)
+        self._neighbors = Text(gui)
+
+    def _showing(self, index: int, client: int) -> Action:
+        """Go to where a wrong association is most probable; the list may have become shorter since it was drawn."""
+        if index >= len(self._risks):
+            return Report("that risk is gone: the route has been predicted anew", failed=False)
+        return LookAt(client, self._risks[index].worst)
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Follow settings, progress and result."""
+        names = (NO_ROUTE, *(route.name for route in view.state.project.routes))
+        if self._route.options != names:
+            self._route.options = names
+        self._inputs.follow(view.state)
+        self._work.follow(view)
+        route, run = view.plan.route, view.run
+        self._show_risks(() if route is None else route.risks)
+        self._neighbors.write((route,), lambda: "" if route is None else _risk_text(route))
+        if route is None:
+            self._chart.write((None,), str)
+            return
+        cycles = 0 if run is None else len(run.series) // CYCLES_PER_CHART
+        self._chart.write(
+            (route, cycles), lambda: chart(route, None if run is None else driven(run.series, route.prediction))
+        )
+
+    def _show_risks(self, risks: tuple[RiskView, ...]) -> None:
+        """A line for each of the most probable mistakes."""
+        if risks is self._risks:
+            return
+        self._risks = risks
+        self._rows.show(
+            [
+                (
+                    f"{risk.reflector} taken for {risk.neighbor}: {100 * risk.chance:.0f} % at worst, "
+                    f"{metres_text(list(risk.metres))}",
+                    theme.WARNING_LINE,
+                )
+                for risk in risks[:MOST_RISKS]
+            ]
+        )
+
+
+def _risk_text(route: RouteView) -> str:
+    """Say whether a wrong association is to be feared."""
+    if not route.risks:
+        text = "No neighbors inside each other's gate: no wrong association expected."
+    else:
+        listed = f", the first {MOST_RISKS} listed" if len(route.risks) > MOST_RISKS else ""
+        text = f"{len(route.risks)} neighbors inside the gate{listed}; a click goes there."
+    return f"<div class='c-note' style='padding:2px 6px'>{text}</div>"

@@ -1,0 +1,165 @@
+"""Drawings over the metres of a route: bars in the colors of the ribbon, a run over them, marks. Only svg in here.
+
+Drawings and no plots of viser's: its curves have one color each, and here the color is the message.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from commission.app.base import theme
+from commission.app.base.panel import escaped
+from commission.app.coverage.words import number_text
+from commission.geometry.arrays import FloatArray
+
+WIDTH, LEFT = 270, 30
+BELOW, ABOVE = 100.0, 2.0
+"""How far a logarithmic axis reaches below and above the limit, as factors: a good drive lies far below it."""
+INK, GRID = "#9aa0a8", "#3a3d43"
+TALL, LOW = 60.0, 34.0
+"""Height of the bars of a track, and of one that matters less [pixels]."""
+LABELS_PX = 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Axis:
+    """The horizontal axis: metres of the route, and what happens at some of them."""
+
+    length: float
+    """Length of the route [m]."""
+    metres: FloatArray
+    """(B,) where each bar begins [m]."""
+    fills: tuple[str, ...]
+    """CSS color of each bar."""
+    stops: FloatArray
+    """Where the supervisor stops the vehicle [m]."""
+    recoveries: FloatArray
+    """Where it may drive again [m]."""
+
+    def x(self, metre: FloatArray) -> FloatArray:
+        """Pixels from the left of the drawing."""
+        return LEFT + (WIDTH - LEFT) * np.asarray(metre) / max(self.length, 1e-9)
+
+    def edges(self) -> FloatArray:
+        """(B + 1,) left edge of each bar, and the right one of the last."""
+        return self.x(np.append(self.metres, self.length))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Limited:
+    """A quantity with a limit, on a logarithmic axis."""
+
+    title: str
+    """Name and unit."""
+    levels: FloatArray
+    """(B,) the worst of each stretch, in the page's unit."""
+    limit: float
+    """The limit, in the page's unit."""
+    errors: FloatArray
+    """(B,) the same of the true error."""
+    driven: tuple[FloatArray, FloatArray] | None = None
+    """(N,) metres of a run and (N,) the same quantity of it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plain:
+    """A quantity without a limit, on an axis from zero."""
+
+    title: str
+    """Name and unit."""
+    levels: FloatArray
+    """(B,) the worst of each stretch, in the page's unit."""
+    ticks: tuple[float, ...]
+    """Levels that are written beside the axis; the largest ends it."""
+
+
+def limited(track: Limited, axis: Axis) -> str:
+    """Draw bars up to a logarithmic level, the limit, the true error, and a run."""
+    low, high = math.log10(track.limit / BELOW), math.log10(track.limit * ABOVE)
+
+    def y(values: FloatArray) -> FloatArray:
+        share = (np.log10(np.maximum(values, 1e-12)) - low) / (high - low)
+        return TALL * (1.0 - np.clip(share, 0.0, 1.0))
+
+    ticks = [10.0**power for power in range(math.ceil(low), math.floor(high) + 1)]
+    parts = [part for tick in ticks for part in _tick(float(y(np.array(tick))), f"{tick:g}")]
+    parts += _bars(axis, y(track.levels), TALL)
+    parts.append(_line(float(y(np.array(track.limit))), theme.css(theme.POSE), "5 4"))
+    parts.append(_steps(axis, y(track.errors), theme.css(theme.REFERENCE)))
+    if track.driven is not None:
+        metres, values = track.driven
+        points = " ".join(f"{px:.1f},{py:.1f}" for px, py in zip(axis.x(metres), y(values), strict=True))
+        parts.append(f"<polyline points='{points}' fill='none' stroke='#fff' stroke-width='1.2'/>")
+    return _svg(track.title, TALL, axis, parts)
+
+
+def plain(track: Plain, axis: Axis) -> str:
+    """Draw bars from zero."""
+    most = max(*track.ticks, 1e-9)
+    parts = [part for tick in track.ticks for part in _tick(LOW * (1.0 - tick / most), number_text(tick))]
+    parts += _bars(axis, LOW * (1.0 - np.clip(track.levels / most, 0.0, 1.0)), LOW)
+    return _svg(track.title, LOW, axis, parts)
+
+
+def round_up(value: float) -> float:
+    """Return the smallest of 1, 2 and 5 times a power of ten that is no less than a value greater than 0."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(nice * power for nice in (1.0, 2.0, 5.0, 10.0) if nice * power >= value * (1.0 - 1e-9))
+
+
+def _svg(title: str, bottom: float, axis: Axis, parts: list[str]) -> str:
+    height = bottom + LABELS_PX
+    content = "".join([*parts, *_events(axis, bottom), *_metre_labels(axis, height)])
+    head = f"<div style='font-size:11px;opacity:.75;padding-top:5px'>{escaped(title)}</div>"
+    box = f"viewBox='0 0 {WIDTH} {height:.0f}' width='100%' style='display:block;font:9px sans-serif'"
+    return f"{head}<svg {box}>{content}</svg>"
+
+
+def _tick(y: float, text: str) -> list[str]:
+    return [_line(y, GRID), _text(LEFT - 4, min(max(y + 3.0, 7.0), 1e3), text)]
+
+
+def _text(x: float, y: float, text: str, anchor: str = "end") -> str:
+    return f"<text x='{x:.1f}' y='{y:.1f}' fill='{INK}' text-anchor='{anchor}'>{text}</text>"
+
+
+def _line(y: float, color: str, dash: str = "none") -> str:
+    return f"<line x1='{LEFT}' x2='{WIDTH}' y1='{y:.1f}' y2='{y:.1f}' stroke='{color}' stroke-dasharray='{dash}'/>"
+
+
+def _bars(axis: Axis, tops: FloatArray, bottom: float) -> list[str]:
+    edges = axis.edges()
+    return [
+        f"<rect x='{left:.1f}' y='{min(top, bottom - 1.0):.1f}' width='{right - left + 0.3:.1f}' "
+        f"height='{max(bottom - top, 1.0):.1f}' fill='{fill}'/>"
+        for left, right, top, fill in zip(edges[:-1], edges[1:], tops, axis.fills, strict=True)
+    ]
+
+
+def _steps(axis: Axis, tops: FloatArray, color: str) -> str:
+    """Draw a line that is level over each bar."""
+    places = np.column_stack((np.repeat(axis.edges(), 2)[1:-1], np.repeat(tops, 2)))
+    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in places.tolist())
+    return f"<polyline class='c-error' points='{points}' fill='none' stroke='{color}' stroke-width='1.2'/>"
+
+
+def _events(axis: Axis, bottom: float) -> list[str]:
+    """Draw an upright line where the supervisor stops the vehicle, and one where it lets it go on."""
+    kinds = ((axis.stops, theme.OVER_LIMIT, "c-stop"), (axis.recoveries, theme.RECOVERY, "c-recovery"))
+    return [
+        f"<line class='{name}' x1='{x:.1f}' x2='{x:.1f}' y1='0' y2='{bottom:.0f}' stroke='{theme.css(color)}' "
+        "stroke-width='1.5'/>"
+        for metres, color, name in kinds
+        for x in axis.x(metres)
+    ]
+
+
+def _metre_labels(axis: Axis, height: float) -> list[str]:
+    """Write the metres at the ends and in the middle."""
+    places = ((0.0, "start"), (0.5 * axis.length, "middle"), (axis.length, "end"))
+    return [
+        _text(float(axis.x(np.array(metre))), height - 2, f"{number_text(metre)} m", anchor) for metre, anchor in places
+    ]

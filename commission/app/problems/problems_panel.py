@@ -1,0 +1,68 @@
+"""What is wrong with the site, live, a click away from its place; and what went wrong in this session."""
+
+from __future__ import annotations
+
+from viser import GuiApi, GuiTabHandle
+
+from commission.app.base import actions, theme
+from commission.app.base.panel import BasePanel, Post, escaped, posting
+from commission.app.base.rows import Rows
+from commission.app.base.view import PageView
+from commission.app.editing.actions import ShowProblem
+from commission.studies.problems import Problem, Severity
+
+COLORS: dict[Severity, theme.Color] = {
+    Severity.ERROR: theme.ERROR_LINE,
+    Severity.WARNING: theme.WARNING_LINE,
+    Severity.NOTE: theme.LINE,
+}
+MOST_SHOWN = 60
+
+
+class ProblemsPanel(BasePanel):
+    """Two lists of problems.
+
+    Parameters
+    ----------
+    gui, post : where the widgets are made, what takes their actions.
+    tab : the tab that holds the lists.
+    """
+
+    def __init__(self, gui: GuiApi, post: Post, tab: GuiTabHandle) -> None:
+        with tab:
+            self._html = gui.add_html("")
+            self._clear = gui.add_button("Clear", color="gray", visible=False)
+        self._clear.on_click(posting(post, lambda _event: actions.ClearProblems()))
+        self._found: tuple[Problem, ...] = ()
+        self._rows = Rows(gui, tab, post, self._showing)
+        self._shown: tuple[object, object] | None = None
+
+    def _showing(self, index: int, client: int) -> actions.Action:
+        """Return the action of a line; the list may have become shorter since it was drawn."""
+        if index < len(self._found):
+            return ShowProblem(client, self._found[index])
+        return actions.Report("this problem is gone", failed=False)
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Show both lists."""
+        problems, found = view.state.problems, view.found
+        if self._shown is not None and self._shown[0] is problems and self._shown[1] is found:
+            return
+        self._shown = problems, found
+        self._found = found[:MOST_SHOWN]
+        lines = "".join(f"<li style='margin:3px 0'>{escaped(text)}</li>" for text in reversed(problems))
+        self._html.content = (
+            f"<ul class='c-problems' style='font-size:12px;padding:0 6px 0 20px;margin:4px 0'>{lines}</ul>"
+            if problems
+            else f"<div class='c-note' style='padding:2px 6px'>{_summary(found)}</div>"
+        )
+        self._clear.visible = bool(problems)
+        self._rows.show([(problem.text, COLORS[problem.severity]) for problem in self._found])
+
+
+def _summary(found: tuple[Problem, ...]) -> str:
+    """Say how many problems there are."""
+    if not found:
+        return "None."
+    count = f"{len(found)} of the site" if len(found) <= MOST_SHOWN else f"{len(found)}, the first {MOST_SHOWN} shown"
+    return f"{count}; a click goes there."

@@ -1,0 +1,1 @@
+"""The project itself: its folder and journal, its name, what is saved."""

@@ -1,0 +1,77 @@
+"""What the project is about, in numbers: hall, reflectors, routes, vehicle, scanner."""
+
+from __future__ import annotations
+
+from viser import GuiApi
+
+from commission.app.base.panel import BasePanel, Post, escaped, table
+from commission.app.base.view import PageView
+from commission.app.editing.equipment_fields import EquipmentFields
+from commission.app.floor_map.floor_map_panel import FloorMapPanel
+from commission.app.project.project_fields import ProjectFields
+from commission.site.project import Project
+
+
+def rows(project: Project) -> list[tuple[str, str]]:
+    """Return what the panel shows, line by line."""
+    floor_map, scanner = project.floor_map, project.scanner
+    first, last = scanner.field_of_view_deg
+    shown = [("Project", escaped(project.name))]
+    if floor_map is None:
+        shown.append(("Floor map", "none: an open field"))
+    else:
+        width, height = floor_map.size
+        shown += [
+            ("Floor map", f"{width:.1f} x {height:.1f} m"),
+            ("Cell", f"{floor_map.resolution * 1000:.0f} mm"),
+        ]
+    shown += [
+        ("Reflectors", str(len(project.reflectors))),
+        ("Routes", str(len(project.routes))),
+        ("Vehicle", escaped(project.vehicle.kind)),
+        ("Scanner", f"{scanner.beam_count} beams, {first:g} to {last:g} °"),
+    ]
+    return shown
+
+
+def route_rows(project: Project) -> list[tuple[str, str]]:
+    """Return name, length and speed of each route."""
+    return [
+        (escaped(route.name), f"{sum(s.spline().length for s in route.segments):.1f} m, {route.speed:g} m/s")
+        for route in project.routes
+    ]
+
+
+class SitePanel(BasePanel):
+    """Facts of the project, loading of its floor map, and the editor of vehicle and scanner."""
+
+    def __init__(self, gui: GuiApi, post: Post, project: Project) -> None:
+        self._html = gui.add_html("")
+        self._project = ProjectFields(gui, post, project)
+        self._floor_map = FloorMapPanel(gui, post, project)
+        self._equipment = EquipmentFields(gui, post, project)
+        self._shown: Project | None = None
+        self._routes = ""
+        self._show(project)
+
+    def draw(self, view: PageView) -> None:
+        """Show how far loading is without delay."""
+        self._floor_map.draw(view)
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Follow the project."""
+        self._floor_map.draw_slowly(view)
+        if view.state.project is not self._shown:
+            self._show(view.state.project)
+
+    def _show(self, project: Project) -> None:
+        if self._shown is None or project.routes is not self._shown.routes:
+            self._routes = table(route_rows(project))  # lengths of many curves take a while
+        self._shown = project
+        facts = f"<div style='padding:2px 6px'>{table(rows(project))}</div>"
+        routes = f"<div style='padding:8px 6px 2px'><div class='c-note'>Routes</div>{self._routes}</div>"
+        content = facts + (routes if project.routes else "")
+        if self._html.content != content:
+            self._html.content = content
+        self._project.show(project)
+        self._equipment.show(project)

@@ -1,0 +1,50 @@
+"""Every inlier and outlier of the drive so far (Sobreira et al. 2016, Fig. 11)."""
+
+from __future__ import annotations
+
+from viser import SceneApi, SceneNodeHandle
+
+from commission.app.base import theme
+from commission.app.base.drawing import NO_POINTS, lift
+from commission.app.base.extent import extent_of
+from commission.app.base.layer import BaseLayer
+from commission.app.base.state import AppState
+from commission.app.base.view import RunView
+from commission.site.project import Project
+
+
+class AccumulatedLayer(BaseLayer):
+    """Detections accumulated over the drive."""
+
+    name = "Accumulated detections"
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._inliers, self._outliers = (
+            scene.add_point_cloud(
+                f"/run/accumulated/{name}",
+                NO_POINTS,
+                color,
+                point_size=0.03,
+                point_shape="circle",
+                point_shading="flat",
+                precision="float32",
+            )
+            for name, color in (("inliers", theme.INLIER), ("outliers", theme.OUTLIER_ASSOCIATION))
+        )
+
+    def show_site(self, project: Project) -> None:
+        """Adapt the size of points to the site's."""
+        for cloud in (self._inliers, self._outliers):
+            cloud.point_size = 0.4 * extent_of(project).mark_size()
+
+    def draw_slowly(self, run: RunView, state: AppState) -> None:
+        """Draw every detection so far, unless the layer is off: it is the largest of all."""
+        if run.accumulated is None or self.name in state.hidden:
+            return
+        self._inliers.points = lift(run.accumulated.inliers, theme.Height.ACCUMULATED)
+        self._outliers.points = lift(run.accumulated.outliers, theme.Height.ACCUMULATED)
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return both sets of points."""
+        return self._inliers, self._outliers

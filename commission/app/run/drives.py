@@ -1,0 +1,57 @@
+"""From a chosen source to a drive: simulated or read, with the belief that the localizer starts from.
+
+Runs as a background job: plain values in, a plain value out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from commission.app.base.actions import Recording, Source, VirtualDrive
+from commission.app.run.session import Drive
+from commission.errors import SourceError
+from commission.geometry.arrays import frozen
+from commission.io.recordings.base import load_log
+from commission.localization.estimate import Belief
+from commission.simulation import scenario
+from commission.site.project import Project
+from commission.studies.start import start_of
+
+
+def prepare(project: Project, source: Source, progress: Callable[[float], None]) -> Drive:
+    """Simulate or read a drive.
+
+    Parameters
+    ----------
+    project : site, vehicle and scanner; its parameters are the wheels' true noise of a virtual drive.
+    source : what drives.
+    progress : called with the share done [0..1]; may raise to cancel.
+
+    Raises
+    ------
+    CommissionError
+        the route does not exist or cannot be driven, the recording cannot be read or holds no scan.
+    """
+    if isinstance(source, VirtualDrive):
+        return _simulated(project, source, progress)
+    return _recorded(project, source, progress)
+
+
+def _simulated(project: Project, source: VirtualDrive, progress: Callable[[float], None]) -> Drive:
+    if source.people is not None:
+        project = replace(project, disturbances=replace(project.disturbances, people=source.people))
+    start = scenario.start_of(project, source.route)
+    log = scenario.virtual_drive(project, source.route, source.seed, progress=progress)
+    covariance = frozen(np.diag(np.square(start.sigmas)), (3, 3), "initial covariance")
+    return Drive(log, Belief(int(log.stamps_ns[0]), start.pose, covariance))
+
+
+def _recorded(project: Project, source: Recording, progress: Callable[[float], None]) -> Drive:
+    progress(0.0)
+    log = load_log(source.path)
+    if log.scans is None and not len(log.detection_stamps_ns):
+        raise SourceError(f"{source.path} holds no scan; expected scans.npz or detections.csv")
+    return Drive(log, start_of(project, log).belief)

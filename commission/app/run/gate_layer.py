@@ -1,0 +1,37 @@
+"""Validation areas: around each reflector in view, where a detection of it must lie to be an inlier."""
+
+from __future__ import annotations
+
+import numpy as np
+from viser import SceneApi, SceneNodeHandle
+
+from commission.app.base import theme
+from commission.app.base.drawing import NO_SEGMENTS, outline_segments
+from commission.app.base.layer import BaseLayer
+from commission.app.base.state import AppState
+from commission.app.base.view import RunView
+
+
+class GateLayer(BaseLayer):
+    """Validation ellipses, all in one node."""
+
+    name = "Validation areas"
+    legend = (theme.Legend("validation area (gate)", theme.GATE, theme.Mark.RING),)
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._lines = scene.add_line_segments(
+            "/run/gates", NO_SEGMENTS, theme.GATE, thickness=1.5, thickness_units="screen"
+        )
+
+    def draw(self, run: RunView, state: AppState) -> None:
+        """Draw the ellipses, larger than they are when asked to."""
+        outlines = run.gates
+        if state.magnify != 1.0 and len(outlines):
+            middle = np.mean(outlines, axis=1, keepdims=True)
+            outlines = middle + state.magnify * (outlines - middle)
+        self._lines.points = outline_segments(outlines, theme.Height.GATE)
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the lines."""
+        return (self._lines,)

@@ -1,0 +1,69 @@
+"""The newest cycle in numbers: where the vehicle is, how well that is known, what was seen."""
+
+from __future__ import annotations
+
+import math
+
+from viser import GuiApi
+
+from commission.app.base.panel import BasePanel, table
+from commission.app.base.view import PageView, RunView
+from commission.localization.estimate import Mode, Status
+from commission.site.parameters import SupervisorParameters
+
+
+def rows(run: RunView, limits: SupervisorParameters) -> list[tuple[str, str]]:
+    """Return what the panel shows, line by line."""
+    x, y, heading = run.pose
+    lived = [episode for episode in run.episodes if episode[0] <= run.time]
+    shown = [
+        ("Mode", "fail: output withheld" if run.mode is Mode.FAIL else "operational"),
+        ("Fail episodes so far", str(len(lived))),
+        ("Position x, y", f"{x:.3f}, {y:.3f} m"),
+        ("Heading", f"{round(math.degrees(heading), 2) + 0.0:.2f} °"),
+    ]
+    if run.estimate is None:
+        return shown
+    sigma_x, sigma_y, sigma_heading = run.series.two_sigma[-1]
+    limit_mm = f"{limits.position_limit * 1000:.0f} mm"
+    estimate = run.estimate
+    inlier = estimate.status == Status.INLIER
+    nis = f"{estimate.d2[inlier].max():.2f}" if inlier.any() else "none seen"
+    error = run.series.error[-1]
+    shown += [
+        ("2σ x / limit", f"{sigma_x * 1000:.1f} / {limit_mm}"),
+        ("2σ y / limit", f"{sigma_y * 1000:.1f} / {limit_mm}"),
+        ("2σ heading / limit", f"{math.degrees(sigma_heading):.2f} / {math.degrees(limits.heading_limit):.1f} °"),
+        ("Inliers", str(estimate.count(Status.INLIER))),
+        (
+            "Outliers by beams, gate",
+            f"{estimate.count(Status.OUTLIER_DETECTOR)}, {estimate.count(Status.OUTLIER_ASSOCIATION)}",
+        ),
+        ("Largest NIS / gate", f"{nis} / {estimate.gate:.2f}"),
+        ("Cycle time", f"{run.series.microseconds[-1]:.0f} µs"),
+        ("Position error", f"{error * 1000:.1f} mm" if math.isfinite(error) else "no reference"),
+    ]
+    return shown
+
+
+class NowPanel(BasePanel):
+    """Numbers of the newest cycle."""
+
+    def __init__(self, gui: GuiApi) -> None:
+        self._html = gui.add_html("<div class='c-note'>Numbers appear with the first scan.</div>")
+
+    @property
+    def visible(self) -> bool:
+        """Whether they are shown."""
+        return self._html.visible
+
+    @visible.setter
+    def visible(self, visible: bool) -> None:
+        if self._html.visible is not visible:
+            self._html.visible = visible
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Show the numbers."""
+        if view.run is not None:
+            shown = table(rows(view.run, view.state.project.parameters.supervisor))
+            self._html.content = f"<div class='c-now' style='padding:2px 14px 2px 6px'>{shown}</div>"

@@ -1,0 +1,129 @@
+"""What drives: a virtual vehicle or a recording, and what is done to it while it does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from viser import GuiApi
+
+from commission.app.base import actions
+from commission.app.base.panel import BasePanel, Post, escaped, posting
+from commission.app.base.state import AppState
+from commission.app.base.view import PageView
+
+NO_ROUTE = ("(the project has none)",)
+
+
+class RunPanel(BasePanel):
+    """Choice of the source."""
+
+    def __init__(self, gui: GuiApi, post: Post, state: AppState) -> None:
+        self._gui = gui
+        self._now = gui.add_html("")
+        self._progress = gui.add_progress_bar(0.0, visible=False, animated=True)
+        self._shown = ""
+        self._add_drive(post, state)
+        self._add_recording(post, state)
+        with gui.add_folder("During the run"):
+            self._cover = gui.add_checkbox(
+                "Cover reflectors",
+                state.covered,
+                hint="From the next scan on no reflector is seen, as if someone had covered them all.",
+            )
+            self._cover.on_update(posting(post, lambda event: actions.Cover(bool(event.target.value))))
+            self._repeat = gui.add_checkbox(
+                "Repeat at the end", state.repeat, hint="The drive starts again at its initial pose."
+            )
+            self._repeat.on_update(posting(post, lambda event: actions.Repeat(bool(event.target.value))))
+            restart = gui.add_button(
+                "Restart", hint="Back to the start, the initial pose and its uncertainty.", color="gray"
+            )
+            restart.on_click(posting(post, lambda _event: actions.Restart()))
+
+    def _add_drive(self, post: Post, state: AppState) -> None:
+        names = _routes(state)
+        drive = state.source if isinstance(state.source, actions.VirtualDrive) else None
+        with self._gui.add_folder("Virtual drive"):
+            self._route = self._gui.add_dropdown("Route", names, initial_value=drive.route if drive else None)
+            seed = self._gui.add_number(
+                "Seed", drive.seed if drive else 1, min=0, step=1, hint="The same seed gives the same drive."
+            )
+            people = self._gui.add_number(
+                "People", state.project.disturbances.people, min=0, max=500, step=1, hint="People walking about."
+            )
+            self._drive = self._gui.add_button("Drive", hint="Simulate the drive and run it.")
+        self._follow_routes(state)
+        self._drive.on_click(
+            posting(
+                post,
+                lambda _event: actions.ChooseSource(
+                    actions.VirtualDrive(self._route.value, int(seed.value), int(people.value))
+                ),
+            )
+        )
+
+    def _add_recording(self, post: Post, state: AppState) -> None:
+        shown = str(state.source.path) if isinstance(state.source, actions.Recording) else ""
+        with self._gui.add_folder("Recording"):
+            path = self._gui.add_text(
+                "Folder", shown, hint="Path, on the computer that serves this page, of a recording."
+            )
+            start = self._gui.add_button("Open", hint="Read the recording and run it.")
+        start.on_click(
+            posting(
+                post,
+                lambda _event: (
+                    actions.ChooseSource(actions.Recording(Path(path.value.strip()).expanduser()))
+                    if path.value.strip()
+                    else actions.Report("no recording was named; expected the path of a folder")
+                ),
+            )
+        )
+
+    def _follow_routes(self, state: AppState) -> None:
+        """Offer the routes that there are now."""
+        names = _routes(state)
+        if self._route.options != names:
+            self._route.options = names
+        for widget in (self._route, self._drive):
+            if widget.disabled is not (names == NO_ROUTE):
+                widget.disabled = names == NO_ROUTE
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Show what runs and what is being prepared."""
+        self._follow_routes(view.state)
+        content = _now(view)
+        if content != self._shown:
+            self._shown = content
+            self._now.content = content
+        jobs = view.jobs
+        seeking = None if view.run is None else view.run.seeking
+        fraction = jobs[0].fraction if jobs else seeking
+        self._progress.visible = fraction is not None
+        if fraction is not None:
+            self._progress.value = 100.0 * min(max(fraction, 0.0), 1.0)
+        if self._cover.value is not view.state.covered:
+            self._cover.value = view.state.covered
+        if self._repeat.value is not view.state.repeat:
+            self._repeat.value = view.state.repeat
+
+
+def _routes(state: AppState) -> tuple[str, ...]:
+    """Return what the list of routes offers."""
+    return tuple(route.name for route in state.project.routes) or NO_ROUTE
+
+
+def _now(view: PageView) -> str:
+    """Say in one line what drives, and what is under way."""
+    source = view.state.source
+    if isinstance(source, actions.VirtualDrive):
+        what = f"Virtual drive, route <b>{escaped(source.route)}</b>, seed {source.seed}"
+    elif isinstance(source, actions.Recording):
+        what = f"Recording <b>{escaped(source.path.name)}</b>"
+    else:
+        what = "Nothing drives yet: choose a virtual drive or a recording."
+    under_way = [escaped(job.line) for job in view.jobs]
+    if view.run is not None and view.run.seeking is not None:
+        under_way.append(f"Replaying {view.run.seeking:.0%}")
+    note = f"<br><span class='c-note'>{'; '.join(under_way)}</span>" if under_way else ""
+    return f"<div style='font-size:12.5px;padding:2px 4px'>{what}{note}</div>"

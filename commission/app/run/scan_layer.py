@@ -1,0 +1,44 @@
+"""The newest scan: where each beam ended, seen from the estimated pose."""
+
+from __future__ import annotations
+
+from viser import SceneApi, SceneNodeHandle
+
+from commission.app.base import theme
+from commission.app.base.drawing import NO_POINTS, lift
+from commission.app.base.extent import extent_of
+from commission.app.base.layer import BaseLayer
+from commission.app.base.state import AppState
+from commission.app.base.view import RunView
+from commission.site.project import Project
+
+
+class ScanLayer(BaseLayer):
+    """Scan points."""
+
+    name = "Scan"
+    legend = (theme.Legend("scan point (paper: dark)", theme.SCAN, theme.Mark.DOT),)
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._points = scene.add_point_cloud(
+            "/run/scan",
+            NO_POINTS,
+            theme.SCAN,
+            point_size=0.04,
+            point_shape="circle",
+            point_shading="flat",
+            precision="float32",
+        )
+
+    def show_site(self, project: Project) -> None:
+        """Adapt the size of points to the site's."""
+        self._points.point_size = 0.4 * extent_of(project).mark_size()
+
+    def draw(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+        """Draw the newest scan."""
+        self._points.points = lift(run.scan_map, theme.Height.SCAN)
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the points."""
+        return (self._points,)

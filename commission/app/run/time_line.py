@@ -1,0 +1,102 @@
+"""The strip under the floor: play, pause, step, speed, the time line with its fail episodes."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from viser import GuiApi
+
+from commission.app.base import actions, theme
+from commission.app.base.panel import BasePanel, Post, clock, posting
+from commission.app.base.state import SPEEDS
+from commission.app.base.view import PageView, RunView
+
+PLAY, PAUSE, STEP = "Play", "Pause", "Step"
+FOLD = (
+    "<div class='c-bottom'><label class='c-fold' title='Fold the plots away, or show them'>"
+    "<input type='checkbox' aria-label='Fold the plots away'></label></div>"
+)
+"""A switch of the browser's own, which the page's style obeys: nobody else's plots are folded by it."""
+SHORTEST_SHOWN = 0.3
+"""Percent of the time line that even the shortest episode takes, so that it is seen."""
+
+
+def strip(run: RunView | None) -> str:
+    """Return the drive as a bar: grey what lies ahead, green what was operational, red each fail episode."""
+    if run is None or run.duration <= 0.0:
+        return "<div class='c-strip' style='height:8px'></div>"
+    percent = 100.0 / run.duration
+    done = min(100.0, run.time * percent)
+    parts = [f"<rect x='0' y='0' width='{done:.2f}' height='8' fill='{theme.OPERATIONAL_COLOR}'/>"]
+    for start, end in run.episodes:
+        width = max(SHORTEST_SHOWN, (end - start) * percent)
+        opacity = 1.0 if start <= run.time else 0.45
+        parts.append(
+            f"<rect x='{min(start * percent, 100.0 - width):.2f}' y='0' width='{width:.2f}' height='8' "
+            f"fill='{theme.FAIL_COLOR}' opacity='{opacity}'/>"
+        )
+    return (
+        f"<div class='c-strip' data-episodes='{len(run.episodes)}'>"
+        "<svg width='100%' height='8' viewBox='0 0 100 8' preserveAspectRatio='none' "
+        f"style='display:block;background:#33363c'>{''.join(parts)}</svg></div>"
+    )
+
+
+class TimeLine(BasePanel):
+    """Play clock and seeking; the page's style turns this panel into a strip."""
+
+    def __init__(self, gui: GuiApi, post: Post, speed: float) -> None:
+        gui.add_html(FOLD)
+        buttons = gui.add_button_group("", (PLAY, PAUSE, STEP))
+        buttons.on_click(posting(post, lambda event: _clicked(event.target.value)))
+        self._speed = gui.add_dropdown(
+            "", tuple(_factor(s) for s in SPEEDS), initial_value=_factor(speed), hint="Speed of the play clock."
+        )
+        self._speed.on_update(posting(post, lambda event: actions.SetSpeed(float(str(event.target.value).rstrip("x")))))
+        self._clock = gui.add_html("")
+        self._slider = gui.add_slider("", 0.0, 1.0, 0.01, 0.0)
+        self._slider.on_update(posting(post, lambda event: actions.Seek(float(event.target.value))))
+        self._strip = gui.add_html(strip(None))
+        self._shown = ("", "")
+        keys: tuple[tuple[str, Literal["P", "N", "B"], actions.Action], ...] = (
+            ("Play or pause", "P", actions.Play()),
+            ("One scan further", "N", actions.Step()),
+            ("Restart the drive", "B", actions.Restart()),
+        )
+        for label, key, action in keys:
+            gui.add_command(label, hotkey=key).on_trigger(lambda _event, action=action: post(action))
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Show time and episodes."""
+        run = view.run
+        if run is None:
+            return
+        if self._slider.max != run.duration and run.duration > 0.0:
+            self._slider.max = run.duration
+        shown_time = round(min(run.time, run.duration), 2)
+        if abs(self._slider.value - shown_time) > 0.005 and run.seeking is None:
+            self._slider.value = shown_time
+        if view.state.speed != float(self._speed.value.rstrip("x")):
+            self._speed.value = _factor(view.state.speed)
+        state = "seeking" if run.seeking is not None else "at the end" if run.at_end else ""
+        state = state or ("playing" if view.state.playing else "paused")
+        text = (
+            "<div class='c-clock' style='font-size:12px;white-space:nowrap;font-variant-numeric:tabular-nums'>"
+            f"<b>{clock(run.time)}</b> / {clock(run.duration)} <span style='opacity:.6'>{state}</span></div>"
+        )
+        bar = strip(run)
+        if (text, bar) != self._shown:
+            self._shown = (text, bar)
+            self._clock.content = text
+            self._strip.content = bar
+
+
+def _factor(speed: float) -> str:
+    return f"{speed:g}x"
+
+
+def _clicked(label: Any) -> actions.Action:
+    """From the button's label to what it means."""
+    if label == STEP:
+        return actions.Step()
+    return actions.Play(label == PLAY)

@@ -1,0 +1,55 @@
+"""Where the vehicle has been: as estimated, and as the reference says."""
+
+from __future__ import annotations
+
+from viser import SceneApi, SceneNodeHandle
+
+from commission.app.base import theme
+from commission.app.base.drawing import NO_SEGMENTS, polyline_segments, thinned
+from commission.app.base.layer import BaseLayer
+from commission.app.base.state import AppState
+from commission.app.base.view import RunView
+
+MOST_POINTS = 800
+
+
+class TrailLayer(BaseLayer):
+    """Trail of the estimate."""
+
+    name = "Trail"
+    legend = (theme.Legend("trail of the estimate", theme.TRAIL, theme.Mark.LINE),)
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._line = scene.add_line_segments(
+            "/run/trail", NO_SEGMENTS, theme.TRAIL, thickness=1.5, thickness_units="screen"
+        )
+
+    def draw_slowly(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+        """Draw the whole trail."""
+        self._line.points = polyline_segments(thinned(run.series.means[:, :2], MOST_POINTS), theme.Height.TRAIL)
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the line."""
+        return (self._line,)
+
+
+class ReferenceLayer(BaseLayer):
+    """Trail of the reference."""
+
+    name = "Reference"
+    legend = (theme.Legend("reference (truth)", theme.REFERENCE, theme.Mark.LINE),)
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._line = scene.add_line_segments(
+            "/run/reference", NO_SEGMENTS, theme.REFERENCE, thickness=3.0, thickness_units="screen"
+        )
+
+    def draw_slowly(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+        """Draw the reference positions up to now."""
+        self._line.points = polyline_segments(thinned(run.references, MOST_POINTS), theme.Height.REFERENCE)
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the line."""
+        return (self._line,)

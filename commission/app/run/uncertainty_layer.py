@@ -1,0 +1,50 @@
+"""The covariance of the estimated pose: an ellipse of 2-sigma for the position, two rays for the heading."""
+
+from __future__ import annotations
+
+import numpy as np
+from viser import SceneApi, SceneNodeHandle
+
+from commission.app.base import theme
+from commission.app.base.drawing import NO_SEGMENTS, lift, outline_segments
+from commission.app.base.layer import BaseLayer
+from commission.app.base.state import AppState
+from commission.app.base.view import RunView
+from commission.geometry.gaussian import ellipse_points
+
+SIGMAS = 2.0
+RAY = 0.8
+
+
+class UncertaintyLayer(BaseLayer):
+    """Pose covariance."""
+
+    name = "Pose covariance"
+    legend = (theme.Legend("2σ of the estimated pose", theme.POSE, theme.Mark.RING),)
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._lines = scene.add_line_segments(
+            "/vehicle/covariance", NO_SEGMENTS, theme.POSE, thickness=2.0, thickness_units="screen"
+        )
+
+    def draw(self, run: RunView, state: AppState) -> None:
+        """Draw ellipse and rays."""
+        # Drawn in the vehicle's frame, so that it sits on the vehicle even where a slow browser skips pictures.
+        c, s = np.cos(run.pose[2]), np.sin(run.pose[2])
+        to_base = np.array([[c, s], [-s, c]])
+        covariance = to_base @ run.covariance[:2, :2] @ to_base.T
+        ellipse = ellipse_points(np.zeros((1, 2)), covariance[np.newaxis], SIGMAS * state.magnify)
+        spread = min(SIGMAS * state.magnify * float(np.sqrt(run.covariance[2, 2])), np.pi)
+        ends = RAY * np.array([(np.cos(spread), np.sin(-spread)), (np.cos(spread), np.sin(spread))])
+        rays = np.stack([np.zeros((2, 2)), ends], axis=1)
+        self._lines.points = np.concatenate(
+            [
+                outline_segments(ellipse, theme.Height.POSE),
+                lift(rays.reshape(-1, 2), theme.Height.POSE).reshape(-1, 2, 3),
+            ]
+        )
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the lines."""
+        return (self._lines,)

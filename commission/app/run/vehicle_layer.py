@@ -1,0 +1,145 @@
+"""The vehicle at its estimated pose: outline, heading and what its scanner sees in the plan, its body in 3D.
+
+Before anything drives it stands at the start of the first route, so that what is edited of it is seen.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from viser import SceneApi, SceneNodeHandle
+
+from commission.app.base import theme
+from commission.app.base.drawing import NO_SEGMENTS, lift, outline_segments, yaw_quaternion
+from commission.app.base.layer import BaseLayer
+from commission.app.base.state import AppState
+from commission.app.base.view import RunView
+from commission.geometry import se2
+from commission.geometry.arrays import FloatArray
+from commission.site.project import Project
+from commission.site.scanner import Scanner
+from commission.site.vehicle import Vehicle
+from commission.studies.start import route_start
+
+if TYPE_CHECKING:
+    import trimesh
+
+GROUND_CLEARANCE = 0.05
+NEAR_FAN = 2.0
+"""Radius of the fan that shows the field of view beside the vehicle, in sizes of the vehicle."""
+ARC_STEP_DEG = 3.0
+
+
+def heading_mark(outline: np.ndarray) -> np.ndarray:
+    """Return the (3, 2, 2) strokes of an arrow from base towards the front [m], base frame."""
+    tip = 0.85 * float(outline[:, 0].max())
+    wing = 0.3 * tip
+    return np.array([[(0, 0), (tip, 0)], [(tip, 0), (tip - wing, wing)], [(tip, 0), (tip - wing, -wing)]])
+
+
+def reach_of(scanner: Scanner) -> float:
+    """Return how far a scanner sees reflectors [m]."""
+    return min(scanner.range[1], scanner.reflector_range)
+
+
+def fan(scanner: Scanner, radius: float) -> np.ndarray:
+    """Return the (N, 2, 2) strokes of a field of view [m], base frame: an arc, and its two edges if there are any."""
+    first, last = np.radians(scanner.field_of_view_deg)
+    count = max(2, int(np.degrees(last - first) / ARC_STEP_DEG) + 1)
+    bearings = np.linspace(first, last, count)
+    arc = radius * np.stack((np.cos(bearings), np.sin(bearings)), axis=1)
+    line = arc if scanner.is_full_turn else np.concatenate((np.zeros((1, 2)), arc, np.zeros((1, 2))))
+    points = se2.transform_points(scanner.mounting, line)
+    return np.stack((points[:-1], points[1:]), axis=1)
+
+
+def body(vehicle: Vehicle) -> trimesh.Trimesh:
+    """Return the outline extruded to the vehicle's height, with a beacon where the front is."""
+    from trimesh.creation import extrude_triangulation
+
+    outline = np.array(vehicle.outline)
+    fan = np.array([(0, i, i + 1) for i in range(1, len(outline) - 1)])
+    hull = extrude_triangulation(outline, fan, vehicle.height - GROUND_CLEARANCE)
+    hull.apply_translation([0.0, 0.0, GROUND_CLEARANCE])
+    return hull
+
+
+class VehicleLayer(BaseLayer):
+    """The vehicle."""
+
+    name = "Vehicle"
+    reads: tuple[str, ...] = ("vehicle", "scanner", "routes")
+    legend = (
+        theme.Legend("vehicle; before a run at the start", theme.VEHICLE, theme.Mark.LINE),
+        theme.Legend("field of view, reach for reflectors", theme.FIELD, theme.Mark.LINE),
+    )
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._project = Project()
+        self._frame = scene.add_frame("/vehicle", show_axes=False, visible=False)
+        self._lines = scene.add_line_segments(
+            "/vehicle/outline", NO_SEGMENTS, theme.VEHICLE, thickness=2.0, thickness_units="screen"
+        )
+        self._near, self._far = (
+            scene.add_line_segments(
+                f"/vehicle/field/{name}", NO_SEGMENTS, color, thickness=1.0, thickness_units="screen"
+            )
+            for name, color in (("near", theme.FIELD), ("far", theme.FAR_FIELD))
+        )
+        self._drives = False
+        self._scanner = scene.add_frame("/vehicle/scanner", axes_length=0.15, axes_radius=0.008, origin_radius=0.02)
+
+    def show_site(self, project: Project) -> None:
+        """Draw the outline and the scanner's place on the vehicle."""
+        self._project = project
+        outline = np.array(project.vehicle.outline)
+        edges = outline_segments(outline[np.newaxis], theme.Height.VEHICLE)
+        arrow = lift(heading_mark(outline).reshape(-1, 2), theme.Height.VEHICLE).reshape(-1, 2, 3)
+        self._lines.points = np.concatenate([edges, arrow])
+        x, y, heading = (float(value) for value in project.scanner.mounting)
+        self._scanner.position = (x, y, theme.Height.VEHICLE)
+        self._scanner.wxyz = yaw_quaternion(heading)
+        size = float(np.abs(outline).max())
+        self._scanner.axes_length = 0.3 * size
+        for node, radius in ((self._near, NEAR_FAN * size), (self._far, reach_of(project.scanner))):
+            strokes = fan(project.scanner, radius)
+            node.points = lift(strokes.reshape(-1, 2), theme.Height.GRID).reshape(-1, 2, 3)
+        if not self._drives:
+            self._wait(project)
+
+    def _wait(self, project: Project) -> None:
+        """Stand at the start of the first route; without one there is no place to stand at."""
+        self._frame.visible = bool(project.routes)
+        if project.routes:
+            self._put(np.array(route_start(project.routes[0])))
+
+    def _put(self, pose: FloatArray) -> None:
+        self._frame.position = (float(pose[0]), float(pose[1]), 0.0)
+        self._frame.wxyz = yaw_quaternion(float(pose[2]))
+
+    def draw(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+        """Move the vehicle to the estimated pose."""
+        if not self._drives:
+            self._drives = self._frame.visible = True
+        self._put(run.pose)
+
+    def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:
+        """Add the body in 3D; in the plan it would hide what lies under the vehicle."""
+        if not three_d:
+            return ()
+        hull = body(self._project.vehicle)
+        return (
+            scene.add_mesh_simple(
+                "/vehicle/body",
+                np.asarray(hull.vertices, np.float32),
+                np.asarray(hull.faces, np.uint32),
+                color=(232, 150, 40),
+                flat_shading=True,
+            ),
+        )
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the parts that hang on the vehicle's frame (which itself is hidden without a run or a route)."""
+        return self._lines, self._scanner, self._near, self._far

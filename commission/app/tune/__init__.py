@@ -1,0 +1,1 @@
+"""The step Tune: every parameter of the localizer."""

@@ -1,0 +1,194 @@
+"""Stations placed, dragged, turned, typed and deleted on the page, without a browser."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commission.app.base import actions as page
+from commission.app.base import reducer
+from commission.app.base.reduction import FlyTo
+from commission.app.base.server import start_server
+from commission.app.base.state import AppState
+from commission.app.base.view import PageView
+from commission.app.editing import actions
+from commission.app.editing.editor import ControlPoint, Editor, Tool
+from commission.app.editing.route_table import RouteTable
+from commission.app.editing.station_actions import AlignStation, DeleteStation, SelectStation, SetStation
+from commission.app.editing.station_gestures import heading_tip
+from commission.app.editing.station_layer import StationLayer
+from commission.app.editing.tool_hint import hint
+from commission.errors import UsageError
+from commission.site.stations import Station
+from commission.studies.problems import Problem, Severity, Subject
+from tests.app.sites import room
+
+ME, OTHER, REACH = 1, 2, 0.15
+ROUTE = "There and back"
+
+
+def after(state: AppState, *wishes: page.Action) -> AppState:
+    for wish in wishes:
+        state = reducer.reduce(wish, state).state
+    return state
+
+
+def click(x: float, y: float, client: int = ME) -> actions.ClickFloor:
+    return actions.ClickFloor(client, (x, y), REACH)
+
+
+def drag(start: tuple[float, float], end: tuple[float, float]) -> tuple[actions.DragFloor, ...]:
+    return actions.DragFloor(ME, "start", start, start, REACH), actions.DragFloor(ME, "end", start, end, REACH)
+
+
+@pytest.fixture
+def state() -> AppState:
+    project = room()
+    joined = after(AppState(project, project, folder=Path("hall")), actions.Join(ME), actions.Join(OTHER))
+    return after(joined, actions.ChooseTool(ME, Tool.STATION))
+
+
+@pytest.fixture
+def placed(state: AppState) -> AppState:
+    """One station in the open, selected."""
+    return after(state, click(3.0, 5.0), actions.ChooseTool(ME, Tool.SELECT))
+
+
+def station(state: AppState, index: int = -1) -> Station:
+    return state.project.stations[index]
+
+
+def editor(state: AppState, client: int = ME) -> Editor:
+    return state.editors[client]
+
+
+def test_a_click_places_a_station_and_near_a_route_it_stands_on_it_and_looks_along_it(state: AppState) -> None:
+    result = after(state, click(3.0, 5.0), click(3.0, 2.1))
+    free, on_route = result.project.stations
+    assert (free.x, free.y, free.heading) == (3.0, 5.0, 0.0)
+    curve = state.project.routes[0].segments[0].spline()
+    u = curve.closest((3.0, 2.1), 0.5)
+    assert (on_route.x, on_route.y) == pytest.approx(tuple(curve.point(u)), abs=1e-6)
+    assert on_route.heading == pytest.approx(float(curve.heading(u)), abs=1e-6)
+    assert [step.name for step in result.undo] == ["place Station 1", "place Station 2"]
+    assert editor(result).station == "Station 2"
+
+
+def test_a_station_is_dragged_as_one_step_and_a_route_attracts_it(placed: AppState) -> None:
+    begin, end = drag((3.05, 5.0), (4.0, 6.0))
+    halfway = after(placed, begin)
+    assert halfway.project is placed.project
+    moved = after(halfway, end)
+    assert (station(moved).x, station(moved).y) == (4.0, 6.0)
+    assert moved.undo[-1].name == "move Station 1"
+    assert after(moved, page.Undo(ME)).project is placed.project
+    on_route = after(placed, *drag((3.0, 5.0), (3.0, 2.1)))
+    assert station(on_route).y == pytest.approx(2.0, abs=0.15)
+    assert station(on_route).heading != 0.0
+
+
+def test_the_tip_turns_a_station_and_leaves_its_place(placed: AppState) -> None:
+    tip = heading_tip(placed.project, station(placed))
+    turned = after(placed, *drag(tip, (3.0, 6.0)))
+    assert station(turned).heading == pytest.approx(math.pi / 2)
+    assert (station(turned).x, station(turned).y) == (3.0, 5.0)
+    assert turned.undo[-1].name == "turn Station 1"
+
+
+def test_while_it_is_dragged_the_page_says_where_it_would_stand(placed: AppState) -> None:
+    begin, _ = drag((3.0, 5.0), (4.0, 6.0))
+    on = actions.DragFloor(ME, "update", (3.0, 5.0), (4.0, 6.0), REACH)
+    dragging = after(placed, begin, on)
+    assert hint(dragging.project, editor(dragging)) == "Station 1 to x 4.000 m, y 6.000 m, heading 0.0°"
+
+
+def test_name_pose_and_accuracy_are_typed_and_typing_is_one_step(placed: AppState) -> None:
+    typed = after(
+        placed,
+        SetStation(ME, "name", "Dock"),
+        SetStation(ME, "required_accuracy", 0.02, 0.0),
+        SetStation(ME, "required_accuracy", 0.01, 0.4),
+        SetStation(ME, "heading", 1.0, 0.6),
+    )
+    assert station(typed) == Station("Dock", 3.0, 5.0, 1.0, 0.01)
+    assert [step.name for step in typed.undo[1:]] == ["rename Station 1", "set accuracy of Dock", "set heading of Dock"]
+    assert editor(typed).station == "Dock"
+    with pytest.raises(ValueError, match="required_accuracy"):
+        after(typed, SetStation(ME, "required_accuracy", 0.0))
+    with pytest.raises(UsageError, match="used already"):
+        after(typed, actions.ChooseTool(ME, Tool.STATION), click(1.0, 6.0), SetStation(ME, "name", "Dock"))
+
+
+def test_a_new_station_is_as_accurate_as_the_one_before(placed: AppState) -> None:
+    docks = after(placed, SetStation(ME, "required_accuracy", 0.01), actions.ChooseTool(ME, Tool.STATION), click(5, 6))
+    assert station(docks).required_accuracy == 0.01
+
+
+def test_a_station_goes_onto_the_nearest_route_when_that_is_asked_for(placed: AppState) -> None:
+    aligned = after(placed, AlignStation(ME))
+    assert math.hypot(station(aligned).x - 3.0, station(aligned).y - 5.0) == pytest.approx(3.0, abs=0.3)
+    assert aligned.undo[-1].name == "align Station 1"
+
+
+def test_the_delete_key_deletes_the_selected_station(placed: AppState) -> None:
+    gone = after(placed, actions.DeleteSelected(ME))
+    assert gone.project.stations == ()
+    assert editor(gone).station == ""
+    with pytest.raises(UsageError, match="no station is selected"):
+        after(gone, DeleteStation(ME))
+
+
+def test_clicks_select_one_kind_of_thing_at_a_time(placed: AppState) -> None:
+    reflector = after(placed, click(0.25, 2.0))
+    assert (editor(reflector).selected, editor(reflector).station) == (("R1",), "")
+    assert editor(reflector, OTHER).station == ""
+    again = after(reflector, click(3.0, 5.0))
+    assert (editor(again).selected, editor(again).station) == ((), "Station 1")
+    route = after(again, click(4.0, 2.1))
+    assert editor(route).point is not None
+    assert editor(route).station == ""
+    assert not editor(after(route, actions.Cancel(ME))).has_selection
+
+
+def test_what_another_browser_deletes_is_not_selected_any_more(placed: AppState) -> None:
+    gone = after(placed, SelectStation(OTHER, "Station 1"), DeleteStation(OTHER))
+    with pytest.raises(UsageError, match="no station is selected"):
+        after(gone, SetStation(ME, "x", 1.0))
+
+
+def test_a_problem_of_a_station_selects_it_and_flies_there(placed: AppState) -> None:
+    problem = Problem(Severity.ERROR, "cut", Subject.STATION, ("Station 1",), (3.0, 5.0))
+    result = reducer.reduce(actions.ShowProblem(OTHER, problem), placed)
+    assert editor(result.state, OTHER).station == "Station 1"
+    assert result.effects == (FlyTo(OTHER, (3.0, 5.0)),)
+
+
+def test_the_table_lists_routes_and_stations_and_a_row_selects_and_flies(placed: AppState) -> None:
+    server = start_server("127.0.0.1", 0)
+    tab = server.gui.add_tab_group().add_tab("Routes")
+    table = RouteTable(server.gui, lambda _action: None, ME, tab)
+    table.draw_slowly(PageView(placed, None))
+    assert [row.text.split("   ")[0] for row in table._shown] == [ROUTE, "Station 1"]
+    assert "100 mm" in table._shown[1].text
+    assert "1 of 2 reverse" in table._shown[0].text
+    assert table._selecting(1, ME) == SelectStation(ME, "Station 1", fly=True)
+    assert table._selecting(0, ME) == actions.SelectControlPoint(ME, ControlPoint(ROUTE), fly=True)
+    assert table._selecting(9, ME) == page.Report("this row is gone", failed=False)
+    server.stop()
+
+
+def test_each_station_is_drawn_with_its_outline_and_its_accuracy(placed: AppState) -> None:
+    server = start_server("127.0.0.1", 0)
+    layer = StationLayer(server.scene)
+    layer.show_site(placed.project)
+    outline = placed.project.vehicle.outline
+    np.testing.assert_allclose(layer._outlines.points[:, 0, :2], np.array(outline) + np.array((3.0, 5.0)), atol=1e-6)
+    label = layer._labels["Station 1"]
+    assert label.text == "Station 1  100 mm"
+    layer.show_site(after(placed, SetStation(ME, "required_accuracy", 0.01)).project)
+    assert layer._labels["Station 1"] is label
+    assert label.text == "Station 1  10 mm"
+    layer.show_site(after(placed, DeleteStation(ME)).project)
+    assert layer._labels == {}
+    server.stop()

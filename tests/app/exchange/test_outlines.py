@@ -1,0 +1,38 @@
+from __future__ import annotations
+
+import numpy as np
+
+from commission.app.exchange.outlines import ghosts_of
+from commission.app.exchange.pending import Pasted, Pending
+from commission.app.exchange.preview import compare
+from commission.io.imk import ReflectorImport
+from commission.io.imports import WHOLE, Imported
+from commission.io.route_edges import RouteImport
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.routes import Route, Segment
+from commission.site.stations import Station
+from tests.app.sites import room
+
+
+def pending(imported: Imported) -> Pending:
+    return Pending(Pasted(""), WHOLE, imported, compare(room(), imported))
+
+
+def test_added_and_moved_reflectors_are_drawn_where_they_would_stand() -> None:
+    table = ReflectorMap((Reflector("R1", 0.25, 2.5), Reflector("R2", 0.25, 6.5, 0.05), Reflector("N", 6.0, 7.8)))
+    ghosts = ghosts_of(room(), pending(ReflectorImport(table)))
+    assert ghosts.centers.tolist() == [[6.0, 7.8], [0.25, 2.5]]
+    assert [line.tolist() for line in ghosts.lines] == [[[0.25, 2.0], [0.25, 2.5]]]
+
+
+def test_new_courses_of_routes_and_new_stations_are_drawn() -> None:
+    route = Route("Detour", (Segment(np.array([[2.0, 2.0], [4.0, 6.0]]), degree=1),))
+    layout = RouteImport((route,), (), (Station("Dock", 4.0, 6.0),), ("V",), ("hall",))
+    ghosts = ghosts_of(room(), pending(layout))
+    assert ghosts.centers.tolist() == [[4.0, 6.0]]
+    np.testing.assert_allclose(ghosts.lines[0][[0, -1]], [[2.0, 2.0], [4.0, 6.0]], atol=1e-9)
+
+
+def test_nothing_is_drawn_of_no_import() -> None:
+    ghosts = ghosts_of(room(), None)
+    assert (len(ghosts.centers), ghosts.lines) == (0, ())

@@ -1,0 +1,304 @@
+"""What loading, drawing on and aligning a floor map means, without a browser and without files."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commission.app.base import actions as page
+from commission.app.base import reducer
+from commission.app.base.actions import View
+from commission.app.base.reduction import PlaceCamera, Reduction, Tell
+from commission.app.base.state import MAP_BYTES, AppState
+from commission.app.base.uploads import Upload
+from commission.app.editing import actions as editing
+from commission.app.editing.editor import MapPen, Tool
+from commission.app.floor_map import actions
+from commission.app.floor_map.draft import MapDraft, MapFile, ReadOptions
+from commission.app.floor_map.effects import DrawMap, ReadMapFile, StopMapWork
+from commission.errors import UsageError
+from commission.io.dxf import Drawing
+from commission.io.image_map import Picture
+from commission.io.mesh import Model
+from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
+from commission.site.project import Project
+from tests.app.sites import room
+
+ME, OTHER, REACH = 1, 2, 0.15
+YAML, IMAGE, ANOTHER = (MapFile(Upload(name, b"x")) for name in ("3.yaml", "3.pgm", "other.png"))
+PLAN = MapFile(Path("plan.png"))
+PICTURE = Picture(np.full((100, 200), 255, np.uint8), np.full((100, 200), 255, np.uint8))
+
+
+@pytest.fixture
+def state() -> AppState:
+    project = room()
+    return after(AppState(project, project, folder=Path("hall")), editing.Join(ME), editing.Join(OTHER)).state
+
+
+def after(state: AppState, *wishes: page.Action) -> Reduction:
+    """Return the state after all wishes with the effects of the last."""
+    reduction = Reduction(state)
+    for wish in wishes:
+        reduction = reducer.reduce(wish, reduction.state)
+    return reduction
+
+
+def click(x: float, y: float) -> editing.ClickFloor:
+    return editing.ClickFloor(ME, (x, y), REACH)
+
+
+def use(tool: Tool) -> editing.ChooseTool:
+    return editing.ChooseTool(ME, tool)
+
+
+def cells(state: AppState) -> np.ndarray:
+    assert state.project.floor_map is not None
+    return state.project.floor_map.cells
+
+
+def draft(state: AppState) -> MapDraft:
+    assert state.mapping.draft is not None
+    return state.mapping.draft
+
+
+def test_a_loaded_map_replaces_the_old_one_in_one_undo_step_and_everybody_sees_it_whole(state: AppState) -> None:
+    loaded = FloorMap(np.zeros((10, 20), np.int8), 0.1)
+    result = after(state, actions.MapMade(ME, MapFile(Path("hall.dxf")), loaded, ("2 texts left out",)))
+    assert result.state.project.floor_map is loaded
+    assert [step.name for step in result.state.undo] == ["load floor map hall.dxf"]
+    assert result.effects == (PlaceCamera(ME, View.FIT), PlaceCamera(OTHER, View.FIT))
+    assert result.state.mapping.notes == ("hall.dxf: 2.0 x 1.0 m, cells of 100 mm", "2 texts left out")
+    assert after(result.state, page.Undo(ME)).state.project is state.project
+
+
+def test_a_map_and_its_image_are_read_together_in_whichever_order_they_come(state: AppState) -> None:
+    first = after(state, actions.OpenMap(ME, YAML))
+    assert first.effects == (ReadMapFile(ME, YAML),)
+    waiting = after(first.state, actions.ImageMissing(YAML, "3.pgm"))
+    assert waiting.effects == (Tell("3.yaml needs its image: upload 3.pgm, too", failed=False),)
+    assert after(waiting.state, actions.OpenMap(ME, IMAGE)).effects == (ReadMapFile(ME, YAML, image=IMAGE),)
+    other_way = after(state, actions.OpenMap(ME, IMAGE), actions.OpenMap(ME, YAML))
+    assert other_way.effects == (ReadMapFile(ME, YAML, image=IMAGE),)
+
+
+def test_another_image_than_the_one_that_is_waited_for_is_named(state: AppState) -> None:
+    waiting = after(state, actions.ImageMissing(YAML, "3.pgm")).state
+    refused = after(waiting, actions.OpenMap(ME, ANOTHER))
+    assert refused.state.mapping.trouble == "other.png: is not the image of 3.yaml; expected 3.pgm"
+    assert refused.state.mapping.waiting == waiting.mapping.waiting
+    freed = after(refused.state, actions.DiscardMap(), actions.OpenMap(ME, ANOTHER))
+    assert freed.effects == (ReadMapFile(ME, ANOTHER),)
+
+
+def test_trouble_leaves_the_project_as_it_is_and_goes_with_the_next_file(state: AppState) -> None:
+    failed = after(state, actions.MapFailed("hall.stl: is no readable STL;\n expected a complete model"))
+    assert failed.state.project is state.project
+    assert failed.state.mapping.trouble == "hall.stl: is no readable STL; expected a complete model"
+    assert failed.effects == (Tell(failed.state.mapping.trouble, failed=True),)
+    assert after(failed.state, actions.OpenMap(ME, PLAN)).state.mapping.trouble == ""
+    unknown = after(state, actions.OpenMap(ME, MapFile(Path("map.pdf"))))
+    assert unknown.state.mapping.trouble.startswith("map.pdf: is no floor map; expected a file that ends in .yaml")
+
+
+def test_an_image_is_placed_by_two_clicks_a_distance_and_an_axis(state: AppState) -> None:
+    opened = after(state, actions.MapOpened(ME, PLAN, PICTURE, ReadOptions()))
+    assert opened.effects == (PlaceCamera(ME, View.FIT),)
+    assert opened.state.editors[ME].tool is Tool.CALIBRATE
+    stage = draft(opened.state).stage
+    # The image lies in the middle of the room of 12 x 8 m, where everybody sees it.
+    assert stage.pixel_at((6.0, 4.0)) == pytest.approx((100.0, 50.0))
+    a, b = stage.place_of((10.0, 90.0)), stage.place_of((10.0, 10.0))
+    placed = after(
+        opened.state,
+        click(*a),
+        click(*b),
+        actions.SetMapOption("distance", 40.0),
+        actions.SetMapOption("direction", math.pi / 2),
+        actions.SetMapOption("first_in_map", (5.0, 0.0)),
+    ).state
+    placement = draft(placed).placement()
+    assert placement is not None
+    assert placement.resolution == pytest.approx(0.5)
+    np.testing.assert_allclose(placement.origin(100), (0.0, -5.0, 0.0), atol=1e-9)
+    assert after(placed, actions.MakeMap(ME)).effects == (DrawMap(ME, draft(placed)),)
+    moved = after(placed, click(*stage.place_of((12.0, 12.0)))).state
+    assert [tuple(np.round(p, 6)) for p in draft(moved).pixels] == [(10.0, 90.0), (12.0, 12.0)]
+    made = after(placed, actions.MapMade(ME, PLAN, PICTURE.floor_map(placement))).state
+    assert made.editors[ME].tool is Tool.SELECT
+    assert made.mapping.draft is None
+
+
+def test_a_click_beside_the_image_is_no_point_of_it(state: AppState) -> None:
+    opened = after(state, actions.MapOpened(ME, PLAN, PICTURE, ReadOptions())).state
+    with pytest.raises(ValueError, match="missed the image"):
+        after(opened, click(1000.0, 0.0))
+
+
+def test_options_out_of_range_are_refused_and_keep_what_was(state: AppState) -> None:
+    opened = after(state, actions.MapOpened(ME, PLAN, PICTURE, ReadOptions())).state
+    for name, value in (("threshold", 1.5), ("distance", 0.0), ("resolution", 5.0), ("heights", ())):
+        with pytest.raises(ValueError, match="expected"):
+            after(opened, actions.SetMapOption(name, value))
+    with pytest.raises(UsageError, match="no option 'color'"):
+        after(opened, actions.SetMapOption("color", 1.0))
+    with pytest.raises(UsageError, match="no file is open"):
+        after(state, actions.MakeMap(ME))
+
+
+def test_a_model_is_cut_where_the_reflectors_hang_unless_somebody_says_otherwise(state: AppState) -> None:
+    model = Model(Path("hall.stl"), np.zeros((1, 3, 3)))
+    opened = after(state, actions.MapOpened(ME, MapFile(Path("hall.stl")), model, ReadOptions())).state
+    assert draft(opened).options.heights == (0.2,)
+    again = after(opened, actions.SetMapOption("heights", (0.3, 1.8)), actions.SetReading(ME, ReadOptions("mm")))
+    assert again.effects == (ReadMapFile(ME, draft(opened).file, ReadOptions("mm")),)
+    # Read in another unit, the choices stay.
+    reread = after(again.state, actions.MapOpened(ME, draft(opened).file, model, ReadOptions("mm"))).state
+    assert draft(reread).options.heights == (0.3, 1.8)
+
+
+def test_stopping_and_discarding_end_the_work_and_change_nothing(state: AppState) -> None:
+    opened = after(state, actions.MapOpened(ME, PLAN, PICTURE, ReadOptions())).state
+    assert after(opened, actions.StopMapJob()) == Reduction(opened, (StopMapWork(),))
+    gone = after(opened, actions.DiscardMap())
+    assert gone.effects == (StopMapWork(),)
+    assert (gone.state.mapping.draft, gone.state.editors[ME].tool) == (None, Tool.SELECT)
+    assert gone.state.project is state.project
+
+
+def test_a_wall_is_drawn_by_clicks_and_enter_in_one_undo_step(state: AppState) -> None:
+    thick = actions.SetPen(ME, MapPen(thickness=0.2))
+    clicked = after(state, use(Tool.WALL), thick, click(3.0, 2.0), click(5.0, 2.0)).state
+    assert clicked.project is state.project
+    drawn = after(clicked, editing.Finish(ME)).state
+    assert [step.name for step in drawn.undo] == ["draw wall"]
+    assert (cells(drawn)[38:42, 60:100] == OCCUPIED).all()
+    assert (cells(state)[38:42, 60:100] == FREE).all()
+    assert (drawn.editors[ME].tool, drawn.editors[ME].draft) == (Tool.WALL, ())
+    np.testing.assert_array_equal(cells(after(drawn, page.Undo(ME)).state), cells(state))
+    np.testing.assert_array_equal(cells(after(drawn, page.Undo(ME), page.Redo(ME)).state), cells(drawn))
+
+
+def rectangle(start: tuple[float, float], end: tuple[float, float]) -> tuple[editing.DragFloor, ...]:
+    steps = (("start", start), ("update", end), ("end", end))
+    return tuple(editing.DragFloor(ME, phase, start, now, REACH) for phase, now in steps)
+
+
+def test_clutter_is_erased_by_a_rectangle_and_a_polygon_becomes_an_obstacle(state: AppState) -> None:
+    # The room has a pillar at columns 150 to 169 and rows 70 to 83.
+    start, update, end = rectangle((7.0, 3.0), (9.0, 5.0))
+    half = after(state, use(Tool.ERASE), start, update).state
+    assert half.project is state.project
+    erased = after(half, end).state
+    assert (cells(erased)[70:84, 150:170] == FREE).all()
+    assert erased.editors[ME].drag is None
+    corners = (click(2.0, 5.0), click(3.0, 5.0), click(3.0, 6.0), click(2.0, 6.0))
+    filled = after(erased, use(Tool.OBSTACLE), *corners, editing.Finish(ME)).state
+    assert (cells(filled)[100:120, 40:60] == OCCUPIED).all()
+    assert [step.name for step in filled.undo] == ["erase", "draw obstacle"]
+    unknown = actions.SetPen(ME, MapPen(to_unknown=True))
+    forgotten = after(filled, use(Tool.ERASE), unknown, *rectangle((2.0, 5.0), (3.0, 6.0))).state
+    assert (cells(forgotten)[100:120, 40:60] == UNKNOWN).all()
+
+
+def test_erasing_where_nothing_is_says_so_and_is_no_step(state: AppState) -> None:
+    result = after(state, use(Tool.ERASE), *rectangle((3.0, 5.0), (4.0, 6.0)))
+    assert result.state.project is state.project
+    assert result.effects == (Tell("nothing to erase there", failed=False),)
+
+
+def test_too_few_points_are_refused_and_kept(state: AppState) -> None:
+    clicked = after(state, use(Tool.OBSTACLE), click(2.0, 5.0), click(3.0, 5.0)).state
+    with pytest.raises(UsageError, match="2 points were clicked; expected 3 or more to draw obstacle"):
+        after(clicked, editing.Finish(ME))
+    assert len(clicked.editors[ME].draft) == 2
+    assert after(clicked, editing.Cancel(ME)).state.editors[ME].draft == ()
+
+
+def test_walls_can_be_drawn_before_there_is_a_map() -> None:
+    empty = after(AppState(Project("New"), Project("New")), editing.Join(ME)).state
+    drawn = after(empty, use(Tool.WALL), click(0.0, 0.0), click(10.0, 0.0), editing.Finish(ME)).state
+    assert drawn.project.floor_map is not None
+    with pytest.raises(UsageError, match="no floor map to erase in"):
+        after(empty, use(Tool.ERASE), *rectangle((0.0, 0.0), (1.0, 1.0)))
+
+
+def test_points_to_align_by_snap_to_reflectors_and_to_corners_of_walls(state: AppState) -> None:
+    # R1 stands at (0.25, 2.0); the pillar's corner lies at (7.5, 3.5).
+    clicked = after(state, use(Tool.ALIGN), click(0.3, 2.05), click(7.55, 3.42)).state
+    assert [point.at for point in clicked.editors[ME].alignment.points] == [(0.25, 2.0), pytest.approx((7.5, 3.5))]
+    again = after(clicked, click(4.0, 4.0)).state
+    assert [point.at for point in again.editors[ME].alignment.points] == [(0.25, 2.0), (4.0, 4.0)]
+
+
+def aligning(state: AppState, *, everything: bool, stretch: float = 1.0) -> Reduction:
+    """Turn the room by a quarter about R1, which comes to lie at (100, 50)."""
+    return after(
+        state,
+        use(Tool.ALIGN),
+        click(0.25, 2.0),
+        click(10.25, 2.0),
+        # In any order: nothing that was typed gets lost behind what is typed next.
+        actions.SetPlantPoint(ME, 1, (100.0, 50.0 + 10.0 * stretch)),
+        actions.SetPlantPoint(ME, 0, (100.0, 50.0), "column B4"),
+        actions.SetAligned(ME, everything),
+        actions.AlignMap(ME),
+    )
+
+
+def test_the_map_is_aligned_in_one_undo_step_alone_or_with_all_that_is_on_it(state: AppState) -> None:
+    alone = aligning(state, everything=False)
+    assert alone.state.undo[-1].name == "align to column B4 and B"
+    assert alone.state.project.reflectors is state.project.reflectors
+    assert alone.state.project.floor_map is not None
+    np.testing.assert_allclose(alone.state.project.floor_map.origin, (102.0, 49.75, math.pi / 2))
+    together = aligning(state, everything=True)
+    np.testing.assert_allclose(together.state.project.reflectors.centers[0], (100.0, 50.0), atol=1e-12)
+    assert after(together.state, page.Undo(ME)).state.project is state.project
+    assert PlaceCamera(OTHER, View.FIT) in together.effects
+    assert together.state.editors[ME].tool is Tool.SELECT
+
+
+def test_a_doubtful_distance_is_told_and_a_wrong_one_refused(state: AppState) -> None:
+    told = [effect for effect in aligning(state, everything=False, stretch=1.005).effects if isinstance(effect, Tell)]
+    assert told[0].failed
+    assert "each 25 mm off; that is 0.5 % of their distance" in told[0].text
+    with pytest.raises(UsageError, match=r"10\.000 m apart on the map and 11\.000 m in the plant"):
+        aligning(state, everything=False, stretch=1.1)
+
+
+def test_maps_of_many_undo_steps_take_bounded_memory_and_all_come_back() -> None:
+    side = 4000
+    first = FloorMap(np.zeros((side, side), np.int8), 0.05)
+    project = Project("Large", first)
+    state = after(AppState(project, project), editing.Join(ME), use(Tool.OBSTACLE)).state
+    steps = MAP_BYTES // side**2 + 3
+    seen = [first]
+    for number in range(steps):
+        state = after(state, *rectangle((2.0 * number, 1.0), (2.0 * number + 1.0, 2.0))).state
+        assert state.project.floor_map is not None
+        seen.append(state.project.floor_map)
+    assert held(state) <= MAP_BYTES
+    for expected in reversed(seen[:-1]):
+        state = after(state, page.Undo(ME)).state
+        assert state.project.floor_map == expected
+        assert held(state) <= 2 * MAP_BYTES
+    for expected in seen[1:]:
+        state = after(state, page.Redo(ME)).state
+        assert state.project.floor_map == expected
+
+
+def held(state: AppState) -> int:
+    """Bytes of cells that undo and redo steps hold unpacked."""
+    maps = (step.project.floor_map for step in (*state.undo, *state.redo))
+    return sum({id(m.cells): m.cells.nbytes for m in maps if m is not None}.values())
+
+
+def test_a_drawing_without_lines_can_be_discarded(state: AppState) -> None:
+    drawing = Drawing(Path("a.dxf"), "mm", (), np.empty((0, 2, 2)), np.empty(0, np.int32), ())
+    opened = after(state, actions.MapOpened(ME, MapFile(Path("a.dxf")), drawing, ReadOptions())).state
+    assert replace(after(opened, actions.DiscardMap()).state, mapping=state.mapping) == state

@@ -1,0 +1,231 @@
+"""The suggested layout: wishes, the job that looks for it, what is seen of it, and what accepting does."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from commission.app.base import reducer
+from commission.app.base.actions import Action, Undo
+from commission.app.base.drawing import crosses
+from commission.app.base.reduction import ApplyParameters
+from commission.app.base.state import AppState
+from commission.app.editing.actions import (
+    ChooseTool,
+    ClickFloor,
+    DeleteRoute,
+    DragFloor,
+    RenameRoute,
+    SelectControlPoint,
+)
+from commission.app.editing.editor import ControlPoint, Tool
+from commission.app.placement.placement_panel import found_text
+from commission.app.placement.reducer import ACCEPT
+from commission.app.placement.suggestion import LayoutWish, Suggestion, suggest, with_option
+from commission.app.placement.suggestion_layer import hatch
+from commission.app.plan.actions import (
+    AcceptLayout,
+    AskLayout,
+    CountRoute,
+    DiscardLayout,
+    FreeAreas,
+    KeepOut,
+    SetLayout,
+)
+from commission.app.plan.view import LayoutView
+from commission.errors import UsageError
+from commission.site.layout_brief import Rectangle
+from commission.site.project import Project
+from tests.app.plan.test_planner import Bench
+
+EMPTY = LayoutWish(extend=False)
+
+
+def quietly(_fraction: float, _message: str) -> None:
+    pass
+
+
+def after(state: AppState, *wishes: Action) -> AppState:
+    for wish in wishes:
+        state = reducer.reduce(wish, state).state
+    return state
+
+
+def asking(project: Project, name: str, value: object) -> Project:
+    return replace(project, layout=with_option(project.layout, name, value))
+
+
+def kept_out(state: AppState) -> tuple[Rectangle, ...]:
+    return state.project.layout.candidates.keep_out
+
+
+@pytest.fixture(scope="module")
+def suggestion(project: Project) -> Suggestion:
+    return suggest(project, EMPTY, quietly)
+
+
+@pytest.fixture
+def bench(project: Project) -> Iterator[Bench]:
+    bench = Bench(project)
+    yield bench
+    bench.jobs.close()
+
+
+def test_demands_are_set_by_the_names_they_have_in_planning(project: Project) -> None:
+    state = after(
+        AppState(project, project),
+        SetLayout("demands.visible", 3),
+        SetLayout("demands.position_limit", 0.05),
+        SetLayout("candidates.spacing", 2.0),
+        SetLayout("extend", value=False),
+    )
+    brief = state.project.layout
+    assert (brief.demands.visible, brief.demands.position_limit) == (3, 0.05)
+    assert (brief.candidates.spacing, state.layout.extend) == (2.0, False)
+    assert [step.name for step in state.undo] == [
+        "set visible of the layout",
+        "set position limit of the layout",
+        "set spacing of the layout",
+    ]
+    assert after(state, Undo(1), Undo(1), Undo(1)).project is project
+
+
+def test_a_slide_over_many_values_is_one_undo_step(project: Project) -> None:
+    slide = [SetLayout("candidates.spacing", 0.1 * step, at=10.0 + 0.1 * step) for step in range(1, 9)]
+    assert len(after(AppState(project, project), *slide).undo) == 1
+
+
+def test_a_route_that_does_not_count_keeps_to_it_under_another_name(project: Project) -> None:
+    route = project.routes[0].name
+    state = after(AppState(project, project), CountRoute(route, counts=False, client=1))
+    assert state.project.layout.ignored_routes == (route,)
+    state = after(state, SelectControlPoint(1, ControlPoint(route)), RenameRoute(1, "Round"))
+    assert state.project.layout.ignored_routes == ("Round",)
+    assert after(state, DeleteRoute(1)).project.layout.ignored_routes == ()
+    assert after(state, CountRoute("Round", counts=True)).project.layout == project.layout
+
+
+@pytest.mark.parametrize(
+    "wish",
+    [
+        SetLayout("demands.beauty", 1),
+        SetLayout("beauty", 1),
+        SetLayout("demands.visible", 0),
+        SetLayout("candidates.spacing", -1.0),
+        CountRoute("Nowhere", counts=True),
+    ],
+)
+def test_demands_that_do_not_exist_or_are_out_of_range_are_refused(project: Project, wish: Action) -> None:
+    with pytest.raises((UsageError, ValueError)):
+        after(AppState(project, project), wish)
+
+
+def test_an_area_is_drawn_by_a_drag_and_freed_by_a_click_in_it(project: Project) -> None:
+    drag = [DragFloor(1, phase, (4.0, 5.0), (2.0, 7.0), 0.1) for phase in ("start", "update", "end")]
+    state = after(AppState(project, project), ChooseTool(1, Tool.KEEP_OUT), *drag)
+    assert kept_out(state) == ((2.0, 5.0, 4.0, 7.0),)
+    assert [step.name for step in state.undo] == ["keep an area free of reflectors"]
+    assert state.editors[1].selected == ()
+    assert kept_out(after(state, ClickFloor(1, (8.0, 6.0), 0.1))) == kept_out(state)
+    assert kept_out(after(state, ClickFloor(1, (3.0, 6.0), 0.1))) == ()
+
+
+def test_a_click_is_no_area_and_all_areas_are_freed_together(project: Project) -> None:
+    state = after(AppState(project, project), KeepOut((1.0, 1.0, 1.01, 3.0)), KeepOut((1.0, 1.0, 2.0, 3.0)))
+    assert len(kept_out(state)) == 1
+    assert kept_out(after(state, FreeAreas())) == ()
+
+
+def test_a_suggestion_keeps_out_of_the_areas_and_clear_of_what_stays(project: Project, suggestion: Suggestion) -> None:
+    assert len(suggestion.added) == suggestion.placement.added > 0
+    x, y = suggestion.added[0]
+    area = (x - 1.0, y - 1.0, x + 1.0, y + 1.0)
+    elsewhere = suggest(asking(project, "candidates.keep_out", (area,)), EMPTY, quietly).added
+    assert not np.any(np.all(np.abs(elsewhere - (x, y)) < 1.0, axis=1))
+
+
+def test_starting_empty_takes_down_all_but_the_locked_ones(project: Project, suggestion: Suggestion) -> None:
+    assert len(suggestion.removed) == len(project.reflectors)
+    first = replace(project.reflectors.reflectors[0], locked=True)
+    locked = replace(project.reflectors, reflectors=(first, *project.reflectors.reflectors[1:]))
+    found = suggest(replace(project, reflectors=locked), EMPTY, quietly)
+    assert found.placement.reflectors.reflectors[0] is first
+    assert len(found.removed) == len(project.reflectors) - 1
+
+
+def test_what_is_not_met_is_told_by_its_metres_and_its_place(project: Project) -> None:
+    wanting = asking(asking(project, "demands.visible", 9), "candidates.spacing", 8.0)
+    found = suggest(wanting, EMPTY, quietly)
+    assert found.unmet
+    for stretch in found.unmet:
+        assert stretch.first < stretch.last
+        along = np.hypot(*np.diff(stretch.points, axis=0).T).sum()
+        assert along == pytest.approx(stretch.last - stretch.first, abs=1.0)
+    assert "a click goes there" in found_text(LayoutView(found, outdated=False, wished_otherwise=False))
+
+
+def test_without_a_route_or_a_wall_it_is_said_what_is_missing(project: Project) -> None:
+    ignoring = replace(project.layout, ignored_routes=tuple(route.name for route in project.routes))
+    with pytest.raises(UsageError, match="no route counts"):
+        suggest(replace(project, layout=ignoring), EMPTY, quietly)
+    with pytest.raises(UsageError, match="no floor map"):
+        suggest(replace(project, floor_map=None), EMPTY, quietly)
+
+
+def test_accepting_is_one_undo_step_and_undo_brings_the_old_ones_back(project: Project, suggestion: Suggestion) -> None:
+    state = after(AppState(project, project), AskLayout())
+    reduction = reducer.reduce(AcceptLayout(1, suggestion), state)
+    accepted = reduction.state
+    assert [step.name for step in accepted.undo] == [ACCEPT]
+    assert accepted.project.reflectors == suggestion.placement.reflectors
+    assert ApplyParameters() in reduction.effects
+    assert not accepted.layout.wanted
+    assert after(accepted, Undo(1)).project is project
+
+
+def test_a_layout_for_other_reflectors_is_not_accepted(project: Project, suggestion: Suggestion) -> None:
+    other = replace(project, reflectors=replace(project.reflectors, reflectors=project.reflectors.reflectors[1:]))
+    with pytest.raises(UsageError, match="suggest it again"):
+        after(AppState(other, other), AcceptLayout(1, suggestion))
+
+
+def test_it_is_looked_for_in_the_background_shown_and_dropped(bench: Bench) -> None:
+    project = bench.state.project
+    bench.state = after(bench.state, SetLayout("extend", value=False), AskLayout())
+    bench.planner.follow(bench.state)
+    found = bench.settle().layout
+    assert found is not None
+    assert not found.outdated
+    assert bench.state.project is project
+    bench.move(0, 0.5)
+    assert not bench.jobs.unfinished()
+    moved = bench.planner.view.layout
+    assert moved is not None
+    assert moved.outdated
+    bench.state = after(bench.state, DiscardLayout())
+    bench.planner.follow(bench.state)
+    assert bench.planner.view.layout is None
+
+
+def test_asking_again_drops_what_was_found_and_looks_anew(bench: Bench) -> None:
+    bench.state = after(bench.state, AskLayout())
+    bench.planner.follow(bench.state)
+    first = bench.settle().layout
+    bench.state = after(bench.state, DiscardLayout(), AskLayout())
+    bench.planner.follow(bench.state)
+    assert bench.planner.view.layout is None
+    second = bench.settle().layout
+    assert first is not None
+    assert second is not None
+    assert second.suggestion is not first.suggestion
+
+
+def test_a_cross_and_a_hatch_stay_within_their_places() -> None:
+    assert crosses(np.array([[1.0, 2.0]]), 0.5).shape == (2, 2, 2)
+    strokes = hatch((1.0, 2.0, 5.0, 4.0), 0.3)
+    assert len(strokes)
+    assert strokes[..., 0].min() >= 1.0 - 1e-9
+    assert strokes[..., 0].max() <= 5.0 + 1e-9
+    assert strokes[..., 1].min() >= 2.0 - 1e-9
+    assert strokes[..., 1].max() <= 4.0 + 1e-9

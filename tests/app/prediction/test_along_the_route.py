@@ -1,0 +1,153 @@
+"""What is drawn along a route: the ribbon's pieces, stretches that fail, a run beside the prediction, the chart."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from commission.app.plan.looks import route_view
+from commission.app.plan.settings import PlanSettings
+from commission.app.plan.view import RouteView, stretches
+from commission.app.plan.work import predict
+from commission.app.prediction.chart import chart
+from commission.app.prediction.driven import driven
+from commission.app.prediction.event_layer import events, place_at
+from commission.app.prediction.load_colors import BOUNDS, load_classes, palette
+from commission.app.prediction.ribbon_layer import pieces
+from commission.app.prediction.tracks import round_up
+from commission.app.run.session import Drive, Session
+from commission.localization.setup import LocalizerSetup
+from commission.planning.route_prediction import RoutePrediction, plan_route, predict_route
+from commission.planning.true_error import predict_errors
+from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
+from commission.site.stations import Station
+
+
+@pytest.fixture(scope="module")
+def prediction(project: Project) -> RoutePrediction:
+    return predict_route(plan_route(project, project.routes[0].name))
+
+
+@pytest.fixture
+def session(project: Project, drive: Drive) -> Session:
+    session = Session(drive, LocalizerSetup.of(project))
+    session.advance(1e-9)
+    while not session.at_end:
+        session.step()
+    return session
+
+
+def test_thinning_a_ribbon_keeps_its_worst_spot_and_both_ends() -> None:
+    points = np.stack([np.arange(1000.0), np.zeros(1000)], axis=1)
+    loads = np.zeros(1000)
+    loads[503] = 2.0
+    lines, classes = pieces(points, loads, 100)
+    assert len(lines) <= 100
+    assert lines[0, 0].tolist() == [0.0, 0.0]
+    assert lines[-1, 1].tolist() == [999.0, 0.0]
+    assert classes.max() == len(palette()) - 1
+    assert np.array_equal(lines[1:, 0], lines[:-1, 1])
+
+
+def test_a_load_above_the_limit_has_a_color_outside_of_the_ramp() -> None:
+    below, above = load_classes(np.array([0.999 * BOUNDS[-1], 1.001 * BOUNDS[-1]])).tolist()
+    assert (below, above) == (len(palette()) - 2, len(palette()) - 1)
+
+
+def test_stretches_are_cut_where_nothing_fails() -> None:
+    points = np.arange(12.0).reshape(6, 2)
+    found = stretches(points, np.array([True, True, False, False, True, False]))
+    assert [len(part) for part in found] == [2, 1]
+    assert stretches(points, np.zeros(6, bool)) == ()
+
+
+def test_a_run_there_and_back_is_laid_over_the_metres_it_was_driven(
+    session: Session, prediction: RoutePrediction
+) -> None:
+    found = driven(session.view().series, prediction)
+    assert found is not None
+    assert np.all(np.diff(found.metres) >= 0.0)
+    # The vehicle stops some centimetres short of the planned end or beyond.
+    assert found.metres[-1] == pytest.approx(prediction.drive.length, abs=0.2)
+
+
+def test_a_run_elsewhere_is_not_laid_over_the_route(session: Session, prediction: RoutePrediction) -> None:
+    series = session.view().series
+    assert driven(replace(series, means=series.means + np.array([3.0, 3.0, 0.0])), prediction) is None
+
+
+def strict(project: Project) -> Project:
+    """A project whose supervisor stops the vehicle at once, and lets it go on metres later."""
+    limits = replace(project.parameters.supervisor, position_limit=0.012)
+    return replace(project, parameters=replace(project.parameters, supervisor=limits))
+
+
+def expected(project: Project) -> RouteView:
+    """What the page shows of the first route."""
+    settings = PlanSettings(route=project.routes[0].name)
+    return route_view(predict(project, settings, lambda _fraction, _message: None), outdated=False)
+
+
+def test_the_chart_says_where_the_supervisor_stops_and_draws_it(project: Project) -> None:
+    calm = chart(expected(project), None)
+    assert "nowhere" in calm
+    assert "c-stop" not in calm
+    route = expected(strict(project))
+    drawn = chart(route, None)
+    assert "nowhere" not in drawn
+    # One line in each of the four drawings.
+    assert drawn.count("class='c-stop'") == 4 * len(route.prediction.trips()) > 0
+    assert drawn.count("class='c-recovery'") == 4 * len(route.prediction.recoveries()) > 0
+
+
+def test_the_chart_draws_the_true_error_that_the_command_writes(project: Project) -> None:
+    route = expected(project)
+    planned = plan_route(project, project.routes[0].name)
+    errors = predict_errors(planned, predict_route(planned)).two_sigma
+    np.testing.assert_array_equal(route.errors.max(axis=0), errors.max(axis=0))
+    drawn = chart(route, None)
+    assert drawn.count("class='c-error'") == 2
+    assert f">{1000 * errors[:, :2].max():.1f} mm<" in drawn
+    assert f">{np.degrees(errors[:, 2].max()):.2f} °<" in drawn
+
+
+def test_the_floor_is_marked_where_the_supervisor_stops_and_lets_go_on(project: Project) -> None:
+    route = expected(strict(project))
+    found = events(route)
+    assert len(found) == len(route.prediction.trips()) + len(route.prediction.recoveries())
+    assert found[0].text.startswith("stops at")
+    assert found[0].place == place_at(route.prediction, float(route.prediction.trips()[0]))
+
+
+def test_a_station_says_whether_its_accuracy_is_met(project: Project) -> None:
+    x, y = (float(value) for value in project.routes[0].segments[0].control_points[-1])
+    drive = expected(project).prediction.drive
+    heading = float(drive.poses[np.argmin(np.hypot(*(drive.poses[:, :2] - (x, y)).T)), 2])
+    stations = Station("Easy <dock>", x, y, heading, 0.1), Station("Hard", x, y, heading, 0.001)
+    route = expected(replace(project, stations=stations))
+    drawn = chart(route, None)
+    assert [each.is_met for each in route.stations] == [True, False]
+    assert "Easy &lt;dock&gt;" in drawn
+    assert ">met<" in drawn
+    assert ">not met<" in drawn
+    assert [event.text.endswith("not met") for event in events(route)] == [False, True]
+
+
+def test_neighbors_inside_the_gate_are_listed_with_chance_and_metres_and_drawn(project: Project) -> None:
+    assert not expected(project).risks
+    first = project.reflectors.reflectors[0]
+    twin = replace(first, id="Twin", y=first.y + 0.05)
+    crowded = replace(project, reflectors=ReflectorMap((*project.reflectors.reflectors, twin)))
+    route = expected(crowded)
+    assert {(risk.reflector, risk.neighbor) for risk in route.risks} == {(first.id, "Twin"), ("Twin", first.id)}
+    worst = route.risks[0]
+    assert 0.1 < worst.chance <= 0.5
+    assert route.risk.max() == worst.chance
+    assert set(worst.metres) <= set(route.metres.metre.tolist())
+    assert np.hypot(*(worst.points - worst.worst).T).min() == 0.0
+    assert "wrong association" in chart(route, None)
+
+
+def test_the_axis_of_a_plain_track_ends_at_a_round_number() -> None:
+    assert [round_up(value) for value in (0.5, 0.51, 1.0, 3.0, 7.0, 20.0)] == [0.5, 1.0, 1.0, 5.0, 10.0, 20.0]
