@@ -12,6 +12,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+from commission.progress import Progress, silent
+
 
 def sources_digest(package: Path) -> str:
     """Digest of every module that holds kernels.
@@ -81,7 +83,7 @@ parallel_range = numba.prange
 
 def warm_up(
     steps: Sequence[tuple[str, Callable[[], None]]],
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress = silent,
 ) -> None:
     """Compile (or load from the cache) all kernels in the given order.
 
@@ -91,8 +93,6 @@ def warm_up(
     progress : called with the fraction done [0..1] and the name of the step that starts; may raise to cancel.
     """
     for done, (name, step) in enumerate(steps):
-        if progress is not None:
-            progress(done / len(steps), name)
+        progress(done / len(steps), name)
         step()
-    if progress is not None:
-        progress(1.0, "compiled")
+    progress(1.0, "compiled")

@@ -35,6 +35,7 @@ from commission.io.project_file import OpenedProject, load_project, open_project
 from commission.localization import localizer, whole_run
 from commission.localization.estimate import Mode
 from commission.localization.setup import LocalizerSetup
+from commission.progress import Progress
 from commission.simulation import follower, scan
 from commission.site.project import Project
 
@@ -210,7 +211,7 @@ def predicted_episodes(drive: Drive, setup: LocalizerSetup) -> tuple[tuple[float
     return episodes(times, np.asarray(run.modes) == Mode.FAIL)
 
 
-def compile_kernels(progress: Callable[[float, str], None]) -> None:
+def compile_kernels(progress: Progress) -> None:
     """Compile the kernels that a run needs, the first needed first; those of planning wait for their own jobs."""
     steps = (
         ("poses", se2.warm_up),

@@ -17,7 +17,7 @@ from typing import Protocol, TypeAlias
 from commission.app.base import actions, reducer, reduction
 from commission.app.base.actions import Action, Source, View
 from commission.app.base.background import PREDICT, Background
-from commission.app.base.jobs import JobReport, JobState, Progress
+from commission.app.base.jobs import JobReport, JobState
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView, RunView
 from commission.app.editing import actions as editing
@@ -27,6 +27,7 @@ from commission.app.project.project_folder import name_of_edit
 from commission.app.run.session import Drive, Session
 from commission.errors import CommissionError
 from commission.localization.setup import LocalizerSetup
+from commission.progress import Progress
 from commission.site.project import Project
 
 FRAME_S = 0.04
@@ -91,13 +92,13 @@ class PageLike(Protocol):
 class Work:
     """What the runtime has done by others, in the background or on disk; tests put their own in."""
 
-    prepare: Callable[[Project, Source, Callable[[float], None]], Drive]
+    prepare: Callable[[Project, Source, Progress], Drive]
     """From a source to a drive."""
     predict: Callable[[Drive, LocalizerSetup], tuple[tuple[float, float], ...]]
     """Fail episodes [s] of a whole run with these parameters."""
     save: Callable[[Project, Path, bool], None]
     """Write a project into a folder; the last says whether what others changed there is replaced."""
-    compile: Callable[[Callable[[float, str], None]], None]
+    compile: Callable[[Progress], None]
     """Compile all kernels."""
     note: Callable[[Project, str], None] = lambda _project, _what: None
     """Journal an edit by its name."""
@@ -303,7 +304,7 @@ class Runtime:
         drive, setup = self.session.drive, self.session.setup
 
         def work(progress: Progress) -> object:
-            progress(0.0)
+            progress(0.0, "")
             return self._work.predict(drive, setup)
 
         self._background.drives.start(PREDICT, work)

@@ -21,8 +21,9 @@ from commission.errors import FileFormatError, UsageError
 from commission.geometry.arrays import FloatArray, read_only
 from commission.io.dxf_shapes import Affine, Insert, Shape, insert_of, shapes_of
 from commission.io.dxf_tags import Group, read_groups, text_of
-from commission.io.findings import Findings, Progress, shown, silent
+from commission.io.findings import Findings, shown
 from commission.io.outline import outline_map
+from commission.progress import Progress, silent
 from commission.site.floor_map import FloorMap
 
 UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048, "dm": 0.1, "km": 1000.0}

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import IO
 
 from commission.errors import FileFormatError
-from commission.io.findings import Progress
 from commission.io.reading import cannot_read, check_size, read_bytes
+from commission.progress import Progress
 
 SIZE_LIMIT = 512_000_000
 """Bytes of a drawing: some 4,000,000 lines."""

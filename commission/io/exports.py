@@ -12,11 +12,11 @@ from enum import StrEnum
 from pathlib import Path
 
 from commission.errors import FileFormatError, UsageError
-from commission.io.findings import Progress, silent
 from commission.io.imk import write_imk
 from commission.io.lif_writer import write_lif
 from commission.io.project_file import save_project
 from commission.io.reflector_tables import write_reflectors
+from commission.progress import Progress, silent
 from commission.site.project import Project
 
 NAME_LIMIT = 48

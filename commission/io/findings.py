@@ -2,17 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-Progress = Callable[[float, str], None]
-"""Takes the part done [0..1] and what is being done; may raise, which ends the work: that is how a job is cancelled."""
-
 SHOWN_LIMIT = 100
 """Different findings that are told; a file that is wrong throughout says so in fewer."""
-
-
-def silent(fraction: float, message: str) -> None:
-    """Progress that nobody looks at."""
 
 
 class Findings:

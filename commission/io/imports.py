@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from commission.errors import FileFormatError
-from commission.io.findings import Findings, Progress, silent
+from commission.io.findings import Findings
 from commission.io.imk import ReflectorImport, read_imk
 from commission.io.json_document import read_json
 from commission.io.lif import read_lif
@@ -22,6 +22,7 @@ from commission.io.reading import read_bytes
 from commission.io.route_edges import RouteImport
 from commission.io.table_import import read_any_table
 from commission.io.vda5050 import read_order
+from commission.progress import Progress, silent
 
 SIZE_LIMIT = 32_000_000
 """Bytes of a file: a layout of about 50,000 edges, a table of about 400,000 rows."""

@@ -16,10 +16,10 @@ import numpy as np
 from commission.errors import FileFormatError, UsageError
 from commission.geometry.arrays import FloatArray, read_only
 from commission.io.dxf import UNITS
-from commission.io.findings import Progress, silent
 from commission.io.glb_header import check_announced
 from commission.io.outline import outline_map
 from commission.io.reading import cannot_read, check_size
+from commission.progress import Progress, silent
 from commission.site.floor_map import FloorMap
 
 SIZE_LIMIT = 512_000_000

@@ -11,8 +11,8 @@ import numpy as np
 from commission.errors import FileFormatError
 from commission.geometry.arrays import FloatArray
 from commission.geometry.rasterize import draw_segments
-from commission.io.findings import Progress, silent
 from commission.io.map_server import CELL_LIMIT
+from commission.progress import Progress, silent
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 
 MARGIN = 1.0

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from commission.errors import FileFormatError
-from commission.io.findings import Progress, silent
 from commission.io.project_file import FILE_NAME, load_project
 from commission.io.reading import cannot_read, check_size
+from commission.progress import Progress, silent
 from commission.site.project import Project
 
 SIZE_LIMIT = 256_000_000

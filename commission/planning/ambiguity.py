@@ -7,7 +7,6 @@ no danger: a scanner knows left from right. What happens while the pose is track
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -20,6 +19,7 @@ from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_onl
 from commission.geometry.se2 import compose
 from commission.planning.coverage import Lattice
 from commission.planning.visibility import VisibilityModel, VisibleReflectors
+from commission.progress import Progress, silent
 from commission.site.checks import above, between
 from commission.site.scanner import Scanner
 
@@ -157,7 +157,7 @@ def cold_start(
     model: VisibilityModel,
     lattice: Lattice,
     options: AmbiguityOptions | None = None,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress = silent,
 ) -> ColdStart:
     """Ask for every spot of a lattice that is not in a wall whether the vehicle could take it for another one.
 
@@ -191,7 +191,7 @@ def ambiguous_poses(
     model: VisibilityModel,
     T_map_base: ArrayLike,
     options: AmbiguityOptions | None = None,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress = silent,
 ) -> ColdStart:
     """Ask for each pose whether another one sees the same constellation.
 
@@ -213,8 +213,7 @@ def ambiguous_poses(
     pairs: dict[tuple[tuple[int, ...], tuple[int, ...]], AmbiguousPair] = {}
     groups = [group for group in _groups(visible) if len(group[0]) >= 2]
     for start in range(0, len(groups), GROUPS_AT_ONCE):
-        if progress is not None:
-            progress(start / len(groups), "ambiguity")
+        progress(start / len(groups), "ambiguity")
         suspects: list[_Suspect] = []
         for constellation, members in groups[start : start + GROUPS_AT_ONCE]:
             suspects += _suspects(table, poses, constellation, members, options)
@@ -225,8 +224,7 @@ def ambiguous_poses(
             partners[chosen] = suspect.others[alike]
             key = (suspect.constellation, tuple(suspect.image.tolist()))
             pairs[key] = AmbiguousPair(*key, len(chosen), _plain(poses[chosen[0]]), _plain(partners[chosen[0]]))
-    if progress is not None:
-        progress(1.0, "ambiguity")
+    progress(1.0, "ambiguity")
     counts = visible.counts()
     ambiguous = np.isfinite(partners[:, 0]) | (counts < 2)
     ranked = sorted(pairs.values(), key=lambda pair: (-pair.poses, pair.constellation, pair.image))

@@ -6,7 +6,6 @@ Both give the same numbers to the last bit. Coloring, files and summaries are el
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -21,6 +20,7 @@ from commission.planning.dilution import Fixes, FixOptions, as_fixes, fix_model,
 from commission.planning.dilution_kernels import FIGURES, FixModel, fill_fixes
 from commission.planning.shadow_kernels import BitMask, Targets, see_points
 from commission.planning.visibility import VisibilityModel, build_visibility, copied, mask_words, replace_target
+from commission.progress import Progress, silent
 from commission.site.checks import above
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -127,7 +127,7 @@ def coverage(
     model: VisibilityModel,
     lattice: Lattice,
     options: FixOptions,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress = silent,
 ) -> Coverage:
     """Visibility and dilution at every point of a lattice.
 
@@ -146,12 +146,10 @@ def coverage(
     floor = ~model.caster.grid.is_occupied(points)
     scanner_points = points + np.array([kernel_model.lever_x, kernel_model.lever_y])
     for tile in tiles(lattice):
-        if progress is not None:
-            progress(tile.start / len(lattice), "coverage")
+        progress(tile.start / len(lattice), "coverage")
         mask = model.visible(scanner_points[tile])
         _fill(model, kernel_model, scanner_points[tile], mask, counts[tile], figures[tile])
-    if progress is not None:
-        progress(1.0, "coverage")
+    progress(1.0, "coverage")
     return Coverage(lattice, options, as_fixes(counts, figures), floor)
 
 
@@ -174,7 +172,7 @@ class LiveCoverage:
         model: VisibilityModel,
         lattice: Lattice,
         options: FixOptions,
-        progress: Callable[[float, str], None] | None = None,
+        progress: Progress = silent,
     ) -> None:
         self._lattice, self._options = lattice, options
         self._model = replace(model, targets=copied(model.targets))
@@ -225,7 +223,7 @@ class LiveCoverage:
         if self._model.bins_for(reflector) > self._model.targets.clear.shape[1]:
             before = self._model
             self._model = build_visibility(reflectors, before.scanner, before.caster, before.options)
-            self._fill_all(None)
+            self._fill_all(silent)
             return [Window(0, self._lattice.rows, 0, self._lattice.columns)]
         targets = self._model.targets
         windows = [self._window_around(index)]
@@ -254,11 +252,10 @@ class LiveCoverage:
         )
         return windows
 
-    def _fill_all(self, progress: Callable[[float, str], None] | None) -> None:
+    def _fill_all(self, progress: Progress) -> None:
         """Compute every point anew."""
         for tile in tiles(self._lattice):
-            if progress is not None:
-                progress(tile.start / len(self._lattice), "coverage")
+            progress(tile.start / len(self._lattice), "coverage")
             points, model = self._scanner_points[tile], self._model
             self._mask[tile] = model.visible(points)
             _fill(model, self._kernel_model, points, self._mask[tile], self._counts[tile], self._figures[tile])

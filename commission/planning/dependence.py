@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -11,6 +11,7 @@ import numpy as np
 
 from commission.geometry.arrays import IntArray
 from commission.planning.route_prediction import NO_DAMAGE, Damage, PlannedRoute, predict_route
+from commission.progress import Progress, part, silent
 from commission.site.checks import above
 
 DIRECTIONS = 4
@@ -80,7 +81,7 @@ class FailureOptions:
 def dependences(
     routes: Sequence[PlannedRoute],
     options: FailureOptions | None = None,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress = silent,
 ) -> tuple[Dependence, ...]:
     """Let each reflector in turn fail, and rank the reflectors by what depends on them.
 
@@ -100,15 +101,13 @@ def dependences(
     seen = np.unique(np.concatenate([np.empty(0, np.int64), *(route.visible.indices for route in routes)]))
     found: list[Dependence] = []
     for number, reflector in enumerate(seen.tolist()):
-        if progress is not None:
-            progress(number / len(seen), "failures")
+        progress(number / len(seen), "failures")
         if reflector in options.given.blocked:
             continue
         damages = _damages(reflector, options)
         parts = [_on_route(route, damages, fails) for route, fails in zip(routes, intact, strict=True)]
         found.append(Dependence(reflector, options.failure, tuple(parts)))
-    if progress is not None:
-        progress(1.0, "failures")
+    progress(1.0, "failures")
     return tuple(sorted(found, key=lambda each: (-each.failing_metres, -each.load, each.reflector)))
 
 
@@ -116,7 +115,7 @@ def worst_failures(
     routes: Sequence[PlannedRoute],
     count: int,
     options: FailureOptions | None = None,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress = silent,
 ) -> tuple[Dependence, ...]:
     """Block reflectors one after the other, each time the one on which most depends then.
 
@@ -134,12 +133,7 @@ def worst_failures(
     options = replace(options or FailureOptions(), failure=Failure.BLOCKED)
     failures: list[Dependence] = []
     for done in range(count):
-
-        def report(fraction: float, what: str, done: int = done) -> None:
-            if progress is not None:
-                progress((done + fraction) / count, what)
-
-        ranked = dependences(routes, options, report)
+        ranked = dependences(routes, options, part(progress, done / count, (done + 1) / count))
         if not ranked:
             break
         failures.append(ranked[0])

@@ -23,6 +23,7 @@ from commission.planning.telling_apart import ChosenPlace, Distinction, chosen_p
 from commission.planning.true_error import quality_of, two_sigma_of
 from commission.planning.unmet import Unmet
 from commission.planning.visibility import VisibilityModel
+from commission.progress import Progress
 from commission.site.checks import at_least
 from commission.site.layout_brief import CandidateOptions, Demands
 from commission.site.project import Project
@@ -32,8 +33,6 @@ ROUNDS = 20
 CORES = os.cpu_count() or 1
 COVERING = 0.9
 """Share of the progress that these rounds take; the rest is doing with fewer."""
-
-Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +95,7 @@ class LayoutSearch:
         *,
         kept: int,
         options: PlacementOptions,
-        progress: Progress | None,
+        progress: Progress,
     ) -> None:
         self._planned, self._options, self._progress, self._fraction = planned, options, progress, 0.0
         count, demands = len(project.reflectors), options.demands
@@ -299,8 +298,7 @@ class LayoutSearch:
         """Tell how far the search is; without a fraction only give the chance to cancel."""
         if fraction is not None:
             self._fraction = fraction
-        if self._progress is not None:
-            self._progress(self._fraction, what)
+        self._progress(self._fraction, what)
 
 
 def _conflicts(centers: FloatArray, spacing: float) -> tuple[IntArray, ...]:

@@ -11,10 +11,11 @@ import numpy as np
 
 from commission.geometry.arrays import FloatArray
 from commission.planning.candidates import clear_of, mounting_heights, wall_candidates
-from commission.planning.layout_search import LayoutSearch, PlacementOptions, Progress
+from commission.planning.layout_search import LayoutSearch, PlacementOptions
 from commission.planning.route_prediction import plan_route
 from commission.planning.unmet import Unmet
 from commission.planning.visibility import visibility_model
+from commission.progress import Progress, silent
 from commission.site.layout_brief import CandidateOptions, Demands
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -42,7 +43,7 @@ def place(
     project: Project,
     routes: tuple[str, ...] | None = None,
     options: PlacementOptions | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Placement:
     """Suggest reflectors on walls and pillars.
 
@@ -70,7 +71,7 @@ def choose(
     routes: tuple[str, ...],
     centers: FloatArray,
     options: PlacementOptions,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> Placement:
     """Choose among given candidates; parameters as for `place`, and `centers`, (C, 2) places [m], map frame."""
     kept = _kept(project, options)

@@ -6,12 +6,13 @@ off leaves the others' draws as they were.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from commission.geometry.arrays import FloatArray, IntArray, frozen
+from commission.progress import Progress, silent
 from commission.simulation import follower, scan
 from commission.simulation.drive import DriveOptions, Motion, drive, measure
 from commission.simulation.people import Crowd, WalkableFloor
@@ -50,7 +51,7 @@ def records(
     seed: int,
     *,
     options: DriveOptions = DEFAULTS,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = silent,
 ) -> Iterator[Record]:
     """Drive a route and deliver the vehicle's records in order, one scan at a time.
 
@@ -60,7 +61,7 @@ def records(
     route_name : which route.
     seed : the same seed, project and options give the same records to the last bit.
     options : rates, rests and limits. Scans and odometry share their stamps where the rates divide.
-    progress : called with the share done [0..1] at each scan; may raise to cancel.
+    progress : called at each scan; may raise to cancel.
 
     Yields
     ------
@@ -85,8 +86,7 @@ def records(
     scans = _scans(project, seed, stamps, poses, options.whole_scans)
     done = 0
     for index, (stamp, pose) in enumerate(zip(stamps.tolist(), poses, strict=True)):
-        if progress is not None:
-            progress(index / len(stamps))
+        progress(index / len(stamps), "driving")
         due = int(np.searchsorted(motion.stamps_ns, stamp, side="right"))
         yield from _odometry(motion, displacements, done, due)
         done = due
@@ -95,8 +95,7 @@ def records(
         if scan_record is not None:
             yield scan_record
     yield from _odometry(motion, displacements, done, len(displacements))
-    if progress is not None:
-        progress(1.0)
+    progress(1.0, "driving")
 
 
 def virtual_drive(
@@ -105,7 +104,7 @@ def virtual_drive(
     seed: int,
     *,
     options: DriveOptions = DEFAULTS,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress = silent,
 ) -> RecordLog:
     """Gather the records of a whole drive; parameters and errors as in `records`."""
     return RecordLog.collect(records(project, route_name, seed, options=options, progress=progress))

@@ -5,7 +5,6 @@ The figures themselves come from `planning`; files and images are elsewhere.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,11 +15,11 @@ from commission.planning.association_risk import NeighborRisk, neighbor_risks
 from commission.planning.coverage import Lattice, lattice_of
 from commission.planning.route_prediction import PredictionOptions, plan_route, predict_route
 from commission.planning.visibility import VisibilityModel, visibility_model
+from commission.progress import Progress, part, silent
 from commission.site.project import Project
 from commission.studies.coverage import free_floor
 
 Number = int | float | None
-Progress = Callable[[float, str], None]
 
 COLD_START = 0.9
 """Share of the time that the floor takes; the rest goes to the routes."""
@@ -79,7 +78,7 @@ def floor_ambiguity(
     model: VisibilityModel,
     lattice: Lattice,
     options: AmbiguityOptions,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> FloorAmbiguity:
     """Ask for every spot of the floor, heading by heading, whether another pose sees the same.
 
@@ -113,7 +112,7 @@ def ambiguity_of(
     *,
     spacing: float = 0.5,
     routes: tuple[str, ...] | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> SiteAmbiguity:
     """Ask where a site is ambiguous.
 
@@ -133,15 +132,13 @@ def ambiguity_of(
     options = options or AmbiguityOptions()
     names = tuple(route.name for route in project.routes) if routes is None else routes
     model, lattice = visibility_model(project), lattice_of(project, spacing)
-    floor = floor_ambiguity(project, model, lattice, options, _scaled(progress, COLD_START))
+    floor = floor_ambiguity(project, model, lattice, options, part(progress, 0.0, COLD_START))
     tracked: list[RouteRisks] = []
     for number, name in enumerate(names):
-        if progress is not None:
-            progress(COLD_START + (1.0 - COLD_START) * number / len(names), "neighbors")
+        progress(COLD_START + (1.0 - COLD_START) * number / len(names), "neighbors")
         planned = plan_route(project, name, PredictionOptions(), model)
         tracked.append(RouteRisks(name, neighbor_risks(planned, predict_route(planned))))
-    if progress is not None:
-        progress(1.0, "neighbors")
+    progress(1.0, "neighbors")
     return SiteAmbiguity(floor, tuple(tracked))
 
 
@@ -183,10 +180,3 @@ def summary(found: SiteAmbiguity) -> dict[str, Number | list[dict[str, str | Num
 def metres_at_risk(risks: tuple[NeighborRisk, ...]) -> IntArray:
     """Numbers of the metres of the way at which any neighbor lies inside a gate."""
     return np.unique(np.concatenate([np.empty(0), *(risk.metres for risk in risks)]).astype(np.int64))
-
-
-def _scaled(progress: Progress | None, share: float) -> Progress | None:
-    """Progress of a first part."""
-    if progress is None:
-        return None
-    return lambda done, what: progress(share * done, what)

@@ -6,7 +6,6 @@ The figures themselves come from `planning`; files and images are elsewhere.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +17,7 @@ from commission.planning.coverage import Coverage, coverage, lattice_of
 from commission.planning.dilution import FixOptions
 from commission.planning.fix_ellipses import every_nth, position_covariances
 from commission.planning.visibility import VisibilityOptions, visibility_model
+from commission.progress import Progress, silent
 from commission.site.floor_map import FREE
 from commission.site.parameters import SupervisorParameters
 from commission.site.project import Project
@@ -31,7 +31,7 @@ def coverage_of(
     *,
     spacing: float = 0.25,
     visibility: VisibilityOptions | None = None,
-    progress: Callable[[float, str], None] | None = None,
+    progress: Progress = silent,
 ) -> Coverage:
     """Visibility and dilution over the floor of a project.
 

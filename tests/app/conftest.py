@@ -5,6 +5,7 @@ import pytest
 from commission.app.base.actions import VirtualDrive
 from commission.app.run.drives import prepare
 from commission.app.run.session import Drive
+from commission.progress import silent
 from commission.site.project import Project
 from tests.app.sites import room
 
@@ -16,7 +17,7 @@ def project() -> Project:
 
 @pytest.fixture(scope="session")
 def drive(project: Project) -> Drive:
-    return prepare(project, VirtualDrive(project.routes[0].name, seed=1), lambda _fraction: None)
+    return prepare(project, VirtualDrive(project.routes[0].name, seed=1), silent)
 
 
 class Clock:

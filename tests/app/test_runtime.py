@@ -13,6 +13,7 @@ from commission.app.run.session import Drive
 from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
 from commission.errors import FileFormatError
 from commission.localization.setup import LocalizerSetup
+from commission.progress import Progress
 from commission.site.project import Project
 
 EPISODES = ((1.0, 2.0),)
@@ -61,10 +62,10 @@ class Bench:
         state = AppState(project, project, folder=Path("hall"))
         self.runtime = Runtime(state, Work(self._prepare, self._predict, self._save, lambda _progress: None))
 
-    def _prepare(self, _project: Project, source: Source, progress: Callable[[float], None]) -> Drive:
+    def _prepare(self, _project: Project, source: Source, progress: Progress) -> Drive:
         if self.slow is not None:
             return self.slow(_project, source, progress)
-        progress(0.5)
+        progress(0.5, "")
         if isinstance(source, actions.Recording):
             raise FileFormatError(source.path, "", "not a recording", "a folder with odometry.csv")
         return self.drive
@@ -197,10 +198,10 @@ def test_a_job_in_sight_is_stopped_by_its_button_and_what_there_was_stays(bench:
     before = bench.runtime.session
     started, end = threading.Event(), threading.Event()
 
-    def prepare(_project: Project, _source: Source, progress: Callable[[float], None]) -> Drive:
+    def prepare(_project: Project, _source: Source, progress: Progress) -> Drive:
         started.set()
         while not end.wait(0.01):
-            progress(0.5)
+            progress(0.5, "")
         raise TimeoutError("nobody stopped it")
 
     bench.slow = prepare

@@ -119,11 +119,11 @@ def test_project_without_a_floor_map_is_an_open_field() -> None:
 
 def test_progress_ends_at_one_and_may_cancel() -> None:
     seen: list[float] = []
-    virtual_drive(project(Disturbances()), ROUTE, 0, progress=seen.append)
+    virtual_drive(project(Disturbances()), ROUTE, 0, progress=lambda done, _: seen.append(done))
     assert seen == sorted(seen)
     assert seen[-1] == 1.0
 
-    def cancel(share: float) -> None:
+    def cancel(share: float, _message: str) -> None:
         if share > 0.5:
             raise KeyboardInterrupt
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +12,7 @@ from commission.geometry.arrays import FloatArray
 from commission.planning.ambiguity import AmbiguityOptions, AmbiguousPair
 from commission.planning.coverage import Lattice, lattice_of
 from commission.planning.visibility import VisibilityOptions, visibility_model
+from commission.progress import Progress
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.studies.ambiguity import FloorAmbiguity, both_ways, floor_ambiguity
@@ -56,7 +56,7 @@ def spots_of(project: Project) -> Lattice:
     return next((lattice for lattice in lattices if len(lattice) <= MOST_SPOTS), lattice_of(project, SPACINGS[-1]))
 
 
-def look_alike(project: Project, settings: PlanSettings, progress: Callable[[float, str], None]) -> Ambiguity:
+def look_alike(project: Project, settings: PlanSettings, progress: Progress) -> Ambiguity:
     """Ask for every free spot of the floor, heading by heading, whether another pose sees the same."""
     progress(0.0, "sight of each reflector")
     model = visibility_model(project, VisibilityOptions(min_beams=settings.min_beams))

@@ -15,9 +15,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from queue import SimpleQueue
-from typing import Protocol
 
 from commission.errors import CommissionError, JobCancelled, JobError
+from commission.progress import Progress
 
 _log = logging.getLogger(__name__)
 
@@ -71,14 +71,6 @@ class JobReport:
 
     result: object = None
     """What the work returned; only in the report that says `JobState.DONE`."""
-
-
-class Progress(Protocol):
-    """Called by the work to say how far it is; the place where a cancelled job stops."""
-
-    def __call__(self, fraction: float, message: str = "") -> None:
-        """Report the part done (0 to 1, others are clipped) and what comes next; raises `JobCancelled`."""
-        ...
 
 
 Work = Callable[[Progress], object]
@@ -187,7 +179,7 @@ class Jobs:
         """What the work of this job calls."""
         reported_at = -math.inf
 
-        def progress(fraction: float, message: str = "") -> None:
+        def progress(fraction: float, message: str, /) -> None:
             nonlocal reported_at
             now = time.monotonic()
             with self._lock:

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Callable
 from typing import TypeAlias, cast
 
-from commission.app.base.jobs import JobReport, Jobs, JobState, Progress
+from commission.app.base.jobs import JobReport, Jobs, JobState
 from commission.app.base.reduction import ExportProject, ReadFile, StopReading
 from commission.app.base.uploads import Upload
 from commission.app.exchange import actions
@@ -15,6 +15,7 @@ from commission.app.exchange.pending import ImportSource, Pasted, ServerFile
 from commission.app.exchange.preview import compare
 from commission.io.exports import export
 from commission.io.imports import Imported, LayoutChoice, read_import, read_named, read_pasted
+from commission.progress import Progress
 
 Asked: TypeAlias = tuple[int, int | None]
 """Number of the browser's connection, and of what it asked for; none for a file that is made."""

@@ -6,7 +6,7 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from commission.app.base.jobs import Jobs, Progress
+from commission.app.base.jobs import Jobs
 from commission.app.floor_map.actions import ImageMissing, MapFailed, MapMade, MapOpened, MapResult
 from commission.app.floor_map.draft import DRAWING_ENDINGS, ENDINGS, MAP_ENDINGS, PICTURE_ENDINGS, MapFile, Read
 from commission.app.floor_map.effects import DrawMap, MapEffect, ReadMapFile, StopMapWork
@@ -15,6 +15,7 @@ from commission.io.dxf import Drawing, read_drawing
 from commission.io.image_map import Picture, read_picture
 from commission.io.map_server import image_name, read_floor_map
 from commission.io.mesh import Model, read_model
+from commission.progress import Progress
 from commission.site.floor_map import FloorMap
 
 

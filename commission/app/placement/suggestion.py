@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,6 +12,7 @@ from commission.geometry.arrays import FloatArray
 from commission.planning import true_error
 from commission.planning.nominal_drive import nominal_drive
 from commission.planning.placement import Placement, PlacementOptions, Unmet, place
+from commission.progress import Progress
 from commission.site.layout_brief import LayoutBrief
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -109,7 +109,7 @@ class Suggestion:
         return all(getattr(project, part) is getattr(self.site, part) for part in parts)
 
 
-def suggest(project: Project, wish: LayoutWish, progress: Callable[[float, str], None]) -> Suggestion:
+def suggest(project: Project, wish: LayoutWish, progress: Progress) -> Suggestion:
     """Look for few reflectors that meet the demands.
 
     Locked reflectors stay even where the layout starts empty.

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Generic, TypeAlias, TypeVar
 
-from commission.app.base.jobs import JobReport, Jobs, JobState, Progress
+from commission.app.base.jobs import JobReport, Jobs, JobState
+from commission.progress import Progress
 
 Result = TypeVar("Result")
 Key: TypeAlias = tuple[object, ...]

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from commission.app.plan.settings import PlanSettings
 from commission.geometry.arrays import BoolArray
@@ -22,11 +20,10 @@ from commission.planning.route_prediction import (
 from commission.planning.station_accuracy import StationAccuracy, station_accuracies
 from commission.planning.true_error import PredictedErrors, predict_errors
 from commission.planning.visibility import VisibilityModel, VisibilityOptions, visibility_model
+from commission.progress import Progress, part
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.studies.coverage import drivable
-
-Progress: TypeAlias = Callable[[float, str], None]
 
 LONGEST_SIDE = 400
 """Points of the lattice along the longer side: as many as the floor has pixels on a small screen."""
@@ -105,7 +102,7 @@ def cover(project: Project, settings: PlanSettings, progress: Progress) -> Cover
     progress(0.05, "sight of each reflector")
     model = _model(project, settings)
     lattice = lattice_of(project, spacing_of(project))
-    live = LiveCoverage(model, lattice, fix_options_of(project, settings), _part(progress, 0.3, 0.95))
+    live = LiveCoverage(model, lattice, fix_options_of(project, settings), part(progress, 0.3, 0.95))
     progress(0.95, "floor")
     return Covered(live, drivable(project, live.coverage))
 
@@ -146,11 +143,11 @@ def rank(
     """
     progress(0.0, "compiling")
     route_prediction.warm_up()
-    planned = planned or _planned(project, settings, _part(progress, 0.05, 0.3))
+    planned = planned or _planned(project, settings, part(progress, 0.05, 0.3))
     names = [reflector.id for reflector in project.reflectors.reflectors]
     blocked = tuple(names.index(name) for name in settings.fallen if name in names)
     options = FailureOptions(settings.failure, given=Damage(blocked=blocked))
-    ranking = dependence.dependences(planned, options, _part(progress, 0.3, 1.0))
+    ranking = dependence.dependences(planned, options, part(progress, 0.3, 1.0))
     return Ranked(project.reflectors, planned, blocked, ranking)
 
 
@@ -172,12 +169,3 @@ def _model(project: Project, settings: PlanSettings) -> VisibilityModel:
 
 def _size(lattice: Lattice) -> tuple[float, float]:
     return lattice.columns * lattice.spacing, lattice.rows * lattice.spacing
-
-
-def _part(progress: Progress, start: float, end: float) -> Progress:
-    """Progress of a part of the work as progress of the whole."""
-
-    def part(fraction: float, message: str) -> None:
-        progress(start + (end - start) * fraction, message)
-
-    return part

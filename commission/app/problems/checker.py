@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from commission.app.base.jobs import Progress
 from commission.planning.route_check import FloorDistances
+from commission.progress import Progress
 from commission.site.project import Project
 from commission.studies.problems import Findings, find_problems
 
@@ -28,6 +28,6 @@ class Checker:
             self._floor = None
         elif self._floor is None or self._floor.floor_map is not floor_map:
             self._floor = FloorDistances(floor_map)
-        progress(0.5)
+        progress(0.5, "checking")
         self._findings = find_problems(project, self._floor, self._findings)
         return self._findings

@@ -10,12 +10,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from commission.app.base.jobs import JobReport, Jobs, Progress
+from commission.app.base.jobs import JobReport, Jobs
 from commission.app.base.state import AppState
 from commission.app.editing.route_gestures import route_of
 from commission.app.plan.upkeep import Upkeep
 from commission.app.problems.checker import Checker
 from commission.planning.route_profile import RouteProfile, route_profile
+from commission.progress import Progress
 from commission.site.routes import Route
 from commission.site.vehicle import Vehicle
 from commission.studies.problems import Findings, Problem
@@ -106,6 +107,6 @@ def profiles_of(routes: tuple[Route, ...], vehicle: Vehicle, before: Profiles | 
         known = dict(zip(map(id, before.routes), before.profiles, strict=True))
     found: list[RouteProfile] = []
     for number, route in enumerate(routes):
-        progress(number / len(routes))
+        progress(number / len(routes), route.name)
         found.append(known[id(route)] if id(route) in known else route_profile(route, vehicle))
     return Profiles(vehicle, routes, tuple(found))

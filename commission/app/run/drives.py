@@ -5,7 +5,6 @@ Runs as a background job: plain values in, a plain value out.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,19 +15,20 @@ from commission.errors import SourceError
 from commission.geometry.arrays import frozen
 from commission.io.recordings.base import load_log
 from commission.localization.estimate import Belief
+from commission.progress import Progress
 from commission.simulation import scenario
 from commission.site.project import Project
 from commission.studies.start import start_of
 
 
-def prepare(project: Project, source: Source, progress: Callable[[float], None]) -> Drive:
+def prepare(project: Project, source: Source, progress: Progress) -> Drive:
     """Simulate or read a drive.
 
     Parameters
     ----------
     project : site, vehicle and scanner; its parameters are the wheels' true noise of a virtual drive.
     source : what drives.
-    progress : called with the share done [0..1]; may raise to cancel.
+    progress : told how far it is; may raise to cancel.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def prepare(project: Project, source: Source, progress: Callable[[float], None])
     return _recorded(project, source, progress)
 
 
-def _simulated(project: Project, source: VirtualDrive, progress: Callable[[float], None]) -> Drive:
+def _simulated(project: Project, source: VirtualDrive, progress: Progress) -> Drive:
     if source.people is not None:
         project = replace(project, disturbances=replace(project.disturbances, people=source.people))
     start = scenario.start_of(project, source.route)
@@ -49,8 +49,8 @@ def _simulated(project: Project, source: VirtualDrive, progress: Callable[[float
     return Drive(log, Belief(int(log.stamps_ns[0]), start.pose, covariance))
 
 
-def _recorded(project: Project, source: Recording, progress: Callable[[float], None]) -> Drive:
-    progress(0.0)
+def _recorded(project: Project, source: Recording, progress: Progress) -> Drive:
+    progress(0.0, "reading the recording")
     log = load_log(source.path)
     if log.scans is None and not len(log.detection_stamps_ns):
         raise SourceError(f"{source.path} holds no scan; expected scans.npz or detections.csv")

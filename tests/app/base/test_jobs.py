@@ -9,8 +9,9 @@ from queue import SimpleQueue
 
 import pytest
 
-from commission.app.base.jobs import Job, JobReport, Jobs, JobState, Progress
+from commission.app.base.jobs import Job, JobReport, Jobs, JobState
 from commission.errors import JobError, ProjectError
+from commission.progress import Progress
 
 
 class Owner:
