@@ -131,7 +131,9 @@ def _reflector(path: Path, line: int, cells: list[str], found: Findings) -> Refl
     if _SUBTYPES[subtype] is ReflectorKind.FLAT:
         found.add(f"line {line}", "the format does not say which way a flat reflector faces; heading is set to 0 rad")
     layer = "" if layers == [0] else "+".join(str(layer) for layer in layers)
-    return Reflector(str(ident), x / 1000.0, y / 1000.0, size / 2000.0, kind=_SUBTYPES[subtype], layer=layer)
+    return Reflector(
+        id=str(ident), x=x / 1000.0, y=y / 1000.0, radius=size / 2000.0, kind=_SUBTYPES[subtype], layer=layer
+    )
 
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:
@@ -200,7 +202,7 @@ def _layers(reflectors: ReflectorMap, found: Findings) -> dict[str, list[int]]:
 
 def _note_losses(reflectors: ReflectorMap, found: Findings) -> None:
     """Say which fields stay behind."""
-    usual = Reflector("usual", 0.0, 0.0)
+    usual = Reflector(id="usual", x=0.0, y=0.0)
     for name in ("heading", "height", "sigma", "note", "locked"):
         count = sum(getattr(r, name) != getattr(usual, name) for r in reflectors.reflectors)
         if count:

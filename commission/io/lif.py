@@ -187,7 +187,8 @@ def _stations(content: _Layout, kind: str) -> Iterator[Station]:
             if theta is None:
                 fields.found.add(fields.where, "says no heading; it is set to 0 rad")
             name = unique(name if len(usable) == 1 else f"{name} from {node}", taken)
-            yield Station(name, *content.nodes[node], 0.0 if theta is None else theta)
+            x, y = content.nodes[node]
+            yield Station(name=name, x=x, y=y, heading=0.0 if theta is None else theta)
 
 
 def _routes(edges: list[Edge], found: Findings) -> tuple[Route, ...]:

@@ -127,16 +127,16 @@ def load_project(path: Path) -> Project:
     document, keys = _read_document(yaml_path)
     try:
         return Project(
-            keys.name,
-            _floor_map(document, keys.floor_map),
-            _reflectors(document, keys.reflectors),
-            keys.routes,
-            _vehicle(document, keys.vehicle),
-            keys.scanner,
-            keys.parameters,
-            keys.disturbances,
-            keys.stations,
-            keys.layout,
+            name=keys.name,
+            floor_map=_floor_map(document, keys.floor_map),
+            reflectors=_reflectors(document, keys.reflectors),
+            routes=keys.routes,
+            vehicle=_vehicle(document, keys.vehicle),
+            scanner=keys.scanner,
+            parameters=keys.parameters,
+            disturbances=keys.disturbances,
+            stations=keys.stations,
+            layout=keys.layout,
         )
     except ProjectError as error:
         problem, _, remedy = str(error).partition("; expected ")

@@ -67,7 +67,7 @@ def reflectors_of(blocks: Iterable[Block]) -> ReflectorMap:
 
 def write_reflectors(reflectors: ReflectorMap, path: Path) -> None:
     """Write a reflector table; optional columns are left out while all of their values are the usual ones."""
-    usual = Reflector("usual", 0.0, 0.0)
+    usual = Reflector(id="usual", x=0.0, y=0.0)
     optional = [
         name for name in OPTIONAL if any(getattr(r, name) != getattr(usual, name) for r in reflectors.reflectors)
     ]

@@ -124,7 +124,7 @@ def curve(fields: Fields, ends: tuple[Sequence[float] | None, Sequence[float] | 
     if math.dist(ends[0], ends[1]) < 1e-6:
         fields.found.add(fields.where, "begins and ends at one place; it is left out")
         return None
-    return Segment(np.array([ends[0], ends[1]]), degree=1)
+    return Segment(control_points=np.array([ends[0], ends[1]]), degree=1)
 
 
 def _nurbs(trajectory: Fields) -> Segment | None:
@@ -150,7 +150,10 @@ def _nurbs(trajectory: Fields) -> Segment | None:
             rational = np.array(weights) if any(weight != 1.0 for weight in weights) else None
             controls = np.array(points, dtype=np.float64)
             segment = Segment(
-                controls, degree=int(degree), knots=_usual(knots, int(degree), trajectory), weights=rational
+                control_points=controls,
+                degree=int(degree),
+                knots=_usual(knots, int(degree), trajectory),
+                weights=rational,
             )
         except (ValueError, OverflowError) as error:
             problem = str(error)

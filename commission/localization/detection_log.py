@@ -22,7 +22,7 @@ from commission.localization.setup import LocalizerSetup
 from commission.site.record_log import RecordLog, ScanLog
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class DetectionLog:
     """What was detected in each scan of a drive, before any association."""
 
@@ -64,12 +64,12 @@ def extract_detections(log: RecordLog, setup: LocalizerSetup, *, parallel: bool 
     if before == 0:
         return own
     early = ScanLog(
-        scans.stamps_ns[:before],
-        scans.ranges[:before],
-        scans.angle_min,
-        scans.angle_increment,
-        None if scans.intensities is None else scans.intensities[:before],
-        None if scans.reflector is None else scans.reflector[:before],
+        stamps_ns=scans.stamps_ns[:before],
+        ranges=scans.ranges[:before],
+        angle_min=scans.angle_min,
+        angle_increment=scans.angle_increment,
+        intensities=None if scans.intensities is None else scans.intensities[:before],
+        reflector=None if scans.reflector is None else scans.reflector[:before],
     )
     return _joined(detect_log(early, setup, parallel=parallel), own)
 
@@ -121,11 +121,11 @@ def _log(
 ) -> DetectionLog:
     """Return a log of read-only arrays."""
     return DetectionLog(
-        read_only(np.asarray(stamps_ns, dtype=np.int64)),
-        read_only(np.asarray(offsets, dtype=np.int64)),
-        read_only(np.asarray(range_bearing, dtype=np.float64)),
-        read_only(beams),
-        read_only(status),
+        stamps_ns=read_only(np.asarray(stamps_ns, dtype=np.int64)),
+        offsets=read_only(np.asarray(offsets, dtype=np.int64)),
+        range_bearing=read_only(np.asarray(range_bearing, dtype=np.float64)),
+        beams=read_only(beams),
+        status=read_only(status),
     )
 
 

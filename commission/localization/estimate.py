@@ -38,7 +38,7 @@ class Belief:
     """(3, 3) of x [m], y [m], theta [rad]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Estimate:
     """One cycle: one scan processed."""
 

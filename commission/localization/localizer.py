@@ -24,12 +24,21 @@ from commission.site.scanner import Scanner
 
 def warm_up() -> None:
     """Compile every kernel that a live localizer needs, by feeding it one record of each kind."""
-    setup = LocalizerSetup(ReflectorMap((Reflector("A", 2.0, 0.0),)), Scanner(), Parameters())
+    setup = LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), Scanner(), Parameters())
     localizer = Localizer(setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3)))
     localizer.feed(Odometry(0, np.zeros(3)))
     localizer.feed(Odometry(1, np.zeros(3)))
     flags = np.array([False, False, True, False])
-    localizer.feed(Scan(2, np.full(4, 1.96, dtype=np.float32), -0.02, 0.01, None, flags))
+    localizer.feed(
+        Scan(
+            stamp_ns=2,
+            ranges=np.full(4, 1.96, dtype=np.float32),
+            angle_min=-0.02,
+            angle_increment=0.01,
+            intensities=None,
+            reflector=flags,
+        )
+    )
     localizer.feed(Detections(3, np.array([[2.0, 0.0]])))
 
 
@@ -150,16 +159,16 @@ class Localizer:
         offsets = np.array((0, count), dtype=np.int64)
         points = project_detections(posterior.mean[np.newaxis], offsets, detections, model.observation)
         return Estimate(
-            stamp_ns,
-            to_belief(cycle.prior, stamp_ns),
-            posterior,
-            self._output,
-            self._mode,
-            detections,
-            seen.beams,
-            points,
-            status,
-            reflector,
-            d2,
-            model.gate.d2,
+            stamp_ns=stamp_ns,
+            prior=to_belief(cycle.prior, stamp_ns),
+            posterior=posterior,
+            output=self._output,
+            mode=self._mode,
+            detections=detections,
+            beams=seen.beams,
+            points_map=points,
+            status=status,
+            reflector=reflector,
+            d2=d2,
+            gate=model.gate.d2,
         )

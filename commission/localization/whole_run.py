@@ -39,7 +39,7 @@ class Columns(NamedTuple):
     d2: FloatArray
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RunArrays:
     """A whole run as columns: K cycles (one per scan) with n detections in total. All arrays are read-only."""
 
@@ -122,18 +122,18 @@ class RunArrays:
         points = project_detections(self.means[cycle : cycle + 1], offsets, detections, self.observation)
         given = int(self.output_cycles()[cycle])
         return Estimate(
-            stamp_ns,
-            Belief(stamp_ns, self.prior_means[cycle], self.prior_covariances[cycle]),
-            self._posterior(cycle),
-            self.initial if given < 0 else self._posterior(given),
-            Mode(int(self.modes[cycle])),
-            detections,
-            self.beams[rows],
-            points,
-            self.status[rows],
-            self.reflector[rows],
-            self.d2[rows],
-            self.gate,
+            stamp_ns=stamp_ns,
+            prior=Belief(stamp_ns, self.prior_means[cycle], self.prior_covariances[cycle]),
+            posterior=self._posterior(cycle),
+            output=self.initial if given < 0 else self._posterior(given),
+            mode=Mode(int(self.modes[cycle])),
+            detections=detections,
+            beams=self.beams[rows],
+            points_map=points,
+            status=self.status[rows],
+            reflector=self.reflector[rows],
+            d2=self.d2[rows],
+            gate=self.gate,
         )
 
     def _posterior(self, cycle: int) -> Belief:
@@ -191,21 +191,36 @@ def run(
         column.setflags(write=False)
     newest = [int(column[-1]) for column in (log.odometry_stamps_ns, detected.stamps_ns) if len(column)]
     return RunArrays(
-        to_belief(start, initial.stamp_ns),
-        detected,
-        setup.filter.gate.d2,
-        setup.filter.observation,
-        *columns,
-        to_belief(final, max(newest, default=initial.stamp_ns)),
+        initial=to_belief(start, initial.stamp_ns),
+        detected=detected,
+        gate=setup.filter.gate.d2,
+        observation=setup.filter.observation,
+        prior_means=columns.prior_means,
+        prior_covariances=columns.prior_covariances,
+        means=columns.means,
+        covariances=columns.covariances,
+        modes=columns.modes,
+        status=columns.status,
+        reflector=columns.reflectors,
+        d2=columns.d2,
+        final=to_belief(final, max(newest, default=initial.stamp_ns)),
     )
 
 
 def warm_up() -> None:
     """Compile the loop and the detection of whole logs (the serial one), by running over one scan."""
-    setup = LocalizerSetup(ReflectorMap((Reflector("A", 2.0, 0.0),)), Scanner(), Parameters())
+    setup = LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), Scanner(), Parameters())
     ranges = np.full((1, 4), 1.96, dtype=np.float32)
-    scans = ScanLog(np.array([2]), ranges, -0.02, 0.01, None, np.array([[False, False, True, False]]))
-    log = RecordLog(np.array([0, 1]), np.zeros((2, 3)), scans)
+    flags = np.array([[False, False, True, False]])
+    scans = ScanLog(
+        stamps_ns=np.array([2]),
+        ranges=ranges,
+        angle_min=-0.02,
+        angle_increment=0.01,
+        intensities=None,
+        reflector=flags,
+    )
+    log = RecordLog(odometry_stamps_ns=np.array([0, 1]), displacements=np.zeros((2, 3)), scans=scans)
     run(log, setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3))).points_map()
 
 

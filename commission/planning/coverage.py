@@ -333,7 +333,7 @@ def _change_bits(  # noqa: PLR0917 - arrays in, arrays out
 def warm_up() -> None:
     """Compile the kernels of this module and of `dilution`."""
     dilution.warm_up()
-    project = Project(reflectors=ReflectorMap((Reflector("1", 2.0, 0.0),)))
+    project = Project(reflectors=ReflectorMap((Reflector(id="1", x=2.0, y=0.0),)))
     model = visibility.visibility_model(project)
     live = LiveCoverage(model, Lattice(0.0, 0.0, 1.0, 2, 2), FixOptions())
-    live.move(0, Reflector("1", 1.0, 0.0))
+    live.move(0, Reflector(id="1", x=1.0, y=0.0))

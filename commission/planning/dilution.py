@@ -238,6 +238,6 @@ def as_fixes(counts: dilution_kernels.Counts, figures: FloatArray) -> Fixes:
 def warm_up() -> None:
     """Compile the kernels of this module and of `visibility`."""
     visibility.warm_up()
-    model = visibility.visibility_model(Project(reflectors=ReflectorMap((Reflector("1", 2.0, 0.0),))))
+    model = visibility.visibility_model(Project(reflectors=ReflectorMap((Reflector(id="1", x=2.0, y=0.0),))))
     fixes(model, [[0.0, 0.0]], FixOptions())
     fix_covariances(model, [[0.0, 0.0, 0.0]], FixOptions())

@@ -110,6 +110,6 @@ def _named(centers: FloatArray, kept: tuple[Reflector, ...], options: CandidateO
     # Places that the caller names may be where no height is allowed; they are his to answer for.
     heights = np.nan_to_num(mounting_heights(centers, options), nan=options.height)
     return tuple(
-        Reflector(name, x, y, options.radius, height=height, note="suggested")
+        Reflector(id=name, x=x, y=y, radius=options.radius, height=height, note="suggested")
         for name, (x, y), height in zip(free, centers.tolist(), heights.tolist(), strict=False)
     )

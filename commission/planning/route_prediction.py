@@ -324,8 +324,8 @@ def predict_route(planned: PlannedRoute, damage: Damage = NO_DAMAGE) -> RoutePre
 
 def smallest_route() -> PlannedRoute:
     """Plan a drive of 0.1 m past one reflector: something to compile the kernels with."""
-    route = Route("Line", (Segment(np.array([[0.0, 0.0], [0.1, 0.0]]), degree=1),))
-    project = Project(reflectors=ReflectorMap((Reflector("1", 2.0, 0.0),)), routes=(route,))
+    route = Route("Line", (Segment(control_points=np.array([[0.0, 0.0], [0.1, 0.0]]), degree=1),))
+    project = Project(reflectors=ReflectorMap((Reflector(id="1", x=2.0, y=0.0),)), routes=(route,))
     return plan_route(project, "Line")
 
 

@@ -323,7 +323,7 @@ def _list_visible(  # noqa: PLR0917 - two passes share one loop
 def warm_up() -> None:
     """Compile the kernels of this module and of `shadow_kernels`."""
     grid = OccupancyGrid(np.eye(3, dtype=np.bool_), 1.0)
-    reflectors = ReflectorMap((Reflector("1", 2.5, 0.5), Reflector("2", 0.5, 2.5)))
+    reflectors = ReflectorMap((Reflector(id="1", x=2.5, y=0.5), Reflector(id="2", x=0.5, y=2.5)))
     model = build_visibility(reflectors, Scanner(), RayCaster(grid), VisibilityOptions())
     model.visible_from_poses([[1.5, 0.5, 0.0]])
     model.with_reflector(0, reflectors.reflectors[0])

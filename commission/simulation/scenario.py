@@ -132,7 +132,14 @@ def _scans(project: Project, seed: int, stamps: IntArray, poses: FloatArray, who
         ranges, flags = scanner.scan(pose, nobody if crowd is None else crowd.legs(), beams, whole=whole)
         if any(0.0 <= 1e-9 * stamp - period.start < period.duration for period in disturbances.covered):
             flags[:] = False
-        record = Scan(stamp, ranges, project.scanner.angle_min, project.scanner.angle_increment, None, flags)
+        record = Scan(
+            stamp_ns=stamp,
+            ranges=ranges,
+            angle_min=project.scanner.angle_min,
+            angle_increment=project.scanner.angle_increment,
+            intensities=None,
+            reflector=flags,
+        )
         yield None if losses.uniform() < disturbances.dropped_scans else record
 
 

@@ -57,7 +57,7 @@ class CoveredPeriod:
         at_least(self.duration, 0.0, "covered period's duration", "s")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Disturbances:
     """Everything that a virtual drive suffers beyond the noise of its sensors."""
 

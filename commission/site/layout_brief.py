@@ -43,7 +43,7 @@ class AllowedHeights:
             raise ValueError(f"allowed_heights.area is {self.area}; expected finite metres")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CandidateOptions:
     """Where reflectors may be put up, and which kind."""
 
@@ -75,7 +75,7 @@ class CandidateOptions:
             raise ValueError(f"candidates.keep_out is {self.keep_out}; expected finite metres")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Demands:
     """What the reflectors must achieve at every scan of the routes, and where a vehicle may be switched on."""
 

@@ -25,7 +25,7 @@ class ObservationParameters:
         between(self.range_bias, (-1.0, 1.0), "observation.range_bias", "m")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryParameters:
     """Growth of the uncertainty while driving (Q of equation 1), independent of how finely odometry is sampled."""
 
@@ -54,7 +54,7 @@ class OdometryParameters:
             at_least(getattr(self, name), 0.0, f"odometry.{name}")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DetectorParameters:
     """From a scan to detections (Algorithm 2) and the detector filter (equation 3)."""
 
@@ -116,7 +116,7 @@ class SupervisorParameters:
         at_least(self.recovery_ratio, 1.0, "supervisor.recovery_ratio")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Parameters:
     """All tunables of the localizer."""
 

@@ -25,7 +25,7 @@ CREEP = 0.02
 """Lowest speed while on the way [m/s]: starts the motion, and reaches the stop in finite time."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MotionLimits:
     """What the drives of a heavy indoor vehicle can do and its load may suffer."""
 
@@ -41,7 +41,7 @@ class MotionLimits:
     """Rate of the steered wheel of a tricycle [rad/s]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Leg:
     """The way from one stop to the next, driven in one direction."""
 
@@ -125,12 +125,12 @@ def _leg(route: Route, run: list[Segment], vehicle: Vehicle, limits: MotionLimit
     step = float(ends[-1]) / (count - 1)
     speeds = _speed_profile(np.minimum(speeds, _speed_in_curves(curvatures, step, vehicle, limits)), step, limits)
     return Leg(
-        frozen(points, (None, 2), "points"),
-        step,
-        frozen(headings, (None,), "travel headings"),
-        frozen(curvatures, (None,), "curvatures"),
-        frozen(speeds, (None,), "speeds"),
-        run[0].direction is Direction.REVERSE,
+        points=frozen(points, (None, 2), "points"),
+        step=step,
+        travel_headings=frozen(headings, (None,), "travel headings"),
+        curvatures=frozen(curvatures, (None,), "curvatures"),
+        speeds=frozen(speeds, (None,), "speeds"),
+        reverse=run[0].direction is Direction.REVERSE,
     )
 
 

@@ -25,7 +25,7 @@ class Origin(StrEnum):
     """No published figure: a cautious value of ours. Measure it."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ScannerPreset:
     """One scanner as delivered, mounted nowhere yet."""
 
@@ -56,8 +56,8 @@ _GEOMETRY = frozenset({"field_of_view_deg", "resolution_deg", "rate", "range"})
 
 SCANNERS: tuple[ScannerPreset, ...] = (
     ScannerPreset(
-        "SICK microScan3",
-        Scanner(
+        name="SICK microScan3",
+        scanner=Scanner(
             field_of_view_deg=(-137.5, 137.5),
             resolution_deg=0.39,
             rate=25.0,
@@ -67,14 +67,14 @@ SCANNERS: tuple[ScannerPreset, ...] = (
             beam_width_deg=0.4,
             reflector_range=20.0,
         ),
-        "Scan of 275 deg, 0.39 deg at a scan cycle time of 40 ms (0.51 deg at 30 ms), distances up to 40 m: operating "
-        "instructions microScan3 Core I/O (8025870) and data output (8022708), as quoted. Variants with a protective "
-        "field of 9 m scan finer.",
-        _GEOMETRY,
+        source="Scan of 275 deg, 0.39 deg at a scan cycle time of 40 ms (0.51 deg at 30 ms), distances up to 40 m: "
+        "operating instructions microScan3 Core I/O (8025870) and data output (8022708), as quoted. Variants "
+        "with a protective field of 9 m scan finer.",
+        quoted=_GEOMETRY,
     ),
     ScannerPreset(
-        "SICK nanoScan3",
-        Scanner(
+        name="SICK nanoScan3",
+        scanner=Scanner(
             field_of_view_deg=(-137.5, 137.5),
             resolution_deg=1.0 / 6.0,
             rate=1000.0 / 30.0,
@@ -84,13 +84,13 @@ SCANNERS: tuple[ScannerPreset, ...] = (
             beam_width_deg=0.3,
             reflector_range=15.0,
         ),
-        "1,651 beams over 275 deg, scan cycle time 30 ms, 40 m for no echo: telegrams of a real device (data output "
-        "8022708); near range of 50 mm: operating instructions nanoScan3 I/O, as quoted.",
-        _GEOMETRY,
+        source="1,651 beams over 275 deg, scan cycle time 30 ms, 40 m for no echo: telegrams of a real device (data "
+        "output 8022708); near range of 50 mm: operating instructions nanoScan3 I/O, as quoted.",
+        quoted=_GEOMETRY,
     ),
     ScannerPreset(
-        "SICK S300",
-        Scanner(
+        name="SICK S300",
+        scanner=Scanner(
             field_of_view_deg=(-135.0, 135.0),
             resolution_deg=0.5,
             rate=12.5,
@@ -100,13 +100,13 @@ SCANNERS: tuple[ScannerPreset, ...] = (
             beam_width_deg=0.5,
             reflector_range=15.0,
         ),
-        "270 deg, 0.5 deg, basic response time 80 ms, distances up to 30 m: operating instructions S300 (8010948), as "
-        "quoted.",
-        _GEOMETRY,
+        source="270 deg, 0.5 deg, basic response time 80 ms, distances up to 30 m: operating instructions S300 "
+        "(8010948), as quoted.",
+        quoted=_GEOMETRY,
     ),
     ScannerPreset(
-        "SICK TiM781",
-        Scanner(
+        name="SICK TiM781",
+        scanner=Scanner(
             field_of_view_deg=(-135.0, 135.0),
             resolution_deg=1.0 / 3.0,
             rate=15.0,
@@ -116,15 +116,15 @@ SCANNERS: tuple[ScannerPreset, ...] = (
             beam_width_deg=0.49,
             reflector_range=20.0,
         ),
-        "270 deg in steps of 0.33 deg: operating instructions TiM781 (8024231, 2019), section 7.3. 811 beams at 15 Hz, "
-        "0.05 to 25 m: data sheet of part 1096807, as quoted. Beam width: that of the smaller TiM3xx, 8.6 mrad "
-        "(8024851, section 3.6.4).",
-        frozenset({"rate", "range"}),
-        frozenset({"field_of_view_deg", "resolution_deg"}),
+        source="270 deg in steps of 0.33 deg: operating instructions TiM781 (8024231, 2019), section 7.3. 811 beams "
+        "at 15 Hz, 0.05 to 25 m: data sheet of part 1096807, as quoted. Beam width: that of the smaller "
+        "TiM3xx, 8.6 mrad (8024851, section 3.6.4).",
+        quoted=frozenset({"rate", "range"}),
+        read=frozenset({"field_of_view_deg", "resolution_deg"}),
     ),
     ScannerPreset(
-        "SICK NAV350",
-        Scanner(
+        name="SICK NAV350",
+        scanner=Scanner(
             field_of_view_deg=(-180.0, 180.0),
             resolution_deg=0.25,
             rate=8.0,
@@ -134,14 +134,14 @@ SCANNERS: tuple[ScannerPreset, ...] = (
             beam_width_deg=0.286,
             reflector_range=70.0,
         ),
-        "0.5 to 70 m and a beam that widens by 5.0 mrad: operating instructions NAV350 (8013889, 2017), section 3.10.3 "
-        "and table 8; 1,440 beams of 0.25 deg at 8 Hz: telegram listing (8013892), as quoted.",
-        frozenset({"field_of_view_deg", "resolution_deg", "rate"}),
-        frozenset({"range", "beam_width_deg"}),
+        source="0.5 to 70 m and a beam that widens by 5.0 mrad: operating instructions NAV350 (8013889, 2017), "
+        "section 3.10.3 and table 8; 1,440 beams of 0.25 deg at 8 Hz: telegram listing (8013892), as quoted.",
+        quoted=frozenset({"field_of_view_deg", "resolution_deg", "rate"}),
+        read=frozenset({"range", "beam_width_deg"}),
     ),
     ScannerPreset(
-        "Hokuyo UAM-05LP",
-        Scanner(
+        name="Hokuyo UAM-05LP",
+        scanner=Scanner(
             field_of_view_deg=(-135.0, 135.0),
             resolution_deg=0.25,
             rate=1000.0 / 30.0,
@@ -151,13 +151,13 @@ SCANNERS: tuple[ScannerPreset, ...] = (
             beam_width_deg=0.3,
             reflector_range=10.0,
         ),
-        "1,081 steps of 0.25 deg over 270 deg, a scan in 30 ms, warning zone up to 20 m: data sheet UAM-05LP-T301 and "
-        "its communication protocol, as quoted.",
-        _GEOMETRY,
+        source="1,081 steps of 0.25 deg over 270 deg, a scan in 30 ms, warning zone up to 20 m: data sheet "
+        "UAM-05LP-T301 and its communication protocol, as quoted.",
+        quoted=_GEOMETRY,
     ),
     ScannerPreset(
-        "Pepperl+Fuchs R2000",
-        Scanner(
+        name="Pepperl+Fuchs R2000",
+        scanner=Scanner(
             field_of_view_deg=(-180.0, 180.0),
             resolution_deg=0.1,
             rate=20.0,
@@ -167,9 +167,9 @@ SCANNERS: tuple[ScannerPreset, ...] = (
             beam_width_deg=0.1,
             reflector_range=30.0,
         ),
-        "360 deg, 10 to 50 scans and up to 250,000 measurements per second (here 3,600 at 20 Hz), 30 m (OMD30M-R2000): "
-        "data sheet 232934 and Ethernet protocol, as quoted.",
-        _GEOMETRY,
+        source="360 deg, 10 to 50 scans and up to 250,000 measurements per second (here 3,600 at 20 Hz), 30 m "
+        "(OMD30M-R2000): data sheet 232934 and Ethernet protocol, as quoted.",
+        quoted=_GEOMETRY,
     ),
 )
 """Presets in the order in which they are offered."""

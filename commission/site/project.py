@@ -16,7 +16,7 @@ from commission.site.stations import Station
 from commission.site.vehicle import DifferentialVehicle, Vehicle
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Project:
     """A site, the vehicle that drives in it and the tunables of its localizer."""
 

@@ -23,7 +23,7 @@ def _stamps(records: list[Record]) -> IntArray:
     return np.array([record.stamp_ns for record in records], dtype=np.int64)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ScanLog:
     """Scans of one scanner; all have the same beams."""
 
@@ -43,16 +43,16 @@ class ScanLog:
     def scan(self, index: int) -> Scan:
         """Return one scan (views, no copies)."""
         return Scan(
-            int(self.stamps_ns[index]),
-            self.ranges[index],
-            self.angle_min,
-            self.angle_increment,
-            None if self.intensities is None else self.intensities[index],
-            None if self.reflector is None else self.reflector[index],
+            stamp_ns=int(self.stamps_ns[index]),
+            ranges=self.ranges[index],
+            angle_min=self.angle_min,
+            angle_increment=self.angle_increment,
+            intensities=None if self.intensities is None else self.intensities[index],
+            reflector=None if self.reflector is None else self.reflector[index],
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RecordLog:
     """All records of one drive, by kind, each kind in ascending order of its stamps."""
 
@@ -103,14 +103,14 @@ class RecordLog:
         references = [r for r in kinds[ReferencePose] if isinstance(r, ReferencePose)]
         counts = [len(r.range_bearing) for r in detections]
         return RecordLog(
-            _stamps(kinds[Odometry]),
-            np.array([r.displacement for r in odometry]).reshape(-1, 3),
-            _scan_log([r for r in kinds[Scan] if isinstance(r, Scan)]),
-            _stamps(kinds[Detections]),
-            np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.int64),
-            np.concatenate([r.range_bearing for r in detections]) if detections else np.empty((0, 2)),
-            _stamps(kinds[ReferencePose]),
-            np.array([r.pose for r in references]).reshape(-1, 3),
+            odometry_stamps_ns=_stamps(kinds[Odometry]),
+            displacements=np.array([r.displacement for r in odometry]).reshape(-1, 3),
+            scans=_scan_log([r for r in kinds[Scan] if isinstance(r, Scan)]),
+            detection_stamps_ns=_stamps(kinds[Detections]),
+            detection_offsets=np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.int64),
+            range_bearing=np.concatenate([r.range_bearing for r in detections]) if detections else np.empty((0, 2)),
+            reference_stamps_ns=_stamps(kinds[ReferencePose]),
+            reference_poses=np.array([r.pose for r in references]).reshape(-1, 3),
         )
 
     def __len__(self) -> int:
@@ -155,10 +155,10 @@ def _scan_log(scans: list[Scan]) -> ScanLog | None:
     intensities = [scan.intensities for scan in scans if scan.intensities is not None]
     reflector = [scan.reflector for scan in scans if scan.reflector is not None]
     return ScanLog(
-        np.array([scan.stamp_ns for scan in scans], dtype=np.int64),
-        np.stack([scan.ranges for scan in scans]),
-        first.angle_min,
-        first.angle_increment,
-        np.stack(intensities) if intensities else None,
-        np.stack(reflector) if reflector else None,
+        stamps_ns=np.array([scan.stamp_ns for scan in scans], dtype=np.int64),
+        ranges=np.stack([scan.ranges for scan in scans]),
+        angle_min=first.angle_min,
+        angle_increment=first.angle_increment,
+        intensities=np.stack(intensities) if intensities else None,
+        reflector=np.stack(reflector) if reflector else None,
     )

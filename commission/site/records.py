@@ -31,7 +31,7 @@ class Odometry:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Scan:
     """One turn of the laser scanner."""
 

@@ -20,7 +20,7 @@ class ReflectorKind(StrEnum):
     FLAT = "flat"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reflector:
     """One reflector on the floor plan."""
 

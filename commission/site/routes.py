@@ -26,7 +26,7 @@ class Direction(StrEnum):
     REVERSE = "reverse"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Segment:
     """One curve of a route, driven without a stop."""
 

@@ -12,7 +12,7 @@ LONGEST_RANGE = 10_000.0
 """No laser scanner measures farther [m]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Scanner:
     """A 2D laser scanner on the vehicle."""
 

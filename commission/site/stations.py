@@ -16,7 +16,7 @@ TRANSIT = 0.1
 """Accuracy that waiting and passing usually need [m]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Station:
     """A pose that the vehicle has to reach."""
 

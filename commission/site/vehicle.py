@@ -60,7 +60,7 @@ class TricycleVehicle:
         _check_outline(self.outline)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OmnidirectionalVehicle:
     """Omnidirectional wheels around the base, each rolling at a right angle to its spoke (Dixon et al. 2010)."""
 

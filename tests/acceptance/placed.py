@@ -40,7 +40,7 @@ def demands_met_by(project: Project) -> Demands:
     assert min(visible) >= 2, "the hand-made layout does not survive a failure"
     position = math.ceil(1e4 * worst[:2].max()) / 1e4
     heading = math.radians(math.ceil(1e3 * math.degrees(worst[2])) / 1e3)
-    return Demands(min(visible) - 1, survive_failure=True, position_limit=position, heading_limit=heading)
+    return Demands(visible=min(visible) - 1, survive_failure=True, position_limit=position, heading_limit=heading)
 
 
 def suggested(project: Project, demands: Demands, spacing: float = 1.0) -> tuple[Project, Placement]:

@@ -18,12 +18,12 @@ def room(rate: float = 10.0, resolution_deg: float = 0.5) -> Project:
     cells[:3], cells[-3:], cells[:, :3], cells[:, -3:] = (OCCUPIED,) * 4
     cells[70:84, 150:170] = OCCUPIED
     places = ((0.25, 2.0), (0.25, 6.5), (11.75, 1.5), (11.75, 5.5))
-    there = Segment(np.array([[2.0, 2.0], [4.0, 2.0], [5.0, 2.5], [6.0, 3.0]]))
-    back = Segment(there.control_points[::-1].copy(), direction=Direction.REVERSE)
+    there = Segment(control_points=np.array([[2.0, 2.0], [4.0, 2.0], [5.0, 2.5], [6.0, 3.0]]))
+    back = Segment(control_points=there.control_points[::-1].copy(), direction=Direction.REVERSE)
     return Project(
         name="Room",
         floor_map=FloorMap(cells, 0.05),
-        reflectors=ReflectorMap(tuple(Reflector(f"R{i + 1}", x, y) for i, (x, y) in enumerate(places))),
+        reflectors=ReflectorMap(tuple(Reflector(id=f"R{i + 1}", x=x, y=y) for i, (x, y) in enumerate(places))),
         routes=(Route("There and back", (there, back), speed=0.6),),
         vehicle=DifferentialVehicle(),
         scanner=Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=resolution_deg, rate=rate),

@@ -104,7 +104,9 @@ def site() -> tuple[OccupancyGrid, ReflectorMap]:
     # Anywhere in the cell: from its center, lines to the lattice run through corners of cells, where rounding rules.
     places = grid.cell_centers(faces[rng.choice(len(faces), REFLECTORS, replace=False)])
     places += rng.uniform(-0.4, 0.4, places.shape) * RESOLUTION
-    return grid, ReflectorMap(tuple(Reflector(str(i), float(x), float(y), RADIUS) for i, (x, y) in enumerate(places)))
+    return grid, ReflectorMap(
+        tuple(Reflector(id=str(i), x=float(x), y=float(y), radius=RADIUS) for i, (x, y) in enumerate(places))
+    )
 
 
 def timed(work: Callable[[], object]) -> tuple[float, object]:

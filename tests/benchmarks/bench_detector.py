@@ -34,7 +34,14 @@ def scans(count: int, beams: int) -> ScanLog:
             flags[k, center - half : center + half] = True
             ranges[k, center - half : center + half] = distance + rng.normal(0.0, 0.01, 2 * half)
     stamps = 40_000_000 * np.arange(count, dtype=np.int64)
-    return ScanLog(stamps, ranges, -math.radians(135.0), increment, None, flags)
+    return ScanLog(
+        stamps_ns=stamps,
+        ranges=ranges,
+        angle_min=-math.radians(135.0),
+        angle_increment=increment,
+        intensities=None,
+        reflector=flags,
+    )
 
 
 def best(log: ScanLog, setup: LocalizerSetup, *, parallel: bool) -> float:
@@ -51,7 +58,7 @@ def best(log: ScanLog, setup: LocalizerSetup, *, parallel: bool) -> float:
 
 def main(count: int = 20_000) -> None:
     """Print one line per number of beams."""
-    posts = ReflectorMap((Reflector("A", 0.0, 0.0, RADIUS),))
+    posts = ReflectorMap((Reflector(id="A", x=0.0, y=0.0, radius=RADIUS),))
     for beams in (541, 2751):
         log = scans(count, beams)
         circle = LocalizerSetup(posts, Scanner(), Parameters())

@@ -37,13 +37,16 @@ def site(rng: np.random.Generator) -> Project:
     occupied = plant(rng)
     grid = OccupancyGrid(occupied, RESOLUTION)
     places = free_poses(grid, rng, REFLECTORS)[:, :2]
-    reflectors = edits.add(ReflectorMap(), places, Reflector("R0", 0.0, 0.0)).reflectors
+    reflectors = edits.add(ReflectorMap(), places, Reflector(id="R0", x=0.0, y=0.0)).reflectors
     routes = []
     for number in range(ROUTES):
         steps = rng.uniform(-15.0, 15.0, (8, 2)).cumsum(axis=0) + rng.uniform([30, 20], [170, 80])
         routes.append(route_edits.new_route(f"Route {number}", np.clip(steps, 2.0, [198.0, 98.0])))
     return Project(
-        "plant", FloorMap(np.where(occupied, OCCUPIED, FREE).astype(np.int8), RESOLUTION), reflectors, tuple(routes)
+        name="plant",
+        floor_map=FloorMap(np.where(occupied, OCCUPIED, FREE).astype(np.int8), RESOLUTION),
+        reflectors=reflectors,
+        routes=tuple(routes),
     )
 
 
@@ -71,7 +74,7 @@ def main() -> int:
     results = [
         timed(
             "place a reflector",
-            lambda: edits.add(project.reflectors, [(50, 50)], Reflector("R1", 0, 0)),
+            lambda: edits.add(project.reflectors, [(50, 50)], Reflector(id="R1", x=0, y=0)),
         ),
         timed("drag 200 reflectors", lambda: edits.move(project.reflectors, some, (0.1, 0.0))),
         timed("snap 20 reflectors to walls", lambda: snapping.snap_to_wall(project.reflectors, some[:20], grid)),

@@ -38,7 +38,7 @@ def hall(count: int) -> LocalizerSetup:
     rng = np.random.default_rng(count)
     side = math.sqrt(count / DENSITY)
     places = rng.uniform(-0.5 * side, 0.5 * side, (count, 2))
-    reflectors = tuple(Reflector(str(i), float(x), float(y)) for i, (x, y) in enumerate(places))
+    reflectors = tuple(Reflector(id=str(i), x=float(x), y=float(y)) for i, (x, y) in enumerate(places))
     return LocalizerSetup(ReflectorMap(reflectors), Scanner(), Parameters())
 
 
@@ -62,7 +62,14 @@ def drive(setup: LocalizerSetup, cycles: int) -> tuple[RecordLog, Belief]:
     detections = np.stack((ranges, np.remainder(bearings + math.pi, 2.0 * math.pi) - math.pi), axis=-1)
     stamps = PERIOD_NS * np.arange(cycles, dtype=np.int64)
     offsets = DETECTIONS * np.arange(cycles + 1, dtype=np.int64)
-    log = RecordLog(stamps, displacements, None, stamps, offsets, detections.reshape(-1, 2))
+    log = RecordLog(
+        odometry_stamps_ns=stamps,
+        displacements=displacements,
+        scans=None,
+        detection_stamps_ns=stamps,
+        detection_offsets=offsets,
+        range_bearing=detections.reshape(-1, 2),
+    )
     return log, Belief(0, poses[0], np.diag([1e-4, 1e-4, 1e-4]))
 
 

@@ -41,7 +41,7 @@ def hall() -> Project:
     cells[:3], cells[-3:], cells[:, :3], cells[:, -3:] = (OCCUPIED,) * 4
     for row, column in rng.integers((10, 10), (1980, 3980), (1000, 2)):
         cells[row : row + 8, column : column + 8] = OCCUPIED
-    return Project("Large", FloorMap(cells, 0.05))
+    return Project(name="Large", floor_map=FloorMap(cells, 0.05))
 
 
 def edit() -> bool:

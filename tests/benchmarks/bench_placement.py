@@ -42,7 +42,10 @@ def small(cases: int) -> None:
 
 def compare(site: str, drives: int) -> None:
     project = load_project(bundled_folder("maps") / site)
-    for name, demands in (("supervisor's limits", Demands(2)), ("as the hand-made one", demands_met_by(project))):
+    for name, demands in (
+        ("supervisor's limits", Demands(visible=2)),
+        ("as the hand-made one", demands_met_by(project)),
+    ):
         began = time.perf_counter()
         placed, found = suggested(project, demands)
         limit, heading = demands.position_limit, demands.heading_limit

@@ -32,9 +32,9 @@ def large_site() -> Project:
     cells = np.full((2000, 4000), FREE, np.int8)
     cells[:3], cells[-3:], cells[:, :3], cells[:, -3:] = (OCCUPIED,) * 4
     places = rng.uniform((1.0, 1.0), (199.0, 99.0), (2000, 2))
-    reflectors = edits.add(ReflectorMap(), places, Reflector("R0", 0.0, 0.0)).reflectors
-    routes = tuple(Route(f"Route {i}", (Segment(rng.uniform(5.0, 95.0, (12, 2))),)) for i in range(50))
-    return Project("Large", FloorMap(cells, 0.05), reflectors, routes)
+    reflectors = edits.add(ReflectorMap(), places, Reflector(id="R0", x=0.0, y=0.0)).reflectors
+    routes = tuple(Route(f"Route {i}", (Segment(control_points=rng.uniform(5.0, 95.0, (12, 2))),)) for i in range(50))
+    return Project(name="Large", floor_map=FloorMap(cells, 0.05), reflectors=reflectors, routes=routes)
 
 
 def main() -> None:

@@ -41,7 +41,7 @@ def _reflectors(project: Project, rng: random.Random) -> Project:
     """Add, move, delete, mirror, lock or describe reflectors."""
     reflectors, ids = project.reflectors, [r.id for r in project.reflectors.reflectors]
     if not ids or rng.random() < 0.4:
-        like = Reflector("R1", 0.0, 0.0, kind=rng.choice(list(ReflectorKind)))
+        like = Reflector(id="R1", x=0.0, y=0.0, kind=rng.choice(list(ReflectorKind)))
         return replace(project, reflectors=edits.add(reflectors, [[rng.random() * 9, 1.0]], like).reflectors)
     chosen = rng.sample(ids, min(2, len(ids)))
     changed = rng.choice(
@@ -74,7 +74,13 @@ def _stations(project: Project, rng: random.Random) -> Project:
     kept = project.stations[-MOST:]
     if kept and rng.random() < 0.3:
         return replace(project, stations=stations.remove(kept, kept[0].name))
-    station = Station(stations.fresh_name(kept), rng.random(), rng.random(), rng.random(), 0.01 + rng.random())
+    station = Station(
+        name=stations.fresh_name(kept),
+        x=rng.random(),
+        y=rng.random(),
+        heading=rng.random(),
+        required_accuracy=0.01 + rng.random(),
+    )
     return replace(project, stations=stations.put(kept, station))
 
 

@@ -69,12 +69,12 @@ def segments(draw: st.DrawFn) -> Segment:
         inner = np.linspace(0.0, 1.0, len(points) - degree + 1)[1:-1] ** 1.5
         knots = np.concatenate([np.zeros(degree + 1), inner, np.ones(degree + 1)])
     return Segment(
-        np.array(points),
-        draw(st.sampled_from(Direction)),
-        degree,
-        knots,
-        None if weights is None else np.array(weights),
-        draw(st.none() | SPEED),
+        control_points=np.array(points),
+        direction=draw(st.sampled_from(Direction)),
+        degree=degree,
+        knots=knots,
+        weights=None if weights is None else np.array(weights),
+        speed=draw(st.none() | SPEED),
     )
 
 

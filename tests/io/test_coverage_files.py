@@ -22,7 +22,7 @@ LATTICE = Lattice(-2.0, -1.0, 1.0, 3, 40)
 @pytest.fixture
 def found() -> Coverage:
     """A strip of 40 m; its far end is out of reach of the two reflectors at its start."""
-    reflectors = ReflectorMap((Reflector("a", 0.0, 2.0), Reflector("b", 4.0, 2.0)))
+    reflectors = ReflectorMap((Reflector(id="a", x=0.0, y=2.0), Reflector(id="b", x=4.0, y=2.0)))
     project = Project(reflectors=reflectors, scanner=Scanner(resolution_deg=0.1))
     return coverage(visibility_model(project), LATTICE, FixOptions())
 

@@ -45,7 +45,7 @@ def test_project_goes_out_as_a_zip_that_unpacks_into_the_same_project(tmp_path: 
 
 
 def test_each_format_says_what_it_cannot_carry() -> None:
-    project = Project(name="Hall", reflectors=ReflectorMap((Reflector("north", 0.0004, 2.0, note="pillar"),)))
+    project = Project(name="Hall", reflectors=ReflectorMap((Reflector(id="north", x=0.0004, y=2.0, note="pillar"),)))
     assert export(project, Format.TABLE).losses == ()
     losses = export(project, Format.IMK).losses
     assert "note of 1 reflectors is not carried by the format" in losses
@@ -74,6 +74,6 @@ def test_work_can_be_stopped() -> None:
 
 
 def test_what_a_format_cannot_hold_is_one_line_that_names_the_file() -> None:
-    far = Project(name="Hall", reflectors=ReflectorMap((Reflector("1", 3e6, 0.0),)))
+    far = Project(name="Hall", reflectors=ReflectorMap((Reflector(id="1", x=3e6, y=0.0),)))
     with pytest.raises(FileFormatError, match=r"^Hall.imk: reflector '1': x is 3e\+06 m; expected at most 2147483 m$"):
         export(far, Format.IMK)

@@ -47,7 +47,7 @@ def test_writing_moves_no_reflector_by_more_than_half_a_millimetre(
     tmp_path_factory: pytest.TempPathFactory, x: float, y: float, radius: float
 ) -> None:
     path = tmp_path_factory.mktemp("layout") / "hall.imk"
-    write_imk(ReflectorMap((Reflector("7", x, y, radius),)), path)
+    write_imk(ReflectorMap((Reflector(id="7", x=x, y=y, radius=radius),)), path)
     (read,) = read_imk(path).reflectors.reflectors
     # Half a millimetre, and what 64-bit numbers of that size cannot resolve.
     assert abs(read.x - x) <= 0.0005 + 1e-9
@@ -59,14 +59,24 @@ def test_layout_of_a_real_sensor_is_read(shared_data: Path) -> None:
     imported = read_imk(shared_data / "sick_captures" / "nav350" / "tvz_20231130_excerpt.imk")
     assert imported.warnings == ()
     first, *_ = imported.reflectors.reflectors
-    assert first == Reflector("1", 14.74, -4.211, 0.03, ReflectorKind.CYLINDER)
+    assert first == Reflector(id="1", x=14.74, y=-4.211, radius=0.03, kind=ReflectorKind.CYLINDER)
     assert len(imported.reflectors) >= 11
 
 
 def test_what_the_format_cannot_carry_is_said(tmp_path: Path) -> None:
     reflectors = (
-        Reflector("north", 1.0004, 2.0, 0.04, ReflectorKind.FLAT, heading=1.0, height=1.8, sigma=0.002, note="pillar"),
-        Reflector("2", 3.0, 4.0, layer="hall"),
+        Reflector(
+            id="north",
+            x=1.0004,
+            y=2.0,
+            radius=0.04,
+            kind=ReflectorKind.FLAT,
+            heading=1.0,
+            height=1.8,
+            sigma=0.002,
+            note="pillar",
+        ),
+        Reflector(id="2", x=3.0, y=4.0, layer="hall"),
     )
     losses = "\n".join(write_imk(ReflectorMap(reflectors), tmp_path / "hall.imk"))
     for said in (
@@ -110,7 +120,7 @@ def test_wrong_layout_is_one_line_with_line_and_column(tmp_path: Path, row: str,
 
 def test_coordinate_beyond_the_format_is_refused(tmp_path: Path) -> None:
     with pytest.raises(FileFormatError, match=r"x is 3e\+06 m; expected at most"):
-        write_imk(ReflectorMap((Reflector("1", 3e6, 0.0),)), tmp_path / "hall.imk")
+        write_imk(ReflectorMap((Reflector(id="1", x=3e6, y=0.0),)), tmp_path / "hall.imk")
 
 
 @given(data=st.binary(max_size=200))

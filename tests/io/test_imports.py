@@ -20,7 +20,7 @@ from commission.site.routes import Route, Segment
 
 EXAMPLES = [f"{number:02}.json" for number in range(20)]
 TABLE = b"id;x;y;radius;note\nR1;0,25;2,1;0,04;pillar\n"
-ROUTE = Route("Loop", (Segment(np.array([[0.0, 0.0], [2.0, 0.0]]), degree=1),), 0.8)
+ROUTE = Route("Loop", (Segment(control_points=np.array([[0.0, 0.0], [2.0, 0.0]]), degree=1),), 0.8)
 ORDER = {
     "version": "3.0.0",
     "orderId": "order-7",
@@ -39,21 +39,27 @@ def reflectors(imported: object) -> tuple[Reflector, ...]:
 
 def test_table_with_semicolons_and_decimal_commas_is_read_and_says_which_columns_it_has() -> None:
     imported = read_import("hall.csv", TABLE)
-    assert reflectors(imported) == (Reflector("R1", 0.25, 2.1, note="pillar"),)
+    assert reflectors(imported) == (Reflector(id="R1", x=0.25, y=2.1, note="pillar"),)
     assert isinstance(imported, ReflectorImport)
     assert set(imported.fields) == {"id", "x", "y", "radius", "note"}
 
 
 def test_table_as_other_tools_write_it_is_read_by_its_header() -> None:
     text = "# survey of May\nNr;X [mm];Y [mm];Diameter [mm]\n7;1250,5;-300;80\n"
-    assert reflectors(read_import("survey.CSV", text.encode())) == (Reflector("7", 1.2505, -0.3, 0.04),)
+    assert reflectors(read_import("survey.CSV", text.encode())) == (Reflector(id="7", x=1.2505, y=-0.3, radius=0.04),)
 
 
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        ("R1\t1,5\t2,5\t0,04\nR2\t3\t4\t0,05", (Reflector("R1", 1.5, 2.5), Reflector("R2", 3.0, 4.0, 0.05))),
-        ("globID\tx_mm\ty_mm\ttype\tsubtype\tsize_mm\tlayer1\n5 1500 2500 1 2 80 0\n", (Reflector("5", 1.5, 2.5),)),
+        (
+            "R1\t1,5\t2,5\t0,04\nR2\t3\t4\t0,05",
+            (Reflector(id="R1", x=1.5, y=2.5), Reflector(id="R2", x=3.0, y=4.0, radius=0.05)),
+        ),
+        (
+            "globID\tx_mm\ty_mm\ttype\tsubtype\tsize_mm\tlayer1\n5 1500 2500 1 2 80 0\n",
+            (Reflector(id="5", x=1.5, y=2.5),),
+        ),
     ],
 )
 def test_pasted_text_is_recognized_by_its_beginning(text: str, expected: tuple[Reflector, ...]) -> None:

@@ -21,8 +21,8 @@ from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
 
 USUAL = ConvertOptions()
-REFLECTORS = ReflectorMap(tuple(Reflector(str(i), float(i), 2.0) for i in range(1, 5)))
-ROUTE = Route("Loop", (Segment(np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 1.0], [6.0, 1.0]])),))
+REFLECTORS = ReflectorMap(tuple(Reflector(id=str(i), x=float(i), y=2.0) for i in range(1, 5)))
+ROUTE = Route("Loop", (Segment(control_points=np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 1.0], [6.0, 1.0]])),))
 ORDER = {
     "version": "2.0.0",
     "orderId": "order-7",

@@ -31,7 +31,11 @@ HALL = FloorMap(np.full((20, 30), FREE, np.int8), 0.1)
 
 def started(folder: Path) -> tuple[Project, Journal]:
     """A saved project and its journal."""
-    project = Project("edit 0", HALL, ReflectorMap((Reflector("A", 1.0, 1.0), Reflector("B", 2.0, 1.0))))
+    project = Project(
+        name="edit 0",
+        floor_map=HALL,
+        reflectors=ReflectorMap((Reflector(id="A", x=1.0, y=1.0), Reflector(id="B", x=2.0, y=1.0))),
+    )
     save_project(project, folder)
     return project, Journal(folder, project)
 
@@ -46,8 +50,10 @@ def test_a_change_made_again_gives_the_later_project(before, after):
 
 
 def test_a_small_edit_is_a_small_change():
-    many = Project(reflectors=ReflectorMap(tuple(Reflector(str(i), float(i), 0.0) for i in range(100))), floor_map=HALL)
-    moved = replace(many, reflectors=ReflectorMap((*many.reflectors.reflectors[:-1], Reflector("99", 5.0, 5.0))))
+    many = Project(
+        reflectors=ReflectorMap(tuple(Reflector(id=str(i), x=float(i), y=0.0) for i in range(100))), floor_map=HALL
+    )
+    moved = replace(many, reflectors=ReflectorMap((*many.reflectors.reflectors[:-1], Reflector(id="99", x=5.0, y=5.0))))
     assert [name for name, _ in change(many, moved)["reflectors"]["set"]] == ["99"]
     cells = np.array(HALL.cells)
     cells[3:5, 7] = OCCUPIED
@@ -141,7 +147,7 @@ def test_a_project_that_somebody_else_changed_is_not_overwritten_silently(tmp_pa
 
 def test_a_save_that_was_killed_halfway_is_not_taken_for_somebody_else(tmp_path, monkeypatch):
     project, journal = started(tmp_path)
-    edited = replace(project, name="edited", reflectors=ReflectorMap((Reflector("A", 7.0, 7.0),)))
+    edited = replace(project, name="edited", reflectors=ReflectorMap((Reflector(id="A", x=7.0, y=7.0),)))
 
     def killed(project: Project, folder: Path) -> None:
         save_project(replace(project, name="edit 0"), folder)

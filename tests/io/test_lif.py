@@ -101,12 +101,18 @@ def test_routes_that_are_written_and_read_again_are_equal(
 
 
 def test_stations_are_written_and_read_again(tmp_path: Path) -> None:
-    stations = (Station("Dock 1", 2.0, 0.0, math.pi / 2, 0.01), Station("Wait", 7.5, -3.0, 4.0))
-    route = Route("Loop", (Segment(np.array([[0.0, 0.0], [2.0, 0.0]]), degree=1),))
+    stations = (
+        Station(name="Dock 1", x=2.0, y=0.0, heading=math.pi / 2, required_accuracy=0.01),
+        Station(name="Wait", x=7.5, y=-3.0, heading=4.0),
+    )
+    route = Route("Loop", (Segment(control_points=np.array([[0.0, 0.0], [2.0, 0.0]]), degree=1),))
     losses = write_lif(Project(routes=(route,), stations=stations), tmp_path / "out.lif")
     assert "the required accuracy of 2 stations is not carried" in losses
     # Headings beyond a half turn come back as the same direction.
-    expected = (Station("Dock 1", 2.0, 0.0, math.pi / 2), Station("Wait", 7.5, -3.0, 4.0 - 2 * math.pi))
+    expected = (
+        Station(name="Dock 1", x=2.0, y=0.0, heading=math.pi / 2),
+        Station(name="Wait", x=7.5, y=-3.0, heading=4.0 - 2 * math.pi),
+    )
     again = read_lif(tmp_path / "out.lif").stations
     assert [(s.name, s.x, s.y) for s in again] == [(s.name, s.x, s.y) for s in expected]
     assert [s.heading for s in again] == pytest.approx([s.heading for s in expected])
@@ -114,12 +120,15 @@ def test_stations_are_written_and_read_again(tmp_path: Path) -> None:
 
 def test_what_lif_cannot_carry_is_said(tmp_path: Path) -> None:
     curve = Segment(
-        np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 2.0]]), Direction.REVERSE, 2, np.array([0, 0, 0, 5, 5, 5.0])
+        control_points=np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 2.0]]),
+        direction=Direction.REVERSE,
+        degree=2,
+        knots=np.array([0, 0, 0, 5, 5, 5.0]),
     )
-    gap = Segment(np.array([[4.005, 2.0], [6.0, 2.0]]), degree=1, speed=0.3)
+    gap = Segment(control_points=np.array([[4.005, 2.0], [6.0, 2.0]]), degree=1, speed=0.3)
     project = Project(
         floor_map=FloorMap(np.zeros((2, 2), dtype=np.int8), 0.05),
-        reflectors=ReflectorMap((Reflector("A", 0.0, 0.0),)),
+        reflectors=ReflectorMap((Reflector(id="A", x=0.0, y=0.0),)),
         routes=(Route("Loop", (curve, gap)),),
     )
     losses = "\n".join(write_lif(project, tmp_path / "out.lif"))
@@ -140,7 +149,7 @@ def test_what_lif_cannot_carry_is_said(tmp_path: Path) -> None:
 
 def test_written_layout_obeys_the_official_schema(tmp_path: Path, shared_data: Path) -> None:
     schema = json.loads((shared_data / "layouts/lif/json_schemas/LIF.schema").read_text(encoding="utf-8"))
-    route = Route("Loop", (Segment(np.array([[0.0, 0.0], [2.0, 0.0]]), degree=1),))
+    route = Route("Loop", (Segment(control_points=np.array([[0.0, 0.0], [2.0, 0.0]]), degree=1),))
     write_lif(Project(routes=(route,)), tmp_path / "out.lif", exported_at=datetime(2024, 5, 1, 12, 0, tzinfo=UTC))
     content = json.loads((tmp_path / "out.lif").read_text())
     assert content["metaInformation"]["exportTimestamp"] == "2024-05-01T12:00:00.00Z"

@@ -10,7 +10,7 @@ from commission.errors import CommissionError, FileFormatError
 from commission.io.pasted_table import parse_table
 from commission.site.reflectors import Reflector, ReflectorKind
 
-A = Reflector("A", 1.5, -2.0, 0.04)
+A = Reflector(id="A", x=1.5, y=-2.0, radius=0.04)
 
 
 @pytest.mark.parametrize(
@@ -33,7 +33,7 @@ def test_table_is_read_as_spreadsheets_give_it(text: str) -> None:
 
 def test_flat_reflectors_are_read_with_their_heading_in_degrees() -> None:
     (read,) = parse_table("name\tx\ty\tr\ttype\theading (deg)\nA\t0\t0\t0,1\tflat\t90").reflectors.reflectors
-    assert read == Reflector("A", 0.0, 0.0, 0.1, ReflectorKind.FLAT, math.pi / 2)
+    assert read == Reflector(id="A", x=0.0, y=0.0, radius=0.1, kind=ReflectorKind.FLAT, heading=math.pi / 2)
 
 
 def test_names_and_sizes_that_are_missing_are_filled_in_and_said() -> None:

@@ -80,7 +80,7 @@ def test_other_readers_of_yaml_see_the_same_numbers(tmp_path_factory: pytest.Tem
 
 
 def test_moving_one_reflector_changes_one_line_of_one_file(tmp_path: Path) -> None:
-    reflectors = tuple(Reflector(str(i), float(i), 0.0) for i in range(9))
+    reflectors = tuple(Reflector(id=str(i), x=float(i), y=0.0) for i in range(9))
     project = Project(reflectors=ReflectorMap(reflectors), floor_map=FloorMap(np.zeros((3, 3), np.int8), 0.1))
     save_project(project, tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
@@ -100,7 +100,7 @@ def test_saving_keeps_the_names_of_the_files_that_are_there(tmp_path: Path) -> N
     (tmp_path / "project.yaml").write_text("schema: 1\nreflectors: tables/may.csv\n")
     (tmp_path / "tables").mkdir()
     (tmp_path / "tables/may.csv").write_text("id,x,y,radius\n")
-    save_project(Project(reflectors=ReflectorMap((Reflector("A", 1.0, 2.0),))), tmp_path)
+    save_project(Project(reflectors=ReflectorMap((Reflector(id="A", x=1.0, y=2.0),))), tmp_path)
     assert (tmp_path / "tables/may.csv").read_text() == "id,x,y,radius\nA,1.0,2.0,0.04\n"
     assert len(load_project(tmp_path).reflectors) == 1
 

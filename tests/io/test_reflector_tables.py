@@ -55,7 +55,7 @@ def test_table_that_is_written_and_read_again_is_equal(
 def test_table_is_read_as_spreadsheets_save_it(tmp_path: Path, text: str) -> None:
     path = tmp_path / "reflectors.csv"
     path.write_bytes(text.encode())
-    assert read_reflectors(path) == ReflectorMap((Reflector("A", 1.5, -2.0, 0.04),))
+    assert read_reflectors(path) == ReflectorMap((Reflector(id="A", x=1.5, y=-2.0, radius=0.04),))
 
 
 @pytest.mark.parametrize(

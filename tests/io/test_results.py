@@ -19,7 +19,7 @@ from commission.site.scanner import Scanner
 
 IDS = ('North, "old"', "süd", "3")
 CENTERS = ((4.0, 1.0), (5.0, -2.0), (1.0, 3.0))
-REFLECTORS = ReflectorMap(tuple(Reflector(name, x, y) for name, (x, y) in zip(IDS, CENTERS, strict=True)))
+REFLECTORS = ReflectorMap(tuple(Reflector(id=name, x=x, y=y) for name, (x, y) in zip(IDS, CENTERS, strict=True)))
 
 
 def seen_from(x):
@@ -76,7 +76,14 @@ def test_every_detection_is_a_row_with_its_place_on_the_floor_and_its_reflector(
 def test_a_rejected_cluster_names_no_reflector_and_no_distance(tmp_path):
     flags = np.zeros(40, dtype=np.bool_)
     flags[10:30] = True
-    scan = Scan(0, np.full(40, 3.0, dtype=np.float32), -0.1, 0.005, None, flags)
+    scan = Scan(
+        stamp_ns=0,
+        ranges=np.full(40, 3.0, dtype=np.float32),
+        angle_min=-0.1,
+        angle_increment=0.005,
+        intensities=None,
+        reflector=flags,
+    )
     arrays = run_over([Odometry(0, np.zeros(3)), scan])
     assert arrays.status.tolist() == [Status.OUTLIER_DETECTOR]
     write_results(tmp_path, arrays, REFLECTORS, {})

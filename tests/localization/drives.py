@@ -49,7 +49,7 @@ class Plan:
 
 def random_map(rng: np.random.Generator, count: int, side: float = 20.0, **more: float) -> ReflectorMap:
     places = rng.uniform(0.0, side, (count, 2))
-    return ReflectorMap(tuple(Reflector(f"R{i}", float(x), float(y), **more) for i, (x, y) in enumerate(places)))
+    return ReflectorMap(tuple(Reflector(id=f"R{i}", x=float(x), y=float(y), **more) for i, (x, y) in enumerate(places)))
 
 
 def odometry_error(
@@ -148,4 +148,11 @@ def scan(stamp: int, pose: FloatArray, setup: LocalizerSetup, rng: np.random.Gen
     for beam in rng.integers(0, plan.beams, rng.poisson(plan.clutter)):
         flags[beam] = True
     ranges[rng.uniform(size=plan.beams) < 0.002] = np.nan
-    return Scan(stamp, ranges.astype(np.float32), -math.pi, increment, None, flags)
+    return Scan(
+        stamp_ns=stamp,
+        ranges=ranges.astype(np.float32),
+        angle_min=-math.pi,
+        angle_increment=increment,
+        intensities=None,
+        reflector=flags,
+    )

@@ -41,7 +41,7 @@ def random_index(rng: np.random.Generator) -> ReflectorIndex:
     return build_index(
         ReflectorMap(
             tuple(
-                Reflector(str(i), float(x), float(y), sigma=float(s))
+                Reflector(id=str(i), x=float(x), y=float(y), sigma=float(s))
                 for i, ((x, y), s) in enumerate(zip(places, sigmas, strict=True))
             )
         )
@@ -92,7 +92,7 @@ def associated(
     return status.tolist(), entries.tolist(), d2.tolist()
 
 
-ONE = build_index(ReflectorMap((Reflector("A", 5.0, 0.0),)))
+ONE = build_index(ReflectorMap((Reflector(id="A", x=5.0, y=0.0),)))
 
 
 def test_of_two_detections_of_one_reflector_the_nearer_stays() -> None:

@@ -18,7 +18,7 @@ from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
 from commission.site.scanner import Scanner
 
 RADIUS = 0.04
-POSTS = ReflectorMap((Reflector("A", 0.0, 0.0, RADIUS),))
+POSTS = ReflectorMap((Reflector(id="A", x=0.0, y=0.0, radius=RADIUS),))
 STEP = math.radians(0.25)
 FULL_TURN = round(2.0 * math.pi / STEP)
 
@@ -46,7 +46,14 @@ def cast(
     ranges = np.where(flags, distance * np.cos(lit) - depth, 15.0)
     if noise is not None:
         ranges = ranges + noise.normal(0.0, 0.01, beams)
-    return Scan(0, ranges.astype(np.float32), angle_min, STEP, None, flags)
+    return Scan(
+        stamp_ns=0,
+        ranges=ranges.astype(np.float32),
+        angle_min=angle_min,
+        angle_increment=STEP,
+        intensities=None,
+        reflector=flags,
+    )
 
 
 def found(
@@ -80,12 +87,12 @@ def test_post_is_found_where_it_stands_at_any_bearing_of_a_full_turn(distance: f
 def test_repeated_first_beam_of_a_full_turn_counts_once() -> None:
     scan = cast((2.0, math.pi - 1e-3))
     again = Scan(
-        0,
-        np.append(scan.ranges, scan.ranges[0]),
-        scan.angle_min,
-        STEP,
-        None,
-        np.append(scan.reflector, scan.reflector[0]),
+        stamp_ns=0,
+        ranges=np.append(scan.ranges, scan.ranges[0]),
+        angle_min=scan.angle_min,
+        angle_increment=STEP,
+        intensities=None,
+        reflector=np.append(scan.reflector, scan.reflector[0]),
     )
     np.testing.assert_array_equal(found(again).range_bearing, found(scan).range_bearing)
     assert found(again).beams.tolist() == found(scan).beams.tolist()
@@ -94,13 +101,27 @@ def test_repeated_first_beam_of_a_full_turn_counts_once() -> None:
 def test_cluster_is_not_joined_across_the_ends_of_a_partial_turn() -> None:
     flags = np.zeros(400, dtype=bool)
     flags[[0, 1, 398, 399]] = True
-    scan = Scan(0, np.full(400, 2.0, np.float32), -1.0, STEP, None, flags)
+    scan = Scan(
+        stamp_ns=0,
+        ranges=np.full(400, 2.0, np.float32),
+        angle_min=-1.0,
+        angle_increment=STEP,
+        intensities=None,
+        reflector=flags,
+    )
     assert found(scan).beams.tolist() == [2, 2]
 
 
 def test_jump_in_range_separates_clusters() -> None:
     ranges = np.array([2.0, 2.0, 2.0, 3.0, 3.0, 3.0], dtype=np.float32)
-    scan = Scan(0, ranges, 0.0, STEP, None, np.ones(6, dtype=bool))
+    scan = Scan(
+        stamp_ns=0,
+        ranges=ranges,
+        angle_min=0.0,
+        angle_increment=STEP,
+        intensities=None,
+        reflector=np.ones(6, dtype=bool),
+    )
     assert found(scan).beams.tolist() == [3, 3]
     assert found(scan, range_jump=1.5).beams.tolist() == [6]
 
@@ -119,7 +140,14 @@ def test_jump_in_range_separates_clusters() -> None:
     ids=["no echo", "flag without range", "no flag", "leg before it", "two missing", "behind a jump", "no ranges"],
 )
 def test_one_missing_beam_is_bridged_and_no_more(ranges: list[float], flags: list[int], beams: list[int]) -> None:
-    scan = Scan(0, np.array(ranges, np.float32), 0.0, STEP, None, np.array(flags, dtype=bool))
+    scan = Scan(
+        stamp_ns=0,
+        ranges=np.array(ranges, np.float32),
+        angle_min=0.0,
+        angle_increment=STEP,
+        intensities=None,
+        reflector=np.array(flags, dtype=bool),
+    )
     assert found(scan).beams.tolist() == beams
 
 
@@ -128,14 +156,23 @@ def test_detector_filter_is_a_window_around_equation_3() -> None:
     for width in range(1, 16):
         flags = np.zeros(60, dtype=bool)
         flags[20 : 20 + width] = True
-        scan = Scan(0, np.full(60, 1.965, np.float32), -0.1, STEP, None, flags)
+        scan = Scan(
+            stamp_ns=0,
+            ranges=np.full(60, 1.965, np.float32),
+            angle_min=-0.1,
+            angle_increment=STEP,
+            intensities=None,
+            reflector=flags,
+        )
         expected = Status.INLIER if 8 <= width <= 11 else Status.OUTLIER_DETECTOR
         assert found(scan, center="central_beam").status.tolist() == [expected], width
         assert found(scan, enabled=False).status.tolist() == [Status.INLIER]
 
 
 def test_class_of_reflectors_that_fits_best_is_taken() -> None:
-    both = ReflectorMap((Reflector("thin", 0.0, 0.0, 0.02), Reflector("thick", 1.0, 0.0, 0.1)))
+    both = ReflectorMap(
+        (Reflector(id="thin", x=0.0, y=0.0, radius=0.02), Reflector(id="thick", x=1.0, y=0.0, radius=0.1))
+    )
     for radius in (0.02, 0.1):
         detected = found(cast((2.0, 0.3), radius=radius), both)
         assert detected.status.tolist() == [Status.INLIER]
@@ -144,10 +181,17 @@ def test_class_of_reflectors_that_fits_best_is_taken() -> None:
 
 
 def test_oblique_plate_passes_with_fewer_beams_and_has_no_radius() -> None:
-    plates = ReflectorMap((Reflector("plate", 0.0, 0.0, 0.1, ReflectorKind.FLAT),))
+    plates = ReflectorMap((Reflector(id="plate", x=0.0, y=0.0, radius=0.1, kind=ReflectorKind.FLAT),))
     flags = np.zeros(60, dtype=bool)
     flags[20:25] = True
-    scan = Scan(0, np.full(60, 2.0, np.float32), -0.1, STEP, None, flags)
+    scan = Scan(
+        stamp_ns=0,
+        ranges=np.full(60, 2.0, np.float32),
+        angle_min=-0.1,
+        angle_increment=STEP,
+        intensities=None,
+        reflector=flags,
+    )
     detected = found(scan, plates)
     assert detected.status.tolist() == [Status.INLIER]
     assert detected.range_bearing[0, 0] == pytest.approx(2.0)
@@ -156,7 +200,13 @@ def test_oblique_plate_passes_with_fewer_beams_and_has_no_radius() -> None:
 def test_intensity_counts_where_the_scanner_gives_no_flag() -> None:
     scan = cast((2.0, 0.3))
     assert scan.reflector is not None
-    strong = Scan(0, scan.ranges, scan.angle_min, STEP, np.where(scan.reflector, 200.0, 40.0).astype(np.float32))
+    strong = Scan(
+        stamp_ns=0,
+        ranges=scan.ranges,
+        angle_min=scan.angle_min,
+        angle_increment=STEP,
+        intensities=np.where(scan.reflector, 200.0, 40.0).astype(np.float32),
+    )
     np.testing.assert_array_equal(found(strong, intensity_threshold=100.0).range_bearing, found(scan).range_bearing)
     assert len(found(strong, intensity_threshold=201.0).beams) == 0
     assert len(found(dataclasses.replace(scan, reflector=None)).beams) == 0

@@ -25,10 +25,17 @@ SCANNER = replace(Scanner(), resolution_deg=STEP_DEG, field_of_view_deg=(-10.5 *
 @pytest.mark.parametrize("distance", [21.0, 23.0, 24.5])
 def test_reflector_between_two_wide_beams_is_not_drawn_nearer_by_its_radius(distance: float) -> None:
     scanner = replace(SCANNER, reflector_range=30.0, bearing_sigma_deg=0.0, range_sigma=0.001)
-    project = Project(reflectors=ReflectorMap((Reflector("Far", distance, 0.0, radius=0.05),)), scanner=scanner)
+    project = Project(reflectors=ReflectorMap((Reflector(id="Far", x=distance, y=0.0, radius=0.05),)), scanner=scanner)
     virtual, setup = VirtualScanner.of(project), LocalizerSetup.of(project)
     ranges, flags = virtual.scan(np.zeros(3), np.empty((0, 3)), np.random.default_rng(0))
-    scan = Scan(0, ranges, scanner.angle_min, scanner.angle_increment, None, flags)
+    scan = Scan(
+        stamp_ns=0,
+        ranges=ranges,
+        angle_min=scanner.angle_min,
+        angle_increment=scanner.angle_increment,
+        intensities=None,
+        reflector=flags,
+    )
     seen = detect(scan, setup.detector, setup.parameters.detector)
     assert seen.beams.tolist() == [2]
     # Two beams of 1 mm noise, and no bias of the lit parts.
@@ -43,7 +50,9 @@ def errors_of(distance: float, radius: float, hidden: float, scans: int = 600) -
 
     `hidden` is the share of its width, from the left, behind a post at two thirds of the way.
     """
-    project = Project(reflectors=ReflectorMap((Reflector("R", distance, 0.0, radius=radius),)), scanner=SHOP_SCANNER)
+    project = Project(
+        reflectors=ReflectorMap((Reflector(id="R", x=distance, y=0.0, radius=radius),)), scanner=SHOP_SCANNER
+    )
     virtual, setup = VirtualScanner.of(project), LocalizerSetup.of(project)
     rng, post = np.random.default_rng(0), 0.1
     # The post's right edge on the line to the point at which the hidden part ends.
@@ -53,7 +62,14 @@ def errors_of(distance: float, radius: float, hidden: float, scans: int = 600) -
     for place in (np.arange(scans) + 0.5) / scans:
         heading = (place - 0.5) * SHOP_SCANNER.angle_increment
         ranges, flags = virtual.scan(np.array([0.0, 0.0, heading]), posts, rng)
-        scan = Scan(0, ranges, SHOP_SCANNER.angle_min, SHOP_SCANNER.angle_increment, None, flags)
+        scan = Scan(
+            stamp_ns=0,
+            ranges=ranges,
+            angle_min=SHOP_SCANNER.angle_min,
+            angle_increment=SHOP_SCANNER.angle_increment,
+            intensities=None,
+            reflector=flags,
+        )
         seen = detect(scan, setup.detector, setup.parameters.detector)
         passed = seen.range_bearing[seen.status == Status.INLIER]
         found += list(passed + np.array([-distance, heading]))

@@ -27,7 +27,7 @@ def test_differential_and_tricycle_wheels_give_back_the_twist(forward: float, tu
 def test_omnidirectional_wheels_give_back_the_twist(
     forward: float, left: float, turn: float, angles: tuple[float, ...]
 ) -> None:
-    vehicle = OmnidirectionalVehicle(angles)
+    vehicle = OmnidirectionalVehicle(wheel_angles_deg=angles)
     twist = [forward, left, turn]
     np.testing.assert_allclose(body_twist(vehicle, wheel_speeds(vehicle, twist)), twist, atol=1e-11)
 

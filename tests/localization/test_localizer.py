@@ -35,7 +35,7 @@ INITIAL = Belief(0, np.array([0.0, 0.0, 0.0]), np.diag([1e-4, 1e-4, 1e-4]))
 
 
 def one_reflector(parameters: Parameters | None = None) -> LocalizerSetup:
-    return LocalizerSetup(ReflectorMap((Reflector("A", 2.0, 0.0),)), Scanner(), parameters or Parameters())
+    return LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), Scanner(), parameters or Parameters())
 
 
 @pytest.mark.parametrize(
@@ -160,7 +160,14 @@ def test_reference_pose_is_never_used() -> None:
 
 def test_detections_of_the_sensor_win_over_its_scans() -> None:
     localizer = Localizer(one_reflector(), INITIAL)
-    scan = Scan(0, np.full(3, 1.96, np.float32), -0.01, 0.01, None, np.array([True, True, True]))
+    scan = Scan(
+        stamp_ns=0,
+        ranges=np.full(3, 1.96, np.float32),
+        angle_min=-0.01,
+        angle_increment=0.01,
+        intensities=None,
+        reflector=np.array([True, True, True]),
+    )
     assert localizer.feed(scan) is not None
     assert localizer.feed(Detections(1, np.array([[2.0, 0.0]]))) is not None
     assert localizer.feed(dataclasses.replace(scan, stamp_ns=2)) is None

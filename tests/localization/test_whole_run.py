@@ -98,9 +98,13 @@ def test_summaries_count_what_the_estimates_hold() -> None:
 def test_log_without_scans_or_records_gives_no_cycles() -> None:
     setup = setup_of(np.random.default_rng(7))
     initial = Belief(5, np.array([1.0, 2.0, 0.5]), np.eye(3))
-    empty = run(RecordLog(np.empty(0, np.int64), np.empty((0, 3))), setup, initial)
+    empty = run(RecordLog(odometry_stamps_ns=np.empty(0, np.int64), displacements=np.empty((0, 3))), setup, initial)
     assert len(empty) == 0
     assert empty.final.stamp_ns == 5
-    moved = run(RecordLog(np.array([0, 10]), np.array([[0.0, 0, 0], [1.0, 0, 0]])), setup, initial)
+    moved = run(
+        RecordLog(odometry_stamps_ns=np.array([0, 10]), displacements=np.array([[0.0, 0, 0], [1.0, 0, 0]])),
+        setup,
+        initial,
+    )
     assert len(moved) == 0
     np.testing.assert_allclose(moved.final.mean[:2], [1.0 + np.cos(0.5), 2.0 + np.sin(0.5)])

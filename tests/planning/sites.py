@@ -23,12 +23,12 @@ def room(width: float, height: float) -> FloorMap:
 
 def reflectors_at(places) -> ReflectorMap:
     """Cylinders named R0, R1 and so on."""
-    return ReflectorMap(tuple(Reflector(f"R{i}", float(x), float(y)) for i, (x, y) in enumerate(places)))
+    return ReflectorMap(tuple(Reflector(id=f"R{i}", x=float(x), y=float(y)) for i, (x, y) in enumerate(places)))
 
 
 def straight(length: float = 20.0, speed: float = 1.0) -> Route:
     """A straight line along x from the origin."""
-    return Route("Line", (Segment(np.array([[0.0, 0.0], [length, 0.0]]), degree=1),), speed)
+    return Route("Line", (Segment(control_points=np.array([[0.0, 0.0], [length, 0.0]]), degree=1),), speed)
 
 
 def open_field(places, length: float = 20.0, **changes) -> Project:

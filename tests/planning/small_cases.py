@@ -40,7 +40,7 @@ class SmallCase:
 
     def layouts_that_hold(self, size: int) -> bool:
         """Whether any layout of that many of the candidates meets the demands."""
-        every = ReflectorMap(tuple(Reflector(f"C{i}", x, y) for i, (x, y) in enumerate(self.centers.tolist())))
+        every = ReflectorMap(tuple(Reflector(id=f"C{i}", x=x, y=y) for i, (x, y) in enumerate(self.centers.tolist())))
         site = replace(self.project, reflectors=every)
         planned = plan_route(site, ROUTE, model=visibility_model(site))
         layouts = itertools.combinations(range(len(self.centers)), size)
@@ -87,7 +87,7 @@ def small_case(seed: int) -> SmallCase:
         # Half of them is the other half turned round in the middle of the hall, so that rivals abound.
         x[5:] = 18.0 - x[:5]
     centers = np.column_stack((x, np.repeat((0.2, 7.8), 5)))
-    demands = Demands(1, survive_failure=False, spacing=0.2)
+    demands = Demands(visible=1, survive_failure=False, spacing=0.2)
     all_of_it = kind == "everything"
     if kind == "failure" or all_of_it:
         demands = replace(demands, survive_failure=True)
@@ -99,8 +99,8 @@ def small_case(seed: int) -> SmallCase:
         demands = replace(demands, visible=2, spacing=float(rng.uniform(0.5, 2.0)))
     if kind == "ambiguity" or all_of_it:
         demands = replace(demands, unambiguous_starts=True, unambiguous_spots=((9.0 + float(rng.uniform(-4, 4)), 3.0),))
-    station = Station("Dock", 9.0, 4.0, required_accuracy=float(rng.choice([0.015, 0.02, 0.03])))
-    route = Route(ROUTE, (Segment(np.array([[2.0, 4.0], [16.0, 4.0]]), degree=1),), 1.0)
+    station = Station(name="Dock", x=9.0, y=4.0, required_accuracy=float(rng.choice([0.015, 0.02, 0.03])))
+    route = Route(ROUTE, (Segment(control_points=np.array([[2.0, 4.0], [16.0, 4.0]]), degree=1),), 1.0)
     project = Project(
         floor_map=room(18.0, 8.0),
         # Five scans a second keep the enumeration of all layouts short; sight all around and from the middle of the

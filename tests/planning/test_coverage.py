@@ -34,8 +34,9 @@ def hall(seed: int, count: int = 70) -> VisibilityModel:
         occupied[row : row + rng.integers(2, 20), column : column + rng.integers(2, 20)] = True
     reflectors = tuple(
         Reflector(
-            str(i),
-            *map(float, rng.uniform([0, 0], [15, 10])),
+            id=str(i),
+            x=float(rng.uniform(0, 15)),
+            y=float(rng.uniform(0, 10)),
             kind=ReflectorKind.FLAT if i % 5 == 0 else ReflectorKind.CYLINDER,
             heading=float(rng.uniform(-3, 3)),
         )
@@ -155,8 +156,8 @@ def test_lattice_covers_the_floor_map_with_squares():
 
 
 def test_lattice_without_a_map_covers_reflectors_and_routes():
-    route = Route("r", (Segment(np.array([[0, 0], [0, 10], [20, 10], [20, 0]], dtype=float)),))
-    lattice = lattice_of(Project(reflectors=ReflectorMap((Reflector("1", -3.0, 2.0),)), routes=(route,)), 1.0)
+    route = Route("r", (Segment(control_points=np.array([[0, 0], [0, 10], [20, 10], [20, 0]], dtype=float)),))
+    lattice = lattice_of(Project(reflectors=ReflectorMap((Reflector(id="1", x=-3.0, y=2.0),)), routes=(route,)), 1.0)
     assert lattice == Lattice(-7.5, -4.5, 1.0, 20, 33)
     assert len(lattice_of(Project())) > 0
 
@@ -191,7 +192,7 @@ from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 import numpy as np
 places = np.random.default_rng(0).uniform(0.0, 100.0, (200, 2))
-reflectors = ReflectorMap(tuple(Reflector(str(i), float(x), float(y)) for i, (x, y) in enumerate(places)))
+reflectors = ReflectorMap(tuple(Reflector(id=str(i), x=x, y=y) for i, (x, y) in enumerate(places.tolist())))
 grid = OccupancyGrid(np.zeros((200, 200), dtype=np.bool_), 0.5)
 model = build_visibility(reflectors, Scanner(), RayCaster(grid), VisibilityOptions())
 coverage(model, Lattice(0.0, 0.0, 1.0, 4, 4), FixOptions())

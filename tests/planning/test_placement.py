@@ -25,7 +25,7 @@ SCANNER = Scanner(field_of_view_deg=(-180.0, 180.0), reflector_range=8.0, rate=5
 
 
 def hall(**changes) -> Project:
-    route = Route("Through", (Segment(np.array([[2.0, 4.0], [16.0, 4.0]]), degree=1),), 1.0)
+    route = Route("Through", (Segment(control_points=np.array([[2.0, 4.0], [16.0, 4.0]]), degree=1),), 1.0)
     return Project(floor_map=room(18.0, 8.0), scanner=SCANNER, routes=(route,), **changes)
 
 
@@ -59,7 +59,10 @@ def test_a_suggested_layout_meets_its_demands_and_its_spacing():
 def test_tight_limits_ask_for_more_reflectors_than_sight_alone():
     # So poor odometry that two distant reflectors do not hold the pose.
     project = hall(parameters=Parameters(odometry=OdometryParameters(heading_per_sqrt_m=0.05, forward_per_sqrt_m=0.05)))
-    loose, tight = Demands(1, survive_failure=False), Demands(1, survive_failure=False, position_limit=0.03)
+    loose, tight = (
+        Demands(visible=1, survive_failure=False),
+        Demands(visible=1, survive_failure=False, position_limit=0.03),
+    )
     few, more = (place(project, options=PlacementOptions(demands)) for demands in (loose, tight))
     assert few.added < more.added
     assert more.unmet == ()
@@ -100,7 +103,7 @@ def test_an_unknown_route_is_refused():
 
 def test_progress_never_falls_and_may_cancel():
     fractions = []
-    place(hall(), options=PlacementOptions(Demands(1)), progress=lambda done, _: fractions.append(done))
+    place(hall(), options=PlacementOptions(Demands(visible=1)), progress=lambda done, _: fractions.append(done))
     assert fractions == sorted(fractions)
 
     def stop(fraction, what):
@@ -108,11 +111,11 @@ def test_progress_never_falls_and_may_cancel():
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        place(hall(), options=PlacementOptions(Demands(1)), progress=stop)
+        place(hall(), options=PlacementOptions(Demands(visible=1)), progress=stop)
 
 
 def test_the_same_seed_gives_the_same_layout():
-    first, second = (place(hall(), options=PlacementOptions(Demands(2))) for _ in range(2))
+    first, second = (place(hall(), options=PlacementOptions(Demands(visible=2))) for _ in range(2))
     assert first.reflectors == second.reflectors
 
 
@@ -121,7 +124,7 @@ CORNERS = ((0.2, 0.2), (11.8, 0.2), (11.8, 7.8), (0.2, 7.8))
 
 
 def symmetric_hall(**changes) -> Project:
-    route = Route("Across", (Segment(np.array([[3.0, 2.5], [9.0, 2.5]]), degree=1),), 1.0)
+    route = Route("Across", (Segment(control_points=np.array([[3.0, 2.5], [9.0, 2.5]]), degree=1),), 1.0)
     given = {"reflectors": reflectors_at(CORNERS), "scanner": replace(SCANNER, reflector_range=20.0), **changes}
     return Project(floor_map=room(12.0, 8.0), routes=(route,), **given)
 
@@ -137,10 +140,10 @@ def without_each(reflectors: ReflectorMap) -> list[ReflectorMap]:
 
 def test_a_symmetric_hall_gets_a_layout_that_tells_the_start_of_a_route_from_its_rival():
     project, start = symmetric_hall(), (3.0, 2.5, 0.0)
-    alike = place(project, options=PlacementOptions(Demands(2, survive_failure=False)))
+    alike = place(project, options=PlacementOptions(Demands(visible=2, survive_failure=False)))
     assert (alike.added, alike.unmet) == (0, ())
     assert ambiguous(project, alike.reflectors, start) == [True]
-    demands = Demands(2, survive_failure=False, unambiguous_starts=True)
+    demands = Demands(visible=2, survive_failure=False, unambiguous_starts=True)
     clear = place(project, options=PlacementOptions(demands))
     assert (clear.added, clear.unmet) == (1, ())
     assert ambiguous(project, clear.reflectors, start) == [False]
@@ -148,8 +151,8 @@ def test_a_symmetric_hall_gets_a_layout_that_tells_the_start_of_a_route_from_its
 
 def test_places_stay_clear_whichever_single_reflector_is_blocked():
     spot = (6.0, 5.0)
-    project = symmetric_hall(stations=(Station("Dock", 9.0, 2.5),), reflectors=ReflectorMap())
-    demands = Demands(1, unambiguous_stations=True, unambiguous_spots=(spot,))
+    project = symmetric_hall(stations=(Station(name="Dock", x=9.0, y=2.5),), reflectors=ReflectorMap())
+    demands = Demands(visible=1, unambiguous_stations=True, unambiguous_spots=(spot,))
     found = place(project, options=PlacementOptions(demands, extend=False))
     assert found.unmet == ()
     for layout in (found.reflectors, *without_each(found.reflectors)):
@@ -161,7 +164,7 @@ def test_a_spot_without_a_heading_is_clear_in_all_of_them_and_one_with_a_heading
     project = symmetric_hall(scanner=narrow)
     counts = []
     for spot in ((6.0, 3.0, 0.0), (6.0, 3.0)):
-        demands = Demands(1, survive_failure=False, unambiguous_spots=(spot,))
+        demands = Demands(visible=1, survive_failure=False, unambiguous_spots=(spot,))
         found = place(project, options=PlacementOptions(demands))
         assert found.unmet == ()
         headings = [0.0] if len(spot) == 3 else np.arange(8) * np.pi / 4
@@ -172,9 +175,9 @@ def test_a_spot_without_a_heading_is_clear_in_all_of_them_and_one_with_a_heading
 
 
 def test_a_place_that_nothing_clears_is_named_beside_the_nearest_metre_of_a_route():
-    project = symmetric_hall(stations=(Station("Dock", 8.2, 3.0),))
+    project = symmetric_hall(stations=(Station(name="Dock", x=8.2, y=3.0),))
     nowhere = CandidateOptions(keep_out=((0.0, 0.0, 12.0, 8.0),))
-    demands = Demands(2, survive_failure=False, unambiguous_stations=True)
+    demands = Demands(visible=2, survive_failure=False, unambiguous_stations=True)
     (unmet,) = place(project, options=PlacementOptions(demands, nowhere)).unmet
     assert (unmet.reason, unmet.place, unmet.route, unmet.metres) == ("ambiguous", "station 'Dock'", "Across", (5,))
 
@@ -183,7 +186,7 @@ def test_locked_reflectors_stay_where_the_layout_starts_empty():
     locked = replace(symmetric_hall().reflectors.reflectors[2], locked=True)
     corners = symmetric_hall().reflectors.reflectors
     project = symmetric_hall(reflectors=ReflectorMap((*corners[:2], locked, corners[3])))
-    found = place(project, options=PlacementOptions(Demands(2), extend=False))
+    found = place(project, options=PlacementOptions(Demands(visible=2), extend=False))
     assert found.reflectors.reflectors[0] == locked
     assert found.added == len(found.reflectors) - 1 > 0
     assert found.unmet == ()

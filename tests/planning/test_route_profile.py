@@ -13,12 +13,14 @@ from commission.site.scanner import Scanner
 from commission.site.vehicle import DifferentialVehicle, TricycleVehicle
 
 HALF = math.sqrt(0.5)
-QUARTER = Segment(np.array([[0, 0], [2, 0], [2, 2]], float), degree=2, weights=np.array([1.0, HALF, 1.0]))
+QUARTER = Segment(
+    control_points=np.array([[0, 0], [2, 0], [2, 2]], float), degree=2, weights=np.array([1.0, HALF, 1.0])
+)
 """A quarter of a circle of 2 m radius, to the left."""
 
 
 def line(start: tuple[float, float], end: tuple[float, float], direction: Direction = Direction.FORWARD) -> Segment:
-    return Segment(np.array([start, end], float), direction, degree=1)
+    return Segment(control_points=np.array([start, end], float), direction=direction, degree=1)
 
 
 def test_a_quarter_circle_has_its_curvature_length_and_turn():
@@ -70,7 +72,7 @@ def test_headings_count_on_over_a_half_turn_and_jump_only_where_the_vehicle_turn
     points, quarters = QUARTER.control_points, [QUARTER]
     for _ in range(7):
         points = points[-1] + (points - points[0]) @ turn
-        quarters.append(Segment(points, degree=2, weights=QUARTER.weights))
+        quarters.append(Segment(control_points=points, degree=2, weights=QUARTER.weights))
     around = route_profile(Route("r", tuple(quarters)), DifferentialVehicle()).headings
     assert around[-1] - around[0] == pytest.approx(4.0 * math.pi, abs=1e-6)
     assert np.abs(np.diff(around)).max() < 0.1
@@ -83,7 +85,7 @@ def test_headings_count_on_over_a_half_turn_and_jump_only_where_the_vehicle_turn
 
 def test_the_limit_is_that_of_the_steering_and_a_long_route_is_thinned_without_losing_its_tightest_curve():
     waves = np.column_stack((np.arange(200.0), np.where(np.arange(200) == 100, 3.0, 0.0)))
-    route = Route("r", (Segment(waves),))
+    route = Route("r", (Segment(control_points=waves),))
     tricycle = TricycleVehicle(1.2, 45.0)
     profile = route_profile(route, tricycle)
     assert profile.largest_curvature == pytest.approx(1.0 / 1.2)

@@ -47,7 +47,9 @@ def squares_with(planned, prediction, worth: tuple[float, ...], start: tuple[flo
 
 
 def test_error_is_what_the_filter_says_where_detections_are_as_its_parameters_say():
-    project = open_field(LINE, parameters=Parameters(FITTING, association=AssociationParameters(enabled=False)))
+    project = open_field(
+        LINE, parameters=Parameters(observation=FITTING, association=AssociationParameters(enabled=False))
+    )
     planned = plan_route(project, "Line")
     prediction = predict_route(planned)
     start = planned.options.start_sigmas
@@ -56,7 +58,7 @@ def test_error_is_what_the_filter_says_where_detections_are_as_its_parameters_sa
 
 
 def test_a_start_that_is_better_than_the_filter_believes_shows_at_once_and_not_later():
-    planned = plan_route(open_field(LINE, parameters=Parameters(FITTING)), "Line")
+    planned = plan_route(open_field(LINE, parameters=Parameters(observation=FITTING)), "Line")
     prediction = predict_route(planned)
     worth = (1.0, 0.0, 0.008**2, 0.0025**2, 0.0, 0.0)
     usual, better = (squares_with(planned, prediction, worth, s) for s in ((0.02, 0.02, 0.01), (0.0, 0.0, 0.0)))
@@ -65,7 +67,7 @@ def test_a_start_that_is_better_than_the_filter_believes_shows_at_once_and_not_l
 
 
 def test_a_range_that_is_always_too_long_does_not_average_out():
-    planned = plan_route(open_field(LINE, parameters=Parameters(FITTING)), "Line")
+    planned = plan_route(open_field(LINE, parameters=Parameters(observation=FITTING)), "Line")
     prediction = predict_route(planned)
     without, with_bias = (
         squares_with(planned, prediction, (1.0, bias, 0.008**2, 0.0025**2, 0.0, 0.0), (0.02, 0.02, 0.01))
@@ -79,8 +81,8 @@ def test_a_range_that_is_always_too_long_does_not_average_out():
 
 def test_errors_of_the_survey_stay_and_are_those_of_drives_among_displaced_reflectors():
     sigma, drives = 0.02, 48
-    surveyed = ReflectorMap(tuple(Reflector(f"R{i}", x, y, sigma=sigma) for i, (x, y) in enumerate(LINE)))
-    project = replace(open_field(LINE, parameters=Parameters(FITTING)), reflectors=surveyed)
+    surveyed = ReflectorMap(tuple(Reflector(id=f"R{i}", x=x, y=y, sigma=sigma) for i, (x, y) in enumerate(LINE)))
+    project = replace(open_field(LINE, parameters=Parameters(observation=FITTING)), reflectors=surveyed)
     start = start_of(project, "Line")
     planned = plan_route(project, "Line", PredictionOptions(start_sigmas=tuple(start.sigmas.tolist())))
     predicted = np.square(predict_errors(planned, predict_route(planned)).sigmas)
@@ -108,7 +110,9 @@ def test_errors_of_the_survey_stay_and_are_those_of_drives_among_displaced_refle
 def test_a_gate_that_rejects_more_leaves_larger_errors(gate: float):
     def sigmas(probability: float) -> np.ndarray:
         association = AssociationParameters(gate_probability=probability)
-        planned = plan_route(open_field(LINE, parameters=Parameters(FITTING, association=association)), "Line")
+        planned = plan_route(
+            open_field(LINE, parameters=Parameters(observation=FITTING, association=association)), "Line"
+        )
         return predict_errors(planned, predict_route(planned)).sigmas[50:].mean(axis=0)
 
     assert np.all(sigmas(gate) > 0.95 * sigmas(0.9999))

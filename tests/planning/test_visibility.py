@@ -61,7 +61,9 @@ def random_hall(rng: np.random.Generator, on_grid: bool) -> tuple[OccupancyGrid,
     cells = np.round(cells * 2.0) / 2.0 if on_grid else cells
     points = grid.cell_centers(cells - 0.5)
     radii = rng.choice([0.02, 0.04, 0.0625, 0.3], 12)
-    reflectors = [Reflector(str(i), *map(float, points[i]), radius=float(radii[i])) for i in range(12)]
+    reflectors = [
+        Reflector(id=str(i), x=float(points[i, 0]), y=float(points[i, 1]), radius=float(radii[i])) for i in range(12)
+    ]
     return grid, ReflectorMap(tuple(reflectors)), points[12:]
 
 
@@ -98,16 +100,16 @@ def sees(model: VisibilityModel, *points: tuple[float, float]) -> list[bool]:
 def test_range_is_measured_to_the_surface_of_a_cylinder_and_to_the_middle_of_a_plate():
     scanner = replace(SHARP, range=(1.0, 10.0))
     points = [(0.95, 0.0), (1.05, 0.0), (9.99, 0.0), (10.05, 0.0), (10.15, 0.0)]
-    assert sees(open_field(Reflector("c", 0, 0, radius=0.1), scanner=scanner), *points) == [
+    assert sees(open_field(Reflector(id="c", x=0, y=0, radius=0.1), scanner=scanner), *points) == [
         *(False, False, True, True, False)
     ]
-    plate = Reflector("p", 0, 0, radius=0.1, kind=ReflectorKind.FLAT)
+    plate = Reflector(id="p", x=0, y=0, radius=0.1, kind=ReflectorKind.FLAT)
     assert sees(open_field(plate, scanner=scanner), *points) == [False, True, True, False, False]
 
 
 def test_reflectors_are_told_from_other_things_only_up_to_the_reflector_range():
     assert sees(
-        open_field(Reflector("c", 0, 0), scanner=replace(SHARP, reflector_range=5.0)), (5.03, 0), (5.05, 0)
+        open_field(Reflector(id="c", x=0, y=0), scanner=replace(SHARP, reflector_range=5.0)), (5.03, 0), (5.05, 0)
     ) == [*(True, False)]
 
 
@@ -127,12 +129,12 @@ def test_promised_range_grows_with_the_width_of_the_beam_and_is_unlimited_when_b
 def test_a_reflector_is_not_seen_where_it_may_get_too_few_beams():
     scanner = Scanner(resolution_deg=0.5, beam_width_deg=0.0)
     limit = promised_range(0.04, math.radians(0.5), 2)
-    model = open_field(Reflector("c", 0, 0), scanner=scanner, min_beams=2)
+    model = open_field(Reflector(id="c", x=0, y=0), scanner=scanner, min_beams=2)
     assert sees(model, (limit - 1e-6, 0), (limit + 1e-6, 0)) == [True, False]
 
 
 def test_a_plate_is_seen_from_its_front_up_to_the_cosine_limit():
-    plate = Reflector("p", 0, 0, radius=0.2, kind=ReflectorKind.FLAT, heading=math.radians(90))
+    plate = Reflector(id="p", x=0, y=0, radius=0.2, kind=ReflectorKind.FLAT, heading=math.radians(90))
     angles = np.radians([90, 131, 49, 136, 44, 270])
     points = [(3 * math.cos(a), 3 * math.sin(a)) for a in angles]
     assert sees(open_field(plate, max_incidence_deg=45.0), *points) == [True, True, True, False, False, False]
@@ -140,7 +142,7 @@ def test_a_plate_is_seen_from_its_front_up_to_the_cosine_limit():
 
 def test_a_plate_gets_its_beams_up_to_a_range_that_shrinks_with_the_cosine_of_incidence():
     scanner = Scanner(resolution_deg=1.0, beam_width_deg=0.0, range=(0.05, 40.0))
-    model = open_field(Reflector("p", 0, 0, radius=0.1, kind=ReflectorKind.FLAT), scanner=scanner)
+    model = open_field(Reflector(id="p", x=0, y=0, radius=0.1, kind=ReflectorKind.FLAT), scanner=scanner)
     limit = promised_range(0.1, math.radians(1.0), 1) * 0.5
     direction = np.array([math.cos(math.radians(60 - 1e-6)), math.sin(math.radians(60 - 1e-6))])
     assert sees(model, tuple(direction * limit * 0.999), tuple(direction * limit * 1.001)) == [True, False]
@@ -152,7 +154,7 @@ def test_a_reflector_that_touches_the_wall_behind_it_is_seen_from_the_front():
     # Center on the wall's face, and 1 cm inside it.
     for x in (0.2, 0.19):
         model = build_visibility(
-            ReflectorMap((Reflector("w", x, 1.0),)),
+            ReflectorMap((Reflector(id="w", x=x, y=1.0),)),
             SHARP,
             RayCaster(OccupancyGrid(occupied, 0.05)),
             VisibilityOptions(),
@@ -161,7 +163,9 @@ def test_a_reflector_that_touches_the_wall_behind_it_is_seen_from_the_front():
 
 
 def test_poses_see_only_what_lies_inside_the_field_of_view_of_the_mounted_scanner():
-    corners = [Reflector(str(i), 5 * math.cos(a), 5 * math.sin(a)) for i, a in enumerate(np.radians([0, 90, 180, 270]))]
+    corners = [
+        Reflector(id=str(i), x=5 * math.cos(a), y=5 * math.sin(a)) for i, a in enumerate(np.radians([0, 90, 180, 270]))
+    ]
     scanner = replace(SHARP, field_of_view_deg=(-90.0, 90.0), mounting=[0.5, 0.0, math.pi])
     seen = open_field(*corners, scanner=scanner).visible_from_poses([[0, 0, 0], [0, 0, math.pi / 2], [99, 0, 0]])
     # The scanner looks backwards, and from half a meter ahead it has both sides behind its front.
@@ -172,7 +176,9 @@ def test_poses_see_only_what_lies_inside_the_field_of_view_of_the_mounted_scanne
 
 def test_a_full_turn_sees_behind_itself_whatever_its_first_bearing():
     scanner = replace(SHARP, field_of_view_deg=(0.0, 360.0))
-    seen = open_field(Reflector("a", -3, 0), Reflector("b", 3, 0), scanner=scanner).visible_from_poses([[0, 0, 1.0]])
+    seen = open_field(Reflector(id="a", x=-3, y=0), Reflector(id="b", x=3, y=0), scanner=scanner).visible_from_poses(
+        [[0, 0, 1.0]]
+    )
     assert seen.of(0).tolist() == [0, 1]
 
 
@@ -183,7 +189,7 @@ def test_a_site_without_reflectors_sees_nothing():
 
 
 def test_more_than_64_reflectors_keep_their_bits_apart():
-    model = open_field(*(Reflector(str(i), float(i), 0.0) for i in range(150)))
+    model = open_field(*(Reflector(id=str(i), x=float(i), y=0.0) for i in range(150)))
     seen = unpack(model.visible([[75.2, 1.0]]), 150)[0]
     distance = np.hypot(np.arange(150) - 75.2, 1.0)
     assert (seen == (distance <= 20.04)).all()

@@ -31,13 +31,17 @@ def out_and_back(speed: float = 0.5) -> Route:
         (Direction.REVERSE, [[8, 3], [6, 3], [5, 1], [3, 1]]),
         (Direction.FORWARD, [[3, 1], [5, 1], [6, 4], [9, 5]]),
     )
-    return Route("Out and back", tuple(Segment(np.array(points), direction) for direction, points in curves), speed)
+    return Route(
+        "Out and back",
+        tuple(Segment(control_points=np.array(points), direction=direction) for direction, points in curves),
+        speed,
+    )
 
 
 def corner_reflectors() -> ReflectorMap:
     """Four cylinders in the corners of the room."""
     places = [(0.2, 0.2), (11.8, 0.2), (11.8, 7.8), (0.2, 7.8)]
-    return ReflectorMap(tuple(Reflector(f"R{i}", x, y) for i, (x, y) in enumerate(places)))
+    return ReflectorMap(tuple(Reflector(id=f"R{i}", x=x, y=y) for i, (x, y) in enumerate(places)))
 
 
 def hall(vehicle: Vehicle | None = None, scanner: Scanner | None = None) -> Project:

@@ -19,8 +19,15 @@ from tests.simulation.halls import out_and_back
 
 VEHICLES = (DifferentialVehicle(), TricycleVehicle(), TricycleVehicle(wheelbase=-1.0), OmnidirectionalVehicle())
 EXACT_START = DriveOptions(start_sigma=(0.0, 0.0, 0.0))
-NOISELESS = OdometryParameters(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-STRAIGHT = Route("Straight", (Segment(np.array([[0.0, 0.0], [10.0, 0.0]]), degree=1),), 1.0)
+NOISELESS = OdometryParameters(
+    forward_per_sqrt_m=0.0,
+    lateral_per_sqrt_m=0.0,
+    heading_per_sqrt_m=0.0,
+    heading_per_sqrt_rad=0.0,
+    forward_per_sqrt_s=0.0,
+    heading_per_sqrt_s=0.0,
+)
+STRAIGHT = Route("Straight", (Segment(control_points=np.array([[0.0, 0.0], [10.0, 0.0]]), degree=1),), 1.0)
 
 
 def driven(vehicle: Vehicle, route: Route, options: DriveOptions = EXACT_START) -> Motion:
@@ -79,7 +86,7 @@ def test_speed_and_acceleration_keep_their_limits() -> None:
 
 
 def test_vehicle_slows_down_in_tight_curves() -> None:
-    bend = Route("Bend", (Segment(np.array([[0, 0], [2, 0], [2.2, 0], [2.2, 0.2], [2.2, 2.2]])),), 1.5)
+    bend = Route("Bend", (Segment(control_points=np.array([[0, 0], [2, 0], [2.2, 0], [2.2, 0.2], [2.2, 2.2]])),), 1.5)
     (leg,) = legs_of(bend, DifferentialVehicle(), MotionLimits())
     tightest = np.argmax(np.abs(leg.curvatures))
     assert leg.speeds[tightest] ** 2 * abs(leg.curvatures[tightest]) <= 0.4 + 1e-9
@@ -88,10 +95,18 @@ def test_vehicle_slows_down_in_tight_curves() -> None:
 
 def test_route_is_cut_at_cusps_and_kinks_only() -> None:
     smooth = Route(
-        "Smooth", (Segment(np.array([[0, 0], [1, 0]]), degree=1), Segment(np.array([[1, 0], [3, 0]]), degree=1))
+        "Smooth",
+        (
+            Segment(control_points=np.array([[0, 0], [1, 0]]), degree=1),
+            Segment(control_points=np.array([[1, 0], [3, 0]]), degree=1),
+        ),
     )
     kinked = Route(
-        "Kinked", (Segment(np.array([[0, 0], [1, 0]]), degree=1), Segment(np.array([[1, 0], [1, 2]]), degree=1))
+        "Kinked",
+        (
+            Segment(control_points=np.array([[0, 0], [1, 0]]), degree=1),
+            Segment(control_points=np.array([[1, 0], [1, 2]]), degree=1),
+        ),
     )
     assert len(legs_of(smooth, DifferentialVehicle(), MotionLimits())) == 1
     assert len(legs_of(kinked, DifferentialVehicle(), MotionLimits())) == 2
@@ -101,7 +116,11 @@ def test_route_is_cut_at_cusps_and_kinks_only() -> None:
 
 def test_differential_vehicle_turns_on_the_spot_at_a_kink() -> None:
     kinked = Route(
-        "Kinked", (Segment(np.array([[0, 0], [1, 0]]), degree=1), Segment(np.array([[1, 0], [1, 2]]), degree=1))
+        "Kinked",
+        (
+            Segment(control_points=np.array([[0, 0], [1, 0]]), degree=1),
+            Segment(control_points=np.array([[1, 0], [1, 2]]), degree=1),
+        ),
     )
     motion = driven(DifferentialVehicle(), kinked)
     assert distances_to(kinked, DifferentialVehicle(), motion).max() < 0.02
@@ -109,7 +128,7 @@ def test_differential_vehicle_turns_on_the_spot_at_a_kink() -> None:
 
 
 def test_tricycle_that_cannot_steer_a_route_says_so() -> None:
-    tight = Route("Tight", (Segment(np.array([[0, 0], [1, 0], [1, 0.3], [0, 0.3]])),))
+    tight = Route("Tight", (Segment(control_points=np.array([[0, 0], [1, 0], [1, 0.3], [0, 0.3]])),))
     vehicle = TricycleVehicle(wheelbase=2.0, max_steering_deg=10.0)
     try:
         motion = driven(vehicle, tight)
@@ -196,6 +215,6 @@ def test_slips_report_motion_that_did_not_happen(vehicle: Vehicle) -> None:
 
 
 def test_reverse_segment_is_driven_rear_first() -> None:
-    back = Route("Back", (Segment(np.array([[0, 0], [-3, 0]]), Direction.REVERSE, 1),))
+    back = Route("Back", (Segment(control_points=np.array([[0, 0], [-3, 0]]), direction=Direction.REVERSE, degree=1),))
     motion = driven(DifferentialVehicle(), back)
     assert motion.poses[-1] == pytest.approx([-3.0, 0.0, 0.0], abs=0.002)

@@ -16,7 +16,16 @@ def stream() -> list[Record]:
         records.append(ReferencePose(stamp, np.zeros(3)))
         records.append(Detections(stamp, np.array([[3.0, 0.1]])))
         flags = np.array([True, False, True])
-        records.append(Scan(stamp, np.ones(3, np.float32), -0.1, 0.1, np.full(3, 7.0, np.float32), flags))
+        records.append(
+            Scan(
+                stamp_ns=stamp,
+                ranges=np.ones(3, np.float32),
+                angle_min=-0.1,
+                angle_increment=0.1,
+                intensities=np.full(3, 7.0, np.float32),
+                reflector=flags,
+            )
+        )
     return records
 
 

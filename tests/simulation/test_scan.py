@@ -57,7 +57,7 @@ def test_open_field_returns_nothing() -> None:
 
 
 def test_cylinder_is_met_at_its_nearest_point_and_flagged() -> None:
-    reflectors = ReflectorMap((Reflector("A", 5.0, 0.0, radius=0.1),))
+    reflectors = ReflectorMap((Reflector(id="A", x=5.0, y=0.0, radius=0.1),))
     ranges, flags = scan(Project(reflectors=reflectors, scanner=QUIET), (0.0, 0.0, 0.0))
     assert np.nanmin(ranges) == pytest.approx(4.9, abs=1e-3)
     assert np.array_equal(flags, np.isfinite(ranges))
@@ -74,7 +74,7 @@ def test_beams_on_a_reflector_follow_equation_3_within_the_detectors_window(
     counts = []
     for seed in range(40):
         turn = 0.37 * seed
-        place = Reflector("A", distance * math.cos(turn), distance * math.sin(turn))
+        place = Reflector(id="A", x=distance * math.cos(turn), y=distance * math.sin(turn))
         project = Project(
             reflectors=ReflectorMap((place,)), scanner=replace(scanner, field_of_view_deg=(-180.0, 180.0))
         )
@@ -87,7 +87,7 @@ def test_beams_on_a_reflector_follow_equation_3_within_the_detectors_window(
 
 
 def test_reflector_behind_a_full_turn_scanner_is_not_cut_at_the_seam() -> None:
-    reflectors = ReflectorMap((Reflector("A", -2.0, 0.0),))
+    reflectors = ReflectorMap((Reflector(id="A", x=-2.0, y=0.0),))
     _, flags = scan(Project(reflectors=reflectors, scanner=FULL_TURN), (0.0, 0.0, 0.0))
     assert flags[:2].all()
     assert flags[-2:].all()
@@ -95,13 +95,13 @@ def test_reflector_behind_a_full_turn_scanner_is_not_cut_at_the_seam() -> None:
 
 
 def test_reflector_outside_the_field_of_view_is_not_seen() -> None:
-    reflectors = ReflectorMap((Reflector("A", -2.0, 0.0),))
+    reflectors = ReflectorMap((Reflector(id="A", x=-2.0, y=0.0),))
     _, flags = scan(Project(reflectors=reflectors, scanner=QUIET), (0.0, 0.0, 0.0))
     assert not flags.any()
 
 
 def test_reflector_beyond_its_detection_range_is_a_wall() -> None:
-    reflectors = ReflectorMap((Reflector("A", 11.0, 4.0, radius=0.1),))
+    reflectors = ReflectorMap((Reflector(id="A", x=11.0, y=4.0, radius=0.1),))
     near_sighted = replace(QUIET, reflector_range=5.0)
     ranges, flags = scan(Project(floor_map=room(), reflectors=reflectors, scanner=near_sighted), (1.0, 4.0, 0.0))
     assert not flags.any()
@@ -109,7 +109,7 @@ def test_reflector_beyond_its_detection_range_is_a_wall() -> None:
 
 
 def test_person_hides_the_reflector_behind() -> None:
-    project = Project(reflectors=ReflectorMap((Reflector("A", 5.0, 0.0),)), scanner=QUIET)
+    project = Project(reflectors=ReflectorMap((Reflector(id="A", x=5.0, y=0.0),)), scanner=QUIET)
     person = np.array([[2.5, 0.0, 0.2]])
     ranges, flags = scan(project, (0.0, 0.0, 0.0), person)
     assert not flags.any()
@@ -119,14 +119,14 @@ def test_person_hides_the_reflector_behind() -> None:
 
 
 def test_wall_hides_the_reflector_behind() -> None:
-    project = Project(floor_map=room(), reflectors=ReflectorMap((Reflector("A", 13.0, 4.0),)), scanner=QUIET)
+    project = Project(floor_map=room(), reflectors=ReflectorMap((Reflector(id="A", x=13.0, y=4.0),)), scanner=QUIET)
     _, flags = scan(project, (6.0, 4.0, 0.0))
     assert not flags.any()
 
 
 @pytest.mark.parametrize(("facing_deg", "seen"), [(180.0, True), (150.0, True), (100.0, False), (0.0, False)])
 def test_flat_plate_is_flagged_only_where_it_faces_the_scanner(facing_deg: float, seen: bool) -> None:
-    plate = Reflector("P", 4.0, 0.0, radius=0.15, kind=ReflectorKind.FLAT, heading=math.radians(facing_deg))
+    plate = Reflector(id="P", x=4.0, y=0.0, radius=0.15, kind=ReflectorKind.FLAT, heading=math.radians(facing_deg))
     ranges, flags = scan(Project(reflectors=ReflectorMap((plate,)), scanner=QUIET), (0.0, 0.0, 0.0))
     assert flags.any() == seen
     if seen:
@@ -147,7 +147,7 @@ def test_shiny_object_passes_for_a_reflector() -> None:
 def test_tilted_floor_cuts_every_beam_and_hides_reflectors() -> None:
     project = Project(
         floor_map=room(),
-        reflectors=ReflectorMap((Reflector("Near", 4.0, 4.0), Reflector("Far", 8.0, 4.0, radius=0.1))),
+        reflectors=ReflectorMap((Reflector(id="Near", x=4.0, y=4.0), Reflector(id="Far", x=8.0, y=4.0, radius=0.1))),
         scanner=QUIET,
         disturbances=Disturbances(tilted_stretches=(TiltedStretch(2.0, 4.0, 1.0),)),
     )

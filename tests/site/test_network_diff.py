@@ -11,7 +11,7 @@ from commission.site.network_diff import Change, NamedDiff, course_shift, differ
 from commission.site.routes import Route, Segment
 from commission.site.stations import Station
 
-LINE = Segment(np.array([[0.0, 0.0], [4.0, 0.0]]), degree=1)
+LINE = Segment(control_points=np.array([[0.0, 0.0], [4.0, 0.0]]), degree=1)
 LOOP, DOCK, PARK = Route("Loop", (LINE,)), Route("Dock", (LINE,), 0.3), Route("Park", (LINE,), 1.0)
 ONE = st.builds(Station, name=st.sampled_from("ABCDEFG"), x=st.floats(0, 1), y=st.floats(0, 1))
 SEVERAL = st.lists(ONE, max_size=6, unique_by=lambda s: s.name).map(tuple)
@@ -36,13 +36,13 @@ def test_applying_a_difference_gives_the_later_stations(
 
 
 def test_a_station_keeps_the_accuracy_that_no_layout_carries() -> None:
-    known = Station("Dock", 1.0, 2.0, required_accuracy=0.01)
-    read = (Station("Dock", 1.5, 2.0), Station("Wait", 0.0, 0.0))
+    known = Station(name="Dock", x=1.0, y=2.0, required_accuracy=0.01)
+    read = (Station(name="Dock", x=1.5, y=2.0), Station(name="Wait", x=0.0, y=0.0))
     assert [s.required_accuracy for s in keeping_accuracy((known,), read)] == [0.01, 0.1]
 
 
 def test_shift_of_a_course_is_the_distance_that_it_moves() -> None:
-    aside = Segment(np.array([[0.0, 0.3], [4.0, 0.3]]), degree=1)
+    aside = Segment(control_points=np.array([[0.0, 0.3], [4.0, 0.3]]), degree=1)
     assert course_shift(LINE, aside) == pytest.approx(0.3)
     # The same line with a control point more is driven the same.
-    assert course_shift(LINE, Segment(np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]), degree=1)) < 1e-9
+    assert course_shift(LINE, Segment(control_points=np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]), degree=1)) < 1e-9

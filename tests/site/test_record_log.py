@@ -11,7 +11,7 @@ from commission.site.records import Detections, Odometry, ReferencePose, Scan
 
 def scan(stamp_ns: int, beams: int = 5) -> Scan:
     ranges = np.linspace(1, 2, beams, dtype=np.float32)
-    return Scan(stamp_ns, ranges, -1.0, 0.5, reflector=ranges > 1.5)
+    return Scan(stamp_ns=stamp_ns, ranges=ranges, angle_min=-1.0, angle_increment=0.5, reflector=ranges > 1.5)
 
 
 def test_records_come_out_in_order_of_stamps_and_within_a_stamp_motion_comes_first():

@@ -10,14 +10,14 @@ from commission.errors import ProjectError
 from commission.site.reflector_diff import ReflectorChange, ReflectorDiff, difference, merged, with_own_ids
 from commission.site.reflectors import Reflector, ReflectorMap
 
-A, B, C = Reflector("A", 0.0, 0.0), Reflector("B", 5.0, 0.0), Reflector("C", 0.0, 5.0)
+A, B, C = Reflector(id="A", x=0.0, y=0.0), Reflector(id="B", x=5.0, y=0.0), Reflector(id="C", x=0.0, y=5.0)
 ONE = st.builds(Reflector, id=st.sampled_from("ABCDEFG"), x=st.floats(0, 1), y=st.floats(0, 1))
 MAPS = st.lists(ONE, max_size=6, unique_by=lambda r: r.id).map(lambda rs: ReflectorMap(tuple(rs)))
 
 
 def test_added_changed_and_removed_reflectors_are_told_apart() -> None:
     moved = replace(B, x=5.3, y=0.4)
-    new = Reflector("D", 9.0, 9.0)
+    new = Reflector(id="D", x=9.0, y=9.0)
     diff = difference(ReflectorMap((A, B, C)), ReflectorMap((new, moved, A)))
     assert diff == ReflectorDiff((new,), (ReflectorChange(B, moved),), (C,), 1)
     assert diff.changed[0].fields == ("x", "y")
@@ -25,7 +25,7 @@ def test_added_changed_and_removed_reflectors_are_told_apart() -> None:
 
 
 def test_reflector_that_only_changed_its_name_is_recognized_by_its_place() -> None:
-    renamed = Reflector("17", 5.01, 0.0)
+    renamed = Reflector(id="17", x=5.01, y=0.0)
     diff = difference(ReflectorMap((A, B)), ReflectorMap((A, renamed)))
     assert diff == ReflectorDiff((), (ReflectorChange(B, renamed),), (), 1)
     assert "id" in diff.changed[0].fields
@@ -68,9 +68,12 @@ def test_name_that_would_be_used_twice_is_refused() -> None:
 
 def test_made_up_ids_give_way_to_those_of_the_reflectors_at_their_places() -> None:
     # A spreadsheet without names calls its rows R1, R2: they are not the reflectors of those names.
-    before = ReflectorMap((Reflector("R1", 0.0, 0.0), Reflector("R2", 5.0, 0.0)))
-    unnamed = ReflectorMap((Reflector("R1", 5.01, 0.0), Reflector("R2", 9.0, 9.0)))
-    assert with_own_ids(before, unnamed).reflectors == (Reflector("R2", 5.01, 0.0), Reflector("R3", 9.0, 9.0))
+    before = ReflectorMap((Reflector(id="R1", x=0.0, y=0.0), Reflector(id="R2", x=5.0, y=0.0)))
+    unnamed = ReflectorMap((Reflector(id="R1", x=5.01, y=0.0), Reflector(id="R2", x=9.0, y=9.0)))
+    assert with_own_ids(before, unnamed).reflectors == (
+        Reflector(id="R2", x=5.01, y=0.0),
+        Reflector(id="R3", x=9.0, y=9.0),
+    )
     assert with_own_ids(ReflectorMap(), unnamed) == unnamed
     diff = difference(before, unnamed, fields=("x", "y"))
     assert [change.after.id for change in diff.changed] == ["R2"]

@@ -20,7 +20,7 @@ from commission.site.scanner import Scanner
 from commission.site.stations import Station
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle
 
-STRAIGHT = Segment([[0, 0], [1, 0], [2, 0], [3, 0]])
+STRAIGHT = Segment(control_points=[[0, 0], [1, 0], [2, 0], [3, 0]])
 
 
 @pytest.mark.parametrize(
@@ -30,19 +30,22 @@ STRAIGHT = Segment([[0, 0], [1, 0], [2, 0], [3, 0]])
         (lambda: Scanner(range=(5.0, 5.0)), "expected smallest < largest range"),
         (lambda: Scanner(mounting=[0.0, math.nan, 0.0]), r"scanner.mounting\[1\] is nan; expected finite"),
         (lambda: Scanner(rate=0.0), "scanner.rate is 0; expected 0.1 to 1000"),
-        (lambda: Reflector("a", 0.0, 0.0, radius=0.0), "radius is 0; expected more than 0"),
-        (lambda: Reflector("", 0.0, 0.0), "id is empty"),
+        (lambda: Reflector(id="a", x=0.0, y=0.0, radius=0.0), "radius is 0; expected more than 0"),
+        (lambda: Reflector(id="", x=0.0, y=0.0), "id is empty"),
         (lambda: DifferentialVehicle(wheel_separation=-0.4), "wheel_separation is -0.4; expected more than 0 m"),
         (lambda: TricycleVehicle(wheelbase=0.0), "wheelbase"),
         (lambda: OmnidirectionalVehicle(wheel_angles_deg=(0.0, 360.0, 90.0)), "expected 3 or more different angles"),
         (lambda: FloorMap(np.zeros((2, 2), np.int8), 0.0), "resolution is 0; expected metres per cell > 0"),
         (lambda: FloorMap(np.zeros((0, 2), np.int8), 0.05), "expected rows x columns"),
         (lambda: Route("r", ()), "has no segments"),
-        (lambda: Segment([[0, 0], [1, 0]], degree=3), "control points"),
+        (lambda: Segment(control_points=[[0, 0], [1, 0]], degree=3), "control points"),
         (lambda: Disturbances(dropped_scans=1.5), "dropped_scans is 1.5; expected 0 to 1"),
-        (lambda: Station("", 0.0, 0.0), "a station's name is empty"),
-        (lambda: Station("Dock", 0.0, math.nan), "y is nan; expected"),
-        (lambda: Station("Dock", 0.0, 0.0, 0.0, 0.0), "required_accuracy is 0; expected 0.001 to 10 m"),
+        (lambda: Station(name="", x=0.0, y=0.0), "a station's name is empty"),
+        (lambda: Station(name="Dock", x=0.0, y=math.nan), "y is nan; expected"),
+        (
+            lambda: Station(name="Dock", x=0.0, y=0.0, heading=0.0, required_accuracy=0.0),
+            "required_accuracy is 0; expected 0.001 to 10 m",
+        ),
         (lambda: ShinyObject(math.inf, 0.0), "expected finite metres"),
         (lambda: TiltedStretch(0.0, 0.0, -1.0), "radius is -1; expected 0 m or more"),
     ],
@@ -54,17 +57,17 @@ def test_impossible_values_are_refused_with_what_was_found_and_expected(build, m
 
 def test_two_reflectors_with_one_id_are_refused():
     with pytest.raises(ProjectError, match="'a' is used twice"):
-        ReflectorMap((Reflector("a", 0, 0), Reflector("a", 1, 0)))
+        ReflectorMap((Reflector(id="a", x=0, y=0), Reflector(id="a", x=1, y=0)))
 
 
 def test_two_stations_of_one_name_are_refused():
     with pytest.raises(ProjectError, match="station name 'Dock' is used twice"):
-        Project(stations=(Station("Dock", 0.0, 0.0), Station("Dock", 1.0, 0.0)))
+        Project(stations=(Station(name="Dock", x=0.0, y=0.0), Station(name="Dock", x=1.0, y=0.0)))
 
 
 def test_a_route_whose_segments_do_not_meet_is_refused_with_the_gap_in_millimetres():
     with pytest.raises(ProjectError, match="segment 2 starts 500 mm from the end of segment 1"):
-        Route("r", (STRAIGHT, Segment([[3.5, 0], [4, 0], [5, 0], [6, 0]])))
+        Route("r", (STRAIGHT, Segment(control_points=[[3.5, 0], [4, 0], [5, 0], [6, 0]])))
 
 
 def test_an_unknown_route_is_answered_with_the_names_there_are():
@@ -109,6 +112,6 @@ def test_a_gate_probability_outside_zero_to_one_is_refused(gate):
 def test_values_that_hold_arrays_compare_by_their_content():
     assert Scanner(mounting=[0.1, 0, 0]) == Scanner(mounting=[0.1, 0, 0])
     assert Scanner(mounting=[0.1, 0, 0]) != Scanner(mounting=[0.2, 0, 0])
-    assert Segment([[0, 0], [1, 0], [2, 0], [3, 0]]) == STRAIGHT
+    assert Segment(control_points=[[0, 0], [1, 0], [2, 0], [3, 0]]) == STRAIGHT
     assert Project(routes=(Route("Loop", (STRAIGHT,)),)) == Project(routes=(Route("Loop", (STRAIGHT,)),))
     assert FloorMap(np.zeros((2, 2), np.int8), 0.05) == FloorMap(np.zeros((2, 2), np.int8), 0.05)

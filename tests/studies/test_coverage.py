@@ -13,7 +13,7 @@ from commission.site.scanner import Scanner
 from commission.studies.coverage import coverage_of, drivable, summary, within_limits
 
 CORNERS = ReflectorMap(
-    tuple(Reflector(str(i), x, y) for i, (x, y) in enumerate([(0.5, 0.5), (9.5, 0.5), (9.5, 5.5), (0.5, 5.5)]))
+    tuple(Reflector(id=str(i), x=x, y=y) for i, (x, y) in enumerate([(0.5, 0.5), (9.5, 0.5), (9.5, 5.5), (0.5, 5.5)]))
 )
 
 

@@ -29,13 +29,15 @@ def hall() -> FloorMap:
 
 
 FLOOR = FloorDistances(hall())
-REFLECTORS = ReflectorMap(tuple(Reflector(n, x, y) for n, x, y in (("A", 1, 7.6), ("B", 4, 7.6), ("C", 11, 7.6))))
+REFLECTORS = ReflectorMap(
+    tuple(Reflector(id=n, x=x, y=y) for n, x, y in (("A", 1, 7.6), ("B", 4, 7.6), ("C", 11, 7.6)))
+)
 EDGE = Scanner(mounting=[0.5, 0.0, 0.0], field_of_view_deg=(-90.0, 90.0))
 SITE = Project(floor_map=FLOOR.floor_map, reflectors=REFLECTORS, vehicle=BOX, scanner=EDGE)
 
 
 def line(*points: tuple[float, float], name: str = "r", direction: Direction = Direction.FORWARD) -> Route:
-    return Route(name, (Segment(np.array(points, float), direction, 1),))
+    return Route(name, (Segment(control_points=np.array(points, float), direction=direction, degree=1),))
 
 
 def texts(project: Project) -> list[str]:
@@ -87,7 +89,7 @@ def test_a_tricycle_can_drive_its_wheelbase_over_the_tangent_of_its_steering(ste
 def test_a_curve_tighter_than_the_vehicle_can_drive_is_an_error_with_both_radii():
     weight = math.cos(math.pi / 4.0)
     corner = [[9.0, 5.0], [10.0, 5.0], [10.0, 6.0]]
-    quarter = Segment(np.array(corner), degree=2, weights=np.array([1.0, weight, 1.0]))
+    quarter = Segment(control_points=np.array(corner), degree=2, weights=np.array([1.0, weight, 1.0]))
     route = Route("bend", (quarter,))
     small = TricycleVehicle(1.2, 45.0, outline=((0.1, 0.1), (-0.1, 0.1), (0.0, -0.1)))
     site = replace(SITE, routes=(route,), vehicle=small, scanner=Scanner(mounting=[0.0, 0.0, 0.0]))
@@ -118,7 +120,7 @@ def test_close_reflectors_are_told_by_what_cannot_tell_them_apart():
     needed = max(apart, gap + 0.08)
 
     def pair(distance):
-        both = ReflectorMap((Reflector("A", 3.0, 7.0), Reflector("B", 3.0 + distance, 7.0)))
+        both = ReflectorMap((Reflector(id="A", x=3.0, y=7.0), Reflector(id="B", x=3.0 + distance, y=7.0)))
         return [(p.severity, p.text) for p in find_problems(replace(SITE, reflectors=both), FLOOR).problems]
 
     assert pair(needed + 0.01) == []
@@ -131,35 +133,40 @@ def test_close_reflectors_are_told_by_what_cannot_tell_them_apart():
 
 
 def test_many_close_reflectors_are_counted_instead_of_listed():
-    crowd = ReflectorMap(tuple(Reflector(str(i), 1.0 + 0.1 * i, 7.0) for i in range(90)))
+    crowd = ReflectorMap(tuple(Reflector(id=str(i), x=1.0 + 0.1 * i, y=7.0) for i in range(90)))
     found = texts(replace(SITE, reflectors=crowd))
     assert len(found) == MOST_OF_A_KIND + 1
     assert "more like" in found[-1]
 
 
 def test_reflectors_that_no_ray_reaches_are_inside_a_wall():
-    plate = Reflector("P", 0.3, 4.0, kind=ReflectorKind.FLAT, heading=math.pi)
-    some = (Reflector("in", 0.12, 2.0), Reflector("on", 0.34, 2.0), plate, replace(plate, id="Q", y=6, heading=0.0))
-    site = replace(SITE, reflectors=ReflectorMap((*some, Reflector("far", 20.0, 20.0))))
+    plate = Reflector(id="P", x=0.3, y=4.0, kind=ReflectorKind.FLAT, heading=math.pi)
+    some = (
+        Reflector(id="in", x=0.12, y=2.0),
+        Reflector(id="on", x=0.34, y=2.0),
+        plate,
+        replace(plate, id="Q", y=6, heading=0.0),
+    )
+    site = replace(SITE, reflectors=ReflectorMap((*some, Reflector(id="far", x=20.0, y=20.0))))
     found = find_problems(site, FLOOR).problems
     assert [p.ids for p in found if "inside a wall" in p.text] == [("in",), ("P",)]
     assert [p.ids for p in found if "outside of the floor map" in p.text] == [("far",)]
 
 
 def test_a_station_without_room_is_an_error():
-    site = replace(SITE, stations=(Station("Dock", 0.6, 4.0), Station("Gate", 3.0, 4.0)))
+    site = replace(SITE, stations=(Station(name="Dock", x=0.6, y=4.0), Station(name="Gate", x=3.0, y=4.0)))
     assert [p.ids for p in find_problems(site, FLOOR).problems if p.severity is Severity.ERROR] == [("Dock",)]
 
 
 def test_a_station_that_no_route_passes_is_told_since_nobody_would_check_its_accuracy():
     there, back = line((1.5, 6.0), (10.5, 6.0), name="a"), line((1.5, 5.0), (10.5, 5.0), direction=Direction.REVERSE)
     stations = (
-        Station("on", 3.0, 6.1),
-        Station("beside", 3.0, 6.3),
-        Station("against", 3.0, 6.0, math.pi),
+        Station(name="on", x=3.0, y=6.1),
+        Station(name="beside", x=3.0, y=6.3),
+        Station(name="against", x=3.0, y=6.0, heading=math.pi),
         # A vehicle that reverses to the east looks to the west.
-        Station("reverse", 3.0, 5.0, math.pi),
-        Station("across", 3.0, 5.0, 0.0),
+        Station(name="reverse", x=3.0, y=5.0, heading=math.pi),
+        Station(name="across", x=3.0, y=5.0, heading=0.0),
     )
     site = replace(SITE, routes=(there, back), stations=stations)
     first = find_problems(site, FLOOR)

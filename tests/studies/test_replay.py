@@ -31,7 +31,7 @@ WITH_REFERENCE = [
 
 
 def hall(**groups):
-    reflectors = tuple(Reflector(f"R{index}", x, y) for index, (x, y) in enumerate(CENTERS))
+    reflectors = tuple(Reflector(id=f"R{index}", x=x, y=y) for index, (x, y) in enumerate(CENTERS))
     return Project(
         reflectors=ReflectorMap(reflectors),
         scanner=Scanner(mounting=[0.0, 0.0, 0.0], field_of_view_deg=(-180.0, 180.0)),

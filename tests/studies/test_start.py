@@ -20,7 +20,7 @@ def recording(*references):
 
 
 def project_with_route(direction=Direction.FORWARD):
-    segment = Segment([[1.0, 2.0], [1.0, 2.0], [1.0, 4.0], [3.0, 4.0]], direction)
+    segment = Segment(control_points=[[1.0, 2.0], [1.0, 2.0], [1.0, 4.0], [3.0, 4.0]], direction=direction)
     return Project(routes=(Route("Loop", (segment,)),))
 
 

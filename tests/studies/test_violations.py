@@ -32,7 +32,7 @@ def route_violations(
 
 
 def line(*points: tuple[float, float]) -> Route:
-    return Route("r", (Segment(np.array(points, float), degree=1),))
+    return Route("r", (Segment(control_points=np.array(points, float), degree=1),))
 
 
 def test_each_stretch_says_where_along_the_route_it_is_and_where_it_is_worst():

@@ -55,7 +55,7 @@ def reflector_map(points: Sequence[Point], radius: float, prefix: str) -> Reflec
     digits = len(str(len(points)))
     return ReflectorMap(
         tuple(
-            Reflector(f"{prefix}{number:0{digits}d}", round(x, 3), round(y, 3), radius)
+            Reflector(id=f"{prefix}{number:0{digits}d}", x=round(x, 3), y=round(y, 3), radius=radius)
             for number, (x, y) in enumerate(points, start=1)
         )
     )
@@ -96,10 +96,10 @@ def laboratory() -> Project:
         return (pose[0], pose[1], pose[2] + 180.0)
 
     segments = (
-        Segment(curve(p0, p1, 3.0), Direction.FORWARD),
-        Segment(curve(reverse(p1), reverse(p2), 2.0), Direction.REVERSE),
-        Segment(curve(p2, p3, 1.6), Direction.FORWARD),
-        Segment(curve(reverse(p3), reverse(p0), 3.0), Direction.REVERSE),
+        Segment(control_points=curve(p0, p1, 3.0), direction=Direction.FORWARD),
+        Segment(control_points=curve(reverse(p1), reverse(p2), 2.0), direction=Direction.REVERSE),
+        Segment(control_points=curve(p2, p3, 1.6), direction=Direction.FORWARD),
+        Segment(control_points=curve(reverse(p3), reverse(p0), 3.0), direction=Direction.REVERSE),
     )
     furniture = ((0.0, 7.0, 1.6, 8.0), (11.2, 0.0, 12.0, 1.2), (5.6, 7.4, 8.0, 8.0), (2.4, 0.0, 4.4, 0.5))
     return Project(
@@ -162,8 +162,15 @@ def shop_floor() -> Project:
         floor_map=hall(24.0, 13.0, 0.02, [*machines, *fence, *tables]),
         reflectors=reflector_map(reflectors, 0.045, "S"),
         routes=(
-            Route("P0-P1-P2", (Segment(into_station, Direction.REVERSE), Segment(out_of_station)), 0.5),
-            Route("Around", (Segment(around),), 0.5),
+            Route(
+                "P0-P1-P2",
+                (
+                    Segment(control_points=into_station, direction=Direction.REVERSE),
+                    Segment(control_points=out_of_station),
+                ),
+                0.5,
+            ),
+            Route("Around", (Segment(control_points=around),), 0.5),
         ),
         vehicle=DifferentialVehicle(0.45, ((0.5, 0.3), (-0.4, 0.3), (-0.4, -0.3), (0.5, -0.3)), 0.35),
         scanner=Scanner(mounting=np.array([0.42, 0.0, 0.0]), resolution_deg=0.25, reflector_range=15.0),
@@ -264,10 +271,14 @@ def warehouse() -> Project:
         floor_map=hall(100.0, 60.0, 0.05, _racks()),
         reflectors=reflector_map(_warehouse_reflectors(), 0.05, "W"),
         routes=(
-            Route("Goods in to aisle 3", (Segment(into_aisle),), 1.2),
-            Route("Aisle 3 to shipping", (Segment(back_out, Direction.REVERSE), Segment(to_shipping)), 1.2),
-            Route("Outer loop", (Segment(loop),), 1.5),
-            Route("Through aisles 6 and 4", (Segment(through),), 1.2),
+            Route("Goods in to aisle 3", (Segment(control_points=into_aisle),), 1.2),
+            Route(
+                "Aisle 3 to shipping",
+                (Segment(control_points=back_out, direction=Direction.REVERSE), Segment(control_points=to_shipping)),
+                1.2,
+            ),
+            Route("Outer loop", (Segment(control_points=loop),), 1.5),
+            Route("Through aisles 6 and 4", (Segment(control_points=through),), 1.2),
         ),
         vehicle=TricycleVehicle(),
         scanner=Scanner(

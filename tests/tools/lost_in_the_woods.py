@@ -29,7 +29,8 @@ TUBE_RADIUS = 0.055
 def project(data: dict[str, np.ndarray]) -> Project:
     """The robot, its laser, and the tubes without names that mean anything."""
     tubes = tuple(
-        Reflector(f"T{i:02d}", float(x), float(y), TUBE_RADIUS) for i, (x, y) in enumerate(data["l"], start=1)
+        Reflector(id=f"T{i:02d}", x=float(x), y=float(y), radius=TUBE_RADIUS)
+        for i, (x, y) in enumerate(data["l"], start=1)
     )
     return Project(
         name="Lost in the woods",

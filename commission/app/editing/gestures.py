@@ -17,7 +17,7 @@ from commission.site.floor_map import OCCUPIED, FloorMap
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
 
-FIRST = Reflector("R0", 0.0, 0.0)
+FIRST = Reflector(id="R0", x=0.0, y=0.0)
 """What the first reflector of a map is like; its id is counted on from."""
 WALL_REACH = (0.05, 1.0)
 """Smallest and largest distance at which a wall attracts [m]: within them, twice a click's reach."""

@@ -50,8 +50,8 @@ def _(action: actions.SelectStation, state: AppState) -> Reduction:
 def _(action: actions.PlaceStation, state: AppState) -> Reduction:
     stations = state.project.stations
     name = edits.fresh_name(stations)
-    last = stations[-1] if stations else Station(name, *action.place)
-    placed = Station(name, *action.place, last.heading, last.required_accuracy)
+    x, y = action.place
+    placed = replace(stations[-1], name=name, x=x, y=y) if stations else Station(name=name, x=x, y=y)
     pose = edits.on_route(state.project.routes, action.place, action.reach)
     if pose is not None:
         x, y, heading = (float(value) for value in pose)

@@ -84,14 +84,14 @@ class CsvFolder:
         seen = np.isfinite(detections.values[:, 0])
         offsets = np.concatenate([[0], np.cumsum(seen)]).astype(np.int64)
         return RecordLog(
-            odometry.stamps_ns,
-            odometry.values,
-            None if self._scans is None else self._scans.load(),
-            detections.stamps_ns[starts],
-            np.append(offsets[starts], offsets[-1]),
-            detections.values[seen],
-            reference.stamps_ns,
-            reference.values,
+            odometry_stamps_ns=odometry.stamps_ns,
+            displacements=odometry.values,
+            scans=None if self._scans is None else self._scans.load(),
+            detection_stamps_ns=detections.stamps_ns[starts],
+            detection_offsets=np.append(offsets[starts], offsets[-1]),
+            range_bearing=detections.values[seen],
+            reference_stamps_ns=reference.stamps_ns,
+            reference_poses=reference.values,
         )
 
     def _odometry(self) -> Iterator[Record]:

@@ -117,12 +117,12 @@ class ScanArchive:
             raise self._error("ranges", f"need {total} bytes", f"at most {LOAD_LIMIT} bytes to load at once")
         shape = self._columns["ranges"].shape
         log = ScanLog(
-            np.empty(len(self), np.int64),
-            np.empty(shape, np.float32),
-            self.angle_min,
-            self.angle_increment,
-            np.empty(shape, np.float32) if "intensities" in self._columns else None,
-            np.empty(shape, np.bool_) if "reflector" in self._columns else None,
+            stamps_ns=np.empty(len(self), np.int64),
+            ranges=np.empty(shape, np.float32),
+            angle_min=self.angle_min,
+            angle_increment=self.angle_increment,
+            intensities=np.empty(shape, np.float32) if "intensities" in self._columns else None,
+            reflector=np.empty(shape, np.bool_) if "reflector" in self._columns else None,
         )
         start = 0
         for block in self.blocks():
@@ -218,12 +218,12 @@ class ScanArchive:
             raise self._error("ranges", found, "0 m or more, NaN where nothing came back")
         intensities, reflector = arrays.get("intensities"), arrays.get("reflector")
         return ScanLog(
-            arrays["stamp_ns"].astype(np.int64),
-            ranges,
-            self.angle_min,
-            self.angle_increment,
-            None if intensities is None else intensities.astype(np.float32),
-            None if reflector is None else reflector.astype(np.bool_),
+            stamps_ns=arrays["stamp_ns"].astype(np.int64),
+            ranges=ranges,
+            angle_min=self.angle_min,
+            angle_increment=self.angle_increment,
+            intensities=None if intensities is None else intensities.astype(np.float32),
+            reflector=None if reflector is None else reflector.astype(np.bool_),
         )
 
     def _check_order(self, block: ScanLog, start: int, last_stamp: int | None) -> None:

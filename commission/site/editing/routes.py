@@ -53,8 +53,8 @@ def segment_of(points: ArrayLike, curve: Curve = Curve.THROUGH) -> Segment:
     if len(distinct) < 2:
         raise ValueError(f"{len(distinct)} different points; expected 2 or more")
     if curve is Curve.NEAR or len(distinct) == 2:
-        return Segment(distinct, degree=min(3, len(distinct) - 1))
-    return _segment(Segment(distinct, degree=1), catmull_rom(distinct))
+        return Segment(control_points=distinct, degree=min(3, len(distinct) - 1))
+    return _segment(Segment(control_points=distinct, degree=1), catmull_rom(distinct))
 
 
 def new_route(name: str, points: ArrayLike, curve: Curve = Curve.THROUGH, speed: float = 0.5) -> Route:
@@ -149,7 +149,9 @@ def delete_point(route: Route, segment: int, point: int) -> Route:
         inner = np.arange(degree + 1, n)
         own = old.knots[point + 1 : point + degree + 1].mean()
         knots = np.delete(old.knots, inner[np.argmin(np.abs(old.knots[inner] - own))])
-    new = Segment(points, old.direction, degree, knots, weights, old.speed)
+    new = Segment(
+        control_points=points, direction=old.direction, degree=degree, knots=knots, weights=weights, speed=old.speed
+    )
     return _with_segment(route, segment, new)
 
 

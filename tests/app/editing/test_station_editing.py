@@ -111,7 +111,7 @@ def test_name_pose_and_accuracy_are_typed_and_typing_is_one_step(placed: AppStat
         SetStation(ME, "required_accuracy", 0.01, 0.4),
         SetStation(ME, "heading", 1.0, 0.6),
     )
-    assert station(typed) == Station("Dock", 3.0, 5.0, 1.0, 0.01)
+    assert station(typed) == Station(name="Dock", x=3.0, y=5.0, heading=1.0, required_accuracy=0.01)
     assert [step.name for step in typed.undo[1:]] == ["rename Station 1", "set accuracy of Dock", "set heading of Dock"]
     assert editor(typed).station == "Dock"
     with pytest.raises(ValueError, match="required_accuracy"):

@@ -19,15 +19,21 @@ def pending(imported: Imported) -> Pending:
 
 
 def test_added_and_moved_reflectors_are_drawn_where_they_would_stand() -> None:
-    table = ReflectorMap((Reflector("R1", 0.25, 2.5), Reflector("R2", 0.25, 6.5, 0.05), Reflector("N", 6.0, 7.8)))
+    table = ReflectorMap(
+        (
+            Reflector(id="R1", x=0.25, y=2.5),
+            Reflector(id="R2", x=0.25, y=6.5, radius=0.05),
+            Reflector(id="N", x=6.0, y=7.8),
+        )
+    )
     ghosts = ghosts_of(room(), pending(ReflectorImport(table)))
     assert ghosts.centers.tolist() == [[6.0, 7.8], [0.25, 2.5]]
     assert [line.tolist() for line in ghosts.lines] == [[[0.25, 2.0], [0.25, 2.5]]]
 
 
 def test_new_courses_of_routes_and_new_stations_are_drawn() -> None:
-    route = Route("Detour", (Segment(np.array([[2.0, 2.0], [4.0, 6.0]]), degree=1),))
-    layout = RouteImport((route,), (), (Station("Dock", 4.0, 6.0),), ("V",), ("hall",))
+    route = Route("Detour", (Segment(control_points=np.array([[2.0, 2.0], [4.0, 6.0]]), degree=1),))
+    layout = RouteImport((route,), (), (Station(name="Dock", x=4.0, y=6.0),), ("V",), ("hall",))
     ghosts = ghosts_of(room(), pending(layout))
     assert ghosts.centers.tolist() == [[4.0, 6.0]]
     np.testing.assert_allclose(ghosts.lines[0][[0, -1]], [[2.0, 2.0], [4.0, 6.0]], atol=1e-9)

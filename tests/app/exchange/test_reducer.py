@@ -39,8 +39,8 @@ from tests.app.sites import room
 ME, OTHER = 1, 2
 FILE = Upload("<b>hall.imk", b"")
 COLUMNS = ("id", "x", "y", "radius")
-NORTH, SOUTH = Reflector("N", 6.0, 7.8), Reflector("S", 6.0, 0.2)
-DETOUR = Route("Detour", (Segment(np.array([[2.0, 2.0], [4.0, 6.0]]), degree=1),))
+NORTH, SOUTH = Reflector(id="N", x=6.0, y=7.8), Reflector(id="S", x=6.0, y=0.2)
+DETOUR = Route("Detour", (Segment(control_points=np.array([[2.0, 2.0], [4.0, 6.0]]), degree=1),))
 
 
 @pytest.fixture
@@ -88,7 +88,7 @@ def test_reading_is_asked_for_and_changes_nothing(state: AppState) -> None:
 
 
 def test_accepted_table_is_one_undo_step_that_is_named_after_the_file(state: AppState) -> None:
-    looking = looking_at(state, table(Reflector("R1", 0.25, 2.1), NORTH))
+    looking = looking_at(state, table(Reflector(id="R1", x=0.25, y=2.1), NORTH))
     assert looking.project is state.project
     result = after(looking, actions.AcceptImport(ME))
     assert ids(result.state) == ["R1", "R2", "R3", "R4", "N"]
@@ -125,7 +125,7 @@ def test_what_the_file_has_no_column_for_stays(state: AppState) -> None:
 
 
 def test_table_without_names_moves_no_reflector_that_happens_to_have_a_made_up_one(state: AppState) -> None:
-    unnamed = table(Reflector("R1", 6.0, 7.8), Reflector("R2", 0.25, 2.0), fields=("x", "y"))
+    unnamed = table(Reflector(id="R1", x=6.0, y=7.8), Reflector(id="R2", x=0.25, y=2.0), fields=("x", "y"))
     result = after(looking_at(state, unnamed), actions.AcceptImport(ME)).state
     assert ids(result) == ["R1", "R2", "R3", "R4", "R5"]
     assert result.project.reflectors.reflectors[:4] == state.project.reflectors.reflectors
@@ -140,12 +140,12 @@ def test_preview_is_of_the_project_as_it_is_when_it_is_accepted(state: AppState)
 
 
 def test_layout_changes_routes_and_stations_and_keeps_accuracies(state: AppState) -> None:
-    dock = Station("Dock", 2.0, 2.0, required_accuracy=0.01)
-    held = replace(state, project=replace(state.project, stations=(dock, Station("Old", 0.0, 0.0))))
-    layout = RouteImport((DETOUR,), (), (Station("Dock", 2.5, 2.0),), ("AGV",), ("hall",))
+    dock = Station(name="Dock", x=2.0, y=2.0, required_accuracy=0.01)
+    held = replace(state, project=replace(state.project, stations=(dock, Station(name="Old", x=0.0, y=0.0))))
+    layout = RouteImport((DETOUR,), (), (Station(name="Dock", x=2.5, y=2.0),), ("AGV",), ("hall",))
     merged = after(looking_at(held, layout), actions.AcceptImport(ME)).state.project
     assert [route.name for route in merged.routes] == ["There and back", "Detour"]
-    assert merged.stations[0] == Station("Dock", 2.5, 2.0, required_accuracy=0.01)
+    assert merged.stations[0] == Station(name="Dock", x=2.5, y=2.0, required_accuracy=0.01)
     looking = after(looking_at(held, layout), actions.RemoveAbsent(ME, True)).state
     replaced = after(looking, actions.AcceptImport(ME)).state.project
     assert replaced.routes == (DETOUR,)
@@ -153,7 +153,7 @@ def test_layout_changes_routes_and_stations_and_keeps_accuracies(state: AppState
 
 
 def test_order_says_nothing_about_stations(state: AppState) -> None:
-    dock = Station("Dock", 2.0, 2.0)
+    dock = Station(name="Dock", x=2.0, y=2.0)
     held = replace(state, project=replace(state.project, stations=(dock,)))
     looking = after(looking_at(held, RouteImport((DETOUR,))), actions.RemoveAbsent(ME, True)).state
     replaced = after(looking, actions.AcceptImport(ME)).state.project

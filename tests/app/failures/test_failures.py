@@ -64,7 +64,7 @@ def test_an_unknown_reflector_cannot_fail(project: Project) -> None:
 
 
 def test_it_is_said_of_a_reflector_that_no_route_sees_it(bench: Bench, project: Project) -> None:
-    hidden = Reflector("Hidden", 30.0, 30.0)
+    hidden = Reflector(id="Hidden", x=30.0, y=30.0)
     reflectors = ReflectorMap((*project.reflectors.reflectors, hidden))
     bench.state = replace(bench.state, project=replace(project, reflectors=reflectors))
     failures = ask(bench, SetPlan("ranking", value=True), SetPlan("failed", "Hidden"))

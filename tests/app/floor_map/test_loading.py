@@ -36,7 +36,7 @@ class Loading:
             compile=lambda _progress: None,
             note=lambda _project, what: self.edits.append(what),
         )
-        self.runtime = Runtime(AppState(Project("New"), Project("New")), work)
+        self.runtime = Runtime(AppState(Project(name="New"), Project(name="New")), work)
         self.runtime.handle(editing.Join(ME))
 
     @property

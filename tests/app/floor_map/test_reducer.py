@@ -220,7 +220,7 @@ def test_too_few_points_are_refused_and_kept(state: AppState) -> None:
 
 
 def test_walls_can_be_drawn_before_there_is_a_map() -> None:
-    empty = after(AppState(Project("New"), Project("New")), editing.Join(ME)).state
+    empty = after(AppState(Project(name="New"), Project(name="New")), editing.Join(ME)).state
     drawn = after(empty, use(Tool.WALL), click(0.0, 0.0), click(10.0, 0.0), editing.Finish(ME)).state
     assert drawn.project.floor_map is not None
     with pytest.raises(UsageError, match="no floor map to erase in"):
@@ -274,7 +274,7 @@ def test_a_doubtful_distance_is_told_and_a_wrong_one_refused(state: AppState) ->
 def test_maps_of_many_undo_steps_take_bounded_memory_and_all_come_back() -> None:
     side = 4000
     first = FloorMap(np.zeros((side, side), np.int8), 0.05)
-    project = Project("Large", first)
+    project = Project(name="Large", floor_map=first)
     state = after(AppState(project, project), editing.Join(ME), use(Tool.OBSTACLE)).state
     steps = MAP_BYTES // side**2 + 3
     seen = [first]

@@ -124,7 +124,10 @@ def test_a_station_says_whether_its_accuracy_is_met(project: Project) -> None:
     x, y = (float(value) for value in project.routes[0].segments[0].control_points[-1])
     drive = expected(project).prediction.drive
     heading = float(drive.poses[np.argmin(np.hypot(*(drive.poses[:, :2] - (x, y)).T)), 2])
-    stations = Station("Easy <dock>", x, y, heading, 0.1), Station("Hard", x, y, heading, 0.001)
+    stations = (
+        Station(name="Easy <dock>", x=x, y=y, heading=heading, required_accuracy=0.1),
+        Station(name="Hard", x=x, y=y, heading=heading, required_accuracy=0.001),
+    )
     route = expected(replace(project, stations=stations))
     drawn = chart(route, None)
     assert [each.is_met for each in route.stations] == [True, False]

@@ -33,7 +33,14 @@ def drive(count: int, beams: int = 7, *, intensities: bool = True) -> Iterator[R
         ranges = np.abs(random.normal(size=beams)).astype(np.float32)
         ranges[step % beams] = np.nan
         strength = random.normal(size=beams).astype(np.float32) if intensities else None
-        yield Scan(stamp, ranges, -1.0, 0.01, strength, ranges > 1.0)
+        yield Scan(
+            stamp_ns=stamp,
+            ranges=ranges,
+            angle_min=-1.0,
+            angle_increment=0.01,
+            intensities=strength,
+            reflector=ranges > 1.0,
+        )
 
 
 def equal(first: object, second: object) -> bool:

@@ -52,7 +52,7 @@ def test_a_difference_of_distances_is_told_and_split_between_the_points(
 def site() -> Project:
     return replace(
         room(),
-        stations=(Station("Dock", 3.0, 2.0, 0.3),),
+        stations=(Station(name="Dock", x=3.0, y=2.0, heading=0.3),),
         disturbances=Disturbances(
             shiny_objects=(ShinyObject(1.0, 2.0),), tilted_stretches=(TiltedStretch(4.0, 5.0, 1.0),)
         ),

@@ -23,7 +23,7 @@ def selections(draw: st.DrawFn) -> tuple[ReflectorMap, tuple[str, ...]]:
     """A map and some of its ids."""
     ids = draw(st.lists(st.integers(0, 30).map(lambda n: f"R{n}"), max_size=6, unique=True))
     kinds = st.sampled_from(ReflectorKind)
-    one = [draw(st.builds(Reflector, st.just(i), METRES, METRES, kind=kinds, heading=ANGLE)) for i in ids]
+    one = [draw(st.builds(Reflector, id=st.just(i), x=METRES, y=METRES, kind=kinds, heading=ANGLE)) for i in ids]
     return ReflectorMap(tuple(one)), tuple(draw(st.lists(st.sampled_from(ids), unique=True)) if ids else ())
 
 
@@ -93,20 +93,22 @@ def test_names_go_on_counting_with_the_width_that_is_there():
 
 
 def test_added_reflectors_are_like_the_given_one_and_numbered_on():
-    added = edits.add(ReflectorMap((Reflector("R1", 0.0, 0.0),)), [[1, 2], [3, 4]], Reflector("R1", 0, 0, 0.05))
+    added = edits.add(
+        ReflectorMap((Reflector(id="R1", x=0.0, y=0.0),)), [[1, 2], [3, 4]], Reflector(id="R1", x=0, y=0, radius=0.05)
+    )
     assert added.ids == ("R2", "R3")
     assert [(r.x, r.y, r.radius) for r in added.reflectors.reflectors[1:]] == [(1, 2, 0.05), (3, 4, 0.05)]
 
 
 def test_a_mirrored_plate_faces_the_mirrored_way():
-    plate = Reflector("P", 1.0, 0.0, kind=ReflectorKind.FLAT, heading=math.radians(30))
+    plate = Reflector(id="P", x=1.0, y=0.0, kind=ReflectorKind.FLAT, heading=math.radians(30))
     mirrored = edits.mirror(ReflectorMap((plate,)), ["P"], edits.Axis.through((0, -1), (0, 5))).reflectors[0]
     assert (mirrored.x, mirrored.y) == pytest.approx((-1.0, 0.0), abs=1e-12)
     assert math.degrees(mirrored.heading) == pytest.approx(150)
 
 
 def test_a_mirrored_copy_leaves_the_original():
-    added = edits.duplicate_mirrored(ReflectorMap((Reflector("R1", 1.0, 2.0),)), ["R1"], edits.Axis(0, 0, 0))
+    added = edits.duplicate_mirrored(ReflectorMap((Reflector(id="R1", x=1.0, y=2.0),)), ["R1"], edits.Axis(0, 0, 0))
     assert [(r.id, r.x, r.y) for r in added.reflectors.reflectors] == [("R1", 1.0, 2.0), ("R2", 1.0, -2.0)]
 
 
@@ -132,5 +134,5 @@ def test_a_row_reaches_its_end_when_the_spacing_fits():
 )
 def test_an_edit_that_cannot_be_is_refused_in_one_line(edit, kind, message):
     with pytest.raises(kind, match=message) as caught:
-        edit(ReflectorMap((Reflector("A", 0, 0), Reflector("B", 1, 0))))
+        edit(ReflectorMap((Reflector(id="A", x=0, y=0), Reflector(id="B", x=1, y=0))))
     assert isinstance(caught.value, CommissionError | ValueError)

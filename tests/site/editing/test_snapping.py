@@ -86,10 +86,10 @@ def test_the_edge_of_the_grid_is_a_surface_towards_the_free_outside():
 def test_a_cylinder_touches_the_wall_and_a_plate_lies_on_it_and_faces_the_hall():
     pair = ReflectorMap(
         (
-            Reflector("C", 5.4, 4.0, radius=0.04, heading=1.0),
-            Reflector("F", 5.4, 6.0, radius=0.04, kind=ReflectorKind.FLAT, heading=1.0),
-            Reflector("L", 5.4, 7.0, locked=True),
-            Reflector("far", 9.0, 5.0),
+            Reflector(id="C", x=5.4, y=4.0, radius=0.04, heading=1.0),
+            Reflector(id="F", x=5.4, y=6.0, radius=0.04, kind=ReflectorKind.FLAT, heading=1.0),
+            Reflector(id="L", x=5.4, y=7.0, locked=True),
+            Reflector(id="far", x=9.0, y=5.0),
         )
     )
     snapped = snapping.snap_to_wall(pair, ["C", "F", "L", "far"], half_plane(0.0))
@@ -106,7 +106,9 @@ def test_snapping_to_a_grid_twice_changes_nothing_more():
 
 
 def test_a_point_lines_up_with_the_nearest_row_and_column():
-    others = ReflectorMap((Reflector("A", 1.0, 5.0), Reflector("B", 7.0, 2.0), Reflector("own", 1.04, 2.04)))
+    others = ReflectorMap(
+        (Reflector(id="A", x=1.0, y=5.0), Reflector(id="B", x=7.0, y=2.0), Reflector(id="own", x=1.04, y=2.04))
+    )
     aligned = snapping.align(others, (1.05, 2.05), 0.1, ["own"])
     assert (aligned.x, aligned.x_of, aligned.y, aligned.y_of) == (1.0, "A", 2.0, "B")
     assert snapping.align(ReflectorMap(), (1.0, 2.0), 0.1) == snapping.Alignment(1.0, 2.0, None, None)

@@ -10,7 +10,10 @@ from commission.site.editing import stations as edits
 from commission.site.routes import Direction, Route, Segment
 from commission.site.stations import DOCKING, Station
 
-DOCK, GATE = Station("Dock", 1.0, 2.0, 0.0, DOCKING), Station("Gate", 5.0, 0.0)
+DOCK, GATE = (
+    Station(name="Dock", x=1.0, y=2.0, heading=0.0, required_accuracy=DOCKING),
+    Station(name="Gate", x=5.0, y=0.0),
+)
 
 
 def test_removing_what_was_added_gives_back_what_was():
@@ -18,7 +21,10 @@ def test_removing_what_was_added_gives_back_what_was():
 
 
 def test_a_station_keeps_its_place_when_it_is_renamed():
-    assert edits.put((DOCK, GATE), Station("Pier", 1.0, 2.0), "Dock") == (Station("Pier", 1.0, 2.0), GATE)
+    assert edits.put((DOCK, GATE), Station(name="Pier", x=1.0, y=2.0), "Dock") == (
+        Station(name="Pier", x=1.0, y=2.0),
+        GATE,
+    )
 
 
 def test_two_stations_never_get_one_name():
@@ -34,8 +40,8 @@ def test_an_unknown_station_is_answered_with_the_names_there_are():
 
 def there_and_back() -> Route:
     """Five metres east, and in reverse five metres back to the west, 1 m farther north at its end."""
-    there = Segment(np.array([[0.0, 0.0], [5.0, 0.0]]), degree=1)
-    back = Segment(np.array([[5.0, 0.0], [3.0, 0.0], [0.0, 1.0]]), Direction.REVERSE, degree=2)
+    there = Segment(control_points=np.array([[0.0, 0.0], [5.0, 0.0]]), degree=1)
+    back = Segment(control_points=np.array([[5.0, 0.0], [3.0, 0.0], [0.0, 1.0]]), direction=Direction.REVERSE, degree=2)
     return Route("r", (there, back))
 
 
@@ -57,7 +63,7 @@ def test_in_reverse_the_vehicle_looks_back_along_the_way():
 
 
 def test_of_several_routes_the_nearest_one_has_it():
-    other = Route("other", (Segment(np.array([[2.0, -5.0], [2.0, -0.3]]), degree=1),))
+    other = Route("other", (Segment(control_points=np.array([[2.0, -5.0], [2.0, -0.3]]), degree=1),))
     pose = edits.on_route((there_and_back(), other), (2.02, -0.25), math.inf)
     assert pose is not None
     assert pose[2] == pytest.approx(math.pi / 2)
@@ -68,6 +74,6 @@ def test_of_several_routes_the_nearest_one_has_it():
     [(0.3, 0.0), (math.pi - 0.3, -math.pi), (-math.pi + 0.1, -math.pi), (math.pi / 2, math.pi / 2)],
 )
 def test_a_station_put_onto_a_route_keeps_the_way_it_looks(heading: float, expected: float):
-    moved = edits.aligned(Station("S", 9.0, 9.0, heading), np.array([1.0, 2.0, 0.0]))
+    moved = edits.aligned(Station(name="S", x=9.0, y=9.0, heading=heading), np.array([1.0, 2.0, 0.0]))
     assert (moved.x, moved.y) == (1.0, 2.0)
     assert math.cos(moved.heading - expected) == pytest.approx(1.0)
