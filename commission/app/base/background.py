@@ -36,7 +36,7 @@ class Background:
         numbers = itertools.count(1)
         # Looking at the site takes milliseconds and does not wait for a simulation, nor does a file that was just sent;
         # a suggested layout takes so long that everything else must not wait for it.
-        self.drives, patient, looking, reading = (Jobs(post, numbers) for _ in range(4))
+        self.drives, patient, looking, reading = (Jobs(post, numbers=numbers) for _ in range(4))
         self.planner = Planner(self.drives, patient)
         self.inspection = Inspection(looking)
         self._map_work = MapWork(reading)
@@ -49,7 +49,7 @@ class Background:
         match effect:
             case reduction.CancelJob(number):
                 for jobs in self._runners:
-                    jobs.cancel(number)
+                    jobs.stop(number)
             case ReadMapFile() | DrawMap() | StopMapWork():
                 self._map_work.do(effect)
             case reduction.ReadFile() | reduction.StopReading() | reduction.ExportProject():

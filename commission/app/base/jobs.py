@@ -1,7 +1,9 @@
-"""Background work: one worker does one job after the other while the page stays quick.
+"""Background work: the one mechanism by which anything is done while the page stays quick.
 
-Nothing here knows what a job computes. Jobs share no state with the thread that owns the project: they get values, and
-their reports (progress, result, error) go through a callback, normally the owner's queue.
+A job carries its continuation: what is to be done with its result, as a function that the owner thread calls and that
+returns the action to reduce. So nobody has to find out whose result has come. Nothing here knows what a job computes.
+Jobs share no state with the thread that owns the project: they get values, and their news (progress, result, error) go
+through a callback, normally the owner's queue.
 """
 
 from __future__ import annotations
@@ -11,10 +13,11 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from queue import SimpleQueue
+from typing import Any, TypeVar
 
 from commission.errors import CommissionError, JobCancelled, JobError
 from commission.progress import Progress
@@ -23,6 +26,21 @@ _log = logging.getLogger(__name__)
 
 _QUIET_S = 0.05
 """Shortest time between two reports of progress: 20 a second look smooth and do not crowd out other actions."""
+
+Result = TypeVar("Result")
+
+
+class Lane(StrEnum):
+    """Who waits for whom: jobs of one lane are done one after the other, lanes beside each other."""
+
+    QUICK = "quick"
+    """Milliseconds: what follows every edit."""
+    FILES = "files"
+    """A file that somebody has just sent, or asked for."""
+    USUAL = "usual"
+    """Seconds."""
+    PATIENT = "patient"
+    """Minutes; nothing else must wait for it."""
 
 
 class JobState(StrEnum):
@@ -45,6 +63,12 @@ class Job:
     name: str
     """What is being done, in the user's words: "Coverage"."""
 
+    key: Hashable = None
+    """What a newer job must share with it to end it."""
+
+    is_shown: bool = True
+    """Whether the page shows it: not what is too quick, or started too often."""
+
     state: JobState = JobState.WAITING
     """Where it stands."""
 
@@ -61,10 +85,15 @@ class Job:
         if not 0.0 <= self.fraction <= 1.0:
             raise ValueError(f"fraction is {self.fraction}; expected 0 to 1")
 
+    @property
+    def has_ended(self) -> bool:
+        """Whether it neither waits nor runs."""
+        return self.state not in (JobState.WAITING, JobState.RUNNING)
+
 
 @dataclass(frozen=True, slots=True)
 class JobReport:
-    """News about a job, handed to the owner."""
+    """News about a job, handed to the owner, who hands it to `Jobs.hear`."""
 
     job: Job
     """How it stands now."""
@@ -73,35 +102,74 @@ class JobReport:
     """What the work returned; only in the report that says `JobState.DONE`."""
 
 
-Work = Callable[[Progress], object]
-"""Does the work and returns its result; calls the given progress often enough to be stopped without annoyance."""
+def _nothing(*_: object) -> None:
+    """Continuation of a job of which nothing follows."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Continuation:
+    """What follows from the end of a job: each returns an action for the owner, or None."""
+
+    key: Hashable
+    then: Callable[[Any], object]
+    failed: Callable[[Job], object]
+    stopped: Callable[[], object]
 
 
 class Jobs:
-    """Runs work in the background, one job after the other.
+    """Runs work in the background.
 
     Parameters
     ----------
     post : takes each `JobReport`, from the thread in which it arises. It should only put it into the owner's queue.
         Reports about one job arrive in order. Progress is thinned out; a change of state or message never is.
+    failed : from a job that failed to the action that says so, for all jobs that do not see to it themselves.
     numbers : where the jobs' numbers come from; runners that report to the same owner share it.
     """
 
-    def __init__(self, post: Callable[[JobReport], None], numbers: Iterator[int] | None = None) -> None:
-        self._post = post
+    def __init__(
+        self,
+        post: Callable[[JobReport], None],
+        failed: Callable[[Job], object] = _nothing,
+        numbers: Iterator[int] | None = None,
+    ) -> None:
+        self._post, self._failed = post, failed
         self._numbers = itertools.count(1) if numbers is None else numbers
         # Held while a report is posted, so that they arrive in order; re-entrant, in case `post` looks at the jobs.
         self._lock = threading.RLock()
         self._unfinished: dict[int, Job] = {}
         self._stopped: set[int] = set()
-        self._queue: SimpleQueue[tuple[int, Work] | None] = SimpleQueue()
+        # Of every job whose end the owner has not heard of and still wants to.
+        self._continuations: dict[int, _Continuation] = {}
+        self._lanes: dict[Lane, SimpleQueue[tuple[int, Callable[[Progress], object]] | None]] = {}
+        self._workers: list[threading.Thread] = []
         self._is_closed = False
-        # A daemon: work that ignores its cancellation must not keep the program from ending.
-        self._worker = threading.Thread(target=self._work_off, name="jobs", daemon=True)
-        self._worker.start()
 
-    def start(self, name: str, work: Work) -> Job:
-        """Queue work; an unfinished job of the same name is cancelled, since its result would be outdated.
+    def start(
+        self,
+        name: str,
+        work: Callable[[Progress], Result],
+        *,
+        then: Callable[[Result], object] = _nothing,
+        failed: Callable[[Job], object] | None = None,
+        stopped: Callable[[], object] = _nothing,
+        key: Hashable = None,
+        lane: Lane = Lane.USUAL,
+        is_shown: bool = True,
+    ) -> Job:
+        """Queue work; an unfinished job of the same key is cancelled, since its result would be outdated.
+
+        Parameters
+        ----------
+        name : what is being done, in the user's words.
+        work : does it and returns the result; calls the given progress often enough to be stopped without annoyance.
+        then : called by the owner thread with the result, unless the job was cancelled before; returns the action that
+            follows, or None.
+        failed : called by the owner thread where the work raised; returns the action that says so.
+        stopped : called by the owner thread where somebody stopped the job; returns the action that follows, or None.
+        key : of the jobs of which only the newest counts; the name when None.
+        lane : in which it waits.
+        is_shown : whether the page shows it.
 
         Raises
         ------
@@ -111,44 +179,92 @@ class Jobs:
         with self._lock:
             if self._is_closed:
                 raise JobError(f"{name} cannot start: the program is closing")
-            for job in self.unfinished():
-                if job.name == name:
-                    self.cancel(job.number)
-            job = Job(next(self._numbers), name)
+            key = name if key is None else key
+            self.cancel(key)
+            job = Job(next(self._numbers), name, key, is_shown)
+            self._continuations[job.number] = _Continuation(key, then, failed or self._failed, stopped)
             self._record(job)
-            self._queue.put((job.number, work))
+            self._lane(lane).put((job.number, work))
             return job
 
-    def cancel(self, number: int) -> None:
-        """Ask a job to stop: a waiting one never starts, a running one ends at its next call of progress.
+    def cancel(self, key: Hashable) -> None:
+        """Let nothing follow any more from the job of a key: it is not wanted.
 
-        A job that has ended, or never existed, cannot be cancelled: nothing happens.
+        A waiting one never starts, a running one ends at its next call of progress. Where it has ended already and the
+        owner has not heard of it yet, it never will. Where there is none, nothing happens.
+        """
+        with self._lock:
+            self._continuations = {number: each for number, each in self._continuations.items() if each.key != key}
+            for job in self.unfinished():
+                if job.key == key:
+                    self._end(job)
+
+    def stop(self, number: int) -> None:
+        """End a job because a person asked for it: as for `cancel`, and its `stopped` is what follows.
+
+        A job that has ended, or never existed, cannot be stopped: nothing happens.
         """
         with self._lock:
             job = self._unfinished.get(number)
-            if job is not None and job.state is JobState.WAITING:
-                self._record(replace(job, state=JobState.CANCELLED))
-            elif job is not None:
-                self._stopped.add(number)
+            if job is not None:
+                self._end(job)
+
+    def hear(self, report: JobReport) -> object:
+        """Take a report back from the owner's queue; return the action that follows from it, or None.
+
+        Called by the owner thread alone: what it has cancelled before is never heard of.
+        """
+        job = report.job
+        if not job.has_ended:
+            return None
+        with self._lock:
+            continuation = self._continuations.pop(job.number, None)
+        if continuation is None:
+            return None
+        match job.state:
+            case JobState.DONE:
+                return continuation.then(report.result)
+            case JobState.FAILED:
+                return continuation.failed(job)
+            case _:
+                return continuation.stopped()
 
     def unfinished(self) -> tuple[Job, ...]:
         """Jobs that wait or run, oldest first."""
         with self._lock:
             return tuple(self._unfinished.values())
 
+    def running(self) -> tuple[Job, ...]:
+        """Jobs that the page shows, oldest first."""
+        return tuple(job for job in self.unfinished() if job.is_shown and job.state is JobState.RUNNING)
+
     def close(self, timeout: float = 2.0) -> bool:
-        """Cancel everything and wait for the worker, at most `timeout` seconds; whether it has ended."""
+        """Cancel everything and wait for the workers, at most `timeout` seconds in all; whether they have ended."""
         with self._lock:
             self._is_closed = True
+            self._continuations.clear()
             for job in self.unfinished():
-                self.cancel(job.number)
-        self._queue.put(None)
-        self._worker.join(timeout)
-        return not self._worker.is_alive()
+                self._end(job)
+            for queue in self._lanes.values():
+                queue.put(None)
+        end = time.monotonic() + timeout
+        for worker in self._workers:
+            worker.join(max(0.0, end - time.monotonic()))
+        return not any(worker.is_alive() for worker in self._workers)
 
-    def _work_off(self) -> None:
-        """Loop of the worker's thread."""
-        while (item := self._queue.get()) is not None:
+    def _lane(self, lane: Lane) -> SimpleQueue[tuple[int, Callable[[Progress], object]] | None]:
+        """Queue of a lane; its worker starts with its first job. The lock is held."""
+        if lane not in self._lanes:
+            queue = self._lanes[lane] = SimpleQueue()
+            # A daemon: work that ignores its cancellation must not keep the program from ending.
+            worker = threading.Thread(target=self._work_off, args=(queue,), name=f"jobs {lane}", daemon=True)
+            self._workers.append(worker)
+            worker.start()
+        return self._lanes[lane]
+
+    def _work_off(self, queue: SimpleQueue[tuple[int, Callable[[Progress], object]] | None]) -> None:
+        """Loop of a worker's thread."""
+        while (item := queue.get()) is not None:
             number, work = item
             with self._lock:
                 job = self._unfinished.get(number)
@@ -157,7 +273,7 @@ class Jobs:
                 self._record(replace(job, state=JobState.RUNNING))
             self._run(number, work)
 
-    def _run(self, number: int, work: Work) -> None:
+    def _run(self, number: int, work: Callable[[Progress], object]) -> None:
         """Do one job and record how it ended."""
         state, result, error = JobState.DONE, None, ""
         try:
@@ -194,13 +310,20 @@ class Jobs:
 
         return progress
 
+    def _end(self, job: Job) -> None:
+        """Let an unfinished job end: at once while it waits, at its next progress while it runs. The lock is held."""
+        if job.state is JobState.WAITING:
+            self._record(replace(job, state=JobState.CANCELLED))
+        else:
+            self._stopped.add(job.number)
+
     def _record(self, job: Job, result: object = None) -> None:
         """Keep and report how a job stands now; an ended one is forgotten. The lock is held."""
-        if job.state in (JobState.WAITING, JobState.RUNNING):
-            self._unfinished[job.number] = job
-        else:
+        if job.has_ended:
             del self._unfinished[job.number]
             self._stopped.discard(job.number)
+        else:
+            self._unfinished[job.number] = job
         self._post(JobReport(job, result))
 
 

@@ -63,7 +63,7 @@ class Exchanger:
     def _stop(self, client: int) -> None:
         """Cancel what is being read for a browser; nothing happens when that is nothing."""
         if client in self._reading:
-            self._jobs.cancel(self._reading.pop(client))
+            self._jobs.stop(self._reading.pop(client))
 
     def _hear(self, report: JobReport) -> None:
         """Turn a report of a job into an action; called by the worker's thread, too."""

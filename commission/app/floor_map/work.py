@@ -33,7 +33,7 @@ class MapWork:
     def do(self, effect: MapEffect) -> None:
         """Start or stop the work; its outcome is the job's result."""
         for job in self._jobs.unfinished():
-            self._jobs.cancel(job.number)
+            self._jobs.stop(job.number)
         match effect:
             case ReadMapFile():
                 self._jobs.start(effect.job, lambda progress: read(effect, progress))

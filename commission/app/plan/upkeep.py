@@ -55,7 +55,7 @@ class Upkeep(Generic[Result]):
     def drop(self) -> None:
         """Forget the result and stop the job: it is not wanted any more."""
         if self._running is not None:
-            self._jobs.cancel(self._running[0])
+            self._jobs.stop(self._running[0])
         self.result, self.key, self._running = None, (), None
 
     def hear(self, report: JobReport) -> bool:
