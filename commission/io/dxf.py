@@ -1,7 +1,7 @@
-"""Floor plans from CAD drawings (DXF): lines, polylines with bulges, arcs, circles, ellipses, splines and blocks.
+"""Floor plans from CAD drawings (DXF): lines and curves, wide polylines, multilines, faces, hatches, and blocks.
 
 A drawing is loaded once, as a job with progress; layers and resolution are chosen afterwards, on what was loaded.
-Texts, dimensions and hatches are no walls and are left out; how many is said.
+Bodies are drawn by their outlines. Texts and dimensions are no walls and are left out; how many is said.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from numpy.typing import NDArray
 
 from commission.errors import FileFormatError, UsageError
 from commission.geometry.arrays import FloatArray, read_only
-from commission.io.dxf_shapes import Affine, Insert, Shape, insert_of, shapes_of
+from commission.io.dxf_entities import Insert, insert_of, shapes_of
+from commission.io.dxf_shapes import Affine, Shape
 from commission.io.dxf_tags import Group, read_groups, text_of
+from commission.io.dxf_units import UNITS, doubts, judged_unit, stated_unit
 from commission.io.findings import Findings, shown
 from commission.io.outline import outline_map
 from commission.progress import Progress, silent
 from commission.site.floor_map import FloorMap
 
-UNITS = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048, "dm": 0.1, "km": 1000.0}
-"""Metres in each unit that a drawing may be made in."""
 TOLERANCE = 0.001
 """Distance [m] between a curve and its chords: a fiftieth of a map's usual cell."""
 SEGMENT_LIMIT = 10_000_000
@@ -38,13 +38,16 @@ DEPTH_LIMIT = 32
 """Blocks within blocks."""
 
 _INSERTS_PER_REPORT = 1000
-_UNIT_CODES = {1: "in", 2: "ft", 4: "mm", 5: "cm", 6: "m", 7: "km", 14: "dm"}
-_DRAWN = {b"LINE", b"LWPOLYLINE", b"POLYLINE", b"ARC", b"CIRCLE", b"ELLIPSE", b"SPLINE", b"INSERT"}
+_DRAWN = {b"LINE", b"LWPOLYLINE", b"POLYLINE", b"ARC", b"CIRCLE", b"ELLIPSE", b"SPLINE", b"INSERT"} | {
+    b"MLINE",
+    b"SOLID",
+    b"TRACE",
+    b"3DFACE",
+    b"HATCH",
+}
 _PARTS = {b"VERTEX", b"SEQEND", b"ATTRIB", b"ENDBLK", b"ENDSEC"}
 _BLIND_TOLERANCE = 0.02
 """Tolerance in drawing units while the unit is unknown: 20 mm if they are metres, not too fine if millimetres."""
-_LARGEST_HALL = 1000.0
-"""A drawing without a unit that is larger than this is in millimetres, a smaller one in metres."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +114,8 @@ def read_drawing(path: Path, *, unit: str | None = None, progress: Progress = si
     Raises
     ------
     FileFormatError
-        the file is no complete DXF, or too large. An entity that cannot be read is passed over and counted.
+        the file is no DXF, ends before its entities do, or is too large. An entity that cannot be read is passed over
+        and counted.
     UsageError
         the unit is unknown.
     """
@@ -139,10 +143,13 @@ class _Reader:
         self._path = path
         self._progress = progress
         self._fraction = 0.0
-        self._unit = unit
+        self._unit = None if unit is None else (unit, UNITS[unit])
+        self._is_unit_chosen = unit is not None
+        self._has_entities = self._has_end = False
         self._found = Findings()
         self._blocks: dict[str, _Block] = {}
-        self._hidden: set[str] = set()
+        self._off: set[str] = set()
+        self._frozen: set[str] = set()
         self._left_out: Counter[str] = Counter()
         self._section = ""
         self._block: _Block | None = None
@@ -162,7 +169,7 @@ class _Reader:
         if self._polyline is not None and group.kind == b"VERTEX":
             self._polyline[1].append(group)
             return
-        self.finish()
+        self._draw_polyline()
         if group.kind == b"SECTION":
             self._section = group.name(2).upper()
             if self._section == "HEADER":
@@ -171,10 +178,22 @@ class _Reader:
             self._read_layer(group)
         elif self._section == "BLOCKS" and group.kind == b"BLOCK":
             self._open_block(group)
+        elif group.kind == b"EOF":
+            self._has_end = True
         elif self._section in ("BLOCKS", "ENTITIES") and group.kind not in _PARTS:
             self._take_entity(group)
+        elif self._section == "ENTITIES" and group.kind == b"ENDSEC":
+            self._has_entities = True
 
     def finish(self) -> None:
+        """Take note that the file has ended; raises FileFormatError where its entities are not complete."""
+        self._draw_polyline()
+        if not self._has_end and not self._has_entities:
+            raise FileFormatError(self._path, "", "ends before its entities do", "a complete DXF drawing")
+        if not self._has_end:
+            self._found.add("", "the end mark EOF is missing; what comes before it was read")
+
+    def _draw_polyline(self) -> None:
         """Draw the polyline whose vertices have come one by one."""
         if self._polyline is not None:
             polyline, vertices = self._polyline
@@ -185,32 +204,38 @@ class _Reader:
         """Everything that was taken."""
         segments = np.frombuffer(self._coordinates, dtype=np.float64).reshape(-1, 2, 2)
         layer_of = np.frombuffer(self._layers, dtype=np.int32)
-        unit = self._unit
-        if unit is None:
-            extent = float(np.ptp(segments.reshape(-1, 2), axis=0).max()) if len(segments) else 0.0
-            unit = "mm" if extent > _LARGEST_HALL else "m"
-            self._found.add("", f"the drawing names no unit; judged by its size, it is drawn in {unit}")
+        width, height = np.ptp(segments.reshape(-1, 2), axis=0).tolist() if len(segments) else (0.0, 0.0)
+        unit, metres = self._unit or (judged_unit((width, height)), 0.0)
+        metres = metres or UNITS[unit]
+        if not self._is_unit_chosen and len(segments):
+            doubt = doubts((width, height), unit, metres, is_stated=self._unit is not None)
+            if doubt:
+                self._found.add("", doubt)
         for kind, count in self._left_out.most_common():
             self._found.add("", f"{count} entities of kind {shown(kind)} are no walls or not understood, and left out")
         counts = np.bincount(layer_of, minlength=len(self._names)).tolist()
-        layers = tuple(DrawingLayer(name, name not in self._hidden, counts[i]) for name, i in self._names.items())
-        return Drawing(
-            self._path, unit, layers, read_only(segments * UNITS[unit]), read_only(layer_of), self._found.lines()
-        )
+        layers = tuple(DrawingLayer(name, self._is_visible(name), counts[i]) for name, i in self._names.items())
+        return Drawing(self._path, unit, layers, read_only(segments * metres), read_only(layer_of), self._found.lines())
+
+    def _is_visible(self, layer: str) -> bool:
+        return layer.upper() not in self._off | self._frozen
 
     def _read_header(self, group: Group) -> None:
         """Unit of the drawing; a header is one group of names (code 9), each with its value behind it."""
         for (code, name), (_, value) in itertools.pairwise(group.tags):
             if code == 9 and name == b"$INSUNITS" and self._unit is None and value.isdigit():
-                self._unit = _UNIT_CODES.get(int(value[:6]))
+                self._unit = stated_unit(int(value[:6]))
 
     def _read_layer(self, group: Group) -> None:
         try:
             is_frozen, is_off = group.whole(70) & 1, group.whole(62, 7) < 0
         except ValueError:
             is_frozen, is_off = 0, False
-        if is_frozen or is_off:
-            self._hidden.add(group.name(2))
+        # Names of layers are told apart without regard to upper and lower case.
+        if is_frozen:
+            self._frozen.add(group.name(2).upper())
+        if is_off:
+            self._off.add(group.name(2).upper())
 
     def _open_block(self, group: Group) -> None:
         try:
@@ -252,7 +277,7 @@ class _Reader:
         if isinstance(part, Insert):
             self._expand(part, layer, to, depth)
             return
-        points = part.chords(to, TOLERANCE / UNITS[self._unit] if self._unit is not None else _BLIND_TOLERANCE)
+        points = part.chords(to, TOLERANCE / self._unit[1] if self._unit is not None else _BLIND_TOLERANCE)
         number = self._names.setdefault(layer, len(self._names))
         for (x1, y1), (x2, y2) in itertools.pairwise(points):
             if not abs(x1) + abs(y1) + abs(x2) + abs(y2) < 1e12:
@@ -264,12 +289,17 @@ class _Reader:
             raise FileFormatError(self._path, "", problem, "a drawing of the walls alone")
 
     def _expand(self, insert: Insert, layer: str, to: Affine, depth: int) -> None:
-        """Draw the content of a block as often as it is inserted; what is on layer 0 in it takes the insert's layer."""
+        """Draw the content of a block as often as it is inserted.
+
+        What is on layer 0 in it takes the insert's layer. An insert on a frozen layer is hidden as a whole (on one that
+        is only switched off, it is not): all of its content then counts as being on that layer.
+        """
         block = self._blocks.get(insert.block.upper())
         if block is None or depth >= DEPTH_LIMIT:
             problem = "does not exist" if block is None else f"is nested over {DEPTH_LIMIT} deep, or in itself"
             self._found.add(f"block {shown(insert.block)}", problem)
             return
+        is_frozen = layer.upper() in self._frozen
         for index in range(insert.rows * insert.columns):
             self._inserts += 1
             if self._inserts % _INSERTS_PER_REPORT == 0:
@@ -287,4 +317,4 @@ class _Reader:
             if not math.isfinite(inner.xx + inner.xy + inner.yx + inner.yy + inner.x0 + inner.y0):
                 raise OverflowError("the block is scaled beyond numbers")
             for own, part in block.content:
-                self._draw(part, layer if own == "0" else own, inner, depth + 1)
+                self._draw(part, layer if own == "0" or is_frozen else own, inner, depth + 1)

@@ -6,6 +6,7 @@ a job with progress. So files are read here, group by group, and ezdxf is asked 
 
 from __future__ import annotations
 
+import itertools
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -26,6 +27,9 @@ _TAG_LIMIT = 2_000_000
 """Pairs in one group: a polyline of about 700,000 points."""
 _BYTES_PER_REPORT = 250_000
 
+MODERN = ("utf-8", "cp1252")
+"""Encodings of texts since AutoCAD 2007, and of drawings that do not say how old they are."""
+
 Tag = tuple[int, bytes]
 
 
@@ -39,6 +43,8 @@ class Group:
     """The pairs behind it, without comments."""
     line: int
     """Line (from 1) of its code 0; in a binary file the number of the pair."""
+    encodings: tuple[str, ...] = MODERN
+    """How its texts may be encoded, the likeliest first."""
 
     def first(self, code: int, default: bytes = b"") -> bytes:
         """First value of a code."""
@@ -55,15 +61,39 @@ class Group:
 
     def name(self, code: int) -> str:
         """First value of a code as text."""
-        return text_of(self.first(code))
+        return text_of(self.first(code), self.encodings)
 
 
-def text_of(value: bytes) -> str:
-    """Text of a value: UTF-8 since AutoCAD 2007, before that a code page, of which the Western one is tried."""
-    try:
-        return value.decode("utf-8").strip()
-    except UnicodeDecodeError:
-        return value.decode("cp1252", errors="replace").strip()
+def text_of(value: bytes, encodings: tuple[str, ...] = MODERN) -> str:
+    r"""Text of a value; what older drawings write as \U+5899 or \M+1C7BD is the character that it stands for."""
+    for encoding in encodings:
+        try:
+            text = value.decode(encoding)
+            break
+        except UnicodeDecodeError:
+            continue
+    else:
+        text = value.decode("cp1252", errors="replace")
+    if "\\U+" in text or "\\M+" in text:
+        from ezdxf.lldxf.encoding import decode_dxf_unicode, decode_mif_to_unicode
+
+        text = decode_mif_to_unicode(decode_dxf_unicode(text))
+    return text.strip()
+
+
+def encodings_of(header: Group) -> tuple[str, ...]:
+    """Encodings of a drawing's texts by its header: UTF-8 since AutoCAD 2007 (AC1021), a code page before."""
+    variables = {name: value for (code, name), (_, value) in itertools.pairwise(header.tags) if code == 9}
+    version = text_of(variables.get(b"$ACADVER", b""))
+    if version >= "AC1021" or not version.startswith("AC"):
+        return MODERN
+    from ezdxf.tools.codepage import toencoding
+
+    page = text_of(variables.get(b"$DWGCODEPAGE", b""))
+    # Many programs state the Western page and write UTF-8, which Western text hardly ever looks like by chance; other
+    # pages are believed first.
+    encoding = toencoding(page)
+    return MODERN if encoding == "cp1252" else (encoding, *MODERN)
 
 
 def read_groups(path: Path, progress: Progress) -> Iterator[Group]:
@@ -77,7 +107,7 @@ def read_groups(path: Path, progress: Progress) -> Iterator[Group]:
     Raises
     ------
     FileFormatError
-        the file is too large, no DXF, or ends before its end mark.
+        the file is too large or no DXF. Whether it is complete is for the caller to see: the last group is then EOF.
     """
     check_size(path, SIZE_LIMIT)
     try:
@@ -92,12 +122,16 @@ def read_groups(path: Path, progress: Progress) -> Iterator[Group]:
 
 def _groups(path: Path, tags: Iterator[tuple[int, int, bytes]]) -> Iterator[Group]:
     group: Group | None = None
+    encodings = MODERN
     for line, code, value in tags:
         if code == 0:
             if group is not None:
+                if group.kind == b"SECTION" and group.first(2).upper() == b"HEADER":
+                    encodings = encodings_of(group)
                 yield group
-            group = Group(value.upper(), [], line)
+            group = Group(value.upper(), [], line, encodings)
             if group.kind == b"EOF":
+                yield group
                 return
         elif group is None:
             if code != 999:
@@ -107,7 +141,8 @@ def _groups(path: Path, tags: Iterator[tuple[int, int, bytes]]) -> Iterator[Grou
             if len(group.tags) > _TAG_LIMIT:
                 kind = text_of(group.kind)
                 raise FileFormatError(path, f"line {group.line}", f"{kind} has over {_TAG_LIMIT} values", "fewer")
-    raise FileFormatError(path, "", "ends without the mark EOF", "a complete DXF drawing")
+    if group is not None:
+        yield group
 
 
 def _text_tags(path: Path, file: IO[bytes], progress: Progress) -> Iterator[tuple[int, int, bytes]]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from commission.errors import FileFormatError, UsageError
 from commission.geometry.arrays import FloatArray, read_only
-from commission.io.dxf import UNITS
+from commission.io.dxf_units import UNITS
 from commission.io.glb_header import check_announced
 from commission.io.outline import outline_map
 from commission.io.reading import cannot_read, check_size

@@ -177,7 +177,7 @@ def test_layers_can_be_chosen_and_those_switched_off_are_not_drawn(tmp_path: Pat
         space.doc.layers.add("GRID").off()
         space.doc.layers.add("OLD").freeze()
         for i, name in enumerate(("WALL", "GRID", "OLD")):
-            space.add_line((0, i), (1, i), dxfattribs={"layer": name})
+            space.add_line((0, i), (10, i), dxfattribs={"layer": name})
         space.add_text("<script>alert(1)</script>")
 
     read = drawing(tmp_path, draw)
@@ -187,7 +187,7 @@ def test_layers_can_be_chosen_and_those_switched_off_are_not_drawn(tmp_path: Pat
         ("OLD", False, 1),
     ]
     assert len(read.on()) == 1
-    np.testing.assert_allclose(read.on(["GRID"]), [[[0, 1], [1, 1]]])
+    np.testing.assert_allclose(read.on(["GRID"]), [[[0, 1], [10, 1]]])
     assert read.warnings == ("1 entities of kind 'TEXT' are no walls or not understood, and left out",)
     with pytest.raises(UsageError, match="no layer is called 'ROOF'; the drawing has: 'WALL', 'GRID', 'OLD'"):
         read.on(["ROOF"])
@@ -260,11 +260,11 @@ BOMB = "".join(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "ends without the mark EOF"),
+        ("", "ends before its entities do"),
         ("hello\nworld\n", "line 1: is 'hello'; expected a group code"),
         ("5\n7\n0\nEOF\n", "line 1: begins with group code 5"),
         ("99999\n7\n", "line 1: group code is 99999"),
-        ("0\nSECTION\n2\nENTITIES\n0\nLINE\n", "ends without the mark EOF"),
+        ("0\nSECTION\n2\nENTITIES\n0\nLINE\n", "ends before its entities do"),
         ("0\n" + "A" * 100_000 + "\n", "line 2: is longer than 65536 bytes"),
         (
             f"0\nSECTION\n2\nBLOCKS\n{BOMB}0\nENDSEC\n0\nSECTION\n2\nENTITIES\n0\nINSERT\n2\nB0\n10\n0\n20\n0\n0\nEOF\n",

@@ -87,8 +87,8 @@ def test_unit_and_axis_can_be_said(tmp_path: Path) -> None:
     path = saved(tmp_path, box(4000, 3000, 2000), "stl")
     np.testing.assert_allclose(read_model(path, unit="mm").bounds, [[0, 0, 0], [4, 3, 2]], atol=1e-6)
     np.testing.assert_allclose(read_model(path, unit="mm", y_up=True).bounds, [[0, -2, 0], [4, 0, 3]], atol=1e-6)
-    with pytest.raises(UsageError, match="unit is 'yd'; expected one of: mm"):
-        read_model(path, unit="yd")
+    with pytest.raises(UsageError, match="unit is 'ell'; expected one of: mm"):
+        read_model(path, unit="ell")
 
 
 def test_part_that_a_scene_shows_twice_is_there_twice(tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ from typing import TypeAlias
 
 from commission.app.base.uploads import Upload
 from commission.app.editing.editor import Point
-from commission.io.dxf import UNITS, Drawing
+from commission.io.dxf import Drawing
+from commission.io.dxf_units import UNITS
 from commission.io.image_map import ImagePlacement, Picture
 from commission.io.mesh import KINDS as MODEL_KINDS
 from commission.io.mesh import Model

@@ -17,7 +17,8 @@ from commission.app.base.panel import Post, client_of, escaped, posting, table, 
 from commission.app.base.rows import Rows
 from commission.app.floor_map import actions
 from commission.app.floor_map.draft import MapDraft, MapOptions, Read, ReadOptions
-from commission.io.dxf import UNITS, Drawing, DrawingLayer
+from commission.io.dxf import Drawing, DrawingLayer
+from commission.io.dxf_units import UNITS
 from commission.io.image_map import Picture
 from commission.io.mesh import Model
 from commission.site.checks import field_hints
