@@ -41,7 +41,12 @@ class Convert:
         from commission.io.interchange import ConvertOptions, convert_file
 
         options = ConvertOptions(
-            self.vehicle_type, self.layout, self.unit, self.layer, self.height or (0.2,), self.resolution
+            vehicle_type=self.vehicle_type,
+            layout=self.layout,
+            unit=self.unit,
+            layers=self.layer,
+            heights=self.height or (0.2,),
+            resolution=self.resolution,
         )
         for line in convert_file(self.source, self.target, options):
             sys.stdout.write(f"Note         {line}\n")

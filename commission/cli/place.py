@@ -102,9 +102,9 @@ class Place:
         from commission.planning.route_prediction import PredictionOptions
 
         return PlacementOptions(
-            self._demands(project.layout.demands),
-            self._candidates(project.layout.candidates),
-            PredictionOptions(blocked_per_m=self.blocked_per_m),
+            demands=self._demands(project.layout.demands),
+            candidates=self._candidates(project.layout.candidates),
+            prediction=PredictionOptions(blocked_per_m=self.blocked_per_m),
             extend=self.extend,
             seed=self.seed,
         )

@@ -62,7 +62,7 @@ class DrawingLayer:
     """Segments on it."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Drawing:
     """The lines of a drawing."""
 
@@ -215,7 +215,14 @@ class _Reader:
             self._found.add("", f"{count} entities of kind {shown(kind)} are no walls or not understood, and left out")
         counts = np.bincount(layer_of, minlength=len(self._names)).tolist()
         layers = tuple(DrawingLayer(name, self._is_visible(name), counts[i]) for name, i in self._names.items())
-        return Drawing(self._path, unit, layers, read_only(segments * metres), read_only(layer_of), self._found.lines())
+        return Drawing(
+            path=self._path,
+            unit=unit,
+            layers=layers,
+            segments=read_only(segments * metres),
+            layer_of=read_only(layer_of),
+            warnings=self._found.lines(),
+        )
 
     def _is_visible(self, layer: str) -> bool:
         return layer.upper() not in self._off | self._frozen

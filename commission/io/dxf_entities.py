@@ -13,7 +13,7 @@ from commission.io.dxf_shapes import Affine, Arc, Curve, Point, Polyline, Shape,
 from commission.io.dxf_tags import Group
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Insert:
     """A block put into a drawing, or into another block."""
 
@@ -65,10 +65,17 @@ def insert_of(group: Group) -> Insert:
     c, s = math.cos(turn), math.sin(turn)
     sx, sy = group.number(41, 1.0), group.number(42, 1.0)
     plane = _plane(group)
-    to = plane.after(Affine(c * sx, -s * sy, s * sx, c * sy, group.number(10), group.number(20)))
+    to = plane.after(Affine(xx=c * sx, xy=-s * sy, yx=s * sx, yy=c * sy, x0=group.number(10), y0=group.number(20)))
     dx, dy = group.number(44), group.number(45)
     row_step, column_step = plane.vector(-s * dy, c * dy), plane.vector(c * dx, s * dx)
-    return Insert(group.name(2), to, max(group.whole(71, 1), 1), max(group.whole(70, 1), 1), row_step, column_step)
+    return Insert(
+        block=group.name(2),
+        to=to,
+        rows=max(group.whole(71, 1), 1),
+        columns=max(group.whole(70, 1), 1),
+        row_step=row_step,
+        column_step=column_step,
+    )
 
 
 def _plane(group: Group) -> Affine:
@@ -80,7 +87,7 @@ def _plane(group: Group) -> Affine:
 
     ocs = OCS(Vec3(extrusion))
     x, y, up = ocs.ux, ocs.uy, ocs.uz * (group.number(38) or group.number(30))
-    return Affine(x.x, y.x, x.y, y.y, up.x, up.y)
+    return Affine(xx=x.x, xy=y.x, yx=x.y, yy=y.y, x0=up.x, y0=up.y)
 
 
 def _circle(group: Group) -> Arc:
@@ -91,7 +98,10 @@ def _circle(group: Group) -> Arc:
     if group.kind == b"ARC":
         start = math.radians(group.number(50))
         end = start + (math.radians(group.number(51)) - start) % (2.0 * math.pi)
-    return through(_plane(group), Arc((group.number(10), group.number(20)), (radius, 0.0), (0.0, radius), start, end))
+    return through(
+        _plane(group),
+        Arc(center=(group.number(10), group.number(20)), u=(radius, 0.0), v=(0.0, radius), start=start, end=end),
+    )
 
 
 def _ellipse(group: Group) -> Arc:
@@ -104,7 +114,9 @@ def _ellipse(group: Group) -> Arc:
     start, end = group.number(41), group.number(42, 2.0 * math.pi)
     if end <= start:
         end += 2.0 * math.pi
-    return Arc((group.number(10), group.number(20)), (major.x, major.y), (minor.x, minor.y), start, end)
+    return Arc(
+        center=(group.number(10), group.number(20)), u=(major.x, major.y), v=(minor.x, minor.y), start=start, end=end
+    )
 
 
 def _light_corners(group: Group) -> list[Corner]:

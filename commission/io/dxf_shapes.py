@@ -21,7 +21,7 @@ _COARSEST = math.radians(30.0)
 Point = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Affine:
     """A map of the plane: x' = xx x + xy y + x0, y' = yx x + yy y + y0."""
 
@@ -44,7 +44,8 @@ class Affine:
         """Map that does `first` and then this one."""
         xx, yx = self.vector(first.xx, first.yx)
         xy, yy = self.vector(first.xy, first.yy)
-        return Affine(xx, xy, yx, yy, *self.point(first.x0, first.y0))
+        x0, y0 = self.point(first.x0, first.y0)
+        return Affine(xx=xx, xy=xy, yx=yx, yy=yy, x0=x0, y0=y0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +59,7 @@ class Polyline:
         return [to.point(x, y) for x, y in self.points]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Arc:
     """Points center + u cos t + v sin t, t from `start` to `end`: circles and ellipses, whole or in part."""
 
@@ -115,7 +116,9 @@ Shape = Polyline | Arc | Curve
 
 def through(plane: Affine, arc: Arc) -> Arc:
     """Image of an arc."""
-    return Arc(plane.point(*arc.center), plane.vector(*arc.u), plane.vector(*arc.v), arc.start, arc.end)
+    return Arc(
+        center=plane.point(*arc.center), u=plane.vector(*arc.u), v=plane.vector(*arc.v), start=arc.start, end=arc.end
+    )
 
 
 def bulged(points: list[Point], bulges: list[float], closed: bool, plane: Affine) -> Iterator[Shape]:
@@ -134,6 +137,6 @@ def bulged(points: list[Point], bulges: list[float], closed: bool, plane: Affine
         cx, cy = 0.5 * (x1 + x2) - (y2 - y1) * across, 0.5 * (y1 + y2) + (x2 - x1) * across
         # From the center, so that the arc begins exactly at the first point whatever the radius.
         u, v = (x1 - cx, y1 - cy), (-(y1 - cy), x1 - cx)
-        yield through(plane, Arc((cx, cy), u, v, 0.0, 4.0 * math.atan(bulge)))
+        yield through(plane, Arc(center=(cx, cy), u=u, v=v, start=0.0, end=4.0 * math.atan(bulge)))
     if len(run) > 1:
         yield Polyline([plane.point(x, y) for x, y in run])

@@ -33,7 +33,7 @@ SIZE_LIMIT = 2_000_000_000
 FORMAT = 1
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Restored:
     """What a journal gave back after a crash."""
 
@@ -301,7 +301,14 @@ class _Replay:
             return None
         foreign = () if self._saving else Fingerprint(folder, self._digests).changed_files()
         when = datetime.fromtimestamp(self._at)
-        return Restored(self._project, self._edits, self._what, when, foreign, self.damage)
+        return Restored(
+            project=self._project,
+            edits=self._edits,
+            last_edit=self._what,
+            last_at=when,
+            foreign_changes=foreign,
+            damage=self.damage,
+        )
 
 
 def _line(entry: dict[str, Any]) -> bytes:

@@ -37,7 +37,7 @@ from commission.site.stations import Station
 _NUMBERED = re.compile(r"(?P<name>.+)/(?P<number>[1-9][0-9]{0,5})", re.DOTALL)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Layout:
     """What all layouts of a file hold, before routes are made of it."""
 
@@ -87,7 +87,9 @@ def read_lif(path: Path, *, vehicle_type: str | None = None, layout: str | None 
     ]
     routes = _routes(edges, found)
     stations = tuple(_stations(content, kind))
-    return RouteImport(routes, found.lines(), stations, tuple(counts), names)
+    return RouteImport(
+        routes=routes, warnings=found.lines(), stations=stations, vehicle_types=tuple(counts), layouts=names
+    )
 
 
 def _chosen(layouts: list[Fields], names: tuple[str, ...], layout: str | None, found: Findings) -> list[Fields]:
@@ -124,7 +126,7 @@ def _content(layouts: list[Fields], found: Findings) -> _Layout:
     headings = {
         (node, part.text("vehicleTypeId")): angle for node, part in poses if (angle := theta.of(part)) is not None
     }
-    return _Layout(nodes, edges, stations, orientation, theta, headings)
+    return _Layout(nodes=nodes, edges=edges, stations=stations, orientation=orientation, theta=theta, headings=headings)
 
 
 def _add_node(node: Fields, nodes: dict[str, tuple[float, float]]) -> None:

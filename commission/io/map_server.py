@@ -45,7 +45,7 @@ class MapMode(StrEnum):
     RAW = "raw"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MapDescription:
     """Content of a `map_server` YAML file."""
 

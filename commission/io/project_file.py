@@ -39,7 +39,7 @@ VEHICLES: dict[str, type[Vehicle]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ProjectDocument:
     """Keys of `project.yaml`."""
 

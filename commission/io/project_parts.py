@@ -37,7 +37,7 @@ _WHOLE = ("name", "scanner", "parameters", "disturbances", "layout")
 """Parts that are written as they are."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class _Parts:
     """Parts of a project that the project's own rules convert and check; those absent have not changed."""
 

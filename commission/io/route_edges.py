@@ -43,7 +43,7 @@ class Edge:
     """The curve, with direction and speed."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RouteImport:
     """Routes from a file of another system."""
 

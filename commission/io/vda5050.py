@@ -67,7 +67,7 @@ def read_order(path: Path) -> RouteImport:
     named = [(unique(root.text("orderId") or path.stem, taken), chain) for chain in chains]
     for name, chain in named:
         note_corners(name, chain, found)
-    return RouteImport(tuple(route_of(name, chain) for name, chain in named), found.lines())
+    return RouteImport(routes=tuple(route_of(name, chain) for name, chain in named), warnings=found.lines())
 
 
 class _Places:

@@ -48,7 +48,7 @@ class AmbiguityOptions:
         between(self.headings, (1, 360), "ambiguity.headings")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class AmbiguousPair:
     """Two groups of reflectors that look the same."""
 
@@ -64,7 +64,7 @@ class AmbiguousPair:
     """Where the vehicle would believe to be then."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ColdStart:
     """What a vehicle that is switched on at each of N poses can know of where it is."""
 
@@ -98,7 +98,7 @@ class _Suspect(NamedTuple):
     others: FloatArray
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PairTable:
     """All ordered pairs of reflectors by their distance: the signature from which alike constellations are found."""
 
@@ -121,7 +121,13 @@ class PairTable:
         pairs = np.concatenate((pairs, pairs[:, ::-1]))
         distances = np.hypot(*(centers[pairs[:, 0]] - centers[pairs[:, 1]]).T)
         order = np.argsort(distances, kind="stable")
-        return PairTable(centers, distances[order], pairs[order, 0].copy(), pairs[order, 1].copy(), tree)
+        return PairTable(
+            centers=centers,
+            distances=distances[order],
+            first=pairs[order, 0].copy(),
+            second=pairs[order, 1].copy(),
+            tree=tree,
+        )
 
     def motions(self, constellation: IntArray, tolerance: float) -> Motions:
         """Rigid motions, the identity included, that bring each reflector of a constellation near to another one.
@@ -222,13 +228,25 @@ def ambiguous_poses(
                 continue
             chosen = suspect.members[alike]
             partners[chosen] = suspect.others[alike]
-            key = (suspect.constellation, tuple(suspect.image.tolist()))
-            pairs[key] = AmbiguousPair(*key, len(chosen), _plain(poses[chosen[0]]), _plain(partners[chosen[0]]))
+            pair = AmbiguousPair(
+                constellation=suspect.constellation,
+                image=tuple(suspect.image.tolist()),
+                poses=len(chosen),
+                example=_plain(poses[chosen[0]]),
+                partner=_plain(partners[chosen[0]]),
+            )
+            pairs[pair.constellation, pair.image] = pair
     progress(1.0, "ambiguity")
     counts = visible.counts()
     ambiguous = np.isfinite(partners[:, 0]) | (counts < 2)
     ranked = sorted(pairs.values(), key=lambda pair: (-pair.poses, pair.constellation, pair.image))
-    return ColdStart(read_only(poses), read_only(counts), read_only(ambiguous), read_only(partners), tuple(ranked))
+    return ColdStart(
+        poses=read_only(poses),
+        visible=read_only(counts),
+        ambiguous=read_only(ambiguous),
+        partners=read_only(partners),
+        pairs=tuple(ranked),
+    )
 
 
 def _groups(visible: VisibleReflectors) -> list[tuple[tuple[int, ...], IntArray]]:

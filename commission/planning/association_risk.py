@@ -20,7 +20,7 @@ WITHOUT_GATE = 25.0
 """Squared Mahalanobis distance within which neighbors are listed when there is no gate: one mistake in 160."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class NeighborRisk:
     """Two reflectors that may be taken for each other on a route."""
 
@@ -84,7 +84,15 @@ def neighbor_risks(planned: PlannedRoute, prediction: RoutePrediction) -> tuple[
             probability = np.asarray(ndtr(-0.5 * np.sqrt(squared[inside])), dtype=np.float64)
             chosen = scans[inside]
             metres = planned.drive.metres[chosen]
-            risks.append(NeighborRisk(reflector, neighbor, read_only(chosen), metres, read_only(probability)))
+            risks.append(
+                NeighborRisk(
+                    reflector=reflector,
+                    neighbor=neighbor,
+                    scans=read_only(chosen),
+                    metres=metres,
+                    probability=read_only(probability),
+                )
+            )
     return tuple(sorted(risks, key=lambda risk: (-risk.worst, risk.reflector, risk.neighbor)))
 
 

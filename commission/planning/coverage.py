@@ -32,7 +32,7 @@ MARGIN = 5.0
 """Floor around reflectors and routes where there is no map [m]."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Lattice:
     """Points on the floor, row by row from the lowest y."""
 
@@ -120,7 +120,9 @@ def lattice_of(project: Project, spacing: float = 0.25) -> Lattice:
     # A hair less, so that a floor of a whole number of squares gets no extra row by rounding.
     columns = max(1, math.ceil((x_max - x_min) / spacing - 1e-9))
     rows = max(1, math.ceil((y_max - y_min) / spacing - 1e-9))
-    return Lattice(float(x_min) + 0.5 * spacing, float(y_min) + 0.5 * spacing, spacing, rows, columns)
+    return Lattice(
+        x=float(x_min) + 0.5 * spacing, y=float(y_min) + 0.5 * spacing, spacing=spacing, rows=rows, columns=columns
+    )
 
 
 def coverage(
@@ -335,5 +337,5 @@ def warm_up() -> None:
     dilution.warm_up()
     project = Project(reflectors=ReflectorMap((Reflector(id="1", x=2.0, y=0.0),)))
     model = visibility.visibility_model(project)
-    live = LiveCoverage(model, Lattice(0.0, 0.0, 1.0, 2, 2), FixOptions())
+    live = LiveCoverage(model, Lattice(x=0.0, y=0.0, spacing=1.0, rows=2, columns=2), FixOptions())
     live.move(0, Reflector(id="1", x=1.0, y=0.0))

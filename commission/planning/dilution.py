@@ -49,7 +49,7 @@ class Heading(StrEnum):
     """As if the scanner saw a full turn."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FixOptions:
     """Measurement model of a fix, and the headings it is asked for."""
 

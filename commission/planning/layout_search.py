@@ -35,7 +35,7 @@ COVERING = 0.9
 """Share of the progress that these rounds take; the rest is doing with fewer."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PlacementOptions:
     """Demands, candidates, and how long to search."""
 

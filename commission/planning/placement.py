@@ -23,7 +23,7 @@ from commission.site.reflectors import Reflector, ReflectorMap
 __all__ = ["Demands", "Placement", "PlacementOptions", "Progress", "Unmet", "choose", "place"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Placement:
     """A suggested layout."""
 
@@ -83,7 +83,13 @@ def choose(
     taken = search.run()
     # Named anew, so that the new ones count without gaps.
     added = _named(everything.centers[len(kept) :][taken[len(kept) :]], kept, options.candidates)
-    return Placement(ReflectorMap((*kept, *added)), len(added), search.bound(), centers, search.unmet(taken))
+    return Placement(
+        reflectors=ReflectorMap((*kept, *added)),
+        added=len(added),
+        at_least=search.bound(),
+        candidates=centers,
+        unmet=search.unmet(taken),
+    )
 
 
 def _kept(project: Project, options: PlacementOptions) -> tuple[Reflector, ...]:

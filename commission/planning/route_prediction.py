@@ -74,7 +74,7 @@ class Damage:
 NO_DAMAGE = Damage()
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlannedRoute:
     """A planned drive and what it sees: all that a prediction needs, whatever reflectors fail."""
 
@@ -131,7 +131,7 @@ class PerMetre(NamedTuple):
     """(B,) whether the supervisor is in fail mode anywhere in it."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RoutePrediction:
     """Expected course of the localizer along a route, after each of K scans. All arrays are read-only."""
 
@@ -232,15 +232,15 @@ def plan_route(
     surveyed = np.array([reflector.sigma**2 for reflector in model.reflectors.reflectors])
     places = np.column_stack((model.reflectors.centers, surveyed))
     return PlannedRoute(
-        route_name,
-        drive,
-        model.visible_from_poses(drive.poses),
-        read_only(places),
-        read_only(model.targets.farthest),
-        model.reflectors,
-        project.scanner,
-        project.parameters,
-        options,
+        name=route_name,
+        drive=drive,
+        visible=model.visible_from_poses(drive.poses),
+        places=read_only(places),
+        farthest=read_only(model.targets.farthest),
+        reflectors=model.reflectors,
+        scanner=project.scanner,
+        parameters=project.parameters,
+        options=options,
     )
 
 
@@ -311,14 +311,14 @@ def predict_route(planned: PlannedRoute, damage: Damage = NO_DAMAGE) -> RoutePre
         columns,
     )
     return RoutePrediction(
-        planned.drive,
-        planned.parameters.supervisor,
-        read_only(columns.prior_covariances),
-        read_only(columns.means),
-        read_only(columns.covariances),
-        read_only(columns.modes),
-        read_only(columns.seen),
-        read_only(columns.on_odometry),
+        drive=planned.drive,
+        limits=planned.parameters.supervisor,
+        prior_covariances=read_only(columns.prior_covariances),
+        means=read_only(columns.means),
+        covariances=read_only(columns.covariances),
+        modes=read_only(columns.modes),
+        seen=read_only(columns.seen),
+        on_odometry=read_only(columns.on_odometry),
     )
 
 

@@ -22,7 +22,7 @@ MOST_ROWS = 600
 """About as many rows as a plot has pixels."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RouteProfile:
     """A route over its metres. All arrays are read-only."""
 
@@ -63,10 +63,14 @@ def route_profile(route: Route, vehicle: Vehicle, limits: MotionLimits | None = 
     for before, after in itertools.pairwise(rows):
         turn = wrap_scalar(float(after[0, 2] - before[-1, 2]))
         after[:, 2] += before[-1, 2] + turn - after[0, 2]
-    metres, curvatures, headings, speeds = np.concatenate(rows).T
+    columns = np.concatenate(rows).T
+    metres, curvatures, headings, speeds = (frozen(column, (None,), "profile") for column in columns)
     radius = smallest_radius(vehicle)
     return RouteProfile(
-        *(frozen(column, (None,), "profile") for column in (metres, curvatures, headings, speeds)),
+        metres=metres,
+        curvatures=curvatures,
+        headings=headings,
+        speeds=speeds,
         largest_curvature=1.0 / radius if radius > 0.0 else math.inf,
         seconds=sum(_seconds(leg) for leg in legs),
         stops=len(legs) - 1,

@@ -10,7 +10,7 @@ from commission.planning.true_error import PredictedErrors
 from commission.site.stations import Station
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class StationAccuracy:
     """What is predicted at a station."""
 
@@ -49,11 +49,11 @@ def station_accuracies(
     said, true = (values[:, :2].max(axis=1) for values in (prediction.two_sigma, errors.two_sigma))
     return tuple(
         StationAccuracy(
-            station.name,
-            float(prediction.drive.metres[scans[0]]),
-            float(said[scans].max()),
-            float(true[scans].max()),
-            station.required_accuracy,
+            station=station.name,
+            metre=float(prediction.drive.metres[scans[0]]),
+            two_sigma=float(said[scans].max()),
+            error=float(true[scans].max()),
+            required=station.required_accuracy,
         )
         for station, scans in station_scans(prediction.drive, stations)
     )

@@ -90,7 +90,7 @@ def promised_range(radius: float, resolution: float, min_beams: int, beam_width:
     return radius / math.sin(min(half_angle, 0.5 * math.pi))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class VisibilityModel:
     """Reflectors, scanner and walls, prepared so that lines of sight cost one comparison each.
 
@@ -217,7 +217,7 @@ def build_visibility(
         hidden_blocks=np.empty((count, bins // BLOCK), dtype=np.float32),
     )
     shadow_kernels.cast_shadows(caster.tables, targets)
-    return VisibilityModel(reflectors, scanner, options, caster, targets)
+    return VisibilityModel(reflectors=reflectors, scanner=scanner, options=options, caster=caster, targets=targets)
 
 
 def copied(targets: Targets) -> Targets:

@@ -30,7 +30,7 @@ SLIP_EXCESS = (0.2, 0.6)
 """Smallest and largest share by which a slipping wheel turns too fast."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DriveOptions:
     """How a virtual drive is driven and reported."""
 

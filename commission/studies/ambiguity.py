@@ -35,7 +35,7 @@ class RouteRisks:
     """Pairs of reflectors, the most probable first."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FloorAmbiguity:
     """Cold start over the floor."""
 
@@ -103,7 +103,14 @@ def floor_ambiguity(
             known = np.isfinite(of_heading[:, 0])
             partners[points[known]] = of_heading[known]
     share[~drivable], visible[~drivable], partners[~drivable] = np.nan, -1, np.nan
-    return FloorAmbiguity(lattice, read_only(drivable), read_only(share), read_only(visible), read_only(partners), cold)
+    return FloorAmbiguity(
+        lattice=lattice,
+        drivable=read_only(drivable),
+        share=read_only(share),
+        visible=read_only(visible),
+        partners=read_only(partners),
+        cold=cold,
+    )
 
 
 def ambiguity_of(

@@ -143,7 +143,7 @@ def largest_jump(errors: FloatArray) -> float:
     return float(known.max()) if len(known) else float("nan")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorStatistics:
     """Errors of one run against its reference, over the cycles that have one."""
 

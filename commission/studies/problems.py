@@ -55,7 +55,7 @@ class Subject(StrEnum):
     FLOOR_MAP = "floor map"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
     """One thing that is wrong."""
 
@@ -79,7 +79,7 @@ class CheckLimits:
     """Smallest room between the vehicle's outline and a wall along a route [m]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Findings:
     """Problems of a project, and what the next check needs not find again."""
 
@@ -133,7 +133,9 @@ def find_problems(
     ]
     order = list(Severity)
     found.sort(key=lambda problem: order.index(problem.severity))
-    return Findings(tuple(found), project, floor, limits, by_route, passed)
+    return Findings(
+        problems=tuple(found), project=project, floor=floor, limits=limits, by_route=by_route, passed=passed
+    )
 
 
 def route_problems(violations: Iterable[Violation]) -> Iterable[Problem]:
@@ -147,7 +149,7 @@ def _route_problem(violation: Violation) -> Problem:
     x, y, _ = (float(value) for value in violation.where.worst_pose)
     text = f"Route {violation.route!r}: {_asked_too_much(violation)}"
     severity = Severity.ERROR if violation.is_fatal else Severity.WARNING
-    return Problem(severity, text, Subject.ROUTE, (violation.route,), (x, y))
+    return Problem(severity=severity, text=text, subject=Subject.ROUTE, ids=(violation.route,), place=(x, y))
 
 
 def _asked_too_much(violation: Violation) -> str:
@@ -186,13 +188,25 @@ def _map_problems(project: Project, floor: FloorDistances | None) -> Iterable[Pr
         text = (
             "No floor map: nothing blocks the line of sight and nothing stands in the way; expected a map of the hall"
         )
-        yield Problem(Severity.WARNING, text, Subject.FLOOR_MAP)
+        yield Problem(severity=Severity.WARNING, text=text, subject=Subject.FLOOR_MAP)
     elif floor is None:
-        yield Problem(Severity.NOTE, "The floor map is being prepared: walls are not checked yet", Subject.FLOOR_MAP)
+        yield Problem(
+            severity=Severity.NOTE,
+            text="The floor map is being prepared: walls are not checked yet",
+            subject=Subject.FLOOR_MAP,
+        )
     elif not floor.grid.occupied.any():
-        yield Problem(Severity.WARNING, "The floor map has no walls; expected occupied cells", Subject.FLOOR_MAP)
+        yield Problem(
+            severity=Severity.WARNING,
+            text="The floor map has no walls; expected occupied cells",
+            subject=Subject.FLOOR_MAP,
+        )
     if not len(project.reflectors):
-        yield Problem(Severity.WARNING, "No reflectors; expected at least 3 around every route", Subject.REFLECTOR)
+        yield Problem(
+            severity=Severity.WARNING,
+            text="No reflectors; expected at least 3 around every route",
+            subject=Subject.REFLECTOR,
+        )
 
 
 def _scanner_problems(project: Project) -> Iterable[Problem]:
@@ -206,7 +220,7 @@ def _scanner_problems(project: Project) -> Iterable[Problem]:
                 f"The scanner is {1000 * depth:.0f} mm inside the vehicle's outline; "
                 "expected at its edge, unless it stands above the body"
             )
-            yield Problem(Severity.NOTE, text, Subject.SCANNER)
+            yield Problem(severity=Severity.NOTE, text=text, subject=Subject.SCANNER)
         return
     bearings = scanner.angle_min + np.arange(scanner.beam_count) * scanner.angle_increment
     blocked = np.flatnonzero(_crosses(position, bearings + scanner.mounting[2], outline))
@@ -216,7 +230,7 @@ def _scanner_problems(project: Project) -> Iterable[Problem]:
             f"The vehicle's own outline blocks {len(blocked)} of {scanner.beam_count} beams, between {low:.1f} and "
             f"{high:.1f} deg; expected a field of view that leaves the vehicle out"
         )
-        yield Problem(Severity.WARNING, text, Subject.SCANNER)
+        yield Problem(severity=Severity.WARNING, text=text, subject=Subject.SCANNER)
 
 
 def _close_reflectors(project: Project) -> Iterable[Problem]:
@@ -262,12 +276,18 @@ def _pair_problem(first: Reflector, second: Reflector, distance: float, needed: 
     ids = (first.id, second.id)
     if distance <= SAME_PLACE:
         text = f"Reflectors {names} are at the same place; expected one of them"
-        return Problem(Severity.ERROR, text, Subject.REFLECTOR, ids, place)
+        return Problem(severity=Severity.ERROR, text=text, subject=Subject.REFLECTOR, ids=ids, place=place)
     touch = first.radius + second.radius
     is_one = distance < touch
     expected = f"expected {needed:.2f} m or more to tell them apart at any range"
     text = f"Reflectors {names} are {1000 * distance:.0f} mm apart{' and overlap' if is_one else ''}; {expected}"
-    return Problem(Severity.ERROR if is_one else Severity.WARNING, text, Subject.REFLECTOR, ids, place)
+    return Problem(
+        severity=Severity.ERROR if is_one else Severity.WARNING,
+        text=text,
+        subject=Subject.REFLECTOR,
+        ids=ids,
+        place=place,
+    )
 
 
 def _reflectors_and_walls(project: Project, floor: FloorDistances | None) -> Iterable[Problem]:
@@ -303,11 +323,11 @@ def _station_problems(project: Project, floor: FloorDistances | None) -> Iterabl
     room = room_along(way, project.vehicle.outline, floor)
     return [
         Problem(
-            Severity.ERROR,
-            f"Station {station.name!r}: the vehicle's outline cuts a wall; expected room for it",
-            Subject.STATION,
-            (station.name,),
-            (station.x, station.y),
+            severity=Severity.ERROR,
+            text=f"Station {station.name!r}: the vehicle's outline cuts a wall; expected room for it",
+            subject=Subject.STATION,
+            ids=(station.name,),
+            place=(station.x, station.y),
         )
         for station, left in zip(project.stations, room, strict=True)
         if left <= 0.0
@@ -316,7 +336,13 @@ def _station_problems(project: Project, floor: FloorDistances | None) -> Iterabl
 
 def _of_reflector(severity: Severity, reflector: Reflector, text: str) -> Problem:
     place = (reflector.x, reflector.y)
-    return Problem(severity, f"Reflector {reflector.id!r} {text}", Subject.REFLECTOR, (reflector.id,), place)
+    return Problem(
+        severity=severity,
+        text=f"Reflector {reflector.id!r} {text}",
+        subject=Subject.REFLECTOR,
+        ids=(reflector.id,),
+        place=place,
+    )
 
 
 def _limited(found: Iterable[Problem], count: int | None = None) -> list[Problem]:
@@ -326,7 +352,11 @@ def _limited(found: Iterable[Problem], count: int | None = None) -> list[Problem
     if more > 0:
         worst = problems[0]
         rest = Problem(
-            worst.severity, f"... and {more} more like {worst.text!r}", worst.subject, worst.ids, worst.place
+            severity=worst.severity,
+            text=f"... and {more} more like {worst.text!r}",
+            subject=worst.subject,
+            ids=worst.ids,
+            place=worst.place,
         )
         return [*problems[:MOST_OF_A_KIND], rest]
     return problems
@@ -336,12 +366,12 @@ def _missed_stations(project: Project, passed: Passed) -> Iterable[Problem]:
     """Stations whose accuracy nobody checks, since no route passes them."""
     return _limited(
         Problem(
-            Severity.WARNING,
-            f"Station {station.name!r}: no route passes it; expected one within {1000 * AT_STATION:.0f} mm that looks "
-            f"its way to {math.degrees(FACING_STATION):.0f} deg, else its accuracy is not checked",
-            Subject.STATION,
-            (station.name,),
-            (station.x, station.y),
+            severity=Severity.WARNING,
+            text=f"Station {station.name!r}: no route passes it; expected one within {1000 * AT_STATION:.0f} mm that "
+            f"looks its way to {math.degrees(FACING_STATION):.0f} deg, else its accuracy is not checked",
+            subject=Subject.STATION,
+            ids=(station.name,),
+            place=(station.x, station.y),
         )
         for station in project.stations
         if station.name not in passed.names

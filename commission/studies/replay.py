@@ -31,7 +31,7 @@ from commission.studies.metrics import (
 Number = int | float | None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class ReplayResult:
     """One recording localized, judged against its reference where it has one."""
 

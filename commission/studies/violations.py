@@ -55,7 +55,7 @@ class Stretch:
         return self.poses[self.worst]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Violation:
     """One stretch of a route that asks too much."""
 
@@ -122,7 +122,14 @@ def _curves(walk: _Walk, vehicle: Vehicle) -> Iterable[Violation]:
     for first, last in _runs(bends * radius > 1.001):
         tightest = first + int(np.argmax(bends[first : last + 1]))
         where = walk.stretch(first, last, tightest)
-        yield Violation(ViolationKind.CURVE, walk.name, where, 1.0 / float(bends[tightest]), radius, is_fatal=True)
+        yield Violation(
+            kind=ViolationKind.CURVE,
+            route=walk.name,
+            where=where,
+            found=1.0 / float(bends[tightest]),
+            expected=radius,
+            is_fatal=True,
+        )
 
 
 def _corners(walk: _Walk, vehicle: Vehicle) -> Iterable[Violation]:
@@ -137,7 +144,12 @@ def _corners(walk: _Walk, vehicle: Vehicle) -> Iterable[Violation]:
         after = int(index) + 1
         turn = abs(float(way.corners[index]))
         yield Violation(
-            ViolationKind.CORNER, walk.name, walk.stretch(after, after, after), turn, KINK, is_fatal=not can_turn
+            kind=ViolationKind.CORNER,
+            route=walk.name,
+            where=walk.stretch(after, after, after),
+            found=turn,
+            expected=KINK,
+            is_fatal=not can_turn,
         )
 
 
@@ -146,13 +158,25 @@ def _room(walk: _Walk, room: FloatArray, clearance: float) -> Iterable[Violation
     for first, last in _runs(room <= 0.0):
         where = walk.stretch(first, last, (first + last) // 2)
         yield Violation(
-            ViolationKind.WALL, walk.name, where, float(room[first : last + 1].min()), clearance, is_fatal=True
+            kind=ViolationKind.WALL,
+            route=walk.name,
+            where=where,
+            found=float(room[first : last + 1].min()),
+            expected=clearance,
+            is_fatal=True,
         )
     for first, last in _runs(room < clearance):
         least = first + int(np.argmin(room[first : last + 1]))
         if room[least] > 0.0:
             where = walk.stretch(first, last, least)
-            yield Violation(ViolationKind.ROOM, walk.name, where, float(room[least]), clearance, is_fatal=False)
+            yield Violation(
+                kind=ViolationKind.ROOM,
+                route=walk.name,
+                where=where,
+                found=float(room[least]),
+                expected=clearance,
+                is_fatal=False,
+            )
 
 
 def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:

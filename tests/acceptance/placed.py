@@ -45,7 +45,9 @@ def demands_met_by(project: Project) -> Demands:
 
 def suggested(project: Project, demands: Demands, spacing: float = 1.0) -> tuple[Project, Placement]:
     """The project with a layout from nothing in place of its own, and the layout; candidates at a spacing [m]."""
-    found = place(project, options=PlacementOptions(demands, CandidateOptions(spacing=spacing), extend=False))
+    found = place(
+        project, options=PlacementOptions(demands=demands, candidates=CandidateOptions(spacing=spacing), extend=False)
+    )
     return replace(project, reflectors=found.reflectors), found
 
 

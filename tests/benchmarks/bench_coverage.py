@@ -35,7 +35,7 @@ from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 from tests.benchmarks.bench_raycast import RESOLUTION, plant
 
-LATTICE = Lattice(0.125, 0.125, 0.25, 400, 800)
+LATTICE = Lattice(x=0.125, y=0.125, spacing=0.25, rows=400, columns=800)
 REFLECTORS, RADIUS, RANGE = 500, 0.04, 30.0
 EVERY = 40
 REQUIRED_RATIO, REQUIRED_RATIO_HEADINGS = 60.0, 25.0

@@ -16,7 +16,7 @@ from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 
-LATTICE = Lattice(-2.0, -1.0, 1.0, 3, 40)
+LATTICE = Lattice(x=-2.0, y=-1.0, spacing=1.0, rows=3, columns=40)
 
 
 @pytest.fixture

@@ -40,7 +40,7 @@ def test_clicked_pixels_lie_where_the_engineer_said(
 ) -> None:
     if math.dist(first, second) < 1.0:
         return
-    placement = ImagePlacement(first, second, distance, direction, place)
+    placement = ImagePlacement(first=first, second=second, distance=distance, direction=direction, first_in_map=place)
     end = np.array(place) + distance * np.array([math.cos(direction), math.sin(direction)])
     # Rounding over images whose corner may lie 50 km away (100 m between neighboring pixels).
     np.testing.assert_allclose(in_map(placement, first, 300), place, atol=1e-8)
@@ -52,7 +52,7 @@ def test_dark_pixels_are_walls_the_right_way_up(tmp_path: Path) -> None:
     gray[5, 8] = 20
     Image.fromarray(gray).save(tmp_path / "plan.png")
     # 20 pixels are 2 m; the upper left corner lies at (0, 3).
-    placement = ImagePlacement((0, 0), (20, 0), 2.0, first_in_map=(0.0, 3.0))
+    placement = ImagePlacement(first=(0, 0), second=(20, 0), distance=2.0, first_in_map=(0.0, 3.0))
     floor_map = read_picture(tmp_path / "plan.png").floor_map(placement)
     assert floor_map.resolution == pytest.approx(0.1)
     np.testing.assert_allclose(floor_map.origin, [0, 0, 0], atol=1e-12)
@@ -63,7 +63,7 @@ def test_dark_pixels_are_walls_the_right_way_up(tmp_path: Path) -> None:
 
 
 def test_transparent_pixels_are_free_and_colors_and_deep_images_are_read(tmp_path: Path) -> None:
-    placement = ImagePlacement((0, 0), (2, 0), 1.0)
+    placement = ImagePlacement(first=(0, 0), second=(2, 0), distance=1.0)
     rgba = np.zeros((2, 2, 4), dtype=np.uint8)
     rgba[0, 0, 3] = 255
     Image.fromarray(rgba).save(tmp_path / "clear.png")
@@ -89,7 +89,8 @@ def test_transparent_pixels_are_free_and_colors_and_deep_images_are_read(tmp_pat
 )
 def test_placement_that_makes_no_sense_is_refused(arguments: tuple, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        ImagePlacement(*arguments)
+        first, second, distance = arguments
+        ImagePlacement(first=first, second=second, distance=distance)
 
 
 def test_image_over_the_limit_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:

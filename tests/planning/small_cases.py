@@ -36,7 +36,7 @@ class SmallCase:
 
     def solved(self) -> Placement:
         """What the search comes to."""
-        return choose(self.project, (ROUTE,), self.centers, PlacementOptions(self.demands, extend=False))
+        return choose(self.project, (ROUTE,), self.centers, PlacementOptions(demands=self.demands, extend=False))
 
     def layouts_that_hold(self, size: int) -> bool:
         """Whether any layout of that many of the candidates meets the demands."""

@@ -26,7 +26,7 @@ def hall(places, scanner=ALL_AROUND) -> Project:
 
 def start_in(project):
     """The middle of the hall: near the walls a reflector may be too close to be measured."""
-    return cold_start(visibility_model(project), Lattice(1.0, 1.0, 0.5, 13, 21))
+    return cold_start(visibility_model(project), Lattice(x=1.0, y=1.0, spacing=0.5, rows=13, columns=21))
 
 
 def test_a_symmetric_hall_is_flagged_with_its_pairs():

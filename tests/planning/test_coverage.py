@@ -22,7 +22,7 @@ from commission.site.routes import Route, Segment
 from commission.site.scanner import Scanner
 
 # Off the corners of cells: on a border, rounding decides which cell a point is in.
-LATTICE = Lattice(0.11, 0.12, 0.25, 40, 60)
+LATTICE = Lattice(x=0.11, y=0.12, spacing=0.25, rows=40, columns=60)
 
 
 def hall(seed: int, count: int = 70) -> VisibilityModel:
@@ -57,8 +57,8 @@ def assert_same(first, second):
 OPTIONS = [
     FixOptions(blocked_per_m=0.02),
     FixOptions(heading=Heading.WORST, headings=5),
-    FixOptions(Measurement.BEARING_ONLY, heading=Heading.GIVEN, given_heading=2.0),
-    FixOptions(Measurement.RANGE_BEARING_PRIOR, heading=Heading.BEST, headings=3),
+    FixOptions(measurement=Measurement.BEARING_ONLY, heading=Heading.GIVEN, given_heading=2.0),
+    FixOptions(measurement=Measurement.RANGE_BEARING_PRIOR, heading=Heading.BEST, headings=3),
 ]
 
 
@@ -152,13 +152,13 @@ def test_points_in_walls_are_not_floor_and_see_nothing():
 def test_lattice_covers_the_floor_map_with_squares():
     cells = np.full((100, 203), OCCUPIED, dtype=np.int8)
     lattice = lattice_of(Project(floor_map=FloorMap(cells, 0.1, (-2.0, 3.0, 0.0))), 0.5)
-    assert lattice == Lattice(-1.75, 3.25, 0.5, 20, 41)
+    assert lattice == Lattice(x=-1.75, y=3.25, spacing=0.5, rows=20, columns=41)
 
 
 def test_lattice_without_a_map_covers_reflectors_and_routes():
     route = Route("r", (Segment(control_points=np.array([[0, 0], [0, 10], [20, 10], [20, 0]], dtype=float)),))
     lattice = lattice_of(Project(reflectors=ReflectorMap((Reflector(id="1", x=-3.0, y=2.0),)), routes=(route,)), 1.0)
-    assert lattice == Lattice(-7.5, -4.5, 1.0, 20, 33)
+    assert lattice == Lattice(x=-7.5, y=-4.5, spacing=1.0, rows=20, columns=33)
     assert len(lattice_of(Project())) > 0
 
 
@@ -176,9 +176,9 @@ def test_progress_can_cancel_the_computation():
 
 def test_a_lattice_without_points_is_refused():
     with pytest.raises(ValueError, match="1 or more each way"):
-        Lattice(0.0, 0.0, 0.25, 0, 5)
+        Lattice(x=0.0, y=0.0, spacing=0.25, rows=0, columns=5)
     with pytest.raises(ValueError, match="spacing"):
-        Lattice(0.0, 0.0, math.inf, 5, 5)
+        Lattice(x=0.0, y=0.0, spacing=math.inf, rows=5, columns=5)
 
 
 PEAK = """
@@ -195,10 +195,10 @@ places = np.random.default_rng(0).uniform(0.0, 100.0, (200, 2))
 reflectors = ReflectorMap(tuple(Reflector(id=str(i), x=x, y=y) for i, (x, y) in enumerate(places.tolist())))
 grid = OccupancyGrid(np.zeros((200, 200), dtype=np.bool_), 0.5)
 model = build_visibility(reflectors, Scanner(), RayCaster(grid), VisibilityOptions())
-coverage(model, Lattice(0.0, 0.0, 1.0, 4, 4), FixOptions())
+coverage(model, Lattice(x=0.0, y=0.0, spacing=1.0, rows=4, columns=4), FixOptions())
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 rows = int(sys.argv[1])
-coverage(model, Lattice(0.0, 0.0, 100.0 / 1000, rows, 1000), FixOptions())
+coverage(model, Lattice(x=0.0, y=0.0, spacing=100.0 / 1000, rows=rows, columns=1000), FixOptions())
 print(1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before))
 """
 

@@ -63,7 +63,9 @@ def test_triangulation_from_the_center_of_a_circle_has_the_closed_form(n):
 
 
 def test_prior_from_odometry_adds_its_information():
-    options = FixOptions(Measurement.RANGE_BEARING_PRIOR, prior_position_sigma=0.03, prior_heading_sigma=0.01)
+    options = FixOptions(
+        measurement=Measurement.RANGE_BEARING_PRIOR, prior_position_sigma=0.03, prior_heading_sigma=0.01
+    )
     model = open_field(on_circle(4, 6.0))
     found = fixes(model, [[0.0, 0.0], [1000.0, 0.0]], options)
     scan = 2.0 * (0.02**-2 + (0.004 * 6.0) ** -2)
@@ -85,7 +87,7 @@ def test_covariance_is_the_inverse_of_a_finite_difference_fisher_information(see
     centers = rng.uniform(-8.0, 8.0, (6, 2))
     pose = np.array([*rng.uniform(-3.0, 3.0, 2), rng.uniform(-3.0, 3.0)])
     mounting = np.array([*rng.uniform(-1.0, 1.0, 2), rng.uniform(-3.0, 3.0)])
-    options = FixOptions(measurement, range_sigma=0.03, bearing_sigma=0.002)
+    options = FixOptions(measurement=measurement, range_sigma=0.03, bearing_sigma=0.002)
     survey = 0.01
     model = open_field(centers, replace(FULL_TURN, mounting=mounting), sigma=survey)
     step, rows = 1e-5, []
@@ -125,7 +127,7 @@ def test_figures_are_those_of_the_covariance():
 def test_dilution_is_unchanged_when_the_whole_hall_is_moved_and_turned(motion, seed, measurement):
     rng = np.random.default_rng(seed)
     centers, points = rng.uniform(-8.0, 8.0, (5, 2)), rng.uniform(-5.0, 5.0, (4, 2))
-    options = FixOptions(measurement)
+    options = FixOptions(measurement=measurement)
     here = fixes(open_field(centers), points, options)
     there = fixes(open_field(transform_points(motion, centers)), transform_points(motion, points), options)
     for name in ("position_sigma", "heading_sigma", "position_dop", "heading_dop"):
@@ -177,8 +179,8 @@ def test_triangulation_is_singular_where_the_vehicle_stands_on_the_circle_throug
 def test_too_few_reflectors_are_a_result_and_not_an_error(measurement, needed):
     for n in range(needed + 1):
         model = open_field(on_circle(5, 6.0)[:n])
-        found = fixes(model, [[0.4, 0.3]], FixOptions(measurement))
-        covariance = fix_covariances(model, [[0.4, 0.3, 0.0]], FixOptions(measurement))[0]
+        found = fixes(model, [[0.4, 0.3]], FixOptions(measurement=measurement))
+        covariance = fix_covariances(model, [[0.4, 0.3, 0.0]], FixOptions(measurement=measurement))[0]
         assert np.isfinite(found.position_sigma[0]) == (n == needed)
         assert np.isfinite(covariance[0, 0]) == (n == needed)
         assert not np.isnan(covariance).any()

@@ -44,7 +44,7 @@ def holds(project: Project, reflectors: ReflectorMap, demands: Demands) -> bool:
 
 def test_a_suggested_layout_meets_its_demands_and_its_spacing():
     project, demands = hall(), Demands(visible=2, spacing=1.0)
-    found = place(project, options=PlacementOptions(demands))
+    found = place(project, options=PlacementOptions(demands=demands))
     assert found.unmet == ()
     assert found.at_least <= found.added == len(found.reflectors) <= found.at_least + 2
     assert holds(project, found.reflectors, demands)
@@ -63,7 +63,7 @@ def test_tight_limits_ask_for_more_reflectors_than_sight_alone():
         Demands(visible=1, survive_failure=False),
         Demands(visible=1, survive_failure=False, position_limit=0.03),
     )
-    few, more = (place(project, options=PlacementOptions(demands)) for demands in (loose, tight))
+    few, more = (place(project, options=PlacementOptions(demands=demands)) for demands in (loose, tight))
     assert few.added < more.added
     assert more.unmet == ()
     assert holds(project, more.reflectors, tight)
@@ -71,9 +71,9 @@ def test_tight_limits_ask_for_more_reflectors_than_sight_alone():
 
 def test_extending_keeps_what_there_is_and_adds_fewer():
     project, demands = hall(), Demands(visible=2)
-    empty = place(project, options=PlacementOptions(demands))
+    empty = place(project, options=PlacementOptions(demands=demands))
     half = ReflectorMap(empty.reflectors.reflectors[::2])
-    extended = place(replace(project, reflectors=half), options=PlacementOptions(demands))
+    extended = place(replace(project, reflectors=half), options=PlacementOptions(demands=demands))
     assert extended.reflectors.reflectors[: len(half)] == half.reflectors
     assert extended.added < empty.added
     assert extended.unmet == ()
@@ -83,7 +83,7 @@ def test_extending_keeps_what_there_is_and_adds_fewer():
 
 def test_what_cannot_be_met_is_named_by_route_and_metre():
     far = Project(floor_map=room(18.0, 8.0), scanner=replace(SCANNER, reflector_range=2.0), routes=hall().routes)
-    found = place(far, options=PlacementOptions(Demands(visible=2)))
+    found = place(far, options=PlacementOptions(demands=Demands(visible=2)))
     assert {(unmet.route, unmet.reason) for unmet in found.unmet} >= {("Through", "visible")}
     # In the middle of the hall no wall is within two metres.
     assert 7 in next(unmet for unmet in found.unmet if unmet.reason == "visible").metres
@@ -103,7 +103,7 @@ def test_an_unknown_route_is_refused():
 
 def test_progress_never_falls_and_may_cancel():
     fractions = []
-    place(hall(), options=PlacementOptions(Demands(visible=1)), progress=lambda done, _: fractions.append(done))
+    place(hall(), options=PlacementOptions(demands=Demands(visible=1)), progress=lambda done, _: fractions.append(done))
     assert fractions == sorted(fractions)
 
     def stop(fraction, what):
@@ -111,11 +111,11 @@ def test_progress_never_falls_and_may_cancel():
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        place(hall(), options=PlacementOptions(Demands(visible=1)), progress=stop)
+        place(hall(), options=PlacementOptions(demands=Demands(visible=1)), progress=stop)
 
 
 def test_the_same_seed_gives_the_same_layout():
-    first, second = (place(hall(), options=PlacementOptions(Demands(visible=2))) for _ in range(2))
+    first, second = (place(hall(), options=PlacementOptions(demands=Demands(visible=2))) for _ in range(2))
     assert first.reflectors == second.reflectors
 
 
@@ -140,11 +140,11 @@ def without_each(reflectors: ReflectorMap) -> list[ReflectorMap]:
 
 def test_a_symmetric_hall_gets_a_layout_that_tells_the_start_of_a_route_from_its_rival():
     project, start = symmetric_hall(), (3.0, 2.5, 0.0)
-    alike = place(project, options=PlacementOptions(Demands(visible=2, survive_failure=False)))
+    alike = place(project, options=PlacementOptions(demands=Demands(visible=2, survive_failure=False)))
     assert (alike.added, alike.unmet) == (0, ())
     assert ambiguous(project, alike.reflectors, start) == [True]
     demands = Demands(visible=2, survive_failure=False, unambiguous_starts=True)
-    clear = place(project, options=PlacementOptions(demands))
+    clear = place(project, options=PlacementOptions(demands=demands))
     assert (clear.added, clear.unmet) == (1, ())
     assert ambiguous(project, clear.reflectors, start) == [False]
 
@@ -153,7 +153,7 @@ def test_places_stay_clear_whichever_single_reflector_is_blocked():
     spot = (6.0, 5.0)
     project = symmetric_hall(stations=(Station(name="Dock", x=9.0, y=2.5),), reflectors=ReflectorMap())
     demands = Demands(visible=1, unambiguous_stations=True, unambiguous_spots=(spot,))
-    found = place(project, options=PlacementOptions(demands, extend=False))
+    found = place(project, options=PlacementOptions(demands=demands, extend=False))
     assert found.unmet == ()
     for layout in (found.reflectors, *without_each(found.reflectors)):
         assert ambiguous(project, layout, (9.0, 2.5, 0.0), (*spot, 0.0)) == [False, False]
@@ -165,7 +165,7 @@ def test_a_spot_without_a_heading_is_clear_in_all_of_them_and_one_with_a_heading
     counts = []
     for spot in ((6.0, 3.0, 0.0), (6.0, 3.0)):
         demands = Demands(visible=1, survive_failure=False, unambiguous_spots=(spot,))
-        found = place(project, options=PlacementOptions(demands))
+        found = place(project, options=PlacementOptions(demands=demands))
         assert found.unmet == ()
         headings = [0.0] if len(spot) == 3 else np.arange(8) * np.pi / 4
         poses = [(*spot[:2], heading) for heading in headings]
@@ -178,7 +178,7 @@ def test_a_place_that_nothing_clears_is_named_beside_the_nearest_metre_of_a_rout
     project = symmetric_hall(stations=(Station(name="Dock", x=8.2, y=3.0),))
     nowhere = CandidateOptions(keep_out=((0.0, 0.0, 12.0, 8.0),))
     demands = Demands(visible=2, survive_failure=False, unambiguous_stations=True)
-    (unmet,) = place(project, options=PlacementOptions(demands, nowhere)).unmet
+    (unmet,) = place(project, options=PlacementOptions(demands=demands, candidates=nowhere)).unmet
     assert (unmet.reason, unmet.place, unmet.route, unmet.metres) == ("ambiguous", "station 'Dock'", "Across", (5,))
 
 
@@ -186,7 +186,7 @@ def test_locked_reflectors_stay_where_the_layout_starts_empty():
     locked = replace(symmetric_hall().reflectors.reflectors[2], locked=True)
     corners = symmetric_hall().reflectors.reflectors
     project = symmetric_hall(reflectors=ReflectorMap((*corners[:2], locked, corners[3])))
-    found = place(project, options=PlacementOptions(Demands(visible=2), extend=False))
+    found = place(project, options=PlacementOptions(demands=Demands(visible=2), extend=False))
     assert found.reflectors.reflectors[0] == locked
     assert found.added == len(found.reflectors) - 1 > 0
     assert found.unmet == ()

@@ -138,7 +138,13 @@ class MapDraft:
             return None
         first, second = self.pixels
         options = self.options
-        return ImagePlacement(first, second, options.distance, options.direction, options.first_in_map)
+        return ImagePlacement(
+            first=first,
+            second=second,
+            distance=options.distance,
+            direction=options.direction,
+            first_in_map=options.first_in_map,
+        )
 
     def clicked(self, place: Point) -> MapDraft:
         """Return the draft after a click on its picture: the first, then the second point, then the nearer is moved.

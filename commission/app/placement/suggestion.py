@@ -130,7 +130,7 @@ def suggest(project: Project, wish: LayoutWish, progress: Progress) -> Suggestio
         site = replace(project, reflectors=ReflectorMap(tuple(r for r in project.reflectors.reflectors if r.locked)))
     progress(0.0, "compiling")
     true_error.warm_up()
-    found = place(site, routes, PlacementOptions(brief.demands, brief.candidates), progress)
+    found = place(site, routes, PlacementOptions(demands=brief.demands, candidates=brief.candidates), progress)
     return Suggestion(wish, project, found, tuple(_stretches(project, found.unmet)))
 
 

@@ -158,7 +158,9 @@ def test_what_another_browser_deletes_is_not_selected_any_more(placed: AppState)
 
 
 def test_a_problem_of_a_station_selects_it_and_flies_there(placed: AppState) -> None:
-    problem = Problem(Severity.ERROR, "cut", Subject.STATION, ("Station 1",), (3.0, 5.0))
+    problem = Problem(
+        severity=Severity.ERROR, text="cut", subject=Subject.STATION, ids=("Station 1",), place=(3.0, 5.0)
+    )
     result = reducer.reduce(actions.ShowProblem(OTHER, problem), placed)
     assert editor(result.state, OTHER).station == "Station 1"
     assert result.effects == (FlyTo(OTHER, (3.0, 5.0)),)

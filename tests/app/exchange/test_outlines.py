@@ -33,7 +33,13 @@ def test_added_and_moved_reflectors_are_drawn_where_they_would_stand() -> None:
 
 def test_new_courses_of_routes_and_new_stations_are_drawn() -> None:
     route = Route("Detour", (Segment(control_points=np.array([[2.0, 2.0], [4.0, 6.0]]), degree=1),))
-    layout = RouteImport((route,), (), (Station(name="Dock", x=4.0, y=6.0),), ("V",), ("hall",))
+    layout = RouteImport(
+        routes=(route,),
+        warnings=(),
+        stations=(Station(name="Dock", x=4.0, y=6.0),),
+        vehicle_types=("V",),
+        layouts=("hall",),
+    )
     ghosts = ghosts_of(room(), pending(layout))
     assert ghosts.centers.tolist() == [[4.0, 6.0]]
     np.testing.assert_allclose(ghosts.lines[0][[0, -1]], [[2.0, 2.0], [4.0, 6.0]], atol=1e-9)

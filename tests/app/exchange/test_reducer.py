@@ -142,7 +142,13 @@ def test_preview_is_of_the_project_as_it_is_when_it_is_accepted(state: AppState)
 def test_layout_changes_routes_and_stations_and_keeps_accuracies(state: AppState) -> None:
     dock = Station(name="Dock", x=2.0, y=2.0, required_accuracy=0.01)
     held = replace(state, project=replace(state.project, stations=(dock, Station(name="Old", x=0.0, y=0.0))))
-    layout = RouteImport((DETOUR,), (), (Station(name="Dock", x=2.5, y=2.0),), ("AGV",), ("hall",))
+    layout = RouteImport(
+        routes=(DETOUR,),
+        warnings=(),
+        stations=(Station(name="Dock", x=2.5, y=2.0),),
+        vehicle_types=("AGV",),
+        layouts=("hall",),
+    )
     merged = after(looking_at(held, layout), actions.AcceptImport(ME)).state.project
     assert [route.name for route in merged.routes] == ["There and back", "Detour"]
     assert merged.stations[0] == Station(name="Dock", x=2.5, y=2.0, required_accuracy=0.01)
@@ -155,7 +161,7 @@ def test_layout_changes_routes_and_stations_and_keeps_accuracies(state: AppState
 def test_order_says_nothing_about_stations(state: AppState) -> None:
     dock = Station(name="Dock", x=2.0, y=2.0)
     held = replace(state, project=replace(state.project, stations=(dock,)))
-    looking = after(looking_at(held, RouteImport((DETOUR,))), actions.RemoveAbsent(ME, True)).state
+    looking = after(looking_at(held, RouteImport(routes=(DETOUR,))), actions.RemoveAbsent(ME, True)).state
     replaced = after(looking, actions.AcceptImport(ME)).state.project
     assert replaced.routes == (DETOUR,)
     assert replaced.stations == (dock,)
@@ -180,7 +186,9 @@ def test_dropped_import_is_gone_and_an_answer_that_was_on_its_way_is_too_late(st
 
 
 def test_another_part_of_the_same_layout_is_read_from_the_same_file(state: AppState) -> None:
-    looking = looking_at(state, RouteImport((DETOUR,), (), (), ("A", "B"), ("hall",)))
+    looking = looking_at(
+        state, RouteImport(routes=(DETOUR,), warnings=(), stations=(), vehicle_types=("A", "B"), layouts=("hall",))
+    )
     choice = LayoutChoice(vehicle_type="B")
     result = after(looking, actions.ChooseLayout(ME, choice))
     assert result.effects == (ReadFile(ME, 2, FILE, choice, state.project),)

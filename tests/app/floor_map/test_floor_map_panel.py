@@ -32,7 +32,9 @@ from commission.site.project import Project
 NASTY = "<img src=x onerror=alert(1)>"
 SEGMENTS = np.array([[[0.0, 0.0], [10.0, 0.0]], [[10.0, 0.0], [10.0, 5.0]], [[2.0, 1.0], [3.0, 1.0]]])
 LAYERS = (DrawingLayer("TEXT", False, 1), DrawingLayer(NASTY, True, 2))
-DRAWING = Drawing(Path("a.dxf"), "mm", LAYERS, SEGMENTS, np.array([1, 1, 0], np.int32), ())
+DRAWING = Drawing(
+    path=Path("a.dxf"), unit="mm", layers=LAYERS, segments=SEGMENTS, layer_of=np.array([1, 1, 0], np.int32), warnings=()
+)
 WHITE = np.full((40, 60), 255, np.uint8)
 DRAFTS = {
     "drawing": MapDraft(MapFile(Path(f"{NASTY}.dxf")), DRAWING),
@@ -118,7 +120,14 @@ def test_a_layer_among_hundreds_is_found_by_a_part_of_its_name(server: viser.Vis
     fields = MapDraftFields(server.gui, posted.append)
     hatches = (DrawingLayer(f"HATCH {n}", True, 1000 - n) for n in range(200))
     layers = (*hatches, DrawingLayer("A-Wall", False, 3))
-    drawing = Drawing(Path("a.dxf"), "mm", layers, SEGMENTS, np.array([200, 200, 0], np.int32), ())
+    drawing = Drawing(
+        path=Path("a.dxf"),
+        unit="mm",
+        layers=layers,
+        segments=SEGMENTS,
+        layer_of=np.array([200, 200, 0], np.int32),
+        warnings=(),
+    )
     fields.show(MapDraft(MapFile(Path("a.dxf")), drawing))
     assert sum(line.visible for line in fields._rows._buttons) == MOST_LAYERS
     assert "of 201 layers" in fields._rest.content

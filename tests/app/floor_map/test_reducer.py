@@ -299,6 +299,13 @@ def held(state: AppState) -> int:
 
 
 def test_a_drawing_without_lines_can_be_discarded(state: AppState) -> None:
-    drawing = Drawing(Path("a.dxf"), "mm", (), np.empty((0, 2, 2)), np.empty(0, np.int32), ())
+    drawing = Drawing(
+        path=Path("a.dxf"),
+        unit="mm",
+        layers=(),
+        segments=np.empty((0, 2, 2)),
+        layer_of=np.empty(0, np.int32),
+        warnings=(),
+    )
     opened = after(state, actions.MapOpened(ME, MapFile(Path("a.dxf")), drawing, ReadOptions())).state
     assert replace(after(opened, actions.DiscardMap()).state, mapping=state.mapping) == state
