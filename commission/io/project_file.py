@@ -6,13 +6,14 @@ It converts between files and `site.Project`; it does not watch for changes and 
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from commission.errors import FileFormatError, ProjectError, UsageError
-from commission.io.atomic import write_text
+from commission.io.atomic import staged, write_text
 from commission.io.conversion import convert, convert_setting, keys_of
 from commission.io.map_server import read_floor_map, write_floor_map
 from commission.io.project_text import project_text
@@ -154,16 +155,16 @@ def save_project(project: Project, folder: Path) -> None:
     Raises
     ------
     FileFormatError
-        a file cannot be written. Each file is replaced whole or not at all, `project.yaml` last.
+        a file cannot be written: then none is. They are put in their place when all are complete, `project.yaml` last.
     """
-    yaml_path = folder / FILE_NAME
-    map_name, table_name = _names_in(yaml_path)
-    if project.floor_map is not None and not _holds_map(folder / map_name, folder, project.floor_map):
-        write_floor_map(project.floor_map, folder / map_name)
-    if not _holds_table(folder / table_name, project.reflectors):
-        write_reflectors(project.reflectors, folder / table_name)
-    text = project_text(project, SCHEMA, map_name if project.floor_map is not None else None, table_name)
-    write_text(yaml_path, text)
+    map_name, table_name = _names_in(folder / FILE_NAME)
+    with staged(folder, last=FILE_NAME) as scratch:
+        if project.floor_map is not None and not _holds_map(folder / map_name, folder, project.floor_map):
+            write_floor_map(project.floor_map, scratch / _normal(folder, map_name))
+        if not _holds_table(folder / table_name, project.reflectors):
+            write_reflectors(project.reflectors, scratch / _normal(folder, table_name))
+        text = project_text(project, SCHEMA, map_name if project.floor_map is not None else None, table_name)
+        write_text(scratch / FILE_NAME, text)
 
 
 def apply_settings(parameters: Parameters, settings: Sequence[str]) -> Parameters:
@@ -248,6 +249,12 @@ def _names_in(yaml_path: Path) -> tuple[str, str]:
     except FileFormatError:
         return "map.yaml", "reflectors.csv"
     return keys.floor_map or "map.yaml", keys.reflectors or "reflectors.csv"
+
+
+def _normal(folder: Path, name: str) -> str:
+    """Name of a file relative to the folder that it lies in, without going out and back: `../hall/map.yaml`."""
+    top = os.path.abspath(folder)
+    return os.path.relpath(os.path.join(top, name), top)
 
 
 def _holds_map(path: Path, folder: Path, floor_map: FloorMap) -> bool:

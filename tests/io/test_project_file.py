@@ -272,3 +272,33 @@ def test_a_broken_project_is_not_taken_for_a_new_one(tmp_path: Path) -> None:
     (tmp_path / "project.yaml").mkdir()
     with pytest.raises(FileFormatError):
         open_project(tmp_path)
+
+
+def test_a_map_that_is_referred_to_by_a_detour_is_saved_where_it_is(tmp_path):
+    folder = tmp_path / "hall"
+    save_project(Project(name="Hall", floor_map=FloorMap(np.zeros((3, 4), np.int8), 0.1)), folder)
+    text = (folder / "project.yaml").read_text(encoding="utf-8")
+    (folder / "project.yaml").write_text(text.replace("floor_map: map.yaml", "floor_map: ../hall/map.yaml"))
+    project = load_project(folder)
+    changed = dataclasses.replace(project, floor_map=FloorMap(np.zeros((5, 4), np.int8), 0.1))
+    save_project(changed, folder)
+    assert load_project(folder) == changed
+    assert sorted(path.name for path in folder.iterdir()) == ["map.png", "map.yaml", "project.yaml", "reflectors.csv"]
+
+
+def test_a_save_for_which_there_is_no_space_writes_no_file_at_all(tmp_path, monkeypatch):
+    project = Project(name="Hall", floor_map=FloorMap(np.zeros((3, 4), np.int8), 0.1))
+    save_project(project, tmp_path)
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+
+    def no_space(*_arguments):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("commission.io.project_file.project_text", no_space)
+    changed = dataclasses.replace(project, floor_map=FloorMap(np.zeros((5, 4), np.int8), 0.1))
+    with pytest.raises(FileFormatError, match="No space left on device"):
+        save_project(changed, tmp_path)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    with pytest.raises(FileFormatError, match="No space left on device"):
+        save_project(changed, tmp_path / "copy" / "of it")
+    assert not (tmp_path / "copy").exists()
