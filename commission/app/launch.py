@@ -17,7 +17,7 @@ import numpy as np
 import viser
 
 from commission import compiled
-from commission.app.base.actions import Recording, Source, VirtualDrive
+from commission.app.base.actions import Recording, Report, Source, VirtualDrive
 from commission.app.base.extent import extent_of
 from commission.app.base.server import start_server
 from commission.app.base.state import MAGNIFICATIONS, NOTHING_SAVED, AppState
@@ -30,7 +30,7 @@ from commission.app.run.history import episodes
 from commission.app.run.session import Drive
 from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
 from commission.geometry import rasterize, se2, spline_kernels
-from commission.io.journal import restore
+from commission.io.journal_replay import restore
 from commission.io.project_file import OpenedProject, load_project, open_project
 from commission.localization import localizer, whole_run
 from commission.localization.estimate import Mode
@@ -158,17 +158,19 @@ def open_page(
     source : what drives at once; none: nothing yet.
     is_new : whether nothing of the project is on disk yet.
     """
+    restored = None if folder is None else restore(folder, project)
     state = AppState(
         project,
         NOTHING_SAVED if is_new else project,
         folder=folder,
+        foreign=() if restored is None else restored.foreign_changes,
         source=source,
         repeat=folder is None,
         hidden=frozenset({AccumulatedLayer.name}),
         magnify=seen_magnification(project),
         greeting=f"A new project in {folder}: it is empty until you load a map or place something" if is_new else "",
     )
-    keeping = Keeping(folder, project)
+    keeping = Keeping(folder, project, restored)
     work = Work(
         prepare,
         predicted_episodes,
@@ -190,9 +192,10 @@ def open_page(
     def _(client: viser.ClientHandle) -> None:
         runtime.post(BrowserLeft(client.client_id))
 
-    restored = None if folder is None else restore(folder, project)
-    if restored is not None:
+    if restored is not None and restored.edits:
         runtime.post(Restored(restored.project, restored.summary()))
+    elif restored is not None:
+        runtime.post(Report(restored.summary()))
     runtime.start(page)
     return runtime
 

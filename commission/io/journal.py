@@ -2,63 +2,32 @@
 
 Guarantee: an edit is in the hands of the system when `append` returns, so that a killed program loses nothing; it is on
 the disk at most a second later, so that a power cut loses at most the last second. A journal needs nothing from the
-project's files but a floor map that was never edited; a line that was cut off or damaged ends what is restored.
+project's files but a floor map that was never edited; where it is itself lost (deleted, replaced, its folder gone), it
+is begun anew with everything. What it gives back is the business of `journal_replay`.
 """
 
 from __future__ import annotations
 
-import json
 import os
 import threading
 import time
-import zlib
 from contextlib import suppress
-from dataclasses import dataclass
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from commission.errors import CommissionError, FileFormatError, ProjectError
+from commission.errors import FileFormatError, ProjectError
+from commission.io.atomic import remove_half_written
 from commission.io.fingerprint import Fingerprint
+from commission.io.journal_file import CHANGED, JournalFile
+from commission.io.journal_lines import FORMAT
+from commission.io.journal_place import FILE_NAME, FileId, rescue_folder
+from commission.io.journal_replay import Restored, set_aside
 from commission.io.project_file import save_project
-from commission.io.project_parts import apply, change
-from commission.io.reading import cannot_read, check_size
+from commission.io.project_parts import change
 from commission.site.project import Project
 
-FILE_NAME = ".commission.journal"
 SYNC_INTERVAL_S = 1.0
 """Longest time that an edit is only in the system's memory [s]."""
-SIZE_LIMIT = 2_000_000_000
-"""Bytes of a journal: a floor map that was changed all over ten thousand times."""
-FORMAT = 1
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Restored:
-    """What a journal gave back after a crash."""
-
-    project: Project
-    """The project as last edited."""
-    edits: int
-    """Number of edits made again."""
-    last_edit: str
-    """Name of the newest of them."""
-    last_at: datetime
-    """When it was made."""
-    foreign_changes: tuple[str, ...] = ()
-    """Files that somebody else has changed since the journal began: ask before they are overwritten."""
-    damage: str = ""
-    """Why the journal could not be read to its end; empty: it could."""
-
-    def summary(self) -> str:
-        """Return what was restored as one line."""
-        edits = f"{self.edits} edit{'' if self.edits == 1 else 's'}"
-        text = f"Restored {edits} up to {self.last_at:%Y-%m-%d %H:%M:%S}: {self.last_edit}"
-        if self.damage:
-            text += f"; the rest of the journal is lost ({self.damage})"
-        if self.foreign_changes:
-            text += f"; meanwhile changed on disk by somebody else: {', '.join(self.foreign_changes)}"
-        return text
 
 
 class Journal:
@@ -68,16 +37,24 @@ class Journal:
     ----------
     folder : the project's folder.
     project : the project as its files are.
-    on_disk : those files; read now when None.
+    restored : what a crashed session's journal gave back: what somebody else had changed by then stays known, and its
+        journal is replaced when the first edit has been written. Any other journal that is found is put aside.
     """
 
-    def __init__(self, folder: Path, project: Project, on_disk: Fingerprint | None = None) -> None:
+    def __init__(self, folder: Path, project: Project, restored: Restored | None = None) -> None:
         self.path = folder / FILE_NAME
         self._folder = folder
         self._saved = self._journaled = project
-        self._on_disk = on_disk or Fingerprint.of(folder)
-        self._has_map = False
-        self._descriptor: int | None = None
+        self._on_disk = (restored and restored.on_disk) or Fingerprint.of(folder)
+        # Files that hold nothing but what the next journal will hold, too.
+        self._replaceable = {restored.source} if restored else set[FileId | None]()
+        self._superseded = restored and restored.journal
+        self._folder_was_there = folder.is_dir()
+        self._file: JournalFile | None = None
+        self._has_map = self._needs_all = False
+        self._unprotected: tuple[Project, str] | None = None
+        self._news: list[str] = []
+        self._news_once_written: list[str] = []
         self._lock = threading.Lock()
         self._unsynced = threading.Event()
         self._closed = threading.Event()
@@ -94,22 +71,37 @@ class Journal:
         Raises
         ------
         FileFormatError
-            the journal cannot be written (disk full): the edit stands, but a crash would lose it.
+            the journal cannot be written (disk full): the edit stands, but a crash would lose it; `check` tries again.
         """
         with self._lock:
-            has_map = self._descriptor is not None and self._has_map
-            values = change(self._journaled, project, with_map=has_map)
-            if not has_map and project.floor_map is not self._journaled.floor_map:
-                # The first edit of the map writes all of it: from here on the files may be of any state.
-                values |= {"floor_map": change(None, project)["floor_map"]}
-                has_map = True
-            line = _line({"at": time.time(), "what": what, "change": values})
-            if self._descriptor is None:
-                self._begin(line)
-            else:
-                self._write(self._descriptor, line)
-            self._journaled, self._has_map = project, has_map
-            self._unsynced.set()
+            self._unprotected = (project, what)
+            self._see_to_file()
+            self._write_down(project, what)
+
+    def check(self) -> tuple[str, ...]:
+        """Look after the journal; call it every second or so. Return what the engineer has to know, one line each.
+
+        A journal that is not there any more is begun anew, and edits for which there was no space are written down.
+        """
+        with self._lock:
+            was_unprotected = self._unprotected is not None
+            self._see_to_file()
+            if self._unprotected is not None:
+                try:
+                    self._write_down(*self._unprotected)
+                except FileFormatError as error:
+                    if not was_unprotected:
+                        self._news.append(str(error))
+                else:
+                    if was_unprotected:
+                        self._news.append(f"all edits are in the journal again: {self.path}")
+            news, self._news = tuple(self._news), []
+            return news
+
+    @property
+    def is_protecting(self) -> bool:
+        """Whether every edit is written down."""
+        return self._unprotected is None
 
     def save(self, project: Project, *, overwrite: bool = False) -> None:
         """Save the project and remove the journal.
@@ -131,15 +123,19 @@ class Journal:
             raise ProjectError(
                 f"changed on disk by somebody else: {', '.join(foreign)}; expected as read or last saved"
             )
-        self.append(project, "Save")
+        # Where there is no space for the journal there may be some for the project, which then is safe.
+        with suppress(FileFormatError):
+            self.append(project, "Save")
         with self._lock:
-            if self._descriptor is not None:
+            if self._file is not None:
                 # A save that is killed halfway leaves files of two states; the mark says that they are our own.
-                self._write(self._descriptor, _line({"saving": True}))
-                os.fsync(self._descriptor)
+                with suppress(FileFormatError):
+                    self._file.append({"saving": True})
+                self._file.sync()
             save_project(project, self._folder)
             self._on_disk = Fingerprint.of(self._folder)
             self._saved = self._journaled = project
+            self._folder_was_there = True
             self._remove()
 
     def foreign_changes(self) -> tuple[str, ...]:
@@ -161,45 +157,66 @@ class Journal:
         with self._lock:
             self._close_file()
 
-    def _begin(self, first: bytes) -> None:
-        """Start a file with the project (without its map) as it was, and the line of the first edit.
+    def _write_down(self, project: Project, what: str) -> None:
+        """Append an edit, or begin a file with it; the lock is held."""
+        has_map = self._needs_all or (self._file is not None and self._has_map)
+        values = change(None if self._needs_all else self._journaled, project, with_map=has_map)
+        if not has_map and project.floor_map is not self._journaled.floor_map:
+            # The first edit of the map writes all of it: from here on the files may be of any state.
+            values |= {"floor_map": change(None, project)["floor_map"]}
+            has_map = True
+        entry = {"at": time.time(), "what": what, "change": values}
+        if self._file is None:
+            self._begin(entry)
+        else:
+            self._file.append(entry)
+        self._journaled, self._has_map, self._unprotected, self._needs_all = project, has_map, None, False
+        self._news += self._news_once_written
+        self._news_once_written.clear()
+        self._unsynced.set()
 
-        It takes the place of a crashed session's journal only when it is complete, since it may hold what was restored.
-        """
-        whole = change(None, self._journaled, with_map=False)
-        header = _line({"journal": FORMAT, "on_disk": list(self._on_disk.digests), "change": whole})
-        beginning = self.path.with_name(f"{FILE_NAME}.new")
-        descriptor = None
-        try:
-            # A new project's folder appears with its first edit.
-            self._folder.mkdir(parents=True, exist_ok=True)
-            flags = os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_APPEND | getattr(os, "O_BINARY", 0)
-            descriptor = os.open(beginning, flags, 0o644)
-            self._write(descriptor, header + first)
-            os.fsync(descriptor)
-            beginning.replace(self.path)
-        except (OSError, FileFormatError) as error:
-            if descriptor is not None:
-                os.close(descriptor)
-            if isinstance(error, FileFormatError):
-                raise
-            raise _cannot_write(self.path, error) from error
-        self._descriptor = descriptor
+    def _see_to_file(self) -> None:
+        """Let go of a journal that is lost, or whose folder is, and have the next one begin with everything."""
+        is_folder_lost = self._folder_was_there and not self._folder.is_dir()
+        is_elsewhere = self.path.parent != self._folder
+        if is_folder_lost and not is_elsewhere:
+            self.path = rescue_folder(self._folder) / FILE_NAME
+            lost = f"the project's folder {self._folder} was deleted or moved; all edits are kept in {self.path.parent}"
+        elif is_elsewhere and not is_folder_lost:
+            self._superseded = self.path
+            self.path = self._folder / FILE_NAME
+            lost = f"the project's folder is there again, and edits are kept in it: {self._folder}"
+        elif self._file is not None and (problem := self._file.problem()):
+            lost = f"the journal of unsaved edits {problem}; it was begun anew with the whole project: {self.path}"
+        else:
+            return
+        self._close_file()
+        self._needs_all = True
+        self._unprotected = self._unprotected or (self._journaled, "everything until then")
+        self._news_once_written.append(lost)
+
+    def _begin(self, entry: dict[str, Any]) -> None:
+        """Start a file with the project as it was, unless the first edit holds all of it; the lock is held."""
+        first = [{"journal": FORMAT, "on_disk": list(self._on_disk.digests)}, entry]
+        if not self._needs_all:
+            first.insert(1, {"change": change(None, self._journaled, with_map=False)})
+        self._put_aside_what_is_there()
+        # A new project's folder appears with its first edit.
+        self._file = JournalFile(self.path, first)
+        self._folder_was_there = self._folder_was_there or self.path.parent == self._folder
+        if self._superseded is not None and self._superseded != self.path:
+            _remove_with_folder(self._superseded)
+        self._superseded = None
         if self._syncer is None:
             self._syncer = threading.Thread(target=self._sync_forever, name="journal", daemon=True)
             self._syncer.start()
 
-    def _write(self, descriptor: int, data: bytes) -> None:
-        """Append in one call of the system, whole or (after a full disk) taken back."""
-        size = os.fstat(descriptor).st_size
-        try:
-            written = os.write(descriptor, data)
-            if written < len(data):
-                raise OSError(f"only {written} of {len(data)} bytes were written")
-        except OSError as error:
-            with suppress(OSError):
-                os.ftruncate(descriptor, size)
-            raise _cannot_write(self.path, error) from error
+    def _put_aside_what_is_there(self) -> None:
+        """Keep a journal that is neither ours nor the one that was restored: nobody has read it."""
+        with suppress(OSError):
+            if FileId.of(self.path) not in self._replaceable:
+                kept = set_aside(self.path, "found")
+                self._news_once_written.append(f"another journal of unsaved edits lay there; it is kept as {kept}")
 
     def _sync_forever(self) -> None:
         """Bring lines to the disk, at most once a second; a slow disk delays nobody who edits."""
@@ -207,7 +224,7 @@ class Journal:
             self._unsynced.wait()
             self._unsynced.clear()
             with self._lock:
-                descriptor = None if self._descriptor is None else os.dup(self._descriptor)
+                descriptor = None if self._file is None else os.dup(self._file.descriptor)
             if descriptor is not None:
                 with suppress(OSError):
                     os.fsync(descriptor)
@@ -215,120 +232,35 @@ class Journal:
             self._closed.wait(0.5 * SYNC_INTERVAL_S)
 
     def _remove(self) -> None:
-        self._close_file()
-        self.path.unlink(missing_ok=True)
+        """Remove the file, as its edits are saved or not wanted; the lock is held."""
+        if self._file is not None:
+            self._file.remove()
+            self._file = None
+            if self.path.parent != self._folder:
+                _remove_with_folder(self.path)
+        self._unprotected, self._needs_all = None, False
+        self.path = self._folder / FILE_NAME
 
     def _close_file(self) -> None:
-        if self._descriptor is not None:
-            with suppress(OSError):
-                os.fsync(self._descriptor)
-            os.close(self._descriptor)
-            self._descriptor = None
+        if self._file is not None:
+            if self._file.problem() != CHANGED:
+                self._replaceable.add(FileId.of(self._file.descriptor))
+            self._file.sync()
+            self._file.close()
+            self._file = None
 
 
-def restore(folder: Path, project: Project) -> Restored | None:
-    """Make the edits of a crashed session again.
-
-    Parameters
-    ----------
-    folder : the project's folder.
-    project : the project as its files are now; its floor map is used where the journal holds none.
-
-    Returns
-    -------
-    restored : None when there is no journal, or none of its edits can be read. The journal stays until the next edit or
-        save: pass the restored project to a new `Journal` by `append` before anything else.
-
-    Raises
-    ------
-    FileFormatError
-        the journal cannot be read at all (no permission, larger than SIZE_LIMIT).
-    """
-    path = folder / FILE_NAME
-    if not path.is_file():
-        return None
-    check_size(path, SIZE_LIMIT)
-    replay = _Replay(path, project)
-    try:
-        with path.open("rb") as file:
-            for number, line in enumerate(file, start=1):
-                replay.read(number, line)
-                if replay.damage:
-                    break
-    except OSError as error:
-        raise cannot_read(path, error) from error
-    return replay.result(folder)
+def remove_leftovers(folder: Path) -> None:
+    """Remove what a killed program has left half-written; nobody else may be saving the project now."""
+    names = [name for name, _ in Fingerprint.of(folder).digests]
+    for place in {folder, *((folder / name).parent for name in names)}:
+        remove_half_written(place, [Path(name).name for name in names])
+    with suppress(OSError):
+        (folder / f"{FILE_NAME}.new").unlink(missing_ok=True)
 
 
-class _Replay:
-    """The edits of a journal, line by line."""
-
-    def __init__(self, path: Path, project: Project) -> None:
-        self._path = path
-        self._project = self._loaded = project
-        self._edits = 0
-        self._what = ""
-        self._at = 0.0
-        self._digests: tuple[tuple[str, str], ...] = ()
-        self._saving = False
-        self.damage = ""
-
-    def read(self, number: int, line: bytes) -> None:
-        """Make the edit of a line; a line that is damaged is noted."""
-        entry = _entry(line)
-        if entry is None:
-            self.damage = f"line {number} is damaged or cut off"
-            return
-        try:
-            if (number == 1) != (entry.get("journal") == FORMAT):
-                raise ValueError(f"line {number} is out of place")
-            if number == 1:
-                self._digests = tuple((str(name), str(digest)) for name, digest in entry["on_disk"])
-            self._saving = "saving" in entry
-            if self._saving:
-                return
-            self._project = apply(self._project, entry["change"], self._path)
-            if number > 1:
-                what, at = str(entry["what"]), float(entry["at"])
-                self._edits, self._what, self._at = self._edits + bool(entry["change"]), what, at
-        except (CommissionError, LookupError, TypeError, ValueError) as error:
-            self.damage = f"line {number}: {error}"
-
-    def result(self, folder: Path) -> Restored | None:
-        """Return what was restored."""
-        was_saved = self._saving and self._project == self._loaded
-        if self._edits == 0 or was_saved:
-            return None
-        foreign = () if self._saving else Fingerprint(folder, self._digests).changed_files()
-        when = datetime.fromtimestamp(self._at)
-        return Restored(
-            project=self._project,
-            edits=self._edits,
-            last_edit=self._what,
-            last_at=when,
-            foreign_changes=foreign,
-            damage=self.damage,
-        )
-
-
-def _line(entry: dict[str, Any]) -> bytes:
-    """Line with a checksum in front: half a line, or one that a disk has mangled, is not mistaken for a whole one."""
-    text = json.dumps(entry, ensure_ascii=True, allow_nan=False, separators=(",", ":")).encode("ascii")
-    return b"%08x %s\n" % (zlib.crc32(text), text)
-
-
-def _entry(line: bytes) -> dict[str, Any] | None:
-    """Entry of a line; None when it is damaged."""
-    checksum, _, text = line.rstrip(b"\n").partition(b" ")
-    if not line.endswith(b"\n") or checksum != b"%08x" % zlib.crc32(text):
-        return None
-    try:
-        entry = json.loads(text)
-    except (ValueError, RecursionError):
-        return None
-    return entry if isinstance(entry, dict) else None
-
-
-def _cannot_write(path: Path, error: OSError) -> FileFormatError:
-    found = f"cannot be written ({error.strerror or error})"
-    return FileFormatError(path, "", found, "a writable place with free space: a crash would lose this edit")
+def _remove_with_folder(path: Path) -> None:
+    """Remove a journal, and its folder where nothing else lies in it."""
+    path.unlink(missing_ok=True)
+    with suppress(OSError):
+        path.parent.rmdir()

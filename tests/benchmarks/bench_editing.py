@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from commission.geometry.occupancy import OccupancyGrid
-from commission.io.journal import Journal, restore
+from commission.io.journal import Journal
+from commission.io.journal_replay import restore
 from commission.io.project_file import save_project
 from commission.planning.route_check import FloorDistances
 from commission.site.editing import reflectors as edits

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from commission.geometry import spline_kernels
-from commission.io.journal import Journal, restore
+from commission.io.journal import Journal
+from commission.io.journal_replay import restore
 from commission.io.project_file import load_project
 from commission.site.editing import reflectors as edits
 from commission.site.editing import routes, stations

@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import pickle
 import random
+import shutil
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -17,7 +18,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from commission.errors import FileFormatError, ProjectError
-from commission.io.journal import Journal, restore
+from commission.io.journal import Journal, remove_leftovers
+from commission.io.journal_replay import Restored, restore
 from commission.io.project_file import load_project, save_project
 from commission.io.project_parts import apply, change
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
@@ -98,36 +100,6 @@ def test_saving_removes_the_journal_and_later_edits_begin_another(tmp_path):
     journal.close()
 
 
-@pytest.mark.parametrize("cut", [1, 5, 40])
-def test_a_line_that_was_cut_off_ends_what_is_restored(tmp_path, cut):
-    project, journal = started(tmp_path)
-    for number in (1, 2):
-        journal.append(replace(project, name=f"edit {number}"), f"Edit {number}")
-    journal.close()
-    data = journal.path.read_bytes()
-    journal.path.write_bytes(data[:-cut])
-    restored = restore(tmp_path, project)
-    assert restored is not None
-    assert restored.project.name == "edit 1"
-    assert "the rest of the journal is lost (line 3 is damaged or cut off)" in restored.summary()
-
-
-def test_a_journal_of_garbage_restores_what_stands_before_the_garbage(tmp_path):
-    project, journal = started(tmp_path)
-    journal.append(replace(project, name="edit 1"), "Edit 1")
-    journal.close()
-    whole = journal.path.read_bytes()
-    rng = random.Random(2)
-    for _ in range(60):
-        data = bytearray(whole)
-        data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
-        journal.path.write_bytes(data)
-        restored = restore(tmp_path, project)
-        assert restored is None or restored.project.name == "edit 1"
-    journal.path.write_bytes(os.urandom(1000))
-    assert restore(tmp_path, project) is None
-
-
 def test_a_project_that_somebody_else_changed_is_not_overwritten_silently(tmp_path):
     project, journal = started(tmp_path)
     mine = replace(project, name="mine")
@@ -164,11 +136,199 @@ def test_a_save_that_was_killed_halfway_is_not_taken_for_somebody_else(tmp_path,
     journal.close()
 
 
-def test_a_journal_that_cannot_be_written_says_that_a_crash_would_lose_the_edit(tmp_path):
+def full_disk(*_arguments: object) -> int:
+    raise OSError(28, "No space left on device")
+
+
+def test_edits_without_space_are_written_down_as_soon_as_there_is_some(tmp_path, monkeypatch):
     project, journal = started(tmp_path)
-    journal.path.mkdir()
-    with pytest.raises(FileFormatError, match="a crash would lose this edit"):
-        journal.append(replace(project, name="x"), "Rename")
+    journal.append(replace(project, name="first"), "Rename")
+    with monkeypatch.context() as full:
+        full.setattr(os, "write", full_disk)
+        with pytest.raises(FileFormatError, match=r"No space left on device.*a crash would lose this edit"):
+            journal.append(replace(project, name="second"), "Rename again")
+        assert not journal.is_protecting
+        assert journal.check() == ()
+        assert given_back(tmp_path).project.name == "first"
+    assert journal.check() == (f"all edits are in the journal again: {journal.path}",)
+    assert journal.is_protecting
+    assert given_back(tmp_path).last_edit == "Rename again"
+    assert given_back(tmp_path).project.name == "second"
+    assert journal.check() == ()
+    journal.close()
+
+
+def test_a_save_that_has_space_where_the_journal_has_none_succeeds(tmp_path, monkeypatch):
+    project, journal = started(tmp_path)
+    monkeypatch.setattr("commission.io.journal_file.os.write", full_disk)
+    with pytest.raises(FileFormatError):
+        journal.append(replace(project, name="first"), "Rename")
+    journal.save(replace(project, name="first"))
+    assert load_project(tmp_path).name == "first"
+    assert journal.is_protecting
+
+
+def given_back(folder: Path) -> Restored:
+    """What the program would find if it was killed now; it has not lost anything by the search."""
+    restored = restore(folder, load_project(folder) if (folder / "project.yaml").exists() else Project())
+    assert restored is not None
+    assert not restored.damage
+    return restored
+
+
+def deleted(path: Path) -> None:
+    path.unlink()
+
+
+def replaced_by_an_older_one(path: Path) -> None:
+    older = path.with_name("older")
+    older.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:3]))
+    older.replace(path)
+
+
+def emptied(path: Path) -> None:
+    path.write_bytes(b"")
+
+
+def added_to(path: Path) -> None:
+    with path.open("ab") as file:
+        file.write(b"something")
+
+
+@pytest.mark.parametrize("by_an_edit", [False, True])
+@pytest.mark.parametrize(
+    ("done", "told"),
+    [
+        (deleted, "was deleted by somebody else"),
+        (replaced_by_an_older_one, "was replaced by somebody else"),
+        (emptied, "was changed by somebody else"),
+        (added_to, "was changed by somebody else"),
+    ],
+)
+def test_a_journal_that_is_lost_is_begun_anew_with_the_whole_project(tmp_path, done, told, by_an_edit):
+    project, journal = started(tmp_path)
+    for number in (1, 2):
+        project = replace(project, name=f"edit {number}", floor_map=HALL)
+        journal.append(project, f"Edit {number}")
+    done(journal.path)
+    there = journal.path.read_bytes() if journal.path.exists() else None
+    if by_an_edit:
+        project = replace(project, name="edit 3")
+        journal.append(project, "Edit 3")
+    news = journal.check()
+    assert f"the journal of unsaved edits {told}; it was begun anew with the whole project" in news[0]
+    # Even the floor map, which was never edited: whoever deletes a journal may delete more.
+    for path in (tmp_path / "map.yaml", tmp_path / "map.png"):
+        path.unlink()
+    restored = restore(tmp_path, Project())
+    assert restored is not None
+    assert restored.project == project
+    kept = [path.read_bytes() for path in tmp_path.glob(".commission.journal.found-*")]
+    assert kept == ([] if there is None else [there])
+    assert len(news) == 1 + len(kept)
+    assert journal.check() == ()
+    journal.close()
+
+
+@pytest.fixture
+def state_home(tmp_path, monkeypatch) -> Path:
+    """The user's own folder."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    return tmp_path / "state"
+
+
+@pytest.mark.parametrize("edits", [0, 2])
+def test_edits_of_a_project_whose_folder_was_deleted_are_kept_where_the_news_tell(tmp_path, state_home, edits):
+    folder = tmp_path / "hall"
+    project, journal = started(folder)
+    for number in range(1, edits + 1):
+        project = replace(project, name=f"edit {number}")
+        journal.append(project, f"Edit {number}")
+    shutil.rmtree(folder)
+    (news,) = journal.check()
+    place = journal.path.parent
+    assert news == f"the project's folder {folder} was deleted or moved; all edits are kept in {place}"
+    assert place.is_relative_to(state_home)
+    assert not folder.exists()
+    later = replace(project, name="later")
+    journal.append(later, "Rename")
+    # Killed now: the place that was told gives it back, and so does the place where the project was.
+    for found in (place, folder):
+        restored = restore(found, Project())
+        assert restored is not None
+        assert restored.project == later
+    following = Journal(folder, Project(), restored)
+    following.append(restored.project, "Restore")
+    assert not place.exists()
+    assert given_back(folder).project == later
+    following.close()
+
+
+def test_a_folder_that_comes_back_has_the_journal_again(tmp_path, state_home):
+    folder = tmp_path / "hall"
+    project, journal = started(folder)
+    journal.append(replace(project, name="first"), "Rename")
+    folder.rename(tmp_path / "elsewhere")
+    assert "was deleted or moved" in journal.check()[0]
+    journal.append(replace(project, name="second"), "Rename")
+    (tmp_path / "elsewhere").rename(folder)
+    assert journal.check() == (f"the project's folder is there again, and edits are kept in it: {folder}",)
+    assert given_back(folder).project.name == "second"
+    assert list(state_home.rglob("*.journal")) == []
+    assert list(folder.glob("*.found-*")) == []
+    journal.save(replace(project, name="second"))
+    assert load_project(folder).name == "second"
+    journal.close()
+
+
+def test_a_save_makes_a_deleted_folder_again_when_asked_to(tmp_path, state_home):
+    folder = tmp_path / "hall"
+    project, journal = started(folder)
+    shutil.rmtree(folder)
+    with pytest.raises(ProjectError, match=r"changed on disk by somebody else: map\.png, map\.yaml, project\.yaml"):
+        journal.save(project)
+    journal.check()
+    journal.save(project, overwrite=True)
+    assert load_project(folder) == project
+    assert [path for path in state_home.rglob("*") if path.is_file()] == []
+    assert journal.check() == ()
+    journal.close()
+
+
+def test_a_folder_that_is_gone_with_no_other_place_is_told_once_and_tried_again(tmp_path, monkeypatch):
+    (tmp_path / "state").write_text("no folder")
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    project, journal = started(tmp_path / "hall")
+    shutil.rmtree(tmp_path / "hall")
+    (news,) = journal.check()
+    assert "a crash would lose this edit" in news
+    assert journal.check() == ()
+    assert not journal.is_protecting
+    (tmp_path / "state").unlink()
+    told, again = journal.check()
+    assert "all edits are kept in" in told
+    assert "all edits are in the journal again" in again
+    restored = restore(tmp_path / "hall", Project())
+    assert restored is not None
+    assert restored.project == project
+    journal.close()
+
+
+def test_what_a_killed_save_left_half_written_is_removed(tmp_path):
+    project, journal = started(tmp_path)
+    for name in (
+        ".project.yaml.abcd_123.tmp",
+        ".map.png.abcd_123.tmp",
+        ".commission.journal.new",
+        ".other.abcd_123.tmp",
+    ):
+        (tmp_path / name).write_text("half")
+    (tmp_path / ".commission.writing.999999999.x").mkdir()
+    remove_leftovers(tmp_path)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"project.yaml", "map.yaml", "map.png", "reflectors.csv", ".other.abcd_123.tmp"}
+    assert load_project(tmp_path) == project
+    journal.close()
 
 
 def heard(receiver: Connection, seconds: float) -> Iterator[Project | None]:

@@ -12,6 +12,7 @@ from commission.app.base import actions
 from commission.app.base.actions import Action
 from commission.app.base.state import AppState
 from commission.io.journal import Journal
+from commission.io.journal_replay import Restored
 from commission.io.project_file import load_project, save_project
 from commission.site.project import Project
 
@@ -25,11 +26,12 @@ class Keeping:
     ----------
     folder : the project's folder; none: bundled with the program, nothing is journaled.
     project : the project as its files are.
+    restored : what the journal of a crashed session gave back.
     """
 
-    def __init__(self, folder: Path | None, project: Project) -> None:
+    def __init__(self, folder: Path | None, project: Project, restored: Restored | None = None) -> None:
         self._folder = folder
-        self._journal = None if folder is None else Journal(folder, project)
+        self._journal = None if folder is None else Journal(folder, project, restored)
         self._listing = _listing(folder)
 
     def note(self, project: Project, what: str) -> None:

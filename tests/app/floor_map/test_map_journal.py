@@ -14,7 +14,7 @@ from commission.app.editing.editor import Tool
 from commission.app.floor_map import actions
 from commission.app.floor_map.draft import MapFile
 from commission.app.project.project_folder import Keeping
-from commission.io.journal import restore
+from commission.io.journal_replay import restore
 from commission.io.project_file import load_project, open_project
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 

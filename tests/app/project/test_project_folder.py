@@ -12,7 +12,7 @@ from commission.app.editing.editor import Tool
 from commission.app.project.project_folder import Keeping
 from commission.app.runtime import Runtime, Work
 from commission.errors import ProjectError
-from commission.io.journal import restore
+from commission.io.journal_replay import restore
 from commission.io.project_file import load_project, save_project
 from commission.site.project import Project
 from tests.app.sites import room
