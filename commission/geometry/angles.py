@@ -50,7 +50,12 @@ def difference(angle: ArrayLike, reference: ArrayLike) -> FloatArray:
 
 @compiled
 def wrap_scalar(angle: float) -> float:
-    """Wrap one angle [rad] to [-pi, pi): the same arithmetic as `wrap`, for kernels."""
+    """Wrap one angle [rad] to [-pi, pi): the same arithmetic as `wrap`, for kernels.
+
+    Notes
+    -----
+    a - 2 pi floor((a + pi) / 2 pi), by definition.
+    """
     if -math.pi <= angle < math.pi:
         return angle
     wrapped = angle - TURN * math.floor((angle + math.pi) / TURN)

@@ -19,8 +19,9 @@ def draw_segments(cells: BoolArray, segments: FloatArray) -> None:
 
     Notes
     -----
-    Row by row: the columns between the two points where the segment enters and leaves a row. Both are computed from the
-    segment's ends, never accumulated, so that a long segment is as exact as a short one.
+    x = x1 + (y - y1) (x2 - x1) / (y2 - y1) where the segment enters and leaves a row, by definition of a line; the
+    columns between are touched. Computed from the segment's ends, never accumulated, so that a long segment is as exact
+    as a short one.
     """
     rows, columns = cells.shape
     for i in range(segments.shape[0]):

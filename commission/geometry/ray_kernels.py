@@ -71,6 +71,10 @@ def cast_ray(  # noqa: PLR0917 - one ray, number by number
     -------
     range : [m]; inf where nothing is hit up to `max_range`.
     row, column : the occupied cell; -1, -1 where nothing is hit.
+
+    Notes
+    -----
+    t = (border - start) / direction at each border of a free square: Amanatides, Woo 1987, by squares instead of cells.
     """
     limit = max_range * (1.0 / tables.resolution)
     x, y, dx, dy, inverse_x, inverse_y, t, row, column = _begin(tables, x, y, dir_x, dir_y)
@@ -84,7 +88,13 @@ def cast_ray(  # noqa: PLR0917 - one ray, number by number
 
 @compiled
 def is_line_free(tables: RayTables, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether no occupied cell is touched on the straight line from a to b [m, map frame], both ends included."""
+    """Whether no occupied cell is touched on the straight line from a to b, both ends included: by `cast_ray`.
+
+    Parameters
+    ----------
+    tables : of a `RayCaster`.
+    ax, ay, bx, by : the two ends [m], map frame.
+    """
     length = math.hypot(bx - ax, by - ay)
     scale = 1.0 / length if length > 0.0 else 0.0
     return cast_ray(tables, ax, ay, (bx - ax) * scale, (by - ay) * scale, length)[1] < 0
@@ -214,7 +224,18 @@ def _entry(  # noqa: PLR0917
 
 @compiled
 def cast_serial(tables: RayTables, rays: FloatArray, max_range: float) -> FloatArray:
-    """Ranges (N,) of rays (N, 3) [m, m, rad], map frame, on one core."""
+    """Ranges of many rays on one core: `cast_ray` for each.
+
+    Parameters
+    ----------
+    tables : of a `RayCaster`.
+    rays : (N, 3) array: start and direction [m, m, rad], map frame.
+    max_range : [m]
+
+    Returns
+    -------
+    ranges : (N,) array [m]; inf where nothing is hit up to `max_range`.
+    """
     ranges = np.empty(len(rays))
     _cast_in_turns(tables, rays, max_range, ranges)
     return ranges
@@ -222,7 +243,16 @@ def cast_serial(tables: RayTables, rays: FloatArray, max_range: float) -> FloatA
 
 @compiled_parallel
 def cast_parallel(tables: RayTables, rays: FloatArray, max_range: float) -> FloatArray:
-    """Ranges (N,) of rays (N, 3) [m, m, rad], map frame, on all cores."""
+    """Ranges of many rays on all cores: `cast_ray` for each.
+
+    Parameters
+    ----------
+    tables, rays, max_range : as in `cast_serial`.
+
+    Returns
+    -------
+    ranges : (N,) array [m], equal to those of `cast_serial`.
+    """
     ranges = np.empty(len(rays))
     for chunk in parallel_range((len(rays) + CHUNK - 1) // CHUNK):
         part = slice(chunk * CHUNK, min((chunk + 1) * CHUNK, len(rays)))
@@ -276,7 +306,17 @@ def _cast_in_turns(tables: RayTables, rays: FloatArray, max_range: float, ranges
 
 @compiled
 def lines_free(tables: RayTables, points_a: FloatArray, points_b: FloatArray) -> BoolArray:
-    """Line of sight (N,) between the rows of two (N, 2) arrays."""
+    """Line of sight between the rows of two arrays: `is_line_free` for each.
+
+    Parameters
+    ----------
+    tables : of a `RayCaster`.
+    points_a, points_b : (N, 2) arrays [m], map frame.
+
+    Returns
+    -------
+    free : (N,) array.
+    """
     free = np.empty(len(points_a), dtype=np.bool_)
     for i in range(len(points_a)):
         free[i] = is_line_free(tables, points_a[i, 0], points_a[i, 1], points_b[i, 0], points_b[i, 1])
@@ -295,6 +335,11 @@ def free_squares(occupied: BoolArray, down: bool, left: bool) -> NDArray[np.uint
     Returns
     -------
     sizes : (H, W) uint8 array [cells]: 0 in occupied cells; outside the grid counts as free; at most 255.
+
+    Notes
+    -----
+    size = 1 + min(size of the three neighbors onward) in a free cell: the recursion of the largest square, by
+    induction.
     """
     height, width = occupied.shape
     padded = np.full((height + 2, width + 2), LARGEST_SQUARE, dtype=np.uint8)

@@ -148,21 +148,49 @@ def log(pose: ArrayLike) -> FloatArray:
 def compose_scalars(  # noqa: PLR0917 - two poses, number by number
     x: float, y: float, t: float, dx: float, dy: float, dt: float
 ) -> tuple[float, float, float]:
-    """Pose of c in a from the six numbers of T_a_b and T_b_c: `compose` for kernels."""
+    """Pose of c in a from the six numbers of T_a_b and T_b_c: `compose` for kernels.
+
+    Parameters
+    ----------
+    x, y, t : T_a_b [m, m, rad].
+    dx, dy, dt : T_b_c [m, m, rad].
+
+    Notes
+    -----
+    (p + R(t) d, wrap(t + dt)) with R the rotation matrix: the product of the two homogeneous matrices, by definition.
+    """
     c, s = math.cos(t), math.sin(t)
     return x + (c * dx - s * dy), y + (s * dx + c * dy), wrap_scalar(t + dt)
 
 
 @compiled
 def inverse_scalars(x: float, y: float, t: float) -> tuple[float, float, float]:
-    """Pose of a in b from the three numbers of T_a_b: `inverse` for kernels."""
+    """Pose of a in b from the three numbers of T_a_b: `inverse` for kernels.
+
+    Parameters
+    ----------
+    x, y, t : T_a_b [m, m, rad].
+
+    Notes
+    -----
+    (-R(t)^T p, wrap(-t)): the inverse of the homogeneous matrix, by definition.
+    """
     c, s = math.cos(t), math.sin(t)
     return -(c * x + s * y), s * x - c * y, wrap_scalar(-t)
 
 
 @compiled
 def exp_scalars(vx: float, vy: float, w: float) -> tuple[float, float, float]:
-    """Pose reached by a constant twist for one second: `exp` for kernels."""
+    """Pose reached by a constant twist for one second: `exp` for kernels.
+
+    Parameters
+    ----------
+    vx, vy, w : forward, left, turn [m, m, rad].
+
+    Notes
+    -----
+    (V(w) v, wrap(w)) with V = [[sin w, cos w - 1], [1 - cos w, sin w]] / w: Solà et al. 2018, equations 156 and 158.
+    """
     if abs(w) < SMALL_ANGLE:
         w2 = w * w
         along = 1.0 - w2 / 6.0 * (1.0 - w2 / 20.0)
@@ -176,7 +204,16 @@ def exp_scalars(vx: float, vy: float, w: float) -> tuple[float, float, float]:
 
 @compiled
 def log_scalars(x: float, y: float, t: float) -> tuple[float, float, float]:
-    """Twist that reaches a pose in one second: `log` for kernels."""
+    """Twist that reaches a pose in one second: `log` for kernels.
+
+    Parameters
+    ----------
+    x, y, t : pose [m, m, rad].
+
+    Notes
+    -----
+    (V(w)^-1 p, w) with w = wrap(t) and V^-1 = w/2 [[cot w/2, 1], [-1, cot w/2]]: Solà et al. 2018, equation 157.
+    """
     w = wrap_scalar(t)
     half = 0.5 * w
     if abs(w) < SMALL_ANGLE:

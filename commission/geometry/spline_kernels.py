@@ -17,7 +17,18 @@ MAX_BACKTRACKS = 30
 
 @compiled
 def span_at(knots: FloatArray, degree: int, u: float) -> int:
-    """Index k with knots[k] <= u < knots[k + 1]; the last span also holds the end of the domain."""
+    """Span of the knots that a parameter lies in; the last span also holds the end of the domain.
+
+    Parameters
+    ----------
+    knots : (N + degree + 1,) array, not decreasing.
+    degree : of the curve.
+    u : parameter within the domain.
+
+    Notes
+    -----
+    k with knots[k] <= u < knots[k + 1], by bisection: The NURBS Book, algorithm A2.1.
+    """
     low, high = degree, len(knots) - degree - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -47,7 +58,8 @@ def evaluate(
 
     Notes
     -----
-    Piegl, Tiller, "The NURBS Book", 1997: equation 3.8 (control points of derivatives) and 4.8 (rational derivatives).
+    C = A / w, C' = (A' - w' C) / w, C'' = (A'' - 2 w' C' - w'' C) / w: Piegl, Tiller, "The NURBS Book", 1997, equation
+    4.8 (rational derivatives), with equation 3.8 (control points of derivatives).
     """
     u = min(max(u, knots[degree]), knots[len(knots) - degree - 1])
     span = span_at(knots, degree, u)
@@ -77,7 +89,13 @@ def evaluate(
 
 @compiled
 def evaluate_many(knots: FloatArray, controls: FloatArray, degree: int, parameters: FloatArray) -> FloatArray:
-    """Rows [x, y, dx, dy, ddx, ddy] of `evaluate` at each of M parameters: (M, 6) array."""
+    """Rows [x, y, dx, dy, ddx, ddy] of `evaluate` at each of M parameters: (M, 6) array.
+
+    Parameters
+    ----------
+    knots, controls, degree : as in `evaluate`.
+    parameters : (M,) array.
+    """
     rows = np.empty((len(parameters), 6))
     for i in range(len(parameters)):
         x, y, dx, dy, ddx, ddy = evaluate(knots, controls, degree, parameters[i])
@@ -89,8 +107,16 @@ def evaluate_many(knots: FloatArray, controls: FloatArray, degree: int, paramete
 def closest_parameter(  # noqa: PLR0917 - three tables and three numbers, as kernels pass them
     knots: FloatArray, controls: FloatArray, degree: int, x: float, y: float, guess: float
 ) -> float:
-    """Parameter of the local minimum of the distance to (x, y) [m] that is reached downhill from `guess`.
+    """Parameter of the local minimum of the distance to a point that is reached downhill from a guess.
 
+    Parameters
+    ----------
+    knots, controls, degree : as in `evaluate`.
+    x, y : the point [m].
+    guess : parameter to begin at.
+
+    Notes
+    -----
     Newton on (C(u) - p) . C'(u) = 0 (The NURBS Book, equation 6.3) with steps that never go uphill.
     """
     first, last = knots[degree], knots[len(knots) - degree - 1]

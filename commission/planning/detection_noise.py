@@ -86,7 +86,16 @@ def detection_noise(reflectors: ReflectorMap, scanner: Scanner, parameters: Dete
 
 
 def classes_of(reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorParameters) -> IntArray:
-    """(M,) row of `DetectionNoise.columns` of each reflector."""
+    """Row of `DetectionNoise.columns` of each reflector.
+
+    Parameters
+    ----------
+    reflectors, scanner, parameters : as in `detection_noise`.
+
+    Returns
+    -------
+    rows : (M,) array.
+    """
     model = detector_model(reflectors, scanner, parameters)
     rows = {pair: row for row, pair in enumerate(zip(model.radii.tolist(), model.flat.tolist(), strict=True))}
     pairs = zip(reflectors.radii.tolist(), reflectors.is_flat.tolist(), strict=True)
@@ -103,14 +112,30 @@ class DetectionQuality(NamedTuple):
 
 
 def detection_quality(reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorParameters) -> DetectionQuality:
-    """Gather `classes_of` and `detection_noise`; parameters as there."""
+    """Gather `classes_of` and `detection_noise`.
+
+    Parameters
+    ----------
+    reflectors, scanner, parameters : as in `detection_noise`.
+    """
     site = reflectors, scanner, parameters
     return DetectionQuality(classes_of(*site), detection_noise(*site))
 
 
 @compiled_inline
 def worth(noise: DetectionNoise, kind: int, distance: float) -> Worth:
-    """Look up a class of reflectors at a distance, linearly between the distances that were looked at."""
+    """Look up a class of reflectors at a distance.
+
+    Parameters
+    ----------
+    noise : what was found out, see `detection_noise`.
+    kind : row of `noise.columns`.
+    distance : of the reflector's center [m].
+
+    Notes
+    -----
+    (1 - b) row[i] + b row[i + 1] with i + b = per_log ln(distance / NEAREST): linear interpolation, by definition.
+    """
     place = noise.per_log * math.log(max(distance, NEAREST) / NEAREST)
     row = min(int(place), noise.columns.shape[1] - 2)
     b = min(place - row, 1.0)

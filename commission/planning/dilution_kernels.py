@@ -73,7 +73,12 @@ class FixModel(NamedTuple):
 
 @compiled
 def lowest_bit(word: np.uint64) -> int:
-    """Index of the lowest set bit of a word that is not zero."""
+    """Index of the lowest set bit of a word that is not zero.
+
+    Notes
+    -----
+    table[((w & -w) * de Bruijn) >> 58] with w & -w = the lowest bit alone: Leiserson, Prokop, Randall 1998.
+    """
     lowest = word & (~word + np.uint64(1))
     return _BIT_OF_PRODUCT[(lowest * np.uint64(DE_BRUIJN)) >> np.uint64(58)]
 
@@ -87,11 +92,22 @@ def reflector_information(  # noqa: PLR0917 - one reflector, number by number
     range_weight: float,
     bearing_weight: float,
 ) -> tuple[float, float, float, float, float, float]:
-    """What range and bearing of a reflector at (dx, dy) from the scanner say about the pose, map axes.
+    """What range and bearing of one reflector say about the pose, map axes.
 
-    The scanner stands at (lever_x, lever_y) from the point whose position is asked for; a weight is one over a
-    variance. The numbers are the upper triangle of the information row by row: xx, xy, xt, yy, yt, tt. A scanner on
-    the reflector itself learns nothing.
+    Parameters
+    ----------
+    dx, dy : reflector from the scanner [m].
+    lever_x, lever_y : scanner from the point whose position is asked for [m].
+    range_weight, bearing_weight : one over the variance of each [1/m^2, 1/rad^2].
+
+    Returns
+    -------
+    xx, xy, xt, yy, yt, tt : upper triangle of the information; zeros for a scanner on the reflector itself.
+
+    Notes
+    -----
+    H^T diag(1 / variance) H with H the Jacobian of range and bearing: Fisher information of Gaussian noise (Bar-Shalom,
+    Li, Kirubarajan 2001, section 2.7).
     """
     r = math.sqrt(dx * dx + dy * dy)
     if r < 1e-9:
@@ -116,9 +132,20 @@ def reflector_information(  # noqa: PLR0917 - one reflector, number by number
 def position_covariance(  # noqa: PLR0917 - a symmetric matrix, number by number
     i_xx: float, i_xy: float, i_xt: float, i_yy: float, i_yt: float, i_tt: float
 ) -> tuple[bool, float, float, float]:
-    """Covariance xx, xy, yy of the position, the heading being estimated with it; whether there is one comes first.
+    """Covariance of the position, the heading being estimated with it.
 
-    It is the inverse of the Schur complement of the heading, whose eigenvalues do not depend on the choice of axes.
+    Parameters
+    ----------
+    i_xx, i_xy, i_xt, i_yy, i_yt, i_tt : upper triangle of the information.
+
+    Returns
+    -------
+    regular, xx, xy, yy : whether there is a covariance, and it [m^2].
+
+    Notes
+    -----
+    P = (I_pp - I_pt I_tp / I_tt)^-1, the inverse of the Schur complement of the heading: inverse of a block matrix, by
+    definition. Its eigenvalues do not depend on the choice of axes.
     """
     if not i_tt > 0.0:
         return False, math.inf, 0.0, math.inf
@@ -135,13 +162,35 @@ def position_covariance(  # noqa: PLR0917 - a symmetric matrix, number by number
 def heading_variance(  # noqa: PLR0917 - parts of two matrices, number by number
     i_xt: float, i_yt: float, i_tt: float, p_xx: float, p_xy: float, p_yy: float
 ) -> float:
-    """Variance of the heading [rad^2], given the covariance of the position."""
+    """Variance of the heading [rad^2], given the covariance of the position.
+
+    Parameters
+    ----------
+    i_xt, i_yt, i_tt : last column of the information.
+    p_xx, p_xy, p_yy : covariance of the position.
+
+    Notes
+    -----
+    (1 + I_tp P I_pt / I_tt) / I_tt: the last element of the inverse of a block matrix, by definition.
+    """
     return (1.0 + (i_xt * i_xt * p_xx + 2.0 * i_xt * i_yt * p_xy + i_yt * i_yt * p_yy) / i_tt) / i_tt
 
 
 @compiled
 def weights_of(dx: float, dy: float, survey_sigma: float, model: FixModel) -> tuple[float, float]:
-    """Weights of the range and of the bearing; the survey error of the reflector's place adds to both noises."""
+    """Weights of the range and of the bearing of one reflector.
+
+    Parameters
+    ----------
+    dx, dy : reflector from the scanner [m].
+    survey_sigma : 1-sigma of the reflector's place, each axis [m].
+    model : the noise of both.
+
+    Notes
+    -----
+    1 / (var_r + s^2) and 1 / (var_b + s^2 / r^2): the survey error adds to both noises, derived from the Jacobian of
+    range and bearing by the reflector's place.
+    """
     squared, survey = max(dx * dx + dy * dy, 1e-18), survey_sigma * survey_sigma
     return 1.0 / (model.range_variance + survey), 1.0 / (model.bearing_variance + survey / squared)
 
@@ -150,10 +199,22 @@ def weights_of(dx: float, dy: float, survey_sigma: float, model: FixModel) -> tu
 def fix_at_heading(  # noqa: PLR0917 - one point and heading
     seen: int, parts: FloatArray, turns: FloatArray, free: FloatArray, heading: float, model: FixModel, one: FloatArray
 ) -> int:
-    """Fill `one` with the figures of one heading, variances in place of sigmas; return the number of reflectors.
+    """Fill the figures of one point and heading, variances in place of sigmas; return the number of reflectors.
 
-    `parts` holds the information of each reflector seen all around, `turns` its bearing from the map's x-axis, `free`
-    the probability that nobody stands before it.
+    Parameters
+    ----------
+    seen : reflectors seen all around: rows in use of the next three.
+    parts : (M, 6) information of each, see `reflector_information`.
+    turns : (M,) bearing of each from the map's x-axis [rad].
+    free : (M,) probability that nobody stands before it.
+    heading : of the scanner [rad], map frame.
+    model : prior, field of view and the fewest reflectors of a fix.
+    one : (FIGURES,) output.
+
+    Notes
+    -----
+    P = (prior + sum of parts)^-1; P(k of n) = p_n P(k - 1 of n - 1) + (1 - p_n) P(k of n - 1): recursion of the Poisson
+    binomial distribution (Barlow, Heidtmann 1984).
     """
     i_xx, i_xy, i_xt = model.prior_position, 0.0, 0.0
     i_yy, i_yt, i_tt = model.prior_position, 0.0, model.prior_heading
@@ -222,6 +283,11 @@ def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
     model : measurement model and headings.
     counts : (N,) array of visible reflectors.
     figures : (N, FIGURES) array.
+
+    Notes
+    -----
+    Per point, sigma = sqrt(figure of `fix_at_heading`), the worst or best of the headings; DOP = sigma / noise of one
+    measurement, by definition.
     """
     many = max(1, len(centers))
     parts, turns, free = np.empty((many, 6)), np.zeros(many), np.ones(many)
@@ -277,7 +343,22 @@ def fill_covariances(  # noqa: PLR0917 - arrays in, arrays out
     model: FixModel,
     covariances: FloatArray,
 ) -> None:
-    """Fill (N, 3, 3) covariances of base poses from the reflectors listed for each; inf on the diagonal if singular."""
+    """Fill covariances of base poses from the reflectors listed for each.
+
+    Parameters
+    ----------
+    centers, survey_sigmas : (M, 2) and (M,) arrays [m], map frame.
+    T_map_scanner : (N, 3) poses of the scanner [m, m, rad].
+    levers : (N, 2) scanner from base [m], map axes.
+    offsets, indices : (N + 1,) and flat: reflectors of pose n are indices[offsets[n] : offsets[n + 1]].
+    model : measurement model; its headings and field of view are not read.
+    covariances : (N, 3, 3) output [m, m, rad]; inf on the diagonal where singular.
+
+    Notes
+    -----
+    P = (prior + sum of `reflector_information`)^-1: the Cramér-Rao bound (Bar-Shalom, Li, Kirubarajan 2001, section
+    2.7).
+    """
     for n in range(len(T_map_scanner)):
         i_xx, i_xy, i_xt = model.prior_position, 0.0, 0.0
         i_yy, i_yt, i_tt = model.prior_position, 0.0, model.prior_heading

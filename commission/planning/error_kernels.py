@@ -75,7 +75,14 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
     kinds : (M,) row of `model.noise` of each.
     priors : (K, 3, 3) what the filter believes before the detections of each scan.
     start_sigmas : (3,) of the start pose.
+    model : what the filter believes of its detections, and what they are truly worth.
     squares : (K, 3, 3) output.
+
+    Notes
+    -----
+    E[e e^T] = P + b b^T + sum of R R^T over the reflectors: white errors P, mean error b, and the response R of the
+    pose to the errors of a reflector that stay (its wave and its place). Derived: e = (I - K H) F e before + K (error
+    of the detection), with the gain K that the filter believes in.
     """
     # Per reflector, what one unit of its error moves the pose by: two quarters of its wave, two axes of its place.
     responses = np.zeros((len(places), 3, 4))

@@ -67,7 +67,13 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
     shifts : (M, 2) what the reflectors have moved since [m].
     reach : (M,) distance up to which each is seen [m]; negative: never.
     belief : at the first scan, before its detections.
+    model : what the filter reads besides the drive.
     columns : outputs.
+
+    Notes
+    -----
+    P = p (I - K H) P + (1 - p) P per visible reflector, p the probability that it is detected: Sinopoli et al. 2004,
+    with the localizer's own *predict* and *correct*.
     """
     prior_covariances, means, covariances, modes, seen, on_odometry = columns
     mode, last_seen_at = 0, metres[0]
@@ -119,9 +125,17 @@ def separations(  # noqa: PLR0917 - the columns of a drive
     Parameters
     ----------
     scans : (n,) rows of `poses` and `prior_covariances`.
+    poses : (K, 3) `T_map_base` of the scans of a drive [m, m, rad].
+    prior_covariances : (K, 3, 3) before the detections of each scan.
     places : (M, 3) as in `predict_covariances`.
     reflector, neighbor : rows of `places`; the covariance is that of the reflector's innovation.
+    model : of the observation.
     squared : (n,) output.
+
+    Notes
+    -----
+    d2 = v^T S^-1 v with v = h(neighbor) - h(reflector): Sobreira et al. 2016, Algorithm 3, with a neighbor in the place
+    of the detection.
     """
     for i in range(len(scans)):
         x, y, theta = poses[scans[i], 0], poses[scans[i], 1], poses[scans[i], 2]
@@ -152,8 +166,15 @@ def _inside_gate(  # noqa: PLR0917 - a measurement, number by number
 def mixed(before: PoseGaussian, after: PoseGaussian, probability: float) -> PoseGaussian:
     """Mean of a belief with a detection and without it, by the probability of the detection.
 
-    Of the covariances alone (Sinopoli et al. 2004, the modified Riccati equation): the filter knows whether it was
-    corrected, so that the spread between the two means is no uncertainty of its own.
+    Parameters
+    ----------
+    before, after : belief without and with the detection.
+    probability : that there is one [0..1].
+
+    Notes
+    -----
+    P = p P_after + (1 - p) P_before: Sinopoli et al. 2004, the modified Riccati equation. Of the covariances alone: the
+    filter knows whether it was corrected, so that the spread between the two means is no uncertainty of its own.
     """
     a, b = probability, 1.0 - probability
     return PoseGaussian(

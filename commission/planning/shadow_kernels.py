@@ -69,7 +69,18 @@ class Targets(NamedTuple):
 
 @compiled
 def direction_bin(dx: float, dy: float, bins: int) -> float:
-    """Direction as a real number in [0, bins): its diamond angle, monotonic in the angle and without an arctangent."""
+    """Direction as a real number in [0, bins): monotonic in the angle, without an arctangent.
+
+    Parameters
+    ----------
+    dx, dy : direction of any length but 0.
+    bins : of a full turn.
+
+    Notes
+    -----
+    bins / 4 times t = dy / (|dx| + |dy|) where dx, dy >= 0, 2 - t where dx < 0, else 4 + t: the diamond angle, by
+    definition.
+    """
     t = dy / (abs(dx) + abs(dy))
     if dx < 0.0:
         t = 2.0 - t
@@ -80,7 +91,7 @@ def direction_bin(dx: float, dy: float, bins: int) -> float:
 
 @compiled
 def bin_edge(index: int, bins: int) -> tuple[float, float]:
-    """Unit vector along the lower edge of a bin."""
+    """Unit vector along the lower edge of a bin: the inverse of `direction_bin`."""
     quarter = bins // 4
     side, t = (index // quarter) % 4, (index % quarter) / quarter
     x, y = 1.0 - t, t
@@ -96,10 +107,18 @@ def bin_edge(index: int, bins: int) -> tuple[float, float]:
 
 @compiled
 def trusted_range(cell: float, sine_yaw: float, cosine_yaw: float, bins: int) -> float:
-    """Range [m] up to which a bin is narrower than a cell, seen from any side, with 5 % to spare.
+    """Range up to which a bin is narrower than a cell, seen from any side, with 5 % to spare [m].
 
-    The widest bins, on the diagonals of the map, measure 8 / bins radians. In a grid along the map's axes a cell seen
-    diagonally is wider too, by sqrt(2).
+    Parameters
+    ----------
+    cell : edge of a cell [m].
+    sine_yaw, cosine_yaw : of the grid's yaw in the map.
+    bins : of a full turn.
+
+    Notes
+    -----
+    0.95 cell bins / 8, derived: the widest bins, on the diagonals of the map, measure 8 / bins radians. In a grid along
+    the map's axes a cell seen diagonally is wider too, by sqrt(2).
     """
     is_aligned = abs(sine_yaw * cosine_yaw) < 1e-9
     return 0.95 * cell * bins / (8.0 / math.sqrt(2.0) if is_aligned else 8.0)
@@ -107,7 +126,17 @@ def trusted_range(cell: float, sine_yaw: float, cosine_yaw: float, bins: int) ->
 
 @compiled
 def is_occupied(tables: RayTables, row: int, column: int) -> bool:
-    """Whether a cell stops rays; cells outside the grid do not."""
+    """Whether a cell stops rays; cells outside the grid do not.
+
+    Parameters
+    ----------
+    tables : of a `RayCaster`.
+    row, column : of the cell.
+
+    Notes
+    -----
+    No formula: a look into the table of free squares, which are 0 in a wall.
+    """
     if row < 0 or row >= tables.rows or column < 0 or column >= tables.columns:
         return False
     tile = (row >> 3) * tables.tile_columns + (column >> 3)
@@ -118,7 +147,19 @@ def is_occupied(tables: RayTables, row: int, column: int) -> bool:
 def chain_reach(  # noqa: PLR0917 - two cells and a point, number by number
     tables: RayTables, x: float, y: float, row: int, column: int, last_row: int, last_column: int
 ) -> float:
-    """Largest distance [cells] from (x, y) of a chain of occupied cells between two occupied ones; inf without one."""
+    """Largest distance from a point of a chain of occupied cells between two occupied ones; inf without one [cells].
+
+    Parameters
+    ----------
+    tables : of a `RayCaster`.
+    x, y : the point [cells], grid frame.
+    row, column, last_row, last_column : the two cells.
+
+    Notes
+    -----
+    max over the chain of |cell center - point| + sqrt(1/2): no point of a cell is farther from its center. The chain is
+    followed along shared sides; why one hides what is behind it, is derived at the top of the module.
+    """
     down, up = min(row, last_row), max(row, last_row) + 1
     left, right = min(column, last_column), max(column, last_column) + 1
     # A chain around the center could link the hits the wrong way round.
@@ -141,7 +182,19 @@ def chain_reach(  # noqa: PLR0917 - two cells and a point, number by number
 
 @compiled
 def mark_cells_under(tables: RayTables, x: float, y: float, radius: float, unclear: BoolArray) -> None:
-    """Mark the bins in which an occupied cell lies across the rim of the disc around (x, y) [m, map frame]."""
+    """Mark the bins in which an occupied cell lies across the rim of a disc.
+
+    Parameters
+    ----------
+    tables : of a `RayCaster`.
+    x, y : center of the disc [m], map frame.
+    radius : of the disc [m].
+    unclear : (K,) output, by bin of direction.
+
+    Notes
+    -----
+    No formula: a cell lies across the rim when its nearest point is inside and its farthest corner outside the disc.
+    """
     bins = len(unclear)
     c, s, cell = tables.origin_cos, tables.origin_sin, tables.resolution
     gx = (c * (x - tables.origin_x) + s * (y - tables.origin_y)) / cell
@@ -181,7 +234,20 @@ def mark_cells_under(tables: RayTables, x: float, y: float, radius: float, uncle
 def shadow_between(  # noqa: PLR0917 - two hits and a point, number by number
     tables: RayTables, grid_x: float, grid_y: float, hits: FloatArray, cells: IntArray, one: int, other: int
 ) -> float:
-    """Distance [m] from (grid_x, grid_y) beyond which all is hidden between two rays; inf if none is certain."""
+    """Distance from the center beyond which all is hidden between two rays; inf if none is certain [m].
+
+    Parameters
+    ----------
+    tables : of a `RayCaster`.
+    grid_x, grid_y : the center [cells], grid frame.
+    hits, cells : (K,) distance [m] and (K, 2) cell of the hit of each edge; row -1: none.
+    one, other : the two edges.
+
+    Notes
+    -----
+    min(chain_reach, max of the two hits) in a straight row of cells, which is convex, else chain_reach: derived at the
+    top of the module.
+    """
     if cells[one, 0] < 0 or cells[other, 0] < 0:
         return math.inf
     row, column, last_row, last_column = cells[one, 0], cells[one, 1], cells[other, 0], cells[other, 1]
@@ -194,7 +260,19 @@ def shadow_between(  # noqa: PLR0917 - two hits and a point, number by number
 
 @compiled
 def cast_shadow(tables: RayTables, targets: Targets, m: int) -> None:
-    """Fill the shadow map of reflector m: halve each wedge until it can be trusted as a whole."""
+    """Fill the shadow map of one reflector: halve each wedge until it can be trusted as a whole.
+
+    Parameters
+    ----------
+    tables : of a `RayCaster`.
+    targets : reflectors; the row of `clear` and `hidden` and of their blocks is filled.
+    m : which reflector.
+
+    Notes
+    -----
+    clear = (min(e, e') - diagonal)^2, hidden = `shadow_between`^2, e and e' the free ranges along the two edges:
+    derived at the top of the module.
+    """
     clear, hidden, radius, farthest = targets.clear[m], targets.hidden[m], targets.radii[m], targets.farthest[m]
     x, y, bins = targets.centers[m, 0], targets.centers[m, 1], len(clear)
     cosine, sine, cell = tables.origin_cos, tables.origin_sin, tables.resolution
@@ -236,7 +314,7 @@ def cast_shadow(tables: RayTables, targets: Targets, m: int) -> None:
 
 @compiled
 def cast_shadows(tables: RayTables, targets: Targets) -> None:
-    """Fill the shadow maps of all reflectors."""
+    """Fill the shadow maps of all reflectors: `cast_shadow` for each."""
     for m in range(len(targets.radii)):
         cast_shadow(tables, targets, m)
 
@@ -245,9 +323,22 @@ def cast_shadows(tables: RayTables, targets: Targets) -> None:
 def see_points(  # noqa: PLR0917 - one reflector, many points
     tables: RayTables, targets: Targets, m: int, points: FloatArray, members: IntArray, seen: BoolArray
 ) -> None:
-    """Fill `seen`: whether a scanner that looks all around sees reflector m from each of the chosen points.
+    """Fill whether a scanner that looks all around sees one reflector from each of the chosen points.
 
     What belongs to the reflector is fetched once: fetched for every point it would cost ten times the comparison.
+
+    Parameters
+    ----------
+    tables : of a `RayCaster`.
+    targets, m : reflectors with their shadow maps, and which of them.
+    points : (N, 2) array [m], map frame.
+    members : (n,) rows of `points`.
+    seen : (n,) output.
+
+    Notes
+    -----
+    nearest <= distance <= farthest and `cast_ray` free up to the radius; a plate also within the angle of incidence and
+    up to promised cos(incidence): equation 3 of Sobreira et al. 2016 for the width that it shows.
     """
     x, y, radius = targets.centers[m, 0], targets.centers[m, 1], targets.radii[m]
     nearest, farthest = targets.nearest[m] ** 2, targets.farthest[m] ** 2
@@ -285,7 +376,23 @@ def see_points(  # noqa: PLR0917 - one reflector, many points
 
 @compiled
 def sight_of_disc(targets: Targets, m: int, dx: float, dy: float, spread: float) -> int:
-    """Whether a disc at (dx, dy) from reflector m is all out of its sight, all in its sight, or neither is certain."""
+    """Whether a disc is all out of a reflector's sight, all in its sight, or neither is certain.
+
+    Parameters
+    ----------
+    targets, m : reflectors with their shadow maps, and which of them.
+    dx, dy : middle of the disc from the reflector's center [m], map axes.
+    spread : radius of the disc [m].
+
+    Returns
+    -------
+    sight : ALL_HIDDEN, ALL_CLEAR or MIXED.
+
+    Notes
+    -----
+    ALL_HIDDEN if max hidden <= (distance - spread)^2, ALL_CLEAR if min clear >= (distance + spread)^2, over the bins
+    within asin(spread / distance) of the direction: derived from what the two columns of a shadow map mean.
+    """
     distance = math.sqrt(dx * dx + dy * dy)
     near, far = distance - spread, distance + spread
     if near <= 0.01 * spread + targets.radii[m]:
@@ -330,6 +437,10 @@ def visible_mask(  # noqa: PLR0917 - points grouped by buckets
     order : (N,) indices of the points, bucket by bucket.
     starts : (B + 1,) where each bucket begins in `order`.
     mask : (N, ceil(M / 64)) array, zero on entry.
+
+    Notes
+    -----
+    No formula: buckets that are ALL_HIDDEN or ALL_CLEAR by `sight_of_disc` as a whole, the others point by point.
     """
     seen = np.empty(len(order), dtype=np.bool_)
     centers, farthest = targets.centers, targets.farthest

@@ -295,7 +295,17 @@ def _bins(farthest: float, grid: OccupancyGrid) -> int:
 
 @compiled
 def in_field_of_view(bearing: float, first: float, width: float) -> bool:
-    """Whether a bearing [rad], of any turn, lies within `width` counterclockwise of `first`."""
+    """Whether a bearing lies within a field of view.
+
+    Parameters
+    ----------
+    bearing : of any turn [rad].
+    first, width : first bearing of the field of view, and its width counterclockwise [rad].
+
+    Notes
+    -----
+    (bearing - first) mod 2 pi <= width, by definition.
+    """
     offset = bearing - first
     return offset - 2.0 * math.pi * math.floor(offset / (2.0 * math.pi)) <= width
 

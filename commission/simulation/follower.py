@@ -78,7 +78,14 @@ class Way(NamedTuple):
 
 
 def drives_of(vehicle: Vehicle, limits: MotionLimits, period: float) -> Drives:
-    """Collect the kernel's numbers; `period` is the time between control steps [s]."""
+    """Collect the kernel's numbers.
+
+    Parameters
+    ----------
+    vehicle : any kind.
+    limits : of its motion.
+    period : time between control steps [s].
+    """
     kind, wheelbase, max_steering = DIFFERENTIAL, 1.0, math.pi / 2
     if isinstance(vehicle, TricycleVehicle):
         # Straight across, the base would not move however fast the driven wheel turns.
@@ -148,6 +155,11 @@ def follow_leg(drives: Drives, way: Way, start: FloatArray, poses: FloatArray, t
     Returns
     -------
     steps : rows written; K when the end was not reached in time.
+
+    Notes
+    -----
+    curvature = way's - KP e - KD sin(heading error) - KI integral of e over the way, e the error across: PID of
+    Sobreira et al. 2016, section 5.1, over distance instead of time.
     """
     x, y, theta = start[0], start[1], start[2]
     place = _place(way, 0, x, y, theta)

@@ -92,7 +92,19 @@ class Echoes(NamedTuple):
 
 @compiled
 def cast_scan(hall: Hall, beams: Beams, moment: Moment, ranges: NDArray[np.float32], flags: BoolArray) -> None:
-    """Fill `ranges` (B,) and `flags` (B,) with one scan; beams that are not cast return nothing."""
+    """Take one scan.
+
+    Parameters
+    ----------
+    hall, beams, moment : what stands still, the scanner, and what differs from scan to scan.
+    ranges : (B,) output: range of each beam [m]; NaN where nothing comes back or the beam is not cast.
+    flags : (B,) output: whether the beam met a reflective object.
+
+    Notes
+    -----
+    range = min over walls and objects of the distance along the beam + sigma_r noise, at bearing angle_min + i
+    increment + sigma_b noise: the scanner's noise model, by definition; echoes of reflectors as in `cylinder_echo`.
+    """
     count = len(ranges)
     wanted = np.full(count, moment.whole)
     if not moment.whole:
