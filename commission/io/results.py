@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from commission.io.atomic import atomic_file, write_text
 from commission.localization.estimate import Mode, Status
-from commission.localization.whole_run import RunArrays
+from commission.localization.run_columns import RunColumns
 from commission.site.reflectors import ReflectorMap
 
 ESTIMATES = "estimates.csv"
@@ -32,7 +32,7 @@ ROWS_AT_ONCE = 50_000
 
 
 def write_results(
-    folder: Path, run: RunArrays, reflectors: ReflectorMap, summary: Mapping[str, int | float | None]
+    folder: Path, run: RunColumns, reflectors: ReflectorMap, summary: Mapping[str, int | float | None]
 ) -> None:
     """Write `estimates.csv`, `detections.csv` and `summary.json`; each is replaced whole or not at all.
 
@@ -53,7 +53,7 @@ def write_results(
     write_text(folder / SUMMARY, json.dumps(dict(summary), indent=2, allow_nan=False) + "\n")
 
 
-def _estimate_rows(run: RunArrays) -> Iterator[Iterable[Any]]:
+def _estimate_rows(run: RunColumns) -> Iterator[Iterable[Any]]:
     """Columns of some cycles at a time."""
     outliers = run.counts(Status.OUTLIER_DETECTOR) + run.counts(Status.OUTLIER_ASSOCIATION)
     columns = [
@@ -67,7 +67,7 @@ def _estimate_rows(run: RunArrays) -> Iterator[Iterable[Any]]:
     return _blocks(columns)
 
 
-def _detection_rows(run: RunArrays, reflectors: ReflectorMap) -> Iterator[Iterable[Any]]:
+def _detection_rows(run: RunColumns, reflectors: ReflectorMap) -> Iterator[Iterable[Any]]:
     """Columns of some detections at a time; empty where there is no reflector, and so no distance to it."""
     points = run.points_map()
     # The name of nobody is the last one, which is where the index -1 leads.

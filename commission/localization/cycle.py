@@ -1,7 +1,7 @@
 """One cycle of the localizer: the scan's stamp is reached, its detections are associated, corrected and supervised.
 
-The one implementation of the cycle: `Localizer.feed` calls it per scan and `whole_run` in a compiled loop, so that
-live, replay and simulation agree to the last bit.
+The one implementation of the cycle: `Localizer.feed` calls it per record and `whole_run` in a compiled loop, so that
+live, replay and simulation agree to the last bit. From a state and a record to the state after it; nothing is kept.
 """
 
 from __future__ import annotations
@@ -15,26 +15,34 @@ from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.association import INLIER, NOBODY, associate
 from commission.localization.kalman import correct
-from commission.localization.odometry import Motion, reach
+from commission.localization.odometry import OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.setup import FilterModel
-from commission.localization.supervisor import supervise
+from commission.localization.state import FilterState
+from commission.localization.supervisor import OPERATIONAL, supervise
 
 
 class Cycle(NamedTuple):
     """State after a scan, and the belief just before its detections were used."""
 
     prior: PoseGaussian
-    posterior: PoseGaussian
-    motion: Motion
-    mode: int
+    state: FilterState
+
+
+@compiled_inline
+def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
+    state: FilterState, stamp_ns: int, dx: float, dy: float, dtheta: float, noise: OdometryNoise
+) -> FilterState:
+    """Predict over the motion of an odometry record (Algorithm 1, lines 2 to 4)."""
+    belief, motion = advance(state.belief, state.motion, stamp_ns, dx, dy, dtheta, noise)
+    return FilterState(
+        belief, stamp_ns, motion, state.mode, state.output, state.output_ns, stamp_ns, state.sensor_detects
+    )
 
 
 @compiled_inline
 def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the whole run
-    belief: PoseGaussian,
-    motion: Motion,
-    mode: int,
+    state: FilterState,
     stamp_ns: int,
     first: int,
     last: int,
@@ -50,14 +58,14 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
 
     Parameters
     ----------
-    belief, motion, mode : state after everything before this scan.
+    state : after everything before this scan.
     detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
     places, cell_offsets : the map, see `ReflectorIndex`.
     status : (n,) in: INLIER or OUTLIER_DETECTOR; out: a `Status`.
     reflectors : (n,) out: index into the reflector map, or -1.
     d2 : (n,) out: squared Mahalanobis distance at the prior, NaN for none.
     """
-    prior, motion = reach(belief, motion, stamp_ns, model.odometry)
+    prior, motion = reach(state.belief, state.motion, stamp_ns, model.odometry)
     associate(
         prior,
         first,
@@ -88,4 +96,10 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
                 model.observation,
             )
         reflectors[i] = int(places[entry, 3])
-    return Cycle(prior, posterior, motion, supervise(mode, posterior, model.limits))
+    mode = supervise(state.mode, posterior, model.limits)
+    output, output_ns = state.output, state.output_ns
+    if mode == OPERATIONAL:
+        output, output_ns = posterior, stamp_ns
+    return Cycle(
+        prior, FilterState(posterior, stamp_ns, motion, mode, output, output_ns, stamp_ns, state.sensor_detects)
+    )

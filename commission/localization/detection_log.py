@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,37 +42,71 @@ class DetectionLog:
         """Return the number of scans."""
         return len(self.stamps_ns)
 
+    def part(self, first: int, last: int) -> DetectionLog:
+        """Return the scans from `first` to before `last`."""
+        if (first, last) == (0, len(self)):
+            return self
+        rows = slice(int(self.offsets[first]), int(self.offsets[last]))
+        return _log(
+            self.stamps_ns[first:last],
+            self.offsets[first : last + 1] - self.offsets[first],
+            self.range_bearing[rows],
+            self.beams[rows],
+            self.status[rows],
+        )
 
-def extract_detections(log: RecordLog, setup: LocalizerSetup, *, parallel: bool = False) -> DetectionLog:
+
+def cycle_stamps(log: RecordLog, *, sensor_detects: bool = False) -> IntArray:
+    """(K,) stamp of every scan that the localizer answers with an estimate [ns].
+
+    Parameters
+    ----------
+    log : where the sensor has reported detections of its own, scans from then on are passed over; of equal stamps the
+        sensor's own detections are delivered first.
+    sensor_detects : whether it has done so before this log begins.
+    """
+    scans = _scans_used(log, sensor_detects)
+    if scans == 0 or log.scans is None:
+        return log.detection_stamps_ns
+    return np.concatenate((log.scans.stamps_ns[:scans], log.detection_stamps_ns))
+
+
+def extract_detections(
+    log: RecordLog,
+    setup: LocalizerSetup,
+    *,
+    first: int = 0,
+    last: int | None = None,
+    sensor_detects: bool = False,
+    parallel: bool = False,
+) -> DetectionLog:
     """All detections of a drive that the localizer would use, in order of delivery.
 
     Depends on the log, the reflectors' radii, the scanner and `parameters.detector`; not on any other parameter.
 
     Parameters
     ----------
-    log : where the sensor has reported detections of its own, scans from then on are not detected from.
+    log : what is used of it: see `cycle_stamps`.
     setup : reflector map, scanner and parameters.
+    first, last : cycles from `first` to before `last` only; None: to the end.
+    sensor_detects : whether the sensor has detected by itself before this log begins.
     parallel : whether to use all cores; the result is the same.
     """
-    own = _sensor_detections(log)
-    scans = log.scans
-    if scans is None:
-        return own
-    if not len(own):
-        return detect_log(scans, setup, parallel=parallel)
-    # Of equal stamps the sensor's own detections are delivered first.
-    before = int(np.searchsorted(scans.stamps_ns, own.stamps_ns[0], side="left"))
-    if before == 0:
-        return own
-    early = ScanLog(
-        stamps_ns=scans.stamps_ns[:before],
-        ranges=scans.ranges[:before],
-        angle_min=scans.angle_min,
-        angle_increment=scans.angle_increment,
-        intensities=None if scans.intensities is None else scans.intensities[:before],
-        reflector=None if scans.reflector is None else scans.reflector[:before],
-    )
-    return _joined(detect_log(early, setup, parallel=parallel), own)
+    scans = _scans_used(log, sensor_detects)
+    end = scans + len(log.detection_stamps_ns) if last is None else last
+    parts: list[DetectionLog] = []
+    if log.scans is not None and first < scans:
+        parts.append(detect_log(_scans_between(log.scans, first, min(end, scans)), setup, parallel=parallel))
+    if end > scans or not parts:
+        parts.append(_sensor_detections(log).part(max(first - scans, 0), max(end - scans, 0)))
+    return joined(parts)
+
+
+def nothing_detected(stamps_ns: IntArray) -> DetectionLog:
+    """Return what is detected at these stamps while all reflectors are covered."""
+    offsets = np.zeros(len(stamps_ns) + 1, dtype=np.int64)
+    nothing = np.empty(0, dtype=np.int64)
+    return _log(stamps_ns, offsets, np.empty((0, 2)), nothing, np.empty(0, dtype=np.int8))
 
 
 def detect_log(scans: ScanLog, setup: LocalizerSetup, *, parallel: bool = False) -> DetectionLog:
@@ -105,14 +140,40 @@ def _sensor_detections(log: RecordLog) -> DetectionLog:
     return _log(log.detection_stamps_ns, log.detection_offsets, log.range_bearing, beams, status)
 
 
-def _joined(first: DetectionLog, second: DetectionLog) -> DetectionLog:
-    """Return one log after the other."""
+def _scans_used(log: RecordLog, sensor_detects: bool) -> int:
+    """Number of scans to detect in: those before the sensor's own detections begin."""
+    if log.scans is None or sensor_detects:
+        return 0
+    if not len(log.detection_stamps_ns):
+        return len(log.scans.stamps_ns)
+    # Of equal stamps the sensor's own detections are delivered first.
+    return int(np.searchsorted(log.scans.stamps_ns, log.detection_stamps_ns[0], side="left"))
+
+
+def _scans_between(scans: ScanLog, first: int, last: int) -> ScanLog:
+    """Return the scans from `first` to before `last` (views, no copies)."""
+    part = slice(first, last)
+    return ScanLog(
+        stamps_ns=scans.stamps_ns[part],
+        ranges=scans.ranges[part],
+        angle_min=scans.angle_min,
+        angle_increment=scans.angle_increment,
+        intensities=None if scans.intensities is None else scans.intensities[part],
+        reflector=None if scans.reflector is None else scans.reflector[part],
+    )
+
+
+def joined(logs: Sequence[DetectionLog]) -> DetectionLog:
+    """Return one log after the other; of a single one itself, without a copy."""
+    if len(logs) == 1:
+        return logs[0]
+    starts = np.cumsum([0, *(int(log.offsets[-1]) for log in logs)])
     return _log(
-        np.concatenate((first.stamps_ns, second.stamps_ns)),
-        np.concatenate((first.offsets, second.offsets[1:] + first.offsets[-1])),
-        np.concatenate((first.range_bearing, second.range_bearing)),
-        np.concatenate((first.beams, second.beams)),
-        np.concatenate((first.status, second.status)),
+        np.concatenate([log.stamps_ns for log in logs]),
+        np.concatenate(([0], *(log.offsets[1:] + start for log, start in zip(logs, starts, strict=False)))),
+        np.concatenate([log.range_bearing for log in logs]),
+        np.concatenate([log.beams for log in logs]),
+        np.concatenate([log.status for log in logs]),
     )
 
 

@@ -9,13 +9,13 @@ import numpy as np
 
 from commission.errors import SourceError
 from commission.geometry.arrays import IntArray, read_only
-from commission.localization.cycle import process_scan
+from commission.localization.cycle import process_odometry, process_scan
 from commission.localization.detector import DetectedReflectors, detect
 from commission.localization.estimate import Belief, Estimate, Mode, Status
 from commission.localization.observation import project_detections
-from commission.localization.odometry import AT_REST, advance
-from commission.localization.pose_gaussian import from_belief, to_belief
+from commission.localization.pose_gaussian import to_belief
 from commission.localization.setup import LocalizerSetup
+from commission.localization.state import FilterState, belief_of, output_of, state_at_start
 from commission.site.parameters import Parameters
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -48,18 +48,12 @@ class Localizer:
     Parameters
     ----------
     setup : reflector map, scanner and parameters; `replace_setup` changes them between two records.
-    initial : belief before the first record.
+    start : belief before the first record, or the state in which another run was left.
     """
 
-    def __init__(self, setup: LocalizerSetup, initial: Belief) -> None:
+    def __init__(self, setup: LocalizerSetup, start: Belief | FilterState) -> None:
         self._setup = setup
-        self._pose = from_belief(initial)
-        self._belief_ns = initial.stamp_ns
-        self._motion = AT_REST
-        self._mode = Mode.OPERATIONAL
-        self._output = to_belief(self._pose, initial.stamp_ns)
-        self._newest_ns: int | None = None
-        self._sensor_detects = False
+        self._state = state_at_start(start) if isinstance(start, Belief) else start
 
     @property
     def setup(self) -> LocalizerSetup:
@@ -67,17 +61,22 @@ class Localizer:
         return self._setup
 
     @property
+    def state(self) -> FilterState:
+        """All that is remembered of the records so far: a run goes on from it as if it had not been interrupted."""
+        return self._state
+
+    @property
     def belief(self) -> Belief:
-        """The filter's own state after the newest record; it goes on in fail mode."""
-        return to_belief(self._pose, self._belief_ns)
+        """The filter's own belief after the newest record; it goes on in fail mode."""
+        return belief_of(self._state)
 
     @property
     def mode(self) -> Mode:
         """State of the supervisor after the newest scan."""
-        return self._mode
+        return Mode(self._state.mode)
 
     def replace_setup(self, setup: LocalizerSetup) -> None:
-        """Use other parameters (or another map) from the next record on; belief and mode stay."""
+        """Use other parameters (or another map) from the next record on; the state stays."""
         self._setup = setup
 
     def feed(self, record: Record) -> Estimate | None:
@@ -97,12 +96,13 @@ class Localizer:
         SourceError
             when the record is older than one before it.
         """
-        if self._newest_ns is not None and record.stamp_ns < self._newest_ns:
+        newest_ns = self._state.newest_ns
+        if record.stamp_ns < newest_ns:
             raise SourceError(
-                f"{type(record).__name__} has stamp {record.stamp_ns} ns, {self._newest_ns - record.stamp_ns} ns "
+                f"{type(record).__name__} has stamp {record.stamp_ns} ns, {newest_ns - record.stamp_ns} ns "
                 "before the record that came before it; expected ascending stamps"
             )
-        self._newest_ns = record.stamp_ns
+        self._state = self._state._replace(newest_ns=int(record.stamp_ns))
         match record:
             case Odometry():
                 self._advance(record)
@@ -110,13 +110,13 @@ class Localizer:
             case ReferencePose():
                 return None
             case Detections():
-                self._sensor_detects = True
+                self._state = self._state._replace(sensor_detects=True)
                 count = len(record.range_bearing)
                 status = np.full(count, Status.INLIER, dtype=np.int8)
                 seen = DetectedReflectors(record.range_bearing, np.zeros(count, dtype=np.int64), status)
                 return self._process(record.stamp_ns, seen)
             case Scan():
-                if self._sensor_detects:
+                if self._state.sensor_detects:
                     return None
                 detected = detect(record, self._setup.detector, self._setup.parameters.detector)
                 return self._process(record.stamp_ns, detected)
@@ -125,8 +125,7 @@ class Localizer:
         """Predict over the motion of an odometry record."""
         dx, dy, dtheta = (float(value) for value in record.displacement)
         noise = self._setup.filter.odometry
-        self._pose, self._motion = advance(self._pose, self._motion, record.stamp_ns, dx, dy, dtheta, noise)
-        self._belief_ns = record.stamp_ns
+        self._state = process_odometry(self._state, record.stamp_ns, dx, dy, dtheta, noise)
 
     def _process(self, stamp_ns: int, seen: DetectedReflectors) -> Estimate:
         """Predict to the scan's stamp, associate, correct, supervise."""
@@ -137,9 +136,7 @@ class Localizer:
         reflector: IntArray = np.empty(count, dtype=np.int64)
         d2 = np.empty(count)
         cycle = process_scan(
-            self._pose,
-            self._motion,
-            int(self._mode),
+            self._state,
             stamp_ns,
             0,
             count,
@@ -151,19 +148,16 @@ class Localizer:
             reflector,
             d2,
         )
-        self._pose, self._motion, self._mode = cycle.posterior, cycle.motion, Mode(cycle.mode)
-        self._belief_ns = stamp_ns
-        posterior = to_belief(cycle.posterior, stamp_ns)
-        if self._mode is Mode.OPERATIONAL:
-            self._output = posterior
+        self._state = cycle.state
+        posterior = belief_of(cycle.state)
         offsets = np.array((0, count), dtype=np.int64)
         points = project_detections(posterior.mean[np.newaxis], offsets, detections, model.observation)
         return Estimate(
             stamp_ns=stamp_ns,
             prior=to_belief(cycle.prior, stamp_ns),
             posterior=posterior,
-            output=self._output,
-            mode=self._mode,
+            output=output_of(cycle.state),
+            mode=self.mode,
             detections=detections,
             beams=seen.beams,
             points_map=points,

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
+import numpy as np
+
 from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import ellipse_points
 from commission.localization.association import Gate, gate_of
@@ -60,6 +62,22 @@ class LocalizerSetup:
         object.__setattr__(self, "filter", model)
         detector = detector_model(self.reflectors, self.scanner, self.parameters.detector)
         object.__setattr__(self, "detector", detector)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether every record is processed alike."""
+        if not isinstance(other, LocalizerSetup):
+            return NotImplemented
+        return (
+            self.parameters == other.parameters
+            and self.scanner == other.scanner
+            and self.reflectors == other.reflectors
+        )
+
+    def detects_like(self, other: LocalizerSetup) -> bool:
+        """Whether the same is detected in every scan: what the filter does with it afterwards may differ."""
+        if self.parameters.detector.intensity_threshold != other.parameters.detector.intensity_threshold:
+            return False
+        return all(np.array_equal(a, b) for a, b in zip(self.detector, other.detector, strict=True))
 
     @staticmethod
     def of(project: Project) -> LocalizerSetup:

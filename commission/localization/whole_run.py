@@ -1,200 +1,207 @@
 """The localizer over a whole recording in one compiled loop, through the same steps as `Localizer.feed`.
 
-Detections are extracted beforehand (`detection_log`), so that a moved gate replays the filter alone.
+Detections are extracted beforehand (`detection_log`), so that a moved gate replays the filter alone. A run begins in
+any state; what an earlier run of the same log has in common with it is taken over, to the last bit as computed again.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+import itertools
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from commission.compiled import compiled, compiled_inline
-from commission.geometry.arrays import FloatArray, IntArray, read_only
-from commission.localization.cycle import process_scan
-from commission.localization.detection_log import DetectionLog, extract_detections
-from commission.localization.estimate import Belief, Estimate, Mode, Status
-from commission.localization.observation import ObservationModel, project_detections
-from commission.localization.odometry import AT_REST, Motion, advance
-from commission.localization.pose_gaussian import PoseGaussian, from_belief, to_belief
-from commission.localization.setup import FilterModel, LocalizerSetup
+from commission.geometry.arrays import IntArray
+from commission.localization.detection_log import (
+    DetectionLog,
+    cycle_stamps,
+    extract_detections,
+    joined,
+    nothing_detected,
+)
+from commission.localization.estimate import Belief
+from commission.localization.run_columns import Checkpoint, RunColumns, Segment, firsts_of
+from commission.localization.run_loop import Stretch, continued, cut, empty_columns, take_over
+from commission.localization.setup import LocalizerSetup
+from commission.localization.state import FilterState, state_at_start
+from commission.progress import Progress, part, silent
 from commission.site.parameters import Parameters
 from commission.site.record_log import RecordLog, ScanLog
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 
-
-class Columns(NamedTuple):
-    """Where the loop writes: a row per cycle, then a row per detection."""
-
-    prior_means: FloatArray
-    prior_covariances: FloatArray
-    means: FloatArray
-    covariances: FloatArray
-    modes: NDArray[np.int8]
-    status: NDArray[np.int8]
-    reflectors: IntArray
-    d2: FloatArray
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class RunArrays:
-    """A whole run as columns: K cycles (one per scan) with n detections in total. All arrays are read-only."""
-
-    initial: Belief
-    """Belief before the first record."""
-    detected: DetectionLog
-    """Stamps of the cycles, rows of their detections, and the detections as measured."""
-    gate: float
-    """Largest squared Mahalanobis distance of an inlier (chi-square, 2 degrees of freedom)."""
-    observation: ObservationModel
-    """Scanner mounting and range bias of the run."""
-    prior_means: FloatArray
-    """(K, 3) `T_map_base` after *predict* [m, m, rad]."""
-    prior_covariances: FloatArray
-    """(K, 3, 3) after *predict*."""
-    means: FloatArray
-    """(K, 3) `T_map_base` after *correct*: the filter's own state [m, m, rad]."""
-    covariances: FloatArray
-    """(K, 3, 3) after *correct*."""
-    modes: NDArray[np.int8]
-    """(K,) a `Mode` each."""
-    status: NDArray[np.int8]
-    """(n,) a `Status` each."""
-    reflector: IntArray
-    """(n,) index into the reflector map; -1: none."""
-    d2: FloatArray
-    """(n,) squared Mahalanobis distance to that reflector; NaN: none."""
-    final: Belief
-    """Belief after the last record, odometry included."""
-
-    def __len__(self) -> int:
-        """Return the number of cycles."""
-        return len(self.detected)
-
-    @property
-    def stamps_ns(self) -> IntArray:
-        """(K,) time of each scan [ns]."""
-        return self.detected.stamps_ns
-
-    @property
-    def offsets(self) -> IntArray:
-        """(K + 1,) detections of cycle k: offsets[k] to offsets[k + 1]."""
-        return self.detected.offsets
-
-    @property
-    def range_bearing(self) -> FloatArray:
-        """(n, 2) range [m] and bearing [rad] of each detection, scanner frame."""
-        return self.detected.range_bearing
-
-    @property
-    def beams(self) -> IntArray:
-        """(n,) width of each cluster [beams]; 0 where the sensor itself detected."""
-        return self.detected.beams
-
-    def counts(self, status: Status) -> IntArray:
-        """(K,) detections of one status in each cycle."""
-        totals = np.concatenate(([0], np.cumsum(self.status == status, dtype=np.int64)))
-        return totals[self.offsets[1:]] - totals[self.offsets[:-1]]
-
-    def nis_sums(self) -> FloatArray:
-        """(K,) sum of the squared Mahalanobis distances of each cycle's inliers; 2 degrees of freedom each."""
-        totals = np.concatenate(([0.0], np.cumsum(np.where(self.status == Status.INLIER, self.d2, 0.0))))
-        return totals[self.offsets[1:]] - totals[self.offsets[:-1]]
-
-    def output_cycles(self) -> IntArray:
-        """(K,) cycle whose posterior the vehicle is given: the last operational one; -1: the initial belief."""
-        cycles = np.where(self.modes == Mode.OPERATIONAL, np.arange(len(self), dtype=np.int64), -1)
-        return np.maximum.accumulate(cycles)
-
-    def points_map(self) -> FloatArray:
-        """(n, 2) every detection seen from the posterior of its cycle [m], map frame."""
-        return project_detections(self.means, self.offsets, self.range_bearing, self.observation)
-
-    def estimate(self, cycle: int) -> Estimate:
-        """Return one cycle as `Localizer.feed` gives it, to the last bit."""
-        stamp_ns = int(self.stamps_ns[cycle])
-        rows = slice(int(self.offsets[cycle]), int(self.offsets[cycle + 1]))
-        detections = self.range_bearing[rows]
-        offsets = np.array((0, len(detections)), dtype=np.int64)
-        points = project_detections(self.means[cycle : cycle + 1], offsets, detections, self.observation)
-        given = int(self.output_cycles()[cycle])
-        return Estimate(
-            stamp_ns=stamp_ns,
-            prior=Belief(stamp_ns, self.prior_means[cycle], self.prior_covariances[cycle]),
-            posterior=self._posterior(cycle),
-            output=self.initial if given < 0 else self._posterior(given),
-            mode=Mode(int(self.modes[cycle])),
-            detections=detections,
-            beams=self.beams[rows],
-            points_map=points,
-            status=self.status[rows],
-            reflector=self.reflector[rows],
-            d2=self.d2[rows],
-            gate=self.gate,
-        )
-
-    def _posterior(self, cycle: int) -> Belief:
-        return Belief(int(self.stamps_ns[cycle]), self.means[cycle], self.covariances[cycle])
+CHECKPOINT_CYCLES = 4096
+"""Cycles between two checkpoints: to resume anywhere takes a few milliseconds, and a cancelled run stops as soon."""
+DETECTION_SHARE = 0.7
+"""Share of the progress that detecting in scans takes; where the sensor detects, it is done in no time."""
 
 
 def run(
     log: RecordLog,
     setup: LocalizerSetup,
-    initial: Belief,
+    start: Belief | FilterState,
     *,
     detected: DetectionLog | None = None,
-) -> RunArrays:
-    """Localize over a whole recording.
+) -> RunColumns:
+    """Localize over a whole recording with one setup.
 
     Parameters
     ----------
     log : all records of a drive.
     setup : reflector map, scanner and parameters.
-    initial : belief before the first record.
+    start : belief before the first record, or the state that a `Localizer` or another run was in when the log began.
     detected : result of `extract_detections` for the same log and detector parameters; None extracts it now.
 
     Returns
     -------
-    arrays : every cycle and every detection, equal to the last bit to feeding the records to a `Localizer`.
+    columns : every cycle and every detection, equal to the last bit to feeding the records to a `Localizer`.
     """
+    state = state_at_start(start) if isinstance(start, Belief) else start
     if detected is None:
-        detected = extract_detections(log, setup)
-    cycles, total = len(detected), len(detected.range_bearing)
-    columns = Columns(
-        np.empty((cycles, 3)),
-        np.empty((cycles, 3, 3)),
-        np.empty((cycles, 3)),
-        np.empty((cycles, 3, 3)),
-        np.empty(cycles, dtype=np.int8),
-        detected.status.copy(),
-        np.empty(total, dtype=np.int64),
-        np.empty(total),
-    )
-    start = from_belief(initial)
-    final = _run(
-        read_only(log.odometry_stamps_ns),
-        read_only(log.displacements),
-        detected.stamps_ns,
-        detected.offsets,
-        detected.range_bearing,
-        setup.filter,
-        setup.index.places,
-        setup.index.offsets,
-        start,
-        AT_REST,
-        columns,
-    )
+        detected = extract_detections(log, setup, sensor_detects=state.sensor_detects)
+    return _filtered(log, (Segment(0, setup),), detected, (Checkpoint(0, state),))
+
+
+def run_segments(
+    log: RecordLog,
+    segments: Sequence[Segment],
+    start: Belief | FilterState,
+    *,
+    earlier: RunColumns | None = None,
+    progress: Progress = silent,
+) -> RunColumns:
+    """Localize over a whole recording with setups that change on the way.
+
+    Parameters
+    ----------
+    log : all records of a drive.
+    segments : the first one begins at cycle 0, each later one after the one before; those that begin after the last
+        cycle are left out.
+    start : belief or state before the first record.
+    earlier : another run of the same log; cycles up to where the two differ, and detections where detectors do not
+        differ, are taken from it. The result is the same to the last bit.
+    progress : called every few thousand cycles.
+
+    Returns
+    -------
+    columns : equal to the last bit to a `Localizer` whose setup is replaced when the cycle before a segment is done.
+
+    Raises
+    ------
+    ValueError
+        the segments do not begin at cycle 0 and follow each other.
+    """
+    firsts_of(segments)
+    state = state_at_start(start) if isinstance(start, Belief) else start
+    stamps_ns = cycle_stamps(log, sensor_detects=state.sensor_detects)
+    segments = tuple(segment for segment in segments if segment.first < max(len(stamps_ns), 1))
+    kept = 0
+    if earlier is not None and earlier.checkpoints[0].state == state:
+        kept = _first_difference(earlier.segments, segments, len(stamps_ns))
+    known: tuple[Checkpoint, ...] = (Checkpoint(0, state),)
+    if earlier is not None and kept > 0:
+        resumed = Checkpoint(kept, state_before(earlier, log, kept))
+        known = (*(checkpoint for checkpoint in earlier.checkpoints if checkpoint.cycle < kept), resumed)
+    detecting = part(progress, 0.0, DETECTION_SHARE)
+    detected = _detected(log, segments, stamps_ns, earlier, progress=detecting, sensor_detects=state.sensor_detects)
+    return _filtered(log, segments, detected, known, earlier=earlier, progress=part(progress, DETECTION_SHARE, 1.0))
+
+
+def state_before(run: RunColumns, log: RecordLog, cycle: int) -> FilterState:
+    """State after the cycle before (odometry after it not yet taken in): from it, the run goes on from `cycle`.
+
+    Parameters
+    ----------
+    run : over `log`.
+    log : the records.
+    cycle : 0 to K; K is the state after the last cycle, `run.final` the one after the last record.
+    """
+    checkpoint = max((c for c in run.checkpoints if c.cycle <= cycle), key=lambda c: c.cycle)
+    state = checkpoint.state
+    for segment, first, last in _chunks(run.segments, checkpoint.cycle, cycle):
+        detected = run.detected.part(first, last)
+        stretch = Stretch(_odometry_rows(log, run.stamps_ns, first, last), detected, empty_columns(detected))
+        state = continued(log, segment.setup, state, stretch)
+    return state
+
+
+def _segment(segments: Sequence[Segment], cycle: int) -> Segment:
+    """Return the segment of a cycle."""
+    return next(segment for segment in reversed(segments) if segment.first <= cycle)
+
+
+def _first_difference(a: Sequence[Segment], b: Sequence[Segment], cycles: int) -> int:
+    """First cycle that two lists of segments treat differently; `cycles` when there is none."""
+    for first in sorted({segment.first for segment in (*a, *b)}):
+        one, other = _segment(a, first), _segment(b, first)
+        if one.covered != other.covered or one.setup != other.setup:
+            return min(first, cycles)
+    return cycles
+
+
+def _detected(
+    log: RecordLog,
+    segments: Sequence[Segment],
+    stamps_ns: IntArray,
+    earlier: RunColumns | None,
+    *,
+    progress: Progress,
+    sensor_detects: bool,
+) -> DetectionLog:
+    """Detections of each segment, from an earlier run where its detector was no other."""
+    bounds = {segment.first for segment in (*segments, *(() if earlier is None else earlier.segments))}
+    edges = (*sorted(bound for bound in bounds if bound < len(stamps_ns)), len(stamps_ns))
+    # In pieces, so that it can be stopped; what the sensor has detected is only cut out of its columns.
+    step = max(len(stamps_ns), 1) if log.scans is None else CHECKPOINT_CYCLES
+    parts: list[DetectionLog] = []
+    for first, last in itertools.pairwise(edges):
+        segment = _segment(segments, first)
+        if segment.covered:
+            parts.append(nothing_detected(stamps_ns[first:last]))
+        elif earlier is not None and _detects_like(segment, earlier.segment(first)):
+            parts.append(earlier.detected.part(first, last))
+        else:
+            for piece in range(first, last, step):
+                progress(piece / len(stamps_ns), "detecting reflectors")
+                end = min(piece + step, last)
+                parts.append(
+                    extract_detections(log, segment.setup, first=piece, last=end, sensor_detects=sensor_detects)
+                )
+    return joined(parts) if parts else nothing_detected(stamps_ns)
+
+
+def _detects_like(segment: Segment, earlier: Segment) -> bool:
+    """Whether an earlier segment holds what is detected in this one, which is not covered."""
+    return not earlier.covered and segment.setup.detects_like(earlier.setup)
+
+
+def _filtered(
+    log: RecordLog,
+    segments: tuple[Segment, ...],
+    detected: DetectionLog,
+    known: tuple[Checkpoint, ...],
+    *,
+    earlier: RunColumns | None = None,
+    progress: Progress = silent,
+) -> RunColumns:
+    """Run the filter from the last known checkpoint on; the cycles before it are taken from an earlier run."""
+    (begin, state), cycles = known[-1], len(detected)
+    columns = empty_columns(detected)
+    if earlier is not None:
+        take_over(earlier, columns, begin, int(detected.offsets[begin]))
+    checkpoints = list(known)
+    for segment, first, last in _chunks(segments, begin, cycles):
+        progress((first - begin) / (cycles - begin), "localizing")
+        rows = _odometry_rows(log, detected.stamps_ns, first, last)
+        stretch = Stretch(rows, detected.part(first, last), cut(columns, detected, first, last))
+        state = continued(log, segment.setup, state, stretch)
+        checkpoints.append(Checkpoint(last, state))
     for column in columns:
         column.setflags(write=False)
-    newest = [int(column[-1]) for column in (log.odometry_stamps_ns, detected.stamps_ns) if len(column)]
-    return RunArrays(
-        initial=to_belief(start, initial.stamp_ns),
+    return RunColumns(
+        segments=segments,
+        checkpoints=tuple(checkpoints),
         detected=detected,
-        gate=setup.filter.gate.d2,
-        observation=setup.filter.observation,
         prior_means=columns.prior_means,
         prior_covariances=columns.prior_covariances,
         means=columns.means,
@@ -203,8 +210,39 @@ def run(
         status=columns.status,
         reflector=columns.reflectors,
         d2=columns.d2,
-        final=to_belief(final, max(newest, default=initial.stamp_ns)),
+        final=_final(log, segments[-1].setup, detected.part(cycles, cycles), checkpoints[-1], detected.stamps_ns),
     )
+
+
+def _final(
+    log: RecordLog, setup: LocalizerSetup, nothing: DetectionLog, last: Checkpoint, stamps_ns: IntArray
+) -> FilterState:
+    """State after the last record: motion after the last scan is taken in, what is no cycle counts as a record."""
+    begin, _ = _odometry_rows(log, stamps_ns, last.cycle, last.cycle)
+    rows = (begin, len(log.odometry_stamps_ns))
+    final = continued(log, setup, last.state, Stretch(rows, nothing, empty_columns(nothing)))
+    if len(log) == 0:
+        return final
+    own = final.sensor_detects or len(log.detection_stamps_ns) > 0
+    return final._replace(newest_ns=int(log.stamps_ns[-1]), sensor_detects=own)
+
+
+def _chunks(segments: Sequence[Segment], begin: int, end: int) -> Iterator[tuple[Segment, int, int]]:
+    """Stretches of cycles of one segment each, no longer than between two checkpoints."""
+    lasts = (*(segment.first for segment in segments[1:]), end)
+    for segment, last in zip(segments, lasts, strict=True):
+        stop = min(last, end)
+        for first in range(max(segment.first, begin), stop, CHECKPOINT_CYCLES):
+            yield segment, first, min(first + CHECKPOINT_CYCLES, stop)
+
+
+def _odometry_rows(log: RecordLog, stamps_ns: IntArray, first: int, last: int) -> tuple[int, int]:
+    """Rows of odometry that are delivered between the cycle before `first` and the last cycle before `last`."""
+    row, end = (
+        int(np.searchsorted(log.odometry_stamps_ns, stamps_ns[cycle - 1], side="right")) if cycle else 0
+        for cycle in (first, last)
+    )
+    return row, end
 
 
 def warm_up() -> None:
@@ -222,61 +260,3 @@ def warm_up() -> None:
     )
     log = RecordLog(odometry_stamps_ns=np.array([0, 1]), displacements=np.zeros((2, 3)), scans=scans)
     run(log, setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3))).points_map()
-
-
-@compiled
-def _run(  # noqa: PLR0917 - the columns of the log
-    odometry_stamps: IntArray,
-    displacements: FloatArray,
-    scan_stamps: IntArray,
-    offsets: IntArray,
-    detections: FloatArray,
-    model: FilterModel,
-    places: FloatArray,
-    cell_offsets: IntArray,
-    belief: PoseGaussian,
-    motion: Motion,
-    columns: Columns,
-) -> PoseGaussian:
-    """Deliver odometry and scans in the order of their stamps, odometry first; return the belief after the last."""
-    prior_means, prior_covariances, means, covariances, modes, status, reflectors, d2 = columns
-    mode = 0
-    rows = 0
-    for k in range(len(scan_stamps)):
-        while rows < len(odometry_stamps) and odometry_stamps[rows] <= scan_stamps[k]:
-            dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
-            belief, motion = advance(belief, motion, odometry_stamps[rows], dx, dy, dtheta, model.odometry)
-            rows += 1
-        cycle = process_scan(
-            belief,
-            motion,
-            mode,
-            scan_stamps[k],
-            offsets[k],
-            offsets[k + 1],
-            detections,
-            model,
-            places,
-            cell_offsets,
-            status,
-            reflectors,
-            d2,
-        )
-        belief, motion, mode = cycle.posterior, cycle.motion, cycle.mode
-        _store(cycle.prior, k, prior_means, prior_covariances)
-        _store(belief, k, means, covariances)
-        modes[k] = mode
-    while rows < len(odometry_stamps):
-        dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
-        belief, motion = advance(belief, motion, odometry_stamps[rows], dx, dy, dtheta, model.odometry)
-        rows += 1
-    return belief
-
-
-@compiled_inline
-def _store(belief: PoseGaussian, row: int, means: FloatArray, covariances: FloatArray) -> None:
-    """Write a belief to its row."""
-    means[row, 0], means[row, 1], means[row, 2] = belief.x, belief.y, belief.theta
-    covariances[row, 0, 0], covariances[row, 0, 1], covariances[row, 0, 2] = belief.xx, belief.xy, belief.xt
-    covariances[row, 1, 0], covariances[row, 1, 1], covariances[row, 1, 2] = belief.xy, belief.yy, belief.yt
-    covariances[row, 2, 0], covariances[row, 2, 1], covariances[row, 2, 2] = belief.xt, belief.yt, belief.tt

@@ -15,8 +15,9 @@ from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
 from commission.localization.detection_log import DetectionLog
 from commission.localization.estimate import Belief, Mode, Status
+from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
-from commission.localization.whole_run import RunArrays, run
+from commission.localization.whole_run import run
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.studies.metrics import (
@@ -35,7 +36,7 @@ Number = int | float | None
 class ReplayResult:
     """One recording localized, judged against its reference where it has one."""
 
-    run: RunArrays
+    run: RunColumns
     """Every cycle and every detection."""
     duration: float
     """Time from the first to the last record [s]."""
@@ -77,7 +78,7 @@ def replay(project: Project, log: RecordLog, initial: Belief, *, detected: Detec
     return judge(project, log, localize(project, log, initial, detected=detected))
 
 
-def localize(project: Project, log: RecordLog, initial: Belief, *, detected: DetectionLog | None = None) -> RunArrays:
+def localize(project: Project, log: RecordLog, initial: Belief, *, detected: DetectionLog | None = None) -> RunColumns:
     """Run the localizer over a recording.
 
     Parameters
@@ -99,7 +100,7 @@ def localize(project: Project, log: RecordLog, initial: Belief, *, detected: Det
     return arrays
 
 
-def judge(project: Project, log: RecordLog, arrays: RunArrays) -> ReplayResult:
+def judge(project: Project, log: RecordLog, arrays: RunColumns) -> ReplayResult:
     """Compare a finished run with the reference poses of its recording.
 
     Parameters

@@ -8,6 +8,7 @@ import numpy as np
 
 from commission.localization import whole_run
 from commission.localization.estimate import Belief, Mode, Status
+from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
 from commission.simulation.scenario import start_of
 from commission.site.project import Project
@@ -19,7 +20,7 @@ from commission.studies.metrics import ErrorStatistics, error_statistics, pose_e
 class Judged:
     """One run and its errors."""
 
-    run: whole_run.RunArrays
+    run: RunColumns
     errors: np.ndarray
     """(K, 3) [m, m, rad]."""
     statistics: ErrorStatistics

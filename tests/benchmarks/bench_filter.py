@@ -20,6 +20,7 @@ from commission.localization.detection_log import extract_detections
 from commission.localization.estimate import Belief
 from commission.localization.observation import jacobians, range_bearing
 from commission.localization.odometry import odometry_noise
+from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
 from commission.site.parameters import Parameters
 from commission.site.record_log import RecordLog
@@ -123,7 +124,7 @@ def peer_seconds(log: RecordLog, setup: LocalizerSetup, initial: Belief, cycles:
     return time.process_time() - start, ekf.x
 
 
-def project_seconds(log: RecordLog, setup: LocalizerSetup, initial: Belief) -> tuple[float, whole_run.RunArrays]:
+def project_seconds(log: RecordLog, setup: LocalizerSetup, initial: Belief) -> tuple[float, RunColumns]:
     """Best of three: seconds of the filter over kept detections."""
     detected = extract_detections(log, setup)
     best, arrays = math.inf, None

@@ -1,0 +1,171 @@
+"""A run of the localizer as columns: a row per cycle, a row per detection. It holds what came out and computes no step.
+
+Whoever makes them (`whole_run` at once, `growing_run` while the vehicle drives), the columns are the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.localization.detection_log import DetectionLog
+from commission.localization.estimate import Belief, Estimate, Mode, Status
+from commission.localization.observation import project_detections
+from commission.localization.setup import LocalizerSetup
+from commission.localization.state import FilterState, belief_of, output_of
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A stretch of a run with one setup: from a cycle on, until the next segment begins."""
+
+    first: int
+    """Its first cycle; what the odometry says between the cycle before and this one belongs to it, too."""
+    setup: LocalizerSetup
+    """Reflector map, scanner and parameters."""
+    covered: bool = False
+    """Whether all reflectors are covered: nothing is detected."""
+
+    def __post_init__(self) -> None:
+        if self.first < 0:
+            raise ValueError(f"a segment begins at cycle {self.first}; expected 0 or more")
+
+
+def firsts_of(segments: Sequence[Segment]) -> IntArray:
+    """(S,) first cycle of each segment; raises ValueError unless they begin at cycle 0 and follow each other."""
+    firsts = np.array([segment.first for segment in segments], dtype=np.int64)
+    if not len(firsts) or firsts[0] != 0 or (np.diff(firsts) <= 0).any():
+        raise ValueError(f"segments begin at cycles {firsts.tolist()}; expected 0, then ascending")
+    return firsts
+
+
+class Checkpoint(NamedTuple):
+    """The filter's state just before a cycle and the odometry that leads to it."""
+
+    cycle: int
+    state: FilterState
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RunColumns:
+    """A run: K cycles (one per scan) with n detections in total. All arrays are read-only."""
+
+    segments: tuple[Segment, ...]
+    """What it was made with; the first one begins at cycle 0, each later one after the one before."""
+    checkpoints: tuple[Checkpoint, ...]
+    """States along the way, the one before the first record first: `whole_run.state_before` resumes from them."""
+    detected: DetectionLog
+    """Stamps of the cycles, rows of their detections, and the detections as measured."""
+    prior_means: FloatArray
+    """(K, 3) `T_map_base` after *predict* [m, m, rad]."""
+    prior_covariances: FloatArray
+    """(K, 3, 3) after *predict*."""
+    means: FloatArray
+    """(K, 3) `T_map_base` after *correct*: the filter's own state [m, m, rad]."""
+    covariances: FloatArray
+    """(K, 3, 3) after *correct*."""
+    modes: NDArray[np.int8]
+    """(K,) a `Mode` each."""
+    status: NDArray[np.int8]
+    """(n,) a `Status` each."""
+    reflector: IntArray
+    """(n,) index into the reflector map of its segment; -1: none."""
+    d2: FloatArray
+    """(n,) squared Mahalanobis distance to that reflector; NaN: none."""
+    final: FilterState
+    """State after the last record, odometry included."""
+    firsts: IntArray = field(init=False, repr=False)
+    """(S,) first cycle of each segment."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "firsts", firsts_of(self.segments))
+
+    def __len__(self) -> int:
+        """Return the number of cycles."""
+        return len(self.detected)
+
+    @property
+    def initial(self) -> Belief:
+        """Belief before the first record."""
+        return belief_of(self.checkpoints[0].state)
+
+    @property
+    def stamps_ns(self) -> IntArray:
+        """(K,) time of each scan [ns]."""
+        return self.detected.stamps_ns
+
+    @property
+    def offsets(self) -> IntArray:
+        """(K + 1,) detections of cycle k: offsets[k] to offsets[k + 1]."""
+        return self.detected.offsets
+
+    @property
+    def range_bearing(self) -> FloatArray:
+        """(n, 2) range [m] and bearing [rad] of each detection, scanner frame."""
+        return self.detected.range_bearing
+
+    @property
+    def beams(self) -> IntArray:
+        """(n,) width of each cluster [beams]; 0 where the sensor itself detected."""
+        return self.detected.beams
+
+    def segment(self, cycle: int) -> Segment:
+        """Return the segment of a cycle."""
+        return self.segments[int(np.searchsorted(self.firsts, cycle, side="right")) - 1]
+
+    def counts(self, status: Status) -> IntArray:
+        """(K,) detections of one status in each cycle."""
+        totals = np.concatenate(([0], np.cumsum(self.status == status, dtype=np.int64)))
+        return totals[self.offsets[1:]] - totals[self.offsets[:-1]]
+
+    def points_map(self) -> FloatArray:
+        """(n, 2) every detection seen from the posterior of its cycle [m], map frame."""
+        ends = (*self.firsts[1:].tolist(), len(self))
+        parts = [
+            project_detections(
+                self.means[segment.first : end],
+                self.offsets[segment.first : end + 1] - self.offsets[segment.first],
+                self.range_bearing[self.offsets[segment.first] : self.offsets[end]],
+                segment.setup.filter.observation,
+            )
+            for segment, end in zip(self.segments, ends, strict=True)
+        ]
+        return parts[0] if len(parts) == 1 else np.concatenate(parts)
+
+    def estimate(self, cycle: int) -> Estimate:
+        """Return one cycle as `Localizer.feed` gives it, to the last bit."""
+        model = self.segment(cycle).setup.filter
+        stamp_ns = int(self.stamps_ns[cycle])
+        rows = slice(int(self.offsets[cycle]), int(self.offsets[cycle + 1]))
+        detections = self.range_bearing[rows]
+        offsets = np.array((0, len(detections)), dtype=np.int64)
+        points = project_detections(self.means[cycle : cycle + 1], offsets, detections, model.observation)
+        return Estimate(
+            stamp_ns=stamp_ns,
+            prior=Belief(stamp_ns, self.prior_means[cycle], self.prior_covariances[cycle]),
+            posterior=self._posterior(cycle),
+            output=self._output(cycle),
+            mode=Mode(int(self.modes[cycle])),
+            detections=detections,
+            beams=self.beams[rows],
+            points_map=points,
+            status=self.status[rows],
+            reflector=self.reflector[rows],
+            d2=self.d2[rows],
+            gate=model.gate.d2,
+        )
+
+    def _posterior(self, cycle: int) -> Belief:
+        """Return the filter's own belief after a cycle."""
+        return Belief(int(self.stamps_ns[cycle]), self.means[cycle], self.covariances[cycle])
+
+    def _output(self, cycle: int) -> Belief:
+        """Return what the vehicle is given after a cycle: the belief of the last operational one."""
+        operational = self.modes[cycle::-1] == Mode.OPERATIONAL
+        back = int(np.argmax(operational))
+        return self._posterior(cycle - back) if operational[back] else output_of(self.checkpoints[0].state)

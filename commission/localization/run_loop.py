@@ -1,0 +1,162 @@
+"""The compiled loop of a whole run over one stretch of cycles, and the columns that it writes.
+
+It knows one setup and one state at its beginning; what lies before and after the stretch is `whole_run`'s.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.compiled import compiled, compiled_inline
+from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.localization.cycle import process_odometry, process_scan
+from commission.localization.detection_log import DetectionLog
+from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.run_columns import RunColumns
+from commission.localization.setup import FilterModel, LocalizerSetup
+from commission.localization.state import FilterState
+from commission.site.record_log import RecordLog
+
+
+class Columns(NamedTuple):
+    """Where the loop writes: a row per cycle, then a row per detection."""
+
+    prior_means: FloatArray
+    prior_covariances: FloatArray
+    means: FloatArray
+    covariances: FloatArray
+    modes: NDArray[np.int8]
+    status: NDArray[np.int8]
+    reflectors: IntArray
+    d2: FloatArray
+
+
+def empty_columns(detected: DetectionLog) -> Columns:
+    """Columns to be written, the detector's verdict in them."""
+    cycles, total = len(detected), len(detected.range_bearing)
+    return Columns(
+        np.empty((cycles, 3)),
+        np.empty((cycles, 3, 3)),
+        np.empty((cycles, 3)),
+        np.empty((cycles, 3, 3)),
+        np.empty(cycles, dtype=np.int8),
+        detected.status.copy(),
+        np.empty(total, dtype=np.int64),
+        np.empty(total),
+    )
+
+
+def cut(columns: Columns, detected: DetectionLog, first: int, last: int) -> Columns:
+    """Views of the cycles from `first` to before `last`."""
+    rows = slice(int(detected.offsets[first]), int(detected.offsets[last]))
+    return Columns(
+        columns.prior_means[first:last],
+        columns.prior_covariances[first:last],
+        columns.means[first:last],
+        columns.covariances[first:last],
+        columns.modes[first:last],
+        columns.status[rows],
+        columns.reflectors[rows],
+        columns.d2[rows],
+    )
+
+
+def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: int) -> None:
+    """Copy the first cycles of another run."""
+    columns.prior_means[:cycles] = earlier.prior_means[:cycles]
+    columns.prior_covariances[:cycles] = earlier.prior_covariances[:cycles]
+    columns.means[:cycles] = earlier.means[:cycles]
+    columns.covariances[:cycles] = earlier.covariances[:cycles]
+    columns.modes[:cycles] = earlier.modes[:cycles]
+    columns.status[:detections] = earlier.status[:detections]
+    columns.reflectors[:detections] = earlier.reflector[:detections]
+    columns.d2[:detections] = earlier.d2[:detections]
+
+
+class Stretch(NamedTuple):
+    """Cycles to go over, and where they are written."""
+
+    rows: tuple[int, int]
+    """First row of odometry to be delivered, and the one behind the last."""
+    detected: DetectionLog
+    """Detections of its scans."""
+    columns: Columns
+    """Rows of its cycles and detections."""
+
+
+def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch: Stretch) -> FilterState:
+    """Go on from a state over a stretch, whose cycles are written; return the state after its last record."""
+    own, detected = log.detection_stamps_ns, stretch.detected
+    rows = slice(*stretch.rows)
+    state = _run(
+        read_only(log.odometry_stamps_ns[rows]),
+        read_only(log.displacements[rows]),
+        detected.stamps_ns,
+        detected.offsets,
+        detected.range_bearing,
+        setup.filter,
+        setup.index.places,
+        setup.index.offsets,
+        state,
+        stretch.columns,
+    )
+    if len(own) and len(detected) and detected.stamps_ns[-1] >= own[0]:
+        return state._replace(sensor_detects=True)
+    return state
+
+
+@compiled
+def _run(  # noqa: PLR0917 - the columns of the log
+    odometry_stamps: IntArray,
+    displacements: FloatArray,
+    scan_stamps: IntArray,
+    offsets: IntArray,
+    detections: FloatArray,
+    model: FilterModel,
+    places: FloatArray,
+    cell_offsets: IntArray,
+    state: FilterState,
+    columns: Columns,
+) -> FilterState:
+    """Deliver odometry and scans in the order of their stamps, odometry first; return the state after the last."""
+    prior_means, prior_covariances, means, covariances, modes, status, reflectors, d2 = columns
+    rows = 0
+    for k in range(len(scan_stamps)):
+        while rows < len(odometry_stamps) and odometry_stamps[rows] <= scan_stamps[k]:
+            dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
+            state = process_odometry(state, odometry_stamps[rows], dx, dy, dtheta, model.odometry)
+            rows += 1
+        cycle = process_scan(
+            state,
+            scan_stamps[k],
+            offsets[k],
+            offsets[k + 1],
+            detections,
+            model,
+            places,
+            cell_offsets,
+            status,
+            reflectors,
+            d2,
+        )
+        state = cycle.state
+        _store(cycle.prior, k, prior_means, prior_covariances)
+        _store(state.belief, k, means, covariances)
+        modes[k] = state.mode
+    while rows < len(odometry_stamps):
+        dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
+        state = process_odometry(state, odometry_stamps[rows], dx, dy, dtheta, model.odometry)
+        rows += 1
+    return state
+
+
+@compiled_inline
+def _store(belief: PoseGaussian, row: int, means: FloatArray, covariances: FloatArray) -> None:
+    """Write a belief to its row."""
+    means[row, 0], means[row, 1], means[row, 2] = belief.x, belief.y, belief.theta
+    covariances[row, 0, 0], covariances[row, 0, 1], covariances[row, 0, 2] = belief.xx, belief.xy, belief.xt
+    covariances[row, 1, 0], covariances[row, 1, 1], covariances[row, 1, 2] = belief.xy, belief.yy, belief.yt
+    covariances[row, 2, 0], covariances[row, 2, 1], covariances[row, 2, 2] = belief.xt, belief.yt, belief.tt

@@ -1,0 +1,62 @@
+"""The filter's whole state as one value: with it and the records to come, the rest of a run is decided.
+
+Scalars only, the form in which kernels hand it to each other; what the filter is given and does not change is `setup`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from commission.localization.estimate import Belief, Mode
+from commission.localization.odometry import AT_REST, Motion
+from commission.localization.pose_gaussian import PoseGaussian, from_belief, to_belief
+
+NO_RECORD_NS = -(2**63)
+"""Stamp of the newest record before there is one: no stamp is older [ns]."""
+
+
+class FilterState(NamedTuple):
+    """All that the localizer remembers from one record to the next."""
+
+    belief: PoseGaussian
+    """The filter's own belief; it goes on in fail mode."""
+    belief_ns: int
+    """Stamp that it is about [ns]."""
+    motion: Motion
+    """Last odometry, and how far the belief has gone ahead of it."""
+    mode: int
+    """State of the supervisor after the newest scan, a `Mode`."""
+    output: PoseGaussian
+    """What the vehicle is given: the belief of the last operational cycle, before the first one the start."""
+    output_ns: int
+    """Stamp that the output is about [ns]."""
+    newest_ns: int
+    """Stamp of the newest record of any kind [ns]."""
+    sensor_detects: bool
+    """Whether the sensor has ever sent detections of its own: from then on its scans are not detected from."""
+
+
+def state_at_start(initial: Belief) -> FilterState:
+    """Return the state before the first record; raises ValueError when the belief is no pose and covariance."""
+    belief = from_belief(initial)
+    stamp_ns = int(initial.stamp_ns)
+    return FilterState(
+        belief=belief,
+        belief_ns=stamp_ns,
+        motion=AT_REST,
+        mode=int(Mode.OPERATIONAL),
+        output=belief,
+        output_ns=stamp_ns,
+        newest_ns=NO_RECORD_NS,
+        sensor_detects=False,
+    )
+
+
+def belief_of(state: FilterState) -> Belief:
+    """Return the filter's own belief as arrays."""
+    return to_belief(state.belief, state.belief_ns)
+
+
+def output_of(state: FilterState) -> Belief:
+    """Return what the vehicle is given as arrays."""
+    return to_belief(state.output, state.output_ns)

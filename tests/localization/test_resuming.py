@@ -1,0 +1,233 @@
+"""A run that is interrupted, resumed or given another setup on the way is the uninterrupted one, to the last bit."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from commission.errors import JobCancelled
+from commission.localization import whole_run
+from commission.localization.detection_log import cycle_stamps, extract_detections
+from commission.localization.estimate import Status
+from commission.localization.localizer import Localizer
+from commission.localization.run_columns import RunColumns, Segment
+from commission.localization.setup import LocalizerSetup
+from commission.localization.state import state_at_start
+from commission.localization.whole_run import run, run_segments, state_before
+from commission.simulation.faults import cover
+from commission.site.parameters import AssociationParameters, DetectorParameters, Parameters, SupervisorParameters
+from commission.site.record_log import RecordLog
+from commission.site.records import Detections, Scan
+from commission.site.scanner import Scanner
+from tests.localization.drives import Drive, Plan, random_drive, random_map
+
+PLANS = {
+    "equal stamps": Plan(scans=40),
+    "scans between odometry": Plan(scans=40, scan_offset_ns=7_000_000),
+    "scans faster than odometry": Plan(scans=40, odometry_ns=100_000_000, scan_ns=30_000_000),
+    "rates that never meet": Plan(scans=40, odometry_ns=17_000_001, scan_ns=41_000_003, scan_offset_ns=5),
+    "raw scans": Plan(scans=30, beams=720, scan_offset_ns=3_000_000),
+    "the sensor starts to detect": Plan(scans=30, beams=720, both_after=10),
+}
+TIGHT = SupervisorParameters(position_limit=0.01)
+"""A limit that a drive among twelve reflectors passes now and then, so that the output is withheld."""
+
+
+def setup_of(seed: int = 3, **groups: object) -> LocalizerSetup:
+    scanner = Scanner(mounting=np.array([0.3, 0.1, 0.2]))
+    parameters = Parameters(**{"supervisor": TIGHT, **groups})  # type: ignore[arg-type]
+    return LocalizerSetup(random_map(np.random.default_rng(seed), 12), scanner, parameters)
+
+
+SETUPS = {
+    "drive": setup_of(),
+    "narrow gate": setup_of(association=AssociationParameters(gate_probability=0.3)),
+    "another map": setup_of(seed=4),
+    "another detector": setup_of(detector=DetectorParameters(min_model_error=0, max_model_error=0)),
+}
+
+
+@pytest.fixture(scope="module", params=PLANS.values(), ids=PLANS.keys())
+def drive(request: pytest.FixtureRequest) -> Drive:
+    return random_drive(SETUPS["drive"], np.random.default_rng(8), request.param)
+
+
+@pytest.fixture(autouse=True)
+def checkpoints_every_seven_cycles(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(whole_run, "CHECKPOINT_CYCLES", 7)
+
+
+def assert_same(a: RunColumns, b: RunColumns, *, after: int = 0) -> None:
+    """Every column of `a` equals that of `b` from a cycle on, and both end in one state."""
+    first = int(b.offsets[after])
+    for name in ("prior_means", "prior_covariances", "means", "covariances", "modes", "stamps_ns"):
+        assert getattr(a, name).tobytes() == getattr(b, name)[after:].tobytes(), name
+    for name in ("status", "reflector", "d2", "range_bearing", "beams"):
+        assert getattr(a, name).tobytes() == getattr(b, name)[first:].tobytes(), name
+    assert (a.offsets + first).tolist() == b.offsets[after:].tolist()
+    assert a.final == b.final
+
+
+def fed(drive: Drive, segments: tuple[Segment, ...]) -> tuple[Localizer, RunColumns | list]:
+    """The live localizer over a drive, its setup replaced and its reflectors covered as the segments say."""
+    localizer = Localizer(segments[0].setup, drive.initial)
+    estimates = []
+    for record in drive.log.records():
+        segment = next(s for s in reversed(segments) if s.first <= len(estimates))
+        localizer.replace_setup(segment.setup)
+        estimate = localizer.feed(cover(record) if segment.covered else record)
+        if estimate is not None:
+            estimates.append(estimate)
+    return localizer, estimates
+
+
+def assert_is_fed(columns: RunColumns, drive: Drive, segments: tuple[Segment, ...]) -> None:
+    localizer, estimates = fed(drive, segments)
+    assert len(estimates) == len(columns) > 0
+    for cycle, live in enumerate(estimates):
+        whole = columns.estimate(cycle)
+        for name in ("detections", "beams", "points_map", "status", "reflector", "d2", "mode", "gate", "stamp_ns"):
+            given, expected = np.asarray(getattr(whole, name)), np.asarray(getattr(live, name))
+            assert given.tobytes() == expected.tobytes(), f"{name} of cycle {cycle}"
+        for name in ("prior", "posterior", "output"):
+            one, other = getattr(whole, name), getattr(live, name)
+            assert one.stamp_ns == other.stamp_ns, f"{name} of cycle {cycle}"
+            assert one.mean.tobytes() == other.mean.tobytes(), f"{name} of cycle {cycle}"
+            assert one.covariance.tobytes() == other.covariance.tobytes(), f"{name} of cycle {cycle}"
+    assert localizer.state == columns.final
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(share=st.floats(0.0, 1.0))
+def test_split_at_any_record_the_rest_goes_on_as_if_nothing_had_happened(drive: Drive, share: float) -> None:
+    setup = SETUPS["drive"]
+    records = list(drive.log.records())
+    position = round(share * len(records))
+    before = Localizer(setup, drive.initial)
+    cycles = sum(before.feed(record) is not None for record in records[:position])
+    whole = run(drive.log, setup, drive.initial)
+    rest = run(RecordLog.collect(records[position:]), setup, before.state)
+    assert_same(rest, whole, after=cycles)
+    live = Localizer(setup, before.state)
+    for record in records[position:]:
+        live.feed(record)
+    assert live.state == whole.final
+
+
+def test_the_state_before_any_cycle_is_that_of_the_live_localizer(drive: Drive) -> None:
+    setup = SETUPS["drive"]
+    whole = run(drive.log, setup, drive.initial)
+    localizer = Localizer(setup, drive.initial)
+    states = [localizer.state]
+    for record in drive.log.records():
+        if localizer.feed(record) is not None:
+            states.append(localizer.state)
+    assert [state_before(whole, drive.log, cycle) for cycle in range(len(whole) + 1)] == states
+    assert whole.final == localizer.state
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_run_of_segments_is_the_live_localizer_whose_setup_is_replaced(drive: Drive, data: st.DataObject) -> None:
+    kinds = st.sampled_from(sorted(SETUPS))
+    firsts = sorted(data.draw(st.sets(st.integers(1, len(cycle_stamps(drive.log)) - 1), max_size=3)))
+    segments = tuple(
+        Segment(first, SETUPS[data.draw(kinds)], covered=data.draw(st.booleans())) for first in (0, *firsts)
+    )
+    columns = run_segments(drive.log, segments, drive.initial)
+    assert_is_fed(columns, drive, segments)
+    # Whatever another run of the same log was made with, what is taken over from it changes nothing.
+    others = tuple(Segment(s.first, SETUPS[data.draw(kinds)], covered=data.draw(st.booleans())) for s in segments)
+    earlier = run_segments(drive.log, others, drive.initial)
+    again = run_segments(drive.log, segments, drive.initial, earlier=earlier)
+    assert_same(again, columns)
+    assert again.segments == segments
+
+
+def test_from_here_on_goes_on_from_the_state_there_and_leaves_what_was_lived(drive: Drive) -> None:
+    setup, other = SETUPS["drive"], SETUPS["narrow gate"]
+    before = run(drive.log, setup, drive.initial)
+    cycle = 17
+    segments = (Segment(0, setup), Segment(cycle, other))
+    after = run_segments(drive.log, segments, drive.initial, earlier=before)
+    assert after.means[:cycle].tobytes() == before.means[:cycle].tobytes()
+    assert after.means[cycle:].tobytes() != before.means[cycle:].tobytes()
+    assert after.estimate(cycle - 1).gate == setup.filter.gate.d2
+    assert after.estimate(cycle).gate == other.filter.gate.d2
+    assert_is_fed(after, drive, segments)
+
+
+def test_covered_reflectors_are_not_detected_until_they_are_uncovered(drive: Drive) -> None:
+    setup = SETUPS["drive"]
+    segments = (Segment(0, setup), Segment(5, setup, covered=True), Segment(20, setup))
+    columns = run_segments(drive.log, segments, drive.initial)
+    seen = sum(columns.counts(status) for status in Status)
+    assert seen[:5].sum() > 0
+    assert seen[5:20].sum() == 0
+    assert seen[20:].sum() > 0
+
+
+def test_detections_are_kept_while_the_detector_stays_and_made_anew_when_it_does_not() -> None:
+    drive = random_drive(SETUPS["drive"], np.random.default_rng(8), Plan(scans=30, beams=720))
+    first = run_segments(drive.log, (Segment(0, SETUPS["drive"]),), drive.initial)
+    moved_gate = run_segments(drive.log, (Segment(0, SETUPS["narrow gate"]),), drive.initial, earlier=first)
+    assert moved_gate.detected is first.detected
+    other = SETUPS["another detector"]
+    stricter = run_segments(drive.log, (Segment(0, other),), drive.initial, earlier=first)
+    fresh = extract_detections(drive.log, other)
+    assert stricter.detected.status.tolist() == fresh.status.tolist()
+    assert first.detected.status.tolist() != fresh.status.tolist()
+
+
+def test_another_start_takes_no_cycle_from_an_earlier_run(drive: Drive) -> None:
+    segments = (Segment(0, SETUPS["drive"]),)
+    earlier = run_segments(drive.log, segments, drive.initial)
+    start = dataclasses.replace(drive.initial, covariance=4.0 * drive.initial.covariance)
+    fresh = run_segments(drive.log, segments, start)
+    assert_same(run_segments(drive.log, segments, start, earlier=earlier), fresh)
+    assert fresh.means[0].tobytes() != earlier.means[0].tobytes()
+
+
+def test_a_segment_behind_the_last_cycle_is_left_out(drive: Drive) -> None:
+    setup = SETUPS["drive"]
+    count = len(run(drive.log, setup, drive.initial))
+    segments = tuple(Segment(first, setup) for first in (0, count - 1, count))
+    assert run_segments(drive.log, segments, drive.initial).segments == segments[:2]
+
+
+@pytest.mark.parametrize("firsts", [(), (1,), (0, 3, 3), (0, 5, 2)])
+def test_segments_that_do_not_follow_each_other_are_refused(drive: Drive, firsts: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match="segments begin at cycles"):
+        run_segments(drive.log, tuple(Segment(first, SETUPS["drive"]) for first in firsts), drive.initial)
+
+
+def test_a_run_says_how_far_it_is_and_stops_where_it_is_told_to(drive: Drive) -> None:
+    told: list[tuple[float, str]] = []
+    segments = (Segment(0, SETUPS["drive"]),)
+    run_segments(drive.log, segments, drive.initial, progress=lambda share, text: told.append((share, text)))
+    shares = [share for share, _ in told]
+    assert shares == sorted(shares)
+    assert {text for _, text in told} == {"detecting reflectors", "localizing"}
+    assert 0.0 <= shares[0] < shares[-1] <= 1.0
+
+    def cancelled(share: float, text: str) -> None:
+        if share > 0.8:
+            raise JobCancelled("nobody wants it")
+
+    with pytest.raises(JobCancelled):
+        run_segments(drive.log, segments, drive.initial, progress=cancelled)
+
+
+def test_a_log_without_cycles_still_moves_the_state(drive: Drive) -> None:
+    log = RecordLog.collect(record for record in drive.log.records() if not isinstance(record, Scan | Detections))
+    setup = SETUPS["drive"]
+    columns = run_segments(log, (Segment(0, setup),), drive.initial)
+    assert len(columns) == 0
+    localizer = Localizer(setup, drive.initial)
+    for record in log.records():
+        localizer.feed(record)
+    assert columns.final == localizer.state != state_at_start(drive.initial)
