@@ -14,9 +14,9 @@ from tyro.conf import Positional, UseAppendAction, arg
 class Convert:
     """Convert reflectors, routes, floor plans and recordings from one format into another, told apart by their endings.
 
-    Reflectors: .csv, .imk. Routes: VDMA LIF (.lif, .json), VDA 5050 orders (.json, read only). Floor plans (read only):
-    .dxf, .stl, .obj, .glb, .ply; they become a map (.yaml). A project folder gives and takes all of these. A recording
-    becomes a CSV folder.
+    Reflectors: .csv, .tsv, .imk. Routes: VDMA LIF (.lif, .json), VDA 5050 orders (.json, read only). Floor maps: .yaml.
+    Floor plans (read only): .dxf, .stl, .obj, .glb, .ply; they become a map (.yaml). A project folder gives and takes
+    all of these. A recording becomes a CSV folder.
     """
 
     source: Annotated[Positional[Path], arg(metavar="IN")]
@@ -27,12 +27,14 @@ class Convert:
     """LIF: vehicle type whose edges are read. None: the one with the most edges."""
     layout: Annotated[str | None, arg(metavar="NAME")] = None
     """LIF: identifier of the layout to read. None: all of them."""
-    unit: Annotated[str | None, arg(metavar="mm|cm|m|in|ft")] = None
+    unit: Annotated[str | None, arg(metavar="mm|cm|m|in|ft|yd|us-ft")] = None
     """Drawing or model: unit in which it was made. None: what a drawing states; metres for a model."""
     layer: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = ()
     """Drawing: a layer that holds walls; repeat it for several. None: every visible layer."""
     height: Annotated[UseAppendAction[tuple[float, ...]], arg(metavar="M")] = ()
     """Model: height at which it is cut [m]; repeat it for several. None: 0.2 m, a safety scanner's."""
+    up: Annotated[str | None, arg(metavar="y|z")] = None
+    """Model: axis that points up. None: y for .glb, z for the others."""
     resolution: float = 0.05
     """Drawing or model: edge of a cell of the map [m]."""
 
@@ -46,6 +48,7 @@ class Convert:
             unit=self.unit,
             layers=self.layer,
             heights=self.height or (0.2,),
+            up=self.up,
             resolution=self.resolution,
         )
         for line in convert_file(self.source, self.target, options):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import codecs
 import csv
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,8 @@ import numpy as np
 
 from commission.errors import FileFormatError
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.io.reading import cannot_read, check_size
+from commission.io.findings import Findings
+from commission.io.reading import cannot_read, check_size, decoded
 from commission.site.checks import LARGEST
 
 SIZE_LIMIT = 64_000_000_000
@@ -25,6 +27,9 @@ SIZE_LIMIT = 64_000_000_000
 LINE_LIMIT = 100_000
 """Characters in one line: nothing that is a table has more."""
 _STAMP_LIMIT = 2**62
+_THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2}(\.[0-9]{3})+")
+_GROUPED = re.compile(r"[-+]?[0-9]{1,3}(\.[0-9]{3})+,[0-9]*")
+_STATED_DELIMITER = re.compile(r"sep=([,;\t|])?", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +61,8 @@ class Block:
         """(N,) finite numbers of a column; empty cells become `empty`, or are errors when it is None."""
         cells = self.columns[column]
         if self.decimal_comma:
-            cells = [cell.replace(",", ".") for cell in cells]
+            self._refuse_doubtful_thousands(column, cells, unit)
+            cells = [_with_point(cell) for cell in cells]
         try:
             values = np.array(cells, dtype=np.float64)
             if (np.abs(values) <= LARGEST).all() and not _has_underscore(cells):
@@ -72,7 +78,7 @@ class Block:
                 raise self.error(row, column, "is empty", f"a number [{unit}]")
             return empty
         try:
-            value = float("_" if "_" in cell else cell.replace(",", ".") if self.decimal_comma else cell)
+            value = float("_" if "_" in cell else _with_point(cell) if self.decimal_comma else cell)
         except ValueError:
             raise self.error(row, column, f"is {shortened(cell)}", f"a number [{unit}]") from None
         if not abs(value) <= LARGEST:
@@ -80,6 +86,13 @@ class Block:
             found = cell if len(cell) <= 40 else shortened(cell)
             raise self.error(row, column, f"is {found}", f"{expected} [{unit}]")
         return value
+
+    def _refuse_doubtful_thousands(self, column: str, cells: list[str], unit: str) -> None:
+        """Refuse 1.500 beside 2,5: whether that is one and a half or fifteen hundred decides over the plant."""
+        doubtful = [row for row, cell in enumerate(cells) if "." in cell and _THOUSANDS.fullmatch(cell.strip())]
+        if doubtful and any("," in cell for cell in cells):
+            found = f"is {shortened(cells[doubtful[0]].strip())} in a column of decimal commas"
+            raise self.error(doubtful[0], column, found, f"a number without points for thousands [{unit}]")
 
     def stamps(self, column: str = "stamp_ns") -> IntArray:
         """(N,) time stamps of a column [ns]."""
@@ -107,8 +120,12 @@ def read_table(
     ignore_unknown: bool = False,
     bytes_at_once: int = 100_000,
     size_limit: int = SIZE_LIMIT,
+    found: Findings | None = None,
 ) -> Iterator[Block]:
-    """Read a table in blocks; blank lines and lines that start with `#` are passed over.
+    """Read a table in blocks.
+
+    Blank lines and lines that start with `#` are passed over, as are what Excel adds: a first line `sep=;`, columns
+    without a name at the end, and rows of empty cells.
 
     Parameters
     ----------
@@ -117,6 +134,7 @@ def read_table(
     ignore_unknown : whether other columns are passed over instead of refused.
     bytes_at_once : how much of the file is read for one block, which bounds the memory used.
     size_limit : largest file [bytes].
+    found : takes what was doubted; with it, text that is not UTF-8 is taken for Windows-1252, else it is refused.
 
     Raises
     ------
@@ -127,10 +145,11 @@ def read_table(
     layout: _Layout | None = None
     try:
         with path.open("rb") as file:
-            for first, text in _chunks(path, file, bytes_at_once):
+            for first, text in _chunks(path, file, bytes_at_once, found):
                 lines, start = text.split("\n"), 0
                 if layout is None:
-                    start = next((index for index, line in enumerate(lines) if is_row(line)), len(lines))
+                    rows = (i for i, line in enumerate(lines) if is_row(line) and stated_delimiter(line) is None)
+                    start = next(rows, len(lines))
                     if start == len(lines):
                         continue
                     layout = _layout(path, first + start, lines[start], (required, optional, ignore_unknown))
@@ -148,12 +167,17 @@ def _has_underscore(cells: list[str]) -> bool:
     return "_" in "".join(cells)
 
 
+def _with_point(cell: str) -> str:
+    """Number with a decimal comma as Python reads it; points before a comma separate thousands."""
+    return cell.replace(".", "").replace(",", ".") if _GROUPED.fullmatch(cell.strip()) else cell.replace(",", ".")
+
+
 def shortened(cell: str) -> str:
     """Cell as a message shows it."""
     return repr(cell if len(cell) <= 40 else f"{cell[:37]}...")
 
 
-def _chunks(path: Path, file: IO[bytes], size: int) -> Iterator[tuple[int, str]]:
+def _chunks(path: Path, file: IO[bytes], size: int, found: Findings | None) -> Iterator[tuple[int, str]]:
     """Number of the first line and text of some whole lines, without the last line's end."""
     number, rest, is_first = 1, b"", True
     while data := file.read(size):
@@ -161,25 +185,20 @@ def _chunks(path: Path, file: IO[bytes], size: int) -> Iterator[tuple[int, str]]
         if cut < 0:
             rest += data
         else:
-            text = _decoded(path, number, rest + data[:cut], is_first)
+            text = _decoded(path, number, rest + data[:cut], is_first, found)
             yield number, text
             number, rest, is_first = number + text.count("\n") + 1, data[cut + 1 :], False
         if len(rest) > LINE_LIMIT + size:
             raise FileFormatError(path, f"line {number}", f"is longer than {LINE_LIMIT} characters", "a table")
     if rest:
-        yield number, _decoded(path, number, rest, is_first)
+        yield number, _decoded(path, number, rest, is_first, found)
 
 
-def _decoded(path: Path, number: int, data: bytes, is_first: bool) -> str:
+def _decoded(path: Path, number: int, data: bytes, is_first: bool, found: Findings | None) -> str:
     """Text of some lines; says which line is none."""
     if is_first:
         data = data.removeprefix(codecs.BOM_UTF8)
-    try:
-        text = data.decode("utf-8").replace("\r\n", "\n").removesuffix("\r")
-    except UnicodeDecodeError as error:
-        where = f"line {number + data.count(bytes([10]), 0, error.start)}"
-        found = f"byte 0x{data[error.start]:02x} is not UTF-8"
-        raise FileFormatError(path, where, found, "a table saved as UTF-8") from error
+    text = decoded(path, number, data, found).replace("\r\n", "\n").removesuffix("\r")
     # Old spreadsheets end their lines with a bare carriage return: one "line" would hold the whole table.
     for character, name in (("\0", "zero byte"), ("\r", "bare carriage return")):
         if character in text:
@@ -193,6 +212,12 @@ def is_row(line: str) -> bool:
     return bool(line) and not line.isspace() and not line.lstrip().startswith("#")
 
 
+def stated_delimiter(line: str) -> str | None:
+    """What separates cells, by Excel's own first line `sep=;`; none for any other line."""
+    match = _STATED_DELIMITER.fullmatch(line.strip().strip('"'))
+    return match[1] if match else None
+
+
 @dataclass(frozen=True, slots=True)
 class _Layout:
     """What the header says."""
@@ -200,30 +225,36 @@ class _Layout:
     names: list[str]
     kept: dict[str, int]
     delimiter: str
+    named: int
+    """Columns up to the last one that has a name; behind them Excel leaves empty ones."""
 
 
 def _layout(path: Path, number: int, header: str, wanted: tuple[Sequence[str], Sequence[str], bool]) -> _Layout:
     delimiter = ";" if ";" in header else ","
     names = [name.strip().lower() for name in _cells(path, number, header, delimiter)]
-    return _Layout(names, _kept_columns(path, number, names, wanted), delimiter)
+    named = names[: max((i for i, name in enumerate(names) if name), default=0) + 1]
+    return _Layout(names, _kept_columns(path, number, named, wanted), delimiter, len(named))
 
 
 def _block(path: Path, number: int, lines: list[str], layout: _Layout) -> Block | None:
     """Rows of some lines; None when there are none."""
     width, delimiter = len(layout.names), layout.delimiter
     numbers: Sequence[int] = range(number, number + len(lines))
-    if _is_plain(lines, width, delimiter):
+    if layout.named == width and _is_plain(lines, width, delimiter):
         cells = delimiter.join(lines).split(delimiter)
     else:
         numbers, cells = [], []
         for place, line in enumerate(lines, start=number):
             if is_row(line):
                 row = _cells(path, place, line, delimiter)
-                if len(row) != width:
-                    remedy = f"{width} cells, one for each of: {', '.join(layout.names)}"
+                # One column without a name is a first column of numbers, never an empty row: a scan that saw nothing.
+                if width > 1 and not any(cell.strip() for cell in row):
+                    continue
+                if any(cell.strip() for cell in row[layout.named :]) or not layout.named <= len(row):
+                    remedy = f"{layout.named} cells, one for each of: {', '.join(layout.names[: layout.named])}"
                     raise FileFormatError(path, f"line {place}", f"has {len(row)} cells", remedy)
                 numbers.append(place)
-                cells += row
+                cells += [*row[:width], *[""] * (width - len(row))]
     if not numbers:
         return None
     columns = {name: cells[index::width] for name, index in layout.kept.items()}

@@ -19,7 +19,7 @@ from commission.io.imk import read_imk, write_imk
 from commission.io.json_document import read_json
 from commission.io.lif import read_lif
 from commission.io.lif_writer import write_lif
-from commission.io.map_server import write_floor_map
+from commission.io.map_server import read_floor_map, write_floor_map
 from commission.io.project_file import FILE_NAME, load_project, project_file, save_project
 from commission.io.recordings.base import open_recording
 from commission.io.recordings.csv_writer import write_recording
@@ -38,7 +38,7 @@ class Kind(StrEnum):
     """What a file holds, in the words of a message."""
 
     PROJECT = "a project"
-    TABLE = "a reflector table (.csv)"
+    TABLE = "a reflector table (.csv, .tsv)"
     IMK = "a SICK layout (.imk)"
     LIF = "a VDMA LIF layout (.lif, .json)"
     ORDER = "a VDA 5050 order (.json)"
@@ -56,19 +56,57 @@ TARGETS: dict[Kind, tuple[Kind, ...]] = {
     Kind.ORDER: (Kind.PROJECT, Kind.LIF),
     Kind.DRAWING: (Kind.MAP, Kind.PROJECT),
     Kind.MODEL: (Kind.MAP, Kind.PROJECT),
+    Kind.MAP: (Kind.PROJECT, Kind.MAP),
     Kind.RECORDING: (Kind.RECORDING,),
 }
 """Into which kinds each kind can be converted."""
 
 _SUFFIXES = {
     ".csv": Kind.TABLE,
+    ".tsv": Kind.TABLE,
+    ".txt": Kind.TABLE,
     ".imk": Kind.IMK,
     ".lif": Kind.LIF,
     ".json": Kind.LIF,
     ".dxf": Kind.DRAWING,
     ".yaml": Kind.MAP,
+    ".yml": Kind.MAP,
     **{f".{suffix}": Kind.MODEL for suffix in mesh.KINDS},
 }
+
+
+_AS_CSV = "a recording as a CSV folder (odometry.csv with detections.csv or scans.npz)"
+_AS_MODEL = "the model as .stl, .obj, .glb or .ply"
+_UNREAD = {
+    ".dwg": "the drawing saved as DXF (in the CAD program: Save as, DXF)",
+    ".dwt": "the drawing saved as DXF (in the CAD program: Save as, DXF)",
+    ".dgn": "the drawing saved as DXF (in the CAD program: Save as, DXF)",
+    ".ifc": "the floor plan exported as DXF, or the model as .glb",
+    ".rvt": "the floor plan exported as DXF, or the model as .glb",
+    ".skp": _AS_MODEL,
+    ".dae": _AS_MODEL,
+    ".fbx": _AS_MODEL,
+    ".step": _AS_MODEL,
+    ".stp": _AS_MODEL,
+    ".3ds": _AS_MODEL,
+    ".bag": _AS_CSV,
+    ".mcap": _AS_CSV,
+    ".db3": _AS_CSV,
+    ".pcap": _AS_CSV,
+    ".pcapng": _AS_CSV,
+    ".log": _AS_CSV,
+    ".smap": "its reflectors as a table (.csv) and its routes as VDMA LIF (.lif)",
+    ".xml": "reflectors as a table (.csv), routes as VDMA LIF (.lif)",
+    ".xls": "the table saved as CSV",
+    ".xlsx": "the table saved as CSV",
+    ".ods": "the table saved as CSV",
+    ".pdf": "the drawing as DXF, or an image (.png), which the page takes as a floor map",
+    ".svg": "the drawing as DXF, or an image (.png), which the page takes as a floor map",
+    ".png": "the map.yaml that describes the image; the page also takes a plain image as a floor map",
+    ".pgm": "the map.yaml that describes the image; the page also takes a plain image as a floor map",
+    ".bmp": "the map.yaml that describes the image; the page also takes a plain image as a floor map",
+}
+"""What to bring instead of a file that is not read."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +123,8 @@ class ConvertOptions:
     """Drawing: layers that hold walls; all visible ones when empty."""
     heights: tuple[float, ...] = (0.2,)
     """Model: heights of the sections that become walls [m]."""
+    up: str | None = None
+    """Model: axis that points up, `y` or `z`; y for GLB and z for the others when None."""
     resolution: float = 0.05
     """Drawing, model: edge of a cell of the map [m]."""
 
@@ -95,7 +135,10 @@ def kind_of_source(path: Path) -> Kind:
         raise FileFormatError(path, "", "does not exist", "a file or folder to convert")
     if path.is_dir() or path.name == FILE_NAME:
         return Kind.PROJECT if project_file(path).is_file() else Kind.RECORDING
-    kind = _SUFFIXES.get(path.suffix.lower(), Kind.RECORDING)
+    kind = _SUFFIXES.get(path.suffix.lower())
+    if kind is None:
+        remedy = _UNREAD.get(path.suffix.lower(), f"a folder, or a file that ends in {', '.join(_SUFFIXES)}")
+        raise FileFormatError(path, "", f"ends in {path.suffix!r}, which is not read", remedy)
     if path.suffix.lower() == ".json" and "layouts" not in read_json(path, Findings()).values:
         return Kind.ORDER
     return kind
@@ -145,14 +188,21 @@ def convert_file(source: Path, target: Path, options: ConvertOptions) -> tuple[s
 
 
 def _from_project(source: Path, target: Path, wanted: Kind, _: ConvertOptions) -> tuple[str, ...]:
-    project = load_project(source)
+    found = Findings()
+    project = load_project(source, found)
     if wanted is Kind.LIF:
-        return write_lif(project, target)
+        return (*found.lines(), *write_lif(project, target))
     if wanted is Kind.MAP:
         if project.floor_map is None:
             raise UsageError(f"{source} has no floor map; expected a project with one")
-        return _written_map(project.floor_map, target, wanted)
-    return _written_reflectors(project.reflectors, target, wanted)
+        return (*found.lines(), *_written_map(project.floor_map, target, wanted))
+    return (*found.lines(), *_written_reflectors(project.reflectors, target, wanted))
+
+
+def _from_map(source: Path, target: Path, wanted: Kind, _: ConvertOptions) -> tuple[str, ...]:
+    found = Findings()
+    floor_map = read_floor_map(source, found=found)
+    return (*found.lines(), *_written_map(floor_map, target, wanted))
 
 
 def _from_reflectors(source: Path, target: Path, wanted: Kind, _: ConvertOptions) -> tuple[str, ...]:
@@ -196,7 +246,10 @@ def _from_drawing(source: Path, target: Path, wanted: Kind, options: ConvertOpti
 
 
 def _from_model(source: Path, target: Path, wanted: Kind, options: ConvertOptions) -> tuple[str, ...]:
-    model = mesh.read_model(source, unit=options.unit or "m")
+    if options.up not in (None, "y", "z"):
+        raise UsageError(f"up is {options.up!r}; expected y or z")
+    is_y_up = None if options.up is None else options.up == "y"
+    model = mesh.read_model(source, unit=options.unit, y_up=is_y_up)
     return _written_map(_checked(lambda: model.floor_map(options.heights, options.resolution)), target, wanted)
 
 
@@ -256,5 +309,6 @@ _CONVERTERS: dict[Kind, Callable[[Path, Path, Kind, ConvertOptions], tuple[str, 
     Kind.ORDER: _from_routes,
     Kind.DRAWING: _from_drawing,
     Kind.MODEL: _from_model,
+    Kind.MAP: _from_map,
     Kind.RECORDING: _from_recording,
 }

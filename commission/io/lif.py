@@ -73,6 +73,7 @@ def read_lif(path: Path, *, vehicle_type: str | None = None, layout: str | None 
     found = Findings()
     root = read_json(path, found)
     root.require_list("layouts")
+    _note_version(root, found)
     layouts = list(root.mappings("layouts", "layout", "layoutId"))
     names = tuple(fields.text("layoutId") for fields in layouts)
     chosen = _chosen(layouts, names, layout, found)
@@ -92,13 +93,43 @@ def read_lif(path: Path, *, vehicle_type: str | None = None, layout: str | None 
     )
 
 
+def _note_version(root: Fields, found: Findings) -> None:
+    """Say when the file is of another version than the one that is published."""
+    meta = root.values.get("metaInformation")
+    version = meta.get("lifVersion") if isinstance(meta, dict) else None
+    if isinstance(version, str) and not version.startswith(("1.", "0.")) and version != "1":
+        found.add("", f"lifVersion is {shown(version)}; 1.0 is known, and of later drafts what this file uses of them")
+
+
+def _for_each_type(part: Fields) -> Iterator[Fields]:
+    """Properties of each vehicle type: drafts of LIF 2 give one set for several types, and several orientations."""
+    values = dict(part.values)
+    orientations = values.pop("vehicleOrientations", None)
+    if isinstance(orientations, list) and orientations and "vehicleOrientation" not in values:
+        values["vehicleOrientation"] = orientations[0]
+        if len(orientations) > 1:
+            part.found.add(part.where, "allows several vehicleOrientations; the first counts")
+    types = values.pop("vehicleTypeIds", None)
+    if "vehicleTypeId" in values or not isinstance(types, list):
+        types = [values.get("vehicleTypeId")]
+    for name in types:
+        yield replace(part, values={**values, "vehicleTypeId": name} if name is not None else values)
+
+
 def _chosen(layouts: list[Fields], names: tuple[str, ...], layout: str | None, found: Findings) -> list[Fields]:
     if layout is not None:
         if layout not in names:
             raise UsageError(f"no layout is called {layout!r}; the file has: {', '.join(map(repr, names)) or 'none'}")
         return [fields for fields, name in zip(layouts, names, strict=True) if name == layout]
     if len(layouts) > 1:
-        found.add("", f"{len(layouts)} layouts ({', '.join(map(shown, names[:5]))}) are laid over one another")
+        listed = ", ".join(map(shown, names[:5]))
+        levels = {fields.text("layoutLevelId") or "" for fields in layouts}
+        floors = {node.text("mapId") or "" for fields in layouts for node in fields.mappings("nodes", "node", "nodeId")}
+        if len(levels) > 1 or len(floors) > 1:
+            count = max(len(levels), len(floors))
+            found.add("", f"{len(layouts)} layouts ({listed}) of {count} floors are laid over one another; choose one")
+        else:
+            found.add("", f"{len(layouts)} layouts ({listed}) are laid over one another")
     return layouts
 
 
@@ -112,10 +143,11 @@ def _content(layouts: list[Fields], found: Findings) -> _Layout:
         if "stations" not in layout.values:
             found.add(layout.where, "stations is missing; LIF demands the key, if only with an empty list")
         for node in layout.mappings("nodes", "node", "nodeId"):
-            poses.extend((node.text("nodeId"), part) for part in node.mappings("vehicleTypeNodeProperties"))
+            for part in node.mappings("vehicleTypeNodeProperties"):
+                poses.extend((node.text("nodeId"), each) for each in _for_each_type(part))
             _add_node(node, nodes)
         for edge in layout.mappings("edges", "edge", "edgeId"):
-            parts = list(edge.mappings("vehicleTypeEdgeProperties"))
+            parts = [each for part in edge.mappings("vehicleTypeEdgeProperties") for each in _for_each_type(part)]
             if not parts:
                 found.add(edge.where, "no vehicle type may drive it; it is left out")
             edges.extend((edge, replace(part, where=edge.where)) for part in parts)

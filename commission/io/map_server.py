@@ -1,7 +1,9 @@
-"""Floor maps in the format of ROS `map_server`: a YAML file that describes a PGM or PNG image, read and written.
+"""Floor maps in the format of ROS `map_server`: a YAML file that describes a PGM, PNG or BMP image, read and written.
 
 Semantics are those of ROS 1 `image_loader.cpp` and Nav2 `map_io.cpp`: occupancy is p = (255 - v) / 255 of a pixel's
 gray value v, or v / 255 when negated; p > occupied_thresh is occupied, p < free_thresh is free, the rest is unknown.
+One deviation: an image of the three grays that `map_saver` writes says itself what is unknown (205), which Nav2's own
+free_thresh of 0.25 would make free.
 """
 
 from __future__ import annotations
@@ -13,7 +15,8 @@ import warnings
 import zlib
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path, PurePath
+from pathlib import Path, PurePath, PureWindowsPath
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +25,7 @@ from PIL import Image
 from commission.errors import FileFormatError
 from commission.io.atomic import write_bytes, write_text
 from commission.io.conversion import convert
+from commission.io.findings import Findings, shown
 from commission.io.reading import check_size, inside
 from commission.io.yaml_document import YamlDocument, read_yaml
 from commission.site.checks import above, between
@@ -35,6 +39,7 @@ FILE_LIMIT = 512_000_000
 _GRAY = {FREE: 254, OCCUPIED: 0, UNKNOWN: 205}
 """Gray values that ROS `map_saver` writes."""
 _ROWS_AT_ONCE = 256
+_ENDINGS = (".pgm", ".png", ".bmp")
 
 
 class MapMode(StrEnum):
@@ -50,7 +55,7 @@ class MapDescription:
     """Content of a `map_server` YAML file."""
 
     image: str
-    """Image file (PGM or PNG), relative to this file."""
+    """Image file (PGM, PNG or BMP), relative to this file."""
     resolution: float
     """Edge of a pixel [m]."""
     origin: tuple[float, float, float]
@@ -66,7 +71,7 @@ class MapDescription:
 
     def __post_init__(self) -> None:
         if not self.image:
-            raise ValueError("image is empty; expected the name of a PGM or PNG file")
+            raise ValueError("image is empty; expected the name of a PGM, PNG or BMP file")
         above(self.resolution, 0.0, "resolution", "metres per pixel")
         for axis, value in zip("xy", self.origin[:2], strict=True):
             between(value, (-1e7, 1e7), f"origin {axis}", "m")
@@ -83,7 +88,9 @@ def image_name(path: Path) -> str:
     return PurePath(_description(path)[1].image.replace("\\", "/")).name
 
 
-def read_floor_map(path: Path, folder: Path | None = None, *, image: Path | None = None) -> FloorMap:
+def read_floor_map(
+    path: Path, folder: Path | None = None, *, image: Path | None = None, found: Findings | None = None
+) -> FloorMap:
     """Read a `map_server` map.
 
     Parameters
@@ -91,6 +98,7 @@ def read_floor_map(path: Path, folder: Path | None = None, *, image: Path | None
     path : the YAML file.
     folder : folder that the image must lie in; the YAML file's own when None.
     image : the image, where it does not lie under the name that the YAML file gives it.
+    found : takes what was doubted: an image that lies elsewhere, thresholds that make unknown cells free.
 
     Returns
     -------
@@ -102,8 +110,9 @@ def read_floor_map(path: Path, folder: Path | None = None, *, image: Path | None
         names file, key, what was found and what is expected.
     """
     document, description = _description(path)
-    image_path = image or _image_beside(document, description, folder)
-    cells = _read_cells(image_path, description)
+    found = Findings() if found is None else found
+    image_path = image or _image_beside(document, description, folder, found)
+    cells = _read_cells(image_path, description, found)
     try:
         return FloorMap(np.flipud(cells), description.resolution, np.array(description.origin))
     except ValueError as error:
@@ -140,12 +149,21 @@ def _description(path: Path) -> tuple[YamlDocument, MapDescription]:
     return document, convert(document, MapDescription, ignore_unknown=True)
 
 
-def _image_beside(document: YamlDocument, description: MapDescription, folder: Path | None) -> Path:
-    """Path of the image that a YAML file names; raises FileFormatError when there is none."""
+def _image_beside(document: YamlDocument, description: MapDescription, folder: Path | None, found: Findings) -> Path:
+    """Path of the image that a YAML file names; raises FileFormatError when there is none.
+
+    A map that was made on another computer often names its image by an absolute path there: then the file of that name
+    beside the YAML file is meant.
+    """
     path = document.path
+    name = PurePath(description.image.replace("\\", "/")).name
+    is_absolute = Path(description.image).is_absolute() or PureWindowsPath(description.image).is_absolute()
+    if is_absolute and name and (path.parent / name).is_file():
+        found.add("", f"the image {shown(description.image)} is not read; {name} beside {path.name} is taken")
+        return path.parent / name
     image_path = inside(folder or path.parent, description.image, path, document.place(("image",)))
     if not image_path.is_file():
-        beside = sorted(p.name for p in path.parent.iterdir() if p.suffix.lower() in {".pgm", ".png"})
+        beside = sorted(p.name for p in path.parent.iterdir() if p.suffix.lower() in _ENDINGS)
         remedy = f"an existing image; beside it there are: {', '.join(beside[:5])}" if beside else "an existing image"
         raise document.error(("image",), f"{description.image!r} does not exist", remedy)
     return image_path
@@ -156,29 +174,29 @@ def _from_value_error(document: YamlDocument, error: ValueError) -> FileFormatEr
     return document.error((), problem, remedy)
 
 
-def _read_cells(path: Path, description: MapDescription) -> NDArray[np.int8]:
+def _read_cells(path: Path, description: MapDescription, found: Findings) -> NDArray[np.int8]:
     """(H, W) cells of an image, top row first."""
     check_size(path, FILE_LIMIT)
     try:
         with warnings.catch_warnings():
             # Pillow warns about images that it thinks large; the limit that counts is CELL_LIMIT.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(path, formats=("PNG", "PPM")) as image:
+            with Image.open(path, formats=("PNG", "PPM", "BMP")) as image:
                 width, height = image.size
                 if not 0 < width * height <= CELL_LIMIT:
-                    found = f"has {width} x {height} pixels"
-                    raise FileFormatError(path, "", found, f"1 to {CELL_LIMIT} pixels")
-                return _classify(image, description)
+                    problem = f"has {width} x {height} pixels"
+                    raise FileFormatError(path, "", problem, f"1 to {CELL_LIMIT} pixels")
+                return _classify(image, description, found)
     except FileFormatError:
         raise
     except Image.DecompressionBombError as error:
         raise FileFormatError(path, "", "is too large", f"1 to {CELL_LIMIT} pixels") from error
     except (OSError, ValueError, SyntaxError, EOFError, OverflowError, struct.error, zlib.error, IndexError) as error:
         # What Pillow raises for garbage and for files that end early depends on format and place.
-        raise FileFormatError(path, "", f"is no readable image ({error})", "a complete PGM or PNG") from error
+        raise FileFormatError(path, "", f"is no readable image ({error})", "a complete PGM, PNG or BMP") from error
 
 
-def _classify(image: Image.Image, description: MapDescription) -> NDArray[np.int8]:
+def _classify(image: Image.Image, description: MapDescription, found: Findings) -> NDArray[np.int8]:
     """Turn pixels into cells, some rows at a time: no copy of the whole image in floating point."""
     opaque: NDArray[np.bool_] | None = None
     if image.mode in ("P", "1", "PA") or "transparency" in image.info:
@@ -191,13 +209,32 @@ def _classify(image: Image.Image, description: MapDescription) -> NDArray[np.int
         opaque = pixels[..., -1] == 255
         pixels = pixels[..., :-1]
     cells = np.empty(pixels.shape[:2], dtype=np.int8)
+    saved = _is_saved_by_map_saver(pixels, description)
     for start in range(0, len(cells), _ROWS_AT_ONCE):
         rows = slice(start, start + _ROWS_AT_ONCE)
         gray = pixels[rows] if pixels.ndim == 2 else pixels[rows].mean(axis=2)
         cells[rows] = _cells_of(gray.astype(np.float64) / full_scale, description)
+        if saved:
+            cells[rows][gray == _GRAY[UNKNOWN]] = UNKNOWN
         if opaque is not None and description.mode is MapMode.SCALE:
             cells[rows][~opaque[rows]] = UNKNOWN
+    if saved and (count := int(np.count_nonzero(cells == UNKNOWN))):
+        problem = f"free_thresh {description.free_thresh:g} would make {count} unknown cells (gray 205) free"
+        found.add("", f"{problem}; they stay unknown, as the program that saved the map means them")
     return cells
+
+
+def _is_saved_by_map_saver(pixels: NDArray[Any], description: MapDescription) -> bool:
+    """Whether the image says itself what is unknown, and thresholds would hide it.
+
+    `map_saver` writes the grays 0, 205 and 254; 205 is an occupancy of 0.196, below Nav2's free_thresh of 0.25.
+    """
+    unknown = 1.0 - _GRAY[UNKNOWN] / 255.0
+    hidden = not description.negate and description.free_thresh > unknown and description.mode is MapMode.TRINARY
+    if not hidden or pixels.ndim != 2 or pixels.dtype != np.uint8:
+        return False
+    grays = np.flatnonzero(np.bincount(pixels.reshape(-1), minlength=256))
+    return set(grays.tolist()) <= {*_GRAY.values(), 255}
 
 
 def _cells_of(brightness: NDArray[np.float64], description: MapDescription) -> NDArray[np.int8]:

@@ -29,6 +29,8 @@ FACE_LIMIT = 10_000_000
 KINDS = ("stl", "obj", "glb", "ply")
 
 _Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+_SCANNER_HEIGHT = 0.2
+"""Height of a safety scanner above its floor [m]."""
 _FACES_AT_ONCE = 200_000
 _BYTES_AT_ONCE = 4_000_000
 _LOOK_S = 0.05
@@ -59,12 +61,22 @@ class Model:
     """Where it comes from."""
     triangles: FloatArray
     """(N, 3, 3) corners [m], z up, z = 0 the model's own zero."""
+    is_y_up: bool = False
+    """Whether the file was read with y pointing up."""
 
     @property
     def bounds(self) -> FloatArray:
         """Lowest and highest x, y, z: (2, 3) array [m]."""
         points = self.triangles.reshape(-1, 3)
         return np.array([points.min(axis=0), points.max(axis=0)])
+
+    def _advice(self, low: float, high: float) -> str:
+        """What to try where no section meets the model: its own floor, or the other axis as the one that points up."""
+        if low < -1.0 and high <= 0.0:
+            # A hall that was drawn with y up lies below the floor once z is taken for up.
+            other = "z" if self.is_y_up else "y"
+            return f" (--height); or it was made with {other} up (--up {other})"
+        return f", such as --height {low + _SCANNER_HEIGHT:.6g}"
 
     def section(self, height: float, progress: Progress = silent) -> FloatArray:
         """Cut the model by a horizontal plane.
@@ -89,16 +101,21 @@ class Model:
     def floor_map(self, heights: tuple[float, ...], resolution: float, progress: Progress = silent) -> FloorMap:
         """Outline at one or several heights [m] in cells of `resolution` [m]; see `outline_map`."""
         segments = [self.section(height, progress) for height in heights]
+        if not any(map(len, segments)):
+            (_, _, low), (_, _, high) = self.bounds.tolist()
+            at = " or ".join(f"{height:g}" for height in heights)
+            problem = f"reaches from z = {low:.6g} to {high:.6g} m; a section at {at} m meets none of it"
+            raise FileFormatError(self.path, "", problem, f"a height within the model{self._advice(low, high)}")
         return outline_map(np.concatenate([np.empty((0, 2, 2)), *segments]), resolution, self.path, progress)
 
 
-def read_model(path: Path, *, unit: str = "m", y_up: bool | None = None, progress: Progress = silent) -> Model:
+def read_model(path: Path, *, unit: str | None = None, y_up: bool | None = None, progress: Progress = silent) -> Model:
     """Read a model.
 
     Parameters
     ----------
     path : file; its ending says which format it has.
-    unit : key of `UNITS` in which it was made; GLB is always in metres.
+    unit : key of `UNITS` in which it was made; metres when None, as GLB demands (which not every program heeds).
     y_up : whether y points up, as GLB demands; that for GLB and z for the others when None.
     progress : told how far the reading is; may raise to cancel.
 
@@ -112,7 +129,7 @@ def read_model(path: Path, *, unit: str = "m", y_up: bool | None = None, progres
     kind = path.suffix.lower().removeprefix(".")
     if kind not in KINDS:
         raise FileFormatError(path, "", f"ends in {path.suffix!r}", f"a model: {', '.join(f'.{k}' for k in KINDS)}")
-    if unit not in UNITS:
+    if unit is not None and unit not in UNITS:
         raise UsageError(f"unit is {unit!r}; expected one of: {', '.join(UNITS)}")
     check_size(path, SIZE_LIMIT)
     try:
@@ -121,13 +138,13 @@ def read_model(path: Path, *, unit: str = "m", y_up: bool | None = None, progres
                 check_announced(path, file, FACE_LIMIT)
             loaded = _loaded(_Reported(file, path.stat().st_size), kind, progress)
             is_y_up = kind == "glb" if y_up is None else y_up
-            to_model = (_Y_UP if is_y_up else np.eye(3)) * (1.0 if kind == "glb" else UNITS[unit])
+            to_model = (_Y_UP if is_y_up else np.eye(3)) * UNITS[unit or "m"]
             triangles = _triangles(path, loaded, to_model, progress)
     except OSError as error:
         raise cannot_read(path, error) from error
     except _GARBAGE as error:
         raise FileFormatError(path, "", f"is no readable {kind.upper()} ({error})", "a complete model") from error
-    return Model(path, triangles)
+    return Model(path, triangles, is_y_up)
 
 
 class _Reported:

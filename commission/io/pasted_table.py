@@ -11,7 +11,7 @@ import re
 from pathlib import Path
 
 from commission.errors import FileFormatError
-from commission.io.csv_table import Block, shortened
+from commission.io.csv_table import Block, shortened, stated_delimiter
 from commission.io.findings import Findings
 from commission.io.imk import ReflectorImport
 from commission.io.reflector_tables import OPTIONAL, REQUIRED, reflectors_of
@@ -63,8 +63,13 @@ def parse_table(text: str) -> ReflectorImport:
     else:
         names = _names_by_position(rows[0])
         units = {}
-    for line, row in zip(lines, rows, strict=True):
-        if len(row) != len(names):
+    while len(names) > 1 and not names[-1]:
+        names = names[:-1]
+    for index, (line, row) in enumerate(zip(lines, rows, strict=True)):
+        # Excel leaves columns of empty cells at the end.
+        if len(row) > len(names) and not any(row[len(names) :]):
+            rows[index] = row[: len(names)]
+        elif len(row) != len(names):
             remedy = f"{len(names)} cells: {', '.join(names)}"
             raise FileFormatError(_SOURCE, f"line {line}", f"has {len(row)} cells", remedy)
     columns = {name: [row[i] for row in rows] for i, name in enumerate(names)}
@@ -76,15 +81,19 @@ def parse_table(text: str) -> ReflectorImport:
     block = Block(_SOURCE, lines, columns, decimal_comma=comma)
     _apply_units(block, units)
     _fill_in(block, units, found)
-    return ReflectorImport(reflectors_of([block]), found.lines(), said)
+    reflectors = reflectors_of([block], found)
+    return ReflectorImport(reflectors, found.lines(), said)
 
 
 def _rows(text: str) -> tuple[list[int], list[list[str]], str]:
     """Number and cells of each row that is not blank, and what separates cells."""
     kept = [(i, line) for i, line in enumerate(text.removeprefix("\ufeff").splitlines(), start=1) if line.strip()]
+    stated = stated_delimiter(kept[0][1]) if kept else None
+    if stated is not None:
+        kept = kept[1:]
     if not kept:
         raise FileFormatError(_SOURCE, "", "is empty", "rows of id, x, y, radius")
-    delimiter = next((mark for mark in "\t;" if mark in kept[0][1]), ",")
+    delimiter = stated or next((mark for mark in "\t;" if mark in kept[0][1]), ",")
     lines: list[int] = []
     rows: list[list[str]] = []
     for number, line in kept:
@@ -107,7 +116,8 @@ def _header(cells: list[str]) -> tuple[list[str], dict[str, str]]:
     names = [_ALIASES.get(match["name"], "") if match else "" for match in matches]
     if "x" not in names or "y" not in names:
         return [], {}
-    for cell, name in zip(cells, names, strict=True):
+    last = max(i for i, cell in enumerate(cells) if cell)
+    for cell, name in zip(cells[: last + 1], names, strict=False):
         if not name:
             remedy = f"one of: {', '.join(_COLUMNS)}, diameter"
             raise FileFormatError(_SOURCE, "header", f"column {shortened(cell)} is unknown", remedy)
@@ -119,6 +129,8 @@ def _header(cells: list[str]) -> tuple[list[str], dict[str, str]]:
 
 
 def _names_by_position(cells: list[str]) -> list[str]:
+    while len(cells) > 1 and not cells[-1]:
+        cells = cells[:-1]
     names = _POSITIONS.get(len(cells))
     coordinates = cells[-2:] if len(cells) == 2 else cells[1:3]
     if names is None or not all(_NUMBER.fullmatch(cell) for cell in coordinates):

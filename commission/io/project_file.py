@@ -15,6 +15,7 @@ from typing import Any
 from commission.errors import FileFormatError, ProjectError, UsageError
 from commission.io.atomic import staged, write_text
 from commission.io.conversion import convert, convert_setting, keys_of
+from commission.io.findings import Findings
 from commission.io.map_server import read_floor_map, write_floor_map
 from commission.io.project_text import project_text
 from commission.io.reading import cannot_read, inside
@@ -83,6 +84,8 @@ class OpenedProject:
     """Where it is kept."""
     is_new: bool
     """Whether nothing of it is on disk yet."""
+    notes: tuple[str, ...] = ()
+    """What was doubted while it was read, one line each."""
 
 
 def open_project(path: Path) -> OpenedProject:
@@ -107,15 +110,18 @@ def open_project(path: Path) -> OpenedProject:
         name = folder.resolve().name or "Unnamed"
     except (OSError, ValueError) as error:
         raise cannot_read(path, error) from error
-    return OpenedProject(Project(name=name) if is_new else load_project(folder), folder, is_new)
+    found = Findings()
+    project = Project(name=name) if is_new else load_project(folder, found)
+    return OpenedProject(project, folder, is_new, found.lines())
 
 
-def load_project(path: Path) -> Project:
+def load_project(path: Path, found: Findings | None = None) -> Project:
     """Read a project.
 
     Parameters
     ----------
     path : folder that holds a `project.yaml`, or that file.
+    found : takes what was doubted in its map and tables.
 
     Raises
     ------
@@ -129,8 +135,8 @@ def load_project(path: Path) -> Project:
     try:
         return Project(
             name=keys.name,
-            floor_map=_floor_map(document, keys.floor_map),
-            reflectors=_reflectors(document, keys.reflectors),
+            floor_map=_floor_map(document, keys.floor_map, found),
+            reflectors=_reflectors(document, keys.reflectors, found),
             routes=keys.routes,
             vehicle=_vehicle(document, keys.vehicle),
             scanner=keys.scanner,
@@ -226,17 +232,18 @@ def _vehicle(document: YamlDocument, keys: dict[str, Any] | None) -> Vehicle:
     return convert(rest, VEHICLES[kind], ("vehicle",))
 
 
-def _floor_map(document: YamlDocument, name: str | None) -> FloorMap | None:
+def _floor_map(document: YamlDocument, name: str | None, found: Findings | None) -> FloorMap | None:
     if name is None:
         return None
     folder = document.path.parent
-    return read_floor_map(inside(folder, name, document.path, document.place(("floor_map",))), folder)
+    return read_floor_map(inside(folder, name, document.path, document.place(("floor_map",))), folder, found=found)
 
 
-def _reflectors(document: YamlDocument, name: str | None) -> ReflectorMap:
+def _reflectors(document: YamlDocument, name: str | None, found: Findings | None) -> ReflectorMap:
     if name is None:
         return ReflectorMap()
-    return read_reflectors(inside(document.path.parent, name, document.path, document.place(("reflectors",))))
+    path = inside(document.path.parent, name, document.path, document.place(("reflectors",)))
+    return read_reflectors(path, found)
 
 
 def _names_in(yaml_path: Path) -> tuple[str, str]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import codecs
+from contextlib import suppress
 from pathlib import Path
 
 from commission.errors import FileFormatError
+from commission.io.findings import Findings
 
 
 def read_bytes(path: Path, limit: int) -> bytes:
@@ -23,15 +26,36 @@ def read_bytes(path: Path, limit: int) -> bytes:
         raise cannot_read(path, error) from error
 
 
-def read_text(path: Path, limit: int) -> str:
-    """Read a whole UTF-8 text of at most `limit` bytes, with or without byte-order mark."""
-    data = read_bytes(path, limit)
+def read_text(path: Path, limit: int, found: Findings | None = None) -> str:
+    """Read a whole text of at most `limit` bytes, with or without byte-order mark; see `decoded`."""
+    return decoded(path, 1, read_bytes(path, limit).removeprefix(codecs.BOM_UTF8), found)
+
+
+def decoded(path: Path, line: int, data: bytes, found: Findings | None = None) -> str:
+    """Text of some bytes of a file.
+
+    Parameters
+    ----------
+    path, line : the file, and the line (from 1) on which the bytes begin, for the message.
+    data : UTF-8.
+    found : takes a note; with it, what is not UTF-8 is taken for Windows-1252, in which Excel saves text.
+
+    Raises
+    ------
+    FileFormatError
+        the bytes are not UTF-8, and no text of Windows-1252 is expected or there is none.
+    """
     try:
-        return data.decode("utf-8-sig")
+        return data.decode("utf-8")
     except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        found = f"byte 0x{data[error.start]:02x} is not UTF-8"
-        raise FileFormatError(path, f"line {line}", found, "text saved as UTF-8") from error
+        if found is not None and b"\0" not in data:
+            with suppress(UnicodeDecodeError):
+                text = data.decode("cp1252")
+                found.add("", f"{path.name} is not UTF-8; it was read as Windows-1252, as Excel saves text")
+                return text
+        where = f"line {line + data.count(bytes([10]), 0, error.start)}"
+        problem = f"byte 0x{data[error.start]:02x} is not UTF-8"
+        raise FileFormatError(path, where, problem, "text saved as UTF-8") from error
 
 
 def check_size(path: Path, limit: int) -> None:

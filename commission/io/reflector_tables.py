@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import io
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from commission.errors import FileFormatError
 from commission.io.atomic import write_text
 from commission.io.csv_table import Block, read_table, shortened
+from commission.io.findings import Findings
 from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
 
 REQUIRED = ("id", "x", "y", "radius")
@@ -23,13 +26,14 @@ _YES, _NO = ("yes", "true", "1"), ("", "no", "false", "0")
 _DEFAULTS: Mapping[str, float] = {"heading": 0.0, "height": 0.2, "sigma": 0.0}
 
 
-def read_reflectors(path: Path) -> ReflectorMap:
+def read_reflectors(path: Path, found: Findings | None = None) -> ReflectorMap:
     """Read a reflector table.
 
     Parameters
     ----------
     path : CSV file with the columns id, x, y, radius and, if wanted, kind, heading, height, sigma, layer, note,
         locked [m, rad, map frame], in any order.
+    found : takes what was doubted; with it, text that is not UTF-8 and headings in degrees are read as what they are.
 
     Returns
     -------
@@ -40,11 +44,11 @@ def read_reflectors(path: Path) -> ReflectorMap:
     FileFormatError
         names line and column, what was found and what is expected.
     """
-    return reflectors_of(read_table(path, REQUIRED, OPTIONAL, size_limit=SIZE_LIMIT))
+    return reflectors_of(read_table(path, REQUIRED, OPTIONAL, size_limit=SIZE_LIMIT, found=found), found)
 
 
-def reflectors_of(blocks: Iterable[Block]) -> ReflectorMap:
-    """Reflectors from the rows of a table, wherever it comes from; raises FileFormatError as `read_reflectors` does."""
+def reflectors_of(blocks: Iterable[Block], found: Findings | None = None) -> ReflectorMap:
+    """Reflectors from the rows of a table, wherever it comes from; parameters and errors as for `read_reflectors`."""
     reflectors: list[Reflector] = []
     lines: dict[str, int] = {}
     for block in blocks:
@@ -58,11 +62,20 @@ def reflectors_of(blocks: Iterable[Block]) -> ReflectorMap:
             cells = {name: values[row] for name, values in texts.items()}
             reflector = _reflector(block, row, cells, {name: values[row] for name, values in numbers.items()})
             if reflector.id in lines:
-                found = f"{shortened(reflector.id)} is used twice (first on line {lines[reflector.id]})"
-                raise block.error(row, "id", found, "unique ids")
+                problem = f"{shortened(reflector.id)} is used twice (first on line {lines[reflector.id]})"
+                raise block.error(row, "id", problem, "unique ids")
             lines[reflector.id] = block.lines[row]
             reflectors.append(reflector)
-    return ReflectorMap(tuple(reflectors))
+    return ReflectorMap(_with_radians(reflectors, found))
+
+
+def _with_radians(reflectors: list[Reflector], found: Findings | None) -> tuple[Reflector, ...]:
+    """Take headings for degrees where one is more than a turn: nobody writes 270 for an angle in radians."""
+    farthest = max((abs(r.heading) for r in reflectors), default=0.0)
+    if found is None or farthest <= 2.0 * math.pi + 1e-3:
+        return tuple(reflectors)
+    found.add("column heading", f"reaches {farthest:g}; the headings are taken for degrees, expected are radians")
+    return tuple(dataclasses.replace(r, heading=math.radians(r.heading)) for r in reflectors)
 
 
 def write_reflectors(reflectors: ReflectorMap, path: Path) -> None:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 from commission.errors import FileFormatError
-from commission.io.csv_table import is_row, read_table
+from commission.io.csv_table import is_row, read_table, stated_delimiter
+from commission.io.findings import Findings
 from commission.io.imk import ReflectorImport
 from commission.io.pasted_table import parse_table
 from commission.io.reading import read_text
@@ -29,14 +31,17 @@ def read_any_table(path: Path) -> ReflectorImport:
     FileFormatError
         names line and column, what was found and what is expected.
     """
-    lines = read_text(path, SIZE_LIMIT).replace("\r", "\n").split("\n")
-    header = next((line for line in lines if is_row(line)), "")
-    names = {cell.strip(' "').lower() for cell in header.split(";" if ";" in header else ",")}
-    if not names.issuperset(REQUIRED):
+    found = Findings()
+    lines = read_text(path, SIZE_LIMIT, found).replace("\r", "\n").split("\n")
+    header = next((line for line in lines if is_row(line) and stated_delimiter(line) is None), "")
+    names = {cell.strip(' "').lower() for cell in header.split(";" if ";" in header else ",")} - {""}
+    if not set(REQUIRED) <= names <= {*REQUIRED, *OPTIONAL}:
         try:
-            return parse_table("\n".join(line if is_row(line) else "" for line in lines))
+            imported = parse_table("\n".join(line if is_row(line) else "" for line in lines))
         except FileFormatError as error:
             raise FileFormatError(path, error.where, error.problem, error.remedy) from error
-    blocks = list(read_table(path, REQUIRED, OPTIONAL, size_limit=SIZE_LIMIT))
+        return dataclasses.replace(imported, warnings=(*found.lines(), *imported.warnings))
+    blocks = list(read_table(path, REQUIRED, OPTIONAL, size_limit=SIZE_LIMIT, found=found))
     fields = tuple(blocks[0].columns) if blocks else REQUIRED
-    return ReflectorImport(reflectors_of(blocks), (), fields)
+    reflectors = reflectors_of(blocks, found)
+    return ReflectorImport(reflectors, found.lines(), fields)

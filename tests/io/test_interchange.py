@@ -101,10 +101,10 @@ def test_recording_is_copied_into_a_csv_folder(tmp_path: Path) -> None:
     ("source", "target", "error", "message"),
     [
         ("absent.csv", "b.imk", FileFormatError, "does not exist; expected a file or folder to convert"),
-        ("a.csv", "b.lif", UsageError, r"a reflector table \(.csv\) cannot become a VDMA LIF layout"),
+        ("a.csv", "b.lif", UsageError, r"a reflector table \(.csv, .tsv\) cannot become a VDMA LIF"),
         ("a.csv", "a.csv", UsageError, "is the source itself"),
-        ("map.yaml", "b.csv", UsageError, "a floor map .* cannot be converted"),
-        ("notes.txt", "out", FileFormatError, "is no recording"),
+        ("map.yaml", "b.csv", UsageError, "a floor map .* cannot become a reflector table"),
+        ("notes.doc", "out", FileFormatError, "ends in '.doc', which is not read; expected a folder, or a file that"),
         ("broken.json", "out", FileFormatError, "is no JSON"),
         ("plan.dxf", "b.csv", UsageError, "cannot become a reflector table"),
     ],
@@ -113,7 +113,7 @@ def test_what_cannot_be_converted_is_one_line(
     tmp_path: Path, source: str, target: str, error: type[CommissionError], message: str
 ) -> None:
     write_reflectors(REFLECTORS, tmp_path / "a.csv")
-    for name in ("map.yaml", "notes.txt", "broken.json", "plan.dxf"):
+    for name in ("map.yaml", "notes.doc", "broken.json", "plan.dxf"):
         (tmp_path / name).write_text("{")
     with pytest.raises(error, match=message) as caught:
         convert_file(tmp_path / source, tmp_path / target, USUAL)

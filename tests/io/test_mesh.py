@@ -79,7 +79,9 @@ def test_scanner_and_reflector_heights_see_different_things(tmp_path: Path) -> N
     table, shelf = [[0.5, 1e-6]], [[4.5, 1e-6]]
     assert [bool(m.occupancy().is_occupied(table)[0]) for m in (low, high, both)] == [True, False, True]
     assert [bool(m.occupancy().is_occupied(shelf)[0]) for m in (low, high, both)] == [False, True, True]
-    with pytest.raises(FileFormatError, match="holds no lines to draw"):
+    with pytest.raises(
+        FileFormatError, match=r"reaches from z = 0 to 2\.5 m; a section at 9 m meets none of it; expected a height"
+    ):
         model.floor_map((9.0,), 0.05)
 
 

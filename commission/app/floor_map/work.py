@@ -103,7 +103,7 @@ def _read(effect: ReadMapFile, path: Path, progress: Progress) -> Read:
         return read_picture(path)
     if file.ending in ENDINGS:
         up = None if not reading.up else reading.up == "y"
-        return read_model(path, unit=reading.unit or "m", y_up=up, progress=progress)
+        return read_model(path, unit=reading.unit or None, y_up=up, progress=progress)
     known = ", ".join(f".{ending}" for ending in ENDINGS)
     raise FileFormatError(path, "", f"ends in {path.suffix!r}", f"a floor map: {known}")
 
