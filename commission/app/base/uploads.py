@@ -7,22 +7,24 @@ shown and never used as a path; what it holds is the business of whoever asked f
 
 from __future__ import annotations
 
-import asyncio
 import re
 import tempfile
+import time
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from viser import GuiApi, GuiEvent, GuiUploadButtonHandle, UploadedFile, _messages
+from viser import GuiApi, GuiUploadButtonHandle, ViserServer
 
+from commission.app.base import viser_private
+from commission.app.base.server import PageServer
+from commission.app.base.transfers import MOST_KEPT, Transfer, Transfers
 from commission.io.imports import shown_name
 
 REFUSED_AFTER_S = 0.5
 """Time until the browser's own note of the upload is replaced [s]; it would write over what comes at once."""
-
 
 _ENDING = re.compile(r"\.[A-Za-z0-9]{1,8}")
 
@@ -51,21 +53,19 @@ class Upload:
             yield path
 
 
-@dataclass(slots=True)
-class _Transfer:
-    """A file on its way."""
-
-    client: int
-    """Number of the browser's connection."""
-    button: str
-    """Identifier of the button."""
-    left: int
-    """Bytes that may still come."""
-
-
 def megabytes(size: int) -> str:
     """Return a size as people read it: 32 MB, 0.25 MB, 12 bytes."""
     return f"{size / 1e6:.3g} MB" if size >= 10_000 else f"{size} bytes"
+
+
+@dataclass(frozen=True, slots=True)
+class _Button:
+    """What becomes of files."""
+
+    limit: int
+    """Largest one [bytes]."""
+    on_file: Callable[[int, Upload], None]
+    """Takes the number of the browser's connection and the file."""
 
 
 class Uploads:
@@ -79,14 +79,10 @@ class Uploads:
 
     def __init__(self, gui: GuiApi, refused: Callable[[int, str], None]) -> None:
         self._gui, self._refused = gui, refused
-        self._limits: dict[str, int] = {}
-        self._transfers: dict[str, _Transfer] = {}
-        # viser has no hook before it begins to collect: its two handlers are exchanged for ours, which call them.
-        socket = gui._websock_interface
-        socket.unregister_handler(_messages.FileTransferStartUpload, gui._handle_file_transfer_start)
-        socket.unregister_handler(_messages.FileTransferPart, gui._handle_file_transfer_part)
-        socket.register_handler(_messages.FileTransferStartUpload, self._begin)
-        socket.register_handler(_messages.FileTransferPart, self._take)
+        self._server = viser_private.server_of(gui)
+        self._transfers = _transfers_of(self._server)
+        self._buttons: dict[str, _Button] = {}
+        viser_private.take_uploads(gui, self._begin, self._take)
 
     def add(
         self,
@@ -110,68 +106,76 @@ class Uploads:
         button = self._gui.add_upload_button(label, mime_type=",".join(endings) or "*/*")
         stated = f"{note} At most {megabytes(limit)}.".strip()
         self._gui.add_html(f"<div class='c-note' style='padding:0 14px 4px 8px'>{stated}</div>")
-        self._limits[button._impl.uuid] = limit
-
-        async def uploaded(event: GuiEvent[Any]) -> None:
-            file = event.target.value
-            if event.client is None or not isinstance(file, UploadedFile):
-                return
-            # viser keeps the last file of each button for ever.
-            button._impl.value = UploadedFile("", b"")
-            on_file(event.client.client_id, Upload(shown_name(file.name), file.content))
-
-        button.on_upload(uploaded)
+        self._buttons[viser_private.identifier(button)] = _Button(limit, on_file)
         return button
 
-    def _begin(self, client_id: int, message: _messages.FileTransferStartUpload) -> None:
+    def _begin(self, client_id: int, message: Any) -> None:
         """Let an announced file in, or refuse it. Every interface hears every message: others' buttons are silent."""
-        limit = self._limits.get(message.source_component_uuid)
-        if limit is None or message.transfer_uuid in self._transfers:
+        button = self._buttons.get(message.source_component_uuid)
+        if button is None or self._transfers.get(message.transfer_uuid) is not None:
             return
         size, parts = message.size_bytes, message.part_count
-        if size > limit:
-            text = f"the file has {megabytes(size)} ({size:,} bytes); expected at most {megabytes(limit)}"
+        if size > button.limit:
+            text = f"the file has {megabytes(size)} ({size:,} bytes); expected at most {megabytes(button.limit)}"
             self._refuse(client_id, message, text)
-        elif not 0 <= parts <= size:
+        elif not bool(size) <= parts <= size:
             self._refuse(client_id, message, f"the upload announces {parts} parts of {size} bytes; expected a file")
-        else:
-            self._forget_others(client_id, message.source_component_uuid)
-            self._transfers[message.transfer_uuid] = _Transfer(client_id, message.source_component_uuid, size)
-            self._gui._handle_file_transfer_start(client_id, message)  # type: ignore[arg-type]
+        elif viser_private.client_of(self._server, client_id) is not None:
+            transfer = Transfer(
+                client=client_id,
+                button=message.source_component_uuid,
+                name=message.filename,
+                size=size,
+                count=parts,
+                touched=time.monotonic(),
+            )
+            self._transfers.begin(message.transfer_uuid, transfer)
+            self._go_on(client_id, message, transfer)
 
-    def _take(self, client_id: int, message: _messages.FileTransferPart) -> None:
-        """Let a part of an announced file in, as long as no more comes than was announced."""
+    def _take(self, client_id: int, message: Any) -> None:
+        """Let a part of an announced file in, as long as no more comes than was announced and than there is room."""
         transfer = self._transfers.get(message.transfer_uuid)
-        if transfer is None or transfer.client != client_id or not isinstance(message.content, bytes):
+        if transfer is None or (transfer.client, transfer.button) != (client_id, message.source_component_uuid):
             return
-        transfer.left -= len(message.content)
-        if transfer.left < 0:
-            self._forget(message.transfer_uuid)
+        if transfer.button not in self._buttons or message.part_index in transfer.parts:
+            return
+        size = len(message.content)
+        if transfer.received + size > transfer.size or message.part_index >= transfer.count:
+            self._transfers.end(message.transfer_uuid)
             self._refused(client_id, "the upload sends more than it announced; it was dropped")
+        elif self._transfers.kept + size > MOST_KEPT:
+            self._transfers.end(message.transfer_uuid)
+            text = f"other files of {megabytes(MOST_KEPT)} are on their way; expected to wait for them"
+            self._refuse(client_id, message, text)
+        else:
+            transfer.parts[message.part_index] = message.content
+            transfer.received += size
+            transfer.touched = time.monotonic()
+            self._go_on(client_id, message, transfer)
+
+    def _go_on(self, client_id: int, message: Any, transfer: Transfer) -> None:
+        """Tell the browser how far it is, and hand the file over when it is whole."""
+        viser_private.acknowledge(self._server, client_id, message, transfer.received, transfer.size)
+        if len(transfer.parts) < transfer.count:
             return
-        self._gui._handle_file_transfer_part(client_id, message)  # type: ignore[arg-type]
-        if message.transfer_uuid not in self._gui._current_file_upload_states:
-            del self._transfers[message.transfer_uuid]
+        self._transfers.end(message.transfer_uuid)
+        if transfer.received != transfer.size:
+            text = f"the upload sends {transfer.received} bytes; expected {transfer.size}, as it announced"
+            self._refused(client_id, text)
+            return
+        content = b"".join(transfer.parts[index] for index in range(transfer.count))
+        self._buttons[transfer.button].on_file(client_id, Upload(shown_name(transfer.name), content))
 
-    def _forget_others(self, client_id: int, button: str) -> None:
-        """One file at a time for a browser and button: a hostile one could otherwise begin thousands."""
-        for name, transfer in tuple(self._transfers.items()):
-            is_over = name not in self._gui._current_file_upload_states
-            if is_over or (transfer.client, transfer.button) == (client_id, button):
-                self._forget(name)
-
-    def _forget(self, transfer_uuid: str) -> None:
-        self._transfers.pop(transfer_uuid, None)
-        self._gui._current_file_upload_states.pop(transfer_uuid, None)
-
-    def _refuse(self, client_id: int, message: _messages.FileTransferStartUpload, text: str) -> None:
+    def _refuse(self, client_id: int, message: Any, text: str) -> None:
         """Say why, and end the waiting of the browser's button and of its note."""
-        socket = self._gui._websock_interface
-        done = _messages.FileTransferPartAck(message.source_component_uuid, message.transfer_uuid, 1, 1)
-        note = _messages.NotificationProps("Not taken", text, False, True, 10.0, "red")
-        socket.queue_message(done)
-        asyncio.get_running_loop().call_later(
+        viser_private.acknowledge(self._server, client_id, message, 1, 1)
+        viser_private.event_loop(self._server).call_later(
             REFUSED_AFTER_S,
-            lambda: socket.queue_message(_messages.NotificationUpdateMessage(f"upload-{message.transfer_uuid}", note)),
+            lambda: viser_private.replace_upload_note(self._server, client_id, message.transfer_uuid, text),
         )
         self._refused(client_id, text)
+
+
+def _transfers_of(server: ViserServer) -> Transfers:
+    """Return what is on its way to a server; that of our own is the same for all its buttons."""
+    return server.transfers if isinstance(server, PageServer) else Transfers(server)

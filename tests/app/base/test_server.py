@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import http.client
+import os
 import socket
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
 
-import msgspec
 import pytest
 import viser
 import websockets.asyncio.server
@@ -15,13 +17,20 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
+from commission.app.base import connection
 from commission.app.base.server import start_server
 from commission.errors import ServerError
+from tests.app.raw_client import RawClient
 
 TOKEN = "a secret; with = and é"
 QUOTED = "a%20secret%3B%20with%20%3D%20and%20%C3%A9"
 
 Start = Callable[..., viser.ViserServer]
+
+
+@pytest.fixture(autouse=True)
+def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(connection, "WRONG_TOKEN_TAKES_S", 0.01)
 
 
 @pytest.fixture
@@ -87,6 +96,70 @@ def _own_address() -> str:
 def test_a_public_address_without_a_token_is_refused(host: str) -> None:
     with pytest.raises(ServerError, match="expected a token"):
         start_server(host, 0, None)
+
+
+@pytest.mark.parametrize(("token", "is_enough"), [("a" * 15, False), ("a" * 16, True)])
+def test_a_token_has_at_least_16_letters(start: Start, token: str, is_enough: bool) -> None:
+    if is_enough:
+        assert get(start(token=token).get_port()).status == 401
+    else:
+        with pytest.raises(ServerError, match="the token has 15 letters; expected at least 16, or --token auto"):
+            start(token=token)
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "agv.example.com",
+        "ftp://agv.example.com",
+        "https://",
+        "https://a/page",
+        "https://a?x",
+        "https://u@a",
+        "https://[",
+        "",
+    ],
+)
+def test_a_public_address_that_is_none_is_refused(url: str) -> None:
+    with pytest.raises(ServerError, match="expected https://name"):
+        start_server("127.0.0.1", 0, TOKEN, url)
+
+
+def test_a_public_address_needs_a_token() -> None:
+    with pytest.raises(ServerError, match="can be reached from other computers; expected a token"):
+        start_server("127.0.0.1", 0, None, "https://agv.example.com")
+
+
+def ports_of_ours() -> set[int]:
+    """Ports on which this process listens."""
+    listening = "0A"
+    lines = [
+        line.split() for name in ("tcp", "tcp6") for line in Path(f"/proc/net/{name}").read_text().splitlines()[1:]
+    ]
+    sockets = {os.readlink(link) for link in Path("/proc/self/fd").iterdir() if link.is_symlink()}
+    return {
+        int(part[1].rpartition(":")[2], 16)
+        for part in lines
+        if part[3] == listening and f"socket:[{part[9]}]" in sockets
+    }
+
+
+def test_a_viser_that_takes_serve_from_elsewhere_ends_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would find our port taken, listen on the next one, and let everybody in without a token."""
+    before = ports_of_ours()
+    real = websockets.asyncio.server.serve
+    monkeypatch.setattr("viser.infra._infra.websockets.asyncio.server", SimpleNamespace(serve=real))
+    with pytest.raises(ServerError, match=r"does not listen behind our gate; expected viser 1\.1"):
+        start_server("127.0.0.1", 0, TOKEN)
+    assert ports_of_ours() == before
+
+
+def test_a_gate_that_lets_strangers_in_ends_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = ports_of_ours()
+    monkeypatch.setattr("commission.app.base.gate.Gate.answer", lambda *_: None)
+    with pytest.raises(ServerError, match=r"a stranger is answered 200 by viser .*; expected to be refused"):
+        start_server("127.0.0.1", 0, TOKEN)
+    assert ports_of_ours() == before
 
 
 def test_an_empty_token_is_refused_even_on_loopback() -> None:
@@ -227,8 +300,8 @@ def test_a_right_cookie_does_not_help_a_page_of_another_origin(start: Start) -> 
 
 
 def test_the_cookie_of_one_server_does_not_open_another(start: Start) -> None:
-    first, second = start(token="one").get_port(), start(token="two").get_port()
-    cookie = (get(first, "/?token=one").getheader("Set-Cookie") or "").partition(";")[0]
+    first, second = start(token="one of the secrets").get_port(), start(token="two of the secrets").get_port()
+    cookie = (get(first, "/?token=one%20of%20the%20secrets").getheader("Set-Cookie") or "").partition(";")[0]
     assert get(first, Cookie=cookie).status == 200
     assert get(second, Cookie=cookie).status == 401
     assert get(second, Cookie=cookie.replace(str(first), str(second))).status == 401
@@ -245,20 +318,10 @@ def test_nobody_can_make_the_server_open_a_tunnel(start: Start, monkeypatch: pyt
     opened: list[object] = []
     monkeypatch.setattr("viser._viser.ViserTunnel", lambda *args: opened.append(args))
     server = start()
-    asked = threading.Event()
-    answer = server.request_share_url
-
-    def request_share_url(*args: bool) -> str | None:
-        try:
-            return answer(*args)
-        finally:
-            asked.set()
-
-    monkeypatch.setattr(server, "request_share_url", request_share_url)
-    with connect(
-        f"ws://127.0.0.1:{server.get_port()}", subprotocols=[Subprotocol(f"viser-v{viser.__version__}")]
-    ) as client:
-        client.send(msgspec.msgpack.encode({"type": "ShareUrlRequest"}))
-        assert asked.wait(10)
+    client = RawClient(server)
+    client.send(type="ShareUrlRequest")
+    client.hear_until(lambda message: message["type"] == "NotificationShowMessage")
+    assert client.refused == 1
     assert server.request_share_url() is None
     assert opened == []
+    client.close()

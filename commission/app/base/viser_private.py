@@ -1,0 +1,241 @@
+"""viser's private names, all that are used: what the server needs and viser 1.1 offers no other way to.
+
+Nothing else in this project touches a name of viser's that begins with an underscore; a test names each of them.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import uuid
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import Any, TypeVar
+
+import viser
+from viser import (
+    ClientHandle,
+    GuiApi,
+    GuiButtonHandle,
+    GuiFormHandle,
+    SceneApi,
+    ViserServer,
+    _messages,
+    _scene_api,
+    _viser,
+)
+from viser.infra import WebsockServer
+
+log = logging.getLogger(__name__)
+
+Result = TypeVar("Result")
+
+HANDLER_MODULE = WebsockServer.__module__
+"""Module of the function that viser gives to websockets' `serve`."""
+SUBPROTOCOL = f"viser-v{viser.__version__}"
+"""What a page of this viser says that it speaks."""
+
+
+class LoopEvent(asyncio.Event):
+    """An event of a loop that other threads may set.
+
+    viser sets a plain one from whatever thread writes to the page, while the loop goes through the same list of
+    waiting browsers: "deque mutated during iteration".
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        super().__init__()
+        self._of_loop = loop
+        self._is_due = False
+
+    def set(self) -> None:
+        """Wake who waits: at once in the loop's own thread, else as soon as the loop comes to it."""
+        try:
+            is_here = asyncio.get_running_loop() is self._of_loop
+        except RuntimeError:
+            is_here = False
+        if is_here:
+            super().set()
+        elif not self._is_due and not self._of_loop.is_closed():
+            self._is_due = True
+            self._of_loop.call_soon_threadsafe(self._set_here)
+
+    def _set_here(self) -> None:
+        # What is written from here on asks for another turn.
+        self._is_due = False
+        super().set()
+
+
+class Callbacks(ThreadPoolExecutor):
+    """Runs the callbacks of widgets one after the other, so that what they post arrives as it was done.
+
+    viser runs them in 32 threads, in no order, and prints what they raise to the terminal.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(max_workers=1, thread_name_prefix="callbacks")
+
+    def submit(self, fn: Callable[..., Result], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Queue a call; what it raises is logged."""
+
+        def reporting() -> Result | None:
+            try:
+                return fn(*args, **kwargs)
+            except Exception as error:
+                report(error)
+                return None
+
+        return super().submit(reporting)
+
+
+def report(error: BaseException) -> None:
+    """Log what a callback raised."""
+    log.error("a callback of the page failed", exc_info=error)
+
+
+def make_robust(server: ViserServer) -> None:
+    """Mend a started server to which no browser has connected yet.
+
+    What other threads write is announced on the server's own loop; callbacks run in order; errors are logged; a write
+    to a browser that has just gone is nothing to warn about.
+    """
+    loop = event_loop(server)
+    callbacks = Callbacks()
+    server._thread_executor.shutdown(wait=False)
+    for part in (server, server.gui, server.scene):
+        part._thread_executor = callbacks
+    # Each module has its own name of the function that prints.
+    for module in (_scene_api, _viser):
+        setattr(module, "print_awaited_callback_error", report)  # noqa: B010  (pyright knows no such name)
+    loop.set_exception_handler(_report_of_loop)
+    server._websock_server.get_message_buffer().message_event = LoopEvent(loop)
+
+    def prepare(connection: Any) -> None:
+        buffer = connection.get_message_buffer()
+        buffer.message_event = LoopEvent(loop)
+        buffer._warned_push_after_done = True
+
+    server._websock_server.on_client_connect(prepare)
+
+
+def _report_of_loop(_loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+    error = context.get("exception")
+    log.error("the page's server: %s", context["message"], exc_info=error)
+
+
+def event_loop(server: ViserServer) -> asyncio.AbstractEventLoop:
+    """Return the loop in which messages are sent and heard."""
+    return server._event_loop
+
+
+def listening_port(server: ViserServer) -> int:
+    """Return the port that viser's server has really bound."""
+    return server._websock_server._port
+
+
+def number_of(server: ViserServer, connection: object) -> int | None:
+    """Return viser's number of a connection; none before viser knows it and after it has gone."""
+    live = server._websock_server._live_connections
+    return next((number for number, known in tuple(live.items()) if known is connection), None)
+
+
+def client_of(server: ViserServer, number: int) -> ClientHandle | None:
+    """Return a connected browser; cheaper than a copy of all of them."""
+    return server._connected_clients.get(number)
+
+
+def send(server: ViserServer, number: int, message: Any) -> None:
+    """Queue a message for one connection; nothing happens when it has gone."""
+    state = server._websock_server._client_state_from_id.get(number)
+    if state is not None:
+        state.message_buffer.push(message)
+
+
+def notify(server: ViserServer, number: int, *, title: str, text: str, seconds: float) -> None:
+    """Show a red note in one browser."""
+    props = _messages.NotificationProps(title, text, False, True, seconds, "red")
+    send(server, number, _messages.NotificationShowMessage(uuid.uuid4().hex, props))
+
+
+def show_value(server: ViserServer, number: int, widget: Any) -> None:
+    """Let one browser show the value that a widget has here."""
+    send(server, number, _messages.GuiUpdateMessage(identifier(widget), {"value": widget.value}))
+
+
+def run_on_pages(server: ViserServer, script: str) -> None:
+    """Let every browser, also those that come later, run a script of ours."""
+    server._websock_server.queue_message(_messages.RunJavascriptMessage(script))
+
+
+def identifier(widget: Any) -> str:
+    """Return the identifier under which browsers speak of a widget."""
+    return widget._impl.uuid
+
+
+def widget_of(gui: GuiApi, name: str) -> Any | None:
+    """Return the input or button with an identifier."""
+    return gui._gui_input_handle_from_uuid.get(name)
+
+
+def form_of(gui: GuiApi, name: str) -> GuiFormHandle | None:
+    """Return the form with an identifier."""
+    container = gui._container_handle_from_uuid.get(name)
+    return container if isinstance(container, GuiFormHandle) else None
+
+
+def is_command(gui: GuiApi, name: str) -> bool:
+    """Whether a key or entry of the command palette has this identifier and can be used."""
+    command = gui._command_handle_from_uuid.get(name)
+    return command is not None and not command.disabled
+
+
+def is_held(button: GuiButtonHandle, frequency: float) -> bool:
+    """Whether anything listens to a button being held at this rate."""
+    return frequency in button._button_impl.hold_cbs_from_freq
+
+
+def is_gizmo(scene: SceneApi, number: int, name: str) -> bool:
+    """Whether a gizmo has this name, or had it when the browser took hold of it."""
+    return name in scene._handle_from_transform_controls_name or (number, name) in scene._active_transform_drag_handles
+
+
+def is_node(scene: SceneApi, number: int, name: str) -> bool:
+    """Whether something in the scene has this name, or had it when the browser began to drag it."""
+    return name in scene._handle_from_node_name or (number, name) in scene._active_drag_handles
+
+
+def owner_of(scene: SceneApi) -> str:
+    """Return the name by which messages call this scene: empty for that of all browsers."""
+    return scene._owner_id
+
+
+def server_of(gui: GuiApi) -> ViserServer:
+    """Return the server that a set of widgets belongs to, be it that of all browsers or one browser's own."""
+    owner = gui._owner
+    return owner if isinstance(owner, ViserServer) else owner._viser_server
+
+
+def on_leave(server: ViserServer, callback: Callable[[int], None]) -> None:
+    """Call a function with the number of each connection that ends, on the server's loop."""
+    server._websock_server.on_client_disconnect(lambda connection: callback(connection.client_id))
+
+
+def take_uploads(gui: GuiApi, begin: Callable[[int, Any], None], part: Callable[[int, Any], None]) -> None:
+    """Put two functions in the place of viser's own, which collects whatever comes and tells it to all browsers."""
+    socket = gui._websock_interface
+    socket.unregister_handler(_messages.FileTransferStartUpload, gui._handle_file_transfer_start)
+    socket.unregister_handler(_messages.FileTransferPart, gui._handle_file_transfer_part)
+    socket.register_handler(_messages.FileTransferStartUpload, begin)
+    socket.register_handler(_messages.FileTransferPart, part)
+
+
+def acknowledge(server: ViserServer, number: int, message: Any, done: int, whole: int) -> None:
+    """Tell a browser how much of its file has come."""
+    ack = _messages.FileTransferPartAck(message.source_component_uuid, message.transfer_uuid, done, whole)
+    send(server, number, ack)
+
+
+def replace_upload_note(server: ViserServer, number: int, transfer: str, text: str) -> None:
+    """Write over what a browser itself says of its upload."""
+    props = _messages.NotificationProps("Not taken", text, False, True, 10.0, "red")
+    send(server, number, _messages.NotificationUpdateMessage(f"upload-{transfer}", props))
