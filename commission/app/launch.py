@@ -13,33 +13,52 @@ from pathlib import Path
 from types import FrameType
 from urllib.parse import quote
 
-import numpy as np
 import viser
 
-from commission import compiled
-from commission.app.base.actions import Recording, Report, Source, VirtualDrive
+from commission.app.ambiguity import feature as ambiguity
+from commission.app.base import page_feature
 from commission.app.base.extent import extent_of
 from commission.app.base.server import start_server
 from commission.app.base.state import MAGNIFICATIONS, NOTHING_SAVED, AppState
-from commission.app.editing.actions import Restored
+from commission.app.coverage import feature as coverage
+from commission.app.editing import feature as editing
+from commission.app.exchange import feature as exchange
+from commission.app.failures import feature as failures
+from commission.app.floor_map import feature as floor_map
 from commission.app.page import Page
-from commission.app.project.project_folder import Keeping
+from commission.app.placement import feature as placement
+from commission.app.plan import feature as plan
+from commission.app.prediction import feature as prediction
+from commission.app.problems import feature as problems
+from commission.app.project import feature as project
+from commission.app.run import feature as run
 from commission.app.run.accumulated_layer import AccumulatedLayer
-from commission.app.run.drives import prepare
-from commission.app.run.history import episodes
-from commission.app.run.session import Drive
-from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
-from commission.geometry import rasterize, se2, spline_kernels
-from commission.io.journal_replay import restore
+from commission.app.run.actions import Recording, Source, VirtualDrive
+from commission.app.run.state import RunState
+from commission.app.runtime import BrowserCame, BrowserLeft, Runtime
+from commission.app.tune import feature as tune
 from commission.io.project_file import OpenedProject, load_project, open_project
-from commission.localization import localizer, whole_run
-from commission.localization.estimate import Mode
-from commission.localization.setup import LocalizerSetup
-from commission.progress import Progress
-from commission.simulation import follower, scan
 from commission.site.project import Project
 
 log = logging.getLogger(__name__)
+
+FEATURES = (
+    page_feature.FEATURE,
+    project.FEATURE,
+    floor_map.FEATURE,
+    editing.FEATURE,
+    exchange.FEATURE,
+    problems.FEATURE,
+    coverage.FEATURE,
+    prediction.FEATURE,
+    failures.FEATURE,
+    ambiguity.FEATURE,
+    placement.FEATURE,
+    plan.FEATURE,
+    run.FEATURE,
+    tune.FEATURE,
+)
+"""What there is on the page: a new feature is a folder and a line here."""
 
 END_AFTER_S = 8.0
 """Time after Ctrl-C in which all background work has to end [s]: each of its threads is waited for up to 2 s."""
@@ -158,44 +177,26 @@ def open_page(
     source : what drives at once; none: nothing yet.
     is_new : whether nothing of the project is on disk yet.
     """
-    restored = None if folder is None else restore(folder, project)
+    greeting = f"A new project in {folder}: it is empty until you load a map or place something" if is_new else ""
     state = AppState(
-        project,
-        NOTHING_SAVED if is_new else project,
+        project=project,
+        saved=NOTHING_SAVED if is_new else project,
         folder=folder,
-        foreign=() if restored is None else restored.foreign_changes,
-        source=source,
-        repeat=folder is None,
         hidden=frozenset({AccumulatedLayer.name}),
         magnify=seen_magnification(project),
-        greeting=f"A new project in {folder}: it is empty until you load a map or place something" if is_new else "",
-    )
-    keeping = Keeping(folder, project, restored)
-    work = Work(
-        prepare,
-        predicted_episodes,
-        keeping.save,
-        compile_kernels,
-        note=keeping.note,
-        foreign_changes=keeping.foreign_changes,
-        close=keeping.close,
-        load=keeping.load,
-    )
-    runtime = Runtime(state, work)
-    page = Page(server, runtime.post, state)
+        greeting=greeting,
+    ).with_part(RunState(source=source, repeat=folder is None))
+    runtime = Runtime(state, FEATURES)
+    page = Page(server, runtime.post, state, FEATURES)
 
     @server.on_client_connect
-    def _(client: viser.ClientHandle) -> None:
+    def connected(client: viser.ClientHandle) -> None:
         runtime.post(BrowserCame(client.client_id))
 
     @server.on_client_disconnect
-    def _(client: viser.ClientHandle) -> None:
+    def disconnected(client: viser.ClientHandle) -> None:
         runtime.post(BrowserLeft(client.client_id))
 
-    if restored is not None and restored.edits:
-        runtime.post(Restored(restored.project, restored.summary()))
-    elif restored is not None:
-        runtime.post(Report(restored.summary()))
     runtime.start(page)
     return runtime
 
@@ -205,24 +206,3 @@ def seen_magnification(project: Project) -> float:
     wanted = SEEN_SHARE * min(extent_of(project).size)
     factor = wanted / (2.45 * project.parameters.observation.range_sigma)
     return max(m for m in MAGNIFICATIONS if m <= max(factor, MAGNIFICATIONS[0]))
-
-
-def predicted_episodes(drive: Drive, setup: LocalizerSetup) -> tuple[tuple[float, float], ...]:
-    """Fail episodes [s] of the whole drive with these parameters."""
-    run = whole_run.run(drive.log, setup, drive.initial)
-    times = (run.stamps_ns - drive.log.stamps_ns[0]) * 1e-9
-    return episodes(times, np.asarray(run.modes) == Mode.FAIL)
-
-
-def compile_kernels(progress: Progress) -> None:
-    """Compile the kernels that a run needs, the first needed first; those of planning wait for their own jobs."""
-    steps = (
-        ("poses", se2.warm_up),
-        ("curves", spline_kernels.warm_up),
-        ("virtual vehicle", follower.warm_up),
-        ("virtual scanner", scan.warm_up),
-        ("localizer", localizer.warm_up),
-        ("prediction", whole_run.warm_up),
-        ("drawing", rasterize.warm_up),
-    )
-    compiled.warm_up(steps, progress)

@@ -1,51 +1,49 @@
-"""The owner thread: drains actions, reduces them, runs what is due, publishes a frozen view. Knows no widget.
+"""The owner thread: drains actions, reduces them, lets services do what is due, publishes a frozen view.
 
-Only this thread touches state, session and page. Callbacks, jobs and browsers reach it through one queue.
+Only this thread touches state, services and page. Callbacks, jobs and browsers reach it through one queue. It knows no
+widget and no feature: those it is given.
 """
 
 from __future__ import annotations
 
 import itertools
+import logging
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import Protocol, TypeAlias
+from typing import Protocol, TypeAlias, TypeVar
 
-from commission.app.base import actions, reducer, reduction
-from commission.app.base.actions import Action, Source, View
-from commission.app.base.background import PREDICT, Background
-from commission.app.base.jobs import JobReport, JobState
+from commission.app.base import page_reducer
+from commission.app.base.actions import PROGRAM, Action, Envelope, Join, Leave, Report, Sender
+from commission.app.base.effects import CancelJob, Effect, FlyTo, PlaceCamera
+from commission.app.base.feature import Feature
+from commission.app.base.jobs import Job, JobReport, Jobs
+from commission.app.base.service import IDLE_S, Context, Due, Service
 from commission.app.base.state import AppState
-from commission.app.base.view import PageView, RunView
-from commission.app.editing import actions as editing
-from commission.app.floor_map.actions import MapResult
-from commission.app.plan.view import PlanView
-from commission.app.project.project_folder import name_of_edit
-from commission.app.run.session import Drive, Session
+from commission.app.base.view import PageView, view_of
 from commission.errors import CommissionError
-from commission.localization.setup import LocalizerSetup
-from commission.progress import Progress
 from commission.site.project import Project
+
+log = logging.getLogger(__name__)
 
 FRAME_S = 0.04
 """Shortest time between two pictures: 25 Hz [s]."""
 SLOW_FRAME_S = 0.2
 """The same for plots, trails and numbers [s]."""
-IDLE_S = 0.5
-LOOK_AT_DISK_S = 2.0
-"""Time between two looks at the project's folder [s]."""
 
-PREPARE, COMPILE = "Preparing the drive", "Compiling"
+REDUCERS = (page_reducer,)
+"""Modules with the handlers of the actions that no feature owns."""
+
+Found = TypeVar("Found", bound=Service)
 
 
 @dataclass(frozen=True, slots=True)
 class BrowserCame:
     """A browser connected."""
 
-    client: int
+    number: int
     """Number of its connection."""
 
 
@@ -53,11 +51,11 @@ class BrowserCame:
 class BrowserLeft:
     """A browser is gone."""
 
-    client: int
+    number: int
     """Number of its connection."""
 
 
-Message: TypeAlias = Action | JobReport | BrowserCame | BrowserLeft
+Message: TypeAlias = Action | Envelope | JobReport | BrowserCame | BrowserLeft
 
 
 class PageLike(Protocol):
@@ -69,71 +67,49 @@ class PageLike(Protocol):
     def draw(self, view: PageView, *, slowly: bool) -> None:
         """Draw a view."""
 
-    def tell(self, text: str, *, failed: bool) -> None:
-        """Notify every browser."""
+    def carry_out(self, effect: Effect, sender: Sender) -> None:
+        """Do one thing that only the page can do, in the sender's browser or in all of them."""
 
-    def show_view(self, client_id: int, view: View) -> None:
-        """Change what one browser looks at."""
-
-    def look_at(self, client_id: int, place: tuple[float, float]) -> None:
-        """Bring a place into one browser's view."""
-
-    def send_file(self, client_id: int, name: str, content: bytes) -> None:
-        """Let one browser save a file."""
-
-    def connected(self, client_id: int) -> None:
+    def connected(self, browser: int) -> None:
         """Set up a browser."""
 
-    def disconnected(self, client_id: int) -> None:
+    def disconnected(self, browser: int) -> None:
         """Forget a browser."""
 
 
-@dataclass(frozen=True, slots=True)
-class Work:
-    """What the runtime has done by others, in the background or on disk; tests put their own in."""
-
-    prepare: Callable[[Project, Source, Progress], Drive]
-    """From a source to a drive."""
-    predict: Callable[[Drive, LocalizerSetup], tuple[tuple[float, float], ...]]
-    """Fail episodes [s] of a whole run with these parameters."""
-    save: Callable[[Project, Path, bool], None]
-    """Write a project into a folder; the last says whether what others changed there is replaced."""
-    compile: Callable[[Progress], None]
-    """Compile all kernels."""
-    note: Callable[[Project, str], None] = lambda _project, _what: None
-    """Journal an edit by its name."""
-    foreign_changes: Callable[[], tuple[str, ...] | None] = lambda: None
-    """Files of the project that somebody else has changed; none when nothing has happened since the last call."""
-    close: Callable[[], None] = lambda: None
-    """Bring the journal to the disk."""
-    load: Callable[[Path], Project] | None = None
-    """Read a project from a folder; none: it cannot be read again."""
-
-
 class Runtime:
-    """State, session and the loop around them.
+    """State, services and the loop around them.
 
     Parameters
     ----------
     state : what the page begins with.
-    work : background work and files.
+    features : what there is on the page.
     clock : returns seconds; another one only in tests.
     """
 
-    def __init__(self, state: AppState, work: Work, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(
+        self, state: AppState, features: Sequence[Feature], clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self.state = state
-        self.session: Session | None = None
-        self._work = work
         self._clock = clock
         self._queue: SimpleQueue[Message] = SimpleQueue()
-        self._background = Background(self._queue.put)
+        self._jobs = Jobs(self._queue.put, failed=_told)
+        context = Context(state, self.post, clock, self._jobs)
+        self._services = tuple(make(context) for feature in features for make in feature.services)
+        self._owners = {kind: service for service in self._services for kind in service.effects}
         self._page: PageLike | None = None
         self._shown: Project | None = None
-        self._dirty = True
-        self._slow_dirty = True
-        self._drawn_at = self._drawn_slowly_at = self._ticked_at = self._looked_at = clock()
+        self._due = Due.SOON
+        self._drawn_at = self._drawn_slowly_at = clock()
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._loop, name="owner", daemon=True)
+
+    def service(self, kind: type[Found]) -> Found:
+        """Return the service of a type; raises LookupError when no feature has one."""
+        for service in self._services:
+            if isinstance(service, kind):
+                return service
+        raise LookupError(f"no feature has a {kind.__name__}")
 
     def post(self, message: Message) -> None:
         """Hand something to the owner thread; returns at once, from any thread."""
@@ -142,17 +118,17 @@ class Runtime:
     def start(self, page: PageLike) -> None:
         """Begin to own the page."""
         self._page = page
-        self._background.drives.start(COMPILE, self._work.compile)
-        if self.state.source is not None:
-            self.post(actions.ChooseSource(self.state.source))
+        for service in self._services:
+            service.start()
         self._thread.start()
 
     def stop(self) -> None:
         """End the loop and the background work."""
         self._stopped.set()
-        self._background.close()
+        self._jobs.close()
         self._thread.join(timeout=2.0)
-        self._work.close()
+        for service in self._services:
+            service.close()
 
     def _loop(self) -> None:
         self._guarded(self._show_site)
@@ -166,8 +142,12 @@ class Runtime:
         try:
             what()
         except Exception as error:
-            text = str(error) if isinstance(error, CommissionError | ValueError) else f"{type(error).__name__}: {error}"
-            self._apply(actions.Report(text))
+            if isinstance(error, CommissionError | ValueError):
+                text = str(error)
+            else:  # a mistake of ours and not of the user's: where was it?
+                log.exception("a fault on the page")
+                text = f"{type(error).__name__}: {error}"
+            self._apply(Report(text))
 
     def _drained(self) -> list[Message]:
         """Wait until something is due and return what has arrived; of seeks and drags in a row only the newest."""
@@ -181,184 +161,88 @@ class Runtime:
         return [
             message
             for message, following in itertools.zip_longest(messages, messages[1:])
-            if not _is_outdated(message, following)
+            if not _is_superseded(message, following)
         ]
 
     def _time_left(self) -> float:
         """Time until the next picture or slice of work is due [s]."""
-        if self.session is not None and self.session.seeking is not None:
-            return 0.001
-        due = self._drawn_at + FRAME_S if self._dirty or self._is_running() else self._drawn_at + IDLE_S
-        if self._slow_dirty:
+        rest = min((service.rest(self.state) for service in self._services), default=IDLE_S)
+        due = self._clock() + rest
+        if self._due is Due.SOON:
+            due = min(due, self._drawn_at + FRAME_S)
+        elif self._due is Due.SLOWLY:
             due = min(due, self._drawn_slowly_at + SLOW_FRAME_S)
         return min(max(due - self._clock(), 0.001), IDLE_S)
-
-    def _is_running(self) -> bool:
-        return self.state.playing and self.session is not None
 
     def handle(self, message: Message) -> None:
         """Do what one message says."""
         page = self._page
-        if isinstance(message, JobReport):
-            self._hear(message)
-        elif isinstance(message, BrowserCame):
-            self._apply(editing.Join(message.client))
-            if page is not None:
-                page.connected(message.client)
-        elif isinstance(message, BrowserLeft):
-            self._apply(editing.Leave(message.client))
-            if page is not None:
-                page.disconnected(message.client)
-        else:
-            self._apply(message)
-        self._dirty = self._slow_dirty = True
+        match message:
+            case JobReport():
+                following = self._jobs.hear(message)
+                if isinstance(following, Action | Envelope):
+                    self.handle(following)
+            case BrowserCame(number):
+                self._apply(Join(), Sender(number, self._clock()))
+                if page is not None:
+                    page.connected(number)
+            case BrowserLeft(number):
+                self._apply(Leave(), Sender(number, self._clock()))
+                if page is not None:
+                    page.disconnected(number)
+            case Envelope(action, sender):
+                self._apply(action, sender)
+            case _:
+                self._apply(message)
+        self._due = Due.SOON
 
-    def _apply(self, action: Action) -> None:
+    def _apply(self, action: Action, sender: Sender = PROGRAM) -> None:
         """Reduce an action and carry out what follows."""
         before = self.state
-        outcome = reducer.reduce(action, before)
+        outcome = page_reducer.reduce(action, before, sender)
         self.state = outcome.state
-        if self.session is not None:
-            self.session.covered = self.state.covered
-        self._dirty = self._slow_dirty = True
-        for effect in outcome.effects:
-            self._carry_out(effect)
+        self._due = Due.SOON
         if outcome.state.project is not before.project:
-            self._work.note(outcome.state.project, name_of_edit(action, before, outcome.state))
+            for service in self._services:
+                service.project_changed(action, before, outcome.state)
+        for effect in outcome.effects:
+            self._carry_out(effect, sender)
 
-    def _carry_out(self, effect: reduction.Effect) -> None:
-        """Do one thing that the reducer asks for."""
-        match effect:
-            case reduction.LoadSource(source):
-                project = self.state.project
-                self._background.drives.start(PREPARE, lambda progress: self._work.prepare(project, source, progress))
-            case reduction.ReadProject(folder):
-                if self._work.load is not None:
-                    self.post(actions.Reloaded(self._work.load(folder)))
-            case reduction.WriteProject(project, folder, overwrite):
-                self._work.save(project, folder, overwrite)
-                self.post(actions.ProjectSaved(project, folder, time.strftime("%H:%M")))
-            case reduction.ApplyParameters() | reduction.MoveTo() | reduction.ProcessOneScan():
-                if self.session is not None:
-                    self._act_on_run(self.session, effect)
-            case reduction.Tell() | reduction.PlaceCamera() | reduction.FlyTo() | reduction.SendFile():
-                self._show_effect(effect)
-            case _:
-                self._background.carry_out(effect)
-
-    def _show_effect(self, effect: reduction.PageEffect) -> None:
-        """Do what only the page can do; a camera is fitted to the site as it is now, not as it was drawn last."""
-        page = self._page
-        if page is None:
-            return
-        if isinstance(effect, reduction.PlaceCamera | reduction.FlyTo) and self.state.project is not self._shown:
-            self._show_site()
-        match effect:
-            case reduction.Tell(text, failed):
-                page.tell(text, failed=failed)
-            case reduction.PlaceCamera(client, view):
-                page.show_view(client, view)
-            case reduction.FlyTo(client, place):
-                page.look_at(client, place)
-            case reduction.SendFile(client, name, content):
-                page.send_file(client, name, content)
-
-    def _act_on_run(
-        self, session: Session, effect: reduction.ApplyParameters | reduction.MoveTo | reduction.ProcessOneScan
-    ) -> None:
-        """Do what concerns the drive that is there."""
-        match effect:
-            case reduction.ApplyParameters():
-                session.set_setup(LocalizerSetup.of(self.state.project))
-                self._predict()
-            case reduction.MoveTo(seconds, afresh):
-                session.seek(seconds, afresh=afresh)
-            case reduction.ProcessOneScan():
-                session.step()
-
-    def _hear(self, report: JobReport) -> None:
-        """Follow a job; take its result or its error."""
-        if report.job.state is JobState.FAILED:
-            self._apply(actions.Report(f"{report.job.name}: {report.job.error}"))
-        match self._background.hear(report):
-            case Drive() as drive:
-                self._begin(drive)
-            case result if isinstance(result, MapResult):
-                self._apply(result)
-            case tuple() as episodes if self.session is not None:
-                self.session.predicted = episodes
-            case _:
-                pass
-
-    def _begin(self, drive: Drive) -> None:
-        """Run the localizer over a new drive, playing."""
-        self.session = Session(drive, LocalizerSetup.of(self.state.project))
-        self.session.covered = self.state.covered
-        self._apply(actions.Play(playing=True))
-        self._predict()
-
-    def _predict(self) -> None:
-        """Look ahead in the background: where the supervisor will stop the vehicle with these parameters."""
-        if self.session is None:
-            return
-        drive, setup = self.session.drive, self.session.setup
-
-        def work(progress: Progress) -> object:
-            progress(0.0, "")
-            return self._work.predict(drive, setup)
-
-        self._background.drives.start(PREDICT, work)
+    def _carry_out(self, effect: Effect, sender: Sender) -> None:
+        """Let somebody do one thing: the service that owns it, or the page."""
+        owner = self._owners.get(type(effect))
+        if owner is not None:
+            owner.carry_out(effect, self.state, sender)
+        elif isinstance(effect, CancelJob):
+            self._jobs.stop(effect.number)
+        elif self._page is not None:
+            # A camera is fitted to the site as it is now, not as it was drawn last.
+            if isinstance(effect, PlaceCamera | FlyTo) and self.state.project is not self._shown:
+                self._show_site()
+            self._page.carry_out(effect, sender)
 
     def tick(self) -> None:
-        """Let the run go on for the time that has passed, and draw when a picture is due."""
-        now = self._clock()
-        elapsed, self._ticked_at = now - self._ticked_at, now
-        session = self.session
-        if session is not None and (self.state.playing or session.seeking is not None):
-            self._advance(session, elapsed)
-        if now - self._looked_at >= LOOK_AT_DISK_S:
-            self._looked_at = now
-            files = self._work.foreign_changes()
-            if files is not None:
-                self._apply(actions.ChangedOnDisk(files))
-        if self._background.planner.follow(self.state):
-            self._dirty = self._slow_dirty = True
+        """Let services do what is due, and draw when a picture is."""
+        for service in self._services:
+            self._due = max(self._due, service.follow(self.state))
         if self._page is None:
             return
-        self._background.inspection.follow(self.state)
         if self.state.project is not self._shown:
             self._show_site()
-        slowly = self._slow_dirty and now - self._drawn_slowly_at >= SLOW_FRAME_S
-        if slowly or (self._dirty and now - self._drawn_at >= FRAME_S):
+        now = self._clock()
+        slowly = self._due > Due.NEVER and now - self._drawn_slowly_at >= SLOW_FRAME_S
+        if slowly or (self._due is Due.SOON and now - self._drawn_at >= FRAME_S):
             self._drawn_at = now
-            self._dirty = False
+            # What is drawn slowly is still to come after a quick picture.
+            self._due = Due.NEVER if slowly else Due.SLOWLY
             if slowly:
-                self._drawn_slowly_at, self._slow_dirty = now, False
+                self._drawn_slowly_at = now
             self._page.draw(self.view(whole=slowly), slowly=slowly)
-
-    def _advance(self, session: Session, elapsed: float) -> None:
-        """Process what is due, and see to the end of the drive."""
-        # A long pause of this thread (a huge drawing) is not made up for: the clock stood still.
-        if session.advance(min(elapsed, 0.25) * self.state.speed):
-            self._dirty = True
-        self._slow_dirty = True
-        if session.at_end and session.seeking is None and self.state.playing:
-            if self.state.repeat:
-                session.seek(0.0, afresh=True)
-            else:
-                self._apply(actions.Play(playing=False))
-
-    @property
-    def plan(self) -> PlanView:
-        """What the step Plan has found so far."""
-        return self._background.planner.view
 
     def view(self, *, whole: bool = True) -> PageView:
         """Return everything the page shows; `whole` with what is drawn slowly, too."""
-        run: RunView | None = None if self.session is None else self.session.view(whole=whole)
-        seen = self._background.inspection
-        jobs = self._background.progress()
-        return PageView(self.state, run, jobs, self.plan, seen.problems, seen.violations, seen.profiles)
+        parts = (part for service in self._services for part in service.parts(slowly=whole))
+        return view_of(self.state, *parts, jobs=self._jobs.running())
 
     def _show_site(self) -> None:
         if self._page is not None:
@@ -366,15 +250,17 @@ class Runtime:
             self._page.show_site(self.state)
 
 
-def _is_outdated(message: Message, following: Message | None) -> bool:
-    """Whether the message behind makes this one pointless: the newest place of the time line or of a drag counts."""
+def _told(job: Job) -> Action:
+    """Say that a job failed."""
+    return Report(f"{job.name}: {job.error}")
+
+
+def _is_superseded(message: Message, following: Message | None) -> bool:
+    """Whether the message behind makes this one pointless."""
     match message, following:
-        case actions.Seek(), actions.Seek():
-            return True
-        case (editing.DragFloor(phase="update"), editing.DragFloor(phase="update")) | (
-            editing.DragSelection(phase="update"),
-            editing.DragSelection(phase="update"),
-        ):
-            return message.client == following.client
+        case Envelope(earlier, one), Envelope(later, other):
+            return one.browser == other.browser and later.supersedes(earlier)
+        case Action(), Action():
+            return following.supersedes(message)
         case _:
             return False

@@ -2,7 +2,7 @@ from collections.abc import Callable
 
 import pytest
 
-from commission.app.base.actions import VirtualDrive
+from commission.app.run.actions import VirtualDrive
 from commission.app.run.drives import prepare
 from commission.app.run.session import Drive
 from commission.progress import silent

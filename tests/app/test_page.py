@@ -8,26 +8,29 @@ import numpy as np
 import pytest
 import viser
 
-from commission.app.base import actions
 from commission.app.base.actions import Action
+from commission.app.base.jobs import Job
 from commission.app.base.panel import clock, escaped, posting
-from commission.app.base.reducer import parameter, with_parameter
 from commission.app.base.server import start_server
 from commission.app.base.state import AppState, LastEdit
-from commission.app.base.view import PageView, Progress
+from commission.app.base.view import view_of
 from commission.app.editing.equipment_fields import source_html
 from commission.app.page import Page
-from commission.app.project.top_bar import badge_text, title
+from commission.app.project.top_bar import title
+from commission.app.run.actions import Seek
+from commission.app.run.badge import badge_text
 from commission.app.run.now_panel import rows
 from commission.app.run.run_panel import NO_ROUTE, RunPanel
 from commission.app.run.session import Drive, Session
 from commission.app.run.time_line import strip
 from commission.app.run.vehicle_layer import VehicleLayer
+from commission.app.tune.reducer import parameter, with_parameter
 from commission.app.tune.tune_panel import KNOBS, SWITCHES, TunePanel, meant, shown
 from commission.localization.estimate import Mode
 from commission.localization.setup import LocalizerSetup
 from commission.site.presets import SCANNERS, ScannerPreset
 from commission.site.project import Project
+from tests.app.asking import FEATURES, taking
 
 NASTY = "<script>alert('hall')</script>"
 
@@ -57,34 +60,34 @@ def change(widget: Any, value: Any, client: object | None) -> None:
 
 def test_the_whole_page_is_built_and_draws_a_run(server: viser.ViserServer, project: Project, session: Session) -> None:
     state = AppState(project, project)
-    page = Page(server, lambda _action: None, state)
+    page = Page(server, lambda _action: None, state, FEATURES)
     page.show_site(state)
-    page.draw(PageView(state, session.view()), slowly=True)
+    page.draw(view_of(state, session.view()), slowly=True)
     hidden = replace(state, hidden=frozenset({"Scan"}))
-    page.draw(PageView(hidden, session.view()), slowly=True)
+    page.draw(view_of(hidden, session.view()), slowly=True)
 
 
 def test_the_page_stands_before_any_run_exists(server: viser.ViserServer) -> None:
     state = AppState(Project(), Project())
-    page = Page(server, lambda _action: None, state)
+    page = Page(server, lambda _action: None, state, FEATURES)
     page.show_site(state)
-    page.draw(PageView(state, None), slowly=True)
+    page.draw(view_of(state), slowly=True)
 
 
 def test_a_person_posts_and_the_server_itself_does_not() -> None:
     posted: list[Action] = []
-    callback: Any = posting(posted.append, lambda event: actions.Seek(event.target.value))
+    callback: Any = posting(taking(posted), lambda event: Seek(event.target.value))
     callback(SimpleNamespace(client=None, target=SimpleNamespace(value=1.0)))
     assert posted == []
-    callback(SimpleNamespace(client=object(), target=SimpleNamespace(value=2.0)))
-    assert posted == [actions.Seek(2.0)]
+    callback(SimpleNamespace(client=SimpleNamespace(client_id=1), target=SimpleNamespace(value=2.0)))
+    assert posted == [Seek(2.0)]
 
 
 def test_every_slider_posts_its_parameter_in_si(server: viser.ViserServer, project: Project) -> None:
     posted: list[Any] = []
-    panel = TunePanel(server.gui, posted.append, AppState(project, project))
+    panel = TunePanel(server.gui, taking(posted), AppState(project, project))
     for key, widget in panel._widgets.items():
-        change(widget, widget.value, client=object())
+        change(widget, widget.value, client=SimpleNamespace(client_id=1))
         assert posted[-1].key == key
         value = parameter(project.parameters, key)
         # The page shows six digits.
@@ -97,10 +100,10 @@ def test_sliders_follow_undo_but_not_their_own_drag(server: viser.ViserServer, p
     key = "supervisor.position_limit"
     panel = TunePanel(server.gui, lambda _action: None, AppState(project, project))
     edited = replace(project, parameters=with_parameter(project.parameters, key, 0.2))
-    change(panel._widgets[key], 200.0, client=object())
-    panel.draw_slowly(PageView(AppState(edited, project, last_edit=LastEdit(key, 0.0)), None))
+    change(panel._widgets[key], 200.0, client=SimpleNamespace(client_id=1))
+    panel.draw_slowly(view_of(AppState(edited, project, last_edit=LastEdit(key))))
     assert panel._widgets[key].value == 200.0
-    panel.draw_slowly(PageView(AppState(project, project), None))
+    panel.draw_slowly(view_of(AppState(project, project)))
     assert panel._widgets[key].value == 100.0
 
 
@@ -122,15 +125,15 @@ def test_names_from_files_are_never_read_as_html(project: Project) -> None:
 
 def test_the_badge_says_operational_fail_or_that_nothing_runs(session: Session, project: Project) -> None:
     state, run = AppState(project, project), session.view()
-    assert badge_text(PageView(state, None))[0] == "NO RUN"
-    assert badge_text(PageView(state, run))[0] == "OPERATIONAL"
-    word, beside, _ = badge_text(PageView(state, replace(run, mode=Mode.FAIL)))
+    assert badge_text(view_of(state))[0] == "NO RUN"
+    assert badge_text(view_of(state, run))[0] == "OPERATIONAL"
+    word, beside, _ = badge_text(view_of(state, replace(run, mode=Mode.FAIL)))
     assert word.startswith("FAIL")
     assert "mm" in beside and "°" in beside
 
 
 def test_what_is_being_prepared_is_said_where_the_badge_is(project: Project) -> None:
-    view = PageView(AppState(project, project), None, (Progress(1, "Compiling", "<rays>", 0.4),))
+    view = view_of(AppState(project, project), jobs=(Job(1, "Compiling", fraction=0.4, message="<rays>"),))
     assert badge_text(view)[:2] == ("PREPARING", "Compiling: &lt;rays&gt; 40%")
 
 
@@ -157,7 +160,7 @@ def test_a_route_that_was_drawn_can_be_driven(server: viser.ViserServer, project
     panel = RunPanel(server.gui, lambda _action: None, bare)
     (offered,) = (w for w in server.gui._gui_input_handle_from_uuid.values() if getattr(w, "label", "") == "Route")
     assert (offered.options, offered.disabled) == (NO_ROUTE, True)
-    panel.draw_slowly(PageView(AppState(project, project), None))
+    panel.draw_slowly(view_of(AppState(project, project)))
     assert (offered.options, offered.disabled) == (("There and back",), False)
 
 

@@ -1,22 +1,50 @@
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from commission.app.base import actions
-from commission.app.base.actions import Action, Source, View
+from commission.app.base.actions import Action, Camera, Envelope, Sender, SetCamera
+from commission.app.base.effects import Effect, PlaceCamera, Tell
+from commission.app.base.feature import Feature
+from commission.app.base.service import Context, Service
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.run.session import Drive
-from commission.app.runtime import BrowserCame, BrowserLeft, Runtime, Work
+from commission.app.project.actions import ProjectSaved, Save
+from commission.app.project.effects import WriteProject
+from commission.app.project.state import FilesState
+from commission.app.run.actions import (
+    ChooseSource,
+    Cover,
+    Play,
+    Recording,
+    Repeat,
+    Seek,
+    SetSpeed,
+    Source,
+    VirtualDrive,
+)
+from commission.app.run.service import RunService
+from commission.app.run.session import Drive, Session
+from commission.app.run.state import RunState
+from commission.app.run.view import RunView
+from commission.app.runtime import BrowserCame, BrowserLeft, Runtime
+from commission.app.tune.actions import SetParameter
 from commission.errors import FileFormatError
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress
 from commission.site.project import Project
+from tests.app.asking import FEATURES, by
 
 EPISODES = ((1.0, 2.0),)
+
+
+def cycles(view: PageView) -> int:
+    run = view.part(RunView)
+    return 0 if run is None else len(run.series)
 
 
 class Pictures:
@@ -26,7 +54,7 @@ class Pictures:
         self.views: list[PageView] = []
         self.told: list[tuple[str, bool]] = []
         self.browsers: list[int] = []
-        self.shown: list[tuple[int, View]] = []
+        self.shown: list[tuple[int | None, Camera]] = []
         self.fail_once = False
 
     def show_site(self, state: AppState) -> None:
@@ -38,17 +66,35 @@ class Pictures:
             raise RuntimeError("no such thing")
         self.views.append(view)
 
-    def tell(self, text: str, *, failed: bool) -> None:
-        self.told.append((text, failed))
+    def carry_out(self, effect: Effect, sender: Sender) -> None:
+        match effect:
+            case Tell(text, failed):
+                self.told.append((text, failed))
+            case PlaceCamera(camera):
+                self.shown.append((sender.browser, camera))
+            case _:
+                raise TypeError(f"nobody asks for {effect} here")
 
-    def show_view(self, client_id: int, view: View) -> None:
-        self.shown.append((client_id, view))
+    def connected(self, browser: int) -> None:
+        self.browsers.append(browser)
 
-    def connected(self, client_id: int) -> None:
-        self.browsers.append(client_id)
+    def disconnected(self, browser: int) -> None:
+        self.browsers.remove(browser)
 
-    def disconnected(self, client_id: int) -> None:
-        self.browsers.remove(client_id)
+
+class Saving(Service):
+    """Remembers where a project was to be written."""
+
+    effects = (WriteProject,)
+
+    def __init__(self, context: Context, saved: list[Path]) -> None:
+        super().__init__(context)
+        self._saved = saved
+
+    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:
+        assert isinstance(effect, WriteProject)
+        self._saved.append(effect.folder)
+        self.context.post(ProjectSaved(effect.project, effect.folder, "12:03"))
 
 
 class Bench:
@@ -59,26 +105,35 @@ class Bench:
         self.saved: list[Path] = []
         self.drive = drive
         self.slow: Callable[..., Drive] | None = None
-        state = AppState(project, project, folder=Path("hall"))
-        self.runtime = Runtime(state, Work(self._prepare, self._predict, self._save, lambda _progress: None))
+        self.runtime = Runtime(AppState(project, project, folder=Path("hall")), self._features())
+
+    def _features(self) -> list[Feature]:
+        run = partial(RunService, prepare=self._prepare, predict=self._predict, compile_all=lambda _progress: None)
+        others = [feature for feature in FEATURES if feature.name not in ("run", "project")]
+        return [
+            *others,
+            Feature("run", services=(run,)),
+            Feature("project", services=(partial(Saving, saved=self.saved),)),
+        ]
 
     def _prepare(self, _project: Project, source: Source, progress: Progress) -> Drive:
         if self.slow is not None:
             return self.slow(_project, source, progress)
         progress(0.5, "")
-        if isinstance(source, actions.Recording):
+        if isinstance(source, Recording):
             raise FileFormatError(source.path, "", "not a recording", "a folder with odometry.csv")
         return self.drive
 
     def _predict(self, _drive: Drive, _setup: LocalizerSetup) -> tuple[tuple[float, float], ...]:
         return EPISODES
 
-    def _save(self, _project: Project, folder: Path, _overwrite: bool) -> None:
-        self.saved.append(folder)
+    @property
+    def session(self) -> Session | None:
+        return self.runtime.service(RunService).session
 
-    def post(self, *wishes: Action) -> None:
-        for wish in wishes:
-            self.runtime.post(wish)
+    def post(self, *asked: Action | Envelope) -> None:
+        for each in asked:
+            self.runtime.post(each)
 
     def until(self, reached: Callable[[], bool]) -> None:
         """Wait until something has happened, at most 20 s: compilation included."""
@@ -89,8 +144,8 @@ class Bench:
         raise TimeoutError("it did not happen within 20 s")
 
     def play(self) -> None:
-        self.post(actions.ChooseSource(actions.VirtualDrive("There and back")))
-        self.until(lambda: self.runtime.session is not None and self.runtime.session.cycles > 0)
+        self.post(ChooseSource(VirtualDrive("There and back")))
+        self.until(lambda: self.session is not None and self.session.cycles > 0)
 
 
 @pytest.fixture
@@ -103,18 +158,18 @@ def bench(project: Project, drive: Drive):
 
 def test_a_chosen_drive_plays_by_itself_and_pictures_follow(bench: Bench) -> None:
     bench.play()
-    bench.until(lambda: any(view.run is not None and len(view.run.series) > 3 for view in bench.page.views))
-    assert bench.runtime.state.playing
+    bench.until(lambda: any(cycles(view) > 3 for view in bench.page.views))
+    assert bench.runtime.state.part(RunState).playing
 
 
 def test_the_prediction_of_the_rest_reaches_the_time_line(bench: Bench) -> None:
     bench.play()
-    bench.until(lambda: bench.runtime.session is not None and bench.runtime.session.predicted == EPISODES)
+    bench.until(lambda: bench.session is not None and bench.session.predicted == EPISODES)
 
 
 def test_pictures_come_at_most_25_times_a_second(bench: Bench) -> None:
     bench.play()
-    bench.post(actions.SetSpeed(50.0))
+    bench.post(SetSpeed(50.0))
     before, since = len(bench.page.views), time.monotonic()
     time.sleep(1.0)
     rate = (len(bench.page.views) - before) / (time.monotonic() - since)
@@ -122,25 +177,25 @@ def test_pictures_come_at_most_25_times_a_second(bench: Bench) -> None:
 
 
 def test_a_recording_that_cannot_be_read_is_told_and_listed_and_the_page_lives_on(bench: Bench) -> None:
-    bench.post(actions.ChooseSource(actions.Recording(Path("nothing"))))
+    bench.post(ChooseSource(Recording(Path("nothing"))))
     bench.until(lambda: bool(bench.page.told))
     assert "not a recording" in bench.page.told[0][0]
     assert bench.page.told[0][1]
-    assert len(bench.runtime.state.problems) == 1
+    assert len(bench.runtime.state.faults) == 1
     bench.play()
 
 
 def test_a_mistake_of_ours_while_drawing_is_listed_and_the_page_lives_on(bench: Bench) -> None:
     bench.page.fail_once = True
     bench.play()
-    bench.until(lambda: bool(bench.runtime.state.problems))
-    assert "RuntimeError: no such thing" in bench.runtime.state.problems[0]
+    bench.until(lambda: bool(bench.runtime.state.faults))
+    assert "RuntimeError: no such thing" in bench.runtime.state.faults[0]
     bench.until(lambda: len(bench.page.views) > 3)
 
 
 def test_a_value_out_of_range_is_told_and_changes_nothing(bench: Bench) -> None:
     before = bench.runtime.state.project
-    bench.post(actions.SetParameter("association.gate_probability", 7.0))
+    bench.post(SetParameter("association.gate_probability", 7.0))
     bench.until(lambda: bool(bench.page.told))
     assert "gate_probability is 7" in bench.page.told[0][0]
     assert bench.runtime.state.project is before
@@ -148,26 +203,26 @@ def test_a_value_out_of_range_is_told_and_changes_nothing(bench: Bench) -> None:
 
 def test_of_many_seeks_in_a_row_the_last_one_counts(bench: Bench) -> None:
     bench.play()
-    bench.post(actions.Play(playing=False), *(actions.Seek(0.1 * k) for k in range(50)))
-    session = bench.runtime.session
+    bench.post(Play(playing=False), *(Seek(0.1 * k) for k in range(50)))
+    session = bench.session
     assert session is not None
     bench.until(lambda: session.seeking is None and abs(session.view().time - 4.9) < 1e-6)
 
 
 def test_the_drive_stops_at_its_end_or_starts_again(bench: Bench) -> None:
     bench.play()
-    bench.post(actions.Repeat(repeat=False), actions.SetSpeed(50.0))
-    bench.until(lambda: not bench.runtime.state.playing)
-    session = bench.runtime.session
+    bench.post(Repeat(repeat=False), SetSpeed(50.0))
+    bench.until(lambda: not bench.runtime.state.part(RunState).playing)
+    session = bench.session
     assert session is not None and session.at_end
-    bench.post(actions.Repeat(repeat=True), actions.Play(playing=True))
+    bench.post(Repeat(repeat=True), Play(playing=True))
     bench.until(lambda: not session.at_end)
 
 
 def test_covering_reaches_the_next_scan(bench: Bench) -> None:
     bench.play()
-    bench.post(actions.Cover(covered=True))
-    session = bench.runtime.session
+    bench.post(Cover(covered=True))
+    session = bench.session
     assert session is not None
 
     def sees_nothing() -> bool:
@@ -178,8 +233,8 @@ def test_covering_reaches_the_next_scan(bench: Bench) -> None:
 
 
 def test_saving_is_told_with_the_folder_and_the_time_of_day(bench: Bench) -> None:
-    bench.post(actions.SetParameter("association.gate_probability", 0.9), actions.Save())
-    bench.until(lambda: bool(bench.runtime.state.saved_at))
+    bench.post(SetParameter("association.gate_probability", 0.9), Save())
+    bench.until(lambda: bool(bench.runtime.state.part(FilesState).saved_at))
     assert bench.saved == [Path("hall")]
     assert not bench.runtime.state.is_changed
 
@@ -187,15 +242,15 @@ def test_saving_is_told_with_the_folder_and_the_time_of_day(bench: Bench) -> Non
 def test_each_browser_has_its_own_view(bench: Bench) -> None:
     bench.runtime.post(BrowserCame(1))
     bench.runtime.post(BrowserCame(2))
-    bench.post(actions.SetView(2, View.THREE_D))
+    bench.post(by(2, SetCamera(Camera.THREE_D)))
     bench.runtime.post(BrowserLeft(1))
     bench.until(lambda: bench.page.browsers == [2])
-    assert bench.page.shown == [(2, View.THREE_D)]
+    assert bench.page.shown == [(2, Camera.THREE_D)]
 
 
 def test_a_job_in_sight_is_stopped_by_its_button_and_what_there_was_stays(bench: Bench) -> None:
     bench.play()
-    before = bench.runtime.session
+    before = bench.session
     started, end = threading.Event(), threading.Event()
 
     def prepare(_project: Project, _source: Source, progress: Progress) -> Drive:
@@ -205,7 +260,7 @@ def test_a_job_in_sight_is_stopped_by_its_button_and_what_there_was_stays(bench:
         raise TimeoutError("nobody stopped it")
 
     bench.slow = prepare
-    bench.post(actions.ChooseSource(actions.VirtualDrive("There and back")))
+    bench.post(ChooseSource(VirtualDrive("There and back")))
     assert started.wait(20.0)
     bench.until(lambda: bool(bench.page.views) and bool(bench.page.views[-1].jobs))
     (job,) = bench.page.views[-1].jobs
@@ -213,5 +268,5 @@ def test_a_job_in_sight_is_stopped_by_its_button_and_what_there_was_stays(bench:
     bench.post(actions.StopJob(job.number))
     bench.until(lambda: not bench.page.views[-1].jobs)
     end.set()
-    assert bench.runtime.session is before
+    assert bench.session is before
     assert bench.page.told == []

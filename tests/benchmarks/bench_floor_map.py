@@ -17,20 +17,25 @@ from pathlib import Path
 import numpy as np
 
 from commission.app.base import actions
+from commission.app.base.actions import PROGRAM, ClickFloor, DragFloor
+from commission.app.base.effects import Effect
 from commission.app.base.jobs import JobReport, Jobs, JobState
+from commission.app.base.service import Context
+from commission.app.base.state import AppState
 from commission.app.editing import actions as editing
 from commission.app.editing.editor import Tool
 from commission.app.floor_map.actions import FinishShape, MapOpened
 from commission.app.floor_map.draft import MapDraft, MapFile
-from commission.app.floor_map.effects import DrawMap, MapEffect, ReadMapFile, StopMapWork
-from commission.app.floor_map.work import MapWork
+from commission.app.floor_map.effects import DrawMap, ReadMapFile, StopMapWork
+from commission.app.floor_map.work import MapService
 from commission.geometry import rasterize
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.project import Project
-from tests.benchmarks.edited_page import ME, EditedPage
+from tests.benchmarks.edited_page import EditedPage
 from tests.io.large_files import write_drawing, write_obj, write_stl
 
 REACH, ROUNDS, LIMIT_MS, STOP_S = 0.5, 12, 100.0, 1.0
+STATE = AppState(Project(), Project())
 ENTITIES, MODEL_BYTES = 200_000, 100_000_000
 
 
@@ -56,23 +61,23 @@ def edit() -> bool:
 
         def wall(reach: float) -> Callable[[], float]:
             def draw() -> float:
-                done(editing.ChooseTool(ME, Tool.WALL))
+                done(editing.ChooseTool(Tool.WALL))
                 start = rng.uniform((20, 20), (180, 80))
                 points = start + np.array([(0.0, 0.0), (reach, 0.2 * reach), (reach, 0.4 * reach)])
                 points = np.clip(points, 1.0, (199.0, 99.0))
-                clicks = [editing.ClickFloor(ME, (float(x), float(y)), REACH) for x, y in points]
-                return done(*clicks, FinishShape(ME))
+                clicks = [ClickFloor((float(x), float(y)), REACH) for x, y in points]
+                return done(*clicks, FinishShape())
 
             return draw
 
         def erase() -> float:
-            done(editing.ChooseTool(ME, Tool.ERASE))
+            done(editing.ChooseTool(Tool.ERASE))
             x, y = (float(value) for value in rng.uniform((5, 5), (170, 70)))
             area = ((x, y), (x + 25.0, y + 20.0))
-            return done(*(editing.DragFloor(ME, phase, *area, REACH) for phase in ("start", "end")))
+            return done(*(DragFloor(phase, *area, REACH) for phase in ("start", "end")))
 
         def undone() -> float:
-            return done(actions.Undo(ME))
+            return done(actions.Undo())
 
         print("hall of 4000 x 2000 cells")
         gestures = {
@@ -97,12 +102,12 @@ class Reading:
     def __init__(self) -> None:
         self._reports: queue.SimpleQueue[JobReport] = queue.SimpleQueue()
         self._jobs = Jobs(self._reports.put)
-        self._work = MapWork(self._jobs)
+        self._service = MapService(Context(STATE, lambda _message: None, time.monotonic, self._jobs))
 
-    def run(self, effect: MapEffect, stop_after_s: float | None = None) -> tuple[JobReport, float, float, int]:
+    def run(self, effect: Effect, stop_after_s: float | None = None) -> tuple[JobReport, float, float, int]:
         """Do something; returns its last report, the time it took, that from the stop to the end, and reports."""
         begun = time.perf_counter()
-        self._work.do(effect)
+        self._service.carry_out(effect, STATE, PROGRAM)
         stopped, count = None, 0
         while True:
             try:
@@ -117,22 +122,22 @@ class Reading:
             now = time.perf_counter()
             if stop_after_s is not None and stopped is None and now - begun > stop_after_s:
                 stopped = now
-                self._work.do(StopMapWork())
+                self._service.carry_out(StopMapWork(), STATE, PROGRAM)
 
 
 def load(path: Path) -> bool:
     """Print what reading and drawing a file cost, and how soon it stops when it is told to; whether that is soon."""
     reading = Reading()
     file = MapFile(path)
-    report, took, _, count = reading.run(ReadMapFile(ME, file))
+    report, took, _, count = reading.run(ReadMapFile(file))
     opened = report.result
     if not isinstance(opened, MapOpened):
         print(f"  {path.name}: {report.job.error or opened}")
         return False
-    _, drawing, _, _ = reading.run(DrawMap(ME, MapDraft(file, opened.read)))
+    _, drawing, _, _ = reading.run(DrawMap(MapDraft(file, opened.read)))
     stops: list[float] = []
     for share in (0.05, 0.3, 0.6, 0.9):
-        stopped, _, waited, _ = reading.run(ReadMapFile(ME, file), stop_after_s=share * took)
+        stopped, _, waited, _ = reading.run(ReadMapFile(file), stop_after_s=share * took)
         if stopped.job.state is JobState.CANCELLED:
             stops.append(waited)
     megabytes = path.stat().st_size / 1e6

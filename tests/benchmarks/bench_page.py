@@ -15,9 +15,10 @@ import viser
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
-from commission.app.base.actions import Repeat, VirtualDrive
 from commission.app.base.server import start_server
 from commission.app.launch import open_page
+from commission.app.run.actions import Repeat, VirtualDrive
+from commission.app.run.service import RunService
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
 
@@ -44,7 +45,7 @@ def main(seconds: float = 20.0) -> None:
     server = start_server("127.0.0.1", 0)
     runtime = open_page(server, project, source=VirtualDrive(project.routes[0].name))
     runtime.post(Repeat(repeat=True))
-    while runtime.session is None or runtime.session.cycles == 0:
+    while runtime.service(RunService).session is None or runtime.service(RunService).session.cycles == 0:
         time.sleep(0.1)
     received: multiprocessing.Queue[int] = multiprocessing.get_context("spawn").Queue()
     client = multiprocessing.get_context("spawn").Process(
@@ -52,10 +53,10 @@ def main(seconds: float = 20.0) -> None:
     )
     client.start()
     time.sleep(4.0)
-    cycles, cpu, wall = runtime.session.cycles, time.process_time(), time.monotonic()
+    cycles, cpu, wall = runtime.service(RunService).session.cycles, time.process_time(), time.monotonic()
     time.sleep(seconds)
     cpu, wall = time.process_time() - cpu, time.monotonic() - wall
-    cycles = runtime.session.cycles - cycles
+    cycles = runtime.service(RunService).session.cycles - cycles
     print(f"{project.scanner.beam_count} beams, {cycles / wall:.1f} scans/s, {received.get() / wall / 1e6:.1f} MB/s")
     print(f"page: {100 * cpu / wall:.1f} % of one core (required: less than {100 * REQUIRED:.0f} %)")
     client.join()

@@ -14,21 +14,22 @@ from collections.abc import Callable
 import numpy as np
 from playwright.sync_api import sync_playwright
 
-from commission.app.base.jobs import Jobs
+from commission.app.base.actions import DragFloor, Envelope, Sender
 from commission.app.base.server import start_server
 from commission.app.base.state import AppState
 from commission.app.coverage.scale import picture
-from commission.app.editing.actions import DragFloor, Join
 from commission.app.editing.editor import Drag, Editor, Grab
 from commission.app.launch import open_page
 from commission.app.plan.actions import SetPlan
 from commission.app.plan.planner import Planner
 from commission.app.plan.settings import Figure, PlanSettings
+from commission.app.runtime import BrowserCame
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
 from commission.planning.dilution import Heading
 from commission.site.project import Project
 from commission.site.reflectors import Reflector
+from tests.app.owning import Owner
 from tests.browser.page import CHROMIUM, FLAGS, WIDE, OpenPage
 
 REQUIRED = 5.0
@@ -66,26 +67,21 @@ def central(project: Project) -> Reflector:
 
 def measure_server(project: Project, settings: PlanSettings) -> None:
     """Print how long the planner takes from a place of a drag to the picture."""
-    reports: list[object] = []
-    jobs = Jobs(reports.append)
-    planner = Planner(jobs, jobs)
-    state = AppState(project, project, plan=settings)
-    planner.follow(state)
-    until(lambda: not jobs.unfinished())
-    for report in reports:
-        planner.hear(report)  # type: ignore[arg-type]
-    planner.follow(state)
+    state = AppState(project, project).joined(1).with_part(settings)
+    owner = Owner(Planner, state)
+    owner.settle(state)
+    planner = owner.service
     reflector, times = central(project), []
     for number in range(DRAGS):
         drag = Drag(Grab.REFLECTORS, (0.0, 0.0), (0.0, 0.05 * (number + 1)))
-        state = state.with_editor(1, Editor(selected=(reflector.id,), drag=drag))
+        state = state.with_browser(1, Editor(selected=(reflector.id,), drag=drag))
         start = time.perf_counter()
         planner.follow(state)
         heat = planner.view.heat
         assert heat is not None
         picture(heat.classes, heat.scale, 0.8)
         times.append(time.perf_counter() - start)
-    jobs.close()
+    owner.close()
     median, worst = 1000 * np.median(times), 1000 * max(times)
     name = f"{settings.figure.value}, {settings.heading.value}"
     print(f"server, {name:>32}: {median:6.1f} ms (median), {worst:.1f} ms (worst) of {1000 / REQUIRED:.0f} ms")
@@ -100,7 +96,7 @@ def measure_browser(project: Project, size: tuple[int, int]) -> None:
         page = OpenPage(browser, server, size)
         page.open(nodes=["/floor/map", "/reflectors/marks"])
         runtime.post(SetPlan("figure", Figure.POSITION_DOP.value))
-        until(lambda: runtime.plan.heat is not None)
+        until(lambda: runtime.service(Planner).view.heat is not None)
         page.wait_until_drawn(["/plan/heat"])
         reflector = central(project)
         x, y = page.pixel_of((reflector.x, reflector.y))
@@ -112,7 +108,9 @@ def measure_browser(project: Project, size: tuple[int, int]) -> None:
             step += 1
             page.page.mouse.move(x + 2 * step % 120, y + step % 60)
             page.page.wait_for_timeout(40)
-            views[id(runtime.plan.heat)] = runtime.plan.heat  # kept, so that no other one gets its number
+            views[id(runtime.service(Planner).view.heat)] = runtime.service(
+                Planner
+            ).view.heat  # kept, so that no other one gets its number
         seconds = time.monotonic() - start
         page.page.mouse.up()
         maps, frames = page.page.evaluate("[window.__maps.size, window.__frames]")
@@ -131,18 +129,18 @@ def measure_runtime(project: Project) -> float:
     """Drag without a browser, at the rate of a hand; print and return the heatmaps per second that are drawn."""
     server = start_server("127.0.0.1", 0)
     runtime = open_page(server, project)
-    runtime.post(Join(1))
+    runtime.post(BrowserCame(1))
     runtime.post(SetPlan("figure", Figure.POSITION_DOP.value))
-    until(lambda: runtime.plan.heat is not None)
+    until(lambda: runtime.service(Planner).view.heat is not None)
     reflector, seen = central(project), set[int]()
     place, keep, start, step = (reflector.x, reflector.y), [], time.monotonic(), 0
     cpu = time.process_time()
     while time.monotonic() - start < SECONDS:
         now = (place[0] + 0.05 * (step % 40), place[1])
-        runtime.post(DragFloor(1, "update" if step else "start", place, now, 0.3))
+        runtime.post(Envelope(DragFloor("update" if step else "start", place, now, 0.3), Sender(1)))
         time.sleep(0.05)
         step += 1
-        heat = runtime.plan.heat
+        heat = runtime.service(Planner).view.heat
         if id(heat) not in seen:
             seen.add(id(heat))
             keep.append(heat)  # kept, so that no other one gets its number

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from commission.app.base import actions
+from commission.app.base.actions import ClickFloor, DragFloor
 from commission.app.editing import actions as editing
 from commission.app.editing.editor import Tool
 from commission.site.editing import reflectors as edits
@@ -21,7 +22,7 @@ from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
-from tests.benchmarks.edited_page import ME, EditedPage
+from tests.benchmarks.edited_page import EditedPage
 
 REACH, ROUNDS = 0.5, 10
 
@@ -48,20 +49,18 @@ def main() -> None:
         def drag() -> float:
             r = page.state.project.reflectors.reflectors[7]
             start, end = (r.x, r.y), (r.x + 1.0, r.y + 1.0)
-            return done(
-                editing.DragFloor(ME, "start", start, start, REACH), editing.DragFloor(ME, "end", start, end, REACH)
-            )
+            return done(DragFloor("start", start, start, REACH), DragFloor("end", start, end, REACH))
 
         def place() -> float:
-            done(editing.ChooseTool(ME, Tool.PLACE))
-            spent = done(editing.ClickFloor(ME, (50.0, 0.5), REACH))
-            done(editing.ChooseTool(ME, Tool.SELECT))
+            done(editing.ChooseTool(Tool.PLACE))
+            spent = done(ClickFloor((50.0, 0.5), REACH))
+            done(editing.ChooseTool(Tool.SELECT))
             return spent
 
         gestures: dict[str, Callable[[], float]] = {
             "place": place,
             "drag": drag,
-            "undo": lambda: done(actions.Undo(ME)),
+            "undo": lambda: done(actions.Undo()),
         }
         for gesture, run in gestures.items():
             spent = [run() * 1e3 for _ in range(ROUNDS)]

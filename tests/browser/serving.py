@@ -6,10 +6,15 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from commission.app.base.actions import Source
 from commission.app.base.server import start_server
 from commission.app.base.state import AppState
+from commission.app.editing.editor import Editor, editor_of
 from commission.app.launch import open_page
+from commission.app.plan.planner import Planner
+from commission.app.plan.view import PlanView
+from commission.app.run.actions import Source
+from commission.app.run.service import RunService
+from commission.app.run.session import Session
 from commission.app.runtime import Runtime
 from commission.site.project import Project
 
@@ -28,11 +33,25 @@ class Served:
         """What the owner thread has made of all that happened."""
         return self.runtime.state
 
+    def editor(self, browser: int) -> Editor:
+        """How a browser edits."""
+        return editor_of(self.state, browser)
+
+    @property
+    def plan(self) -> PlanView:
+        """What the step Plan has found."""
+        return self.runtime.service(Planner).view
+
+    @property
+    def session(self) -> Session | None:
+        """The run."""
+        return self.runtime.service(RunService).session
+
     def until(self, reached: Callable[[], bool], seconds: float = 120.0) -> None:
         """Wait until something has happened on the server; compilation may be included."""
         end = time.monotonic() + seconds
         while not reached():
-            assert time.monotonic() < end, f"it did not happen within {seconds} s: {self.state.problems}"
+            assert time.monotonic() < end, f"it did not happen within {seconds} s: {self.state.faults}"
             time.sleep(0.02)
 
     def close(self) -> None:

@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from commission.app.editing.editor import Tool
+from commission.app.floor_map.draft import MapLoading
 from commission.io.map_server import read_floor_map, write_floor_map
 from commission.io.project_file import load_project, open_project
 from commission.site.floor_map import OCCUPIED, FloorMap
@@ -43,7 +44,7 @@ def site(tmp_path: Path) -> Iterator[NewSite]:
 
 def choose(site: NewSite, page: OpenPage, client: int, tool: Tool) -> None:
     page.press(tool.value)
-    site.until(lambda: site.state.editors[client].tool is tool)
+    site.until(lambda: site.editor(client).tool is tool)
 
 
 def click(site: NewSite, page: OpenPage, client: int, place: tuple[float, float], points: Callable[[], int]) -> None:
@@ -83,7 +84,7 @@ def test_a_real_map_is_loaded_into_an_empty_folder_drawn_on_saved_and_read_again
     page.wait_until_drawn(FLOOR)
     choose(site, page, client, Tool.WALL)
     for place in ((-10.0, 10.0), (0.0, 15.0), (6.0, 15.0)):
-        click(site, page, client, place, lambda: len(site.state.editors[client].draft))
+        click(site, page, client, place, lambda: len(site.editor(client).draft))
     page.page.keyboard.press("Enter")
     site.until(lambda: site.state.undo[-1].name == "draw wall")
     assert site.floor_map.occupancy().is_occupied([(-5.0, 12.5), (3.0, 15.0)]).all()
@@ -93,7 +94,7 @@ def test_a_real_map_is_loaded_into_an_empty_folder_drawn_on_saved_and_read_again
     page.wait_for_text("saved ")
     assert load_project(site.folder) == site.state.project
     assert page.errors == []
-    assert site.state.problems == ()
+    assert site.state.faults == ()
 
 
 def test_a_map_and_its_image_are_uploaded_and_hostile_files_are_one_line(
@@ -134,18 +135,22 @@ def test_an_image_is_placed_by_clicks_and_the_map_moved_onto_the_plants_coordina
     page = window(site.server)
     client = page.open().client_id
     upload(page, tmp_path / "plan.png")
-    site.until(lambda: site.state.mapping.draft is not None)
+    site.until(lambda: site.state.part(MapLoading).draft is not None)
     page.wait_until_drawn(("/draft/image",))
-    draft = site.state.mapping.draft
+    draft = site.state.part(MapLoading).draft
     assert draft is not None
 
     def clicked() -> int:
-        return 0 if site.state.mapping.draft is None else len(site.state.mapping.draft.pixels)
+        return 0 if site.state.part(MapLoading).draft is None else len(site.state.part(MapLoading).draft.pixels)
 
     for pixel in ((50.0, 150.0), (350.0, 150.0)):
         click(site, page, client, draft.stage.place_of(pixel), clicked)
     page.fill("A to B [m]", "30")
-    site.until(lambda: site.state.mapping.draft is not None and site.state.mapping.draft.options.distance == 30.0)
+    site.until(
+        lambda: (
+            site.state.part(MapLoading).draft is not None and site.state.part(MapLoading).draft.options.distance == 30.0
+        )
+    )
     page.press("Load as the floor map")
     site.until(lambda: site.state.project.floor_map is not None)
     # A click is good for a pixel or two of the screen, which shows 400 pixels of the image on 900 of its own.
@@ -154,8 +159,8 @@ def test_an_image_is_placed_by_clicks_and_the_map_moved_onto_the_plants_coordina
     page.wait_until_drawn(FLOOR)
     choose(site, page, client, Tool.ALIGN)
     for place in ((0.0, 0.0), (20.0, 0.0)):
-        click(site, page, client, place, lambda: len(site.state.editors[client].alignment.points))
-    points = site.state.editors[client].alignment.points
+        click(site, page, client, place, lambda: len(site.editor(client).alignment.points))
+    points = site.editor(client).alignment.points
     origin = site.floor_map.origin
     distance = points[1].at[0] - points[0].at[0]
     for label, place in (("A x, y [m]", (100.0, 50.0)), ("B x, y [m]", (100.0, 50.0 + distance))):
@@ -163,7 +168,7 @@ def test_an_image_is_placed_by_clicks_and_the_map_moved_onto_the_plants_coordina
             field.fill(f"{value:.3f}")
             field.press("Tab")
     plants = ((100.0, 50.0), (100.0, round(50.0 + distance, 3)))
-    site.until(lambda: tuple(p.plant for p in site.state.editors[client].alignment.points) == plants)
+    site.until(lambda: tuple(p.plant for p in site.editor(client).alignment.points) == plants)
     page.press("Move and turn")
     site.until(lambda: site.state.undo[-1].name == "align to A and B")
     (x, y), (dx, dy) = points[0].at, (origin[0] - points[0].at[0], origin[1] - points[0].at[1])
@@ -174,4 +179,4 @@ def test_an_image_is_placed_by_clicks_and_the_map_moved_onto_the_plants_coordina
     np.testing.assert_allclose(site.floor_map.origin[:2], expected, atol=0.01)
     page.wait_until_drawn(FLOOR)
     assert page.errors == []
-    assert site.state.problems == ()
+    assert site.state.faults == ()

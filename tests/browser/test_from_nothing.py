@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commission.app.base import actions
 from commission.app.editing.editor import Tool
+from commission.app.run.actions import SetSpeed
 from commission.io.project_file import load_project
 from tests.browser.page import OpenPage
 from tests.browser.test_floor_map import NewSite, choose, click
@@ -63,7 +63,7 @@ def test_a_site_is_built_from_an_empty_folder_and_a_vehicle_drives_in_it(
         assert load_project(tmp_path / "hall") == site.state.project
         drive(site, page)
         assert page.errors == []
-        assert site.state.problems == ()
+        assert site.state.faults == ()
     finally:
         site.close()
 
@@ -101,7 +101,7 @@ def place_the_reflectors(site: NewSite, page: OpenPage, client: int) -> None:
 def draw_the_route(site: NewSite, page: OpenPage, client: int) -> None:
     choose(site, page, client, Tool.ROUTE)
     for place in AROUND:
-        click(site, page, client, place, lambda: len(site.state.editors[client].draft))
+        click(site, page, client, place, lambda: len(site.editor(client).draft))
     page.press("Finish the route")
     site.until(lambda: len(site.state.project.routes) == 1)
 
@@ -109,11 +109,11 @@ def draw_the_route(site: NewSite, page: OpenPage, client: int) -> None:
 def drive(site: NewSite, page: OpenPage) -> None:
     page.open_tab("Run")
     page.press("Drive")
-    site.until(lambda: site.runtime.session is not None)
-    site.runtime.post(actions.SetSpeed(50.0))
-    site.until(lambda: site.runtime.session is not None and site.runtime.session.at_end)
+    site.until(lambda: site.session is not None)
+    site.runtime.post(SetSpeed(50.0))
+    site.until(lambda: site.session is not None and site.session.at_end)
     page.wait_for_text("OPERATIONAL")
-    session = site.runtime.session
+    session = site.session
     assert session is not None
     series = session.view().series
     assert len(series) > 500

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from playwright.sync_api import Browser
 
-from commission.app.base import actions
-from commission.app.base.actions import VirtualDrive
 from commission.app.base.panel import clock
-from commission.app.base.reducer import with_parameter
+from commission.app.run.actions import Cover, Play, Restart, Seek, SetSpeed, VirtualDrive
 from commission.app.run.session import Session
+from commission.app.run.state import RunState
+from commission.app.tune.actions import ResetParameters
+from commission.app.tune.reducer import with_parameter
 from commission.site.project import Project
 from tests.app.sites import room
 from tests.browser.page import SMALL, OpenPage
@@ -27,11 +28,11 @@ class OpenRun(Served):
 
     def __init__(self, project: Project) -> None:
         super().__init__(project, source=VirtualDrive(project.routes[0].name))
-        self.until(lambda: self.runtime.session is not None)
+        self.until(lambda: super(OpenRun, self).session is not None)
 
     @property
     def session(self) -> Session:
-        session = self.runtime.session
+        session = super().session
         assert session is not None
         return session
 
@@ -58,11 +59,11 @@ def page(browser: Browser, run: OpenRun) -> Iterator[OpenPage]:
 @pytest.fixture(autouse=True)
 def from_the_start(run: OpenRun, page: OpenPage) -> None:
     """Each test finds the drive playing from its start with the saved parameters."""
-    run.runtime.post(actions.ResetParameters())
-    run.runtime.post(actions.Cover(covered=False))
-    run.runtime.post(actions.Restart())
-    run.runtime.post(actions.SetSpeed(1.0))
-    run.runtime.post(actions.Play(playing=True))
+    run.runtime.post(ResetParameters())
+    run.runtime.post(Cover(covered=False))
+    run.runtime.post(Restart())
+    run.runtime.post(SetSpeed(1.0))
+    run.runtime.post(Play(playing=True))
 
 
 def wait_for_badge(page: OpenPage, word: str) -> None:
@@ -71,7 +72,7 @@ def wait_for_badge(page: OpenPage, word: str) -> None:
 
 def settled_clock(run: OpenRun) -> str:
     """Time that every browser shows once the run is paused."""
-    run.until(lambda: not run.runtime.state.playing and run.session.seeking is None)
+    run.until(lambda: not run.runtime.state.part(RunState).playing and run.session.seeking is None)
     return clock(run.session.view().time)
 
 
@@ -90,7 +91,7 @@ def test_the_page_shows_a_driving_vehicle_its_badge_and_every_panel(run: OpenRun
         page.wait_for_text(text)
     assert page.page.locator(".uplot").count() == 6
     assert page.errors == []
-    assert run.runtime.state.problems == ()
+    assert run.runtime.state.faults == ()
 
 
 def test_the_badge_turns_red_when_reflectors_are_covered_and_back(run: OpenRun, page: OpenPage) -> None:
@@ -104,9 +105,9 @@ def test_the_badge_turns_red_when_reflectors_are_covered_and_back(run: OpenRun, 
 
 
 def test_the_gate_slider_widens_the_validation_areas(run: OpenRun, page: OpenPage) -> None:
-    run.runtime.post(actions.Play(playing=False))
+    run.runtime.post(Play(playing=False))
     # Some way from the start, where the initial uncertainty no longer shrinks from scan to scan.
-    run.runtime.post(actions.Seek(2.0))
+    run.runtime.post(Seek(2.0))
     run.until(lambda: run.session.seeking is None and run.session.view().time == pytest.approx(2.0))
     before = np.ptp(run.session.view().gates, axis=1).mean()
     page.open_tab("Tune")
@@ -121,7 +122,7 @@ def test_the_gate_slider_widens_the_validation_areas(run: OpenRun, page: OpenPag
 
 def test_the_time_line_seeks_and_play_and_pause_obey(run: OpenRun, page: OpenPage) -> None:
     page.press("Pause")
-    run.until(lambda: not run.runtime.state.playing)
+    run.until(lambda: not run.runtime.state.part(RunState).playing)
     track = page.page.locator("div:has(> div > .c-bottom) .mantine-Slider-track").first.bounding_box()
     assert track is not None
     page.page.mouse.click(track["x"] + 0.5 * track["width"], track["y"] + 0.5 * track["height"])
@@ -141,7 +142,7 @@ def test_two_browsers_see_the_same_run_each_in_its_own_view(
     other.wait_until_drawn(("/floor/walls", "/vehicle/body", "/reflectors/bodies/cylinder"))
     assert not one.page.evaluate("'/floor/walls' in window.__viserMutable.nodeRefFromName")
     one.press("Pause")
-    run.until(lambda: not run.runtime.state.playing)
+    run.until(lambda: not run.runtime.state.part(RunState).playing)
     other.page.wait_for_function(
         "text => document.querySelector('.c-clock b').innerText === text", arg=settled_clock(run)
     )
@@ -164,12 +165,12 @@ def test_a_recording_that_is_none_gives_one_clear_line_on_the_page(run: OpenRun,
     page.open_tab("Run")
     page.fill("Folder", "/no/such <b>recording</b>")
     page.press("Open")
-    run.until(lambda: bool(run.runtime.state.problems))
+    run.until(lambda: bool(run.runtime.state.faults))
     page.open_tab("Problems")
     page.wait_for_text("/no/such <b>recording</b>")
-    assert "\n" not in run.runtime.state.problems[-1]
+    assert "\n" not in run.runtime.state.faults[-1]
     page.press("Clear")
-    run.until(lambda: not run.runtime.state.problems)
+    run.until(lambda: not run.runtime.state.faults)
 
 
 def test_folded_plots_leave_their_room_to_the_floor_which_is_fitted_anew(run: OpenRun, page: OpenPage) -> None:

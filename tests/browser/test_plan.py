@@ -32,7 +32,7 @@ class OpenSite(Served):
 
     @property
     def heat(self) -> HeatView | None:
-        return self.runtime.plan.heat
+        return self.plan.heat
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def test_a_heatmap_is_switched_on_seen_and_read(page: OpenPage, site: OpenSite) 
     assert nearest == int(heat.classes.ravel()[index]) - FIRST, (seen, ramp.tolist())
     page.click_at(spot)
     page.wait_for_text("Clicked at x, y")
-    reading = site.runtime.plan.reading
+    reading = site.plan.reading
     assert reading is not None
     assert abs(reading.place[0] - spot[0]) < 0.2
     assert abs(reading.place[1] - spot[1]) < 0.2
@@ -107,7 +107,7 @@ def test_a_route_is_predicted_over_its_metres(page: OpenPage, site: OpenSite) ->
     page.fold("Along a route")
     page.choose("Route", site.project.routes[0].name)
     page.wait_for_text("Supervisor stops")
-    assert site.runtime.plan.route is not None
+    assert site.plan.route is not None
     assert page.errors == []
 
 
@@ -125,7 +125,7 @@ def test_a_layout_is_suggested_accepted_and_taken_back(page: OpenPage, site: Ope
     project = site.runtime.state.project
     page.press("Suggest reflectors")
     page.wait_for_text("Fewest possible")
-    found = site.runtime.plan.layout
+    found = site.plan.layout
     assert found is not None
     placement = found.suggestion.placement
     assert 0 < placement.at_least <= placement.added < len(whole.reflectors)
@@ -135,7 +135,7 @@ def test_a_layout_is_suggested_accepted_and_taken_back(page: OpenPage, site: Ope
     site.until(lambda: site.runtime.state.project is not project)
     assert site.runtime.state.project.reflectors == placement.reflectors
     assert site.runtime.state.undo[-1].name == ACCEPT
-    site.until(lambda: site.runtime.plan.layout is None)
+    site.until(lambda: site.plan.layout is None)
     site.until(lambda: site.heat is not None and site.heat is not before and not site.heat.outdated)
     page.page.get_by_role("button", name="Undo").first.click()
     site.until(lambda: site.runtime.state.project is project)

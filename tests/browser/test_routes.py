@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from commission.app.editing.editor import Tool
+from commission.app.problems.view import inspection_of
 from commission.io.project_file import load_project, save_project
 from commission.studies.violations import ViolationKind
 from tests.app.sites import room
@@ -41,7 +42,7 @@ def test_a_station_is_placed_typed_dragged_and_seen_by_another_browser(
     client = page.open(nodes=NODES).client_id
     theirs = other.open(nodes=NODES).client_id
     page.press(Tool.STATION.value)
-    site.until(lambda: site.state.editors[client].tool is Tool.STATION)
+    site.until(lambda: site.editor(client).tool is Tool.STATION)
     page.click_at((3.0, 2.1))
     site.until(lambda: len(site.state.project.stations) == 1)
     # It stands on the route, which passes 0.1 m below the click, and looks along it.
@@ -52,8 +53,8 @@ def test_a_station_is_placed_typed_dragged_and_seen_by_another_browser(
     assert abs(station.heading) < math.radians(30.0)
     label = f"/station_names/{station.name.encode().hex()}"
     other.wait_until_drawn((label,))
-    assert site.state.editors[theirs].station == ""
-    assert site.state.editors[theirs].tool is Tool.SELECT
+    assert site.editor(theirs).station == ""
+    assert site.editor(theirs).tool is Tool.SELECT
     other.open_tab("Routes")
     other.wait_for_text(f"{station.name}   100 mm")
     assert other.errors == []
@@ -70,7 +71,7 @@ def test_a_station_is_placed_typed_dragged_and_seen_by_another_browser(
     page.open_tab("Routes")
     page.wait_for_text("Dock <b>1</b>   12 mm")
     assert page.errors == []
-    assert site.state.problems == ()
+    assert site.state.faults == ()
 
 
 def test_a_route_that_is_bent_into_a_wall_is_marked_plotted_and_found_from_its_problem(
@@ -81,19 +82,19 @@ def test_a_route_that_is_bent_into_a_wall_is_marked_plotted_and_found_from_its_p
     page.open_tab("Route")
     page.wait_for_text("Select a route on the floor")
     page.click_at((4.0, 2.1))
-    site.until(lambda: site.state.editors[client].point is not None)
+    site.until(lambda: site.editor(client).point is not None)
     page.wait_for_text("nothing violated")
     assert page.page.locator(".uplot:visible").count() == 3
     # The end of the route, onto the pillar that begins at x 7.5 m, y 3.5 m.
     page.drag((6.0, 3.0), (7.7, 3.7))
-    site.until(lambda: ViolationKind.WALL in {v.kind for v in site.runtime.view().violations})
+    site.until(lambda: ViolationKind.WALL in {v.kind for v in inspection_of(site.runtime.view()).violations})
     page.wait_for_text("cuts walls")
     page.page.keyboard.press("Escape")
-    site.until(lambda: site.state.editors[client].point is None)
+    site.until(lambda: site.editor(client).point is None)
     page.wait_for_text("Select a route on the floor")
     page.open_tab("Problems")
     page.page.get_by_role("button", name="cuts a wall").first.click()
-    site.until(lambda: site.state.editors[client].point is not None)
+    site.until(lambda: site.editor(client).point is not None)
     page.page.keyboard.press("Control+z")
-    site.until(lambda: site.runtime.view().violations == ())
+    site.until(lambda: inspection_of(site.runtime.view()).violations == ())
     assert page.errors == []

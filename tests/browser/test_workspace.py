@@ -40,7 +40,7 @@ def site(tmp_path: Path) -> Iterator[OpenSite]:
 
 def choose(site: OpenSite, page: OpenPage, client: int, tool: Tool) -> None:
     page.press(tool.value)
-    site.until(lambda: site.state.editors[client].tool is tool)
+    site.until(lambda: site.editor(client).tool is tool)
 
 
 def test_reflectors_are_placed_dragged_undone_redone_and_saved(site: OpenSite, window: Callable[..., OpenPage]) -> None:
@@ -76,7 +76,7 @@ def test_reflectors_are_placed_dragged_undone_redone_and_saved(site: OpenSite, w
     page.wait_for_text("saved ")
     assert load_project(site.folder) == moved
     assert page.errors == []
-    assert site.state.problems == ()
+    assert site.state.faults == ()
 
 
 def test_typed_values_change_a_reflector_and_another_browser_sees_it(
@@ -86,13 +86,13 @@ def test_typed_values_change_a_reflector_and_another_browser_sees_it(
     client = page.open(nodes=NODES).client_id
     theirs = other.open(nodes=NODES).client_id
     page.click_at(site.centers[0])
-    site.until(lambda: site.state.editors[client].selected == ("R1",))
-    assert site.state.editors[theirs].selected == ()
+    site.until(lambda: site.editor(client).selected == ("R1",))
+    assert site.editor(theirs).selected == ()
     page.fill("Radius [mm]", "35")
     site.until(lambda: site.state.project.reflectors.radii[0] == 0.035)
     other.wait_for_text("Undo set radius of R1")
     page.click_at((6.0, 6.5))
-    site.until(lambda: site.state.editors[client].selected == ())
+    site.until(lambda: site.editor(client).selected == ())
     choose(site, page, client, Tool.MEASURE)
     page.page.keyboard.press("Escape")
-    site.until(lambda: site.state.editors[client].tool is Tool.SELECT)
+    site.until(lambda: site.editor(client).tool is Tool.SELECT)

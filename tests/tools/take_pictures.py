@@ -16,11 +16,13 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, sync_playwright
 
-from commission.app.base import actions
-from commission.app.base.actions import VirtualDrive
+from commission.app.base.actions import Envelope, Sender
 from commission.app.editing.actions import SelectReflectors
-from commission.app.editing.editor import Tool
+from commission.app.editing.editor import Tool, editors_of
 from commission.app.plan.actions import SetLayout, SetPlan
+from commission.app.plan.planner import Planner
+from commission.app.run.actions import Cover, Play, Seek, VirtualDrive
+from commission.app.run.service import RunService
 from commission.app.runtime import Runtime
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
@@ -77,17 +79,17 @@ def covered(page: OpenPage, runtime: Runtime) -> None:
     """Nothing has been seen for a while."""
     page.open_tab("Run")
     page.open_tab("Layers")
-    runtime.post(actions.Seek(5.0))
+    runtime.post(Seek(5.0))
     until(lambda: _is_at(runtime, 5.0))
-    runtime.post(actions.Cover(covered=True))
-    runtime.post(actions.Seek(30.0))
+    runtime.post(Cover(covered=True))
+    runtime.post(Seek(30.0))
 
 
 def selected(page: OpenPage, runtime: Runtime) -> None:
     """One reflector is selected."""
     reflector = runtime.state.project.reflectors.reflectors[4]
     page.click_at((reflector.x, reflector.y))
-    until(lambda: any(editor.selected for editor in runtime.state.editors.values()))
+    until(lambda: any(editor.selected for editor in editors_of(runtime.state)))
 
 
 def on_route(page: OpenPage, runtime: Runtime) -> None:
@@ -95,24 +97,24 @@ def on_route(page: OpenPage, runtime: Runtime) -> None:
     selected(page, runtime)
     point = runtime.state.project.routes[1].segments[0].control_points[1]
     page.click_at((float(point[0]), float(point[1])))
-    until(lambda: any(editor.point for editor in runtime.state.editors.values()))
+    until(lambda: any(editor.point for editor in editors_of(runtime.state)))
 
 
 def measured(page: OpenPage, runtime: Runtime) -> None:
     """A distance has been measured."""
     page.press(Tool.MEASURE.value)
-    until(lambda: any(editor.tool is Tool.MEASURE for editor in runtime.state.editors.values()))
+    until(lambda: any(editor.tool is Tool.MEASURE for editor in editors_of(runtime.state)))
     first, second = runtime.state.project.reflectors.reflectors[:2]
     for reflector in (first, second):
         page.click_at((reflector.x, reflector.y))
-    until(lambda: any(len(editor.measured) == 2 for editor in runtime.state.editors.values()))
+    until(lambda: any(len(editor.measured) == 2 for editor in editors_of(runtime.state)))
 
 
 def heatmap(page: OpenPage, runtime: Runtime) -> None:
     """The position error all over the floor."""
     page.open_tab("Plan")
     page.choose("Show", "Position error, 1σ [mm]")
-    until(lambda: runtime.plan.heat is not None)
+    until(lambda: runtime.service(Planner).view.heat is not None)
 
 
 def predicted(page: OpenPage, runtime: Runtime) -> None:
@@ -120,7 +122,7 @@ def predicted(page: OpenPage, runtime: Runtime) -> None:
     page.open_tab("Plan")
     page.fold("Along a route")
     page.choose("Route", runtime.state.project.routes[1].name)
-    until(lambda: runtime.plan.route is not None)
+    until(lambda: runtime.service(Planner).view.route is not None)
 
 
 def suggested(page: OpenPage, runtime: Runtime) -> None:
@@ -130,7 +132,7 @@ def suggested(page: OpenPage, runtime: Runtime) -> None:
     page.fold("Suggested layout")
     runtime.post(SetLayout("extend", value=False))
     page.press("Suggest reflectors")
-    until(lambda: runtime.plan.layout is not None)
+    until(lambda: runtime.service(Planner).view.layout is not None)
 
 
 def ambiguous(page: OpenPage, runtime: Runtime) -> None:
@@ -139,7 +141,7 @@ def ambiguous(page: OpenPage, runtime: Runtime) -> None:
     page.fold("Heatmap of the floor")
     page.fold("Ambiguous places")
     page.press("Find ambiguous places")
-    until(lambda: runtime.plan.cold_start is not None)
+    until(lambda: runtime.service(Planner).view.cold_start is not None)
 
 
 def along(page: OpenPage, runtime: Runtime) -> None:
@@ -159,10 +161,10 @@ def files(page: OpenPage, _runtime: Runtime) -> None:
 def drawing(page: OpenPage, runtime: Runtime) -> None:
     """An obstacle is being drawn."""
     page.press(Tool.OBSTACLE.value)
-    until(lambda: any(editor.tool is Tool.OBSTACLE for editor in runtime.state.editors.values()))
+    until(lambda: any(editor.tool is Tool.OBSTACLE for editor in editors_of(runtime.state)))
     for count, place in enumerate(((9.0, 4.0), (11.0, 4.0), (10.0, 5.5)), start=1):
         page.click_at(place)
-        until(lambda count=count: any(len(editor.draft) == count for editor in runtime.state.editors.values()))
+        until(lambda count=count: any(len(editor.draft) == count for editor in editors_of(runtime.state)))
 
 
 def failing(page: OpenPage, runtime: Runtime) -> None:
@@ -171,11 +173,16 @@ def failing(page: OpenPage, runtime: Runtime) -> None:
     page.fold("Heatmap of the floor")
     page.fold("What if one reflector fails")
     page.press("Rank reflectors")
-    until(lambda: runtime.plan.failures is not None)
-    failures = runtime.plan.failures
+    until(lambda: runtime.service(Planner).view.failures is not None)
+    failures = runtime.service(Planner).view.failures
     if failures is not None:
         runtime.post(SetPlan("failed", failures.names[0]))
-    until(lambda: runtime.plan.failures is not None and runtime.plan.failures.chosen is not None)
+    until(
+        lambda: (
+            runtime.service(Planner).view.failures is not None
+            and runtime.service(Planner).view.failures.chosen is not None
+        )
+    )
 
 
 def equipment(page: OpenPage, _runtime: Runtime) -> None:
@@ -190,7 +197,7 @@ def equipment(page: OpenPage, _runtime: Runtime) -> None:
 def at_station(page: OpenPage, runtime: Runtime) -> None:
     """A station has been placed, and is selected."""
     page.press(Tool.STATION.value)
-    until(lambda: any(editor.tool is Tool.STATION for editor in runtime.state.editors.values()))
+    until(lambda: any(editor.tool is Tool.STATION for editor in editors_of(runtime.state)))
     page.click_at((9.0, 6.5))
     until(lambda: len(runtime.state.project.stations) == 1)
     page.page.locator(".c-fold").click()
@@ -199,9 +206,8 @@ def at_station(page: OpenPage, runtime: Runtime) -> None:
 def several(page: OpenPage, runtime: Runtime) -> None:
     """Some reflectors are selected together."""
     ids = tuple(reflector.id for reflector in runtime.state.project.reflectors.reflectors[:4])
-    client = next(iter(runtime.state.editors))
-    runtime.post(SelectReflectors(client, ids))
-    until(lambda: any(editor.selected == ids for editor in runtime.state.editors.values()))
+    runtime.post(Envelope(SelectReflectors(ids), Sender(next(iter(runtime.state.browsers)))))
+    until(lambda: any(editor.selected == ids for editor in editors_of(runtime.state)))
     page.page.locator(".c-fold").click()
     page.fold("Mirror, repeat")
     page.fold("Snapping")
@@ -242,7 +248,7 @@ PICTURES = (
 
 
 def _is_at(runtime: Runtime, seconds: float) -> bool:
-    session = runtime.session
+    session = runtime.service(RunService).session
     return session is not None and session.seeking is None and session.view().time >= seconds - 0.1
 
 
@@ -251,7 +257,7 @@ def served(site: str) -> Iterator[Served]:
     """A page of a bundled site, as `commission demo` opens it."""
     project = load_project(bundled_folder("maps") / site)
     page = Served(project, source=VirtualDrive(project.routes[0].name))
-    page.until(lambda: page.runtime.session is not None)
+    page.until(lambda: page.runtime.service(RunService).session is not None)
     try:
         yield page
     finally:
@@ -264,8 +270,8 @@ def take(browser: Browser, picture: Picture, size: tuple[int, int], path: Path) 
         runtime, page = site.runtime, OpenPage(browser, site.server, size)
         page.page.set_default_timeout(60_000)
         page.open(nodes=("/floor/map", "/vehicle/outline"))
-        runtime.post(actions.Play(playing=False))
-        runtime.post(actions.Seek(picture.time))
+        runtime.post(Play(playing=False))
+        runtime.post(Seek(picture.time))
         until(lambda: _is_at(runtime, picture.time))
         picture.steps(page, runtime)
         page.page.wait_for_timeout(1500)

@@ -11,8 +11,9 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, Points, outline_segments, stroke_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.plan.view import ColdStartView, PlanView, TwinsView
+from commission.app.base.view import PageView
+from commission.app.plan.settings import PlanSettings
+from commission.app.plan.view import ColdStartView, TwinsView, plan_of
 from commission.app.run.vehicle_layer import heading_mark
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
@@ -47,6 +48,7 @@ class AmbiguityLayer(BaseLayer):
     """Ambiguous places."""
 
     name = "Ambiguous places"
+    rank = 30
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes", "vehicle")
     legend = (
         theme.Legend("a place, and what it sees", theme.FIRST_TWIN, theme.Mark.DOT),
@@ -71,12 +73,14 @@ class AmbiguityLayer(BaseLayer):
         outline = np.array(project.vehicle.outline)
         self._outline = outline * max(1.0, SMALLEST_VEHICLE * self._mark / float(np.abs(outline).max()))
 
-    def draw_plan(self, plan: PlanView, state: AppState) -> None:
+    def draw(self, view: PageView) -> None:
         """Draw what has changed."""
+        plan = plan_of(view)
+        state = view.state
         found, visible = plan.cold_start, self.name not in state.hidden
-        if (found, state.plan.opacity) != self._shown:
-            self._shown = found, state.plan.opacity
-            self._draw(found, state.plan.opacity, visible=visible)
+        if (found, state.part(PlanSettings).opacity) != self._shown:
+            self._shown = found, state.part(PlanSettings).opacity
+            self._draw(found, state.part(PlanSettings).opacity, visible=visible)
         twins = None if found is None else found.twins
         if twins is not self._twins:
             self._twins = twins
@@ -139,8 +143,9 @@ class AmbiguityLayer(BaseLayer):
             for index, (text, pose) in enumerate(zip(("here", "or here?"), twins.poses, strict=True))
         )
 
-    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - the protocol's
+    def is_used(self, view: PageView) -> bool:
         """Whether a pair is shown."""
+        plan = plan_of(view)
         return plan.cold_start is not None and plan.cold_start.twins is not None
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:

@@ -1,183 +1,76 @@
 """Everything that can happen on the page, as frozen values. Callbacks post them; nothing is done here.
 
-An action says what was asked for, in SI and radians; `reducer` decides what it means, `runtime` carries it out.
+An action says what was asked for, in SI and radians; an envelope says who asked and when. Each feature declares its own
+actions beside the handlers that say what they mean (`reduce`); here are only those that no feature owns.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
-from commission.app.editing.actions import EditAction
-from commission.app.exchange.actions import ExchangeAction
-from commission.app.floor_map.actions import MapAction
-from commission.app.plan.actions import PlanAction
-from commission.site.project import Project
-
-ParameterValue: TypeAlias = bool | int | float | str
+Point: TypeAlias = tuple[float, float]
+"""A place on the floor [m, m], map frame."""
+Phase: TypeAlias = Literal["start", "update", "end"]
 
 
-@dataclass(frozen=True, slots=True)
-class VirtualDrive:
-    """A source: a virtual AGV drives a planned route."""
+class Action:
+    """Something that was asked for, or has happened: the base of frozen dataclasses."""
 
-    route: str
-    """Name of the route."""
-    seed: int = 1
-    """Seed of everything random: the same seed gives the same drive, to the bit."""
-    people: int | None = None
-    """People walking about; none: as many as the project says."""
+    __slots__ = ()
+
+    def supersedes(self, earlier: Action) -> bool:  # noqa: ARG002 - a default
+        """Whether the same browser's action just before has no meaning any more: the newest place of a drag counts."""
+        return False
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
-    """A source: what a vehicle recorded."""
+class Sender:
+    """Who asked for something, and when."""
 
-    path: Path
-    """Folder or file of the recording."""
-
-
-Source: TypeAlias = VirtualDrive | Recording
-
-
-@dataclass(frozen=True, slots=True)
-class SetParameter:
-    """Change one tunable of the localizer."""
-
-    key: str
-    """`group.name`, as in `project.yaml`."""
-    value: ParameterValue
-    """New value, SI and radians."""
+    browser: int | None = None
+    """Number of the browser's connection; none: the program itself."""
     at: float = 0.0
-    """When it was asked for [s, any monotonic clock]: changes that follow quickly are one undo step."""
+    """When [s, any monotonic clock]: edits of one thing that follow quickly are one undo step."""
+
+
+PROGRAM = Sender()
+"""The program itself."""
 
 
 @dataclass(frozen=True, slots=True)
-class ResetParameters:
-    """Go back to the parameters of the saved project."""
+class Envelope:
+    """An action on its way to the owner thread."""
+
+    action: Action
+    """What was asked for."""
+    sender: Sender = PROGRAM
+    """Who asked, and when."""
 
 
 @dataclass(frozen=True, slots=True)
-class Undo:
+class Join(Action):
+    """A browser came."""
+
+
+@dataclass(frozen=True, slots=True)
+class Leave(Action):
+    """A browser is gone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Undo(Action):
     """Take back the last change of the project."""
 
-    client: int | None = None
-    """Number of the browser that asks; none: nobody in particular."""
-
 
 @dataclass(frozen=True, slots=True)
-class Redo:
+class Redo(Action):
     """Make the change that was taken back again."""
 
-    client: int | None = None
-    """Number of the browser that asks; none: nobody in particular."""
-
 
 @dataclass(frozen=True, slots=True)
-class Save:
-    """Write the project."""
-
-    folder: Path | None = None
-    """Where to; none: where it came from."""
-    overwrite: bool = False
-    """Whether files that somebody else has changed meanwhile are replaced."""
-
-
-@dataclass(frozen=True, slots=True)
-class ProjectSaved:
-    """The project was written."""
-
-    project: Project
-    """What was written."""
-    folder: Path
-    """Where to."""
-    time_of_day: str
-    """When, as the page shows it."""
-
-
-@dataclass(frozen=True, slots=True)
-class ChangedOnDisk:
-    """The project's files were looked at, because something has happened in their folder."""
-
-    files: tuple[str, ...]
-    """Names of those that somebody else has changed since they were read or saved; empty: none."""
-
-
-@dataclass(frozen=True, slots=True)
-class Reload:
-    """Read the project from its files again, as an edit that can be undone."""
-
-
-@dataclass(frozen=True, slots=True)
-class Reloaded:
-    """The project was read again."""
-
-    project: Project
-    """As its files are."""
-
-
-@dataclass(frozen=True, slots=True)
-class ChooseSource:
-    """Run the localizer over another drive."""
-
-    source: Source
-    """What drives."""
-
-
-@dataclass(frozen=True, slots=True)
-class Play:
-    """Start or stop the play clock."""
-
-    playing: bool | None = None
-    """Whether it runs; none: the other way round."""
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """Pause and process one more scan."""
-
-
-@dataclass(frozen=True, slots=True)
-class SetSpeed:
-    """Let the play clock run faster or slower than the vehicle's."""
-
-    factor: float
-    """1 is real time."""
-
-
-@dataclass(frozen=True, slots=True)
-class Seek:
-    """Go to a time of the drive."""
-
-    time: float
-    """Seconds after its start [s]."""
-
-
-@dataclass(frozen=True, slots=True)
-class Restart:
-    """Go back to the start, the initial pose and its uncertainty."""
-
-
-@dataclass(frozen=True, slots=True)
-class Repeat:
-    """Whether the drive starts again at its end."""
-
-    repeat: bool
-    """Start again."""
-
-
-@dataclass(frozen=True, slots=True)
-class Cover:
-    """Cover or uncover every reflector of the hall, from the next scan on."""
-
-    covered: bool
-    """Whether no reflector can be seen."""
-
-
-@dataclass(frozen=True, slots=True)
-class ShowLayer:
+class ShowLayer(Action):
     """Show or hide one drawn thing."""
 
     name: str
@@ -187,14 +80,14 @@ class ShowLayer:
 
 
 @dataclass(frozen=True, slots=True)
-class Magnify:
+class Magnify(Action):
     """Draw ellipses larger than they are."""
 
     factor: float
     """Factor; 1 is true to scale."""
 
 
-class View(StrEnum):
+class Camera(StrEnum):
     """What one browser looks at."""
 
     PLAN = "Plan"
@@ -204,27 +97,55 @@ class View(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class SetView:
-    """Change the view of one browser; the others keep theirs."""
+class SetCamera(Action):
+    """Change what one browser looks at; the others keep their view."""
 
-    client: int
-    """Number of the browser's connection."""
-    view: View
+    camera: Camera
     """What it looks at; `Fit` keeps plan or 3D, `Follow` is switched on or off."""
 
 
 @dataclass(frozen=True, slots=True)
-class RenameProject:
-    """Call the project something else."""
+class LookAt(Action):
+    """Bring a place into view."""
 
-    name: str
-    """New name."""
-    client: int | None = None
-    """Number of the browser that asks; none: nobody in particular."""
+    place: Point
+    """Where [m], map frame."""
 
 
 @dataclass(frozen=True, slots=True)
-class StopJob:
+class ClickFloor(Action):
+    """The floor was clicked."""
+
+    place: Point
+    """Where [m], map frame."""
+    reach: float
+    """How near counts as on something [m]: some pixels at the browser's zoom."""
+    add: bool = False
+    """Whether to add to the selection."""
+
+
+@dataclass(frozen=True, slots=True)
+class DragFloor(Action):
+    """The pointer is dragged over the floor."""
+
+    phase: Phase
+    """Whether the drag begins, goes on or ends."""
+    start: Point
+    """Where the drag began [m]."""
+    now: Point
+    """Where it is [m]."""
+    reach: float
+    """How near counts as on something [m]."""
+    add: bool = False
+    """Whether a rectangle adds to the selection."""
+
+    def supersedes(self, earlier: Action) -> bool:
+        """Whether the place before is passed already."""
+        return isinstance(earlier, DragFloor) and (earlier.phase, self.phase) == ("update", "update")
+
+
+@dataclass(frozen=True, slots=True)
+class StopJob(Action):
     """Stop a piece of background work; what there was before it stays."""
 
     number: int
@@ -232,8 +153,8 @@ class StopJob:
 
 
 @dataclass(frozen=True, slots=True)
-class Report:
-    """Something went wrong outside the owner thread, or is worth telling."""
+class Report(Action):
+    """Something went wrong outside the owner thread, or is good to know."""
 
     text: str
     """One line."""
@@ -242,37 +163,5 @@ class Report:
 
 
 @dataclass(frozen=True, slots=True)
-class ClearProblems:
-    """The listed problems were read."""
-
-
-Action: TypeAlias = (
-    SetParameter
-    | ResetParameters
-    | Undo
-    | Redo
-    | Save
-    | ProjectSaved
-    | ChangedOnDisk
-    | Reload
-    | Reloaded
-    | ChooseSource
-    | Play
-    | Step
-    | SetSpeed
-    | Seek
-    | Restart
-    | Repeat
-    | Cover
-    | ShowLayer
-    | Magnify
-    | SetView
-    | RenameProject
-    | StopJob
-    | Report
-    | ClearProblems
-    | EditAction
-    | MapAction
-    | PlanAction
-    | ExchangeAction
-)
+class ClearFaults(Action):
+    """The list of what went wrong was read."""

@@ -14,10 +14,9 @@ import numpy as np
 import viser
 from viser import CameraHandle, ClientHandle, SceneNodeHandle
 
-from commission.app.base.actions import View
+from commission.app.base.actions import Camera, Point
 from commission.app.base.extent import Extent
 from commission.app.base.layer import Layer
-from commission.app.base.view import RunView
 
 PLAN_FOV = 0.02
 """Vertical opening of the camera in the plan [rad]: from so far away that heights do not shift anything."""
@@ -79,32 +78,32 @@ class Cameras:
         self._views[client.client_id] = ClientView(client)
         client.camera.on_update(self._watch)
         self._furnish(self._views[client.client_id])
-        self.show(client.client_id, View.FIT)
+        self.show(client.client_id, Camera.FIT)
 
     def disconnected(self, client_id: int) -> None:
         """Forget a browser; its nodes went with it."""
         self._views.pop(client_id, None)
 
-    def show(self, client_id: int, view: View) -> None:
+    def show(self, client_id: int, wanted: Camera) -> None:
         """Change what a browser looks at; one that is gone is ignored."""
         own = self._views.get(client_id)
         if own is None:
             return
-        if view is View.FOLLOW:
+        if wanted is Camera.FOLLOW:
             own.follow = not own.follow
             if own.follow and self._target is not None and not own.three_d:
                 self._look_down(own.client, self._target, FOLLOWED_HEIGHT)
             return
         own.follow = False
-        if view is not View.FIT and own.three_d is not (view is View.THREE_D):
-            own.three_d = view is View.THREE_D
+        if wanted is not Camera.FIT and own.three_d is not (wanted is Camera.THREE_D):
+            own.three_d = wanted is Camera.THREE_D
             self._furnish(own)
         if own.three_d:
             self._look_from_the_south(own.client)
         else:
             self._fit(own)
 
-    def look_at(self, client_id: int, place: tuple[float, float]) -> None:
+    def look_at(self, client_id: int, place: Point) -> None:
         """Bring a place into the middle of a browser's view, near enough to see it."""
         own = self._views.get(client_id)
         if own is None:
@@ -135,9 +134,9 @@ class Cameras:
         for name in hidden & changed:
             self.show_layer(name, visible=False)
 
-    def follow(self, run: RunView) -> None:
-        """Move the cameras that follow the vehicle."""
-        self._target = (float(run.pose[0]), float(run.pose[1]))
+    def follow(self, place: Point) -> None:
+        """Move the cameras that follow what moves."""
+        self._target = place
         target = np.array([*self._target, 0.0])
         for own in self._views.values():
             if own.follow:

@@ -13,12 +13,20 @@ NO_POINTS: Points = np.empty((0, 3), np.float32)
 # An empty array of segments makes the browser drop the buffer's size; one of zero length, far below, draws nothing.
 NO_SEGMENTS: Points = np.full((1, 2, 3), -1000.0, np.float32)
 
+RING_POINTS = 28
+
 
 def lift(points: FloatArray, height: float) -> Points:
     """Return (N, 2) points [m] as (N, 3) at a height [m]."""
     lifted = np.full((len(points), 3), height, np.float32)
     lifted[:, :2] = points
     return lifted
+
+
+def rings(centers: FloatArray, radius: float) -> FloatArray:
+    """Return the (N, RING_POINTS, 2) outlines of circles [m]."""
+    angles = np.linspace(0.0, 2.0 * np.pi, RING_POINTS, endpoint=False)
+    return centers[:, np.newaxis, :] + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
 def outline_segments(outlines: FloatArray, height: float) -> Points:

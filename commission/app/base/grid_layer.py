@@ -35,6 +35,7 @@ class GridLayer(BaseLayer):
     """Grid and scale bar."""
 
     name = "Grid"
+    rank = 40
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
 
     def __init__(self, scene: SceneApi) -> None:

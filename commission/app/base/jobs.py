@@ -86,6 +86,11 @@ class Job:
             raise ValueError(f"fraction is {self.fraction}; expected 0 to 1")
 
     @property
+    def line(self) -> str:
+        """How it stands, in one line."""
+        return f"{self.name}{self.message and ': '}{self.message} {self.fraction:.0%}"
+
+    @property
     def has_ended(self) -> bool:
         """Whether it neither waits nor runs."""
         return self.state not in (JobState.WAITING, JobState.RUNNING)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Protocol
 
 from viser import SceneApi, SceneNodeHandle
 
-from commission.app.base.state import AppState
 from commission.app.base.theme import Legend
-from commission.app.base.view import RunView
-from commission.app.plan.view import PlanView
+from commission.app.base.view import PageView
 from commission.site.project import Project
-from commission.studies.violations import Violation
 
 
 class Layer(Protocol):
@@ -20,6 +16,8 @@ class Layer(Protocol):
 
     name: str
     """Shown beside its switch; unique."""
+    rank: int
+    """Where it stands in legend and switches: what lies lowest comes first."""
     legend: tuple[Legend, ...]
     """Its entries in the legend."""
     reads: tuple[str, ...]
@@ -28,21 +26,15 @@ class Layer(Protocol):
     def show_site(self, project: Project) -> None:
         """Draw what depends on the project alone."""
 
-    def draw(self, run: RunView, state: AppState) -> None:
-        """Draw what changes with each scan."""
+    def draw(self, view: PageView) -> None:
+        """Draw what changes with each picture; whatever has not changed costs nothing."""
 
-    def draw_slowly(self, run: RunView, state: AppState) -> None:
-        """Draw what may lag some scans behind: whatever grows with the drive."""
+    def draw_slowly(self, view: PageView) -> None:
+        """Draw what may lag some pictures behind: whatever grows with the drive."""
 
-    def draw_plan(self, plan: PlanView, state: AppState) -> None:
-        """Draw what the step Plan has found."""
-
-    def is_used(self, plan: PlanView, state: AppState) -> bool:
+    def is_used(self, view: PageView) -> bool:
         """Whether there is something that the legend has to explain."""
         ...
-
-    def draw_violations(self, violations: Sequence[Violation]) -> None:
-        """Mark where routes ask too much of the vehicle."""
 
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:
         """Add what only one browser's view needs; the caller removes it when the view changes."""
@@ -57,6 +49,7 @@ class BaseLayer:
     """A layer that draws nothing: each one overrides what it needs."""
 
     name = ""
+    rank = 0
     legend: tuple[Legend, ...] = ()
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes", "vehicle", "scanner")
 
@@ -66,21 +59,15 @@ class BaseLayer:
     def show_site(self, project: Project) -> None:
         """Draw what depends on the project alone."""
 
-    def draw(self, run: RunView, state: AppState) -> None:
-        """Draw what changes with each scan."""
+    def draw(self, view: PageView) -> None:
+        """Draw what changes with each picture."""
 
-    def draw_slowly(self, run: RunView, state: AppState) -> None:
-        """Draw what may lag some scans behind."""
+    def draw_slowly(self, view: PageView) -> None:
+        """Draw what may lag some pictures behind."""
 
-    def draw_plan(self, plan: PlanView, state: AppState) -> None:
-        """Draw what the step Plan has found."""
-
-    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - a default
+    def is_used(self, view: PageView) -> bool:  # noqa: ARG002 - a default
         """Whether there is something that the legend has to explain."""
         return True
-
-    def draw_violations(self, violations: Sequence[Violation]) -> None:
-        """Mark where routes ask too much of the vehicle."""
 
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:  # noqa: ARG002 - a default
         """Add what only one browser's view needs."""

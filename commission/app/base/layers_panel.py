@@ -52,7 +52,7 @@ class LegendPanel(BasePanel):
     def draw_slowly(self, view: PageView) -> None:
         """Explain what is drawn now, and say by how much ellipses are magnified."""
         state = view.state
-        used = [layer for layer in self._layers if layer.name not in state.hidden and layer.is_used(view.plan, state)]
+        used = [layer for layer in self._layers if layer.name not in state.hidden and layer.is_used(view)]
         shown = (state.magnify, *(layer.name for layer in used))
         if shown != self._shown:
             self._shown = shown

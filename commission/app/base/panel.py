@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import html
+import time
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol, TypeAlias
 
-from viser import GuiEvent
+from viser import CommandEvent, GuiButtonHandle, GuiEvent
 
-from commission.app.base.actions import Action
+from commission.app.base.actions import Action, Envelope, Sender
 from commission.app.base.view import PageView
 
-Post: TypeAlias = Callable[[Action], None]
+Post: TypeAlias = Callable[[Envelope], None]
 
 
 class Panel(Protocol):
@@ -34,33 +35,44 @@ class BasePanel:
         """Show what may lag some scans behind."""
 
 
-def posting(post: Post, make: Callable[[Any], Action]) -> Callable[[GuiEvent[Any]], None]:
-    """Return a callback that posts what a person asked for.
+def from_browser(action: Action, browser: int | None) -> Envelope:
+    """Return an action in the envelope of a browser that asks for it now."""
+    return Envelope(action, Sender(browser, time.monotonic()))
 
-    The server's own writes to a widget fire its callbacks too, without a client; they are nobody's wish.
+
+def posting(post: Post, make: Callable[[Any], Action]) -> Callable[[Any], None]:
+    """Return a callback that posts what a person asked for, with the browser that asked.
+
+    The server's own writes to a widget fire its callbacks too, without a client; nobody asks for anything by them.
 
     Parameters
     ----------
-    post : takes the action.
-    make : from the widget's event to the action.
+    post : takes the action in its envelope.
+    make : from the widget's event, or that of a command, to the action.
     """
 
-    def callback(event: GuiEvent[Any]) -> None:
+    def callback(event: GuiEvent[Any] | CommandEvent) -> None:
         if event.client is not None:
-            post(make(event))
+            post(from_browser(make(event), event.client.client_id))
 
     return callback
-
-
-def client_of(event: GuiEvent[Any]) -> int:
-    """Return the number of the browser whose person did something; `posting` sees to it that there is one."""
-    return -1 if event.client_id is None else event.client_id
 
 
 def write(widget: Any, value: object) -> None:
     """Show a value in an input where it is another one: nothing is sent for what is there already."""
     if widget.value != value:
         widget.value = value
+
+
+def shortened(text: str, longest: int) -> str:
+    """Return a text that has at most so many letters."""
+    return text if len(text) <= longest else text[: longest - 1] + "…"
+
+
+def write_label(button: GuiButtonHandle, text: str) -> None:
+    """Write on a button what it does not say already."""
+    if button.label != text:
+        button.label = text
 
 
 def escaped(text: object) -> str:

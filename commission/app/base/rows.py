@@ -21,17 +21,16 @@ class Rows:
     Parameters
     ----------
     gui : where the widgets are made.
-    tab : the tab or folder that the lines are at the end of.
+    tab : the tab or folder that the lines are at the end of; the list is made inside of it.
     post : takes the actions.
-    make : from a line's index and the number of the browser that clicked on it to the action.
+    make : from a line's index to the action.
     """
 
     def __init__(
-        self, gui: GuiApi, tab: GuiTabHandle | GuiFolderHandle, post: Post, make: Callable[[int, int], Action]
+        self, gui: GuiApi, tab: GuiTabHandle | GuiFolderHandle, post: Post, make: Callable[[int], Action]
     ) -> None:
         self._gui, self._tab, self._post, self._make = gui, tab, post, make
-        with tab:
-            gui.add_html(ROWS)
+        gui.add_html(ROWS)
         self._buttons: list[Any] = []
 
     def show(self, lines: Sequence[tuple[str, theme.Color]]) -> None:
@@ -53,5 +52,5 @@ class Rows:
     def _added(self, index: int) -> Any:
         """Make one more line at the end."""
         button = self._gui.add_button(" ", color=theme.LINE)
-        button.on_click(posting(self._post, lambda event: self._make(index, event.client_id)))
+        button.on_click(posting(self._post, lambda _event: self._make(index)))
         return button

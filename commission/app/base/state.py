@@ -1,6 +1,6 @@
-"""The state of the page as one frozen value: the project with its undo steps, and what the run is asked to do.
+"""The state of the page as one frozen value: the project with its undo steps, the browsers, and parts of features.
 
-No widget and no estimator: the state of the run itself lives in `session`.
+It knows no feature: each keeps its own frozen value here, found by its type. No widget, no estimator.
 """
 
 from __future__ import annotations
@@ -9,16 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from commission.app.base.actions import Source
-from commission.app.editing.editor import Editor
-from commission.app.floor_map.draft import MapLoading
-from commission.app.placement.suggestion import LayoutWish
-from commission.app.plan.settings import PlanSettings
+from commission.app.base.actions import PROGRAM, Sender
+from commission.app.base.parts import Part, Parts, part_of
 from commission.site.editing.packed_map import PackedMap
 from commission.site.project import Project
-
-SPEEDS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
-"""Factors that the play clock offers."""
 
 MAGNIFICATIONS = (1.0, 3.0, 10.0, 30.0)
 """Factors at which ellipses can be drawn."""
@@ -42,8 +36,8 @@ class Step:
     """The project; without its floor map where that is packed."""
     name: str = ""
     """What is taken back or made again by that, as its button says."""
-    client: int | None = None
-    """Number of the browser that did it; none: nobody in particular."""
+    browser: int | None = None
+    """Number of the browser that did it; none: the program itself."""
     packed: PackedMap | None = None
     """Its floor map, where that is packed."""
 
@@ -55,17 +49,17 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class LastEdit:
-    """What the newest undo step changed, and when: what follows quickly belongs to it."""
+    """What the newest undo step changed, who did it and when: what follows quickly belongs to it."""
 
     key: str
     """Names the thing that was changed: `group.name` of a parameter."""
-    at: float
-    """When [s, any monotonic clock]."""
+    sender: Sender = PROGRAM
+    """Who, and when."""
 
 
 @dataclass(frozen=True, slots=True)
 class AppState:
-    """Everything the page shows that is not the run's own."""
+    """Everything that the page shows and that no background work computes."""
 
     project: Project
     """As edited now."""
@@ -73,10 +67,6 @@ class AppState:
     """As on disk."""
     folder: Path | None = None
     """Where the project is written to; none: it is bundled with the program and stays as it is."""
-    saved_at: str = ""
-    """Time of day of the last save; empty: not saved in this session."""
-    foreign: tuple[str, ...] = ()
-    """Files of the project that somebody else has changed since they were read or saved."""
     greeting: str = ""
     """What each browser is told when it comes: what was restored after a crash, until it is saved."""
     undo: tuple[Step, ...] = ()
@@ -85,43 +75,47 @@ class AppState:
     """Projects that were taken back, the newest last."""
     last_edit: LastEdit | None = None
     """The edit that a quick next one of the same thing is merged with."""
-    editors: Mapping[int, Editor] = field(default_factory=dict)
-    """How each connected browser edits, by its number; never changed in place."""
-    source: Source | None = None
-    """What drives."""
-    playing: bool = False
-    """Whether the play clock runs."""
-    speed: float = 1.0
-    """Factor of the play clock against real time."""
-    repeat: bool = False
-    """Whether the drive starts again at its end."""
-    covered: bool = False
-    """Whether every reflector is covered."""
     hidden: frozenset[str] = frozenset()
     """Names of layers that are not drawn."""
     magnify: float = 1.0
     """Factor at which ellipses are drawn."""
-    plan: PlanSettings = field(default_factory=PlanSettings)
-    """What the step Plan shows."""
-    layout: LayoutWish = field(default_factory=LayoutWish)
-    """Whether a suggested layout is wanted."""
-    mapping: MapLoading = field(default_factory=MapLoading)
-    """The floor map that is being loaded."""
-    problems: tuple[str, ...] = field(default=())
+    faults: tuple[str, ...] = ()
     """What went wrong, the newest last."""
+    parts: Parts = field(default_factory=dict[type, object])
+    """What features keep for all browsers together."""
+    browsers: Mapping[int, Parts] = field(default_factory=dict[int, Parts])
+    """What features keep for each connected browser, by its number."""
 
     @property
     def is_changed(self) -> bool:
         """Whether there is something to save."""
         return self.project is not self.saved and self.project != self.saved
 
-    def editor(self, client: int) -> Editor:
-        """Return how a browser edits; one that is not known yet selects."""
-        return self.editors.get(client, Editor())
+    def part(self, kind: type[Part]) -> Part:
+        """Return what a feature keeps; its default where it has kept nothing yet."""
+        return part_of(self.parts, kind)
 
-    def with_editor(self, client: int, editor: Editor) -> AppState:
-        """Return the state with one browser's editor exchanged."""
-        return replace(self, editors={**self.editors, client: editor})
+    def with_part(self, part: object) -> AppState:
+        """Return the state with one part exchanged."""
+        return replace(self, parts={**self.parts, type(part): part})
+
+    def of_browser(self, browser: int | None, kind: type[Part]) -> Part:
+        """Return what a feature keeps for a browser; its default where that is nothing, or the browser is not there."""
+        return part_of({} if browser is None else self.browsers.get(browser, {}), kind)
+
+    def with_browser(self, browser: int | None, part: object) -> AppState:
+        """Return the state with one part of a browser exchanged; one that has left, or never came, gets none."""
+        if browser is None or browser not in self.browsers:
+            return self
+        return replace(self, browsers={**self.browsers, browser: {**self.browsers[browser], type(part): part}})
+
+    def joined(self, browser: int) -> AppState:
+        """Return the state with one more browser, which begins with the defaults."""
+        return replace(self, browsers={**self.browsers, browser: {}})
+
+    def left(self, browser: int) -> AppState:
+        """Return the state without a browser."""
+        return replace(self, browsers={number: parts for number, parts in self.browsers.items() if number != browser})
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,24 +124,31 @@ class Edit:
 
     name: str
     """As the undo button says: `move R3`."""
-    client: int | None = None
-    """Number of the browser that made it; none: nobody in particular."""
+    sender: Sender = PROGRAM
+    """Who made it, and when."""
     key: str = ""
-    """Names the thing that was changed; edits of one thing in quick succession are one step. Empty: never merged."""
-    at: float = 0.0
-    """When [s, any monotonic clock]."""
+    """Names the thing that was changed; one browser's edits of one thing in quick succession are one step. Empty:
+    never merged."""
 
 
 def edited(state: AppState, project: Project, edit: Edit) -> AppState:
     """Return the state after an edit: one more undo step, unless it belongs to the newest one."""
-    last = state.last_edit
-    merged = bool(edit.key) and last is not None and last.key == edit.key and edit.at - last.at <= MERGE_WITHIN_S
-    step = Step(state.project, edit.name, edit.client)
-    undo = state.undo if merged and state.undo else (*state.undo, step)[-UNDO_STEPS:]
+    step = Step(state.project, edit.name, edit.sender.browser)
+    undo = state.undo if _is_merged(state, edit) else (*state.undo, step)[-UNDO_STEPS:]
     if project.floor_map is not state.project.floor_map:
         undo = with_maps_packed(undo)
-    return replace(
-        state, project=project, undo=undo, redo=(), last_edit=LastEdit(edit.key, edit.at) if edit.key else None
+    last_edit = LastEdit(edit.key, edit.sender) if edit.key else None
+    return replace(state, project=project, undo=undo, redo=(), last_edit=last_edit)
+
+
+def _is_merged(state: AppState, edit: Edit) -> bool:
+    """Whether an edit goes on with the newest undo step."""
+    last, sender = state.last_edit, edit.sender
+    return (
+        last is not None
+        and bool(edit.key and state.undo)
+        and (last.key, last.sender.browser) == (edit.key, sender.browser)
+        and sender.at - last.sender.at <= MERGE_WITHIN_S
     )
 
 

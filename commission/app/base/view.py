@@ -2,110 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
+from commission.app.base.jobs import Job
+from commission.app.base.parts import Part, Parts
 from commission.app.base.state import AppState
-from commission.app.plan.view import PlanView
-from commission.geometry.arrays import FloatArray
-from commission.localization.estimate import Estimate, Mode
-from commission.planning.route_profile import RouteProfile
-from commission.studies.problems import Problem
-from commission.studies.violations import Violation
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Series:
-    """What is known about each cycle of the drive so far; one row per scan, views of the run's own arrays."""
-
-    times: FloatArray
-    """(K,) time of each scan after the start of the drive [s]."""
-    means: FloatArray
-    """(K, 3) estimated pose of base in map [m, m, rad]."""
-    two_sigma: FloatArray
-    """(K, 3) 2-sigma of x [m], y [m] and heading [rad]."""
-    nis: FloatArray
-    """(K,) largest squared Mahalanobis distance of the scan's inliers; 0 where there is none."""
-    counts: NDArray[np.int64]
-    """(K, 3) detections of each `Status`."""
-    failed: NDArray[np.bool_]
-    """(K,) whether the supervisor was in fail mode."""
-    microseconds: FloatArray
-    """(K,) time that the localizer took for the cycle [us]."""
-    error: FloatArray
-    """(K,) position error against the reference [m]; NaN where there is none."""
-
-    def __len__(self) -> int:
-        """Return the number of cycles."""
-        return len(self.times)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Accumulated:
-    """Where detections lay over the drive so far (Sobreira et al. 2016, Fig. 11)."""
-
-    inliers: FloatArray
-    """(N, 2) points [m], map frame."""
-    outliers: FloatArray
-    """(M, 2) points [m], map frame."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RunView:
-    """The run as it is now."""
-
-    time: float
-    """Time of the play clock after the start of the drive [s]."""
-    duration: float
-    """Length of the drive [s]."""
-    pose: FloatArray
-    """(3,) pose at which the vehicle is drawn: the filter's own [m, m, rad]."""
-    covariance: FloatArray
-    """(3, 3) its covariance."""
-    mode: Mode
-    """State of the supervisor."""
-    estimate: Estimate | None
-    """The newest cycle; none before the first."""
-    scan_map: FloatArray
-    """(B, 2) end points of the newest scan's beams [m], map frame."""
-    gates: FloatArray
-    """(R, n, 2) outlines of the validation areas of the reflectors in view [m], map frame."""
-    reference: FloatArray | None
-    """(3,) reference pose of the newest cycle [m, m, rad], where there is one."""
-    references: FloatArray
-    """(L, 2) reference positions so far [m], map frame."""
-    series: Series
-    """Every cycle so far."""
-    accumulated: Accumulated | None
-    """Every detection so far; none in views that are drawn at the full rate."""
-    episodes: tuple[tuple[float, float], ...]
-    """Start and end of each fail episode [s]: as lived up to now, as predicted for the rest."""
-    seeking: float | None = None
-    """Share of a seek that is done [0..1]; none when none is under way."""
-    at_end: bool = False
-    """Whether the drive is over."""
 
 
 @dataclass(frozen=True, slots=True)
-class Progress:
-    """A piece of background work, as the page shows it."""
+class Followed:
+    """The place that a camera goes with where it follows; whoever has something that moves puts it into the view."""
 
-    number: int
-    """Number of the job."""
-    name: str
-    """What is being done."""
-    message: str
-    """What it does now; empty when it does not say."""
-    fraction: float
-    """Share that is done [0..1]."""
-
-    @property
-    def line(self) -> str:
-        """All of it in one line."""
-        return f"{self.name}{self.message and ': '}{self.message} {self.fraction:.0%}"
+    place: tuple[float, float]
+    """Where it is [m], map frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,15 +23,17 @@ class PageView:
 
     state: AppState
     """The page's own state."""
-    run: RunView | None
-    """The run; none until a drive is loaded."""
-    jobs: tuple[Progress, ...] = ()
+    jobs: tuple[Job, ...] = ()
     """Background work under way."""
-    plan: PlanView = field(default_factory=PlanView)
-    """What the step Plan has found."""
-    found: tuple[Problem, ...] = ()
-    """What is wrong with the site, errors first; of the newest project that was checked."""
-    violations: tuple[Violation, ...] = ()
-    """Where routes ask too much of the vehicle; the same value as long as nothing changes."""
-    profiles: Mapping[str, RouteProfile] = field(default_factory=dict)
-    """How the routes drive that some browser has selected, by name."""
+    parts: Parts = field(default_factory=dict[type, object])
+    """What services have found, one value of each type."""
+
+    def part(self, kind: type[Part]) -> Part | None:
+        """Return what a service has found; none where there is nothing yet."""
+        part = self.parts.get(kind)
+        return part if isinstance(part, kind) else None
+
+
+def view_of(state: AppState, *parts: object, jobs: tuple[Job, ...] = ()) -> PageView:
+    """Return a view with these parts, each found by its type."""
+    return PageView(state, jobs, {type(part): part for part in parts})

@@ -7,8 +7,8 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, outline_segments
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.plan.view import EllipseView, PlanView
+from commission.app.base.view import PageView
+from commission.app.plan.view import EllipseView, plan_of
 from commission.geometry.gaussian import ellipse_points
 
 POINTS = 32
@@ -18,6 +18,7 @@ class FixEllipseLayer(BaseLayer):
     """1-sigma ellipses of a fix."""
 
     name = "Ellipses of a fix"
+    rank = 60
     reads: tuple[str, ...] = ()
 
     def __init__(self, scene: SceneApi) -> None:
@@ -31,8 +32,9 @@ class FixEllipseLayer(BaseLayer):
         )
         self._shown: EllipseView | None = None
 
-    def draw_plan(self, plan: PlanView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+    def draw(self, view: PageView) -> None:
         """Draw the ellipses anew where they have changed."""
+        plan = plan_of(view)
         found = plan.ellipses
         if found is self._shown:
             return

@@ -6,10 +6,11 @@ from viser import ImageHandle, LabelHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
+from commission.app.base.view import PageView
 from commission.app.coverage.scale import picture
 from commission.app.coverage.words import value_text
-from commission.app.plan.view import HeatView, PlanView, Reading
+from commission.app.plan.settings import PlanSettings
+from commission.app.plan.view import HeatView, Reading, plan_of
 from commission.planning.dilution import Measurement
 
 
@@ -17,6 +18,7 @@ class HeatLayer(BaseLayer):
     """Coverage of the floor."""
 
     name = "Heatmap"
+    rank = 20
     reads: tuple[str, ...] = ()
 
     def __init__(self, scene: SceneApi) -> None:
@@ -26,15 +28,17 @@ class HeatLayer(BaseLayer):
         self._shown: tuple[HeatView | None, float] = (None, 0.0)
         self._read: tuple[Reading | None, HeatView | None] = (None, None)
 
-    def draw_plan(self, plan: PlanView, state: AppState) -> None:
+    def draw(self, view: PageView) -> None:
         """Draw the picture anew where it or its opacity has changed."""
+        plan = plan_of(view)
+        state = view.state
         visible = self.name not in state.hidden
-        if (plan.heat, state.plan.opacity) != self._shown:
-            before, self._shown = self._shown[0], (plan.heat, state.plan.opacity)
-            self._draw(plan.heat, before, state.plan.opacity, visible=visible)
+        if (plan.heat, state.part(PlanSettings).opacity) != self._shown:
+            before, self._shown = self._shown[0], (plan.heat, state.part(PlanSettings).opacity)
+            self._draw(plan.heat, before, state.part(PlanSettings).opacity, visible=visible)
         if (plan.reading, plan.heat) != self._read:
             self._read = (plan.reading, plan.heat)
-            self._write(plan.reading, plan.heat, state.plan.measurement, visible=visible)
+            self._write(plan.reading, plan.heat, state.part(PlanSettings).measurement, visible=visible)
 
     def _draw(self, heat: HeatView | None, before: HeatView | None, opacity: float, *, visible: bool) -> None:
         """Exchange the picture's content, or the picture itself where its place is another one."""

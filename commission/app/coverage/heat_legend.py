@@ -15,7 +15,7 @@ from commission.app.base.view import PageView
 from commission.app.coverage.scale import NO_FIX_COLORS
 from commission.app.coverage.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES, number_text, value_text
 from commission.app.plan.settings import Figure, PlanSettings
-from commission.app.plan.view import ColdStartView, EllipseView, HeatView, Reading, RouteView
+from commission.app.plan.view import ColdStartView, EllipseView, HeatView, Reading, RouteView, plan_of
 from commission.app.prediction.load_colors import BOUNDS, palette
 
 AMONG_PEOPLE = (Figure.EXPECTED_VISIBLE, Figure.TWO_OR_MORE, Figure.THREE_OR_MORE)
@@ -37,11 +37,12 @@ class HeatLegend(BasePanel):
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow what is drawn."""
-        heat, cold, route = view.plan.heat, view.plan.cold_start, view.plan.route
+        plan = plan_of(view)
+        heat, cold, route = plan.heat, plan.cold_start, plan.route
         content = "" if heat is None else heat_scale(heat, view.state)
         content += "" if cold is None or not cold.is_drawn else cold_start_scale(cold)
-        content += "" if view.plan.ellipses is None or heat is None else ellipse_note(view.plan.ellipses)
-        content += "" if view.plan.reading is None else reading_table(view.plan.reading, view.state.plan)
+        content += "" if plan.ellipses is None or heat is None else ellipse_note(plan.ellipses)
+        content += "" if plan.reading is None else reading_table(plan.reading, view.state.part(PlanSettings))
         content += "" if route is None else load_scale(route)
         if content != self._shown:
             self._shown = content
@@ -51,7 +52,7 @@ class HeatLegend(BasePanel):
 
 def heat_scale(heat: HeatView, state: AppState) -> str:
     """Return title, colors with their bounds, the share of the floor in each, and what it is held against."""
-    quantity, plan = heat.scale.quantity, state.plan
+    quantity, plan = heat.scale.quantity, state.part(PlanSettings)
     tuples = [(int(r), int(g), int(b)) for r, g, b in heat.scale.colors()]
     bounds = [number_text(bound) for bound in heat.scale.bounds]
     head = f"<b>{escaped(quantity.label)}</b><div class='c-note'>{_conditions(state)}</div>"
@@ -122,7 +123,7 @@ def load_scale(route: RouteView) -> str:
 
 def _conditions(state: AppState) -> str:
     """Say under which conditions the heatmap holds."""
-    plan = state.plan
+    plan = state.part(PlanSettings)
     parts = [HEADING_NAMES[plan.heading], MEASUREMENT_NAMES[plan.measurement]]
     if plan.blocked_per_m > 0.0:
         parts.append(f"people {100 * plan.blocked_per_m:.1f} %/m")

@@ -12,7 +12,7 @@ from commission.app.base.view import PageView
 from commission.app.coverage.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES
 from commission.app.plan.actions import ClearEllipses, SetPlan
 from commission.app.plan.planner import COVERAGE
-from commission.app.plan.settings import Figure
+from commission.app.plan.settings import Figure, PlanSettings
 from commission.planning.dilution import Heading, Measurement
 
 FACTORS = (1.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
@@ -23,7 +23,7 @@ class HeatmapPanel(BasePanel):
     """Widgets of the heatmap."""
 
     def __init__(self, gui: GuiApi, post: Post) -> None:
-        self._inputs = inputs = Inputs(gui, post, SetPlan, lambda state, name: getattr(state.plan, name))
+        self._inputs = inputs = Inputs(gui, post, SetPlan, lambda state, name: getattr(state.part(PlanSettings), name))
         inputs.choice("figure", "Show", FIGURE_NAMES, "What the floor is colored by.")
         self._work = WorkBar(gui, post, COVERAGE, SetPlan("figure", Figure.NONE.value))
         inputs.number("opacity", 100.0, gui.add_slider("Opacity [%]", 10, 100, 5, 80))
@@ -53,14 +53,17 @@ class HeatmapPanel(BasePanel):
         hint = "Factor at which the ellipses are drawn; true to scale is 1x."
         drawn = gui.add_dropdown("Drawn", tuple(meant), hint=hint)
         self._inputs.connect(
-            "ellipse_factor", drawn, lambda text: meant[text], lambda state: f"{state.plan.ellipse_factor:g}x"
+            "ellipse_factor",
+            drawn,
+            lambda text: meant[text],
+            lambda state: f"{state.part(PlanSettings).ellipse_factor:g}x",
         )
         self._clear = gui.add_button("Clear", color="gray", hint="Drop the ellipses of clicks.")
         self._clear.on_click(posting(post, lambda _event: ClearEllipses()))
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow settings and progress."""
-        plan = view.state.plan
+        plan = view.state.part(PlanSettings)
         self._inputs.follow(view.state)
         self._work.follow(view)
         self._clear.disabled = not plan.spots

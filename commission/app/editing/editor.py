@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TypeAlias
 
-from commission.app.exchange.pending import IDLE, Exchange
-
-Point: TypeAlias = tuple[float, float]
-"""A place on the floor [m, m], map frame."""
+from commission.app.base.actions import Point
+from commission.app.base.state import AppState
 
 
 class Tool(StrEnum):
@@ -156,8 +153,6 @@ class Editor:
     """Points to align the floor map by."""
     reach: float = 0.1
     """How near a click has to be to mean something, at the zoom of the newest gesture [m]."""
-    exchange: Exchange = IDLE
-    """Files that this browser imports and exports."""
 
     def selecting(
         self, reflectors: tuple[str, ...] = (), *, point: ControlPoint | None = None, station: str = ""
@@ -169,6 +164,16 @@ class Editor:
     def has_selection(self) -> bool:
         """Whether anything is selected."""
         return bool(self.selected) or self.point is not None or bool(self.station)
+
+
+def editor_of(state: AppState, browser: int | None) -> Editor:
+    """Return how a browser edits; one that is not there selects."""
+    return state.of_browser(browser, Editor)
+
+
+def editors_of(state: AppState) -> tuple[Editor, ...]:
+    """Return how each connected browser edits."""
+    return tuple(editor_of(state, browser) for browser in state.browsers)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
@@ -11,7 +10,8 @@ from typing import Any
 from viser import GuiApi, GuiEvent, GuiInputHandle
 
 from commission.app.base import actions as page_actions
-from commission.app.base.panel import Post, escaped, posting, write
+from commission.app.base.panel import BasePanel, Post, escaped, posting, write
+from commission.app.base.view import PageView
 from commission.app.editing import actions
 from commission.site.checks import field_hints
 from commission.site.presets import SCANNERS, Origin, ScannerPreset, with_preset
@@ -142,15 +142,16 @@ def source_html(preset: ScannerPreset | None) -> str:
     return f"<div class='c-note' style='padding:2px 6px'>{parts}</div>"
 
 
-class EquipmentFields:
+class EquipmentFields(BasePanel):
     """The two folders."""
 
     def __init__(self, gui: GuiApi, post: Post, project: Project) -> None:
         self._gui, self._post, self._project = gui, post, project
+        self._shown: Project | None = None
         with gui.add_folder("Vehicle", expand_by_default=False):
             self._kind = gui.add_dropdown("Kind", tuple(KINDS), initial_value=project.vehicle.kind)
             self._kind.on_update(
-                self._posting(lambda event: self._vehicle(event, of_kind(self._now, event.target.value)))
+                self._posting(lambda event: actions.SetVehicle(of_kind(self._now, event.target.value)))
             )
             self._parts = self._add_vehicle()
         with gui.add_folder("Scanner", expand_by_default=False):
@@ -175,9 +176,6 @@ class EquipmentFields:
 
         return posting(self._post, action)
 
-    def _vehicle(self, event: GuiEvent[Any], vehicle: Vehicle) -> page_actions.Action:
-        return actions.SetVehicle(vehicle, event.client_id, time.monotonic())
-
     def _add_vehicle(self) -> dict[str, GuiInputHandle[Any]]:
         """Add an input for each field of every kind; those of other kinds are hidden."""
         hints = {name: hint for kind in KINDS.values() for name, hint in field_hints(kind).items()}
@@ -191,7 +189,7 @@ class EquipmentFields:
             def changed(event: GuiEvent[Any], name: str = name) -> page_actions.Action:
                 typed = event.target.value
                 changes: dict[str, Any] = {name: list_value(name, typed) if name in LISTS else float(typed)}
-                return self._vehicle(event, replace(self._now, **changes))
+                return actions.SetVehicle(replace(self._now, **changes))
 
             widget.on_update(self._posting(changed))
             parts[name] = widget
@@ -203,18 +201,24 @@ class EquipmentFields:
 
         def changed(event: GuiEvent[Any]) -> page_actions.Action:
             scanner = entry.write(self._project.scanner, float(event.target.value))
-            return actions.SetScanner(scanner, event.client_id, time.monotonic())
+            return actions.SetScanner(scanner)
 
         widget.on_update(self._posting(changed))
         return widget
 
     def _from_preset(self, event: GuiEvent[Any]) -> page_actions.Action:
         if event.target.value == OWN:
-            return actions.SetScanner(self._project.scanner, event.client_id)
-        return actions.SetScanner(with_preset(self._project.scanner, event.target.value), event.client_id)
+            return actions.SetScanner(self._project.scanner)
+        return actions.SetScanner(with_preset(self._project.scanner, event.target.value))
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Follow the project."""
+        if view.state.project is not self._shown:
+            self._shown = view.state.project
+            self.show(view.state.project)
 
     def show(self, project: Project) -> None:
-        """Follow the project."""
+        """Show vehicle and scanner of a project."""
         self._project = project
         vehicle, scanner = project.vehicle, project.scanner
         write(self._kind, vehicle.kind)

@@ -11,34 +11,27 @@ from collections.abc import Callable, Coroutine
 from typing import Any
 
 import numpy as np
-from viser import ClientHandle, LabelHandle, TransformControlsEvent
+from viser import LabelHandle, SceneApi, TransformControlsEvent
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_POINTS, NO_SEGMENTS, lift, outline_segments, polyline_segments
+from commission.app.base.drawing import NO_POINTS, NO_SEGMENTS, lift, outline_segments, polyline_segments, rings
 from commission.app.base.extent import extent_of
-from commission.app.base.panel import Post
+from commission.app.base.panel import BasePanel, Post, from_browser
+from commission.app.base.view import PageView
 from commission.app.editing import actions
 from commission.app.editing.editor import Editor, Grab, Tool, measurement
 from commission.app.editing.gestures import moved, selected_of
 from commission.app.editing.route_gestures import curve, moved_route
 from commission.app.editing.station_gestures import heading_tip, moved_station
 from commission.app.editing.station_layer import station_marks
-from commission.app.exchange.outlines import ghosts_of
 from commission.app.floor_map.tools import AREA_TOOLS
 from commission.geometry.arrays import FloatArray
 from commission.site.editing.routes import segment_of
 from commission.site.project import Project
 from commission.site.stations import Station
 
-RING_POINTS = 28
 HANDLE_FROM = 14.0
 """Size of the selection's handle, in sizes of a mark."""
-
-
-def rings(centers: FloatArray, radius: float) -> FloatArray:
-    """Return the (N, RING_POINTS, 2) outlines of circles [m]."""
-    angles = np.linspace(0.0, 2.0 * np.pi, RING_POINTS, endpoint=False)
-    return centers[:, np.newaxis, :] + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
 
 
 def map_lines(editor: Editor) -> list[FloatArray]:
@@ -73,18 +66,18 @@ def millimeters(editor: Editor) -> str:
     return f"{found.distance:.3f} m, {math.degrees(found.bearing):.1f}°  (dx {found.dx:.3f} m, dy {found.dy:.3f} m)"
 
 
-class Overlay:
-    """One browser's own marks.
+class Overlay(BasePanel):
+    """One browser's own marks: a panel without widgets.
 
     Parameters
     ----------
-    client : the browser.
+    scene : the browser's own.
     post : takes the actions of the handle.
+    browser : number of its connection.
     """
 
-    def __init__(self, client: ClientHandle, post: Post) -> None:
-        self._client = client
-        scene = client.scene
+    def __init__(self, scene: SceneApi, post: Post, browser: int) -> None:
+        self._scene, self._browser = scene, browser
         self._selected = scene.add_line_segments(
             "/editing/selected", NO_SEGMENTS, theme.SELECTED, thickness=2.0, thickness_units="screen"
         )
@@ -119,12 +112,13 @@ class Overlay:
                 return
             self._dragging = event.phase != "end"
             x, y = (float(value) for value in event.target.position[:2])
-            post(actions.DragSelection(event.client.client_id, event.phase, (x, y)))
+            post(from_browser(actions.DragSelection(event.phase, (x, y)), event.client.client_id))
 
         return dragged
 
-    def draw(self, project: Project, editor: Editor) -> None:
+    def draw(self, view: PageView) -> None:
         """Show an editor where it or the project has changed."""
+        project, editor = view.state.project, view.state.of_browser(self._browser, Editor)
         if self._shown is not None and self._shown[0] is project and self._shown[1] == editor:
             return
         self._shown = project, editor
@@ -174,9 +168,6 @@ class Overlay:
         if editor.tool is Tool.ROUTE and len(set(editor.draft)) > 1:
             lines.append(polyline_segments(curve(segment_of(editor.draft)), height))
         lines += [polyline_segments(line, height) for line in map_lines(editor)]
-        ghosts = ghosts_of(project, editor.exchange.pending)
-        lines.append(outline_segments(rings(ghosts.centers, size), height))
-        lines += [polyline_segments(line, height) for line in ghosts.lines]
         if len(editor.measured) == 2:
             lines.append(polyline_segments(np.array(editor.measured), height))
         return np.concatenate(lines) if lines else NO_SEGMENTS
@@ -204,7 +195,7 @@ class Overlay:
         middle = np.mean(editor.measured, axis=0)
         place = (float(middle[0]), float(middle[1]), theme.Height.EDITING)
         if self._label is None:
-            self._label = self._client.scene.add_label("/editing/label", text, position=place)
+            self._label = self._scene.add_label("/editing/label", text, position=place)
         self._label.text, self._label.position = text, place
 
     def _name_points(self, editor: Editor) -> None:
@@ -218,7 +209,7 @@ class Overlay:
                 self._letters[index].position = place
             else:
                 name = f"/editing/point/{index}"
-                self._letters.append(self._client.scene.add_label(name, "AB"[index], position=place))
+                self._letters.append(self._scene.add_label(name, "AB"[index], position=place))
 
 
 def _places(station: Station | None) -> FloatArray:

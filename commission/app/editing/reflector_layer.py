@@ -21,6 +21,7 @@ class ReflectorLayer(BaseLayer):
     """Where the map says that reflectors are."""
 
     name = "Reflectors"
+    rank = 120
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
     legend = (theme.Legend("reflector (paper: dark blue)", theme.REFLECTOR, theme.Mark.DOT),)
 
@@ -58,6 +59,7 @@ class ReflectorNameLayer(BaseLayer):
     """Names of the reflectors, where they are few enough to be read."""
 
     name = "Reflector names"
+    rank = 140
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
 
     def __init__(self, scene: SceneApi) -> None:

@@ -37,13 +37,12 @@ def row_text(reflector: Reflector) -> str:
 class ReflectorTable(BasePanel):
     """The table of one browser."""
 
-    def __init__(self, gui: GuiApi, post: Post, client: int, tab: GuiTabHandle) -> None:
-        self._client = client
-        with tab:
-            self._order = gui.add_dropdown("Sort by", tuple(ORDERS))
-            self._find = gui.add_text("Find", "", hint="Part of a name, layer or note.")
-            self._page = gui.add_number("Page", 1, min=1, step=1, visible=False)
-            self._count = gui.add_html("")
+    def __init__(self, gui: GuiApi, post: Post, browser: int, tab: GuiTabHandle) -> None:
+        self._browser = browser
+        self._order = gui.add_dropdown("Sort by", tuple(ORDERS))
+        self._find = gui.add_text("Find", "", hint="Part of a name, layer or note.")
+        self._page = gui.add_number("Page", 1, min=1, step=1, visible=False)
+        self._count = gui.add_html("")
         self._ids: tuple[str, ...] = ()
         self._rows = Rows(gui, tab, post, self._selecting)
         self._drawn: tuple[object, ...] = ()
@@ -51,7 +50,7 @@ class ReflectorTable(BasePanel):
     def draw_slowly(self, view: PageView) -> None:
         """Show the reflectors in their order."""
         reflectors = view.state.project.reflectors
-        editor = view.state.editors.get(self._client, Editor())
+        editor = view.state.of_browser(self._browser, Editor)
         asked = (self._order.value, self._find.value, self._page.value, editor.selected)
         if self._drawn and self._drawn[0] is reflectors and self._drawn[1] == asked:
             return
@@ -70,6 +69,6 @@ class ReflectorTable(BasePanel):
         self._ids = tuple(r.id for r in shown)
         self._rows.show([(row_text(r), theme.SELECTED_LINE if r.id in selected else theme.LINE) for r in shown])
 
-    def _selecting(self, index: int, client: int) -> actions.SelectReflectors:
+    def _selecting(self, index: int) -> actions.SelectReflectors:
         """Return the action of a row."""
-        return actions.SelectReflectors(client, self._ids[index : index + 1], fly=True)
+        return actions.SelectReflectors(self._ids[index : index + 1], fly=True)

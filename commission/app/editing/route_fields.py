@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 from viser import GuiApi, GuiEvent
@@ -20,14 +19,12 @@ from commission.site.routes import SPEEDS, Direction
 class RouteFields:
     """Name, control point, direction, speed, buttons."""
 
-    def __init__(self, gui: GuiApi, post: Post, client: int) -> None:
-        self._client = client
+    def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
+        self._browser = browser
         self._folder = gui.add_folder("Control point", visible=False)
         with self._folder:
             self._name = gui.add_text("Route", "", hint="Name of the route, unique within the project.")
-            self._name.on_update(
-                posting(post, lambda event: actions.RenameRoute(client, str(event.target.value).strip()))
-            )
+            self._name.on_update(posting(post, lambda event: actions.RenameRoute(str(event.target.value).strip())))
             self._which = gui.add_html("")
             self._x = gui.add_number("x [m]", 0.0, step=0.001)
             self._y = gui.add_number("y [m]", 0.0, step=0.001)
@@ -47,22 +44,22 @@ class RouteFields:
 
     def _placed(self, _event: GuiEvent[Any]) -> page_actions.Action:
         place = (float(self._x.value), float(self._y.value))
-        return actions.PlaceControlPoint(self._client, place, time.monotonic())
+        return actions.PlaceControlPoint(place)
 
     def _driven(self, _event: GuiEvent[Any]) -> page_actions.Action:
         direction, speed = Direction(self._direction.value), float(self._speed.value)
-        return actions.SetSegment(self._client, direction, speed, time.monotonic())
+        return actions.SetSegment(direction, speed)
 
     def _pressed(self, event: GuiEvent[Any]) -> page_actions.Action:
         match event.target.value:
             case "Insert":
-                return actions.InsertControlPoint(self._client)
+                return actions.InsertControlPoint()
             case "Split":
-                return actions.SplitSegment(self._client)
+                return actions.SplitSegment()
             case "Delete":
-                return actions.DeleteControlPoint(self._client)
+                return actions.DeleteControlPoint()
             case _:
-                return actions.DeleteRoute(self._client)
+                return actions.DeleteRoute()
 
     def show(self, project: Project, editor: Editor) -> None:
         """Show what is selected of the routes."""

@@ -41,6 +41,7 @@ class RouteLayer(BaseLayer):
     """All routes of the project."""
 
     name = "Routes"
+    rank = 50
     reads: tuple[str, ...] = ("floor_map", "routes")
     legend = (theme.Legend("route (dashed: in reverse)", theme.ROUTE, theme.Mark.LINE),)
 

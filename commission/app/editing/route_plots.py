@@ -18,6 +18,7 @@ from commission.app.base.panel import BasePanel, clock, escaped
 from commission.app.base.view import PageView
 from commission.app.editing.editor import Editor
 from commission.app.editing.route_gestures import route_of
+from commission.app.problems.view import inspection_of
 from commission.app.run.plots import HEIGHT_PX, LIMIT, ROOM_PX, TURQUOISE, axis_style
 from commission.geometry.arrays import FloatArray
 from commission.planning.route_profile import RouteProfile
@@ -111,11 +112,11 @@ class RoutePlots(BasePanel):
     Parameters
     ----------
     gui : the browser's own.
-    client : number of the browser's connection.
+    browser : number of its connection.
     """
 
-    def __init__(self, gui: GuiApi, client: int) -> None:
-        self._client = client
+    def __init__(self, gui: GuiApi, browser: int) -> None:
+        self._browser = browser
         self._head = gui.add_html(_head(NOTHING))
         self._plots = [_plot(gui, chart) for chart in CHARTS]
         self._drawn: tuple[object, ...] = ()
@@ -124,10 +125,10 @@ class RoutePlots(BasePanel):
 
     def draw_slowly(self, view: PageView) -> None:
         """Draw the selected route where something about it has changed."""
-        route = route_of(view.state.project, view.state.editors.get(self._client, Editor()))
-        profile = None if route is None else view.profiles.get(route.name)
+        route = route_of(view.state.project, view.state.of_browser(self._browser, Editor))
+        profile = None if route is None else inspection_of(view).profiles.get(route.name)
         name = "" if route is None else route.name
-        drawn = (name, profile, view.violations)
+        drawn = (name, profile, inspection_of(view).violations)
         if len(self._drawn) == 3 and all(a is b for a, b in zip(drawn, self._drawn, strict=True)):
             return
         self._drawn = drawn
@@ -136,7 +137,7 @@ class RoutePlots(BasePanel):
             for plot in self._plots:
                 plot.visible = False
             return
-        violations = [violation for violation in view.violations if violation.route == name]
+        violations = [violation for violation in inspection_of(view).violations if violation.route == name]
         self._head.content = _head(summary(name, profile, violations))
         self._draw(profile, violations)
 

@@ -15,6 +15,7 @@ from commission.app.base.view import PageView
 from commission.app.editing import actions
 from commission.app.editing.editor import ControlPoint, Editor
 from commission.app.editing.station_actions import SelectStation
+from commission.app.problems.view import inspection_of
 from commission.site.project import Project
 from commission.site.routes import Direction, Route
 from commission.site.stations import Station
@@ -61,25 +62,24 @@ def rows(project: Project, violations: Counter[str], sought: str) -> list[Row]:
 class RouteTable(BasePanel):
     """The table of one browser."""
 
-    def __init__(self, gui: GuiApi, post: Post, client: int, tab: GuiTabHandle) -> None:
-        self._client = client
-        with tab:
-            self._find = gui.add_text("Find", "", hint="Part of the name of a route or a station.")
-            self._count = gui.add_html("")
+    def __init__(self, gui: GuiApi, post: Post, browser: int, tab: GuiTabHandle) -> None:
+        self._browser = browser
+        self._find = gui.add_text("Find", "", hint="Part of the name of a route or a station.")
+        self._count = gui.add_html("")
         self._shown: list[Row] = []
         self._rows = Rows(gui, tab, post, self._selecting)
         self._drawn: tuple[object, ...] = ()
 
     def draw_slowly(self, view: PageView) -> None:
         """Show routes and stations in the order of the project."""
-        project, editor = view.state.project, view.state.editors.get(self._client, Editor())
+        project, editor = view.state.project, view.state.of_browser(self._browser, Editor)
         chosen = "" if editor.point is None else editor.point.route
-        drawn = (project.routes, project.stations, view.violations)
+        drawn = (project.routes, project.stations, inspection_of(view).violations)
         asked = (self._find.value, chosen, editor.station)
         if self._drawn and self._drawn[-1] == asked and all(a is b for a, b in zip(self._drawn, drawn, strict=False)):
             return
         self._drawn = (*drawn, asked)
-        violations = Counter(violation.route for violation in view.violations)
+        violations = Counter(violation.route for violation in inspection_of(view).violations)
         found = rows(project, violations, self._find.value.strip().lower())
         self._shown = found[:MOST_ROWS]
         more = f", the first {MOST_ROWS} shown" if len(found) > MOST_ROWS else ""
@@ -87,17 +87,17 @@ class RouteTable(BasePanel):
             f"<div class='c-note' style='padding:2px 6px'>{len(project.routes)} routes, "
             f"{len(project.stations)} stations{more}</div>"
         )
-        fatal = {violation.route for violation in view.violations if violation.is_fatal}
+        fatal = {violation.route for violation in inspection_of(view).violations if violation.is_fatal}
         self._rows.show([(row.text, _color(row, chosen, editor.station, violations, fatal)) for row in self._shown])
 
-    def _selecting(self, index: int, client: int) -> page_actions.Action:
+    def _selecting(self, index: int) -> page_actions.Action:
         """Return the action of a row; the table may have become shorter since it was drawn."""
         if index >= len(self._shown):
             return page_actions.Report("this row is gone", failed=False)
         row = self._shown[index]
         if row.station:
-            return SelectStation(client, row.station, fly=True)
-        return actions.SelectControlPoint(client, ControlPoint(row.route), fly=True)
+            return SelectStation(row.station, fly=True)
+        return actions.SelectControlPoint(ControlPoint(row.route), fly=True)
 
 
 def _color(row: Row, route: str, station: str, violations: Counter[str], fatal: set[str]) -> theme.Color:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -67,23 +66,23 @@ class SelectionPanel(BasePanel):
     ----------
     gui : the browser's own.
     post : takes the actions.
-    client : number of the browser's connection.
+    browser : number of its connection.
     """
 
-    def __init__(self, gui: GuiApi, post: Post, client: int) -> None:
-        self._gui, self._post, self._client = gui, post, client
+    def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
+        self._gui, self._post, self._browser = gui, post, browser
         self._editor = Editor()
         self._reflectors: tuple[Reflector, ...] = ()
         self._drawn: tuple[object, ...] = ()
         gui.add_html(theme.WIDE.replace("c-wide", "c-wide c-tools"))
         tools = gui.add_button_group("", tuple(tool.value for tool in SITE_TOOLS))
-        tools.on_click(posting(post, lambda event: actions.ChooseTool(client, Tool(event.target.value))))
+        tools.on_click(posting(post, lambda event: actions.ChooseTool(Tool(event.target.value))))
         gui.add_html(theme.WIDE)
         map_tools = gui.add_button_group("", tuple(tool.value for tool in MAP_TOOLS))
-        map_tools.on_click(posting(post, lambda event: actions.ChooseTool(client, Tool(event.target.value))))
+        map_tools.on_click(posting(post, lambda event: actions.ChooseTool(Tool(event.target.value))))
         self._finish = gui.add_button("Finish the route", visible=False, hint="Make it of the points clicked (Enter).")
-        self._finish.on_click(posting(post, lambda _event: actions.Finish(client)))
-        self._map_tools = MapToolFields(gui, post, client)
+        self._finish.on_click(posting(post, lambda _event: actions.Finish()))
+        self._map_tools = MapToolFields(gui, post, browser)
         self._head = gui.add_html("")
         self._fields: dict[str, GuiInputHandle[Any]] = {}
         self._add_fields()
@@ -94,8 +93,8 @@ class SelectionPanel(BasePanel):
         with self._copies:
             self._add_mirror()
             self._add_repeat()
-        self._route = RouteFields(gui, post, client)
-        self._station = StationFields(gui, post, client)
+        self._route = RouteFields(gui, post, browser)
+        self._station = StationFields(gui, post, browser)
         self._now = NowPanel(gui)
         with gui.add_folder("Snapping", expand_by_default=False):
             self._add_snapping()
@@ -128,7 +127,7 @@ class SelectionPanel(BasePanel):
                 value = float(value) / NUMBERS[name].scale
             elif name == "kind":
                 value = ReflectorKind(value)
-            return actions.SetSelected(self._client, name, value, time.monotonic())
+            return actions.SetSelected(name, value)
 
         return action
 
@@ -136,14 +135,14 @@ class SelectionPanel(BasePanel):
         """Return the action of one of the buttons."""
         match event.target.value:
             case "Duplicate":
-                return actions.DuplicateSelected(self._client)
+                return actions.DuplicateSelected()
             case "Delete":
-                return actions.DeleteSelected(self._client)
+                return actions.DeleteSelected()
             case _:
-                return actions.SnapSelected(self._client)
+                return actions.SnapSelected()
 
     def _add_mirror(self) -> None:
-        gui, client = self._gui, self._client
+        gui = self._gui
         axis = gui.add_dropdown("About", ("x =", "y ="), hint="A line across x, or one across y.")
         at = gui.add_number("Line at [m]", 0.0, step=0.001)
         gui.add_html(theme.WIDE)
@@ -153,13 +152,13 @@ class SelectionPanel(BasePanel):
             upright = axis.value == "x ="
             through = (float(at.value), 0.0) if upright else (0.0, float(at.value))
             return actions.MirrorSelected(
-                client, through, 0.5 * math.pi if upright else 0.0, event.target.value == "Mirrored copy"
+                through, 0.5 * math.pi if upright else 0.0, event.target.value == "Mirrored copy"
             )
 
         mirror.on_click(posting(self._post, mirrored))
 
     def _add_repeat(self) -> None:
-        gui, client = self._gui, self._client
+        gui = self._gui
         dx = gui.add_number("Step x [m]", 2.0, step=0.001)
         dy = gui.add_number("Step y [m]", 0.0, step=0.001)
         count = gui.add_number("Copies", 3, min=1, max=1000, step=1)
@@ -167,7 +166,7 @@ class SelectionPanel(BasePanel):
         repeat.on_click(
             posting(
                 self._post,
-                lambda _event: actions.RepeatSelected(client, (float(dx.value), float(dy.value)), int(count.value)),
+                lambda _event: actions.RepeatSelected((float(dx.value), float(dy.value)), int(count.value)),
             )
         )
 
@@ -187,36 +186,36 @@ class SelectionPanel(BasePanel):
             neighbors=self._neighbors.value,
             grid=float(self._grid.value),
         )
-        return actions.ChooseSnapping(self._client, snapping)
+        return actions.ChooseSnapping(snapping)
 
     def _add_commands(self) -> None:
         """Add keys for what the hand does most."""
-        gui, client, post = self._gui, self._client, self._post
+        gui, post = self._gui, self._post
         commands: tuple[tuple[str, Any, Any, page_actions.Action], ...] = (
-            ("Select", "V", None, actions.ChooseTool(client, Tool.SELECT)),
-            ("Place reflectors", "R", None, actions.ChooseTool(client, Tool.PLACE)),
-            ("Draw a route", "T", None, actions.ChooseTool(client, Tool.ROUTE)),
-            ("Place stations", "K", None, actions.ChooseTool(client, Tool.STATION)),
-            ("Measure", "M", None, actions.ChooseTool(client, Tool.MEASURE)),
-            ("Erase walls", "X", None, actions.ChooseTool(client, Tool.ERASE)),
-            ("Draw a wall", "L", None, actions.ChooseTool(client, Tool.WALL)),
-            ("Draw an obstacle", "O", None, actions.ChooseTool(client, Tool.OBSTACLE)),
-            ("Finish what is drawn", "enter", None, actions.Finish(client)),
-            ("Cancel", "escape", None, actions.Cancel(client)),
-            ("Delete the selection", "delete", None, actions.DeleteSelected(client)),
-            ("Duplicate the selection", "D", "cmd/ctrl+shift", actions.DuplicateSelected(client)),
+            ("Select", "V", None, actions.ChooseTool(Tool.SELECT)),
+            ("Place reflectors", "R", None, actions.ChooseTool(Tool.PLACE)),
+            ("Draw a route", "T", None, actions.ChooseTool(Tool.ROUTE)),
+            ("Place stations", "K", None, actions.ChooseTool(Tool.STATION)),
+            ("Measure", "M", None, actions.ChooseTool(Tool.MEASURE)),
+            ("Erase walls", "X", None, actions.ChooseTool(Tool.ERASE)),
+            ("Draw a wall", "L", None, actions.ChooseTool(Tool.WALL)),
+            ("Draw an obstacle", "O", None, actions.ChooseTool(Tool.OBSTACLE)),
+            ("Finish what is drawn", "enter", None, actions.Finish()),
+            ("Cancel", "escape", None, actions.Cancel()),
+            ("Delete the selection", "delete", None, actions.DeleteSelected()),
+            ("Duplicate the selection", "D", "cmd/ctrl+shift", actions.DuplicateSelected()),
         )
         for label, key, modifier, action in commands:
             command = gui.add_command(label, hotkey=key, modifier=modifier)
-            command.on_trigger(lambda _event, action=action: post(action))
+            command.on_trigger(posting(post, lambda _event, action=action: action))
 
     def draw_slowly(self, view: PageView) -> None:
         """Show what is selected."""
-        editor = view.state.editors.get(self._client, Editor())
+        editor = view.state.of_browser(self._browser, Editor)
         self._editor = editor
         if not editor.has_selection:
             self._now.draw_slowly(view)
-        drawn = (view.state.project, editor, len(view.state.editors))
+        drawn = (view.state.project, editor, len(view.state.browsers))
         if self._drawn and self._drawn[0] is drawn[0] and self._drawn[1:] == drawn[1:]:
             return
         self._drawn = drawn
@@ -225,7 +224,7 @@ class SelectionPanel(BasePanel):
         if self._finish.visible:
             self._finish.label = f"Finish the {FINISHED.get(editor.tool, 'route')}"
         self._map_tools.show(editor)
-        self._head.content = _company(self._client, len(view.state.editors)) + _head(editor, self._reflectors)
+        self._head.content = _company(self._browser, len(view.state.browsers)) + _head(editor, self._reflectors)
         self._now.visible = not editor.has_selection
         self._buttons.visible = self._copies.visible = bool(self._reflectors)
         for name, widget in self._fields.items():
@@ -250,11 +249,11 @@ class SelectionPanel(BasePanel):
             widget.value = value
 
 
-def _company(client: int, browsers: int) -> str:
+def _company(browser: int, browsers: int) -> str:
     """Say which browser this is where there are others: an undo that is another's names that one by its number."""
     if browsers < 2:
         return ""
-    return f"<div class='c-note' style='padding:0 6px 4px'>This is browser {client}; {browsers} edit this site.</div>"
+    return f"<div class='c-note' style='padding:0 6px 4px'>This is browser {browser}; {browsers} edit this site.</div>"
 
 
 def _head(editor: Editor, reflectors: tuple[Reflector, ...]) -> str:

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from commission.app.base.reduction import ApplyParameters, FlyTo, Reduction, Tell, reduce
+from commission.app.base.actions import Sender
+from commission.app.base.effects import FlyTo
+from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing import actions
-from commission.app.editing.editor import ControlPoint, Editor, Point, Tool
-from commission.app.editing.reducer import editor_of
+from commission.app.editing.editor import ControlPoint, Editor, Point, Tool, editor_of
 from commission.app.editing.route_gestures import control_point_at, route_of, segment_of
 from commission.errors import UsageError
 from commission.site.editing import routes as edits
@@ -25,19 +26,17 @@ def _with_routes(
     edit: Edit,
     point: ControlPoint | None,
     layout: LayoutBrief | None = None,
-) -> Reduction:
+) -> Outcome:
     """Return what follows from other routes: one undo step, and `point` is selected."""
-    client = edit.client
     project = replace(state.project, routes=routes, layout=layout or state.project.layout)
     after = edited(state, project, edit)
-    if client is not None:
-        after = after.with_editor(client, editor_of(after, client).selecting(point=point))
-    return Reduction(after)
+    browser = edit.sender.browser
+    return Outcome(after.with_browser(browser, editor_of(after, browser).selecting(point=point)))
 
 
-def _selected(state: AppState, client: int) -> tuple[Editor, Route, Segment, ControlPoint]:
+def _selected(state: AppState, sender: Sender) -> tuple[Editor, Route, Segment, ControlPoint]:
     """Return editor, route, segment and control point that a browser has selected; raises UsageError for none."""
-    editor = editor_of(state, client)
+    editor = editor_of(state, sender.browser)
     route, segment = route_of(state.project, editor), segment_of(state.project, editor)
     if route is None or segment is None or editor.point is None or editor.point.index >= len(segment.control_points):
         raise UsageError("no control point of a route is selected; expected one")
@@ -45,92 +44,91 @@ def _selected(state: AppState, client: int) -> tuple[Editor, Route, Segment, Con
 
 
 @reduce.register
-def _(action: actions.FinishRoute, state: AppState) -> Reduction:
-    editor = editor_of(state, action.client)
+def finish_route(_action: actions.FinishRoute, state: AppState, sender: Sender) -> Outcome:
+    editor = editor_of(state, sender.browser)
     name = edits.fresh_name(state.project.routes)
     route = edits.new_route(name, editor.draft)
-    done = state.with_editor(action.client, replace(editor, draft=(), tool=Tool.SELECT))
+    done = state.with_browser(sender.browser, replace(editor, draft=(), tool=Tool.SELECT))
     routes = edits.put(state.project.routes, route)
-    return _with_routes(done, routes, Edit(f"draw {name}", action.client), ControlPoint(name))
+    return _with_routes(done, routes, Edit(f"draw {name}", sender), ControlPoint(name))
 
 
 @reduce.register
-def _(action: actions.SelectControlPoint, state: AppState) -> Reduction:
-    editor = editor_of(state, action.client).selecting(point=action.point)
-    selecting = state.with_editor(action.client, editor)
+def select_control_point(action: actions.SelectControlPoint, state: AppState, sender: Sender) -> Outcome:
+    editor = editor_of(state, sender.browser).selecting(point=action.point)
+    selecting = state.with_browser(sender.browser, editor)
     segment = segment_of(state.project, editor)
     if not action.fly or segment is None:
-        return Reduction(selecting)
+        return Outcome(selecting)
     x, y = segment.control_points[min(action.point.index, len(segment.control_points) - 1)]
-    return Reduction(selecting, (FlyTo(action.client, (float(x), float(y))),))
+    return Outcome(selecting, (FlyTo((float(x), float(y))),))
 
 
 @reduce.register
-def _(action: actions.InsertControlPoint, state: AppState) -> Reduction:
-    editor, route, segment, point = _selected(state, action.client)
+def insert_control_point(_action: actions.InsertControlPoint, state: AppState, sender: Sender) -> Outcome:
+    editor, route, segment, point = _selected(state, sender)
     near = _where(editor, segment, point)
     inserted = edits.insert_point(route, point.segment, near)
     gaps = np.hypot(*(inserted.segments[point.segment].control_points - near).T)
-    edit = Edit(f"insert point in {route.name}", action.client)
+    edit = Edit(f"insert point in {route.name}", sender)
     nearest = replace(point, index=int(np.argmin(gaps)))
     return _with_routes(state, edits.put(state.project.routes, inserted, route.name), edit, nearest)
 
 
 @reduce.register
-def _(action: actions.SplitSegment, state: AppState) -> Reduction:
-    editor, route, segment, point = _selected(state, action.client)
+def split_segment(_action: actions.SplitSegment, state: AppState, sender: Sender) -> Outcome:
+    editor, route, segment, point = _selected(state, sender)
     cut = edits.split_segment(route, point.segment, _where(editor, segment, point))
     routes = edits.put(state.project.routes, cut, route.name)
     behind = ControlPoint(route.name, point.segment + 1)
-    return _with_routes(state, routes, Edit(f"split {route.name}", action.client), behind)
+    return _with_routes(state, routes, Edit(f"split {route.name}", sender), behind)
 
 
 @reduce.register
-def _(action: actions.DeleteControlPoint, state: AppState) -> Reduction:
-    _, route, _, point = _selected(state, action.client)
+def delete_control_point(_action: actions.DeleteControlPoint, state: AppState, sender: Sender) -> Outcome:
+    _, route, _, point = _selected(state, sender)
     fewer = edits.delete_point(route, point.segment, point.index)
-    edit = Edit(f"delete point of {route.name}", action.client)
+    edit = Edit(f"delete point of {route.name}", sender)
     before = replace(point, index=max(point.index - 1, 0))
     return _with_routes(state, edits.put(state.project.routes, fewer, route.name), edit, before)
 
 
 @reduce.register
-def _(action: actions.PlaceControlPoint, state: AppState) -> Reduction:
-    _, route, _, point = _selected(state, action.client)
+def place_control_point(action: actions.PlaceControlPoint, state: AppState, sender: Sender) -> Outcome:
+    _, route, _, point = _selected(state, sender)
     bent = edits.move_point(route, point.segment, point.index, action.place)
-    key = f"{action.client}:{point}" if action.at else ""
-    edit = Edit(f"move point of {route.name}", action.client, key, action.at)
+    edit = Edit(f"move point of {route.name}", sender, "" if action.dragged else str(point))
     return _with_routes(state, edits.put(state.project.routes, bent, route.name), edit, point)
 
 
 @reduce.register
-def _(action: actions.SetSegment, state: AppState) -> Reduction:
-    _, route, segment, point = _selected(state, action.client)
+def set_segment(action: actions.SetSegment, state: AppState, sender: Sender) -> Outcome:
+    _, route, segment, point = _selected(state, sender)
     if (action.direction, action.speed) == (segment.direction, route.speed_of(segment)):
-        return Reduction(state)
+        return Outcome(state)
     changed = edits.set_direction(route, point.segment, action.direction)
     changed = edits.set_speed(changed, point.segment, action.speed)
-    edit = Edit(f"set drive of {route.name}", action.client, f"{action.client}:{point.segment}:drive", action.at)
+    edit = Edit(f"set drive of {route.name}", sender, f"{route.name}:{point.segment}:drive")
     return _with_routes(state, edits.put(state.project.routes, changed, route.name), edit, point)
 
 
 @reduce.register
-def _(action: actions.RenameRoute, state: AppState) -> Reduction:
-    _, route, _, point = _selected(state, action.client)
+def rename_route(action: actions.RenameRoute, state: AppState, sender: Sender) -> Outcome:
+    _, route, _, point = _selected(state, sender)
     if action.name == route.name:
-        return Reduction(state)
+        return Outcome(state)
     routes = edits.put(state.project.routes, replace(route, name=action.name), route.name)
-    edit = Edit(f"rename {route.name}", action.client)
+    edit = Edit(f"rename {route.name}", sender)
     layout = state.project.layout.renamed(route.name, action.name)
     return _with_routes(state, routes, edit, replace(point, route=action.name), layout)
 
 
 @reduce.register
-def _(action: actions.DeleteRoute, state: AppState) -> Reduction:
-    _, route, _, _ = _selected(state, action.client)
+def delete_route(_action: actions.DeleteRoute, state: AppState, sender: Sender) -> Outcome:
+    _, route, _, _ = _selected(state, sender)
     routes = edits.remove(state.project.routes, route.name)
     layout = state.project.layout.renamed(route.name, None)
-    return _with_routes(state, routes, Edit(f"delete {route.name}", action.client), None, layout)
+    return _with_routes(state, routes, Edit(f"delete {route.name}", sender), None, layout)
 
 
 def _where(editor: Editor, segment: Segment, point: ControlPoint) -> Point:
@@ -142,25 +140,25 @@ def _where(editor: Editor, segment: Segment, point: ControlPoint) -> Point:
 
 
 @reduce.register
-def _(action: actions.SetVehicle, state: AppState) -> Reduction:
+def set_vehicle(action: actions.SetVehicle, state: AppState, sender: Sender) -> Outcome:
     if action.vehicle == state.project.vehicle:
-        return Reduction(state)
-    edit = Edit("change the vehicle", action.client, "vehicle", action.at)
-    return Reduction(edited(state, replace(state.project, vehicle=action.vehicle), edit), (ApplyParameters(),))
+        return Outcome(state)
+    edit = Edit("change the vehicle", sender, "vehicle")
+    return Outcome(edited(state, replace(state.project, vehicle=action.vehicle), edit))
 
 
 @reduce.register
-def _(action: actions.SetScanner, state: AppState) -> Reduction:
+def set_scanner(action: actions.SetScanner, state: AppState, sender: Sender) -> Outcome:
     if action.scanner == state.project.scanner:
-        return Reduction(state)
-    edit = Edit("change the scanner", action.client, "scanner", action.at)
-    return Reduction(edited(state, replace(state.project, scanner=action.scanner), edit), (ApplyParameters(),))
+        return Outcome(state)
+    edit = Edit("change the scanner", sender, "scanner")
+    return Outcome(edited(state, replace(state.project, scanner=action.scanner), edit))
 
 
 @reduce.register
-def _(action: actions.ShowProblem, state: AppState) -> Reduction:
+def show_problem(action: actions.ShowProblem, state: AppState, sender: Sender) -> Outcome:
     problem = action.problem
-    editor = replace(editor_of(state, action.client), tool=Tool.SELECT).selecting()
+    editor = replace(editor_of(state, sender.browser), tool=Tool.SELECT).selecting()
     if problem.subject is Subject.REFLECTOR:
         editor = editor.selecting(problem.ids)
     elif problem.subject is Subject.STATION and problem.ids:
@@ -168,11 +166,5 @@ def _(action: actions.ShowProblem, state: AppState) -> Reduction:
     elif problem.subject is Subject.ROUTE and problem.ids:
         near = problem.place or (0.0, 0.0)
         editor = editor.selecting(point=control_point_at(state.project, problem.ids[0], near, float("inf")))
-    there = () if problem.place is None else (FlyTo(action.client, problem.place),)
-    return Reduction(state.with_editor(action.client, editor), there)
-
-
-@reduce.register
-def _(action: actions.Restored, state: AppState) -> Reduction:
-    restored = edited(replace(state, greeting=action.text), action.project, Edit("restore unsaved edits"))
-    return Reduction(restored, (Tell(action.text, failed=False),))
+    there = () if problem.place is None else (FlyTo(problem.place),)
+    return Outcome(state.with_browser(sender.browser, editor), there)

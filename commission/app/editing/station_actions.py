@@ -1,19 +1,17 @@
-"""What a person can ask for about stations, as frozen values; `client` is the number of the browser's connection."""
+"""What a person can ask for about stations, as frozen values."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
+from commission.app.base.actions import Action
 from commission.app.editing.editor import Point
 
 
 @dataclass(frozen=True, slots=True)
-class SelectStation:
+class SelectStation(Action):
     """Select a station and nothing else."""
 
-    client: int
-    """Number of the browser's connection."""
     name: str
     """Its name."""
     fly: bool = False
@@ -21,11 +19,9 @@ class SelectStation:
 
 
 @dataclass(frozen=True, slots=True)
-class PlaceStation:
+class PlaceStation(Action):
     """Put a new station somewhere: on a route and along it where one is near."""
 
-    client: int
-    """Number of the browser's connection."""
     place: Point
     """Where [m], map frame."""
     reach: float
@@ -33,11 +29,9 @@ class PlaceStation:
 
 
 @dataclass(frozen=True, slots=True)
-class MoveStation:
+class MoveStation(Action):
     """Put the selected station somewhere else, or turn it."""
 
-    client: int
-    """Number of the browser's connection."""
     place: Point
     """Where [m], map frame."""
     heading: float
@@ -45,33 +39,20 @@ class MoveStation:
 
 
 @dataclass(frozen=True, slots=True)
-class SetStation:
+class SetStation(Action):
     """Set one field of the selected station."""
 
-    client: int
-    """Number of the browser's connection."""
     field: str
     """Field of `Station`."""
     value: float | str
     """New value, SI and radians."""
-    at: float = 0.0
-    """When [s, any monotonic clock]: changes that follow quickly are one undo step."""
 
 
 @dataclass(frozen=True, slots=True)
-class AlignStation:
+class AlignStation(Action):
     """Put the selected station onto the nearest route, looking along it."""
 
-    client: int
-    """Number of the browser's connection."""
-
 
 @dataclass(frozen=True, slots=True)
-class DeleteStation:
+class DeleteStation(Action):
     """Delete the selected station."""
-
-    client: int
-    """Number of the browser's connection."""
-
-
-StationAction: TypeAlias = SelectStation | PlaceStation | MoveStation | SetStation | AlignStation | DeleteStation

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -29,8 +28,8 @@ ALIGN, DELETE = "Onto route", "Delete"
 class StationFields:
     """Name, pose, required accuracy, buttons."""
 
-    def __init__(self, gui: GuiApi, post: Post, client: int) -> None:
-        self._post, self._client = post, client
+    def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
+        self._post, self._browser = post, browser
         hints = field_hints(Station)
         self._folder = gui.add_folder("Station", visible=False)
         with self._folder:
@@ -52,17 +51,17 @@ class StationFields:
         self, field: str, meant: Callable[[Any], float | str]
     ) -> Callable[[GuiEvent[Any]], page_actions.Action]:
         """Return what makes the action of one field's widget."""
-        return lambda event: actions.SetStation(self._client, field, meant(event.target.value), time.monotonic())
+        return lambda event: actions.SetStation(field, meant(event.target.value))
 
     def _pressed(self, event: GuiEvent[Any]) -> page_actions.Action:
         match event.target.value:
             case "Onto route":
-                return actions.AlignStation(self._client)
+                return actions.AlignStation()
             case "Delete":
-                return actions.DeleteStation(self._client)
+                return actions.DeleteStation()
             case label:
                 accuracy = DOCKING if label == DOCK else TRANSIT
-                return actions.SetStation(self._client, "required_accuracy", accuracy, time.monotonic())
+                return actions.SetStation("required_accuracy", accuracy)
 
     def show(self, project: Project, editor: Editor) -> None:
         """Show the selected station."""

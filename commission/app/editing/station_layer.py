@@ -9,8 +9,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, outline_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.plan.view import PlanView
+from commission.app.base.view import PageView
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
@@ -34,11 +33,13 @@ class StationLayer(BaseLayer):
     """All stations of the project."""
 
     name = "Stations"
+    rank = 80
     reads: tuple[str, ...] = ("floor_map", "stations", "vehicle")
     legend = (theme.Legend("station, with its required accuracy", theme.STATION, theme.Mark.LINE),)
 
-    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - the protocol's
+    def is_used(self, view: PageView) -> bool:
         """Whether the project has stations."""
+        state = view.state
         return bool(state.project.stations)
 
     def __init__(self, scene: SceneApi) -> None:

@@ -6,10 +6,12 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from commission.app.base.reduction import FlyTo, Reduction, reduce
+from commission.app.base.actions import Sender
+from commission.app.base.effects import FlyTo
+from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing import station_actions as actions
-from commission.app.editing.reducer import editor_of
+from commission.app.editing.editor import editor_of
 from commission.app.editing.station_gestures import station_of
 from commission.errors import UsageError
 from commission.site.editing import stations as edits
@@ -19,35 +21,34 @@ WORDS = {"x": "place", "y": "place", "heading": "heading", "required_accuracy": 
 """What the fields of a station are called in an undo step."""
 
 
-def _selected(state: AppState, client: int) -> Station:
+def _selected(state: AppState, sender: Sender) -> Station:
     """Return the station that a browser has selected; raises UsageError for none."""
-    station = station_of(state.project, editor_of(state, client))
+    station = station_of(state.project, editor_of(state, sender.browser))
     if station is None:
         raise UsageError("no station is selected; expected one")
     return station
 
 
-def _with_stations(state: AppState, stations: tuple[Station, ...], edit: Edit, selected: str) -> Reduction:
+def _with_stations(state: AppState, stations: tuple[Station, ...], edit: Edit, selected: str) -> Outcome:
     """Return what follows from other stations: one undo step, and one of them is selected."""
     if stations == state.project.stations:
-        return Reduction(state)
+        return Outcome(state)
     after = edited(state, replace(state.project, stations=stations), edit)
-    if edit.client is not None:
-        after = after.with_editor(edit.client, editor_of(after, edit.client).selecting(station=selected))
-    return Reduction(after)
+    browser = edit.sender.browser
+    return Outcome(after.with_browser(browser, editor_of(after, browser).selecting(station=selected)))
 
 
 @reduce.register
-def _(action: actions.SelectStation, state: AppState) -> Reduction:
-    editor = editor_of(state, action.client).selecting(station=action.name)
-    selecting, station = state.with_editor(action.client, editor), station_of(state.project, editor)
+def select_station(action: actions.SelectStation, state: AppState, sender: Sender) -> Outcome:
+    editor = editor_of(state, sender.browser).selecting(station=action.name)
+    selecting, station = state.with_browser(sender.browser, editor), station_of(state.project, editor)
     if not action.fly or station is None:
-        return Reduction(selecting)
-    return Reduction(selecting, (FlyTo(action.client, (station.x, station.y)),))
+        return Outcome(selecting)
+    return Outcome(selecting, (FlyTo((station.x, station.y)),))
 
 
 @reduce.register
-def _(action: actions.PlaceStation, state: AppState) -> Reduction:
+def place_station(action: actions.PlaceStation, state: AppState, sender: Sender) -> Outcome:
     stations = state.project.stations
     name = edits.fresh_name(stations)
     x, y = action.place
@@ -56,41 +57,41 @@ def _(action: actions.PlaceStation, state: AppState) -> Reduction:
     if pose is not None:
         x, y, heading = (float(value) for value in pose)
         placed = replace(placed, x=x, y=y, heading=heading)
-    return _with_stations(state, edits.put(stations, placed), Edit(f"place {name}", action.client), name)
+    return _with_stations(state, edits.put(stations, placed), Edit(f"place {name}", sender), name)
 
 
 @reduce.register
-def _(action: actions.MoveStation, state: AppState) -> Reduction:
-    station = _selected(state, action.client)
+def move_station(action: actions.MoveStation, state: AppState, sender: Sender) -> Outcome:
+    station = _selected(state, sender)
     verb = "turn" if action.place == (station.x, station.y) else "move"
     moved = replace(station, x=action.place[0], y=action.place[1], heading=action.heading)
     stations = edits.put(state.project.stations, moved, station.name)
-    return _with_stations(state, stations, Edit(f"{verb} {station.name}", action.client), station.name)
+    return _with_stations(state, stations, Edit(f"{verb} {station.name}", sender), station.name)
 
 
 @reduce.register
-def _(action: actions.SetStation, state: AppState) -> Reduction:
-    station = _selected(state, action.client)
+def set_station(action: actions.SetStation, state: AppState, sender: Sender) -> Outcome:
+    station = _selected(state, sender)
     changes: dict[str, Any] = {action.field: action.value}
     changed = replace(station, **changes)
     what = f"rename {station.name}" if action.field == "name" else f"set {WORDS[action.field]} of {station.name}"
-    key = "" if action.field == "name" else f"{action.client}:{station.name}:{action.field}"
+    key = "" if action.field == "name" else f"{station.name}:{action.field}"
     stations = edits.put(state.project.stations, changed, station.name)
-    return _with_stations(state, stations, Edit(what, action.client, key, action.at), changed.name)
+    return _with_stations(state, stations, Edit(what, sender, key), changed.name)
 
 
 @reduce.register
-def _(action: actions.AlignStation, state: AppState) -> Reduction:
-    station = _selected(state, action.client)
+def align_station(_action: actions.AlignStation, state: AppState, sender: Sender) -> Outcome:
+    station = _selected(state, sender)
     pose = edits.on_route(state.project.routes, (station.x, station.y), math.inf)
     if pose is None:
         raise UsageError("the project has no route to put the station on; expected one")
     stations = edits.put(state.project.stations, edits.aligned(station, pose), station.name)
-    return _with_stations(state, stations, Edit(f"align {station.name}", action.client), station.name)
+    return _with_stations(state, stations, Edit(f"align {station.name}", sender), station.name)
 
 
 @reduce.register
-def _(action: actions.DeleteStation, state: AppState) -> Reduction:
-    station = _selected(state, action.client)
+def delete_station(_action: actions.DeleteStation, state: AppState, sender: Sender) -> Outcome:
+    station = _selected(state, sender)
     stations = edits.remove(state.project.stations, station.name)
-    return _with_stations(state, stations, Edit(f"delete {station.name}", action.client), "")
+    return _with_stations(state, stations, Edit(f"delete {station.name}", sender), "")

@@ -90,15 +90,14 @@ def _dragging(project: Project, editor: Editor) -> str:
 class ToolHint(BasePanel):
     """The line, in the middle above the floor."""
 
-    def __init__(self, gui: GuiApi, client: int) -> None:
-        self._client = client
+    def __init__(self, gui: GuiApi, browser: int) -> None:
+        self._browser = browser
         self._html = gui.add_html("")
         self._shown = ""
 
     def draw(self, view: PageView) -> None:
         """Follow the editor without delay."""
-        editor = view.state.editors.get(self._client)
-        text = "" if editor is None else hint(view.state.project, editor)
+        text = hint(view.state.project, view.state.of_browser(self._browser, Editor))
         if text == self._shown:
             return
         self._shown = text

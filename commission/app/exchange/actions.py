@@ -1,10 +1,10 @@
-"""What can be asked for and what can happen while files come and go; `client` is the number of the connection."""
+"""What can be asked for and what can happen while files come and go."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
+from commission.app.base.actions import Action
 from commission.app.exchange.pending import ImportSource
 from commission.app.exchange.preview import Preview
 from commission.io.exports import Exported, Format
@@ -12,11 +12,9 @@ from commission.io.imports import WHOLE, Imported, LayoutChoice
 
 
 @dataclass(frozen=True, slots=True)
-class ReadImport:
+class ReadImport(Action):
     """Read a file and show what it would change."""
 
-    client: int
-    """Number of the browser's connection."""
     source: ImportSource
     """Which file."""
     choice: LayoutChoice = WHOLE
@@ -24,57 +22,43 @@ class ReadImport:
 
 
 @dataclass(frozen=True, slots=True)
-class ChooseLayout:
+class ChooseLayout(Action):
     """Read another part of the file that is being looked at."""
 
-    client: int
-    """Number of the browser's connection."""
     choice: LayoutChoice
     """Which part."""
 
 
 @dataclass(frozen=True, slots=True)
-class RemoveAbsent:
+class RemoveAbsent(Action):
     """Choose between merging and replacing."""
 
-    client: int
-    """Number of the browser's connection."""
     remove: bool
     """Whether what is in the project and not in the file is removed."""
 
 
 @dataclass(frozen=True, slots=True)
-class AcceptImport:
+class AcceptImport(Action):
     """Change the project as the preview says."""
 
-    client: int
-    """Number of the browser's connection."""
-
 
 @dataclass(frozen=True, slots=True)
-class DropImport:
+class DropImport(Action):
     """Leave the project as it is; what is being read is stopped."""
 
-    client: int
-    """Number of the browser's connection."""
-
 
 @dataclass(frozen=True, slots=True)
-class MakeFile:
+class MakeFile(Action):
     """Make a file of the project and hand it to the browser."""
 
-    client: int
-    """Number of the browser's connection."""
     wanted: Format
     """In which format."""
 
 
 @dataclass(frozen=True, slots=True)
-class ExchangeProgressed:
+class ExchangeProgressed(Action):
     """Reading has come farther."""
 
-    client: int
-    """Number of the browser's connection."""
     number: int
     """What was asked for."""
     fraction: float
@@ -84,11 +68,9 @@ class ExchangeProgressed:
 
 
 @dataclass(frozen=True, slots=True)
-class ImportRead:
+class ImportRead(Action):
     """A file was read."""
 
-    client: int
-    """Number of the browser's connection."""
     number: int
     """What was asked for."""
     choice: LayoutChoice
@@ -100,36 +82,18 @@ class ImportRead:
 
 
 @dataclass(frozen=True, slots=True)
-class FileMade:
+class FileMade(Action):
     """A file was made."""
 
-    client: int
-    """Number of the browser's connection."""
     file: Exported
     """The file."""
 
 
 @dataclass(frozen=True, slots=True)
-class ExchangeFailed:
+class ExchangeFailed(Action):
     """A file could not be taken, read or made."""
 
-    client: int
-    """Number of the browser's connection."""
     text: str
     """Why, in one line."""
     number: int | None = None
     """What was asked for; none: it did not come so far."""
-
-
-ExchangeAction: TypeAlias = (
-    ReadImport
-    | ChooseLayout
-    | RemoveAbsent
-    | AcceptImport
-    | DropImport
-    | MakeFile
-    | ExchangeProgressed
-    | ImportRead
-    | FileMade
-    | ExchangeFailed
-)

@@ -9,11 +9,11 @@ from viser import GuiApi, GuiDropdownHandle, GuiEvent
 
 from commission.app.base import actions as page_actions
 from commission.app.base import theme
-from commission.app.base.panel import BasePanel, Post, escaped, posting, write
+from commission.app.base.panel import BasePanel, Post, escaped, from_browser, posting, write
 from commission.app.base.uploads import Uploads
 from commission.app.base.view import PageView
 from commission.app.exchange import actions
-from commission.app.exchange.pending import IDLE, Exchange, Pasted, Pending, ServerFile
+from commission.app.exchange.pending import Exchange, Pasted, Pending, ServerFile
 from commission.app.exchange.words import counts, details, notes
 from commission.io.exports import Format
 from commission.io.imports import ENDINGS, SIZE_LIMIT, LayoutChoice
@@ -33,16 +33,16 @@ class ExchangePanel(BasePanel):
     ----------
     gui : the browser's own.
     post : takes the actions.
-    client : number of the browser's connection.
+    browser : number of its connection.
     """
 
-    def __init__(self, gui: GuiApi, post: Post, client: int) -> None:
-        self._gui, self._post, self._client = gui, post, client
-        self._shown: tuple[Exchange, Project | None] = (IDLE, None)
+    def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
+        self._gui, self._post, self._browser = gui, post, browser
+        self._shown: tuple[Exchange, Project | None] = (Exchange(), None)
         with gui.add_folder("Exchange", expand_by_default=False):
             self._state = gui.add_html("")
             self._stop = gui.add_button("Stop", color="gray", visible=False, hint="Do not read the file any further.")
-            self._stop.on_click(posting(post, lambda _event: actions.DropImport(client)))
+            self._stop.on_click(posting(post, lambda _event: actions.DropImport()))
             self._add_preview()
             # A folder, because an upload button cannot be hidden by itself.
             self._inputs = gui.add_folder("Import")
@@ -52,11 +52,11 @@ class ExchangePanel(BasePanel):
 
     def _add_inputs(self) -> None:
         """Add the three ways in."""
-        gui, post, client = self._gui, self._post, self._client
-        uploads = Uploads(gui, lambda _client, text: post(actions.ExchangeFailed(client, text)))
+        gui, post = self._gui, self._post
+        uploads = Uploads(gui, lambda browser, text: post(from_browser(actions.ExchangeFailed(text), browser)))
         uploads.add(
             "Upload a file",
-            lambda _client, upload: post(actions.ReadImport(client, upload)),
+            lambda browser, upload: post(from_browser(actions.ReadImport(upload), browser)),
             limit=SIZE_LIMIT,
             endings=ENDINGS,
             note="Reflectors: CSV, SICK .imk. Routes: VDMA LIF, VDA 5050. A project: .zip.",
@@ -72,17 +72,17 @@ class ExchangePanel(BasePanel):
 
     def _named(self, typed: str) -> page_actions.Action:
         if not typed.strip():
-            return actions.ExchangeFailed(self._client, "no file was named; expected its path on the server")
-        return actions.ReadImport(self._client, ServerFile(Path(typed.strip())))
+            return actions.ExchangeFailed("no file was named; expected its path on the server")
+        return actions.ReadImport(ServerFile(Path(typed.strip())))
 
     def _pasted(self, text: str) -> page_actions.Action:
         if not text.strip():
-            return actions.ExchangeFailed(self._client, "nothing was pasted; expected rows of id, x, y, radius")
-        return actions.ReadImport(self._client, Pasted(text))
+            return actions.ExchangeFailed("nothing was pasted; expected rows of id, x, y, radius")
+        return actions.ReadImport(Pasted(text))
 
     def _add_preview(self) -> None:
         """Add what is shown while a file waits for a yes or no."""
-        gui, post, client = self._gui, self._post, self._client
+        gui, post = self._gui, self._post
         self._vehicle: GuiDropdownHandle[Any] = gui.add_dropdown(
             "Vehicle type", (ANY,), visible=False, hint="Whose edges are read."
         )
@@ -90,11 +90,11 @@ class ExchangePanel(BasePanel):
             "Layout", (ALL,), visible=False, hint="Which layout of the file is read."
         )
         for widget in (self._vehicle, self._layout):
-            widget.on_update(posting(post, lambda _event: actions.ChooseLayout(client, self._choice())))
+            widget.on_update(posting(post, lambda _event: actions.ChooseLayout(self._choice())))
         self._remove = gui.add_checkbox(
             "Remove others", False, visible=False, hint="Replace: remove what is not in the file. Otherwise it stays."
         )
-        self._remove.on_update(posting(post, lambda event: actions.RemoveAbsent(client, bool(event.target.value))))
+        self._remove.on_update(posting(post, lambda event: actions.RemoveAbsent(bool(event.target.value))))
         self._wide = gui.add_html(theme.WIDE, visible=False)
         self._answer = gui.add_button_group("", (ACCEPT, CANCEL), visible=False)
         self._answer.on_click(posting(post, self._answered))
@@ -102,26 +102,25 @@ class ExchangePanel(BasePanel):
 
     def _answered(self, event: GuiEvent[Any]) -> page_actions.Action:
         accepts = event.target.value == ACCEPT
-        return actions.AcceptImport(self._client) if accepts else actions.DropImport(self._client)
+        return actions.AcceptImport() if accepts else actions.DropImport()
 
     def _choice(self) -> LayoutChoice:
         vehicle, layout = self._vehicle.value, self._layout.value
         return LayoutChoice(None if vehicle == ANY else vehicle, None if layout == ALL else layout)
 
     def _add_exports(self) -> None:
-        gui, post, client = self._gui, self._post, self._client
+        gui, post = self._gui, self._post
         gui.add_html("<div class='c-note' style='padding:2px 8px'>Export</div>")
         gui.add_html(theme.WIDE)
         made = gui.add_button_group(
             "", tuple(Format), hint="Reflectors as CSV or SICK .imk, routes as VDMA LIF, the whole project as a zip."
         )
-        made.on_click(posting(post, lambda event: actions.MakeFile(client, Format(event.target.value))))
+        made.on_click(posting(post, lambda event: actions.MakeFile(Format(event.target.value))))
         self._sent = gui.add_html("")
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow the browser's exchange, and the project while something waits to be compared with it."""
-        editor = view.state.editors.get(self._client)
-        exchange = IDLE if editor is None else editor.exchange
+        exchange = view.state.of_browser(self._browser, Exchange)
         compared = view.state.project if exchange.pending is not None else None
         if self._shown[0] is exchange and self._shown[1] is compared:
             return

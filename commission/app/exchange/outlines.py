@@ -16,7 +16,7 @@ MOST = 2000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ghosts:
+class Outlines:
     """What is drawn of an import."""
 
     centers: FloatArray
@@ -25,10 +25,10 @@ class Ghosts:
     """(M, 2) points [m] each: from the place of a moved reflector to its new one, and along new courses of routes."""
 
 
-NOTHING = Ghosts(np.empty((0, 2)), ())
+NOTHING = Outlines(np.empty((0, 2)), ())
 
 
-def ghosts_of(project: Project, pending: Pending | None) -> Ghosts:
+def outlines_of(project: Project, pending: Pending | None) -> Outlines:
     """Return what is drawn of an import that waits; nothing when there is none."""
     if pending is None:
         return NOTHING
@@ -44,4 +44,4 @@ def ghosts_of(project: Project, pending: Pending | None) -> Ghosts:
         lines += [curve(segment) for route in courses[:MOST] for segment in route.segments]
     if found.stations is not None:
         places += [(station.x, station.y) for station in found.stations.added[:MOST]]
-    return Ghosts(np.array(places, dtype=np.float64).reshape(-1, 2), tuple(lines))
+    return Outlines(np.array(places, dtype=np.float64).reshape(-1, 2), tuple(lines))

@@ -97,7 +97,3 @@ class Exchange:
     """Why the last file could not be read or made."""
     sent: Sent | None = None
     """The last file that was made."""
-
-
-IDLE = Exchange()
-"""Of a browser that has neither imported nor exported anything."""

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from commission.app.base.reduction import (
-    ApplyParameters,
-    ExportProject,
-    ReadFile,
-    Reduction,
-    SendFile,
-    StopReading,
-    Tell,
-    reduce,
-)
+from commission.app.base.actions import Sender
+from commission.app.base.effects import SendFile, Tell
+from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
-from commission.app.editing.editor import Editor
 from commission.app.exchange import actions
+from commission.app.exchange.effects import ExportProject, ReadFile, StopReading
 from commission.app.exchange.pending import Exchange, Pending, Reading, Sent
 from commission.errors import UsageError
 from commission.io.project_archive import ProjectImport
@@ -25,103 +18,94 @@ PROBLEM_LIMIT = 500
 """Characters of a problem that are shown."""
 
 
-def _exchange(state: AppState, client: int) -> Exchange:
-    return state.editors.get(client, Editor()).exchange
-
-
-def _with(state: AppState, client: int, exchange: Exchange) -> AppState:
-    """Return the state with another exchange of one browser; one that has left gets none."""
-    if client not in state.editors:
-        return state
-    return state.with_editor(client, replace(state.editors[client], exchange=exchange))
-
-
-def _pending(state: AppState, client: int) -> Pending:
-    pending = _exchange(state, client).pending
+def _pending(state: AppState, sender: Sender) -> Pending:
+    pending = state.of_browser(sender.browser, Exchange).pending
     if pending is None:
         raise UsageError("no file was read; expected one that waits to be accepted")
     return pending
 
 
 @reduce.register
-def _(action: actions.ReadImport, state: AppState) -> Reduction:
-    exchange = _exchange(state, action.client)
+def read_import(action: actions.ReadImport, state: AppState, sender: Sender) -> Outcome:
+    exchange = state.of_browser(sender.browser, Exchange)
     number = exchange.number + 1
     reading = Exchange(number, Reading(action.source), exchange.pending)
-    return Reduction(
-        _with(state, action.client, reading),
-        (ReadFile(action.client, number, action.source, action.choice, state.project),),
+    return Outcome(
+        state.with_browser(sender.browser, reading),
+        (ReadFile(number, action.source, action.choice, state.project),),
     )
 
 
 @reduce.register
-def _(action: actions.ChooseLayout, state: AppState) -> Reduction:
-    source = _pending(state, action.client).source
-    return reduce(actions.ReadImport(action.client, source, action.choice), state)
+def choose_layout(action: actions.ChooseLayout, state: AppState, sender: Sender) -> Outcome:
+    source = _pending(state, sender).source
+    return reduce(actions.ReadImport(source, action.choice), state, sender)
 
 
 @reduce.register
-def _(action: actions.ExchangeProgressed, state: AppState) -> Reduction:
-    exchange = _exchange(state, action.client)
+def exchange_progressed(action: actions.ExchangeProgressed, state: AppState, sender: Sender) -> Outcome:
+    exchange = state.of_browser(sender.browser, Exchange)
     if exchange.reading is None or action.number != exchange.number:
-        return Reduction(state)
+        return Outcome(state)
     reading = replace(exchange.reading, fraction=action.fraction, message=action.message)
-    return Reduction(_with(state, action.client, replace(exchange, reading=reading)))
+    return Outcome(state.with_browser(sender.browser, replace(exchange, reading=reading)))
 
 
 @reduce.register
-def _(action: actions.ImportRead, state: AppState) -> Reduction:
-    exchange = _exchange(state, action.client)
+def import_read(action: actions.ImportRead, state: AppState, sender: Sender) -> Outcome:
+    exchange = state.of_browser(sender.browser, Exchange)
     if exchange.reading is None or action.number != exchange.number:
-        return Reduction(state)
+        return Outcome(state)
     # A table is usually one of several, a project is usually wanted as it is.
     whole = isinstance(action.imported, ProjectImport)
     pending = Pending(exchange.reading.source, action.choice, action.imported, action.found, remove=whole)
-    return Reduction(_with(state, action.client, Exchange(exchange.number, pending=pending)))
+    return Outcome(state.with_browser(sender.browser, Exchange(exchange.number, pending=pending)))
 
 
 @reduce.register
-def _(action: actions.RemoveAbsent, state: AppState) -> Reduction:
-    pending = replace(_pending(state, action.client), remove=action.remove)
-    return Reduction(_with(state, action.client, replace(_exchange(state, action.client), pending=pending)))
+def remove_absent(action: actions.RemoveAbsent, state: AppState, sender: Sender) -> Outcome:
+    pending = replace(_pending(state, sender), remove=action.remove)
+    return Outcome(
+        state.with_browser(sender.browser, replace(state.of_browser(sender.browser, Exchange), pending=pending))
+    )
 
 
 @reduce.register
-def _(action: actions.AcceptImport, state: AppState) -> Reduction:
-    pending = _pending(state, action.client)
+def accept_import(_action: actions.AcceptImport, state: AppState, sender: Sender) -> Outcome:
+    pending = _pending(state, sender)
     project = pending.preview(state.project).accepted(remove=pending.remove)
-    done = _with(state, action.client, Exchange(_exchange(state, action.client).number))
+    done = state.with_browser(sender.browser, Exchange(state.of_browser(sender.browser, Exchange).number))
     title = pending.source.title
     if project is state.project:
-        return Reduction(done, (Tell(f"{title} changes nothing", failed=False),))
-    return Reduction(edited(done, project, Edit(f"import {title}", action.client)), (ApplyParameters(),))
+        return Outcome(done, (Tell(f"{title} changes nothing", failed=False),))
+    return Outcome(edited(done, project, Edit(f"import {title}", sender)))
 
 
 @reduce.register
-def _(action: actions.DropImport, state: AppState) -> Reduction:
+def drop_import(_action: actions.DropImport, state: AppState, sender: Sender) -> Outcome:
     # The next number makes an answer that is on its way too late.
-    dropped = Exchange(_exchange(state, action.client).number + 1)
-    return Reduction(_with(state, action.client, dropped), (StopReading(action.client),))
+    dropped = Exchange(state.of_browser(sender.browser, Exchange).number + 1)
+    return Outcome(state.with_browser(sender.browser, dropped), (StopReading(),))
 
 
 @reduce.register
-def _(action: actions.MakeFile, state: AppState) -> Reduction:
-    return Reduction(state, (ExportProject(action.client, action.wanted, state.project),))
+def make_file(action: actions.MakeFile, state: AppState, _sender: Sender) -> Outcome:
+    return Outcome(state, (ExportProject(action.wanted, state.project),))
 
 
 @reduce.register
-def _(action: actions.FileMade, state: AppState) -> Reduction:
+def file_made(action: actions.FileMade, state: AppState, sender: Sender) -> Outcome:
     sent = Sent(action.file.name, action.file.losses)
-    exchange = replace(_exchange(state, action.client), sent=sent, problem="")
-    sending = SendFile(action.client, action.file.name, action.file.content)
-    return Reduction(_with(state, action.client, exchange), (sending,))
+    exchange = replace(state.of_browser(sender.browser, Exchange), sent=sent, problem="")
+    sending = SendFile(action.file.name, action.file.content)
+    return Outcome(state.with_browser(sender.browser, exchange), (sending,))
 
 
 @reduce.register
-def _(action: actions.ExchangeFailed, state: AppState) -> Reduction:
-    exchange = _exchange(state, action.client)
+def exchange_failed(action: actions.ExchangeFailed, state: AppState, sender: Sender) -> Outcome:
+    exchange = state.of_browser(sender.browser, Exchange)
     if action.number is not None and action.number != exchange.number:
-        return Reduction(state)
+        return Outcome(state)
     text = " ".join(action.text.split())
     text = text if len(text) <= PROBLEM_LIMIT else f"{text[: PROBLEM_LIMIT - 1]}…"
-    return Reduction(_with(state, action.client, replace(exchange, reading=None, problem=text)))
+    return Outcome(state.with_browser(sender.browser, replace(exchange, reading=None, problem=text)))

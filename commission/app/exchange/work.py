@@ -1,89 +1,95 @@
-"""Reading and making files in the background, with a worker of its own: an import does not wait for a simulation."""
+"""Reading and making files in the background: an import does not wait for a simulation."""
 
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
-from typing import TypeAlias, cast
 
-from commission.app.base.jobs import JobReport, Jobs, JobState
-from commission.app.base.reduction import ExportProject, ReadFile, StopReading
+from commission.app.base.actions import Action, Envelope, Sender
+from commission.app.base.effects import Effect
+from commission.app.base.jobs import Lane
+from commission.app.base.service import Context, Service
+from commission.app.base.state import AppState
 from commission.app.base.uploads import Upload
 from commission.app.exchange import actions
-from commission.app.exchange.actions import ExchangeAction
+from commission.app.exchange.effects import ExportProject, ReadFile, StopReading
 from commission.app.exchange.pending import ImportSource, Pasted, ServerFile
 from commission.app.exchange.preview import compare
 from commission.io.exports import export
 from commission.io.imports import Imported, LayoutChoice, read_import, read_named, read_pasted
 from commission.progress import Progress
 
-Asked: TypeAlias = tuple[int, int | None]
-"""Number of the browser's connection, and of what it asked for; none for a file that is made."""
+QUIET_S = 0.05
+"""Shortest time between two words about how far reading is [s]."""
 
 
-class Exchanger:
-    """Does what the reducer asks for and posts what becomes of it.
+class ExchangeService(Service):
+    """Does what a handler asks for; a browser's newest file ends the reading of the one before."""
 
-    Parameters
-    ----------
-    post : takes actions, from any thread.
-    """
+    effects = (ReadFile, StopReading, ExportProject)
 
-    def __init__(self, post: Callable[[ExchangeAction], None]) -> None:
-        self._post = post
-        self._names = (f"exchange {number}" for number in itertools.count(1))
-        self._asked: dict[str, Asked] = {}
-        self._reading: dict[int, int] = {}
-        self._jobs = Jobs(self._hear)
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._exports = itertools.count(1)
 
-    def carry_out(self, effect: ReadFile | StopReading | ExportProject) -> None:
-        """Start or stop work; called by the owner thread only."""
+    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:  # noqa: ARG002 - the service's
+        """Start or stop work on behalf of a browser."""
         match effect:
-            case ReadFile(client, number):
-                self._stop(client)
-                self._reading[client] = self._start((client, number), lambda progress: _answer(effect, progress))
-            case ExportProject(client, wanted, project):
-                self._start(
-                    (client, None),
-                    lambda progress: actions.FileMade(client, export(project, wanted, progress=progress)),
-                )
-            case StopReading(client):
-                self._stop(client)
+            case ReadFile(number):
 
-    def close(self) -> None:
-        """Stop everything."""
-        self._jobs.close()
+                def read_it(progress: Progress) -> Action:
+                    return _answer(effect, self._telling(progress, number, sender))
 
-    def _start(self, asked: Asked, work: Callable[[Progress], ExchangeAction]) -> int:
-        """Queue work that returns what to post; returns the number of its job."""
-        name = next(self._names)
-        self._asked[name] = asked
-        return self._jobs.start(name, work).number
+                self._start(sender, read_it, number, key=_reading_of(sender))
+            case ExportProject(wanted, project):
+                self._start(sender, lambda progress: actions.FileMade(export(project, wanted, progress=progress)))
+            case _:
+                self.context.jobs.cancel(_reading_of(sender))
 
-    def _stop(self, client: int) -> None:
-        """Cancel what is being read for a browser; nothing happens when that is nothing."""
-        if client in self._reading:
-            self._jobs.stop(self._reading.pop(client))
+    def _start(
+        self,
+        sender: Sender,
+        work: Callable[[Progress], Action],
+        number: int | None = None,
+        *,
+        key: tuple[object, ...] | None = None,
+    ) -> None:
+        """Queue work that returns what follows; of exports, each is made."""
+        self.context.jobs.start(
+            "Files",
+            work,
+            then=lambda action: Envelope(action, sender),
+            failed=lambda job: Envelope(actions.ExchangeFailed(job.error, number), sender),
+            key=key or ("export", next(self._exports)),
+            lane=Lane.FILES,
+            is_shown=False,
+        )
 
-    def _hear(self, report: JobReport) -> None:
-        """Turn a report of a job into an action; called by the worker's thread, too."""
-        job = report.job
-        client, number = self._asked[job.name]
-        if job.state is JobState.RUNNING and number is not None:
-            self._post(actions.ExchangeProgressed(client, number, job.fraction, job.message))
-        elif job.state is JobState.FAILED:
-            self._post(actions.ExchangeFailed(client, job.error, number))
-        elif job.state is JobState.DONE:
-            self._post(cast(ExchangeAction, report.result))
-        if job.state in (JobState.DONE, JobState.FAILED, JobState.CANCELLED):
-            del self._asked[job.name]
+    def _telling(self, progress: Progress, number: int, sender: Sender) -> Progress:
+        """Progress that is shown in the browser that asked, not in all of them."""
+        told_at = -math.inf
+
+        def tell(fraction: float, message: str, /) -> None:
+            nonlocal told_at
+            progress(fraction, message)
+            now = self.context.clock()
+            if now - told_at >= QUIET_S:
+                told_at = now
+                self.context.post(Envelope(actions.ExchangeProgressed(number, fraction, message), sender))
+
+        return tell
 
 
-def _answer(asked: ReadFile, progress: Progress) -> ExchangeAction:
+def _reading_of(sender: Sender) -> tuple[object, ...]:
+    return "import", sender.browser
+
+
+def _answer(asked: ReadFile, progress: Progress) -> Action:
     """Read a file and compare it."""
     imported = read(asked.source, asked.choice, progress)
     progress(0.9, "comparing")
-    return actions.ImportRead(asked.client, asked.number, asked.choice, imported, compare(asked.project, imported))
+    return actions.ImportRead(asked.number, asked.choice, imported, compare(asked.project, imported))
 
 
 def read(source: ImportSource, choice: LayoutChoice, progress: Progress) -> Imported:

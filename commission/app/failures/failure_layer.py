@@ -9,8 +9,8 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, crosses, outline_segments, polyline_segments, stroke_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.plan.view import FailureView, PlanView
+from commission.app.base.view import PageView
+from commission.app.plan.view import FailureView, plan_of
 from commission.site.project import Project
 
 RING_POINTS = 32
@@ -22,6 +22,7 @@ class FailingLayer(BaseLayer):
     """The chosen reflector and its dependents."""
 
     name = "What if one fails"
+    rank = 110
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
     legend = (theme.Legend("fails without the chosen reflector", theme.DEPENDENT, theme.Mark.LINE),)
 
@@ -40,8 +41,9 @@ class FailingLayer(BaseLayer):
         """Adapt the size of the ring to the site's."""
         self._mark = extent_of(project).mark_size()
 
-    def draw_plan(self, plan: PlanView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+    def draw(self, view: PageView) -> None:
         """Draw what depends on the chosen reflector."""
+        plan = plan_of(view)
         if plan.failures is self._shown:
             return
         self._shown = plan.failures
@@ -58,8 +60,9 @@ class FailingLayer(BaseLayer):
         circle = np.array(place) + RING_MARKS * self._mark * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         self._ring.points = outline_segments(circle[np.newaxis], theme.Height.LABEL)
 
-    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - the protocol's
+    def is_used(self, view: PageView) -> bool:
         """Whether a reflector's failure is shown, or one that came before."""
+        plan = plan_of(view)
         return plan.failures is not None and (plan.failures.place is not None or bool(plan.failures.fallen))
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:

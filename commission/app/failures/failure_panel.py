@@ -13,7 +13,8 @@ from commission.app.base.view import PageView
 from commission.app.coverage.words import FAILURE_NAMES, metres_text
 from commission.app.plan.actions import AlsoFails, SetPlan
 from commission.app.plan.planner import RANKING
-from commission.app.plan.view import FailureView
+from commission.app.plan.settings import PlanSettings
+from commission.app.plan.view import FailureView, plan_of
 
 NO_REFLECTOR = "none"
 RANKED_SHOWN = 10
@@ -23,7 +24,7 @@ class FailurePanel(BasePanel):
     """Widgets of the ranking."""
 
     def __init__(self, gui: GuiApi, post: Post) -> None:
-        self._inputs = Inputs(gui, post, SetPlan, lambda state, name: getattr(state.plan, name))
+        self._inputs = Inputs(gui, post, SetPlan, lambda state, name: getattr(state.part(PlanSettings), name))
         self._inputs.choice("failure", "Each is", FAILURE_NAMES, "What happens to each reflector in turn.")
         rank = gui.add_button("Rank reflectors", hint="Let each fail on every route, and rank what depends on it.")
         rank.on_click(posting(post, lambda _event: SetPlan("ranking", value=True)))
@@ -38,7 +39,11 @@ class FailurePanel(BasePanel):
             "failed",
             self._failed,
             lambda name: "" if name == NO_REFLECTOR else name,
-            lambda state: state.plan.failed if state.plan.failed in self._failed.options else NO_REFLECTOR,
+            lambda state: (
+                state.part(PlanSettings).failed
+                if state.part(PlanSettings).failed in self._failed.options
+                else NO_REFLECTOR
+            ),
         )
         self._table = Text(gui)
         self._failures: FailureView | None = None
@@ -52,7 +57,7 @@ class FailurePanel(BasePanel):
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow settings, progress and result."""
-        failures = self._failures = view.plan.failures
+        failures = self._failures = plan_of(view).failures
         options = (NO_REFLECTOR, *(() if failures is None else failures.names))
         if self._failed.options != options:
             self._failed.options = options

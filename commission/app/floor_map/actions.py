@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from commission.app.base.actions import Action
 from commission.app.editing.editor import MapPen, Point
 from commission.app.floor_map.draft import MapFile, Read, ReadOptions
 from commission.site.floor_map import FloorMap
@@ -13,27 +14,23 @@ OptionValue: TypeAlias = float | bool | tuple[str, ...] | tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class OpenMap:
+class OpenMap(Action):
     """Read a file to load a floor map from."""
 
-    client: int
-    """Number of the browser's connection."""
     file: MapFile
     """The file."""
 
 
 @dataclass(frozen=True, slots=True)
-class SetReading:
+class SetReading(Action):
     """Read the file again in another way."""
 
-    client: int
-    """Number of the browser's connection."""
     reading: ReadOptions
     """How."""
 
 
 @dataclass(frozen=True, slots=True)
-class SetMapOption:
+class SetMapOption(Action):
     """Choose one thing that the file leaves open."""
 
     name: str
@@ -43,55 +40,42 @@ class SetMapOption:
 
 
 @dataclass(frozen=True, slots=True)
-class ClickPicture:
+class ClickPicture(Action):
     """Click on the two points of a picture (anew)."""
 
-    client: int
-    """Number of the browser's connection."""
-
 
 @dataclass(frozen=True, slots=True)
-class MakeMap:
+class MakeMap(Action):
     """Make the floor map of the file that was read."""
 
-    client: int
-    """Number of the browser's connection."""
-
 
 @dataclass(frozen=True, slots=True)
-class StopMapJob:
+class StopMapJob(Action):
     """Stop reading or drawing."""
 
 
 @dataclass(frozen=True, slots=True)
-class DiscardMap:
+class DiscardMap(Action):
     """Forget the file that was read or waits for another."""
 
 
 @dataclass(frozen=True, slots=True)
-class SetPen:
+class SetPen(Action):
     """Change how the floor map's tools draw."""
 
-    client: int
-    """Number of the browser's connection."""
     pen: MapPen
     """How they draw from now on."""
 
 
 @dataclass(frozen=True, slots=True)
-class FinishShape:
+class FinishShape(Action):
     """Draw the wall or the obstacle, or erase the area, whose points were clicked."""
-
-    client: int
-    """Number of the browser's connection."""
 
 
 @dataclass(frozen=True, slots=True)
-class SetPlantPoint:
+class SetPlantPoint(Action):
     """Name one of the points to align by, and say where it lies in the plant."""
 
-    client: int
-    """Number of the browser's connection."""
     index: int
     """Which point, 0 or 1: the other one stays as it is, for who types quickly is ahead of what is shown."""
     plant: Point
@@ -101,29 +85,22 @@ class SetPlantPoint:
 
 
 @dataclass(frozen=True, slots=True)
-class SetAligned:
+class SetAligned(Action):
     """Choose what moves with the floor map."""
 
-    client: int
-    """Number of the browser's connection."""
     everything: bool
     """Whether reflectors, routes and stations do."""
 
 
 @dataclass(frozen=True, slots=True)
-class AlignMap:
+class AlignMap(Action):
     """Move and turn the floor map by the two points."""
-
-    client: int
-    """Number of the browser's connection."""
 
 
 @dataclass(frozen=True, slots=True)
-class MapOpened:
+class MapOpened(Action):
     """A file was read that leaves something open."""
 
-    client: int
-    """Number of the browser that asked."""
     file: MapFile
     """The file."""
     read: Read
@@ -133,11 +110,9 @@ class MapOpened:
 
 
 @dataclass(frozen=True, slots=True)
-class MapMade:
+class MapMade(Action):
     """A floor map was made."""
 
-    client: int
-    """Number of the browser that asked."""
     file: MapFile
     """The file that it was made of."""
     floor_map: FloorMap
@@ -147,7 +122,7 @@ class MapMade:
 
 
 @dataclass(frozen=True, slots=True)
-class ImageMissing:
+class ImageMissing(Action):
     """A `map_server` YAML file came without its image."""
 
     file: MapFile
@@ -157,30 +132,8 @@ class ImageMissing:
 
 
 @dataclass(frozen=True, slots=True)
-class MapFailed:
+class MapFailed(Action):
     """A file could not be loaded."""
 
     text: str
     """Why, in one line."""
-
-
-MapResult: TypeAlias = MapOpened | MapMade | ImageMissing | MapFailed
-"""What a job may come back with."""
-MapAction: TypeAlias = (
-    OpenMap
-    | SetReading
-    | SetMapOption
-    | ClickPicture
-    | MakeMap
-    | StopMapJob
-    | DiscardMap
-    | SetPen
-    | FinishShape
-    | SetPlantPoint
-    | SetAligned
-    | AlignMap
-    | MapOpened
-    | MapMade
-    | ImageMissing
-    | MapFailed
-)

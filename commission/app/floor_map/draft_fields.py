@@ -13,7 +13,7 @@ from viser import GuiApi, GuiEvent
 from commission.app.base import actions as page_actions
 from commission.app.base import theme
 from commission.app.base.inputs import write_html
-from commission.app.base.panel import Post, client_of, escaped, posting, table, write
+from commission.app.base.panel import Post, escaped, posting, table, write
 from commission.app.base.rows import Rows
 from commission.app.floor_map import actions
 from commission.app.floor_map.draft import MapDraft, MapOptions, Read, ReadOptions
@@ -102,7 +102,7 @@ class MapDraftFields:
         self._make = gui.add_button(
             "Load as the floor map", visible=False, hint="Replaces the floor map; can be undone."
         )
-        self._make.on_click(posting(post, lambda event: actions.MakeMap(client_of(event))))
+        self._make.on_click(posting(post, lambda _event: actions.MakeMap()))
 
     def _posting(self, make: Callable[[GuiEvent[Any], MapDraft], page_actions.Action]) -> Callable[[Any], None]:
         """Return a callback that posts while a file is open; what cannot be meant is reported instead."""
@@ -136,10 +136,10 @@ class MapDraftFields:
         gui = self._gui
         unit = gui.add_dropdown("Unit", (AS_STATED, *UNITS), hint="Unit in which it was made, where the file is wrong.")
 
-        def read_again(event: GuiEvent[Any], draft: MapDraft) -> page_actions.Action:
+        def read_again(_event: GuiEvent[Any], draft: MapDraft) -> page_actions.Action:
             typed = unit.value, up.value
             words = ["" if word == AS_STATED else word for word in typed]
-            return actions.SetReading(client_of(event), replace(draft.reading, unit=words[0], up=words[1]))
+            return actions.SetReading(replace(draft.reading, unit=words[0], up=words[1]))
 
         self._add(unit, (Drawing, Model), lambda draft: draft.reading.unit or AS_STATED)
         up = gui.add_dropdown("Upward", (AS_STATED, "y", "z"), hint=field_hints(ReadOptions)["up"])
@@ -160,7 +160,7 @@ class MapDraftFields:
             every = gui.add_button_group("", ("All", "None", "Visible"))
             self._find = gui.add_text("Find", "", hint="Part of a layer's name.")
             self._rest = gui.add_html("", visible=False)
-        self._rows = Rows(gui, self._layers, self._post, self._toggled)
+            self._rows = Rows(gui, self._layers, self._post, self._toggled)
         self._listed: tuple[DrawingLayer, ...] = ()
         self._sought = ""
 
@@ -172,7 +172,7 @@ class MapDraftFields:
 
         every.on_click(self._posting(several))
 
-    def _toggled(self, index: int, _client: int) -> page_actions.Action:
+    def _toggled(self, index: int) -> page_actions.Action:
         """Return the action of a click on a layer's line."""
         draft, listed = self._draft, self._listed
         if draft is None or not isinstance(draft.read, Drawing):
@@ -213,7 +213,7 @@ class MapDraftFields:
         )
         self._add(walls, picture, lambda draft: LIGHT if draft.options.light_walls else DARK)
         again = gui.add_button("Click both points anew", color="gray", hint="Far apart, of known distance.")
-        again.on_click(posting(self._post, lambda event: actions.ClickPicture(client_of(event))))
+        again.on_click(posting(self._post, lambda _event: actions.ClickPicture()))
         self._add(again, picture)
 
     def show(self, draft: MapDraft | None) -> None:

@@ -9,9 +9,8 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import lift, polyline_segments
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.floor_map.draft import MapDraft
-from commission.app.plan.view import PlanView
+from commission.app.base.view import PageView
+from commission.app.floor_map.draft import MapDraft, MapLoading
 from commission.io.image_map import Picture
 
 LONGEST_SIDE = 1600
@@ -32,6 +31,7 @@ class MapDraftLayer(BaseLayer):
     """The image, in everybody's scene, over all else: one clicks on it."""
 
     name = "Image being placed"
+    rank = 240
     reads: tuple[str, ...] = ()
 
     def __init__(self, scene: SceneApi) -> None:
@@ -41,9 +41,10 @@ class MapDraftLayer(BaseLayer):
         self._marked: tuple[SceneNodeHandle, ...] = ()
         self._shown: MapDraft | None = None
 
-    def draw_plan(self, plan: PlanView, state: AppState) -> None:  # noqa: ARG002 - the hook that sees the whole state
+    def draw(self, view: PageView) -> None:
         """Follow the draft."""
-        draft = state.mapping.draft
+        state = view.state
+        draft = state.part(MapLoading).draft
         if draft is self._shown:
             return
         self._shown = draft

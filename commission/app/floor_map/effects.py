@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TypeAlias
 
+from commission.app.base.effects import Effect
 from commission.app.floor_map.draft import MapDraft, MapFile, ReadOptions
 
 
 @dataclass(frozen=True, slots=True)
-class ReadMapFile:
+class ReadMapFile(Effect):
     """Read a file."""
 
-    client: int
-    """Number of the browser that asked."""
     file: MapFile
     """The file."""
     reading: ReadOptions = field(default_factory=ReadOptions)
@@ -28,11 +26,9 @@ class ReadMapFile:
 
 
 @dataclass(frozen=True, slots=True)
-class DrawMap:
+class DrawMap(Effect):
     """Make the floor map of a file that was read."""
 
-    client: int
-    """Number of the browser that asked."""
     draft: MapDraft
     """The file with all that it left open."""
 
@@ -43,8 +39,5 @@ class DrawMap:
 
 
 @dataclass(frozen=True, slots=True)
-class StopMapWork:
+class StopMapWork(Effect):
     """Stop what is under way."""
-
-
-MapEffect: TypeAlias = ReadMapFile | DrawMap | StopMapWork

@@ -72,6 +72,7 @@ class FloorLayer(BaseLayer):
     """The floor map."""
 
     name = "Floor map"
+    rank = 10
     reads: tuple[str, ...] = ("floor_map",)
     legend = (theme.Legend("wall", theme.WALL, theme.Mark.SQUARE),)
 

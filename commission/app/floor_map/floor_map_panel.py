@@ -9,7 +9,7 @@ from typing import Any
 from viser import GuiApi, GuiEvent
 
 from commission.app.base import actions as page_actions
-from commission.app.base.panel import BasePanel, Post, client_of, escaped, posting
+from commission.app.base.panel import BasePanel, Post, escaped, from_browser, posting
 from commission.app.base.uploads import Uploads
 from commission.app.base.view import PageView
 from commission.app.floor_map import actions
@@ -37,16 +37,16 @@ class FloorMapPanel(BasePanel):
             path = gui.add_text("Map file", "", hint="Path of a file on the computer that serves this page.")
             opened = gui.add_button("Open", hint="Read the file of this path.")
 
-            def open_path(event: GuiEvent[Any]) -> page_actions.Action:
+            def open_path(_event: GuiEvent[Any]) -> page_actions.Action:
                 typed = path.value.strip()
                 if not typed:
                     return page_actions.Report("no file was named; expected its path on the server's computer")
-                return actions.OpenMap(client_of(event), MapFile(Path(os.path.expanduser(typed))))
+                return actions.OpenMap(MapFile(Path(os.path.expanduser(typed))))
 
             opened.on_click(posting(post, open_path))
-            Uploads(gui, lambda _client, text: post(actions.MapFailed(text))).add(
+            Uploads(gui, lambda browser, text: post(from_browser(actions.MapFailed(text), browser))).add(
                 "Upload a map",
-                lambda client, upload: post(actions.OpenMap(client, MapFile(upload))),
+                lambda browser, upload: post(from_browser(actions.OpenMap(MapFile(upload)), browser)),
                 limit=UPLOAD_LIMIT,
                 endings=tuple(f".{ending}" for ending in ENDINGS),
                 note="Of a ROS map the .yaml and its image, one after the other.",
@@ -71,7 +71,7 @@ class FloorMapPanel(BasePanel):
 
     def draw_slowly(self, view: PageView) -> None:
         """Show what is under way and what came of it."""
-        loading = view.state.mapping
+        loading = view.state.part(MapLoading)
         self._fields.refresh()
         if loading is self._shown:
             return

@@ -6,12 +6,13 @@ import dataclasses
 from dataclasses import replace
 from typing import Any
 
-from commission.app.base.actions import View
+from commission.app.base.actions import Camera, Sender
+from commission.app.base.effects import PlaceCamera, Tell
 from commission.app.base.extent import extent_of
-from commission.app.base.reduction import PlaceCamera, Reduction, Tell, reduce
+from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.base.uploads import Upload
-from commission.app.editing.editor import Tool
+from commission.app.editing.editor import Tool, editor_of
 from commission.app.floor_map import actions, tools
 from commission.app.floor_map.draft import (
     ENDINGS,
@@ -31,53 +32,53 @@ from commission.site.project import Project
 
 
 @reduce.register
-def _(action: actions.OpenMap, state: AppState) -> Reduction:
-    file, mapping = action.file, replace(state.mapping, trouble="", notes=())
+def open_map(action: actions.OpenMap, state: AppState, sender: Sender) -> Outcome:
+    file, loading = action.file, replace(state.part(MapLoading), trouble="", notes=())
     if file.ending not in ENDINGS:
         known = ", ".join(f".{ending}" for ending in ENDINGS)
-        return reduce(actions.MapFailed(f"{file.name}: is no floor map; expected a file that ends in {known}"), state)
+        return reduce(
+            actions.MapFailed(f"{file.name}: is no floor map; expected a file that ends in {known}"), state, sender
+        )
     if not isinstance(file.source, Upload):
-        return Reduction(replace(state, mapping=mapping), (ReadMapFile(action.client, file),))
+        return Outcome(state.with_part(loading), (ReadMapFile(file),))
     if file.ending in MAP_ENDINGS:
-        read = ReadMapFile(action.client, file, image=mapping.image)
-        return Reduction(replace(state, mapping=replace(mapping, waiting=None)), (read,))
+        read = ReadMapFile(file, image=loading.image)
+        return Outcome(state.with_part(replace(loading, waiting=None)), (read,))
     if file.ending not in PICTURE_ENDINGS:
-        return Reduction(replace(state, mapping=mapping), (ReadMapFile(action.client, file),))
-    waiting = mapping.waiting
+        return Outcome(state.with_part(loading), (ReadMapFile(file),))
+    waiting = loading.waiting
     if waiting is not None and file.name != waiting.image:
         text = f"{file.name}: is not the image of {waiting.file.name}; expected {waiting.image}"
-        return reduce(actions.MapFailed(text), state)
-    mapping = replace(mapping, image=file)
-    read = ReadMapFile(action.client, file) if waiting is None else ReadMapFile(action.client, waiting.file, image=file)
-    return Reduction(replace(state, mapping=mapping), (read,))
+        return reduce(actions.MapFailed(text), state, sender)
+    loading = replace(loading, image=file)
+    read = ReadMapFile(file) if waiting is None else ReadMapFile(waiting.file, image=file)
+    return Outcome(state.with_part(loading), (read,))
 
 
 @reduce.register
-def _(action: actions.ImageMissing, state: AppState) -> Reduction:
+def image_missing(action: actions.ImageMissing, state: AppState, _sender: Sender) -> Outcome:
     waiting = WaitingMap(action.file, action.image)
     text = f"{action.file.name} needs its image: upload {action.image}, too"
-    return Reduction(
-        replace(state, mapping=replace(state.mapping, waiting=waiting, draft=None)), (Tell(text, failed=False),)
+    return Outcome(
+        state.with_part(replace(state.part(MapLoading), waiting=waiting, draft=None)), (Tell(text, failed=False),)
     )
 
 
 @reduce.register
-def _(action: actions.MapFailed, state: AppState) -> Reduction:
+def map_failed(action: actions.MapFailed, state: AppState, _sender: Sender) -> Outcome:
     text = " ".join(action.text.split())
-    return Reduction(replace(state, mapping=replace(state.mapping, trouble=text)), (Tell(text, failed=True),))
+    return Outcome(state.with_part(replace(state.part(MapLoading), trouble=text)), (Tell(text, failed=True),))
 
 
 @reduce.register
-def _(action: actions.MapOpened, state: AppState) -> Reduction:
-    before = state.mapping.draft
+def map_opened(action: actions.MapOpened, state: AppState, sender: Sender) -> Outcome:
+    before = state.part(MapLoading).draft
     options = before.options if before is not None and before.file is action.file else _usual(action, state.project)
     draft = MapDraft(action.file, action.read, action.reading, options)
     if isinstance(action.read, Picture):
         draft = replace(draft, stage=_stage(action.read, state.project))
-    opened = replace(state, mapping=replace(state.mapping, draft=draft, waiting=None, trouble=""))
-    return (
-        reduce(actions.ClickPicture(action.client), opened) if isinstance(action.read, Picture) else Reduction(opened)
-    )
+    opened = state.with_part(replace(state.part(MapLoading), draft=draft, waiting=None, trouble=""))
+    return reduce(actions.ClickPicture(), opened, sender) if isinstance(action.read, Picture) else Outcome(opened)
 
 
 def _usual(action: actions.MapOpened, project: Project) -> MapOptions:
@@ -95,104 +96,103 @@ def _stage(picture: Picture, project: Project) -> Stage:
 
 
 @reduce.register
-def _(action: actions.ClickPicture, state: AppState) -> Reduction:
+def click_picture(_action: actions.ClickPicture, state: AppState, sender: Sender) -> Outcome:
     draft = _draft(state)
-    editor = replace(state.editor(action.client), tool=Tool.CALIBRATE, drag=None, draft=(), measured=())
-    cleared = replace(state, mapping=replace(state.mapping, draft=replace(draft, pixels=())))
-    return Reduction(cleared.with_editor(action.client, editor), (PlaceCamera(action.client, View.FIT),))
+    editor = replace(editor_of(state, sender.browser), tool=Tool.CALIBRATE, drag=None, draft=(), measured=())
+    cleared = state.with_part(replace(state.part(MapLoading), draft=replace(draft, pixels=())))
+    return Outcome(cleared.with_browser(sender.browser, editor), (PlaceCamera(Camera.FIT),))
 
 
 @reduce.register
-def _(action: actions.SetReading, state: AppState) -> Reduction:
+def set_reading(action: actions.SetReading, state: AppState, _sender: Sender) -> Outcome:
     draft = _draft(state)
     if action.reading == draft.reading:
-        return Reduction(state)
-    return Reduction(state, (ReadMapFile(action.client, draft.file, action.reading),))
+        return Outcome(state)
+    return Outcome(state, (ReadMapFile(draft.file, action.reading),))
 
 
 @reduce.register
-def _(action: actions.SetMapOption, state: AppState) -> Reduction:
+def set_map_option(action: actions.SetMapOption, state: AppState, _sender: Sender) -> Outcome:
     draft = _draft(state)
     if action.name not in {field.name for field in dataclasses.fields(MapOptions)}:
         raise UsageError(f"a floor map has no option {action.name!r}")
     changes: dict[str, Any] = {action.name: action.value}
     options = replace(draft.options, **changes)
-    return Reduction(replace(state, mapping=replace(state.mapping, draft=replace(draft, options=options))))
+    return Outcome(state.with_part(replace(state.part(MapLoading), draft=replace(draft, options=options))))
 
 
 @reduce.register
-def _(action: actions.MakeMap, state: AppState) -> Reduction:
-    return Reduction(state, (DrawMap(action.client, _draft(state)),))
+def make_map(_action: actions.MakeMap, state: AppState, _sender: Sender) -> Outcome:
+    return Outcome(state, (DrawMap(_draft(state)),))
 
 
 @reduce.register
-def _(_action: actions.StopMapJob, state: AppState) -> Reduction:
-    return Reduction(state, (StopMapWork(),))
+def stop_map_job(_action: actions.StopMapJob, state: AppState, _sender: Sender) -> Outcome:
+    return Outcome(state, (StopMapWork(),))
 
 
 @reduce.register
-def _(_action: actions.DiscardMap, state: AppState) -> Reduction:
-    return Reduction(_without_calibration(replace(state, mapping=MapLoading())), (StopMapWork(),))
+def discard_map(_action: actions.DiscardMap, state: AppState, _sender: Sender) -> Outcome:
+    return Outcome(_without_calibration(state.with_part(MapLoading())), (StopMapWork(),))
 
 
 @reduce.register
-def _(action: actions.SetPen, state: AppState) -> Reduction:
-    return Reduction(state.with_editor(action.client, replace(state.editor(action.client), pen=action.pen)))
+def set_pen(action: actions.SetPen, state: AppState, sender: Sender) -> Outcome:
+    return Outcome(state.with_browser(sender.browser, replace(editor_of(state, sender.browser), pen=action.pen)))
 
 
 @reduce.register
-def _(action: actions.FinishShape, state: AppState) -> Reduction:
-    return tools.finished(state, action.client)
+def finish_shape(_action: actions.FinishShape, state: AppState, sender: Sender) -> Outcome:
+    return tools.finished(state, sender)
 
 
 @reduce.register
-def _(action: actions.SetPlantPoint, state: AppState) -> Reduction:
-    points = list(state.editor(action.client).alignment.points)
+def set_plant_point(action: actions.SetPlantPoint, state: AppState, sender: Sender) -> Outcome:
+    points = list(editor_of(state, sender.browser).alignment.points)
     if action.index < len(points):
         points[action.index] = replace(points[action.index], plant=action.plant, name=action.name)
-    return _aligning(state, action.client, points=tuple(points))
+    return _aligning(state, sender, points=tuple(points))
 
 
 @reduce.register
-def _(action: actions.SetAligned, state: AppState) -> Reduction:
-    return _aligning(state, action.client, everything=action.everything)
+def set_aligned(action: actions.SetAligned, state: AppState, sender: Sender) -> Outcome:
+    return _aligning(state, sender, everything=action.everything)
 
 
-def _aligning(state: AppState, client: int, **changes: Any) -> Reduction:
+def _aligning(state: AppState, sender: Sender, **changes: Any) -> Outcome:
     """Change what one browser aligns by."""
-    editor = state.editor(client)
+    editor = editor_of(state, sender.browser)
     alignment = replace(editor.alignment, **changes)
-    return Reduction(state.with_editor(client, replace(editor, alignment=alignment)))
+    return Outcome(state.with_browser(sender.browser, replace(editor, alignment=alignment)))
 
 
 @reduce.register
-def _(action: actions.AlignMap, state: AppState) -> Reduction:
-    return tools.align_map(action, state)
+def align_map(_action: actions.AlignMap, state: AppState, sender: Sender) -> Outcome:
+    return tools.align_map(state, sender)
 
 
 @reduce.register
-def _(action: actions.MapMade, state: AppState) -> Reduction:
+def map_made(action: actions.MapMade, state: AppState, sender: Sender) -> Outcome:
     width, height = action.floor_map.size
     said = f"{action.file.name}: {width:.1f} x {height:.1f} m, cells of {1000 * action.floor_map.resolution:.4g} mm"
     project = replace(state.project, floor_map=action.floor_map)
-    edit = Edit(f"load floor map {action.file.name}", action.client)
-    loaded = replace(edited(state, project, edit), mapping=MapLoading(notes=(said, *action.notes)))
+    edit = Edit(f"load floor map {action.file.name}", sender)
+    loaded = edited(state, project, edit).with_part(MapLoading(notes=(said, *action.notes)))
     # The site may be elsewhere now, for everybody.
-    cameras = tuple(PlaceCamera(client, View.FIT) for client in state.editors)
-    return Reduction(_without_calibration(loaded), cameras)
+    return Outcome(_without_calibration(loaded), (PlaceCamera(Camera.FIT, everywhere=True),))
 
 
 def _without_calibration(state: AppState) -> AppState:
     """Return the state with nobody clicking on a picture that is not there any more."""
-    editors = {
-        client: replace(editor, tool=Tool.SELECT) if editor.tool is Tool.CALIBRATE else editor
-        for client, editor in state.editors.items()
-    }
-    return replace(state, editors=editors)
+    for browser in state.browsers:
+        editor = editor_of(state, browser)
+        if editor.tool is Tool.CALIBRATE:
+            state = state.with_browser(browser, replace(editor, tool=Tool.SELECT))
+    return state
 
 
 def _draft(state: AppState) -> MapDraft:
-    draft = state.mapping.draft
+    draft = state.part(MapLoading).draft
     if draft is None:
         raise UsageError("no file is open to load a floor map from; expected one")
     return draft

@@ -25,8 +25,8 @@ LONGEST_NAME = 40
 class MapToolFields:
     """Thickness, what erased cells become, points and their plant coordinates; only what the tool in use needs."""
 
-    def __init__(self, gui: GuiApi, post: Post, client: int) -> None:
-        self._gui, self._post, self._client = gui, post, client
+    def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
+        self._gui, self._post, self._browser = gui, post, browser
         self._pen = MapPen()
         self._thickness = gui.add_number(
             "Thickness [mm]",
@@ -47,7 +47,7 @@ class MapToolFields:
         self._add_alignment()
 
     def _with_pen(self, **changes: Any) -> page_actions.Action:
-        return actions.SetPen(self._client, replace(self._pen, **changes))
+        return actions.SetPen(replace(self._pen, **changes))
 
     def _add_alignment(self) -> None:
         gui = self._gui
@@ -58,11 +58,11 @@ class MapToolFields:
                 "Moves", (MAP_ONLY, EVERYTHING), hint="Reflectors, routes, stations: where they are, or with the map."
             )
             self._moves.on_update(
-                posting(self._post, lambda event: actions.SetAligned(self._client, event.target.value == EVERYTHING))
+                posting(self._post, lambda event: actions.SetAligned(event.target.value == EVERYTHING))
             )
             self._said = gui.add_html("")
             self._align = gui.add_button("Move and turn", hint="The map keeps its scale; can be undone.")
-            self._align.on_click(posting(self._post, lambda _event: actions.AlignMap(self._client)))
+            self._align.on_click(posting(self._post, lambda _event: actions.AlignMap()))
 
     def _add_point(self, index: int) -> tuple[Any, Any]:
         """Add name and plant coordinates of a point."""
@@ -72,7 +72,7 @@ class MapToolFields:
 
         def typed(_event: GuiEvent[Any]) -> page_actions.Action:
             x, y = (float(value) for value in plant.value)
-            return actions.SetPlantPoint(self._client, index, (x, y), str(name.value).strip()[:LONGEST_NAME])
+            return actions.SetPlantPoint(index, (x, y), str(name.value).strip()[:LONGEST_NAME])
 
         for widget in (name, plant):
             widget.on_update(posting(self._post, typed))

@@ -50,6 +50,7 @@ class WallLayer(BaseLayer):
     """Extruded walls."""
 
     name = "Walls in 3D"
+    rank = 230
     reads: tuple[str, ...] = ("floor_map",)
 
     def __init__(self, scene: SceneApi) -> None:

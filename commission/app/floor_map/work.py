@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from pathlib import Path
 
-from commission.app.base.jobs import Jobs
-from commission.app.floor_map.actions import ImageMissing, MapFailed, MapMade, MapOpened, MapResult
+from commission.app.base.actions import Action, Envelope, Sender
+from commission.app.base.effects import Effect
+from commission.app.base.jobs import Lane
+from commission.app.base.service import Service
+from commission.app.base.state import AppState
+from commission.app.floor_map.actions import ImageMissing, MapFailed, MapMade, MapOpened
 from commission.app.floor_map.draft import DRAWING_ENDINGS, ENDINGS, MAP_ENDINGS, PICTURE_ENDINGS, MapFile, Read
-from commission.app.floor_map.effects import DrawMap, MapEffect, ReadMapFile, StopMapWork
+from commission.app.floor_map.effects import DrawMap, ReadMapFile, StopMapWork
 from commission.errors import CommissionError, FileFormatError, JobError
 from commission.io.dxf import Drawing, read_drawing
 from commission.io.image_map import Picture, read_picture
@@ -18,32 +22,30 @@ from commission.io.mesh import Model, read_model
 from commission.progress import Progress
 from commission.site.floor_map import FloorMap
 
+KEY = "floor map"
+"""Of its jobs only the newest counts."""
 
-class MapWork:
-    """Does what loading a floor map asks for, one thing at a time: a new wish ends the one before.
 
-    Parameters
-    ----------
-    jobs : a runner of its own, so that no file waits for a simulation.
-    """
+class MapService(Service):
+    """Does what loading a floor map asks for, one thing at a time: what is asked for next ends the one before."""
 
-    def __init__(self, jobs: Jobs) -> None:
-        self._jobs = jobs
+    effects = (ReadMapFile, DrawMap, StopMapWork)
 
-    def do(self, effect: MapEffect) -> None:
-        """Start or stop the work; its outcome is the job's result."""
-        for job in self._jobs.unfinished():
-            self._jobs.stop(job.number)
+    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:  # noqa: ARG002 - the service's
+        """Start or stop the work; its outcome is the action that follows, on behalf of who asked."""
         match effect:
             case ReadMapFile():
-                self._jobs.start(effect.job, lambda progress: read(effect, progress))
+                self._start(effect.job, lambda progress: read(effect, progress), sender)
             case DrawMap():
-                self._jobs.start(effect.job, lambda progress: draw(effect, progress))
-            case StopMapWork():
-                pass
+                self._start(effect.job, lambda progress: draw(effect, progress), sender)
+            case _:
+                self.context.jobs.cancel(KEY)
+
+    def _start(self, name: str, work: Callable[[Progress], Action], sender: Sender) -> None:
+        self.context.jobs.start(name, work, then=lambda action: Envelope(action, sender), key=KEY, lane=Lane.FILES)
 
 
-def read(effect: ReadMapFile, progress: Progress) -> MapResult:
+def read(effect: ReadMapFile, progress: Progress) -> Action:
     """Read a file; what a person can mend comes back as `MapFailed`.
 
     Parameters
@@ -57,7 +59,7 @@ def read(effect: ReadMapFile, progress: Progress) -> MapResult:
         with _path_of(file) as path:
             if file.ending in MAP_ENDINGS:
                 return _read_map(effect, path)
-            return MapOpened(effect.client, file, _read(effect, path, progress), effect.reading)
+            return MapOpened(file, _read(effect, path, progress), effect.reading)
     except JobError:
         raise
     except FileFormatError as error:
@@ -66,13 +68,13 @@ def read(effect: ReadMapFile, progress: Progress) -> MapResult:
         return MapFailed(f"{file.name}: {error}")
 
 
-def draw(effect: DrawMap, progress: Progress) -> MapResult:
+def draw(effect: DrawMap, progress: Progress) -> Action:
     """Make the floor map; what a person can mend comes back as `MapFailed`."""
     draft, file = effect.draft, effect.draft.file
     notes = draft.read.warnings if isinstance(draft.read, Drawing) else ()
     progress(0.0, "")
     try:
-        return MapMade(effect.client, file, _drawn(effect, progress), notes)
+        return MapMade(file, _drawn(effect, progress), notes)
     except JobError:
         raise
     except FileFormatError as error:
@@ -108,16 +110,16 @@ def _read(effect: ReadMapFile, path: Path, progress: Progress) -> Read:
     raise FileFormatError(path, "", f"ends in {path.suffix!r}", f"a floor map: {known}")
 
 
-def _read_map(effect: ReadMapFile, path: Path) -> MapResult:
+def _read_map(effect: ReadMapFile, path: Path) -> Action:
     """Read a `map_server` map: its image lies beside it, or was sent, too."""
     file, image = effect.file, effect.image
     if isinstance(file.source, Path):
-        return MapMade(effect.client, file, read_floor_map(path))
+        return MapMade(file, read_floor_map(path))
     name = image_name(path)
     if image is None or image.name != name:
         return ImageMissing(file, name)
     with _path_of(image) as image_path:
-        return MapMade(effect.client, file, read_floor_map(path, image=image_path))
+        return MapMade(file, read_floor_map(path, image=image_path))
 
 
 @contextmanager

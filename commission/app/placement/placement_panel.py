@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import Any
 
-from viser import GuiApi, GuiFolderHandle
+from viser import GuiApi
 
 from commission.app.base import theme
-from commission.app.base.actions import Action
+from commission.app.base.actions import Action, LookAt
 from commission.app.base.inputs import Inputs, Text, WorkBar, show
 from commission.app.base.panel import BasePanel, Post, escaped, posting, table
 from commission.app.base.rows import Rows
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.editing.actions import ChooseTool, LookAt
+from commission.app.editing.actions import ChooseTool
 from commission.app.editing.editor import Tool
-from commission.app.placement.suggestion import Suggestion
+from commission.app.placement.suggestion import LayoutWish, Suggestion
 from commission.app.plan.actions import AcceptLayout, AskLayout, CountRoute, DiscardLayout, FreeAreas, SetLayout
 from commission.app.plan.planner import LAYOUT
-from commission.app.plan.view import LayoutView
+from commission.app.plan.view import LayoutView, plan_of
 
 DEG, MM = math.degrees(1.0), 1000.0
 POSITION, HEADING = "demands.position_limit", "demands.heading_limit"
@@ -32,7 +31,9 @@ DRAW, CLEAR = "Draw area", "Clear areas"
 def option_of(state: AppState, name: str) -> Any:
     """Return an option of the suggested layout by its name; a limit that is not set is the supervisor's."""
     group, _, inner = name.rpartition(".")
-    value: Any = getattr(getattr(state.project.layout, group), inner) if group else getattr(state.layout, name)
+    value: Any = (
+        getattr(getattr(state.project.layout, group), inner) if group else getattr(state.part(LayoutWish), name)
+    )
     limits = state.project.parameters.supervisor
     if value is None and name == POSITION:
         return limits.position_limit
@@ -45,29 +46,28 @@ class LayoutPanel(BasePanel):
     Parameters
     ----------
     gui, post : where the widgets are made, what takes their actions.
-    folder : the folder that holds them.
     """
 
-    def __init__(self, gui: GuiApi, post: Post, folder: GuiFolderHandle) -> None:
+    def __init__(self, gui: GuiApi, post: Post) -> None:
         self._gui, self._post = gui, post
-        self._inputs = Inputs(gui, post, lambda name, value: SetLayout(name, value, at=time.monotonic()), option_of)
+        self._inputs = Inputs(gui, post, SetLayout, option_of)
         self._suggestion: Suggestion | None = None
         self._shown: LayoutView | None = None
         self._routes: dict[str, Any] = {}
-        with folder:
-            # What was found stands above the demands: below them, it would be out of sight on a small screen.
-            self._ask = gui.add_button("Suggest reflectors", hint="Fewest reflectors on walls that meet the demands.")
-            self._ask.on_click(posting(post, lambda _event: AskLayout()))
-            self._work = WorkBar(gui, post, LAYOUT, DiscardLayout())
-            self._found = Text(gui)
-            self._decide = gui.add_button_group("", ("Accept", "Discard"), visible=False)
-            self._decide.on_click(posting(post, self._decided))
-            self._not_met = gui.add_folder("Not met", visible=False)
-            self._add_demands()
-            self._counted = gui.add_folder("Routes that count", expand_by_default=False)
-            with gui.add_folder("Where they may stand", expand_by_default=False):
-                self._add_candidates()
-        self._unmet = Rows(gui, self._not_met, post, self._showing)
+        # What was found stands above the demands: below them, it would be out of sight on a small screen.
+        self._ask = gui.add_button("Suggest reflectors", hint="Fewest reflectors on walls that meet the demands.")
+        self._ask.on_click(posting(post, lambda _event: AskLayout()))
+        self._work = WorkBar(gui, post, LAYOUT, DiscardLayout())
+        self._found = Text(gui)
+        self._decide = gui.add_button_group("", ("Accept", "Discard"), visible=False)
+        self._decide.on_click(posting(post, self._decided))
+        self._not_met = gui.add_folder("Not met", visible=False)
+        self._add_demands()
+        self._counted = gui.add_folder("Routes that count", expand_by_default=False)
+        with gui.add_folder("Where they may stand", expand_by_default=False):
+            self._add_candidates()
+        with self._not_met:
+            self._unmet = Rows(gui, self._not_met, post, self._showing)
 
     def _add_demands(self) -> None:
         gui, inputs = self._gui, self._inputs
@@ -107,30 +107,26 @@ class LayoutPanel(BasePanel):
         areas.on_click(
             posting(
                 self._post,
-                lambda event: (
-                    ChooseTool(event.client_id, Tool.KEEP_OUT)
-                    if event.target.value == DRAW
-                    else FreeAreas(None, event.client_id)
-                ),
+                lambda event: ChooseTool(Tool.KEEP_OUT) if event.target.value == DRAW else FreeAreas(None),
             )
         )
 
     def _decided(self, event: Any) -> Action:
         """Accept what is shown; it may have been dropped since it was drawn."""
         if event.target.value == "Accept" and self._suggestion is not None:
-            return AcceptLayout(event.client_id, self._suggestion)
+            return AcceptLayout(self._suggestion)
         return DiscardLayout()
 
-    def _showing(self, index: int, client: int) -> Action:
+    def _showing(self, index: int) -> Action:
         """Go to where a demand is not met; the list may have become shorter since it was drawn."""
         suggestion = self._suggestion
         if suggestion is None or index >= len(suggestion.unmet):
-            return DiscardLayout() if suggestion is None else LookAt(client, suggestion.unmet[-1].place)
-        return LookAt(client, suggestion.unmet[index].place)
+            return DiscardLayout() if suggestion is None else LookAt(suggestion.unmet[-1].place)
+        return LookAt(suggestion.unmet[index].place)
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow wishes, progress and what was found."""
-        state, found = view.state, view.plan.layout
+        state, found = view.state, plan_of(view).layout
         self._inputs.follow(state)
         self._follow_routes(state)
         count = len(state.project.layout.candidates.keep_out)
@@ -160,7 +156,7 @@ class LayoutPanel(BasePanel):
 
     def _route_switch(self, name: str) -> Any:
         widget = self._gui.add_checkbox(name, True, hint="Whether the demands must hold on this route.")
-        widget.on_update(posting(self._post, lambda event: CountRoute(name, bool(event.target.value), event.client_id)))
+        widget.on_update(posting(self._post, lambda event: CountRoute(name, bool(event.target.value))))
         return widget
 
 

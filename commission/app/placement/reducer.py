@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from commission.app.base.reduction import Reduction, Tell, reduce
+from commission.app.base.actions import Sender
+from commission.app.base.effects import Tell
+from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing.reducer import with_reflectors
 from commission.app.placement.suggestion import SMALLEST_AREA, LayoutWish, with_option
@@ -16,55 +18,55 @@ ACCEPT = "accept suggested layout"
 """Name of the undo step."""
 
 
-def _wishing(state: AppState, wish: LayoutWish) -> Reduction:
-    return Reduction(replace(state, layout=wish))
+def _wishing(state: AppState, wish: LayoutWish) -> Outcome:
+    return Outcome(state.with_part(wish))
 
 
-def _asking(state: AppState, brief: LayoutBrief, edit: Edit) -> Reduction:
+def _asking(state: AppState, brief: LayoutBrief, edit: Edit) -> Outcome:
     """Ask something else of the layout: one undo step."""
     if brief == state.project.layout:
-        return Reduction(state)
-    return Reduction(edited(state, replace(state.project, layout=brief), edit))
+        return Outcome(state)
+    return Outcome(edited(state, replace(state.project, layout=brief), edit))
 
 
 @reduce.register
-def _(action: actions.SetLayout, state: AppState) -> Reduction:
+def set_layout(action: actions.SetLayout, state: AppState, sender: Sender) -> Outcome:
     if action.name == "extend":
-        return _wishing(state, replace(state.layout, extend=bool(action.value)))
+        return _wishing(state, replace(state.part(LayoutWish), extend=bool(action.value)))
     words = action.name.rpartition(".")[2].replace("_", " ")
-    edit = Edit(f"set {words} of the layout", action.client, f"layout.{action.name}", action.at)
+    edit = Edit(f"set {words} of the layout", sender, f"layout.{action.name}")
     return _asking(state, with_option(state.project.layout, action.name, action.value), edit)
 
 
 @reduce.register
-def _(action: actions.CountRoute, state: AppState) -> Reduction:
+def count_route(action: actions.CountRoute, state: AppState, sender: Sender) -> Outcome:
     state.project.route(action.name)
     brief = state.project.layout
     others = tuple(name for name in brief.ignored_routes if name != action.name)
     ignored = others if action.counts else (*others, action.name)
-    edit = Edit(f"{'count' if action.counts else 'ignore'} {action.name}", action.client)
+    edit = Edit(f"{'count' if action.counts else 'ignore'} {action.name}", sender)
     return _asking(state, replace(brief, ignored_routes=ignored), edit)
 
 
-def _keeping_out(state: AppState, areas: tuple[Rectangle, ...], edit: Edit) -> Reduction:
+def _keeping_out(state: AppState, areas: tuple[Rectangle, ...], edit: Edit) -> Outcome:
     return _asking(state, with_option(state.project.layout, "candidates.keep_out", areas), edit)
 
 
 @reduce.register
-def _(action: actions.KeepOut, state: AppState) -> Reduction:
+def keep_out(action: actions.KeepOut, state: AppState, sender: Sender) -> Outcome:
     low, high = low_high(action.area)
     if min(high[0] - low[0], high[1] - low[1]) < SMALLEST_AREA:
-        return Reduction(state)
+        return Outcome(state)
     areas = (*state.project.layout.candidates.keep_out, (*low, *high))
-    return _keeping_out(state, areas, Edit("keep an area free of reflectors", action.client))
+    return _keeping_out(state, areas, Edit("keep an area free of reflectors", sender))
 
 
 @reduce.register
-def _(action: actions.FreeAreas, state: AppState) -> Reduction:
+def free_areas(action: actions.FreeAreas, state: AppState, sender: Sender) -> Outcome:
     place = action.place
     areas = state.project.layout.candidates.keep_out
     left = () if place is None else tuple(area for area in areas if not _contains(area, place))
-    return _keeping_out(state, left, Edit("allow reflectors again", action.client))
+    return _keeping_out(state, left, Edit("allow reflectors again", sender))
 
 
 def _contains(area: Rectangle, place: tuple[float, float]) -> bool:
@@ -73,22 +75,22 @@ def _contains(area: Rectangle, place: tuple[float, float]) -> bool:
 
 
 @reduce.register
-def _(_action: actions.AskLayout, state: AppState) -> Reduction:
-    return _wishing(state, replace(state.layout, wanted=True, asked=state.layout.asked + 1))
+def ask_layout(_action: actions.AskLayout, state: AppState, _sender: Sender) -> Outcome:
+    return _wishing(state, replace(state.part(LayoutWish), wanted=True, asked=state.part(LayoutWish).asked + 1))
 
 
 @reduce.register
-def _(_action: actions.DiscardLayout, state: AppState) -> Reduction:
-    return _wishing(state, replace(state.layout, wanted=False))
+def discard_layout(_action: actions.DiscardLayout, state: AppState, _sender: Sender) -> Outcome:
+    return _wishing(state, replace(state.part(LayoutWish), wanted=False))
 
 
 @reduce.register
-def _(action: actions.AcceptLayout, state: AppState) -> Reduction:
+def accept_layout(action: actions.AcceptLayout, state: AppState, sender: Sender) -> Outcome:
     suggestion = action.suggestion
     if suggestion.site.reflectors is not state.project.reflectors:
         raise UsageError("the reflectors have changed since the layout was suggested; suggest it again")
-    dropped = replace(state, layout=replace(state.layout, wanted=False))
-    accepted = with_reflectors(dropped, suggestion.placement.reflectors, Edit(ACCEPT, action.client))
+    dropped = state.with_part(replace(state.part(LayoutWish), wanted=False))
+    accepted = with_reflectors(dropped, suggestion.placement.reflectors, Edit(ACCEPT, sender))
     return replace(accepted, effects=(*accepted.effects, Tell(_told(action), failed=False)))
 
 

@@ -18,8 +18,8 @@ from commission.app.base.drawing import (
 )
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.plan.view import LayoutView, PlanView
+from commission.app.base.view import PageView
+from commission.app.plan.view import LayoutView, plan_of
 from commission.geometry.arrays import FloatArray
 from commission.site.layout_brief import Rectangle, low_high
 from commission.site.project import Project
@@ -45,6 +45,7 @@ class SuggestionLayer(BaseLayer):
     """Suggested reflectors."""
 
     name = "Suggested layout"
+    rank = 130
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
     legend = (
         theme.Legend("suggested reflector", theme.SUGGESTED, theme.Mark.DOT),
@@ -80,8 +81,10 @@ class SuggestionLayer(BaseLayer):
         """Adapt the size of the marks to the site's."""
         self._mark = extent_of(project).mark_size()
 
-    def draw_plan(self, plan: PlanView, state: AppState) -> None:
+    def draw(self, view: PageView) -> None:
         """Draw what has changed."""
+        plan = plan_of(view)
+        state = view.state
         areas = state.project.layout.candidates.keep_out
         if areas != self._areas:
             self._areas = areas
@@ -113,8 +116,10 @@ class SuggestionLayer(BaseLayer):
             ]
         )
 
-    def is_used(self, plan: PlanView, state: AppState) -> bool:
+    def is_used(self, view: PageView) -> bool:
         """Whether there is a suggestion, or an area without reflectors."""
+        plan = plan_of(view)
+        state = view.state
         return plan.layout is not None or bool(state.project.layout.candidates.keep_out)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:

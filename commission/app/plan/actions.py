@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
+from commission.app.base.actions import Action
 from commission.app.placement.suggestion import Suggestion
 from commission.app.plan.settings import Place, PlanValue
 from commission.site.layout_brief import Rectangle
 
 
 @dataclass(frozen=True, slots=True)
-class SetPlan:
+class SetPlan(Action):
     """Change one setting of the step Plan."""
 
     name: str
@@ -21,24 +21,22 @@ class SetPlan:
 
 
 @dataclass(frozen=True, slots=True)
-class ReadFloor:
+class ReadFloor(Action):
     """Read the values at a place of the floor, or ask for a reflector there."""
 
     place: Place
     """Where it was clicked [m], map frame."""
     reach: float
     """How near to a reflector counts as on it [m]: some pixels at the browser's zoom."""
-    client: int | None = None
-    """Number of the browser's connection; none: nobody in particular."""
 
 
 @dataclass(frozen=True, slots=True)
-class ClearEllipses:
+class ClearEllipses(Action):
     """Drop the ellipses that were asked for by clicks."""
 
 
 @dataclass(frozen=True, slots=True)
-class AlsoFails:
+class AlsoFails(Action):
     """Let a reflector fail beside those that have failed already, and rank the others again."""
 
     name: str
@@ -46,81 +44,54 @@ class AlsoFails:
 
 
 @dataclass(frozen=True, slots=True)
-class SetLayout:
+class SetLayout(Action):
     """Change one option of the suggested layout."""
 
     name: str
     """`extend`, or `group.name` of the demands or candidates of `LayoutBrief`."""
     value: PlanValue
     """New value, SI and radians."""
-    client: int | None = None
-    """Number of the browser's connection; none: nobody in particular."""
-    at: float = 0.0
-    """When it was asked for [s, any monotonic clock]: changes that follow quickly are one undo step."""
 
 
 @dataclass(frozen=True, slots=True)
-class CountRoute:
+class CountRoute(Action):
     """Let a route count for the suggested layout, or not."""
 
     name: str
     """Name of the route."""
     counts: bool
     """Whether it counts."""
-    client: int | None = None
-    """Number of the browser's connection; none: nobody in particular."""
 
 
 @dataclass(frozen=True, slots=True)
-class KeepOut:
+class KeepOut(Action):
     """Keep new reflectors out of one more area."""
 
     area: Rectangle
     """Two opposite corners [m], map frame."""
-    client: int | None = None
-    """Number of the browser's connection; none: nobody in particular."""
 
 
 @dataclass(frozen=True, slots=True)
-class FreeAreas:
+class FreeAreas(Action):
     """Allow new reflectors again where they were kept out."""
 
     place: Place | None = None
     """In the areas around this place [m]; none: everywhere."""
-    client: int | None = None
-    """Number of the browser's connection; none: nobody in particular."""
 
 
 @dataclass(frozen=True, slots=True)
-class AskLayout:
+class AskLayout(Action):
     """Suggest a layout; one that is being looked for or shown is dropped."""
 
 
 @dataclass(frozen=True, slots=True)
-class DiscardLayout:
+class DiscardLayout(Action):
     """Drop the suggested layout, or stop looking for one."""
 
 
 @dataclass(frozen=True, slots=True)
-class AcceptLayout:
+class AcceptLayout(Action):
     """Put up the suggested reflectors."""
 
-    client: int
-    """Number of the browser's connection."""
     suggestion: Suggestion
     """What was seen on the page when it was accepted."""
-
-
-PlanAction: TypeAlias = (
-    SetPlan
-    | ReadFloor
-    | ClearEllipses
-    | AlsoFails
-    | SetLayout
-    | CountRoute
-    | KeepOut
-    | FreeAreas
-    | AskLayout
-    | DiscardLayout
-    | AcceptLayout
-)

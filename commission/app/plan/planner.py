@@ -9,13 +9,14 @@ from dataclasses import replace
 from typing import Any
 
 from commission.app.ambiguity.cold_start import Ambiguity, look_alike
-from commission.app.base.jobs import JobReport, Jobs
+from commission.app.base.jobs import Lane
+from commission.app.base.service import Context, Due, Service
 from commission.app.base.state import AppState
 from commission.app.coverage.ellipses import ellipses
 from commission.app.coverage.scale import Scale, scale_for
-from commission.app.editing.editor import Editor, Grab
+from commission.app.editing.editor import Editor, Grab, editors_of
 from commission.app.editing.gestures import moved
-from commission.app.placement.suggestion import Suggestion, suggest
+from commission.app.placement.suggestion import LayoutWish, Suggestion, suggest
 from commission.app.plan import work
 from commission.app.plan.keys import changed_reflectors, cold_start_key, floor_key, ranking_key, route_key, site_key
 from commission.app.plan.looks import cold_start_view, failure_view, heat_view, layout_view, reading_of, route_view
@@ -33,22 +34,19 @@ JOBS = (COVERAGE, PREDICTION, RANKING, COLD_START, LAYOUT)
 """Names of the jobs, as the page shows them."""
 
 
-class Planner:
-    """Coverage, prediction and ranking of the site as it is now.
+class Planner(Service):
+    """Coverage, prediction and ranking of the site as it is now."""
 
-    Parameters
-    ----------
-    jobs : where they are computed.
-    patient : where what takes long is computed, so that the rest need not wait for it.
-    """
-
-    def __init__(self, jobs: Jobs, patient: Jobs) -> None:
-        self._coverage = Upkeep(COVERAGE, Covered, jobs)
-        self._prediction = Upkeep(PREDICTION, Predicted, jobs)
-        self._ranking = Upkeep(RANKING, Ranked, jobs)
-        self._cold_start = Upkeep(COLD_START, Ambiguity, patient)
-        self._layout = Upkeep(LAYOUT, Suggestion, patient)
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        jobs = context.jobs
+        self._coverage = Upkeep[Covered](COVERAGE, jobs)
+        self._prediction = Upkeep[Predicted](PREDICTION, jobs)
+        self._ranking = Upkeep[Ranked](RANKING, jobs)
+        self._cold_start = Upkeep[Ambiguity](COLD_START, jobs, Lane.PATIENT)
+        self._layout = Upkeep[Suggestion](LAYOUT, jobs, Lane.PATIENT)
         self._scale: Scale | None = None
+        self._scaled: Covered | None = None
         self._view = PlanView()
         self._ellipse_view = Remembered[EllipseView]()
         self._route_view = Remembered[RouteView]()
@@ -64,16 +62,13 @@ class Planner:
         """What there is now; the same value as long as nothing changes."""
         return self._view
 
-    def hear(self, report: JobReport) -> bool:
-        """Take the end of a job; return whether it was one of the planner's."""
-        if self._coverage.hear(report):
-            self._scale = None
-            return True
-        return any(each.hear(report) for each in self._all())
+    def parts(self, *, slowly: bool) -> tuple[object, ...]:  # noqa: ARG002 - the protocol's
+        """Return what there is now."""
+        return (self._view,)
 
-    def follow(self, state: AppState) -> bool:
-        """Start what is wanted and not there, drop what is not wanted; return whether the view is another one."""
-        project, plan = state.project, state.plan
+    def follow(self, state: AppState) -> Due:
+        """Start what is wanted and not there, drop what is not wanted."""
+        project, plan = state.project, state.part(PlanSettings)
         floor = self._dragged(state)
         self._keep_coverage(floor, plan)
         if plan.route and any(route.name == plan.route for route in project.routes):
@@ -89,19 +84,19 @@ class Planner:
             *(part for each in self._all() for part in (each.result, each.is_running)),
             self._moves,
             plan,
-            state.layout,
+            state.part(LayoutWish),
             project,
             floor,
         )
         if len(shown) == len(self._shown) and all(a is b for a, b in zip(shown, self._shown, strict=True)):
-            return False
+            return Due.NEVER
         self._shown = shown
         self._view = self._look(floor, state)
-        return True
+        return Due.SOON
 
     def _dragged(self, state: AppState) -> Project:
         """Return the site with reflectors where they are being dragged to: the heatmap shows what a drag would do."""
-        editors = tuple(e for e in state.editors.values() if e.drag is not None and e.drag.grab is Grab.REFLECTORS)
+        editors = tuple(e for e in editors_of(state) if e.drag is not None and e.drag.grab is Grab.REFLECTORS)
         if not editors:
             self._drag = None
             return state.project
@@ -142,7 +137,7 @@ class Planner:
 
     def _keep_patiently(self, state: AppState) -> None:
         """Do what takes long once: other wishes and other sites wait until it is asked for again."""
-        project, plan, wish = state.project, state.plan, state.layout
+        project, plan, wish = state.project, state.part(PlanSettings), state.part(LayoutWish)
         if not plan.cold_start:
             self._cold_start.drop()
         elif self._cold_start.key[:1] != (plan.cold_start,):
@@ -155,7 +150,7 @@ class Planner:
 
     def _look(self, floor: Project, state: AppState) -> PlanView:
         """Put the view together; parts that did not change stay the same value."""
-        project, plan = state.project, state.plan
+        project, plan = state.project, state.part(PlanSettings)
         covered, predicted, ranked = self._coverage.result, self._prediction.result, self._ranking.result
         ambiguity, suggestion = self._cold_start.result, self._layout.result
         old_route = not is_same(self._prediction.key, route_key(project, plan))
@@ -180,15 +175,16 @@ class Planner:
                 lambda: ambiguity and cold_start_view(ambiguity, plan, outdated=old_places),
             ),
             layout=self._layout_view.of(
-                (suggestion, project, state.layout),
-                lambda: suggestion and layout_view(suggestion, project, state.layout),
+                (suggestion, project, state.part(LayoutWish)),
+                lambda: suggestion and layout_view(suggestion, project, state.part(LayoutWish)),
             ),
             waiting=any(each.is_running for each in self._all()),
         )
 
     def _heat(self, covered: Covered, floor: Project, plan: PlanSettings) -> HeatView:
         """The heatmap; its scale stays while reflectors move, so that colors compare."""
-        if self._scale is None or self._scale.figure is not plan.figure:
+        if self._scale is None or self._scale.figure is not plan.figure or self._scaled is not covered:
+            self._scaled = covered
             values = getattr(covered.live.coverage.fixes, plan.figure.value)
             self._scale = scale_for(plan.figure, values[covered.floor])
         return heat_view(covered, self._scale, outdated=not is_same(self._coverage.key, floor_key(floor, plan)))

@@ -1,4 +1,4 @@
-"""What the actions of the step Plan mean for its settings. Pure; the page's own reducer calls it."""
+"""What the actions of the step Plan mean for its settings. Pure; importing it registers them with `reduce`."""
 
 from __future__ import annotations
 
@@ -6,8 +6,12 @@ import dataclasses
 from dataclasses import replace
 from typing import Any
 
+from commission.app.base.actions import Sender
+from commission.app.base.reducer import Outcome, reduce
+from commission.app.base.state import AppState
+from commission.app.editing.editor import Tool, editor_of
 from commission.app.editing.gestures import reflector_at
-from commission.app.plan.actions import AlsoFails, ReadFloor, SetPlan
+from commission.app.plan.actions import AlsoFails, ClearEllipses, ReadFloor, SetPlan
 from commission.app.plan.settings import Figure, PlanSettings
 from commission.errors import UsageError
 from commission.planning.dependence import Failure
@@ -81,3 +85,25 @@ def also_fails(action: AlsoFails, plan: PlanSettings, project: Project) -> PlanS
     if all(reflector.id != action.name for reflector in project.reflectors.reflectors):
         raise UsageError(f"no reflector is called {action.name!r}")
     return replace(plan, fallen=(*plan.fallen, action.name), failed="", ranking=plan.ranking + 1)
+
+
+@reduce.register
+def set_plan(action: SetPlan, state: AppState, _sender: Sender) -> Outcome:
+    return Outcome(state.with_part(changed(action, state.part(PlanSettings), state.project)))
+
+
+@reduce.register
+def read_floor(action: ReadFloor, state: AppState, sender: Sender) -> Outcome:
+    if editor_of(state, sender.browser).tool is not Tool.SELECT:
+        return Outcome(state)
+    return Outcome(state.with_part(clicked(action, state.part(PlanSettings), state.project)))
+
+
+@reduce.register
+def clear_ellipses(_action: ClearEllipses, state: AppState, _sender: Sender) -> Outcome:
+    return Outcome(state.with_part(replace(state.part(PlanSettings), spots=())))
+
+
+@reduce.register
+def let_fail(action: AlsoFails, state: AppState, _sender: Sender) -> Outcome:
+    return Outcome(state.with_part(also_fails(action, state.part(PlanSettings), state.project)))

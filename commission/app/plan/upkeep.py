@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Generic, TypeAlias, TypeVar
 
-from commission.app.base.jobs import JobReport, Jobs, JobState
+from commission.app.base.actions import Report
+from commission.app.base.jobs import Job, Jobs, Lane
 from commission.progress import Progress
 
 Result = TypeVar("Result")
@@ -22,18 +23,18 @@ class Upkeep(Generic[Result]):
     Parameters
     ----------
     name : of the job, in the user's words.
-    kind : type of the result.
     jobs : where it runs.
+    lane : in which it waits.
+    is_shown : whether the page shows the job.
     """
 
-    def __init__(self, name: str, kind: type[Result], jobs: Jobs) -> None:
+    def __init__(self, name: str, jobs: Jobs, lane: Lane = Lane.USUAL, *, is_shown: bool = True) -> None:
         self.name = name
         self.result: Result | None = None
         self.key: Key = ()
         """What the result depends on."""
-        self._kind = kind
-        self._jobs = jobs
-        self._running: tuple[int, Key] | None = None
+        self._jobs, self._lane, self._is_shown = jobs, lane, is_shown
+        self._running: Key | None = None
 
     @property
     def is_running(self) -> bool:
@@ -42,12 +43,22 @@ class Upkeep(Generic[Result]):
 
     def keep(self, key: Key, work: Callable[[Progress], Result]) -> None:
         """Start the job unless the result is there, or one is under way."""
-        if self._running is None and not is_same(key, self.key):
-            self._running = (self._jobs.start(self.name, work).number, key)
+        if self._running is not None or is_same(key, self.key):
+            return
+        self._running = key
+        self._jobs.start(
+            self.name,
+            work,
+            then=self._take,
+            failed=self._failed,
+            stopped=self._end,
+            lane=self._lane,
+            is_shown=self._is_shown,
+        )
 
     def ask(self, key: Key, work: Callable[[Progress], Result]) -> None:
         """Start the job where the key is another one than before; what the one before led to is dropped."""
-        before = self.key if self._running is None else self._running[1]
+        before = self.key if self._running is None else self._running
         if not is_same(key, before):
             self.drop()
             self.keep(key, work)
@@ -55,21 +66,20 @@ class Upkeep(Generic[Result]):
     def drop(self) -> None:
         """Forget the result and stop the job: it is not wanted any more."""
         if self._running is not None:
-            self._jobs.stop(self._running[0])
+            self._jobs.cancel(self.name)
         self.result, self.key, self._running = None, (), None
 
-    def hear(self, report: JobReport) -> bool:
-        """Take the end of the job; return whether it was this one's."""
-        # Numbers tell jobs of one runner apart; there are several runners.
-        if self._running is None or (report.job.name, report.job.number) != (self.name, self._running[0]):
-            return False
-        if report.job.state in (JobState.WAITING, JobState.RUNNING):
-            return False
-        # What failed or was stopped is not tried again until something changes.
-        self.key = self._running[1]
-        self.result = report.result if isinstance(report.result, self._kind) else None
-        self._running = None
-        return True
+    def _take(self, result: Result) -> None:
+        self._end()
+        self.result = result
+
+    def _end(self) -> None:
+        """Take note that the job has ended; what failed or was stopped is not tried again until something changes."""
+        self.key, self.result, self._running = self._running or (), None, None
+
+    def _failed(self, job: Job) -> Report:
+        self._end()
+        return Report(f"{job.name}: {job.error}")
 
 
 def is_same(one: Key, other: Key) -> bool:

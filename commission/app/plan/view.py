@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commission.app.ambiguity.cold_start import Ambiguity
+from commission.app.base.view import PageView
 from commission.app.coverage.scale import Scale
 from commission.app.placement.suggestion import Suggestion
 from commission.app.plan.settings import Figure, Place
@@ -188,6 +189,14 @@ class PlanView:
     """The suggested layout."""
     waiting: bool = False
     """Whether something is wanted that is not there yet."""
+
+
+NOTHING = PlanView()
+
+
+def plan_of(view: PageView) -> PlanView:
+    """Return what the step Plan has found; nothing before its service has followed."""
+    return view.part(PlanView) or NOTHING
 
 
 def stretches(points: FloatArray, chosen: BoolArray) -> tuple[FloatArray, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from commission.app.base.view import Series
+from commission.app.run.view import Series
 from commission.geometry.arrays import FloatArray
 from commission.planning.route_prediction import RoutePrediction
 

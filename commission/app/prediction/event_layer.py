@@ -11,8 +11,8 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_POINTS, lift, thinned
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.plan.view import PlanView, RouteView
+from commission.app.base.view import PageView
+from commission.app.plan.view import RouteView, plan_of
 from commission.geometry.arrays import FloatArray
 from commission.planning.route_prediction import RoutePrediction
 from commission.site.project import Project
@@ -61,6 +61,7 @@ class EventLayer(BaseLayer):
     """Marks and names along the predicted route."""
 
     name = "Stops, stations, risks"
+    rank = 100
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
     legend = (
         theme.Legend("supervisor stops; station not met", theme.OVER_LIMIT, theme.Mark.DOT),
@@ -90,8 +91,10 @@ class EventLayer(BaseLayer):
         """Adapt the size of the marks to the site's."""
         self._mark = extent_of(project).mark_size()
 
-    def draw_plan(self, plan: PlanView, state: AppState) -> None:
+    def draw(self, view: PageView) -> None:
         """Draw the marks anew where the prediction has changed."""
+        plan = plan_of(view)
+        state = view.state
         if plan.route is self._shown:
             return
         self._shown = plan.route
@@ -119,8 +122,9 @@ class EventLayer(BaseLayer):
             for number, event in enumerate(found)
         )
 
-    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - the protocol's
+    def is_used(self, view: PageView) -> bool:
         """Whether something happens on the route."""
+        plan = plan_of(view)
         route = plan.route
         return route is not None and bool(route.risks or route.stations or len(route.prediction.trips()))
 

@@ -8,8 +8,8 @@ from viser import LineSegmentsHandle, SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, stroke_segments
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.plan.view import PlanView
+from commission.app.base.view import PageView
+from commission.app.plan.view import plan_of
 from commission.app.prediction.load_colors import load_classes, palette
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.planning.route_prediction import RoutePrediction
@@ -42,6 +42,7 @@ class RibbonLayer(BaseLayer):
     """Predicted uncertainty along the chosen route."""
 
     name = "Route prediction"
+    rank = 90
     reads: tuple[str, ...] = ()
 
     def __init__(self, scene: SceneApi) -> None:
@@ -57,8 +58,9 @@ class RibbonLayer(BaseLayer):
             f"/plan/{name}", NO_SEGMENTS, color, thickness=width, thickness_units="screen"
         )
 
-    def draw_plan(self, plan: PlanView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+    def draw(self, view: PageView) -> None:
         """Draw the ribbon anew where the prediction has changed."""
+        plan = plan_of(view)
         prediction = None if plan.route is None else plan.route.prediction
         if prediction is self._shown:
             return

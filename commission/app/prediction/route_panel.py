@@ -7,18 +7,19 @@ from typing import Any
 from viser import GuiApi, GuiDropdownHandle, GuiFolderHandle
 
 from commission.app.base import theme
-from commission.app.base.actions import Action, Report
+from commission.app.base.actions import Action, LookAt, Report
 from commission.app.base.inputs import Inputs, Text, WorkBar
 from commission.app.base.panel import BasePanel, Post
 from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
 from commission.app.coverage.words import metres_text
-from commission.app.editing.actions import LookAt
 from commission.app.plan.actions import SetPlan
 from commission.app.plan.planner import PREDICTION
-from commission.app.plan.view import RiskView, RouteView
+from commission.app.plan.settings import PlanSettings
+from commission.app.plan.view import RiskView, RouteView, plan_of
 from commission.app.prediction.chart import chart
 from commission.app.prediction.driven import driven
+from commission.app.run.view import RunView
 
 NO_ROUTE = "Off"
 MOST_RISKS = 12
@@ -36,10 +37,9 @@ class RoutePanel(BasePanel):
     """
 
     def __init__(self, gui: GuiApi, post: Post, folder: GuiFolderHandle) -> None:
-        self._inputs = Inputs(gui, post, SetPlan, lambda state, name: getattr(state.plan, name))
+        self._inputs = Inputs(gui, post, SetPlan, lambda state, name: getattr(state.part(PlanSettings), name))
         self._risks: tuple[RiskView, ...] = ()
-        with folder:
-            self._add(gui, post)
+        self._add(gui, post)
         self._rows = Rows(gui, folder, post, self._showing)
 
     def _add(self, gui: GuiApi, post: Post) -> None:
@@ -50,17 +50,19 @@ class RoutePanel(BasePanel):
             "route",
             self._route,
             lambda name: "" if name == NO_ROUTE else name,
-            lambda state: state.plan.route if state.plan.route in self._route.options else NO_ROUTE,
+            lambda state: (
+                state.part(PlanSettings).route if state.part(PlanSettings).route in self._route.options else NO_ROUTE
+            ),
         )
         self._work = WorkBar(gui, post, PREDICTION, SetPlan("route", ""))
         self._chart = Text(gui)
         self._neighbors = Text(gui)
 
-    def _showing(self, index: int, client: int) -> Action:
+    def _showing(self, index: int) -> Action:
         """Go to where a wrong association is most probable; the list may have become shorter since it was drawn."""
         if index >= len(self._risks):
             return Report("that risk is gone: the route has been predicted anew", failed=False)
-        return LookAt(client, self._risks[index].worst)
+        return LookAt(self._risks[index].worst)
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow settings, progress and result."""
@@ -69,7 +71,7 @@ class RoutePanel(BasePanel):
             self._route.options = names
         self._inputs.follow(view.state)
         self._work.follow(view)
-        route, run = view.plan.route, view.run
+        route, run = plan_of(view).route, view.part(RunView)
         self._show_risks(() if route is None else route.risks)
         self._neighbors.write((route,), lambda: "" if route is None else _risk_text(route))
         if route is None:

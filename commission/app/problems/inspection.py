@@ -10,11 +10,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from commission.app.base.jobs import JobReport, Jobs
+from commission.app.base.jobs import Lane
+from commission.app.base.service import Context, Due, Service
 from commission.app.base.state import AppState
+from commission.app.editing.editor import editors_of
 from commission.app.editing.route_gestures import route_of
 from commission.app.plan.upkeep import Upkeep
 from commission.app.problems.checker import Checker
+from commission.app.problems.view import InspectionView
 from commission.planning.route_profile import RouteProfile, route_profile
 from commission.progress import Progress
 from commission.site.routes import Route
@@ -37,19 +40,16 @@ class Profiles:
     """One for each of them."""
 
 
-class Inspection:
-    """What there is to say about the site as it was last looked at.
+class Inspection(Service):
+    """What there is to say about the site as it was last looked at."""
 
-    Parameters
-    ----------
-    jobs : a background thread of its own; its reports come back through `hear`.
-    """
-
-    def __init__(self, jobs: Jobs) -> None:
-        self._jobs = jobs
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
         self._checker = Checker()
-        self._check = Upkeep(CHECK, Findings, self._jobs)
-        self._profile = Upkeep(PROFILE, Profiles, self._jobs)
+        self._check = Upkeep[Findings](CHECK, context.jobs, Lane.QUICK, is_shown=False)
+        self._profile = Upkeep[Profiles](PROFILE, context.jobs, Lane.QUICK, is_shown=False)
+        self._found: Findings | None = None
+        self._looked_along: Profiles | None = None
         self.problems: tuple[Problem, ...] = ()
         """Errors first."""
         self.violations: tuple[Violation, ...] = ()
@@ -57,39 +57,40 @@ class Inspection:
         self.profiles: Mapping[str, RouteProfile] = MappingProxyType({})
         """How the selected routes drive, by name; one that was just edited as it was, until it is looked at."""
 
-    def follow(self, state: AppState) -> None:
+    def follow(self, state: AppState) -> Due:
         """Look at what is new: edits meanwhile are looked at afterwards, and nothing at what nobody has selected."""
+        self._take_results()
         project = state.project
         self._check.keep((project,), lambda progress: self._checker.check(project, progress))
-        selected = {route.name: route for editor in state.editors.values() if (route := route_of(project, editor))}
+        selected = {route.name: route for editor in editors_of(state) if (route := route_of(project, editor))}
         routes, vehicle, before = tuple(selected.values()), project.vehicle, self._profile.result
         if routes:
             self._profile.keep((vehicle, *routes), lambda progress: profiles_of(routes, vehicle, before, progress))
         elif self._profile.key or self._profile.is_running:
             self._profile.drop()
             self.profiles = MappingProxyType({})
+        return Due.NEVER
 
-    def hear(self, report: JobReport) -> bool:
-        """Take news of the background thread; return whether it was this one's."""
-        if report.job.name not in (CHECK, PROFILE):
-            return False
-        if self._check.hear(report) and self._check.result is not None:
-            self.problems = self._check.result.problems
-            self.violations = tuple(found for route in self._check.result.by_route for found in route.violations)
-        if self._profile.hear(report) and self._profile.result is not None:
-            profiles = self._profile.result
+    def parts(self, *, slowly: bool) -> tuple[object, ...]:  # noqa: ARG002 - the protocol's
+        """Return what was found."""
+        return (InspectionView(self.problems, self.violations, self.profiles),)
+
+    def _take_results(self) -> None:
+        """Sort what was found; what failed leaves what there was before."""
+        found, profiles = self._check.result, self._profile.result
+        if found is not None and found is not self._found:
+            self._found = found
+            self.problems = found.problems
+            self.violations = tuple(violation for route in found.by_route for violation in route.violations)
+        if profiles is not None and profiles is not self._looked_along:
+            self._looked_along = profiles
             named = zip(profiles.routes, profiles.profiles, strict=True)
             self.profiles = MappingProxyType({route.name: profile for route, profile in named})
-        return True
 
     @property
     def is_busy(self) -> bool:
         """Whether something is being looked at."""
         return self._check.is_running or self._profile.is_running
-
-    def close(self) -> None:
-        """End the background thread."""
-        self._jobs.close()
 
 
 def profiles_of(routes: tuple[Route, ...], vehicle: Vehicle, before: Profiles | None, progress: Progress) -> Profiles:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from viser import GuiApi, GuiTabHandle
 
 from commission.app.base import actions, theme
+from commission.app.base.actions import ClearFaults
 from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
 from commission.app.editing.actions import ShowProblem
+from commission.app.problems.view import inspection_of
 from commission.studies.problems import Problem, Severity
 
 COLORS: dict[Severity, theme.Color] = {
@@ -29,23 +31,22 @@ class ProblemsPanel(BasePanel):
     """
 
     def __init__(self, gui: GuiApi, post: Post, tab: GuiTabHandle) -> None:
-        with tab:
-            self._html = gui.add_html("")
-            self._clear = gui.add_button("Clear", color="gray", visible=False)
-        self._clear.on_click(posting(post, lambda _event: actions.ClearProblems()))
+        self._html = gui.add_html("")
+        self._clear = gui.add_button("Clear", color="gray", visible=False)
+        self._clear.on_click(posting(post, lambda _event: ClearFaults()))
         self._found: tuple[Problem, ...] = ()
         self._rows = Rows(gui, tab, post, self._showing)
         self._shown: tuple[object, object] | None = None
 
-    def _showing(self, index: int, client: int) -> actions.Action:
+    def _showing(self, index: int) -> actions.Action:
         """Return the action of a line; the list may have become shorter since it was drawn."""
         if index < len(self._found):
-            return ShowProblem(client, self._found[index])
+            return ShowProblem(self._found[index])
         return actions.Report("this problem is gone", failed=False)
 
     def draw_slowly(self, view: PageView) -> None:
         """Show both lists."""
-        problems, found = view.state.problems, view.found
+        problems, found = view.state.faults, inspection_of(view).problems
         if self._shown is not None and self._shown[0] is problems and self._shown[1] is found:
             return
         self._shown = problems, found

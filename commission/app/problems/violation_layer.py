@@ -11,8 +11,8 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, Points, outline_segments, polyline_segments, thinned
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.plan.view import PlanView
+from commission.app.base.view import PageView
+from commission.app.problems.view import inspection_of
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
@@ -31,6 +31,7 @@ class ViolationLayer(BaseLayer):
     """Too tight curves, corners, walls in the way, too little room."""
 
     name = "Route violations"
+    rank = 70
     reads: tuple[str, ...] = ("floor_map", "vehicle")
     legend = (
         theme.Legend("vehicle cannot drive this: curve, wall", theme.OVER_LIMIT, theme.Mark.LINE),
@@ -57,8 +58,9 @@ class ViolationLayer(BaseLayer):
         self._mark = SHORTEST * extent_of(project).mark_size()
         self._shown = None
 
-    def draw_violations(self, violations: Sequence[Violation]) -> None:
+    def draw(self, view: PageView) -> None:
         """Draw every stretch anew where something was found anew."""
+        violations = inspection_of(view).violations
         if violations is self._shown:
             return
         self._shown = violations
@@ -69,7 +71,7 @@ class ViolationLayer(BaseLayer):
         ]
         self._ghosts.points = outline_segments(np.array(ghosts), theme.Height.ACCUMULATED)
 
-    def is_used(self, plan: PlanView, state: AppState) -> bool:  # noqa: ARG002 - the protocol's
+    def is_used(self, view: PageView) -> bool:  # noqa: ARG002 - the protocol's
         """Whether a route asks too much."""
         return bool(self._shown)
 

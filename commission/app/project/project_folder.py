@@ -1,38 +1,75 @@
-"""Where the page keeps a project: its folder, the journal beside it, and an eye on what others change there.
-
-The runtime's owner thread calls it; it decides nothing.
-"""
+"""The folder of the project: its files, the journal beside them, and an eye on what others change there."""
 
 from __future__ import annotations
 
 import os
+import time
 from pathlib import Path
 
 from commission.app.base import actions
-from commission.app.base.actions import Action
+from commission.app.base.actions import Action, Envelope, Report, Sender
+from commission.app.base.effects import Effect
+from commission.app.base.service import Context, Due, Service
 from commission.app.base.state import AppState
+from commission.app.project.actions import ChangedOnDisk, ProjectSaved, Reloaded, Restored
+from commission.app.project.effects import ReadProject, WriteProject
+from commission.app.project.state import FilesState
 from commission.io.journal import Journal
-from commission.io.journal_replay import Restored
+from commission.io.journal_replay import restore
 from commission.io.project_file import load_project, save_project
 from commission.site.project import Project
 
 OWN_PREFIX = ".commission."
+LOOK_AT_DISK_S = 2.0
+"""Time between two looks at the project's folder [s]."""
 
 
-class Keeping:
-    """The files of the project that is being edited.
+class ProjectFolder(Service):
+    """The files of the project that is being edited."""
 
-    Parameters
-    ----------
-    folder : the project's folder; none: bundled with the program, nothing is journaled.
-    project : the project as its files are.
-    restored : what the journal of a crashed session gave back.
-    """
+    effects = (WriteProject, ReadProject)
 
-    def __init__(self, folder: Path | None, project: Project, restored: Restored | None = None) -> None:
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        folder, project = context.state.folder, context.state.project
         self._folder = folder
-        self._journal = None if folder is None else Journal(folder, project, restored)
+        self._restored = None if folder is None else restore(folder, project)
+        self._journal = None if folder is None else Journal(folder, project, self._restored)
         self._listing = _listing(folder)
+        self._looked_at = context.clock()
+
+    def start(self) -> None:
+        """Make the edits again that a killed program left in the journal."""
+        restored = self._restored
+        if restored is not None and restored.edits:
+            self.context.post(Restored(restored.project, restored.summary(), restored.foreign_changes))
+        elif restored is not None:
+            self.context.post(Report(restored.summary()))
+
+    def project_changed(self, action: Action, before: AppState, after: AppState) -> None:
+        """Journal an edit."""
+        self.note(after.project, name_of_edit(action, before, after))
+
+    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:  # noqa: ARG002 - the protocol's
+        """Write or read the project."""
+        match effect:
+            case WriteProject(project, folder, overwrite):
+                self.save(project, folder, overwrite)
+                self.context.post(Envelope(ProjectSaved(project, folder, time.strftime("%H:%M")), sender))
+            case ReadProject(folder):
+                self.context.post(Envelope(Reloaded(self.load(folder)), sender))
+            case _:
+                pass
+
+    def follow(self, state: AppState) -> Due:
+        """Look now and then at what others do in the folder."""
+        now = self.context.clock()
+        if now - self._looked_at >= LOOK_AT_DISK_S:
+            self._looked_at = now
+            files = self.foreign_changes()
+            if files is not None and files != state.part(FilesState).foreign:
+                self.context.post(ChangedOnDisk(files))
+        return Due.NEVER
 
     def note(self, project: Project, what: str) -> None:
         """Journal an edit; see `Journal.append`."""

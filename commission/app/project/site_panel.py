@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from viser import GuiApi
 
-from commission.app.base.panel import BasePanel, Post, escaped, table
+from commission.app.base.panel import BasePanel, escaped, table
 from commission.app.base.view import PageView
-from commission.app.editing.equipment_fields import EquipmentFields
-from commission.app.floor_map.floor_map_panel import FloorMapPanel
-from commission.app.project.project_fields import ProjectFields
 from commission.site.project import Project
 
 
@@ -43,24 +40,16 @@ def route_rows(project: Project) -> list[tuple[str, str]]:
 
 
 class SitePanel(BasePanel):
-    """Facts of the project, loading of its floor map, and the editor of vehicle and scanner."""
+    """Facts of the project."""
 
-    def __init__(self, gui: GuiApi, post: Post, project: Project) -> None:
+    def __init__(self, gui: GuiApi, project: Project) -> None:
         self._html = gui.add_html("")
-        self._project = ProjectFields(gui, post, project)
-        self._floor_map = FloorMapPanel(gui, post, project)
-        self._equipment = EquipmentFields(gui, post, project)
         self._shown: Project | None = None
         self._routes = ""
         self._show(project)
 
-    def draw(self, view: PageView) -> None:
-        """Show how far loading is without delay."""
-        self._floor_map.draw(view)
-
     def draw_slowly(self, view: PageView) -> None:
         """Follow the project."""
-        self._floor_map.draw_slowly(view)
         if view.state.project is not self._shown:
             self._show(view.state.project)
 
@@ -73,5 +62,3 @@ class SitePanel(BasePanel):
         content = facts + (routes if project.routes else "")
         if self._html.content != content:
             self._html.content = content
-        self._project.show(project)
-        self._equipment.show(project)

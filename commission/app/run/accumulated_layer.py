@@ -8,8 +8,8 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_POINTS, lift
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.base.view import RunView
+from commission.app.base.view import PageView
+from commission.app.run.view import RunView
 from commission.site.project import Project
 
 
@@ -17,6 +17,7 @@ class AccumulatedLayer(BaseLayer):
     """Detections accumulated over the drive."""
 
     name = "Accumulated detections"
+    rank = 180
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
@@ -38,8 +39,12 @@ class AccumulatedLayer(BaseLayer):
         for cloud in (self._inliers, self._outliers):
             cloud.point_size = 0.4 * extent_of(project).mark_size()
 
-    def draw_slowly(self, run: RunView, state: AppState) -> None:
+    def draw_slowly(self, view: PageView) -> None:
         """Draw every detection so far, unless the layer is off: it is the largest of all."""
+        run = view.part(RunView)
+        if run is None:
+            return
+        state = view.state
         if run.accumulated is None or self.name in state.hidden:
             return
         self._inliers.points = lift(run.accumulated.inliers, theme.Height.ACCUMULATED)

@@ -10,8 +10,8 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_POINTS, lift
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.base.view import RunView
+from commission.app.base.view import PageView
+from commission.app.run.view import RunView
 from commission.localization.estimate import Status
 from commission.site.project import Project
 
@@ -29,6 +29,7 @@ class DetectionLayer(BaseLayer):
     """Detections of the newest scan."""
 
     name = "Detections"
+    rank = 170
     legend = tuple(theme.Legend(text, color, MARKS[shape]) for color, shape, text in STYLES.values())
 
     def __init__(self, scene: SceneApi) -> None:
@@ -51,8 +52,11 @@ class DetectionLayer(BaseLayer):
         for cloud in self._clouds.values():
             cloud.point_size = 0.9 * extent_of(project).mark_size()
 
-    def draw(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+    def draw(self, view: PageView) -> None:
         """Draw every detection where it is seen from the estimated pose."""
+        run = view.part(RunView)
+        if run is None:
+            return
         for status, cloud in self._clouds.items():
             chosen = NO_POINTS
             if run.estimate is not None:

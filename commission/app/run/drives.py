@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from commission.app.base.actions import Recording, Source, VirtualDrive
+from commission.app.run.actions import Recording, Source, VirtualDrive
 from commission.app.run.session import Drive
 from commission.errors import SourceError
 from commission.geometry.arrays import frozen

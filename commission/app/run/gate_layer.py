@@ -8,14 +8,15 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, outline_segments
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.base.view import RunView
+from commission.app.base.view import PageView
+from commission.app.run.view import RunView
 
 
 class GateLayer(BaseLayer):
     """Validation ellipses, all in one node."""
 
     name = "Validation areas"
+    rank = 150
     legend = (theme.Legend("validation area (gate)", theme.GATE, theme.Mark.RING),)
 
     def __init__(self, scene: SceneApi) -> None:
@@ -24,8 +25,12 @@ class GateLayer(BaseLayer):
             "/run/gates", NO_SEGMENTS, theme.GATE, thickness=1.5, thickness_units="screen"
         )
 
-    def draw(self, run: RunView, state: AppState) -> None:
+    def draw(self, view: PageView) -> None:
         """Draw the ellipses, larger than they are when asked to."""
+        run = view.part(RunView)
+        if run is None:
+            return
+        state = view.state
         outlines = run.gates
         if state.magnify != 1.0 and len(outlines):
             middle = np.mean(outlines, axis=1, keepdims=True)

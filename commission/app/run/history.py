@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.app.base.view import Accumulated, Series
+from commission.app.run.view import Accumulated, Series
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Estimate, Mode, Status
 

@@ -7,7 +7,8 @@ import math
 from viser import GuiApi
 
 from commission.app.base.panel import BasePanel, table
-from commission.app.base.view import PageView, RunView
+from commission.app.base.view import PageView
+from commission.app.run.view import RunView
 from commission.localization.estimate import Mode, Status
 from commission.site.parameters import SupervisorParameters
 
@@ -64,6 +65,7 @@ class NowPanel(BasePanel):
 
     def draw_slowly(self, view: PageView) -> None:
         """Show the numbers."""
-        if view.run is not None:
-            shown = table(rows(view.run, view.state.project.parameters.supervisor))
+        run = view.part(RunView)
+        if run is not None:
+            shown = table(rows(run, view.state.project.parameters.supervisor))
             self._html.content = f"<div class='c-now' style='padding:2px 14px 2px 6px'>{shown}</div>"

@@ -11,7 +11,8 @@ from viser import GuiApi, GuiUplotHandle, uplot
 
 from commission.app.base import theme
 from commission.app.base.panel import BasePanel
-from commission.app.base.view import PageView, RunView, Series
+from commission.app.base.view import PageView
+from commission.app.run.view import RunView, Series
 from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
 from commission.localization.estimate import Status
@@ -186,7 +187,7 @@ class Plots(BasePanel):
 
     def draw_slowly(self, view: PageView) -> None:
         """Draw the drive so far."""
-        run = view.run
+        run = view.part(RunView)
         if run is None or run.duration <= 0.0:
             return
         parameters = view.state.project.parameters

@@ -10,6 +10,9 @@ from commission.app.base import actions
 from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
+from commission.app.run.actions import ChooseSource, Cover, Recording, Repeat, Restart, VirtualDrive
+from commission.app.run.state import RunState
+from commission.app.run.view import RunView
 
 NO_ROUTE = ("(the project has none)",)
 
@@ -27,22 +30,23 @@ class RunPanel(BasePanel):
         with gui.add_folder("During the run"):
             self._cover = gui.add_checkbox(
                 "Cover reflectors",
-                state.covered,
+                state.part(RunState).covered,
                 hint="From the next scan on no reflector is seen, as if someone had covered them all.",
             )
-            self._cover.on_update(posting(post, lambda event: actions.Cover(bool(event.target.value))))
+            self._cover.on_update(posting(post, lambda event: Cover(bool(event.target.value))))
             self._repeat = gui.add_checkbox(
-                "Repeat at the end", state.repeat, hint="The drive starts again at its initial pose."
+                "Repeat at the end", state.part(RunState).repeat, hint="The drive starts again at its initial pose."
             )
-            self._repeat.on_update(posting(post, lambda event: actions.Repeat(bool(event.target.value))))
+            self._repeat.on_update(posting(post, lambda event: Repeat(bool(event.target.value))))
             restart = gui.add_button(
                 "Restart", hint="Back to the start, the initial pose and its uncertainty.", color="gray"
             )
-            restart.on_click(posting(post, lambda _event: actions.Restart()))
+            restart.on_click(posting(post, lambda _event: Restart()))
 
     def _add_drive(self, post: Post, state: AppState) -> None:
         names = _routes(state)
-        drive = state.source if isinstance(state.source, actions.VirtualDrive) else None
+        source = state.part(RunState).source
+        drive = source if isinstance(source, VirtualDrive) else None
         with self._gui.add_folder("Virtual drive"):
             self._route = self._gui.add_dropdown("Route", names, initial_value=drive.route if drive else None)
             seed = self._gui.add_number(
@@ -56,14 +60,13 @@ class RunPanel(BasePanel):
         self._drive.on_click(
             posting(
                 post,
-                lambda _event: actions.ChooseSource(
-                    actions.VirtualDrive(self._route.value, int(seed.value), int(people.value))
-                ),
+                lambda _event: ChooseSource(VirtualDrive(self._route.value, int(seed.value), int(people.value))),
             )
         )
 
     def _add_recording(self, post: Post, state: AppState) -> None:
-        shown = str(state.source.path) if isinstance(state.source, actions.Recording) else ""
+        source = state.part(RunState).source
+        shown = str(source.path) if isinstance(source, Recording) else ""
         with self._gui.add_folder("Recording"):
             path = self._gui.add_text(
                 "Folder", shown, hint="Path, on the computer that serves this page, of a recording."
@@ -73,7 +76,7 @@ class RunPanel(BasePanel):
             posting(
                 post,
                 lambda _event: (
-                    actions.ChooseSource(actions.Recording(Path(path.value.strip()).expanduser()))
+                    ChooseSource(Recording(Path(path.value.strip()).expanduser()))
                     if path.value.strip()
                     else actions.Report("no recording was named; expected the path of a folder")
                 ),
@@ -97,15 +100,16 @@ class RunPanel(BasePanel):
             self._shown = content
             self._now.content = content
         jobs = view.jobs
-        seeking = None if view.run is None else view.run.seeking
+        run = view.part(RunView)
+        seeking = None if run is None else run.seeking
         fraction = jobs[0].fraction if jobs else seeking
         self._progress.visible = fraction is not None
         if fraction is not None:
             self._progress.value = 100.0 * min(max(fraction, 0.0), 1.0)
-        if self._cover.value is not view.state.covered:
-            self._cover.value = view.state.covered
-        if self._repeat.value is not view.state.repeat:
-            self._repeat.value = view.state.repeat
+        if self._cover.value is not view.state.part(RunState).covered:
+            self._cover.value = view.state.part(RunState).covered
+        if self._repeat.value is not view.state.part(RunState).repeat:
+            self._repeat.value = view.state.part(RunState).repeat
 
 
 def _routes(state: AppState) -> tuple[str, ...]:
@@ -115,15 +119,16 @@ def _routes(state: AppState) -> tuple[str, ...]:
 
 def _now(view: PageView) -> str:
     """Say in one line what drives, and what is under way."""
-    source = view.state.source
-    if isinstance(source, actions.VirtualDrive):
+    source = view.state.part(RunState).source
+    if isinstance(source, VirtualDrive):
         what = f"Virtual drive, route <b>{escaped(source.route)}</b>, seed {source.seed}"
-    elif isinstance(source, actions.Recording):
+    elif isinstance(source, Recording):
         what = f"Recording <b>{escaped(source.path.name)}</b>"
     else:
         what = "Nothing drives yet: choose a virtual drive or a recording."
     under_way = [escaped(job.line) for job in view.jobs]
-    if view.run is not None and view.run.seeking is not None:
-        under_way.append(f"Replaying {view.run.seeking:.0%}")
+    run = view.part(RunView)
+    if run is not None and run.seeking is not None:
+        under_way.append(f"Replaying {run.seeking:.0%}")
     note = f"<br><span class='c-note'>{'; '.join(under_way)}</span>" if under_way else ""
     return f"<div style='font-size:12.5px;padding:2px 4px'>{what}{note}</div>"

@@ -8,8 +8,8 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_POINTS, lift
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.base.view import RunView
+from commission.app.base.view import PageView
+from commission.app.run.view import RunView
 from commission.site.project import Project
 
 
@@ -17,6 +17,7 @@ class ScanLayer(BaseLayer):
     """Scan points."""
 
     name = "Scan"
+    rank = 160
     legend = (theme.Legend("scan point (paper: dark)", theme.SCAN, theme.Mark.DOT),)
 
     def __init__(self, scene: SceneApi) -> None:
@@ -35,8 +36,11 @@ class ScanLayer(BaseLayer):
         """Adapt the size of points to the site's."""
         self._points.point_size = 0.4 * extent_of(project).mark_size()
 
-    def draw(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+    def draw(self, view: PageView) -> None:
         """Draw the newest scan."""
+        run = view.part(RunView)
+        if run is None:
+            return
         self._points.points = lift(run.scan_map, theme.Height.SCAN)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from commission.app.base.view import RunView
 from commission.app.run.history import History, Measured, episodes
+from commission.app.run.view import RunView
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Belief, Estimate, Mode

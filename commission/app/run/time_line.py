@@ -8,8 +8,10 @@ from viser import GuiApi
 
 from commission.app.base import actions, theme
 from commission.app.base.panel import BasePanel, Post, clock, posting
-from commission.app.base.state import SPEEDS
-from commission.app.base.view import PageView, RunView
+from commission.app.base.view import PageView
+from commission.app.run.actions import Play, Restart, Seek, SetSpeed, StepScan
+from commission.app.run.state import SPEEDS, RunState
+from commission.app.run.view import RunView
 
 PLAY, PAUSE, STEP = "Play", "Pause", "Step"
 FOLD = (
@@ -52,23 +54,23 @@ class TimeLine(BasePanel):
         self._speed = gui.add_dropdown(
             "", tuple(_factor(s) for s in SPEEDS), initial_value=_factor(speed), hint="Speed of the play clock."
         )
-        self._speed.on_update(posting(post, lambda event: actions.SetSpeed(float(str(event.target.value).rstrip("x")))))
+        self._speed.on_update(posting(post, lambda event: SetSpeed(float(str(event.target.value).rstrip("x")))))
         self._clock = gui.add_html("")
         self._slider = gui.add_slider("", 0.0, 1.0, 0.01, 0.0)
-        self._slider.on_update(posting(post, lambda event: actions.Seek(float(event.target.value))))
+        self._slider.on_update(posting(post, lambda event: Seek(float(event.target.value))))
         self._strip = gui.add_html(strip(None))
         self._shown = ("", "")
         keys: tuple[tuple[str, Literal["P", "N", "B"], actions.Action], ...] = (
-            ("Play or pause", "P", actions.Play()),
-            ("One scan further", "N", actions.Step()),
-            ("Restart the drive", "B", actions.Restart()),
+            ("Play or pause", "P", Play()),
+            ("One scan further", "N", StepScan()),
+            ("Restart the drive", "B", Restart()),
         )
         for label, key, action in keys:
-            gui.add_command(label, hotkey=key).on_trigger(lambda _event, action=action: post(action))
+            gui.add_command(label, hotkey=key).on_trigger(posting(post, lambda _event, action=action: action))
 
     def draw_slowly(self, view: PageView) -> None:
         """Show time and episodes."""
-        run = view.run
+        run = view.part(RunView)
         if run is None:
             return
         if self._slider.max != run.duration and run.duration > 0.0:
@@ -76,10 +78,10 @@ class TimeLine(BasePanel):
         shown_time = round(min(run.time, run.duration), 2)
         if abs(self._slider.value - shown_time) > 0.005 and run.seeking is None:
             self._slider.value = shown_time
-        if view.state.speed != float(self._speed.value.rstrip("x")):
-            self._speed.value = _factor(view.state.speed)
+        if view.state.part(RunState).speed != float(self._speed.value.rstrip("x")):
+            self._speed.value = _factor(view.state.part(RunState).speed)
         state = "seeking" if run.seeking is not None else "at the end" if run.at_end else ""
-        state = state or ("playing" if view.state.playing else "paused")
+        state = state or ("playing" if view.state.part(RunState).playing else "paused")
         text = (
             "<div class='c-clock' style='font-size:12px;white-space:nowrap;font-variant-numeric:tabular-nums'>"
             f"<b>{clock(run.time)}</b> / {clock(run.duration)} <span style='opacity:.6'>{state}</span></div>"
@@ -98,5 +100,5 @@ def _factor(speed: float) -> str:
 def _clicked(label: Any) -> actions.Action:
     """From the button's label to what it means."""
     if label == STEP:
-        return actions.Step()
-    return actions.Play(label == PLAY)
+        return StepScan()
+    return Play(label == PLAY)

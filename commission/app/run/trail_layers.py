@@ -7,8 +7,8 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, polyline_segments, thinned
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.base.view import RunView
+from commission.app.base.view import PageView
+from commission.app.run.view import RunView
 
 MOST_POINTS = 800
 
@@ -17,6 +17,7 @@ class TrailLayer(BaseLayer):
     """Trail of the estimate."""
 
     name = "Trail"
+    rank = 210
     legend = (theme.Legend("trail of the estimate", theme.TRAIL, theme.Mark.LINE),)
 
     def __init__(self, scene: SceneApi) -> None:
@@ -25,8 +26,11 @@ class TrailLayer(BaseLayer):
             "/run/trail", NO_SEGMENTS, theme.TRAIL, thickness=1.5, thickness_units="screen"
         )
 
-    def draw_slowly(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+    def draw_slowly(self, view: PageView) -> None:
         """Draw the whole trail."""
+        run = view.part(RunView)
+        if run is None:
+            return
         self._line.points = polyline_segments(thinned(run.series.means[:, :2], MOST_POINTS), theme.Height.TRAIL)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
@@ -38,6 +42,7 @@ class ReferenceLayer(BaseLayer):
     """Trail of the reference."""
 
     name = "Reference"
+    rank = 220
     legend = (theme.Legend("reference (truth)", theme.REFERENCE, theme.Mark.LINE),)
 
     def __init__(self, scene: SceneApi) -> None:
@@ -46,8 +51,11 @@ class ReferenceLayer(BaseLayer):
             "/run/reference", NO_SEGMENTS, theme.REFERENCE, thickness=3.0, thickness_units="screen"
         )
 
-    def draw_slowly(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+    def draw_slowly(self, view: PageView) -> None:
         """Draw the reference positions up to now."""
+        run = view.part(RunView)
+        if run is None:
+            return
         self._line.points = polyline_segments(thinned(run.references, MOST_POINTS), theme.Height.REFERENCE)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:

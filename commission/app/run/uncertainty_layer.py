@@ -8,8 +8,8 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, lift, outline_segments
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.base.view import RunView
+from commission.app.base.view import PageView
+from commission.app.run.view import RunView
 from commission.geometry.gaussian import ellipse_points
 
 SIGMAS = 2.0
@@ -20,6 +20,7 @@ class UncertaintyLayer(BaseLayer):
     """Pose covariance."""
 
     name = "Pose covariance"
+    rank = 200
     legend = (theme.Legend("2σ of the estimated pose", theme.POSE, theme.Mark.RING),)
 
     def __init__(self, scene: SceneApi) -> None:
@@ -28,8 +29,12 @@ class UncertaintyLayer(BaseLayer):
             "/vehicle/covariance", NO_SEGMENTS, theme.POSE, thickness=2.0, thickness_units="screen"
         )
 
-    def draw(self, run: RunView, state: AppState) -> None:
+    def draw(self, view: PageView) -> None:
         """Draw ellipse and rays."""
+        run = view.part(RunView)
+        if run is None:
+            return
+        state = view.state
         # Drawn in the vehicle's frame, so that it sits on the vehicle even where a slow browser skips pictures.
         c, s = np.cos(run.pose[2]), np.sin(run.pose[2])
         to_base = np.array([[c, s], [-s, c]])

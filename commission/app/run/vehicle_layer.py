@@ -13,8 +13,8 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, lift, outline_segments, yaw_quaternion
 from commission.app.base.layer import BaseLayer
-from commission.app.base.state import AppState
-from commission.app.base.view import RunView
+from commission.app.base.view import PageView
+from commission.app.run.view import RunView
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
@@ -69,6 +69,7 @@ class VehicleLayer(BaseLayer):
     """The vehicle."""
 
     name = "Vehicle"
+    rank = 190
     reads: tuple[str, ...] = ("vehicle", "scanner", "routes")
     legend = (
         theme.Legend("vehicle; before a run at the start", theme.VEHICLE, theme.Mark.LINE),
@@ -119,8 +120,11 @@ class VehicleLayer(BaseLayer):
         self._frame.position = (float(pose[0]), float(pose[1]), 0.0)
         self._frame.wxyz = yaw_quaternion(float(pose[2]))
 
-    def draw(self, run: RunView, state: AppState) -> None:  # noqa: ARG002 - the protocol's
+    def draw(self, view: PageView) -> None:
         """Move the vehicle to the estimated pose."""
+        run = view.part(RunView)
+        if run is None:
+            return
         if not self._drives:
             self._drives = self._frame.visible = True
         self._put(run.pose)

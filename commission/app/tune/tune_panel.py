@@ -7,17 +7,16 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import time
 from dataclasses import dataclass
 from typing import Any
 
 from viser import GuiApi, GuiInputHandle
 
-from commission.app.base import actions
 from commission.app.base.panel import BasePanel, Post, posting
-from commission.app.base.reducer import parameter
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
+from commission.app.tune.actions import ParameterValue, ResetParameters, SetParameter
+from commission.app.tune.reducer import parameter
 from commission.site.checks import field_hints
 from commission.site.parameters import Parameters
 
@@ -97,7 +96,7 @@ class TunePanel(BasePanel):
             with gui.add_folder(heading, expand_by_default=name != "odometry"):
                 self._add_group(gui, post, name)
         reset = gui.add_button("Reset to saved", color="gray", hint="Back to the parameters of project.yaml.")
-        reset.on_click(posting(post, lambda _event: actions.ResetParameters()))
+        reset.on_click(posting(post, lambda _event: ResetParameters()))
 
     def _add_group(self, gui: GuiApi, post: Post, group: str) -> None:
         """Add a widget for each field of a group of parameters."""
@@ -113,14 +112,12 @@ class TunePanel(BasePanel):
             widget.on_update(
                 posting(
                     post,
-                    lambda event, key=key: actions.SetParameter(
-                        key, self._value(key, event.target.value), time.monotonic()
-                    ),
+                    lambda event, key=key: SetParameter(key, self._value(key, event.target.value)),
                 )
             )
             self._widgets[key] = widget
 
-    def _value(self, key: str, number: Any) -> actions.ParameterValue:
+    def _value(self, key: str, number: Any) -> ParameterValue:
         """From what the widget holds to what the parameter means."""
         knob = KNOBS.get(key)
         if knob is None:

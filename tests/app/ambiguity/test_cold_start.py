@@ -8,7 +8,6 @@ import pytest
 
 from commission.app.ambiguity.ambiguity_layer import MAP_COLORS, ambiguity_picture
 from commission.app.ambiguity.cold_start import EVERY, NOTHING, SOME, TOO_FEW, UNIQUE, Ambiguity, look_alike
-from commission.app.base import reducer
 from commission.app.base.state import AppState
 from commission.app.coverage.heat_legend import cold_start_scale
 from commission.app.plan.actions import SetPlan
@@ -17,6 +16,7 @@ from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
+from tests.app.asking import after
 from tests.app.plan.test_planner import Bench
 
 
@@ -38,7 +38,7 @@ def found_in(project: Project) -> Ambiguity:
 def bench() -> Iterator[Bench]:
     bench = Bench(symmetric_hall())
     yield bench
-    bench.jobs.close()
+    bench.close()
 
 
 def test_a_symmetric_hall_is_ambiguous_everywhere_and_moving_one_reflector_clears_it() -> None:
@@ -74,28 +74,28 @@ def test_a_pair_is_listed_once_whichever_is_taken_for_the_other() -> None:
 
 def test_it_is_looked_for_once_and_outdated_after_an_edit(bench: Bench) -> None:
     bench.ask(cold_start=1)
-    found = bench.settle().cold_start
+    found = bench.found().cold_start
     assert found is not None
     assert found.is_drawn
     assert not found.outdated
     bench.move(0, 0.5)
     assert not bench.jobs.unfinished()
-    after = bench.planner.view.cold_start
+    after = bench.view.cold_start
     assert after is not None
     assert after.outdated
     bench.ask(cold_start=2)
-    again = bench.settle().cold_start
+    again = bench.found().cold_start
     assert again is not None
     assert not again.ambiguity.pairs
     bench.ask(cold_start=0)
-    assert bench.planner.view.cold_start is None
+    assert bench.view.cold_start is None
 
 
 def test_a_chosen_pair_shows_two_poses_that_see_the_same(bench: Bench) -> None:
     bench.ask(cold_start=1)
-    bench.settle()
+    bench.found()
     bench.ask(pair=0)
-    view = bench.planner.view.cold_start
+    view = bench.view.cold_start
     assert view is not None
     assert view.twins is not None
     seen = [np.hypot(*(group - pose[:2]).T) for group, pose in zip(view.twins.groups, view.twins.poses, strict=True)]
@@ -105,22 +105,21 @@ def test_a_chosen_pair_shows_two_poses_that_see_the_same(bench: Bench) -> None:
 
 def test_its_map_takes_the_place_of_the_heatmap_and_leaves_it_when_one_is_chosen(bench: Bench) -> None:
     state = AppState(bench.state.project, bench.state.project)
-    for wish in (SetPlan("figure", "visible"), SetPlan("cold_start", value=True)):
-        state = reducer.reduce(wish, state).state
-    assert state.plan.figure is Figure.NONE
+    state = after(state, SetPlan("figure", "visible"), SetPlan("cold_start", value=True)).state
+    assert state.part(PlanSettings).figure is Figure.NONE
     bench.ask(cold_start=1)
-    bench.settle()
+    bench.found()
     bench.ask(figure=Figure.VISIBLE)
-    view = bench.settle().cold_start
+    view = bench.found().cold_start
     assert view is not None
     assert not view.is_drawn
 
 
 def test_a_second_click_on_a_pair_hides_it(bench: Bench) -> None:
     state = AppState(bench.state.project, bench.state.project)
-    state = reducer.reduce(SetPlan("pair", 3), state).state
-    assert state.plan.pair == 3
-    assert reducer.reduce(SetPlan("pair", 3), state).state.plan.pair == -1
+    state = after(state, SetPlan("pair", 3)).state
+    assert state.part(PlanSettings).pair == 3
+    assert after(state, SetPlan("pair", 3)).state.part(PlanSettings).pair == -1
 
 
 def test_picture_and_legend_have_each_class(bench: Bench) -> None:
@@ -128,6 +127,6 @@ def test_picture_and_legend_have_each_class(bench: Bench) -> None:
     assert picture[0, 0, 3] == 0
     assert {tuple(color[:3]) for color in picture[0].tolist()[4:]} == set(MAP_COLORS.values())
     bench.ask(cold_start=1)
-    found = bench.settle().cold_start
+    found = bench.found().cold_start
     assert found is not None
     assert "100.0 %" in cold_start_scale(found)

@@ -2,11 +2,22 @@ from pathlib import Path
 
 import pytest
 
-from commission.app.base import actions, reducer
-from commission.app.base.actions import ParameterValue
-from commission.app.base.reducer import Reduction, parameter
+from commission.app.base import actions
+from commission.app.base.actions import ClearFaults
+from commission.app.base.effects import Tell
+from commission.app.base.page_reducer import FAULTS_KEPT
+from commission.app.base.reducer import Outcome
 from commission.app.base.state import AppState
+from commission.app.project.actions import ProjectSaved, RenameProject, Save
+from commission.app.project.effects import WriteProject
+from commission.app.project.state import FilesState
+from commission.app.run.actions import ChooseSource, Play, Restart, Seek, SetSpeed, StepScan, VirtualDrive
+from commission.app.run.effects import LoadSource, MoveTo, ProcessOneScan
+from commission.app.run.state import RunState
+from commission.app.tune.actions import ParameterValue, ResetParameters, SetParameter
+from commission.app.tune.reducer import parameter
 from commission.errors import UsageError
+from tests.app.asking import ME, after, by
 from tests.app.sites import room
 
 GATE = "association.gate_probability"
@@ -18,105 +29,97 @@ def state() -> AppState:
     return AppState(project, project, folder=Path("hall"))
 
 
-def after(state: AppState, *wishes: actions.Action) -> Reduction:
-    reduction = Reduction(state)
-    for wish in wishes:
-        reduction = reducer.reduce(wish, reduction.state)
-    return reduction
-
-
 def gate(state: AppState) -> ParameterValue:
     return parameter(state.project.parameters, GATE)
 
 
-def test_a_parameter_change_edits_the_project_and_reaches_the_running_localizer(state: AppState) -> None:
-    result = after(state, actions.SetParameter(GATE, 0.99))
+def test_a_parameter_change_edits_the_project(state: AppState) -> None:
+    result = after(state, SetParameter(GATE, 0.99))
     assert gate(result.state) == 0.99
-    assert result.effects == (reducer.ApplyParameters(),)
     assert result.state.is_changed
 
 
 def test_changes_of_one_parameter_in_quick_succession_are_one_undo_step(state: AppState) -> None:
-    drag = [actions.SetParameter(GATE, 0.9 + 0.01 * i, at=0.1 * i) for i in range(1, 5)]
+    drag = [by(ME, SetParameter(GATE, 0.9 + 0.01 * i), 0.1 * i) for i in range(1, 5)]
     assert len(after(state, *drag).state.undo) == 1
     assert gate(after(state, *drag, actions.Undo()).state) == 0.95
 
 
 def test_a_later_change_of_the_same_parameter_is_its_own_undo_step(state: AppState) -> None:
-    twice = (actions.SetParameter(GATE, 0.9, at=0.0), actions.SetParameter(GATE, 0.99, at=5.0))
+    twice = (SetParameter(GATE, 0.9), by(ME, SetParameter(GATE, 0.99), 5.0))
     assert gate(after(state, *twice, actions.Undo()).state) == 0.9
 
 
 def test_redo_brings_back_what_undo_took_away_until_something_else_changes(state: AppState) -> None:
-    changed = after(state, actions.SetParameter(GATE, 0.9), actions.Undo(), actions.Redo()).state
+    changed = after(state, SetParameter(GATE, 0.9), actions.Undo(), actions.Redo()).state
     assert gate(changed) == 0.9
-    other = after(state, actions.SetParameter(GATE, 0.9), actions.Undo(), actions.SetParameter(GATE, 0.8)).state
+    other = after(state, SetParameter(GATE, 0.9), actions.Undo(), SetParameter(GATE, 0.8)).state
     assert other.redo == ()
 
 
 def test_undo_and_redo_with_nothing_to_do_change_nothing(state: AppState) -> None:
-    assert after(state, actions.Undo(), actions.Redo()) == Reduction(state)
+    assert after(state, actions.Undo(), actions.Redo()) == Outcome(state)
 
 
 def test_reset_goes_back_to_the_saved_parameters_and_can_be_undone(state: AppState) -> None:
-    changed = after(state, actions.SetParameter(GATE, 0.9), actions.ResetParameters())
+    changed = after(state, SetParameter(GATE, 0.9), ResetParameters())
     assert gate(changed.state) == 0.95
     assert gate(after(changed.state, actions.Undo()).state) == 0.9
 
 
 def test_a_value_out_of_range_is_refused_with_what_is_expected(state: AppState) -> None:
     with pytest.raises(ValueError, match="expected more than 0 and less than 1"):
-        after(state, actions.SetParameter(GATE, 1.5))
+        after(state, SetParameter(GATE, 1.5))
 
 
 @pytest.mark.parametrize("key", ["gate_probability", "association", "association.nothing", "no.gate", "", "a.b c"])
 def test_an_unknown_parameter_is_refused_by_its_name(state: AppState, key: str) -> None:
     with pytest.raises(UsageError, match="no parameter is called"):
-        after(state, actions.SetParameter(key, 1.0))
+        after(state, SetParameter(key, 1.0))
 
 
 def test_saving_writes_into_the_projects_folder_and_is_remembered_when_done(state: AppState) -> None:
-    wish = after(state, actions.SetParameter(GATE, 0.9), actions.Save())
-    assert wish.effects == (reducer.WriteProject(wish.state.project, Path("hall")),)
-    done = after(wish.state, actions.ProjectSaved(wish.state.project, Path("hall"), "12:03")).state
+    wish = after(state, SetParameter(GATE, 0.9), Save())
+    assert wish.effects == (WriteProject(wish.state.project, Path("hall")),)
+    done = after(wish.state, ProjectSaved(wish.state.project, Path("hall"), "12:03")).state
     assert not done.is_changed
-    assert done.saved_at == "12:03"
+    assert done.part(FilesState).saved_at == "12:03"
 
 
 def test_a_bundled_project_is_not_written_without_a_folder(state: AppState) -> None:
     bundled = AppState(state.project, state.project, folder=None)
     with pytest.raises(UsageError, match="bundled"):
-        after(bundled, actions.Save())
-    assert after(bundled, actions.Save(Path("copy"))).effects
+        after(bundled, Save())
+    assert after(bundled, Save(Path("copy"))).effects
 
 
 def test_what_was_changed_while_a_save_was_under_way_still_counts_as_changed(state: AppState) -> None:
-    first = after(state, actions.SetParameter(GATE, 0.9)).state
-    then = after(first, actions.SetParameter(GATE, 0.8, at=9.0)).state
-    assert after(then, actions.ProjectSaved(first.project, Path("hall"), "12:03")).state.is_changed
+    first = after(state, SetParameter(GATE, 0.9)).state
+    then = after(first, SetParameter(GATE, 0.8)).state
+    assert after(then, ProjectSaved(first.project, Path("hall"), "12:03")).state.is_changed
 
 
 def test_a_virtual_drive_needs_a_route_of_the_project(state: AppState) -> None:
     with pytest.raises(UsageError, match="There and back"):
-        after(state, actions.ChooseSource(actions.VirtualDrive("Nowhere")))
-    source = actions.VirtualDrive("There and back", seed=3)
-    assert after(state, actions.ChooseSource(source)).effects == (reducer.LoadSource(source),)
+        after(state, ChooseSource(VirtualDrive("Nowhere")))
+    source = VirtualDrive("There and back", seed=3)
+    assert after(state, ChooseSource(source)).effects == (LoadSource(source),)
 
 
 def test_a_step_pauses_and_processes_one_scan(state: AppState) -> None:
-    stepped = after(state, actions.Play(playing=True), actions.Step())
-    assert not stepped.state.playing
-    assert stepped.effects == (reducer.ProcessOneScan(),)
+    stepped = after(state, Play(playing=True), StepScan())
+    assert not stepped.state.part(RunState).playing
+    assert stepped.effects == (ProcessOneScan(),)
 
 
 @pytest.mark.parametrize(
     "wish",
     [
-        actions.SetSpeed(0.0),
-        actions.SetSpeed(float("nan")),
-        actions.SetSpeed(1000.0),
-        actions.Seek(-1.0),
-        actions.Seek(float("nan")),
+        SetSpeed(0.0),
+        SetSpeed(float("nan")),
+        SetSpeed(1000.0),
+        Seek(-1.0),
+        Seek(float("nan")),
         actions.Magnify(0.0),
     ],
 )
@@ -126,7 +129,7 @@ def test_impossible_numbers_are_refused(state: AppState, wish: actions.Action) -
 
 
 def test_a_restart_goes_to_the_start_afresh(state: AppState) -> None:
-    assert after(state, actions.Restart()).effects == (reducer.MoveTo(0.0, afresh=True),)
+    assert after(state, Restart()).effects == (MoveTo(0.0, afresh=True),)
 
 
 def test_a_hidden_layer_can_be_shown_again(state: AppState) -> None:
@@ -137,21 +140,21 @@ def test_a_hidden_layer_can_be_shown_again(state: AppState) -> None:
 
 def test_problems_are_listed_on_one_line_each_and_bounded(state: AppState) -> None:
     reported = after(state, *(actions.Report(f"a\nb {i}") for i in range(50))).state
-    assert len(reported.problems) == reducer.PROBLEMS_KEPT
-    assert reported.problems[-1] == "a b 49"
-    assert after(reported, actions.ClearProblems()).state.problems == ()
+    assert len(reported.faults) == FAULTS_KEPT
+    assert reported.faults[-1] == "a b 49"
+    assert after(reported, ClearFaults()).state.faults == ()
 
 
 def test_good_news_are_told_and_not_listed(state: AppState) -> None:
     told = after(state, actions.Report("saved", failed=False))
-    assert told.state.problems == ()
-    assert told.effects == (reducer.Tell("saved", failed=False),)
+    assert told.state.faults == ()
+    assert told.effects == (Tell("saved", failed=False),)
 
 
 def test_a_project_gets_another_name_as_one_step_and_an_empty_one_is_refused(state: AppState) -> None:
-    renamed = after(state, actions.RenameProject("  Hall   7 ", 3)).state
+    renamed = after(state, RenameProject("  Hall   7 ")).state
     assert renamed.project.name == "Hall 7"
     assert renamed.undo[-1].name == "rename the project"
-    assert after(renamed, actions.Undo(3)).state.project == state.project
+    assert after(renamed, actions.Undo()).state.project == state.project
     with pytest.raises(UsageError, match="expected some letters"):
-        after(state, actions.RenameProject("  "))
+        after(state, RenameProject("  "))

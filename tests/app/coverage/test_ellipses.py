@@ -6,12 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commission.app.base import reducer
 from commission.app.base.actions import Action
 from commission.app.base.state import AppState
 from commission.app.coverage.ellipses import ellipses
 from commission.app.coverage.heat_legend import ellipse_note
-from commission.app.editing.actions import ChooseTool, Join
+from commission.app.editing.actions import ChooseTool
 from commission.app.editing.editor import Tool
 from commission.app.plan.actions import ClearEllipses, ReadFloor, SetPlan
 from commission.app.plan.settings import Figure, PlanSettings
@@ -20,6 +19,8 @@ from commission.geometry.gaussian import ellipse_axes
 from commission.planning.dilution import Heading
 from commission.site.project import Project
 from commission.site.scanner import Scanner
+from tests.app.asking import after as outcome
+from tests.app.asking import joined
 from tests.app.plan.test_planner import Bench
 
 SPOTS = ((2.0, 2.0), (6.0, 6.0), (10.0, 4.0))
@@ -29,7 +30,7 @@ SPOTS = ((2.0, 2.0), (6.0, 6.0), (10.0, 4.0))
 def bench(project: Project) -> Iterator[Bench]:
     bench = Bench(project)
     yield bench
-    bench.jobs.close()
+    bench.close()
 
 
 def covered(project: Project, heading: Heading) -> Covered:
@@ -38,10 +39,7 @@ def covered(project: Project, heading: Heading) -> Covered:
 
 
 def after(project: Project, *wishes: Action) -> PlanSettings:
-    state = AppState(project, project)
-    for wish in wishes:
-        state = reducer.reduce(wish, state).state
-    return state.plan
+    return outcome(joined(AppState(project, project)), *wishes).state.part(PlanSettings)
 
 
 @pytest.mark.parametrize("heading", list(Heading))
@@ -74,11 +72,11 @@ def test_of_a_grid_those_are_left_out_that_would_hide_the_others(project: Projec
 
 def test_ellipses_follow_a_moved_reflector(bench: Bench) -> None:
     bench.ask(figure=Figure.POSITION_SIGMA, spots=SPOTS)
-    before = bench.settle().ellipses
+    before = bench.found().ellipses
     bench.ask(opacity=0.5)
-    assert bench.planner.view.ellipses is before
+    assert bench.view.ellipses is before
     bench.move(0, 0.7)
-    moved = bench.planner.view.ellipses
+    moved = bench.view.ellipses
     assert before is not None
     assert moved is not None
     assert not np.array_equal(before.covariances, moved.covariances)
@@ -96,9 +94,7 @@ def test_a_click_on_the_heatmap_leaves_an_ellipse_and_one_on_a_reflector_does_no
 
 
 def test_a_click_of_another_tool_reads_nothing(project: Project) -> None:
-    plan = after(
-        project, SetPlan("figure", "visible"), Join(1), ChooseTool(1, Tool.MEASURE), ReadFloor((2.0, 2.0), 0.1, 1)
-    )
+    plan = after(project, SetPlan("figure", "visible"), ChooseTool(Tool.MEASURE), ReadFloor((2.0, 2.0), 0.1))
     assert plan.probe is None
     assert plan.spots == ()
 

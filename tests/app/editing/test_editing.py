@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 
 from commission.app.base import actions as page
-from commission.app.base import reducer
-from commission.app.base.reduction import ApplyParameters, FlyTo, Reduction, Tell
+from commission.app.base.actions import ClickFloor, DragFloor, Envelope, Leave
+from commission.app.base.effects import FlyTo, Tell
 from commission.app.base.state import AppState
 from commission.app.editing import actions
 from commission.app.editing.editor import ControlPoint, Editor, Snapping, Tool, measurement
 from commission.errors import UsageError
 from commission.site.reflectors import Reflector
 from commission.site.routes import Direction
+from tests.app.asking import ME, OTHER, after, by, joined
 from tests.app.sites import room
 
-ME, OTHER = 1, 2
 REACH = 0.15
 RADIUS = 0.04
 
@@ -24,37 +24,29 @@ RADIUS = 0.04
 @pytest.fixture
 def state() -> AppState:
     project = room()
-    return after(AppState(project, project, folder=Path("hall")), actions.Join(ME), actions.Join(OTHER)).state
+    return joined(AppState(project, project, folder=Path("hall")))
 
 
-def after(state: AppState, *wishes: page.Action) -> Reduction:
-    """Return the state after all wishes with the effects of the last."""
-    reduction = Reduction(state)
-    for wish in wishes:
-        reduction = reducer.reduce(wish, reduction.state)
-    return reduction
+def click(x: float, y: float, *, add: bool = False, browser: int = ME) -> Envelope:
+    return by(browser, ClickFloor((x, y), REACH, add))
 
 
-def click(x: float, y: float, *, add: bool = False, client: int = ME) -> actions.ClickFloor:
-    return actions.ClickFloor(client, (x, y), REACH, add)
-
-
-def drag(start: tuple[float, float], end: tuple[float, float], *, add: bool = False) -> tuple[actions.DragFloor, ...]:
+def drag(start: tuple[float, float], end: tuple[float, float], *, add: bool = False) -> tuple[DragFloor, ...]:
     half = (0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]))
     steps = (("start", start), ("update", half), ("end", end))
-    return tuple(actions.DragFloor(ME, phase, start, now, REACH, add) for phase, now in steps)
+    return tuple(DragFloor(phase, start, now, REACH, add) for phase, now in steps)
 
 
-def place(tool: Tool = Tool.PLACE, client: int = ME) -> actions.ChooseTool:
-    return actions.ChooseTool(client, tool)
+def place(tool: Tool = Tool.PLACE, browser: int = ME) -> Envelope:
+    return by(browser, actions.ChooseTool(tool))
 
 
 def reflector(state: AppState, name: str) -> Reflector:
     return next(r for r in state.project.reflectors.reflectors if r.id == name)
 
 
-def editor(state: AppState, client: int = ME) -> Editor:
-    return state.editors[client]
+def editor(state: AppState, browser: int = ME) -> Editor:
+    return state.of_browser(browser, Editor)
 
 
 def test_a_click_near_a_wall_places_a_reflector_that_touches_it(state: AppState) -> None:
@@ -63,20 +55,20 @@ def test_a_click_near_a_wall_places_a_reflector_that_touches_it(state: AppState)
     # The wall is 3 cells of 50 mm thick.
     assert (new.x, new.y) == pytest.approx((4.0, 0.15 + RADIUS))
     assert editor(result.state).selected == ("R5",)
-    assert result.effects == (ApplyParameters(),)
+    assert result.effects == ()
     assert result.state.undo[-1].name == "place R5"
 
 
 def test_without_snapping_a_reflector_stands_where_it_was_clicked(state: AppState) -> None:
-    freely = actions.ChooseSnapping(ME, Snapping(walls=False))
+    freely = actions.ChooseSnapping(Snapping(walls=False))
     new = reflector(after(state, freely, place(), click(4.0, 0.3)).state, "R5")
     assert (new.x, new.y) == (4.0, 0.3)
 
 
 def test_a_grid_and_the_rows_of_neighbors_attract_when_they_are_asked_to(state: AppState) -> None:
-    on_grid = actions.ChooseSnapping(ME, Snapping(walls=False, grid=0.5))
+    on_grid = actions.ChooseSnapping(Snapping(walls=False, grid=0.5))
     assert reflector(after(state, on_grid, place(), click(4.1, 3.2)).state, "R5").x == 4.0
-    in_line = actions.ChooseSnapping(ME, Snapping(walls=False, neighbors=True))
+    in_line = actions.ChooseSnapping(Snapping(walls=False, neighbors=True))
     new = reflector(after(state, in_line, place(), click(4.1, 2.1)).state, "R5")
     assert (new.x, new.y) == (4.1, 2.0)
 
@@ -103,8 +95,8 @@ def test_a_drag_is_one_undo_step_and_changes_nothing_before_it_ends(state: AppSt
     moved = after(before, end).state
     assert (reflector(moved, "R1").x, reflector(moved, "R1").y) == pytest.approx((3.0, 4.0))
     assert [step.name for step in moved.undo] == ["move R1"]
-    assert after(moved, page.Undo(ME)).state.project is state.project
-    assert after(moved, page.Undo(ME), page.Redo(ME)).state.project is moved.project
+    assert after(moved, page.Undo()).state.project is state.project
+    assert after(moved, page.Undo(), page.Redo()).state.project is moved.project
 
 
 def test_a_single_dragged_reflector_snaps_and_several_keep_their_places_to_each_other(state: AppState) -> None:
@@ -117,15 +109,15 @@ def test_a_single_dragged_reflector_snaps_and_several_keep_their_places_to_each_
 
 
 def test_the_handle_moves_the_selection_by_as_much_as_itself(state: AppState) -> None:
-    begin = after(state, click(0.25, 2.0), actions.ChooseSnapping(ME, Snapping(walls=False)))
+    begin = after(state, click(0.25, 2.0), actions.ChooseSnapping(Snapping(walls=False)))
     now = (3.0, 3.0)
-    moved = after(begin.state, actions.DragSelection(ME, "start", (0.25, 2.0)), actions.DragSelection(ME, "end", now))
+    moved = after(begin.state, actions.DragSelection("start", (0.25, 2.0)), actions.DragSelection("end", now))
     assert (reflector(moved.state, "R1").x, reflector(moved.state, "R1").y) == pytest.approx(now)
 
 
 def test_what_is_locked_stays_and_the_page_says_so(state: AppState) -> None:
-    locked = after(state, click(0.25, 2.0), actions.SetSelected(ME, "locked", True)).state
-    result = after(locked, actions.DeleteSelected(ME))
+    locked = after(state, click(0.25, 2.0), actions.SetSelected("locked", True)).state
+    result = after(locked, actions.DeleteSelected())
     assert result.state.project is locked.project
     assert result.effects == (Tell("locked and left as they are: R1", failed=False),)
     assert after(locked, *drag((0.25, 2.0), (3.0, 4.0))).state.project is locked.project
@@ -133,61 +125,61 @@ def test_what_is_locked_stays_and_the_page_says_so(state: AppState) -> None:
 
 def test_delete_duplicate_mirror_and_repeat_are_one_step_each(state: AppState) -> None:
     chosen = after(state, click(0.25, 2.0)).state
-    assert len(after(chosen, actions.DeleteSelected(ME)).state.project.reflectors) == 3
-    twice = after(chosen, actions.DuplicateSelected(ME)).state
+    assert len(after(chosen, actions.DeleteSelected()).state.project.reflectors) == 3
+    twice = after(chosen, actions.DuplicateSelected()).state
     assert editor(twice).selected == ("R5",)
-    mirrored = after(chosen, actions.MirrorSelected(ME, (6.0, 0.0), np.pi / 2, copy=True)).state
+    mirrored = after(chosen, actions.MirrorSelected((6.0, 0.0), np.pi / 2, copy=True)).state
     assert reflector(mirrored, "R5").x == pytest.approx(11.75)
-    row = after(chosen, actions.RepeatSelected(ME, (0.0, 1.0), 3)).state
+    row = after(chosen, actions.RepeatSelected((0.0, 1.0), 3)).state
     assert [r.y for r in row.project.reflectors.reflectors[4:]] == pytest.approx([3.0, 4.0, 5.0])
     assert all(len(s.undo) == 1 for s in (twice, mirrored, row))
 
 
 def test_typed_values_are_set_exactly_and_typing_is_one_step(state: AppState) -> None:
-    typed = [actions.SetSelected(ME, "x", x, at=0.2 * k) for k, x in enumerate((1.0, 1.2, 1.234))]
+    typed = [by(ME, actions.SetSelected("x", x), 0.2 * k) for k, x in enumerate((1.0, 1.2, 1.234))]
     result = after(state, click(0.25, 2.0), *typed).state
     assert reflector(result, "R1").x == 1.234
     assert len(result.undo) == 1
-    renamed = after(result, actions.SetSelected(ME, "id", "North 7")).state
+    renamed = after(result, actions.SetSelected("id", "North 7")).state
     assert editor(renamed).selected == ("North 7",)
     with pytest.raises(ValueError, match="expected more than 0"):
-        after(state, click(0.25, 2.0), actions.SetSelected(ME, "radius", 0.0))
+        after(state, click(0.25, 2.0), actions.SetSelected("radius", 0.0))
 
 
 def test_editing_nothing_is_refused_with_what_is_expected(state: AppState) -> None:
     with pytest.raises(UsageError, match="no reflector is selected"):
-        after(state, actions.DeleteSelected(ME))
+        after(state, actions.DeleteSelected())
 
 
 def test_each_browser_has_its_own_selection_and_tool(state: AppState) -> None:
-    result = after(state, place(), click(0.25, 2.0, client=OTHER)).state
+    result = after(state, place(), click(0.25, 2.0, browser=OTHER)).state
     assert editor(result).tool is Tool.PLACE
     assert editor(result, OTHER).tool is Tool.SELECT
     assert editor(result, OTHER).selected == ("R1",)
-    assert OTHER not in after(result, actions.Leave(OTHER)).state.editors
+    assert OTHER not in after(result, by(OTHER, Leave())).state.browsers
 
 
 def test_undo_leaves_anothers_later_edit_alone_while_that_browser_is_there(state: AppState) -> None:
     mine = after(state, place(), click(4.0, 3.0)).state
-    both = after(mine, place(client=OTHER), click(5.0, 3.0, client=OTHER))
-    refused = after(both.state, page.Undo(ME))
+    both = after(mine, place(browser=OTHER), click(5.0, 3.0, browser=OTHER))
+    refused = after(both.state, page.Undo())
     assert refused.state.project is both.state.project
     assert isinstance(refused.effects[0], Tell)
     assert f"browser {OTHER}" in refused.effects[0].text
-    assert after(both.state, page.Undo(OTHER), page.Undo(ME)).state.project is state.project
-    assert after(both.state, actions.Leave(OTHER), page.Undo(ME)).state.project is mine.project
+    assert after(both.state, by(OTHER, page.Undo()), page.Undo()).state.project is state.project
+    assert after(both.state, by(OTHER, Leave()), page.Undo()).state.project is mine.project
 
 
 def test_a_selection_survives_what_another_browser_deletes(state: AppState) -> None:
     mine = after(state, click(0.25, 2.0)).state
-    gone = after(mine, click(0.25, 2.0, client=OTHER), actions.DeleteSelected(OTHER)).state
+    gone = after(mine, click(0.25, 2.0, browser=OTHER), by(OTHER, actions.DeleteSelected())).state
     with pytest.raises(UsageError, match="no reflector is selected"):
-        after(gone, actions.DeleteSelected(ME))
+        after(gone, actions.DeleteSelected())
 
 
 def test_a_route_is_drawn_by_clicks_and_its_points_are_dragged(state: AppState) -> None:
     clicks = [click(x, y) for x, y in ((1.0, 5.0), (3.0, 5.0), (4.0, 6.0), (6.0, 6.0))]
-    drawn = after(state, place(Tool.ROUTE), *clicks, actions.FinishRoute(ME)).state
+    drawn = after(state, place(Tool.ROUTE), *clicks, actions.FinishRoute()).state
     route = drawn.project.routes[-1]
     assert editor(drawn).point == ControlPoint(route.name)
     assert drawn.undo[-1].name == f"draw {route.name}"
@@ -203,7 +195,7 @@ def test_a_segment_is_split_reversed_and_driven_slower(state: AppState) -> None:
     chosen = after(state, click(4.0, 2.1)).state
     point = editor(chosen).point
     assert point is not None
-    split = after(chosen, actions.SplitSegment(ME), actions.SetSegment(ME, Direction.REVERSE, 0.2)).state
+    split = after(chosen, actions.SplitSegment(), actions.SetSegment(Direction.REVERSE, 0.2)).state
     segments = split.project.routes[0].segments
     assert len(segments) == len(state.project.routes[0].segments) + 1
     assert [(s.direction, s.speed) for s in segments].count((Direction.REVERSE, 0.2)) == 1
@@ -211,13 +203,13 @@ def test_a_segment_is_split_reversed_and_driven_slower(state: AppState) -> None:
 
 def test_a_control_point_is_inserted_without_bending_the_curve_and_deleted_again(state: AppState) -> None:
     chosen = after(state, click(4.0, 2.1)).state
-    more = after(chosen, actions.InsertControlPoint(ME)).state
+    more = after(chosen, actions.InsertControlPoint()).state
     point = editor(more).point
     assert point is not None
     before, now = (s.project.routes[0].segments[point.segment] for s in (state, more))
     assert len(now.control_points) == len(before.control_points) + 1
     assert now.spline().length == pytest.approx(before.spline().length, abs=1e-9)
-    fewer = after(more, actions.DeleteSelected(ME)).state.project.routes[0].segments[point.segment]
+    fewer = after(more, actions.DeleteSelected()).state.project.routes[0].segments[point.segment]
     assert len(fewer.control_points) == len(before.control_points)
 
 
@@ -242,14 +234,14 @@ def test_a_measurement_snaps_to_the_corners_of_walls_and_to_stations(state: AppS
 
 def test_escape_drops_what_is_half_done_then_the_tool_then_the_selection(state: AppState) -> None:
     drawing = after(state, click(0.25, 2.0), place(Tool.ROUTE), click(1.0, 1.0)).state
-    first = after(drawing, actions.Cancel(ME)).state
+    first = after(drawing, actions.Cancel()).state
     assert (editor(first).draft, editor(first).tool) == ((), Tool.ROUTE)
-    second = after(first, actions.Cancel(ME)).state
+    second = after(first, actions.Cancel()).state
     assert (editor(second).tool, editor(second).selected) == (Tool.SELECT, ("R1",))
-    assert editor(after(second, actions.Cancel(ME)).state).selected == ()
+    assert editor(after(second, actions.Cancel()).state).selected == ()
 
 
 def test_a_row_of_the_table_selects_and_flies_there(state: AppState) -> None:
-    result = after(state, actions.SelectReflectors(ME, ("R3",), fly=True))
+    result = after(state, actions.SelectReflectors(("R3",), fly=True))
     assert editor(result.state).selected == ("R3",)
-    assert result.effects == (FlyTo(ME, (11.75, 1.5)),)
+    assert result.effects == (FlyTo((11.75, 1.5)),)

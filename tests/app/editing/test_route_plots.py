@@ -7,17 +7,18 @@ import pytest
 
 from commission.app.base.server import start_server
 from commission.app.base.state import AppState
-from commission.app.base.view import PageView
+from commission.app.base.view import PageView, view_of
 from commission.app.editing.editor import ControlPoint, Editor
 from commission.app.editing.route_plots import CHARTS, NOTHING, RoutePlots, flags, span, summary
+from commission.app.problems.view import InspectionView
 from commission.app.problems.violation_layer import ViolationLayer
 from commission.planning.route_profile import route_profile
 from commission.site.routes import Route
 from commission.site.vehicle import TricycleVehicle
 from commission.studies.violations import Violation, ViolationKind, check_route
+from tests.app.asking import ME, joined
 from tests.app.sites import room
 
-ME = 1
 ROOM = replace(room(), vehicle=TricycleVehicle(wheelbase=3.0, max_steering_deg=20.0))
 ROUTE = ROOM.routes[0]
 PROFILE = route_profile(ROUTE, ROOM.vehicle)
@@ -33,8 +34,8 @@ def server():
 
 def view(route: str | None, violations: tuple[Violation, ...] = VIOLATIONS) -> PageView:
     point = None if route is None else ControlPoint(route)
-    state = AppState(ROOM, ROOM, editors={ME: Editor(point=point)})
-    return PageView(state, None, violations=violations, profiles={ROUTE.name: PROFILE})
+    state = joined(AppState(ROOM, ROOM)).with_browser(ME, Editor(point=point))
+    return view_of(state, InspectionView(violations=violations, profiles={ROUTE.name: PROFILE}))
 
 
 def test_without_a_selected_route_there_is_a_hint_and_no_plot(server) -> None:
@@ -84,7 +85,7 @@ def test_the_line_of_facts_names_lengths_radii_and_what_is_violated_and_escapes_
 def test_every_violated_stretch_is_drawn_with_the_outline_where_it_is_worst(server) -> None:
     layer = ViolationLayer(server.scene)
     layer.show_site(ROOM)
-    layer.draw_violations(VIOLATIONS)
+    layer.draw(view(None))
     fatal = [v for v in VIOLATIONS if v.is_fatal]
     places = layer._fatal.points.reshape(-1, 3)[:, :2]
     for violation in fatal:
@@ -93,15 +94,17 @@ def test_every_violated_stretch_is_drawn_with_the_outline_where_it_is_worst(serv
     corners = len(ROOM.vehicle.outline)
     assert len(layer._ghosts.points) == corners * len(VIOLATIONS)
     before = layer._fatal.points
-    layer.draw_violations(VIOLATIONS)
+    layer.draw(view(None))
     assert layer._fatal.points is before
-    layer.draw_violations(())
+    layer.draw(view(None, ()))
     assert layer._fatal.points.min() == -1000.0
 
 
 def test_a_route_of_another_name_leaves_the_plots_of_this_one_empty(server) -> None:
     panel = RoutePlots(server.gui, ME)
     renamed = Route("Other", ROUTE.segments)
-    state = AppState(replace(ROOM, routes=(ROUTE, renamed)), ROOM, editors={ME: Editor(point=ControlPoint("Other"))})
-    panel.draw_slowly(PageView(state, None, profiles={ROUTE.name: PROFILE}))
+    state = joined(AppState(replace(ROOM, routes=(ROUTE, renamed)), ROOM)).with_browser(
+        ME, Editor(point=ControlPoint("Other"))
+    )
+    panel.draw_slowly(view_of(state, InspectionView(profiles={ROUTE.name: PROFILE})))
     assert "Looking along Other" in panel._head.content

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from commission.app.base import actions as page
-from commission.app.base import reducer
-from commission.app.base.reduction import FlyTo
+from commission.app.base.actions import Action, ClickFloor, DragFloor, Envelope
+from commission.app.base.effects import FlyTo
 from commission.app.base.server import start_server
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
@@ -22,45 +22,44 @@ from commission.app.editing.tool_hint import hint
 from commission.errors import UsageError
 from commission.site.stations import Station
 from commission.studies.problems import Problem, Severity, Subject
+from tests.app.asking import ME, OTHER, by, joined
+from tests.app.asking import after as outcome
 from tests.app.sites import room
 
-ME, OTHER, REACH = 1, 2, 0.15
+REACH = 0.15
 ROUTE = "There and back"
 
 
-def after(state: AppState, *wishes: page.Action) -> AppState:
-    for wish in wishes:
-        state = reducer.reduce(wish, state).state
-    return state
+def after(state: AppState, *asked: Action | Envelope) -> AppState:
+    return outcome(state, *asked).state
 
 
-def click(x: float, y: float, client: int = ME) -> actions.ClickFloor:
-    return actions.ClickFloor(client, (x, y), REACH)
+def click(x: float, y: float) -> ClickFloor:
+    return ClickFloor((x, y), REACH)
 
 
-def drag(start: tuple[float, float], end: tuple[float, float]) -> tuple[actions.DragFloor, ...]:
-    return actions.DragFloor(ME, "start", start, start, REACH), actions.DragFloor(ME, "end", start, end, REACH)
+def drag(start: tuple[float, float], end: tuple[float, float]) -> tuple[DragFloor, ...]:
+    return DragFloor("start", start, start, REACH), DragFloor("end", start, end, REACH)
 
 
 @pytest.fixture
 def state() -> AppState:
     project = room()
-    joined = after(AppState(project, project, folder=Path("hall")), actions.Join(ME), actions.Join(OTHER))
-    return after(joined, actions.ChooseTool(ME, Tool.STATION))
+    return after(joined(AppState(project, project, folder=Path("hall"))), actions.ChooseTool(Tool.STATION))
 
 
 @pytest.fixture
 def placed(state: AppState) -> AppState:
     """One station in the open, selected."""
-    return after(state, click(3.0, 5.0), actions.ChooseTool(ME, Tool.SELECT))
+    return after(state, click(3.0, 5.0), actions.ChooseTool(Tool.SELECT))
 
 
 def station(state: AppState, index: int = -1) -> Station:
     return state.project.stations[index]
 
 
-def editor(state: AppState, client: int = ME) -> Editor:
-    return state.editors[client]
+def editor(state: AppState, browser: int = ME) -> Editor:
+    return state.of_browser(browser, Editor)
 
 
 def test_a_click_places_a_station_and_near_a_route_it_stands_on_it_and_looks_along_it(state: AppState) -> None:
@@ -82,7 +81,7 @@ def test_a_station_is_dragged_as_one_step_and_a_route_attracts_it(placed: AppSta
     moved = after(halfway, end)
     assert (station(moved).x, station(moved).y) == (4.0, 6.0)
     assert moved.undo[-1].name == "move Station 1"
-    assert after(moved, page.Undo(ME)).project is placed.project
+    assert after(moved, page.Undo()).project is placed.project
     on_route = after(placed, *drag((3.0, 5.0), (3.0, 2.1)))
     assert station(on_route).y == pytest.approx(2.0, abs=0.15)
     assert station(on_route).heading != 0.0
@@ -98,7 +97,7 @@ def test_the_tip_turns_a_station_and_leaves_its_place(placed: AppState) -> None:
 
 def test_while_it_is_dragged_the_page_says_where_it_would_stand(placed: AppState) -> None:
     begin, _ = drag((3.0, 5.0), (4.0, 6.0))
-    on = actions.DragFloor(ME, "update", (3.0, 5.0), (4.0, 6.0), REACH)
+    on = DragFloor("update", (3.0, 5.0), (4.0, 6.0), REACH)
     dragging = after(placed, begin, on)
     assert hint(dragging.project, editor(dragging)) == "Station 1 to x 4.000 m, y 6.000 m, heading 0.0°"
 
@@ -106,37 +105,37 @@ def test_while_it_is_dragged_the_page_says_where_it_would_stand(placed: AppState
 def test_name_pose_and_accuracy_are_typed_and_typing_is_one_step(placed: AppState) -> None:
     typed = after(
         placed,
-        SetStation(ME, "name", "Dock"),
-        SetStation(ME, "required_accuracy", 0.02, 0.0),
-        SetStation(ME, "required_accuracy", 0.01, 0.4),
-        SetStation(ME, "heading", 1.0, 0.6),
+        SetStation("name", "Dock"),
+        SetStation("required_accuracy", 0.02),
+        by(ME, SetStation("required_accuracy", 0.01), 0.4),
+        by(ME, SetStation("heading", 1.0), 0.6),
     )
     assert station(typed) == Station(name="Dock", x=3.0, y=5.0, heading=1.0, required_accuracy=0.01)
     assert [step.name for step in typed.undo[1:]] == ["rename Station 1", "set accuracy of Dock", "set heading of Dock"]
     assert editor(typed).station == "Dock"
     with pytest.raises(ValueError, match="required_accuracy"):
-        after(typed, SetStation(ME, "required_accuracy", 0.0))
+        after(typed, SetStation("required_accuracy", 0.0))
     with pytest.raises(UsageError, match="used already"):
-        after(typed, actions.ChooseTool(ME, Tool.STATION), click(1.0, 6.0), SetStation(ME, "name", "Dock"))
+        after(typed, actions.ChooseTool(Tool.STATION), click(1.0, 6.0), SetStation("name", "Dock"))
 
 
 def test_a_new_station_is_as_accurate_as_the_one_before(placed: AppState) -> None:
-    docks = after(placed, SetStation(ME, "required_accuracy", 0.01), actions.ChooseTool(ME, Tool.STATION), click(5, 6))
+    docks = after(placed, SetStation("required_accuracy", 0.01), actions.ChooseTool(Tool.STATION), click(5, 6))
     assert station(docks).required_accuracy == 0.01
 
 
 def test_a_station_goes_onto_the_nearest_route_when_that_is_asked_for(placed: AppState) -> None:
-    aligned = after(placed, AlignStation(ME))
+    aligned = after(placed, AlignStation())
     assert math.hypot(station(aligned).x - 3.0, station(aligned).y - 5.0) == pytest.approx(3.0, abs=0.3)
     assert aligned.undo[-1].name == "align Station 1"
 
 
 def test_the_delete_key_deletes_the_selected_station(placed: AppState) -> None:
-    gone = after(placed, actions.DeleteSelected(ME))
+    gone = after(placed, actions.DeleteSelected())
     assert gone.project.stations == ()
     assert editor(gone).station == ""
     with pytest.raises(UsageError, match="no station is selected"):
-        after(gone, DeleteStation(ME))
+        after(gone, DeleteStation())
 
 
 def test_clicks_select_one_kind_of_thing_at_a_time(placed: AppState) -> None:
@@ -148,35 +147,35 @@ def test_clicks_select_one_kind_of_thing_at_a_time(placed: AppState) -> None:
     route = after(again, click(4.0, 2.1))
     assert editor(route).point is not None
     assert editor(route).station == ""
-    assert not editor(after(route, actions.Cancel(ME))).has_selection
+    assert not editor(after(route, actions.Cancel())).has_selection
 
 
 def test_what_another_browser_deletes_is_not_selected_any_more(placed: AppState) -> None:
-    gone = after(placed, SelectStation(OTHER, "Station 1"), DeleteStation(OTHER))
+    gone = after(placed, by(OTHER, SelectStation("Station 1")), by(OTHER, DeleteStation()))
     with pytest.raises(UsageError, match="no station is selected"):
-        after(gone, SetStation(ME, "x", 1.0))
+        after(gone, SetStation("x", 1.0))
 
 
 def test_a_problem_of_a_station_selects_it_and_flies_there(placed: AppState) -> None:
     problem = Problem(
         severity=Severity.ERROR, text="cut", subject=Subject.STATION, ids=("Station 1",), place=(3.0, 5.0)
     )
-    result = reducer.reduce(actions.ShowProblem(OTHER, problem), placed)
+    result = outcome(placed, by(OTHER, actions.ShowProblem(problem)))
     assert editor(result.state, OTHER).station == "Station 1"
-    assert result.effects == (FlyTo(OTHER, (3.0, 5.0)),)
+    assert result.effects == (FlyTo((3.0, 5.0)),)
 
 
 def test_the_table_lists_routes_and_stations_and_a_row_selects_and_flies(placed: AppState) -> None:
     server = start_server("127.0.0.1", 0)
     tab = server.gui.add_tab_group().add_tab("Routes")
     table = RouteTable(server.gui, lambda _action: None, ME, tab)
-    table.draw_slowly(PageView(placed, None))
+    table.draw_slowly(PageView(placed))
     assert [row.text.split("   ")[0] for row in table._shown] == [ROUTE, "Station 1"]
     assert "100 mm" in table._shown[1].text
     assert "1 of 2 reverse" in table._shown[0].text
-    assert table._selecting(1, ME) == SelectStation(ME, "Station 1", fly=True)
-    assert table._selecting(0, ME) == actions.SelectControlPoint(ME, ControlPoint(ROUTE), fly=True)
-    assert table._selecting(9, ME) == page.Report("this row is gone", failed=False)
+    assert table._selecting(1) == SelectStation("Station 1", fly=True)
+    assert table._selecting(0) == actions.SelectControlPoint(ControlPoint(ROUTE), fly=True)
+    assert table._selecting(9) == page.Report("this row is gone", failed=False)
     server.stop()
 
 
@@ -188,9 +187,9 @@ def test_each_station_is_drawn_with_its_outline_and_its_accuracy(placed: AppStat
     np.testing.assert_allclose(layer._outlines.points[:, 0, :2], np.array(outline) + np.array((3.0, 5.0)), atol=1e-6)
     label = layer._labels["Station 1"]
     assert label.text == "Station 1  100 mm"
-    layer.show_site(after(placed, SetStation(ME, "required_accuracy", 0.01)).project)
+    layer.show_site(after(placed, SetStation("required_accuracy", 0.01)).project)
     assert layer._labels["Station 1"] is label
     assert label.text == "Station 1  10 mm"
-    layer.show_site(after(placed, DeleteStation(ME)).project)
+    layer.show_site(after(placed, DeleteStation()).project)
     assert layer._labels == {}
     server.stop()

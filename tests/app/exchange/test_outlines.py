@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from commission.app.exchange.outlines import ghosts_of
+from commission.app.exchange.outlines import outlines_of
 from commission.app.exchange.pending import Pasted, Pending
 from commission.app.exchange.preview import compare
 from commission.io.imk import ReflectorImport
@@ -26,9 +26,9 @@ def test_added_and_moved_reflectors_are_drawn_where_they_would_stand() -> None:
             Reflector(id="N", x=6.0, y=7.8),
         )
     )
-    ghosts = ghosts_of(room(), pending(ReflectorImport(table)))
-    assert ghosts.centers.tolist() == [[6.0, 7.8], [0.25, 2.5]]
-    assert [line.tolist() for line in ghosts.lines] == [[[0.25, 2.0], [0.25, 2.5]]]
+    outlines = outlines_of(room(), pending(ReflectorImport(table)))
+    assert outlines.centers.tolist() == [[6.0, 7.8], [0.25, 2.5]]
+    assert [line.tolist() for line in outlines.lines] == [[[0.25, 2.0], [0.25, 2.5]]]
 
 
 def test_new_courses_of_routes_and_new_stations_are_drawn() -> None:
@@ -40,11 +40,11 @@ def test_new_courses_of_routes_and_new_stations_are_drawn() -> None:
         vehicle_types=("V",),
         layouts=("hall",),
     )
-    ghosts = ghosts_of(room(), pending(layout))
-    assert ghosts.centers.tolist() == [[4.0, 6.0]]
-    np.testing.assert_allclose(ghosts.lines[0][[0, -1]], [[2.0, 2.0], [4.0, 6.0]], atol=1e-9)
+    outlines = outlines_of(room(), pending(layout))
+    assert outlines.centers.tolist() == [[4.0, 6.0]]
+    np.testing.assert_allclose(outlines.lines[0][[0, -1]], [[2.0, 2.0], [4.0, 6.0]], atol=1e-9)
 
 
 def test_nothing_is_drawn_of_no_import() -> None:
-    ghosts = ghosts_of(room(), None)
-    assert (len(ghosts.centers), ghosts.lines) == (0, ())
+    outlines = outlines_of(room(), None)
+    assert (len(outlines.centers), outlines.lines) == (0, ())

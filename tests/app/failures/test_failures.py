@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import pytest
 
-from commission.app.base import reducer
 from commission.app.base.actions import Action
 from commission.app.base.state import AppState
 from commission.app.failures.failure_panel import ranking_table
@@ -17,6 +16,7 @@ from commission.errors import UsageError
 from commission.planning.dependence import worst_failures
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
+from tests.app.asking import after
 from tests.app.plan.test_planner import Bench
 
 
@@ -24,14 +24,13 @@ from tests.app.plan.test_planner import Bench
 def bench(project: Project) -> Iterator[Bench]:
     bench = Bench(project)
     yield bench
-    bench.jobs.close()
+    bench.close()
 
 
 def ask(bench: Bench, *wishes: Action) -> FailureView:
-    for wish in wishes:
-        bench.state = reducer.reduce(wish, bench.state).state
-    bench.planner.follow(bench.state)
-    failures = bench.settle().failures
+    bench.state = after(bench.state, *wishes).state
+    bench.service.follow(bench.state)
+    failures = bench.found().failures
     assert failures is not None
     return failures
 
@@ -60,7 +59,7 @@ def test_ranking_anew_begins_with_nothing_failed(bench: Bench) -> None:
 
 def test_an_unknown_reflector_cannot_fail(project: Project) -> None:
     with pytest.raises(UsageError, match="Nobody"):
-        reducer.reduce(AlsoFails("Nobody"), AppState(project, project))
+        after(AppState(project, project), AlsoFails("Nobody"))
 
 
 def test_it_is_said_of_a_reflector_that_no_route_sees_it(bench: Bench, project: Project) -> None:

@@ -13,9 +13,10 @@ import pytest
 import viser
 
 from commission.app.base.actions import Action, Report
+from commission.app.base.jobs import Job
 from commission.app.base.server import start_server
 from commission.app.base.state import AppState
-from commission.app.base.view import PageView, Progress
+from commission.app.base.view import view_of
 from commission.app.editing.editor import AlignmentDraft, NamedPoint
 from commission.app.floor_map import actions
 from commission.app.floor_map.draft import MapDraft, MapFile, MapLoading, MapOptions, Stage, WaitingMap
@@ -23,11 +24,11 @@ from commission.app.floor_map.draft_fields import MOST_LAYERS, MapDraftFields, f
 from commission.app.floor_map.draft_layer import INK, PAPER, MapDraftLayer, preview
 from commission.app.floor_map.floor_map_panel import FloorMapPanel, said
 from commission.app.floor_map.tool_fields import alignment_text
-from commission.app.plan.view import PlanView
 from commission.io.dxf import Drawing, DrawingLayer
 from commission.io.image_map import Picture
 from commission.io.mesh import Model
 from commission.site.project import Project
+from tests.app.asking import taking
 
 NASTY = "<img src=x onerror=alert(1)>"
 SEGMENTS = np.array([[[0.0, 0.0], [10.0, 0.0]], [[10.0, 0.0], [10.0, 5.0]], [[2.0, 1.0], [3.0, 1.0]]])
@@ -54,7 +55,7 @@ def change(widget: Any, value: Any) -> None:
     """Let a widget say that a person changed it, as viser does."""
     widget._impl.value = value
     for callback in widget._impl.update_cb:
-        callback(SimpleNamespace(client=object(), client_id=1, target=widget))
+        callback(SimpleNamespace(client=SimpleNamespace(client_id=1), client_id=1, target=widget))
 
 
 def labelled(server: viser.ViserServer, label: str) -> Any:
@@ -69,7 +70,7 @@ def labelled(server: viser.ViserServer, label: str) -> Any:
 @pytest.mark.parametrize("kind", sorted(DRAFTS))
 def test_each_kind_of_file_shows_its_own_inputs(server: viser.ViserServer, kind: str) -> None:
     posted: list[Action] = []
-    fields = MapDraftFields(server.gui, posted.append)
+    fields = MapDraftFields(server.gui, taking(posted))
     every = {
         "drawing": ("Unit", "Cell [mm]"),
         "model": ("Unit", "Upward", "Cut at [m]", "Cell [mm]"),
@@ -87,7 +88,7 @@ def test_each_kind_of_file_shows_its_own_inputs(server: viser.ViserServer, kind:
 
 def test_inputs_post_si_units_and_nonsense_is_told(server: viser.ViserServer) -> None:
     posted: list[Action] = []
-    fields = MapDraftFields(server.gui, posted.append)
+    fields = MapDraftFields(server.gui, taking(posted))
     fields.show(DRAFTS["model"])
     change(labelled(server, "Cell [mm]"), 25.0)
     change(labelled(server, "Cut at [m]"), "0.2, 1.8")
@@ -104,7 +105,7 @@ def test_inputs_post_si_units_and_nonsense_is_told(server: viser.ViserServer) ->
 
 def test_layers_are_chosen_one_by_one_by_their_plain_names(server: viser.ViserServer) -> None:
     posted: list[Action] = []
-    fields = MapDraftFields(server.gui, posted.append)
+    fields = MapDraftFields(server.gui, taking(posted))
     fields.show(DRAFTS["drawing"])
     assert [layer.name for layer in layers_by_size(DRAWING)] == [NASTY, "TEXT"]
     lines = fields._rows._buttons
@@ -117,7 +118,7 @@ def test_layers_are_chosen_one_by_one_by_their_plain_names(server: viser.ViserSe
 
 def test_a_layer_among_hundreds_is_found_by_a_part_of_its_name(server: viser.ViserServer) -> None:
     posted: list[Action] = []
-    fields = MapDraftFields(server.gui, posted.append)
+    fields = MapDraftFields(server.gui, taking(posted))
     hatches = (DrawingLayer(f"HATCH {n}", True, 1000 - n) for n in range(200))
     layers = (*hatches, DrawingLayer("A-Wall", False, 3))
     drawing = Drawing(
@@ -172,24 +173,24 @@ def test_the_difference_of_distances_is_told_in_millimetres_with_what_is_allowed
 
 def test_progress_and_cancel_appear_while_a_file_is_read(server: viser.ViserServer) -> None:
     posted: list[Action] = []
-    panel = FloorMapPanel(server.gui, posted.append, Project())
+    panel = FloorMapPanel(server.gui, taking(posted), Project())
     state = AppState(Project(), Project())
-    panel.draw(PageView(state, None, (Progress(1, "Coverage", "", 0.2), Progress(2, "Reading hall.dxf", "", 0.4))))
+    panel.draw(view_of(state, jobs=(Job(1, "Coverage", fraction=0.2), Job(2, "Reading hall.dxf", fraction=0.4))))
     assert (panel._bar.visible, panel._bar.value, panel._cancel.visible) == (True, 40.0, True)
     change(panel._cancel, True)
     assert posted == [actions.StopMapJob()]
-    panel.draw(PageView(state, None, (Progress(1, "Coverage", "", 0.2),)))
+    panel.draw(view_of(state, jobs=(Job(1, "Coverage", fraction=0.2),)))
     assert (panel._bar.visible, panel._cancel.visible) == (False, False)
 
 
 def test_a_typed_path_is_opened_and_an_empty_one_told(server: viser.ViserServer) -> None:
     posted: list[Action] = []
-    FloorMapPanel(server.gui, posted.append, Project())
+    FloorMapPanel(server.gui, taking(posted), Project())
     change(labelled(server, "Open"), True)
     change(labelled(server, "Map file"), " /halls/3.yaml ")
     change(labelled(server, "Open"), True)
     assert isinstance(posted[0], Report)
-    assert posted[-1] == actions.OpenMap(1, MapFile(Path("/halls/3.yaml")))
+    assert posted[-1] == actions.OpenMap(MapFile(Path("/halls/3.yaml")))
 
 
 def test_an_image_is_shown_as_the_walls_that_it_would_become(server: viser.ViserServer) -> None:
@@ -201,9 +202,9 @@ def test_an_image_is_shown_as_the_walls_that_it_would_become(server: viser.Viser
     assert (preview(picture, 0.3, light_walls=False)[-1] == PAPER).all()
     layer = MapDraftLayer(server.scene)
     draft = replace(DRAFTS["picture"], pixels=((30.0, 20.0),))
-    state = AppState(Project(), Project(), mapping=MapLoading(draft=draft))
-    layer.draw_plan(PlanView(), state)
+    state = AppState(Project(), Project()).with_part(MapLoading(draft=draft))
+    layer.draw(view_of(state))
     assert {node.name for node in layer.nodes()} == {"/draft/image", "/draft/points", "/draft/line", "/draft/A"}
     np.testing.assert_allclose(layer.nodes()[0].position[:2], (3.0, 2.0))
-    layer.draw_plan(PlanView(), AppState(Project(), Project()))
+    layer.draw(view_of(AppState(Project(), Project())))
     assert layer.nodes() == ()

@@ -4,24 +4,38 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from commission.app.base import actions as page
+from commission.app.base.actions import Action, Join
+from commission.app.base.feature import Feature
+from commission.app.base.service import Context, Service
 from commission.app.base.state import AppState
 from commission.app.base.uploads import Upload
-from commission.app.editing import actions as editing
 from commission.app.floor_map import actions
-from commission.app.floor_map.draft import MapFile
-from commission.app.runtime import Runtime, Work
+from commission.app.floor_map.draft import MapFile, MapLoading
+from commission.app.project.project_folder import name_of_edit
+from commission.app.runtime import Runtime
 from commission.io.map_server import write_floor_map
 from commission.site.floor_map import FloorMap
 from commission.site.project import Project
+from tests.app.asking import FEATURES, ME, by
 from tests.app.sites import room
 from tests.io.large_files import write_drawing
 
-ME = 1
+
+class Noting(Service):
+    """Collects what the journal calls each edit."""
+
+    def __init__(self, edits: list[str], context: Context) -> None:
+        super().__init__(context)
+        self._edits = edits
+
+    def project_changed(self, action: Action, before: AppState, after: AppState) -> None:
+        self._edits.append(name_of_edit(action, before, after))
 
 
 class Loading:
@@ -29,15 +43,10 @@ class Loading:
 
     def __init__(self) -> None:
         self.edits: list[str] = []
-        work = Work(
-            prepare=lambda *_: pytest.fail("nothing drives"),
-            predict=lambda *_: (),
-            save=lambda *_: None,
-            compile=lambda _progress: None,
-            note=lambda _project, what: self.edits.append(what),
-        )
-        self.runtime = Runtime(AppState(Project(name="New"), Project(name="New")), work)
-        self.runtime.handle(editing.Join(ME))
+        note = partial(Noting, self.edits)
+        features = (*(feature for feature in FEATURES if feature.name != "run"), Feature("noting", services=(note,)))
+        self.runtime = Runtime(AppState(Project(name="New"), Project(name="New")), features)
+        self.runtime.handle(by(ME, Join()))
 
     @property
     def state(self) -> AppState:
@@ -47,19 +56,19 @@ class Loading:
         """Handle messages until something has happened, at most a minute."""
         end = time.monotonic() + 60.0
         while not reached():
-            assert time.monotonic() < end, (self.state.mapping, self.state.problems)
+            assert time.monotonic() < end, (self.state.part(MapLoading), self.state.faults)
             for message in self.runtime._drained():
                 self.runtime.handle(message)
 
     def open(self, source: Path | Upload) -> None:
-        self.runtime.handle(actions.OpenMap(ME, MapFile(source)))
+        self.runtime.handle(by(ME, actions.OpenMap(MapFile(source))))
 
 
 @pytest.fixture
 def loading() -> Iterator[Loading]:
     started = Loading()
     yield started
-    started.runtime._background.close()
+    started.runtime._jobs.close()
 
 
 @pytest.fixture
@@ -77,7 +86,7 @@ def test_a_map_is_read_in_the_background_and_journaled_by_its_name(
     assert loading.state.project.floor_map is None
     loading.until(lambda: loading.state.project.floor_map is not None)
     assert loading.state.project.floor_map == hall
-    loading.runtime.handle(page.Undo(ME))
+    loading.runtime.handle(page.Undo())
     assert loading.edits == ["load floor map hall.yaml", "undo load floor map hall.yaml"]
 
 
@@ -93,8 +102,8 @@ def test_a_broken_file_is_told_and_the_map_stays(loading: Loading, hall: FloorMa
         (nowhere, nowhere),
     ):
         loading.open(source)
-        loading.until(lambda: bool(loading.state.mapping.trouble))
-        assert loading.state.mapping.trouble.startswith(f"{name}: ")
+        loading.until(lambda: bool(loading.state.part(MapLoading).trouble))
+        assert loading.state.part(MapLoading).trouble.startswith(f"{name}: ")
     assert loading.state.project is before
 
 
@@ -106,6 +115,6 @@ def test_a_stopped_job_shows_nothing_and_the_next_file_loads(loading: Loading, h
     loading.until(lambda: any((job.name, job.message) == under_way for job in loading.runtime.view().jobs))
     loading.runtime.handle(actions.StopMapJob())
     loading.until(lambda: not loading.runtime.view().jobs)
-    assert loading.state.mapping.draft is None
+    assert loading.state.part(MapLoading).draft is None
     loading.open(tmp_path / "hall.yaml")
     loading.until(lambda: loading.state.project.floor_map is not None)

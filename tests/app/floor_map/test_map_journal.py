@@ -7,18 +7,20 @@ from pathlib import Path
 import numpy as np
 
 from commission.app.base import actions as page
-from commission.app.base import reducer
+from commission.app.base.actions import ClickFloor, DragFloor
 from commission.app.base.state import NOTHING_SAVED, AppState
 from commission.app.editing import actions as editing
 from commission.app.editing.editor import Tool
 from commission.app.floor_map import actions
 from commission.app.floor_map.draft import MapFile
-from commission.app.project.project_folder import Keeping
+from commission.app.project.project_folder import ProjectFolder
 from commission.io.journal_replay import restore
 from commission.io.project_file import load_project, open_project
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
+from tests.app.asking import after, joined
+from tests.app.owning import Owner
 
-ME, REACH = 1, 0.1
+REACH = 0.1
 
 
 def hall() -> FloorMap:
@@ -28,41 +30,41 @@ def hall() -> FloorMap:
 
 
 WISHES: tuple[page.Action, ...] = (
-    actions.MapMade(ME, MapFile(Path("hall.yaml")), hall()),
-    editing.ChooseTool(ME, Tool.WALL),
-    editing.ClickFloor(ME, (2.0, 2.0), REACH),
-    editing.ClickFloor(ME, (6.0, 4.0), REACH),
-    editing.Finish(ME),
-    editing.ChooseTool(ME, Tool.ERASE),
-    editing.DragFloor(ME, "end", (5.0, 3.0), (7.0, 5.0), REACH),
-    editing.ChooseTool(ME, Tool.PLACE),
-    editing.ClickFloor(ME, (3.0, 6.0), REACH),
-    editing.ChooseTool(ME, Tool.ALIGN),
-    editing.ClickFloor(ME, (1.0, 1.0), REACH),
-    editing.ClickFloor(ME, (11.0, 1.0), REACH),
-    actions.SetPlantPoint(ME, 0, (50.0, 7.0)),
-    actions.SetPlantPoint(ME, 1, (50.0, 17.0)),
-    actions.SetAligned(ME, everything=True),
-    actions.AlignMap(ME),
-    editing.ChooseTool(ME, Tool.OBSTACLE),
-    editing.DragFloor(ME, "end", (45.0, 10.0), (46.0, 11.0), REACH),
-    page.Undo(ME),
-    page.Undo(ME),
-    page.Redo(ME),
+    actions.MapMade(MapFile(Path("hall.yaml")), hall()),
+    editing.ChooseTool(Tool.WALL),
+    ClickFloor((2.0, 2.0), REACH),
+    ClickFloor((6.0, 4.0), REACH),
+    editing.Finish(),
+    editing.ChooseTool(Tool.ERASE),
+    DragFloor("end", (5.0, 3.0), (7.0, 5.0), REACH),
+    editing.ChooseTool(Tool.PLACE),
+    ClickFloor((3.0, 6.0), REACH),
+    editing.ChooseTool(Tool.ALIGN),
+    ClickFloor((1.0, 1.0), REACH),
+    ClickFloor((11.0, 1.0), REACH),
+    actions.SetPlantPoint(0, (50.0, 7.0)),
+    actions.SetPlantPoint(1, (50.0, 17.0)),
+    actions.SetAligned(everything=True),
+    actions.AlignMap(),
+    editing.ChooseTool(Tool.OBSTACLE),
+    DragFloor("end", (45.0, 10.0), (46.0, 11.0), REACH),
+    page.Undo(),
+    page.Undo(),
+    page.Redo(),
 )
 
 
 def test_every_edit_of_the_map_survives_a_crash_before_the_first_save(tmp_path: Path) -> None:
     folder = tmp_path / "hall"
     opened = open_project(folder)
-    keeping = Keeping(opened.folder, opened.project)
-    state = reducer.reduce(editing.Join(ME), AppState(opened.project, NOTHING_SAVED, folder=folder)).state
+    state = joined(AppState(project=opened.project, saved=NOTHING_SAVED, folder=folder))
+    files = Owner(ProjectFolder, state).service
     for wish in WISHES:
         before = state.project
-        state = reducer.reduce(wish, state).state
+        state = after(state, wish).state
         if state.project is before:
             continue
-        keeping.note(state.project, type(wish).__name__)
+        files.note(state.project, type(wish).__name__)
         # The program is killed here.
         restored = restore(folder, open_project(folder).project)
         assert restored is not None
@@ -70,7 +72,7 @@ def test_every_edit_of_the_map_survives_a_crash_before_the_first_save(tmp_path: 
     assert [path.name for path in folder.iterdir()] == [".commission.journal"]
     # One whole map, and rectangles of it.
     assert (folder / ".commission.journal").stat().st_size < 20_000
-    keeping.save(state.project, folder, False)
+    files.save(state.project, folder, False)
     assert load_project(folder) == state.project
     assert restore(folder, load_project(folder)) is None
-    keeping.close()
+    files.close()

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from commission.app.base import actions as page
-from commission.app.base import reducer
-from commission.app.base.actions import View
-from commission.app.base.reduction import PlaceCamera, Reduction, Tell
+from commission.app.base.actions import Camera, ClickFloor, DragFloor
+from commission.app.base.effects import PlaceCamera, Tell
+from commission.app.base.reducer import Outcome
 from commission.app.base.state import MAP_BYTES, AppState
 from commission.app.base.uploads import Upload
 from commission.app.editing import actions as editing
-from commission.app.editing.editor import MapPen, Tool
+from commission.app.editing.editor import Editor, MapPen, Tool
 from commission.app.floor_map import actions
-from commission.app.floor_map.draft import MapDraft, MapFile, ReadOptions
+from commission.app.floor_map.draft import MapDraft, MapFile, MapLoading, ReadOptions
 from commission.app.floor_map.effects import DrawMap, ReadMapFile, StopMapWork
 from commission.errors import UsageError
 from commission.io.dxf import Drawing
@@ -26,9 +25,10 @@ from commission.io.image_map import Picture
 from commission.io.mesh import Model
 from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
 from commission.site.project import Project
+from tests.app.asking import ME, after, joined
 from tests.app.sites import room
 
-ME, OTHER, REACH = 1, 2, 0.15
+REACH = 0.15
 YAML, IMAGE, ANOTHER = (MapFile(Upload(name, b"x")) for name in ("3.yaml", "3.pgm", "other.png"))
 PLAN = MapFile(Path("plan.png"))
 PICTURE = Picture(np.full((100, 200), 255, np.uint8), np.full((100, 200), 255, np.uint8))
@@ -37,23 +37,15 @@ PICTURE = Picture(np.full((100, 200), 255, np.uint8), np.full((100, 200), 255, n
 @pytest.fixture
 def state() -> AppState:
     project = room()
-    return after(AppState(project, project, folder=Path("hall")), editing.Join(ME), editing.Join(OTHER)).state
+    return joined(AppState(project, project, folder=Path("hall")))
 
 
-def after(state: AppState, *wishes: page.Action) -> Reduction:
-    """Return the state after all wishes with the effects of the last."""
-    reduction = Reduction(state)
-    for wish in wishes:
-        reduction = reducer.reduce(wish, reduction.state)
-    return reduction
-
-
-def click(x: float, y: float) -> editing.ClickFloor:
-    return editing.ClickFloor(ME, (x, y), REACH)
+def click(x: float, y: float) -> ClickFloor:
+    return ClickFloor((x, y), REACH)
 
 
 def use(tool: Tool) -> editing.ChooseTool:
-    return editing.ChooseTool(ME, tool)
+    return editing.ChooseTool(tool)
 
 
 def cells(state: AppState) -> np.ndarray:
@@ -62,53 +54,55 @@ def cells(state: AppState) -> np.ndarray:
 
 
 def draft(state: AppState) -> MapDraft:
-    assert state.mapping.draft is not None
-    return state.mapping.draft
+    assert state.part(MapLoading).draft is not None
+    return state.part(MapLoading).draft
 
 
 def test_a_loaded_map_replaces_the_old_one_in_one_undo_step_and_everybody_sees_it_whole(state: AppState) -> None:
     loaded = FloorMap(np.zeros((10, 20), np.int8), 0.1)
-    result = after(state, actions.MapMade(ME, MapFile(Path("hall.dxf")), loaded, ("2 texts left out",)))
+    result = after(state, actions.MapMade(MapFile(Path("hall.dxf")), loaded, ("2 texts left out",)))
     assert result.state.project.floor_map is loaded
     assert [step.name for step in result.state.undo] == ["load floor map hall.dxf"]
-    assert result.effects == (PlaceCamera(ME, View.FIT), PlaceCamera(OTHER, View.FIT))
-    assert result.state.mapping.notes == ("hall.dxf: 2.0 x 1.0 m, cells of 100 mm", "2 texts left out")
-    assert after(result.state, page.Undo(ME)).state.project is state.project
+    assert result.effects == (PlaceCamera(Camera.FIT, everywhere=True),)
+    assert result.state.part(MapLoading).notes == ("hall.dxf: 2.0 x 1.0 m, cells of 100 mm", "2 texts left out")
+    assert after(result.state, page.Undo()).state.project is state.project
 
 
 def test_a_map_and_its_image_are_read_together_in_whichever_order_they_come(state: AppState) -> None:
-    first = after(state, actions.OpenMap(ME, YAML))
-    assert first.effects == (ReadMapFile(ME, YAML),)
+    first = after(state, actions.OpenMap(YAML))
+    assert first.effects == (ReadMapFile(YAML),)
     waiting = after(first.state, actions.ImageMissing(YAML, "3.pgm"))
     assert waiting.effects == (Tell("3.yaml needs its image: upload 3.pgm, too", failed=False),)
-    assert after(waiting.state, actions.OpenMap(ME, IMAGE)).effects == (ReadMapFile(ME, YAML, image=IMAGE),)
-    other_way = after(state, actions.OpenMap(ME, IMAGE), actions.OpenMap(ME, YAML))
-    assert other_way.effects == (ReadMapFile(ME, YAML, image=IMAGE),)
+    assert after(waiting.state, actions.OpenMap(IMAGE)).effects == (ReadMapFile(YAML, image=IMAGE),)
+    other_way = after(state, actions.OpenMap(IMAGE), actions.OpenMap(YAML))
+    assert other_way.effects == (ReadMapFile(YAML, image=IMAGE),)
 
 
 def test_another_image_than_the_one_that_is_waited_for_is_named(state: AppState) -> None:
     waiting = after(state, actions.ImageMissing(YAML, "3.pgm")).state
-    refused = after(waiting, actions.OpenMap(ME, ANOTHER))
-    assert refused.state.mapping.trouble == "other.png: is not the image of 3.yaml; expected 3.pgm"
-    assert refused.state.mapping.waiting == waiting.mapping.waiting
-    freed = after(refused.state, actions.DiscardMap(), actions.OpenMap(ME, ANOTHER))
-    assert freed.effects == (ReadMapFile(ME, ANOTHER),)
+    refused = after(waiting, actions.OpenMap(ANOTHER))
+    assert refused.state.part(MapLoading).trouble == "other.png: is not the image of 3.yaml; expected 3.pgm"
+    assert refused.state.part(MapLoading).waiting == waiting.part(MapLoading).waiting
+    freed = after(refused.state, actions.DiscardMap(), actions.OpenMap(ANOTHER))
+    assert freed.effects == (ReadMapFile(ANOTHER),)
 
 
 def test_trouble_leaves_the_project_as_it_is_and_goes_with_the_next_file(state: AppState) -> None:
     failed = after(state, actions.MapFailed("hall.stl: is no readable STL;\n expected a complete model"))
     assert failed.state.project is state.project
-    assert failed.state.mapping.trouble == "hall.stl: is no readable STL; expected a complete model"
-    assert failed.effects == (Tell(failed.state.mapping.trouble, failed=True),)
-    assert after(failed.state, actions.OpenMap(ME, PLAN)).state.mapping.trouble == ""
-    unknown = after(state, actions.OpenMap(ME, MapFile(Path("map.pdf"))))
-    assert unknown.state.mapping.trouble.startswith("map.pdf: is no floor map; expected a file that ends in .yaml")
+    assert failed.state.part(MapLoading).trouble == "hall.stl: is no readable STL; expected a complete model"
+    assert failed.effects == (Tell(failed.state.part(MapLoading).trouble, failed=True),)
+    assert after(failed.state, actions.OpenMap(PLAN)).state.part(MapLoading).trouble == ""
+    unknown = after(state, actions.OpenMap(MapFile(Path("map.pdf"))))
+    assert unknown.state.part(MapLoading).trouble.startswith(
+        "map.pdf: is no floor map; expected a file that ends in .yaml"
+    )
 
 
 def test_an_image_is_placed_by_two_clicks_a_distance_and_an_axis(state: AppState) -> None:
-    opened = after(state, actions.MapOpened(ME, PLAN, PICTURE, ReadOptions()))
-    assert opened.effects == (PlaceCamera(ME, View.FIT),)
-    assert opened.state.editors[ME].tool is Tool.CALIBRATE
+    opened = after(state, actions.MapOpened(PLAN, PICTURE, ReadOptions()))
+    assert opened.effects == (PlaceCamera(Camera.FIT),)
+    assert opened.state.of_browser(ME, Editor).tool is Tool.CALIBRATE
     stage = draft(opened.state).stage
     # The image lies in the middle of the room of 12 x 8 m, where everybody sees it.
     assert stage.pixel_at((6.0, 4.0)) == pytest.approx((100.0, 50.0))
@@ -125,67 +119,67 @@ def test_an_image_is_placed_by_two_clicks_a_distance_and_an_axis(state: AppState
     assert placement is not None
     assert placement.resolution == pytest.approx(0.5)
     np.testing.assert_allclose(placement.origin(100), (0.0, -5.0, 0.0), atol=1e-9)
-    assert after(placed, actions.MakeMap(ME)).effects == (DrawMap(ME, draft(placed)),)
+    assert after(placed, actions.MakeMap()).effects == (DrawMap(draft(placed)),)
     moved = after(placed, click(*stage.place_of((12.0, 12.0)))).state
     assert [tuple(np.round(p, 6)) for p in draft(moved).pixels] == [(10.0, 90.0), (12.0, 12.0)]
-    made = after(placed, actions.MapMade(ME, PLAN, PICTURE.floor_map(placement))).state
-    assert made.editors[ME].tool is Tool.SELECT
-    assert made.mapping.draft is None
+    made = after(placed, actions.MapMade(PLAN, PICTURE.floor_map(placement))).state
+    assert made.of_browser(ME, Editor).tool is Tool.SELECT
+    assert made.part(MapLoading).draft is None
 
 
 def test_a_click_beside_the_image_is_no_point_of_it(state: AppState) -> None:
-    opened = after(state, actions.MapOpened(ME, PLAN, PICTURE, ReadOptions())).state
+    opened = after(state, actions.MapOpened(PLAN, PICTURE, ReadOptions())).state
     with pytest.raises(ValueError, match="missed the image"):
         after(opened, click(1000.0, 0.0))
 
 
 def test_options_out_of_range_are_refused_and_keep_what_was(state: AppState) -> None:
-    opened = after(state, actions.MapOpened(ME, PLAN, PICTURE, ReadOptions())).state
+    opened = after(state, actions.MapOpened(PLAN, PICTURE, ReadOptions())).state
     for name, value in (("threshold", 1.5), ("distance", 0.0), ("resolution", 5.0), ("heights", ())):
         with pytest.raises(ValueError, match="expected"):
             after(opened, actions.SetMapOption(name, value))
     with pytest.raises(UsageError, match="no option 'color'"):
         after(opened, actions.SetMapOption("color", 1.0))
     with pytest.raises(UsageError, match="no file is open"):
-        after(state, actions.MakeMap(ME))
+        after(state, actions.MakeMap())
 
 
 def test_a_model_is_cut_where_the_reflectors_hang_unless_somebody_says_otherwise(state: AppState) -> None:
     model = Model(Path("hall.stl"), np.zeros((1, 3, 3)))
-    opened = after(state, actions.MapOpened(ME, MapFile(Path("hall.stl")), model, ReadOptions())).state
+    opened = after(state, actions.MapOpened(MapFile(Path("hall.stl")), model, ReadOptions())).state
     assert draft(opened).options.heights == (0.2,)
-    again = after(opened, actions.SetMapOption("heights", (0.3, 1.8)), actions.SetReading(ME, ReadOptions("mm")))
-    assert again.effects == (ReadMapFile(ME, draft(opened).file, ReadOptions("mm")),)
+    again = after(opened, actions.SetMapOption("heights", (0.3, 1.8)), actions.SetReading(ReadOptions("mm")))
+    assert again.effects == (ReadMapFile(draft(opened).file, ReadOptions("mm")),)
     # Read in another unit, the choices stay.
-    reread = after(again.state, actions.MapOpened(ME, draft(opened).file, model, ReadOptions("mm"))).state
+    reread = after(again.state, actions.MapOpened(draft(opened).file, model, ReadOptions("mm"))).state
     assert draft(reread).options.heights == (0.3, 1.8)
 
 
 def test_stopping_and_discarding_end_the_work_and_change_nothing(state: AppState) -> None:
-    opened = after(state, actions.MapOpened(ME, PLAN, PICTURE, ReadOptions())).state
-    assert after(opened, actions.StopMapJob()) == Reduction(opened, (StopMapWork(),))
+    opened = after(state, actions.MapOpened(PLAN, PICTURE, ReadOptions())).state
+    assert after(opened, actions.StopMapJob()) == Outcome(opened, (StopMapWork(),))
     gone = after(opened, actions.DiscardMap())
     assert gone.effects == (StopMapWork(),)
-    assert (gone.state.mapping.draft, gone.state.editors[ME].tool) == (None, Tool.SELECT)
+    assert (gone.state.part(MapLoading).draft, gone.state.of_browser(ME, Editor).tool) == (None, Tool.SELECT)
     assert gone.state.project is state.project
 
 
 def test_a_wall_is_drawn_by_clicks_and_enter_in_one_undo_step(state: AppState) -> None:
-    thick = actions.SetPen(ME, MapPen(thickness=0.2))
+    thick = actions.SetPen(MapPen(thickness=0.2))
     clicked = after(state, use(Tool.WALL), thick, click(3.0, 2.0), click(5.0, 2.0)).state
     assert clicked.project is state.project
-    drawn = after(clicked, editing.Finish(ME)).state
+    drawn = after(clicked, editing.Finish()).state
     assert [step.name for step in drawn.undo] == ["draw wall"]
     assert (cells(drawn)[38:42, 60:100] == OCCUPIED).all()
     assert (cells(state)[38:42, 60:100] == FREE).all()
-    assert (drawn.editors[ME].tool, drawn.editors[ME].draft) == (Tool.WALL, ())
-    np.testing.assert_array_equal(cells(after(drawn, page.Undo(ME)).state), cells(state))
-    np.testing.assert_array_equal(cells(after(drawn, page.Undo(ME), page.Redo(ME)).state), cells(drawn))
+    assert (drawn.of_browser(ME, Editor).tool, drawn.of_browser(ME, Editor).draft) == (Tool.WALL, ())
+    np.testing.assert_array_equal(cells(after(drawn, page.Undo()).state), cells(state))
+    np.testing.assert_array_equal(cells(after(drawn, page.Undo(), page.Redo()).state), cells(drawn))
 
 
-def rectangle(start: tuple[float, float], end: tuple[float, float]) -> tuple[editing.DragFloor, ...]:
+def rectangle(start: tuple[float, float], end: tuple[float, float]) -> tuple[DragFloor, ...]:
     steps = (("start", start), ("update", end), ("end", end))
-    return tuple(editing.DragFloor(ME, phase, start, now, REACH) for phase, now in steps)
+    return tuple(DragFloor(phase, start, now, REACH) for phase, now in steps)
 
 
 def test_clutter_is_erased_by_a_rectangle_and_a_polygon_becomes_an_obstacle(state: AppState) -> None:
@@ -195,12 +189,12 @@ def test_clutter_is_erased_by_a_rectangle_and_a_polygon_becomes_an_obstacle(stat
     assert half.project is state.project
     erased = after(half, end).state
     assert (cells(erased)[70:84, 150:170] == FREE).all()
-    assert erased.editors[ME].drag is None
+    assert erased.of_browser(ME, Editor).drag is None
     corners = (click(2.0, 5.0), click(3.0, 5.0), click(3.0, 6.0), click(2.0, 6.0))
-    filled = after(erased, use(Tool.OBSTACLE), *corners, editing.Finish(ME)).state
+    filled = after(erased, use(Tool.OBSTACLE), *corners, editing.Finish()).state
     assert (cells(filled)[100:120, 40:60] == OCCUPIED).all()
     assert [step.name for step in filled.undo] == ["erase", "draw obstacle"]
-    unknown = actions.SetPen(ME, MapPen(to_unknown=True))
+    unknown = actions.SetPen(MapPen(to_unknown=True))
     forgotten = after(filled, use(Tool.ERASE), unknown, *rectangle((2.0, 5.0), (3.0, 6.0))).state
     assert (cells(forgotten)[100:120, 40:60] == UNKNOWN).all()
 
@@ -214,14 +208,14 @@ def test_erasing_where_nothing_is_says_so_and_is_no_step(state: AppState) -> Non
 def test_too_few_points_are_refused_and_kept(state: AppState) -> None:
     clicked = after(state, use(Tool.OBSTACLE), click(2.0, 5.0), click(3.0, 5.0)).state
     with pytest.raises(UsageError, match="2 points were clicked; expected 3 or more to draw obstacle"):
-        after(clicked, editing.Finish(ME))
-    assert len(clicked.editors[ME].draft) == 2
-    assert after(clicked, editing.Cancel(ME)).state.editors[ME].draft == ()
+        after(clicked, editing.Finish())
+    assert len(clicked.of_browser(ME, Editor).draft) == 2
+    assert after(clicked, editing.Cancel()).state.of_browser(ME, Editor).draft == ()
 
 
 def test_walls_can_be_drawn_before_there_is_a_map() -> None:
-    empty = after(AppState(Project(name="New"), Project(name="New")), editing.Join(ME)).state
-    drawn = after(empty, use(Tool.WALL), click(0.0, 0.0), click(10.0, 0.0), editing.Finish(ME)).state
+    empty = joined(AppState(Project(name="New"), Project(name="New")))
+    drawn = after(empty, use(Tool.WALL), click(0.0, 0.0), click(10.0, 0.0), editing.Finish()).state
     assert drawn.project.floor_map is not None
     with pytest.raises(UsageError, match="no floor map to erase in"):
         after(empty, use(Tool.ERASE), *rectangle((0.0, 0.0), (1.0, 1.0)))
@@ -230,12 +224,15 @@ def test_walls_can_be_drawn_before_there_is_a_map() -> None:
 def test_points_to_align_by_snap_to_reflectors_and_to_corners_of_walls(state: AppState) -> None:
     # R1 stands at (0.25, 2.0); the pillar's corner lies at (7.5, 3.5).
     clicked = after(state, use(Tool.ALIGN), click(0.3, 2.05), click(7.55, 3.42)).state
-    assert [point.at for point in clicked.editors[ME].alignment.points] == [(0.25, 2.0), pytest.approx((7.5, 3.5))]
+    assert [point.at for point in clicked.of_browser(ME, Editor).alignment.points] == [
+        (0.25, 2.0),
+        pytest.approx((7.5, 3.5)),
+    ]
     again = after(clicked, click(4.0, 4.0)).state
-    assert [point.at for point in again.editors[ME].alignment.points] == [(0.25, 2.0), (4.0, 4.0)]
+    assert [point.at for point in again.of_browser(ME, Editor).alignment.points] == [(0.25, 2.0), (4.0, 4.0)]
 
 
-def aligning(state: AppState, *, everything: bool, stretch: float = 1.0) -> Reduction:
+def aligning(state: AppState, *, everything: bool, stretch: float = 1.0) -> Outcome:
     """Turn the room by a quarter about R1, which comes to lie at (100, 50)."""
     return after(
         state,
@@ -243,10 +240,10 @@ def aligning(state: AppState, *, everything: bool, stretch: float = 1.0) -> Redu
         click(0.25, 2.0),
         click(10.25, 2.0),
         # In any order: nothing that was typed gets lost behind what is typed next.
-        actions.SetPlantPoint(ME, 1, (100.0, 50.0 + 10.0 * stretch)),
-        actions.SetPlantPoint(ME, 0, (100.0, 50.0), "column B4"),
-        actions.SetAligned(ME, everything),
-        actions.AlignMap(ME),
+        actions.SetPlantPoint(1, (100.0, 50.0 + 10.0 * stretch)),
+        actions.SetPlantPoint(0, (100.0, 50.0), "column B4"),
+        actions.SetAligned(everything),
+        actions.AlignMap(),
     )
 
 
@@ -258,9 +255,9 @@ def test_the_map_is_aligned_in_one_undo_step_alone_or_with_all_that_is_on_it(sta
     np.testing.assert_allclose(alone.state.project.floor_map.origin, (102.0, 49.75, math.pi / 2))
     together = aligning(state, everything=True)
     np.testing.assert_allclose(together.state.project.reflectors.centers[0], (100.0, 50.0), atol=1e-12)
-    assert after(together.state, page.Undo(ME)).state.project is state.project
-    assert PlaceCamera(OTHER, View.FIT) in together.effects
-    assert together.state.editors[ME].tool is Tool.SELECT
+    assert after(together.state, page.Undo()).state.project is state.project
+    assert PlaceCamera(Camera.FIT, everywhere=True) in together.effects
+    assert together.state.of_browser(ME, Editor).tool is Tool.SELECT
 
 
 def test_a_doubtful_distance_is_told_and_a_wrong_one_refused(state: AppState) -> None:
@@ -275,7 +272,7 @@ def test_maps_of_many_undo_steps_take_bounded_memory_and_all_come_back() -> None
     side = 4000
     first = FloorMap(np.zeros((side, side), np.int8), 0.05)
     project = Project(name="Large", floor_map=first)
-    state = after(AppState(project, project), editing.Join(ME), use(Tool.OBSTACLE)).state
+    state = after(joined(AppState(project, project)), use(Tool.OBSTACLE)).state
     steps = MAP_BYTES // side**2 + 3
     seen = [first]
     for number in range(steps):
@@ -284,11 +281,11 @@ def test_maps_of_many_undo_steps_take_bounded_memory_and_all_come_back() -> None
         seen.append(state.project.floor_map)
     assert held(state) <= MAP_BYTES
     for expected in reversed(seen[:-1]):
-        state = after(state, page.Undo(ME)).state
+        state = after(state, page.Undo()).state
         assert state.project.floor_map == expected
         assert held(state) <= 2 * MAP_BYTES
     for expected in seen[1:]:
-        state = after(state, page.Redo(ME)).state
+        state = after(state, page.Redo()).state
         assert state.project.floor_map == expected
 
 
@@ -307,5 +304,5 @@ def test_a_drawing_without_lines_can_be_discarded(state: AppState) -> None:
         layer_of=np.empty(0, np.int32),
         warnings=(),
     )
-    opened = after(state, actions.MapOpened(ME, MapFile(Path("a.dxf")), drawing, ReadOptions())).state
-    assert replace(after(opened, actions.DiscardMap()).state, mapping=state.mapping) == state
+    opened = after(state, actions.MapOpened(MapFile(Path("a.dxf")), drawing, ReadOptions())).state
+    assert after(opened, actions.DiscardMap()).state.part(MapLoading) == MapLoading()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import queue
 import shutil
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -15,20 +16,25 @@ import pytest
 import trimesh
 from PIL import Image
 
+from commission.app.base.actions import PROGRAM, Action
+from commission.app.base.effects import Effect
 from commission.app.base.jobs import JobReport, Jobs, JobState
+from commission.app.base.service import Context
+from commission.app.base.state import AppState
 from commission.app.base.uploads import Upload
-from commission.app.floor_map.actions import ImageMissing, MapFailed, MapMade, MapOpened, MapResult
+from commission.app.floor_map.actions import ImageMissing, MapFailed, MapMade, MapOpened
 from commission.app.floor_map.draft import MapDraft, MapFile, MapOptions, ReadOptions
-from commission.app.floor_map.effects import DrawMap, MapEffect, ReadMapFile, StopMapWork
-from commission.app.floor_map.work import MapWork, draw, read
+from commission.app.floor_map.effects import DrawMap, ReadMapFile, StopMapWork
+from commission.app.floor_map.work import MapService, draw, read
 from commission.io.dxf import Drawing
 from commission.io.image_map import Picture
 from commission.io.map_server import write_floor_map
 from commission.io.mesh import Model
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
+from commission.site.project import Project
 from tests.io.large_files import write_drawing, write_stl
 
-ME = 1
+STATE = AppState(Project(), Project())
 HALL = FloorMap(np.where(np.eye(30, 40, dtype=bool), np.int8(OCCUPIED), np.int8(FREE)), 0.05, np.array([1.0, 2.0, 0.0]))
 
 
@@ -41,15 +47,15 @@ def uploaded(path: Path, name: str = "") -> MapFile:
     return MapFile(Upload(name or path.name, path.read_bytes()))
 
 
-def outcome(file: MapFile, reading: ReadOptions | None = None, image: MapFile | None = None) -> MapResult:
-    return read(ReadMapFile(ME, file, reading or ReadOptions(), image), silent)
+def outcome(file: MapFile, reading: ReadOptions | None = None, image: MapFile | None = None) -> Action:
+    return read(ReadMapFile(file, reading or ReadOptions(), image), silent)
 
 
 def drawn(file: MapFile, options: MapOptions, reading: ReadOptions | None = None, **changes: object) -> FloorMap:
     """The floor map that a file becomes."""
     opened = outcome(file, reading)
     assert isinstance(opened, MapOpened), opened
-    made = draw(DrawMap(ME, replace(MapDraft(file, opened.read, options=options), **changes)), silent)
+    made = draw(DrawMap(replace(MapDraft(file, opened.read, options=options), **changes)), silent)
     assert isinstance(made, MapMade), made
     return made.floor_map
 
@@ -64,10 +70,10 @@ def failure(file: MapFile, image: MapFile | None = None) -> str:
 def test_a_ros_map_is_read_from_a_path_and_from_two_uploads(tmp_path: Path) -> None:
     write_floor_map(HALL, tmp_path / "hall.yaml")
     by_path = outcome(MapFile(tmp_path / "hall.yaml"))
-    assert by_path == MapMade(ME, MapFile(tmp_path / "hall.yaml"), HALL)
+    assert by_path == MapMade(MapFile(tmp_path / "hall.yaml"), HALL)
     yaml, image = uploaded(tmp_path / "hall.yaml"), uploaded(tmp_path / "hall.png")
     assert outcome(yaml) == ImageMissing(yaml, "hall.png")
-    assert outcome(yaml, image=image) == MapMade(ME, yaml, HALL)
+    assert outcome(yaml, image=image) == MapMade(yaml, HALL)
 
 
 @pytest.mark.parametrize("reference", ["/home/robot/maps/hall.png", "../../maps/hall.png", "maps\\hall.png"])
@@ -76,7 +82,7 @@ def test_an_uploaded_map_never_leads_to_a_file_of_this_computer(tmp_path: Path, 
     text = (tmp_path / "hall.yaml").read_text().replace("hall.png", f"'{reference}'")
     yaml = MapFile(Upload("hall.yaml", text.encode()))
     assert outcome(yaml) == ImageMissing(yaml, "hall.png")
-    assert outcome(yaml, image=uploaded(tmp_path / "hall.png")) == MapMade(ME, yaml, HALL)
+    assert outcome(yaml, image=uploaded(tmp_path / "hall.png")) == MapMade(yaml, HALL)
 
 
 def plan(folder: Path, draw_on: Callable[[ezdxf.document.Drawing], None], units: int = 4) -> Path:
@@ -136,7 +142,7 @@ def test_an_image_becomes_walls_at_the_place_and_scale_of_its_two_points(tmp_pat
     assert not floor_map.occupancy().is_occupied([(2.8, 5.0), (3.2, 5.0)]).any()
     opened = outcome(uploaded(tmp_path / "plan.png"))
     assert isinstance(opened, MapOpened)
-    unplaced = draw(DrawMap(ME, MapDraft(opened.file, opened.read)), silent)
+    unplaced = draw(DrawMap(MapDraft(opened.file, opened.read)), silent)
     assert isinstance(unplaced, MapFailed) and "expected two points" in unplaced.text
 
 
@@ -156,7 +162,7 @@ def test_broken_files_say_in_one_line_what_is_wrong_under_the_name_that_they_hav
     shutil.rmtree(tmp_path / "folder.png")
     opened = outcome(MapFile(plan(tmp_path, lambda document: None)))
     assert isinstance(opened, MapOpened)
-    empty = draw(DrawMap(ME, MapDraft(opened.file, opened.read)), silent)
+    empty = draw(DrawMap(MapDraft(opened.file, opened.read)), silent)
     assert isinstance(empty, MapFailed) and "holds no lines to draw" in empty.text
 
 
@@ -180,18 +186,19 @@ class Stopping:
         self.fractions: list[float] = []
         self._ends: queue.SimpleQueue[JobReport] = queue.SimpleQueue()
         self._jobs = Jobs(self._heard)
-        self._work = MapWork(self._jobs)
+        context = Context(STATE, lambda _message: None, time.monotonic, self._jobs)
+        self._service = MapService(context)
 
     def _heard(self, report: JobReport) -> None:
         if report.job.state is JobState.RUNNING:
             self.fractions.append(report.job.fraction)
             if self.stop_at is not None and len(self.fractions) >= self.stop_at:
-                self._work.do(StopMapWork())
+                self._service.carry_out(StopMapWork(), STATE, PROGRAM)
         elif report.job.state is not JobState.WAITING:
             self._ends.put(report)
 
-    def run(self, effect: MapEffect) -> JobReport:
-        self._work.do(effect)
+    def run(self, effect: Effect) -> JobReport:
+        self._service.carry_out(effect, STATE, PROGRAM)
         return self._ends.get(timeout=120.0)
 
 
@@ -204,7 +211,7 @@ def test_a_large_file_loads_as_a_job_with_progress_and_is_stopped_on_the_way(tmp
     else:
         write_stl(path, 100_000_000)
     whole = Stopping(None)
-    report = whole.run(ReadMapFile(ME, MapFile(path)))
+    report = whole.run(ReadMapFile(MapFile(path)))
     opened = report.result
     assert isinstance(opened, MapOpened)
     if isinstance(opened.read, Drawing):
@@ -213,11 +220,11 @@ def test_a_large_file_loads_as_a_job_with_progress_and_is_stopped_on_the_way(tmp
         assert isinstance(opened.read, Model)
         assert len(opened.read.triangles) == (100_000_000 - 84) // 50
     assert len({round(fraction, 1) for fraction in whole.fractions}) >= 4
-    made = Stopping(None).run(DrawMap(ME, MapDraft(opened.file, opened.read))).result
+    made = Stopping(None).run(DrawMap(MapDraft(opened.file, opened.read))).result
     assert isinstance(made, MapMade)
     # The corners were drawn over 180 x 80 m, with 1 m of floor around.
     assert made.floor_map.size == pytest.approx((182.0, 82.0), rel=0.1)
-    for effect in (ReadMapFile(ME, MapFile(path)), DrawMap(ME, MapDraft(opened.file, opened.read))):
+    for effect in (ReadMapFile(MapFile(path)), DrawMap(MapDraft(opened.file, opened.read))):
         stopped = Stopping(2)
         assert stopped.run(effect).job.state is JobState.CANCELLED
         assert max(stopped.fractions) < 0.9

@@ -6,20 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commission.app.base import reducer
-from commission.app.base.actions import Action, Undo
+from commission.app.base.actions import Action, ClickFloor, DragFloor, Envelope, Undo
 from commission.app.base.drawing import crosses
-from commission.app.base.reduction import ApplyParameters
 from commission.app.base.state import AppState
 from commission.app.editing.actions import (
     ChooseTool,
-    ClickFloor,
     DeleteRoute,
-    DragFloor,
     RenameRoute,
     SelectControlPoint,
 )
-from commission.app.editing.editor import ControlPoint, Tool
+from commission.app.editing.editor import ControlPoint, Editor, Tool
 from commission.app.placement.placement_panel import found_text
 from commission.app.placement.reducer import ACCEPT
 from commission.app.placement.suggestion import LayoutWish, Suggestion, suggest, with_option
@@ -37,6 +33,8 @@ from commission.app.plan.view import LayoutView
 from commission.errors import UsageError
 from commission.site.layout_brief import Rectangle
 from commission.site.project import Project
+from tests.app.asking import ME, by, joined
+from tests.app.asking import after as outcome
 from tests.app.plan.test_planner import Bench
 
 EMPTY = LayoutWish(extend=False)
@@ -46,10 +44,8 @@ def quietly(_fraction: float, _message: str) -> None:
     pass
 
 
-def after(state: AppState, *wishes: Action) -> AppState:
-    for wish in wishes:
-        state = reducer.reduce(wish, state).state
-    return state
+def after(state: AppState, *asked: Action | Envelope) -> AppState:
+    return outcome(state, *asked).state
 
 
 def asking(project: Project, name: str, value: object) -> Project:
@@ -69,7 +65,7 @@ def suggestion(project: Project) -> Suggestion:
 def bench(project: Project) -> Iterator[Bench]:
     bench = Bench(project)
     yield bench
-    bench.jobs.close()
+    bench.close()
 
 
 def test_demands_are_set_by_the_names_they_have_in_planning(project: Project) -> None:
@@ -82,27 +78,27 @@ def test_demands_are_set_by_the_names_they_have_in_planning(project: Project) ->
     )
     brief = state.project.layout
     assert (brief.demands.visible, brief.demands.position_limit) == (3, 0.05)
-    assert (brief.candidates.spacing, state.layout.extend) == (2.0, False)
+    assert (brief.candidates.spacing, state.part(LayoutWish).extend) == (2.0, False)
     assert [step.name for step in state.undo] == [
         "set visible of the layout",
         "set position limit of the layout",
         "set spacing of the layout",
     ]
-    assert after(state, Undo(1), Undo(1), Undo(1)).project is project
+    assert after(state, Undo(), Undo(), Undo()).project is project
 
 
 def test_a_slide_over_many_values_is_one_undo_step(project: Project) -> None:
-    slide = [SetLayout("candidates.spacing", 0.1 * step, at=10.0 + 0.1 * step) for step in range(1, 9)]
+    slide = [by(ME, SetLayout("candidates.spacing", 0.1 * step), 10.0 + 0.1 * step) for step in range(1, 9)]
     assert len(after(AppState(project, project), *slide).undo) == 1
 
 
 def test_a_route_that_does_not_count_keeps_to_it_under_another_name(project: Project) -> None:
     route = project.routes[0].name
-    state = after(AppState(project, project), CountRoute(route, counts=False, client=1))
+    state = after(joined(AppState(project, project)), CountRoute(route, counts=False))
     assert state.project.layout.ignored_routes == (route,)
-    state = after(state, SelectControlPoint(1, ControlPoint(route)), RenameRoute(1, "Round"))
+    state = after(state, SelectControlPoint(ControlPoint(route)), RenameRoute("Round"))
     assert state.project.layout.ignored_routes == ("Round",)
-    assert after(state, DeleteRoute(1)).project.layout.ignored_routes == ()
+    assert after(state, DeleteRoute()).project.layout.ignored_routes == ()
     assert after(state, CountRoute("Round", counts=True)).project.layout == project.layout
 
 
@@ -122,13 +118,13 @@ def test_demands_that_do_not_exist_or_are_out_of_range_are_refused(project: Proj
 
 
 def test_an_area_is_drawn_by_a_drag_and_freed_by_a_click_in_it(project: Project) -> None:
-    drag = [DragFloor(1, phase, (4.0, 5.0), (2.0, 7.0), 0.1) for phase in ("start", "update", "end")]
-    state = after(AppState(project, project), ChooseTool(1, Tool.KEEP_OUT), *drag)
+    drag = [DragFloor(phase, (4.0, 5.0), (2.0, 7.0), 0.1) for phase in ("start", "update", "end")]
+    state = after(joined(AppState(project, project)), ChooseTool(Tool.KEEP_OUT), *drag)
     assert kept_out(state) == ((2.0, 5.0, 4.0, 7.0),)
     assert [step.name for step in state.undo] == ["keep an area free of reflectors"]
-    assert state.editors[1].selected == ()
-    assert kept_out(after(state, ClickFloor(1, (8.0, 6.0), 0.1))) == kept_out(state)
-    assert kept_out(after(state, ClickFloor(1, (3.0, 6.0), 0.1))) == ()
+    assert state.of_browser(ME, Editor).selected == ()
+    assert kept_out(after(state, ClickFloor((8.0, 6.0), 0.1))) == kept_out(state)
+    assert kept_out(after(state, ClickFloor((3.0, 6.0), 0.1))) == ()
 
 
 def test_a_click_is_no_area_and_all_areas_are_freed_together(project: Project) -> None:
@@ -175,47 +171,45 @@ def test_without_a_route_or_a_wall_it_is_said_what_is_missing(project: Project) 
 
 def test_accepting_is_one_undo_step_and_undo_brings_the_old_ones_back(project: Project, suggestion: Suggestion) -> None:
     state = after(AppState(project, project), AskLayout())
-    reduction = reducer.reduce(AcceptLayout(1, suggestion), state)
-    accepted = reduction.state
+    accepted = after(state, AcceptLayout(suggestion))
     assert [step.name for step in accepted.undo] == [ACCEPT]
     assert accepted.project.reflectors == suggestion.placement.reflectors
-    assert ApplyParameters() in reduction.effects
-    assert not accepted.layout.wanted
-    assert after(accepted, Undo(1)).project is project
+    assert not accepted.part(LayoutWish).wanted
+    assert after(accepted, Undo()).project is project
 
 
 def test_a_layout_for_other_reflectors_is_not_accepted(project: Project, suggestion: Suggestion) -> None:
     other = replace(project, reflectors=replace(project.reflectors, reflectors=project.reflectors.reflectors[1:]))
     with pytest.raises(UsageError, match="suggest it again"):
-        after(AppState(other, other), AcceptLayout(1, suggestion))
+        after(AppState(other, other), AcceptLayout(suggestion))
 
 
 def test_it_is_looked_for_in_the_background_shown_and_dropped(bench: Bench) -> None:
     project = bench.state.project
     bench.state = after(bench.state, SetLayout("extend", value=False), AskLayout())
-    bench.planner.follow(bench.state)
-    found = bench.settle().layout
+    bench.service.follow(bench.state)
+    found = bench.found().layout
     assert found is not None
     assert not found.outdated
     assert bench.state.project is project
     bench.move(0, 0.5)
     assert not bench.jobs.unfinished()
-    moved = bench.planner.view.layout
+    moved = bench.service.view.layout
     assert moved is not None
     assert moved.outdated
     bench.state = after(bench.state, DiscardLayout())
-    bench.planner.follow(bench.state)
-    assert bench.planner.view.layout is None
+    bench.service.follow(bench.state)
+    assert bench.service.view.layout is None
 
 
 def test_asking_again_drops_what_was_found_and_looks_anew(bench: Bench) -> None:
     bench.state = after(bench.state, AskLayout())
-    bench.planner.follow(bench.state)
-    first = bench.settle().layout
+    bench.service.follow(bench.state)
+    first = bench.found().layout
     bench.state = after(bench.state, DiscardLayout(), AskLayout())
-    bench.planner.follow(bench.state)
-    assert bench.planner.view.layout is None
-    second = bench.settle().layout
+    bench.service.follow(bench.state)
+    assert bench.service.view.layout is None
+    second = bench.found().layout
     assert first is not None
     assert second is not None
     assert second.suggestion is not first.suggestion

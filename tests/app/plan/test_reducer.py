@@ -3,7 +3,6 @@ from dataclasses import replace
 
 import pytest
 
-from commission.app.base import reducer
 from commission.app.base.actions import Action
 from commission.app.base.state import AppState
 from commission.app.plan.actions import ReadFloor, SetPlan
@@ -11,13 +10,12 @@ from commission.app.plan.settings import Figure, PlanSettings
 from commission.errors import UsageError
 from commission.planning.dilution import Heading
 from commission.site.project import Project
+from tests.app.asking import after as outcome
+from tests.app.asking import joined
 
 
 def after(project: Project, *wishes: Action) -> PlanSettings:
-    state = AppState(project, project)
-    for wish in wishes:
-        state = reducer.reduce(wish, state).state
-    return state.plan
+    return outcome(joined(AppState(project, project)), *wishes).state.part(PlanSettings)
 
 
 def test_settings_are_set_from_plain_values(project: Project) -> None:
@@ -42,7 +40,7 @@ def test_what_does_not_exist_or_is_out_of_range_is_refused(project: Project, wis
 
 
 def test_settings_of_the_plan_are_no_undo_steps(project: Project) -> None:
-    state = reducer.reduce(SetPlan("figure", "visible"), AppState(project, project)).state
+    state = outcome(AppState(project, project), SetPlan("figure", "visible")).state
     assert not state.undo
     assert not state.is_changed
 

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commission.app.base.reducer import with_parameter
 from commission.app.run.session import Drive, Session
+from commission.app.tune.reducer import with_parameter
 from commission.localization import whole_run
 from commission.localization.estimate import Mode
 from commission.localization.setup import LocalizerSetup

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from viser import ClientHandle, SceneClickEvent, SceneNodeDragEvent
 
+from commission.app.base.actions import ClickFloor, DragFloor, Point
 from commission.app.base.cameras import OnDrag
-from commission.app.base.panel import Post
-from commission.app.editing import actions
-from commission.app.editing.editor import Point
+from commission.app.base.panel import Post, from_browser
 
 REACH_SHARE = 0.016
 """How near to something a click has to be, as a share of the visible height: about 10 pixels."""
@@ -37,7 +36,7 @@ def take_clicks(client: ClientHandle, post: Post) -> None:
     def clicked(event: SceneClickEvent, *, add: bool) -> None:
         place = on_floor(event.ray_origin, event.ray_direction)
         if place is not None:
-            post(actions.ClickFloor(client.client_id, place, reach_of(client), add))
+            post(from_browser(ClickFloor(place, reach_of(client), add), client.client_id))
 
     client.scene.on_click()(lambda event: clicked(event, add=False))
     client.scene.on_click(modifier="shift")(lambda event: clicked(event, add=True))
@@ -54,6 +53,6 @@ def floor_drag(post: Post) -> OnDrag:
             (float(position[0]), float(position[1])) for position in (event.start_position, event.end_position)
         )
         add = event.modifier == "shift"
-        post(actions.DragFloor(event.client_id, event.phase, start, now, reach_of(event.client), add))
+        post(from_browser(DragFloor(event.phase, start, now, reach_of(event.client), add), event.client_id))
 
     return dragged

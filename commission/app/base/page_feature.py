@@ -1,0 +1,55 @@
+"""What the page has without any feature: grid, legend, switches of layers, choice of the view, work under way."""
+
+from __future__ import annotations
+
+from viser import GuiApi
+
+from commission.app.base import page_reducer
+from commission.app.base.actions import Camera, SetCamera, StopJob
+from commission.app.base.feature import LAYERS, LEGEND, Docked, Feature
+from commission.app.base.grid_layer import GridLayer
+from commission.app.base.inputs import show
+from commission.app.base.layers_panel import LayersPanel, LegendPanel
+from commission.app.base.panel import BasePanel, Post, posting, shortened, write_label
+from commission.app.base.view import PageView
+
+LONGEST_JOB = 16
+"""Letters of a job's name that fit on a button."""
+
+
+class JobButton(BasePanel):
+    """The work under way as the button that stops it: wherever the engineer is on the page, it is in sight."""
+
+    def __init__(self, gui: GuiApi, post: Post) -> None:
+        self._job: int | None = None
+        self._stop = gui.add_button("", hint="Background work; press to stop it.", color="gray", visible=False)
+        self._stop.on_click(posting(post, lambda _event: StopJob(self._job or 0)))
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Show the oldest job."""
+        job = view.jobs[0] if view.jobs else None
+        self._job = None if job is None else job.number
+        show(self._stop, visible=job is not None)
+        if job is not None:
+            write_label(self._stop, f"✕ {shortened(job.name, LONGEST_JOB)} {job.fraction:.0%}")
+
+
+class CameraButtons(BasePanel):
+    """What the browser looks at."""
+
+    def __init__(self, gui: GuiApi, post: Post) -> None:
+        buttons = gui.add_button_group("", tuple(camera.value for camera in Camera))
+        buttons.on_click(posting(post, lambda event: SetCamera(Camera(event.target.value))))
+
+
+FEATURE = Feature(
+    "base",
+    reducers=(page_reducer,),
+    layers=(GridLayer,),
+    panels=(
+        Docked(lambda at: JobButton(at.gui, at.post), None, 20),
+        Docked(lambda at: CameraButtons(at.gui, at.post), None, 40),
+        Docked(lambda at: LegendPanel(at.gui, at.post, at.layers, at.state), LEGEND, 20),
+        Docked(lambda at: LayersPanel(at.gui, at.post, at.layers, at.state), LAYERS),
+    ),
+)

@@ -1,0 +1,20 @@
+"""Coverage of the floor: a heatmap with its scale, values at a place, ellipses of a fix."""
+
+from __future__ import annotations
+
+from commission.app.base.feature import LEGEND, PLAN, Docked, Feature
+from commission.app.coverage.click_reader import ClickReader
+from commission.app.coverage.ellipse_layer import FixEllipseLayer
+from commission.app.coverage.heat_layer import HeatLayer
+from commission.app.coverage.heat_legend import HeatLegend
+from commission.app.coverage.heatmap_panel import HeatmapPanel
+
+FEATURE = Feature(
+    "coverage",
+    layers=(HeatLayer, FixEllipseLayer),
+    panels=(
+        Docked(lambda at: HeatmapPanel(at.gui, at.post), PLAN, 10, folder="Heatmap of the floor", is_open=True),
+        Docked(lambda at: HeatLegend(at.gui), LEGEND, 10),
+        Docked(lambda at: ClickReader(at.scene, at.post), None, 90),
+    ),
+)

@@ -1,0 +1,19 @@
+"""The floor map: loaded from files, drawn, edited by tools on the floor."""
+
+from __future__ import annotations
+
+from commission.app.base.feature import SITE, Docked, Feature
+from commission.app.floor_map import reducer
+from commission.app.floor_map.draft_layer import MapDraftLayer
+from commission.app.floor_map.floor_layer import FloorLayer
+from commission.app.floor_map.floor_map_panel import FloorMapPanel
+from commission.app.floor_map.wall_layer import WallLayer
+from commission.app.floor_map.work import MapService
+
+FEATURE = Feature(
+    "floor_map",
+    reducers=(reducer,),
+    services=(MapService,),
+    layers=(FloorLayer, WallLayer, MapDraftLayer),
+    panels=(Docked(lambda at: FloorMapPanel(at.gui, at.post, at.state.project), SITE, 20),),
+)

@@ -1,0 +1,94 @@
+"""What a person can ask of the run, and what drives; frozen values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+from commission.app.base.actions import Action
+
+
+@dataclass(frozen=True, slots=True)
+class VirtualDrive:
+    """A source: a virtual AGV drives a planned route."""
+
+    route: str
+    """Name of the route."""
+    seed: int = 1
+    """Seed of everything random: the same seed gives the same drive, to the bit."""
+    people: int | None = None
+    """People walking about; none: as many as the project says."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recording:
+    """A source: what a vehicle recorded."""
+
+    path: Path
+    """Folder or file of the recording."""
+
+
+Source: TypeAlias = VirtualDrive | Recording
+
+
+@dataclass(frozen=True, slots=True)
+class ChooseSource(Action):
+    """Run the localizer over another drive."""
+
+    source: Source
+    """What drives."""
+
+
+@dataclass(frozen=True, slots=True)
+class Play(Action):
+    """Start or stop the play clock."""
+
+    playing: bool | None = None
+    """Whether it runs; none: the other way round."""
+
+
+@dataclass(frozen=True, slots=True)
+class StepScan(Action):
+    """Pause and process one more scan."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetSpeed(Action):
+    """Let the play clock run faster or slower than the vehicle's."""
+
+    factor: float
+    """1 is real time."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seek(Action):
+    """Go to a time of the drive."""
+
+    time: float
+    """Seconds after its start [s]."""
+
+    def supersedes(self, earlier: Action) -> bool:
+        """Whether the time before need not be gone to: of many in a row the newest counts."""
+        return isinstance(earlier, Seek)
+
+
+@dataclass(frozen=True, slots=True)
+class Restart(Action):
+    """Go back to the start, the initial pose and its uncertainty."""
+
+
+@dataclass(frozen=True, slots=True)
+class Repeat(Action):
+    """Whether the drive starts again at its end."""
+
+    repeat: bool
+    """Start again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cover(Action):
+    """Cover or uncover every reflector of the hall, from the next scan on."""
+
+    covered: bool
+    """Whether no reflector can be seen."""

@@ -1,0 +1,62 @@
+"""The supervisor's badge in the bar at the top: operational or fail, and 2-sigma against its limits."""
+
+from __future__ import annotations
+
+import math
+
+from viser import GuiApi
+
+from commission.app.base import theme
+from commission.app.base.panel import BasePanel, escaped
+from commission.app.base.view import PageView
+from commission.app.run.view import RunView
+from commission.localization.estimate import Mode
+
+
+def badge_text(view: PageView) -> tuple[str, str, str]:
+    """Return the badge's word, what stands beside it, and its color."""
+    run, limits = view.part(RunView), view.state.project.parameters.supervisor
+    if run is None or run.estimate is None:
+        under_way = [escaped(job.line) for job in view.jobs]
+        return ("PREPARING" if under_way else "NO RUN"), "; ".join(under_way), theme.IDLE_COLOR
+    x, y, heading = run.series.two_sigma[-1]
+    beside = (
+        f"2σ {max(x, y) * 1000:.0f} / {limits.position_limit * 1000:.0f} mm"
+        f" &nbsp; {math.degrees(heading):.2f} / {math.degrees(limits.heading_limit):.1f} °"
+    )
+    if run.mode is Mode.FAIL:
+        lived = [episode for episode in run.episodes if episode[0] <= run.time]
+        since = f" {run.time - lived[-1][0]:.0f} s" if lived else ""
+        return f"FAIL{since}", beside, theme.FAIL_COLOR
+    return "OPERATIONAL", beside, theme.OPERATIONAL_COLOR
+
+
+class Badge(BasePanel):
+    """The badge, and the numbers beside it."""
+
+    def __init__(self, gui: GuiApi) -> None:
+        self._badge = gui.add_html("")
+        self._shown = ("", "")
+
+    def draw(self, view: PageView) -> None:
+        """Show the supervisor's state without delay."""
+        word, beside, color = badge_text(view)
+        if (word, color) == self._shown:
+            return
+        self._shown = (word, color)
+        self._show_badge(word, beside, color)
+
+    def _show_badge(self, word: str, beside: str, color: str) -> None:
+        """Write the badge: in the row with the buttons, because above them it would cover them on a small screen."""
+        self._badge.content = (
+            "<div style='display:flex;align-items:center;gap:12px;margin-right:24px;white-space:nowrap'>"
+            f"<span class='c-badge' style='background:{color};color:#fff;font-weight:700;font-size:15px;"
+            f"letter-spacing:.1em;padding:3px 20px;border-radius:3px'>{word}</span>"
+            "<span class='c-beside' style='font-size:12px;opacity:.8;font-variant-numeric:tabular-nums;"
+            "min-width:130px'>"
+            f"{beside}</span></div>"
+        )
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Show the numbers beside the badge."""
+        self._show_badge(*badge_text(view))

@@ -1,0 +1,41 @@
+"""The run: what drives, the localizer over it, its time line, curves and marks on the floor."""
+
+from __future__ import annotations
+
+from commission.app.base.feature import RUN, TIME, Docked, Feature
+from commission.app.run import reducer
+from commission.app.run.accumulated_layer import AccumulatedLayer
+from commission.app.run.badge import Badge
+from commission.app.run.detection_layer import DetectionLayer
+from commission.app.run.gate_layer import GateLayer
+from commission.app.run.plots import Plots
+from commission.app.run.run_panel import RunPanel
+from commission.app.run.scan_layer import ScanLayer
+from commission.app.run.service import RunService
+from commission.app.run.state import RunState
+from commission.app.run.time_line import TimeLine
+from commission.app.run.trail_layers import ReferenceLayer, TrailLayer
+from commission.app.run.uncertainty_layer import UncertaintyLayer
+from commission.app.run.vehicle_layer import VehicleLayer
+
+FEATURE = Feature(
+    "run",
+    reducers=(reducer,),
+    services=(RunService,),
+    layers=(
+        GateLayer,
+        ScanLayer,
+        DetectionLayer,
+        AccumulatedLayer,
+        VehicleLayer,
+        UncertaintyLayer,
+        TrailLayer,
+        ReferenceLayer,
+    ),
+    panels=(
+        Docked(lambda at: Badge(at.gui), None, 10),
+        Docked(lambda at: RunPanel(at.gui, at.post, at.state), RUN),
+        Docked(lambda at: TimeLine(at.gui, at.post, at.state.part(RunState).speed), TIME, 10),
+        Docked(lambda at: Plots(at.gui), TIME, 20),
+    ),
+)

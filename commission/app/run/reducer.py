@@ -1,0 +1,73 @@
+"""What the actions of the run mean. Pure; importing it registers them with `reduce`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from commission.app.base.actions import Sender
+from commission.app.base.reducer import Outcome, reduce
+from commission.app.base.state import AppState
+from commission.app.run import actions
+from commission.app.run.effects import LoadSource, MoveTo, ProcessOneScan
+from commission.app.run.state import SPEEDS, RunState
+
+
+def _with(state: AppState, **changes: Any) -> AppState:
+    """Return the state with the run asked to do something else."""
+    return state.with_part(replace(state.part(RunState), **changes))
+
+
+@reduce.register
+def choose_source(action: actions.ChooseSource, state: AppState, _sender: Sender) -> Outcome:
+    """Load what drives."""
+    if isinstance(action.source, actions.VirtualDrive):
+        state.project.route(action.source.route)
+    return Outcome(_with(state, source=action.source), (LoadSource(action.source),))
+
+
+@reduce.register
+def play(action: actions.Play, state: AppState, _sender: Sender) -> Outcome:
+    """Start or stop the play clock."""
+    playing = not state.part(RunState).playing if action.playing is None else action.playing
+    return Outcome(_with(state, playing=playing))
+
+
+@reduce.register
+def step_scan(_action: actions.StepScan, state: AppState, _sender: Sender) -> Outcome:
+    """Pause and go on by one scan."""
+    return Outcome(_with(state, playing=False), (ProcessOneScan(),))
+
+
+@reduce.register
+def set_speed(action: actions.SetSpeed, state: AppState, _sender: Sender) -> Outcome:
+    """Let the play clock run at another speed."""
+    if not SPEEDS[0] <= action.factor <= SPEEDS[-1]:
+        raise ValueError(f"speed is {action.factor:g}; expected {SPEEDS[0]:g} to {SPEEDS[-1]:g} times real time")
+    return Outcome(_with(state, speed=action.factor))
+
+
+@reduce.register
+def seek(action: actions.Seek, state: AppState, _sender: Sender) -> Outcome:
+    """Go to a time of the drive."""
+    if not action.time >= 0.0:
+        raise ValueError(f"time is {action.time:g}; expected 0 s or more")
+    return Outcome(state, (MoveTo(action.time),))
+
+
+@reduce.register
+def restart(_action: actions.Restart, state: AppState, _sender: Sender) -> Outcome:
+    """Begin again."""
+    return Outcome(state, (MoveTo(0.0, afresh=True),))
+
+
+@reduce.register
+def repeat(action: actions.Repeat, state: AppState, _sender: Sender) -> Outcome:
+    """Choose what happens at the end of the drive."""
+    return Outcome(_with(state, repeat=action.repeat))
+
+
+@reduce.register
+def cover(action: actions.Cover, state: AppState, _sender: Sender) -> Outcome:
+    """Cover or uncover the reflectors."""
+    return Outcome(_with(state, covered=action.covered))

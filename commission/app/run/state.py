@@ -1,0 +1,26 @@
+"""What the run is asked to do: the feature's part of the page's state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from commission.app.run.actions import Source
+
+SPEEDS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+"""Factors that the play clock offers."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunState:
+    """Source and play clock."""
+
+    source: Source | None = None
+    """What drives."""
+    playing: bool = False
+    """Whether the play clock runs."""
+    speed: float = 1.0
+    """Factor of the play clock against real time."""
+    repeat: bool = False
+    """Whether the drive starts again at its end."""
+    covered: bool = False
+    """Whether every reflector is covered."""
