@@ -50,7 +50,13 @@ class Block:
         return len(self.lines)
 
     def error(self, row: int, column: str, problem: str, remedy: str) -> FileFormatError:
-        """Error in a cell."""
+        """Error in a cell.
+
+        Parameters
+        ----------
+        row, column : index of the row in this block, name of the column.
+        problem, remedy : what was found, what is expected.
+        """
         return FileFormatError(self.path, f"line {self.lines[row]}, column {column}", problem, remedy)
 
     def texts(self, column: str) -> list[str]:
@@ -58,7 +64,18 @@ class Block:
         return [cell.strip() for cell in self.columns[column]]
 
     def numbers(self, column: str, unit: str, *, empty: float | None = None) -> FloatArray:
-        """(N,) finite numbers of a column; empty cells become `empty`, or are errors when it is None."""
+        """Finite numbers of a column.
+
+        Parameters
+        ----------
+        column : its name.
+        unit : for the message.
+        empty : what an empty cell counts as; None: an error.
+
+        Returns
+        -------
+        values : (N,) array.
+        """
         cells = self.columns[column]
         if self.decimal_comma:
             self._refuse_doubtful_thousands(column, cells, unit)

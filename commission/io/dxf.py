@@ -94,7 +94,14 @@ class Drawing:
     def floor_map(
         self, resolution: float, layers: Collection[str] | None = None, progress: Progress = silent
     ) -> FloorMap:
-        """Outline of the named layers (all visible ones when None) in cells of `resolution` [m]; see `outline_map`."""
+        """Outline of what is on some layers, see `outline_map`.
+
+        Parameters
+        ----------
+        resolution : edge of a cell [m].
+        layers : names; all visible ones when None.
+        progress : told how far it is; may raise to cancel.
+        """
         return outline_map(self.on(layers), resolution, self.path, progress)
 
 

@@ -27,7 +27,14 @@ class Corner:
 
 
 def polyline(corners: list[Corner], closed: bool, plane: Affine) -> Iterator[Shape]:
-    """Center line of a thin polyline, outlines of the stretches of a wide one: a wall drawn with its thickness."""
+    """Center line of a thin polyline, outlines of the stretches of a wide one: a wall drawn with its thickness.
+
+    Parameters
+    ----------
+    corners : with widths and bulges.
+    closed : whether the last is joined to the first.
+    plane : where the drawing's plane lies.
+    """
     if any(width > 0.0 for corner in corners for width in corner.widths):
         yield from _outlines(corners, closed, plane)
     else:

@@ -122,7 +122,15 @@ def through(plane: Affine, arc: Arc) -> Arc:
 
 
 def bulged(points: list[Point], bulges: list[float], closed: bool, plane: Affine) -> Iterator[Shape]:
-    """Straight runs and arcs; a bulge is the tangent of a quarter of the arc's angle, positive to the left."""
+    """Straight runs and arcs.
+
+    Parameters
+    ----------
+    points : the corners.
+    bulges : per corner, of the stretch after it: tangent of a quarter of the arc's angle, positive to the left.
+    closed : whether the last is joined to the first.
+    plane : where the drawing's plane lies.
+    """
     if closed and points:
         points = [*points, points[0]]
     run: list[Point] = points[:1]

@@ -100,7 +100,13 @@ class Picture:
         return self.on_black > 255.0 * threshold if light_walls else self.on_white < 255.0 * threshold
 
     def floor_map(self, placement: ImagePlacement, *, threshold: float = 0.5, light_walls: bool = False) -> FloorMap:
-        """Return the picture as a floor map with one cell for each pixel; see `walls` for the options."""
+        """Return the picture as a floor map with one cell for each pixel.
+
+        Parameters
+        ----------
+        placement : where it lies, and how large a pixel is.
+        threshold, light_walls : as in `walls`.
+        """
         walls = self.walls(threshold, light_walls=light_walls)
         cells = np.where(np.flipud(walls), np.int8(OCCUPIED), np.int8(FREE))
         return FloorMap(cells, placement.resolution, placement.origin(len(cells)))

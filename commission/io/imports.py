@@ -113,7 +113,18 @@ def read_pasted(text: str, *, progress: Progress = silent) -> Imported:
 
 
 def read_named(path: Path, choice: LayoutChoice = WHOLE, *, progress: Progress = silent) -> Imported:
-    """Read a file of the computer that serves the page; see `read_import`."""
+    """Read a file of the computer that serves the page.
+
+    Parameters
+    ----------
+    path : as the engineer typed it.
+    choice, progress : as in `read_import`.
+
+    Raises
+    ------
+    FileFormatError
+        as `read_import`, or the file is of a kind that is not read here.
+    """
     with suppress(RuntimeError):  # there is no such user: then the file does not exist either
         path = path.expanduser()
     if path.suffix.lower() not in _FORMATS:

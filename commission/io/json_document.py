@@ -86,7 +86,13 @@ class Fields:
         return Fields(self.path, where or self.where, _stripped(value), self.found)
 
     def mappings(self, key: str, kind: str = "", name: str = "") -> Iterator[Fields]:
-        """Objects in the list under a key, called by `kind` and the value of their key `name`; others are noted."""
+        """Objects in the list under a key; what else is in it is noted.
+
+        Parameters
+        ----------
+        key : of the list.
+        kind, name : notes about an object call it by this kind and the value of its key `name`.
+        """
         values = self.values.get(key)
         if values is None:
             return

@@ -99,7 +99,14 @@ class Model:
         return np.concatenate(pieces)
 
     def floor_map(self, heights: tuple[float, ...], resolution: float, progress: Progress = silent) -> FloorMap:
-        """Outline at one or several heights [m] in cells of `resolution` [m]; see `outline_map`."""
+        """Outline of a model's sections, see `outline_map`.
+
+        Parameters
+        ----------
+        heights : one or several [m].
+        resolution : edge of a cell [m].
+        progress : told how far it is; may raise to cancel.
+        """
         segments = [self.section(height, progress) for height in heights]
         if not any(map(len, segments)):
             (_, _, low), (_, _, high) = self.bounds.tolist()

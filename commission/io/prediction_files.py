@@ -69,7 +69,14 @@ def write_prediction(
 def summary(
     route: str, prediction: RoutePrediction, errors: PredictedErrors
 ) -> dict[str, str | int | float | list[float]]:
-    """Return what a prediction comes to; metres, seconds and radians."""
+    """Return what a prediction comes to; metres, seconds and radians.
+
+    Parameters
+    ----------
+    route : its name.
+    prediction : what the filter will say.
+    errors : how far it will be off.
+    """
     x, y, theta = (float(value) for value in prediction.two_sigma.max(axis=0))
     error_x, error_y, error_theta = (float(value) for value in errors.two_sigma.max(axis=0))
     return {

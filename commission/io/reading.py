@@ -27,7 +27,14 @@ def read_bytes(path: Path, limit: int) -> bytes:
 
 
 def read_text(path: Path, limit: int, found: Findings | None = None) -> str:
-    """Read a whole text of at most `limit` bytes, with or without byte-order mark; see `decoded`."""
+    """Read a whole text, with or without byte-order mark.
+
+    Parameters
+    ----------
+    path : the file.
+    limit : largest size [bytes].
+    found : as in `decoded`.
+    """
     return decoded(path, 1, read_bytes(path, limit).removeprefix(codecs.BOM_UTF8), found)
 
 

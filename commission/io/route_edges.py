@@ -266,7 +266,14 @@ def unique(name: str, taken: set[str]) -> str:
 
 
 def note_corners(name: str, edges: Sequence[Edge], found: Findings) -> None:
-    """Note where a vehicle would have to turn on the spot."""
+    """Note where a vehicle would have to turn on the spot.
+
+    Parameters
+    ----------
+    name : of the route, for the note.
+    edges : in the order in which they are driven.
+    found : where it is noted.
+    """
     for before, after in itertools.pairwise(edges):
         angle = turn(before.segment, after.segment)
         if angle > CORNER:

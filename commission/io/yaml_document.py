@@ -64,7 +64,13 @@ class YamlDocument:
         return ", ".join(part for part in (f"line {self.lines.get(known, 1)}", name) if part)
 
     def error(self, key_path: KeyPath, problem: str, remedy: str) -> FileFormatError:
-        """Error at a key of this file."""
+        """Error at a key of this file.
+
+        Parameters
+        ----------
+        key_path : where the key is.
+        problem, remedy : what was found, what is expected.
+        """
         return FileFormatError(self.path, self.place(key_path), problem, remedy)
 
 

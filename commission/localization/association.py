@@ -52,7 +52,13 @@ def gate_of(parameters: AssociationParameters) -> Gate:
 
 @compiled_inline
 def viewpoint(belief: PoseGaussian, model: ObservationModel) -> Viewpoint:
-    """Return the scanner's place and the largest 1-sigma of its position and heading."""
+    """Scanner's place, and the largest 1-sigma of its position and heading.
+
+    Notes
+    -----
+    sigma^2 = (a + c) / 2 + sqrt(((a - c) / 2)^2 + b^2) of J P J^T = [[a, b], [b, c]], J = [[1, 0, -oy], [0, 1, ox]]:
+    the larger eigenvalue of the scanner's position covariance, derived from the lever (ox, oy) of the scanner.
+    """
     offset_x, offset_y = scanner_offset(belief.theta, model)
     # The scanner moves by (-offset_y, offset_x) per radian of heading.
     xx = belief.xx - 2.0 * offset_y * belief.xt + offset_y * offset_y * belief.tt
@@ -69,8 +75,19 @@ def search_radius(
 ) -> float:
     """Distance on the floor, from a detection, within which every reflector of Mahalanobis distance <= d2 lies [m].
 
-    Each innovation is at most sqrt(d2) of its own sigma. The sigma of the range is bounded by that of the scanner's
-    position; the sigma of the bearing too, seen from the nearest range that the first bound leaves.
+    Parameters
+    ----------
+    d2 : largest squared Mahalanobis distance.
+    measured_range : of the detection [m].
+    view : scanner's place and the bounds of its uncertainty.
+    model : of the observation.
+    largest_variance : of all surveyed places, each axis [m^2].
+
+    Notes
+    -----
+    sqrt(u^2 + r (r + u) c^2), u = sqrt(d2 var_r), c the chord of a turn by sqrt(d2 var_b). Derived: each innovation is
+    at most sqrt(d2) of its own sigma. The sigma of the range is bounded by that of the scanner's position; the sigma of
+    the bearing too, seen from the nearest range that the first bound leaves.
     """
     range_variance = view.position_sigma * view.position_sigma + model.range_variance + largest_variance
     depth = math.sqrt(d2 * range_variance)
@@ -98,7 +115,21 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     view: Viewpoint,
     model: ObservationModel,
 ) -> tuple[float, float]:
-    """Squared Mahalanobis distance to one reflector, and -2 ln(likelihood) up to a constant: d2 + ln(det S / det R)."""
+    """Squared Mahalanobis distance to one reflector, and -2 ln(likelihood) up to a constant.
+
+    Parameters
+    ----------
+    belief : the detection is judged at it.
+    measured_range, measured_bearing : range bias already taken off [m], [rad].
+    x, y : the reflector's center [m], map frame.
+    surveyed_variance : of the reflector's place, each axis [m^2].
+    view, model : scanner's place, and model of the observation.
+
+    Notes
+    -----
+    d2 = v^T S^-1 v, and d2 + ln(det S / det R): Sobreira et al. 2016, Algorithm 3, line 4, with the power -1/2 that its
+    likelihood lacks.
+    """
     expected = expect(belief.x, belief.y, belief.theta, view.offset_x, view.offset_y, x, y, model.mount_theta)
     v = innovation(belief, expected, measured_range, measured_bearing, surveyed_variance, model)
     d2 = squared_distance(v)
@@ -117,13 +148,25 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     places: FloatArray,
     cell_offsets: IntArray,
 ) -> tuple[int, float]:
-    """Most likely reflector of the whole map (line 4), found near the detection: its row in `places`, and d2.
+    """Most likely reflector of the whole map, found near the detection: its row in `places`, and d2.
 
     First those that may be inside the gate. A reflector outside the gate may still be more likely than one inside,
     when its det S is smaller; since S >= R, it must then lie within d2 <= cost of the best so far: if that reaches
     farther than the first search, search again. Equal to a search over all reflectors whenever the result is inside
     the gate, or the filter is disabled; of equals it is the first in the map. Otherwise the detection is an outlier,
     and the result is the most likely of those near it, for the engineer to see, or NOBODY and NaN.
+
+    Parameters
+    ----------
+    belief : the detection is judged at it.
+    measured_range, measured_bearing : range bias already taken off [m], [rad].
+    view, model : scanner's place, and model of the observation.
+    gate : of the association filter.
+    cells, places, cell_offsets : the map, see `ReflectorIndex`.
+
+    Notes
+    -----
+    argmin over reflectors of d2 + ln(det S), see `score`: Sobreira et al. 2016, Algorithm 3, line 4.
     """
     direction = belief.theta + model.mount_theta + measured_bearing
     px = belief.x + view.offset_x + measured_range * math.cos(direction) - cells.origin_x
@@ -169,11 +212,15 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
     entries: IntArray,
     d2: FloatArray,
 ) -> None:
-    """Associate the detections `first` to `last` (excluded) of one scan, all at the predicted belief.
+    """Associate the detections of one scan, all at the predicted belief.
 
     Parameters
     ----------
+    belief : after *predict*.
+    first, last : rows of the scan's detections, the last one excluded.
     detections : (n, 2) measured range and bearing.
+    model : of the observation.
+    gate : of the association filter.
     cells, places, cell_offsets : the map, see `ReflectorIndex`.
     status : (n,) in: INLIER or OUTLIER_DETECTOR, the latter is left alone; out: a `Status`.
     entries : (n,) out: row of `places`, or NOBODY.
@@ -181,6 +228,8 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
 
     Notes
     -----
+    Inlier if d2 <= gate of the most likely reflector: Sobreira et al. 2016, Algorithm 3, line 6.
+
     A reflector is one cluster in a scan. Where two inliers claim the same one, the paper uses both; here the nearer
     one in the Mahalanobis sense stays and the other becomes an outlier of the association filter, because one of them
     is a false reflector beside the true one. With the filter disabled both stay, as in the paper.

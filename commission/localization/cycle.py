@@ -33,7 +33,15 @@ class Cycle(NamedTuple):
 def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
     state: FilterState, stamp_ns: int, dx: float, dy: float, dtheta: float, noise: OdometryNoise
 ) -> FilterState:
-    """Predict over the motion of an odometry record (Algorithm 1, lines 2 to 4)."""
+    """Predict over the motion of an odometry record: `advance`, in the filter's state.
+
+    Parameters
+    ----------
+    state : before the record.
+    stamp_ns : of the record [ns].
+    dx, dy, dtheta : its displacement [m, m, rad].
+    noise : variances per metre, radian and second.
+    """
     belief, motion = advance(state.belief, state.motion, stamp_ns, dx, dy, dtheta, noise)
     return FilterState(
         belief, stamp_ns, motion, state.mode, state.output, state.output_ns, stamp_ns, state.sensor_detects
@@ -54,16 +62,23 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     reflectors: IntArray,
     d2: FloatArray,
 ) -> Cycle:
-    """Process the detections `first` to `last` (excluded) of a scan (Algorithms 1, 3 and 4).
+    """Process the detections of a scan.
 
     Parameters
     ----------
     state : after everything before this scan.
+    stamp_ns : of the scan [ns].
+    first, last : rows of the scan's detections, the last one excluded.
     detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
+    model : of the whole filter.
     places, cell_offsets : the map, see `ReflectorIndex`.
     status : (n,) in: INLIER or OUTLIER_DETECTOR; out: a `Status`.
     reflectors : (n,) out: index into the reflector map, or -1.
     d2 : (n,) out: squared Mahalanobis distance at the prior, NaN for none.
+
+    Notes
+    -----
+    No formula: `reach`, `associate`, `correct` and `supervise` in turn: Sobreira et al. 2016, Algorithms 1, 3 and 4.
     """
     prior, motion = reach(state.belief, state.motion, stamp_ns, model.odometry)
     associate(

@@ -76,7 +76,14 @@ class DetectedReflectors:
 
 
 def detector_model(reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorParameters) -> DetectorModel:
-    """Return the distinct radii and kinds of a map, and the detector's tolerances."""
+    """Return the distinct radii and kinds of a map, and the detector's tolerances.
+
+    Parameters
+    ----------
+    reflectors : their radii and kinds are looked at.
+    scanner : width and noise of its beams.
+    parameters : window of the detector filter and rule for the center.
+    """
     flat_of = reflectors.is_flat
     classes = sorted({(float(radius), bool(flat)) for radius, flat in zip(reflectors.radii, flat_of, strict=True)})
     radii = np.array([radius for radius, _ in classes], dtype=np.float64)
@@ -96,7 +103,18 @@ def detector_model(reflectors: ReflectorMap, scanner: Scanner, parameters: Detec
 
 
 def beams_of(count: int, angle_min: float, increment: float) -> Beams:
-    """Return the bearings of a scan for the kernels; raises ValueError when the beams do not advance."""
+    """Return the bearings of a scan for the kernels.
+
+    Parameters
+    ----------
+    count : beams of a scan.
+    angle_min, increment : first bearing and step between beams [rad].
+
+    Raises
+    ------
+    ValueError
+        the beams do not advance.
+    """
     if not (math.isfinite(angle_min) and math.isfinite(increment) and increment != 0.0):
         raise ValueError(f"scan starts at {angle_min} rad with steps of {increment} rad; expected a finite step, not 0")
     step = abs(increment)
@@ -110,7 +128,18 @@ def reflective_beams(
     reflector: NDArray[np.bool_] | None,
     threshold: float,
 ) -> NDArray[np.bool_]:
-    """Which beams met something reflective: the scanner's flag, else echoes at least as strong as the threshold."""
+    """Which beams met something reflective: the scanner's flag, else echoes at least as strong as the threshold.
+
+    Parameters
+    ----------
+    ranges : (..., B) array [m].
+    intensities, reflector : (..., B) arrays, or None where the scanner has none; without either no beam did.
+    threshold : smallest intensity of a reflector, in the scanner's own unit.
+
+    Returns
+    -------
+    flags : (..., B) array.
+    """
     if reflector is not None:
         return read_only(np.asarray(reflector, dtype=np.bool_))
     if intensities is not None:
@@ -144,7 +173,18 @@ def detect(scan: Scan, model: DetectorModel, parameters: DetectorParameters) -> 
 
 @compiled_inline
 def expected_beams(distance: float, radius: float, increment: float) -> int:
-    """Beams that a reflector of a radius intercepts at a distance (equation 3)."""
+    """Beams that a reflector intercepts.
+
+    Parameters
+    ----------
+    distance : to its center [m].
+    radius : of the reflector [m].
+    increment : step between beams [rad].
+
+    Notes
+    -----
+    floor(2 asin(radius / distance) / increment): Sobreira et al. 2016, equation 3.
+    """
     return math.floor(2.0 * math.asin(min(1.0, radius / max(distance, radius))) / abs(increment))
 
 
@@ -201,7 +241,18 @@ def _start_of_turn(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams:
 
 @compiled
 def count_clusters(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, model: DetectorModel) -> int:
-    """Count the clusters in a scan, to reserve space for them."""
+    """Count the clusters in a scan, to reserve space for them.
+
+    Parameters
+    ----------
+    ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
+    beams : bearings of the scan.
+    model : the largest jump of the range within a cluster is read.
+
+    Notes
+    -----
+    No formula: what a cluster is, is said at the top of the module (Sobreira et al. 2016, Algorithm 2, lines 2 and 3).
+    """
     position = _start_of_turn(ranges, flags, beams)
     end = position + beams.used if beams.full_turn else beams.used
     found = 0
@@ -224,7 +275,23 @@ def detect_clusters(  # noqa: PLR0917 - outputs are written into the arrays of t
     widths: IntArray,
     status: NDArray[np.int8],
 ) -> int:
-    """Write center, width and status of each cluster of a scan from `row` on; return the row after the last."""
+    """Write center, width and status of each cluster of a scan; return the row after the last.
+
+    Parameters
+    ----------
+    ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
+    beams : bearings of the scan.
+    model : classes of reflectors and tolerances.
+    row : of the first cluster in the outputs.
+    range_bearing : (n, 2) output: center [m, rad], scanner frame.
+    widths : (n,) output: [beams].
+    status : (n,) output: INLIER or OUTLIER_DETECTOR.
+
+    Notes
+    -----
+    Inlier if -min_model_error <= counted - expected beams <= max_model_error: Sobreira et al. 2016, Algorithm 2, line
+    7, whose lower bound is printed without its sign.
+    """
     position = _start_of_turn(ranges, flags, beams)
     end = position + beams.used if beams.full_turn else beams.used
     while position < end:

@@ -56,13 +56,19 @@ def innovation(  # noqa: PLR0917 - a measurement, number by number
     surveyed_variance: float,
     model: ObservationModel,
 ) -> Innovation:
-    """Innovation of a detection against one reflector, with S of Algorithm 1 line 8.
+    """Innovation of a detection against one reflector, with its covariance.
 
     Parameters
     ----------
+    belief : before the correction.
     expected : observation of the reflector expected from the mean of `belief`.
     measured_range, measured_bearing : range bias already taken off [m], [rad].
     surveyed_variance : of the reflector's place, each axis [m^2]; adds to R.
+    model : of the observation.
+
+    Notes
+    -----
+    v = z - h, S = H P H^T + R: Sobreira et al. 2016, Algorithm 1, lines 7 and 8. S is factored as L D L^T.
     """
     e = expected
     range_noise = model.range_variance + surveyed_variance
@@ -97,7 +103,12 @@ def innovation(  # noqa: PLR0917 - a measurement, number by number
 
 @compiled_inline
 def squared_distance(given: Innovation) -> float:
-    """Squared Mahalanobis distance of an innovation (NIS, 2 degrees of freedom)."""
+    """Squared Mahalanobis distance of an innovation (NIS, 2 degrees of freedom).
+
+    Notes
+    -----
+    v^T S^-1 v = v_r^2 / S_rr + (v_b - w v_r)^2 / schur with w = S_rb / S_rr: solved with S = L D L^T, by definition.
+    """
     rest = given.bearing - given.w * given.range
     return given.range * given.range / given.s_rr + rest * rest / given.schur
 
@@ -112,7 +123,21 @@ def correct(  # noqa: PLR0917 - a measurement and a reflector, number by number
     surveyed_variance: float,
     model: ObservationModel,
 ) -> PoseGaussian:
-    """Correct a belief by one detection of one reflector, linearized at that belief; Joseph form."""
+    """Correct a belief by one detection of one reflector, linearized at that belief.
+
+    Parameters
+    ----------
+    belief : before the correction.
+    measured_range, measured_bearing : range bias already taken off [m], [rad].
+    reflector_x, reflector_y : the reflector's center [m], map frame.
+    surveyed_variance : of the reflector's place, each axis [m^2]; adds to R.
+    model : of the observation.
+
+    Notes
+    -----
+    x = x + K v, and P as in `corrected_covariance`: Sobreira et al. 2016, Algorithm 1, lines 16 and 17, at the freshest
+    state.
+    """
     offset_x, offset_y = scanner_offset(belief.theta, model)
     e = expect(belief.x, belief.y, belief.theta, offset_x, offset_y, reflector_x, reflector_y, model.mount_theta)
     v = innovation(belief, e, measured_range, measured_bearing, surveyed_variance, model)
@@ -133,7 +158,12 @@ def correct(  # noqa: PLR0917 - a measurement and a reflector, number by number
 
 @compiled_inline
 def gain(given: Innovation) -> Gain:
-    """K = P H^T S^-1, a row per state, solved with the factors of S."""
+    """Kalman gain, a row per state, solved with the factors of S.
+
+    Notes
+    -----
+    K = P H^T S^-1: Sobreira et al. 2016, Algorithm 1, line 15.
+    """
     v = given
     xb, yb = _second(v.range_px, v.bearing_px, v), _second(v.range_py, v.bearing_py, v)
     tb = _second(v.range_pt, v.bearing_pt, v)
@@ -151,7 +181,7 @@ def gain(given: Innovation) -> Gain:
 def corrected_covariance(
     p: PoseGaussian, e: Expected, k: Gain, range_noise: float, bearing_noise: float
 ) -> tuple[float, float, float, float, float, float]:
-    """Upper triangle after a correction with any gain (Joseph form): A P A^T + K R K^T with A = I - K H.
+    """Upper triangle of the covariance after a correction with any gain.
 
     Parameters
     ----------
@@ -159,6 +189,10 @@ def corrected_covariance(
     e : its Jacobian is H.
     k : gain, of this covariance or of another one.
     range_noise, bearing_noise : R [m^2], [rad^2].
+
+    Notes
+    -----
+    A P A^T + K R K^T with A = I - K H: Joseph form (Bar-Shalom, Li, Kirubarajan 2001, equation 5.2.3-18).
     """
     a00 = 1.0 - k.xr * e.range_x - k.xb * e.bearing_x
     a01 = -k.xr * e.range_y - k.xb * e.bearing_y

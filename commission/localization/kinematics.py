@@ -78,10 +78,21 @@ def body_twist(vehicle: Vehicle, wheels: ArrayLike) -> FloatArray:
 
 
 def displacement(vehicle: Vehicle, wheels: ArrayLike, seconds: float) -> FloatArray:
-    """Motion of the base while the wheels keep their speeds: (3,) pose of base afterwards in base before [m, m, rad].
+    """Motion of the base while the wheels keep their speeds: pose of base afterwards in base before.
 
-    The exact arc. The centered difference of Sobreira et al. 2016 (section 4.1: half the turn, the whole way, half
-    the turn) is its approximation of second order in the turn.
+    Parameters
+    ----------
+    vehicle, wheels : as in `body_twist`.
+    seconds : how long they keep them [s].
+
+    Returns
+    -------
+    displacement : (3,) array [m, m, rad].
+
+    Notes
+    -----
+    exp(twist seconds), the exact arc. The centered difference of Sobreira et al. 2016 (section 4.1: half the turn, the
+    whole way, half the turn) is its approximation of second order in the turn.
     """
     return se2.exp(body_twist(vehicle, wheels) * seconds)
 

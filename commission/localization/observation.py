@@ -57,7 +57,12 @@ def observation_model(scanner: Scanner, parameters: ObservationParameters) -> Ob
 
 @compiled_inline
 def scanner_offset(theta: float, model: ObservationModel) -> tuple[float, float]:
-    """Scanner's place seen from base, map axes [m]."""
+    """Scanner's place seen from base, map axes [m].
+
+    Notes
+    -----
+    R(theta) m with m the mounting, by definition.
+    """
     c, s = math.cos(theta), math.sin(theta)
     return c * model.mount_x - s * model.mount_y, s * model.mount_x + c * model.mount_y
 
@@ -66,13 +71,19 @@ def scanner_offset(theta: float, model: ObservationModel) -> tuple[float, float]
 def expect(  # noqa: PLR0917 - a pose and a point, number by number
     x: float, y: float, theta: float, offset_x: float, offset_y: float, target_x: float, target_y: float, mount: float
 ) -> Expected:
-    """Range and bearing of a point seen by the scanner, with the Jacobian (Algorithm 1, line 7).
+    """Range and bearing of a point seen by the scanner, with the Jacobian.
 
     Parameters
     ----------
-    x, y, theta : pose of base in map; offset_x, offset_y : `scanner_offset` of it.
+    x, y, theta : pose of base in map [m, m, rad].
+    offset_x, offset_y : `scanner_offset` of it [m].
     target_x, target_y : point [m], map frame.
     mount : heading of the scanner in the base frame [rad].
+
+    Notes
+    -----
+    h = (|d|, atan2(d_y, d_x) - theta - mount), d = target - scanner: Sobreira et al. 2016, equation 2; H its derivative
+    (Algorithm 1, line 7).
     """
     dx, dy = target_x - (x + offset_x), target_y - (y + offset_y)
     distance = math.sqrt(dx * dx + dy * dy)
@@ -113,6 +124,10 @@ def range_bearing(T_map_base: ArrayLike, mounting: ArrayLike, points_map: ArrayL
 
 def jacobians(T_map_base: ArrayLike, mounting: ArrayLike, points_map: ArrayLike) -> FloatArray:
     """Jacobian of `range_bearing` with respect to `T_map_base`.
+
+    Parameters
+    ----------
+    T_map_base, mounting, points_map : as in `range_bearing`.
 
     Returns
     -------
@@ -189,6 +204,7 @@ def project_detections(
     means : (K, 3) poses of base in map [m, m, rad].
     offsets : (K + 1,) rows of `detections` that belong to each.
     detections : (n, 2) range [m] and bearing [rad], scanner frame, as measured; the range bias is taken off.
+    model : mounting of the scanner and range bias.
 
     Returns
     -------

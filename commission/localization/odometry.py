@@ -64,7 +64,16 @@ def odometry_noise(parameters: OdometryParameters) -> OdometryNoise:
 
 @compiled_inline
 def arc_length(dx: float, dy: float, dtheta: float) -> float:
-    """Length of the arc [m] that leads to a displacement, from its chord and its turn."""
+    """Length of the arc that leads to a displacement, from its chord and its turn [m].
+
+    Parameters
+    ----------
+    dx, dy, dtheta : displacement [m, m, rad].
+
+    Notes
+    -----
+    |d| h / sin(h) with h = dtheta / 2: chord = 2 r sin(h) and arc = 2 r h, by definition of a circle.
+    """
     half = 0.5 * wrap_scalar(dtheta)
     chord = math.sqrt(dx * dx + dy * dy)
     if abs(half) < 0.05:
@@ -78,12 +87,24 @@ def arc_length(dx: float, dy: float, dtheta: float) -> float:
 def predict(  # noqa: PLR0917 - a displacement, number by number
     belief: PoseGaussian, dx: float, dy: float, dtheta: float, seconds: float, noise: OdometryNoise
 ) -> PoseGaussian:
-    """Move a belief by a displacement that took some time (equation 1, Algorithm 1 lines 3 and 4).
+    """Move a belief by a displacement that took some time.
 
     The mean is composed exactly. All variances are linear in distance, angle and time, and act halfway: along the
     motion and across it, along the vehicle's axis at half the turn, and as a heading error whose lever is half the
     way. Heading errors in truth arise all along the way: their lever is spread evenly and has the second moment 1/3,
     not 1/4. With that, a straight motion split anyhow gives the same covariance, and a curved one nearly so.
+
+    Parameters
+    ----------
+    belief : before the motion.
+    dx, dy, dtheta : displacement of base, in base before [m, m, rad].
+    seconds : how long it took [s].
+    noise : variances per metre, radian and second.
+
+    Notes
+    -----
+    P = F P F^T + Q with F = [[1, 0, -my], [0, 1, mx], [0, 0, 1]] and (mx, my) the motion in the map: Sobreira et al.
+    2016, equation 1 and Algorithm 1, lines 3 and 4; Q derived as said above.
     """
     x, y, theta = compose_scalars(belief.x, belief.y, belief.theta, dx, dy, dtheta)
     mx, my = x - belief.x, y - belief.y
@@ -122,9 +143,21 @@ def predict(  # noqa: PLR0917 - a displacement, number by number
 def advance(  # noqa: PLR0917 - one odometry record, number by number
     belief: PoseGaussian, motion: Motion, stamp_ns: int, dx: float, dy: float, dtheta: float, noise: OdometryNoise
 ) -> tuple[PoseGaussian, Motion]:
-    """Take in an odometry record: the motion from the record before to `stamp_ns`.
+    """Take in an odometry record: the motion from the record before to its stamp.
 
     The first record only starts the clock. What `reach` has applied in advance, of motion and of time, is taken off.
+
+    Parameters
+    ----------
+    belief, motion : before the record.
+    stamp_ns : of the record [ns].
+    dx, dy, dtheta : its displacement [m, m, rad].
+    noise : variances per metre, radian and second.
+
+    Notes
+    -----
+    predict(belief, ahead^-1 displacement): poses compose, so that `reach` and `advance` together are the record's
+    motion, by definition.
     """
     if not motion.started:
         return belief, Motion(True, stamp_ns, stamp_ns, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -144,6 +177,17 @@ def reach(belief: PoseGaussian, motion: Motion, stamp_ns: int, noise: OdometryNo
 
     The last displacement is continued at its speed, for at most as long as it took; time goes on beyond that. Nothing
     happens before the first odometry record or when the belief is about that stamp already.
+
+    Parameters
+    ----------
+    belief, motion : before the scan.
+    stamp_ns : of the scan [ns].
+    noise : variances per metre, radian and second.
+
+    Notes
+    -----
+    exp(share log(displacement)), share = time ahead / time of the displacement: motion at a constant twist (Solà et al.
+    2018, equations 156 to 158).
     """
     if not motion.started or stamp_ns <= motion.belief_ns:
         return belief, motion

@@ -64,6 +64,19 @@ def central_beam(  # noqa: PLR0917 - a scan, a cluster in it and the reflector
     """Center by the paper's rule: bearing of the central beam, its range plus the radius.
 
     Of an even number, the middle of the central two; where the central beam is a bridged one, of its neighbors.
+
+    Parameters
+    ----------
+    ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
+    count : beams of a turn, or of the scan.
+    first, last : the cluster's first and last beam, which count on past a full turn.
+    angle_min, increment : first bearing and step between beams [rad].
+    radius : of the reflector [m].
+
+    Notes
+    -----
+    r = ranges[(first + last) / 2] + radius, b = angle_min + increment (first + last) / 2: Sobreira et al. 2016,
+    Algorithm 2, line 5.
     """
     low, high = (first + last) // 2, (first + last + 1) // 2
     distance = _mean_range(ranges, flags, count, low, high)
@@ -82,7 +95,19 @@ def plate(  # noqa: PLR0917 - a scan and a cluster in it
     angle_min: float,
     increment: float,
 ) -> tuple[float, float]:
-    """Center of a flat plate: the middle of its beams, their mean range, no radius added."""
+    """Center of a flat plate: the middle of its beams, their mean range, no radius added.
+
+    Parameters
+    ----------
+    ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
+    count : beams of a turn, or of the scan.
+    first, last : the cluster's first and last beam, which count on past a full turn.
+    angle_min, increment : first bearing and step between beams [rad].
+
+    Notes
+    -----
+    r = mean of ranges, b = angle_min + increment (first + last) / 2, derived for a plate that is faced squarely.
+    """
     return _mean_range(ranges, flags, count, first, last), angle_min + 0.5 * increment * (first + last)
 
 
@@ -107,7 +132,21 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it, the reflector and th
     The echo of a beam comes from the middle of its lit part, which for the outer beams is nearer to the axis than the
     middle of the beam: taking the latter put posts at 15 to 20 m up to 9 mm too near. A beam counts the less the
     steeper the surface falls away under it, because the noise of its bearing then becomes noise of its range.
-    Gauss-Newton in range and bearing.
+
+    Parameters
+    ----------
+    ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
+    count : beams of a turn, or of the scan.
+    first, last : the cluster's first and last beam, which count on past a full turn.
+    angle_min, increment : first bearing and step between beams [rad].
+    radius : of the reflector [m].
+    model : width and noise of the beams.
+    full_turn : whether the last beam is the first one's neighbor.
+
+    Notes
+    -----
+    min over (r, b) of sum (range - echo(r, b))^2 / (var_r + slope^2 var_b) + (b - edges)^2 / var_edges: Gauss-Newton on
+    the maximum likelihood, derived.
     """
     middle = angle_min + 0.5 * increment * (first + last)
     mean = _mean_range(ranges, flags, count, first, last)

@@ -67,7 +67,18 @@ def build_index(reflectors: ReflectorMap) -> ReflectorIndex:
 
 @compiled_inline
 def cell_range(low: float, high: float, cell: float, count: int) -> tuple[int, int]:
-    """First and last of `count` cells that the interval [low, high] touches; last < first when none."""
+    """First and last cell that an interval touches; last < first when none.
+
+    Parameters
+    ----------
+    low, high : ends of the interval, from the first cell's edge [m].
+    cell : edge of a cell [m].
+    count : of cells.
+
+    Notes
+    -----
+    floor(low / cell) to floor(high / cell), clipped to 0 ... count - 1, by definition.
+    """
     first, last = low / cell, high / cell
     if first >= count or last < 0.0:
         return 0, -1

@@ -50,7 +50,14 @@ def empty_columns(detected: DetectionLog) -> Columns:
 
 
 def cut(columns: Columns, detected: DetectionLog, first: int, last: int) -> Columns:
-    """Views of the cycles from `first` to before `last`."""
+    """Views of some cycles.
+
+    Parameters
+    ----------
+    columns : of the whole run.
+    detected : says which detections belong to which cycle.
+    first, last : cycles, the last one excluded.
+    """
     rows = slice(int(detected.offsets[first]), int(detected.offsets[last]))
     return Columns(
         columns.prior_means[first:last],
@@ -65,7 +72,14 @@ def cut(columns: Columns, detected: DetectionLog, first: int, last: int) -> Colu
 
 
 def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: int) -> None:
-    """Copy the first cycles of another run."""
+    """Copy the first cycles of another run.
+
+    Parameters
+    ----------
+    earlier : what is copied from.
+    columns : what is written to.
+    cycles, detections : how many rows of each kind.
+    """
     columns.prior_means[:cycles] = earlier.prior_means[:cycles]
     columns.prior_covariances[:cycles] = earlier.prior_covariances[:cycles]
     columns.means[:cycles] = earlier.means[:cycles]
@@ -88,7 +102,15 @@ class Stretch(NamedTuple):
 
 
 def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch: Stretch) -> FilterState:
-    """Go on from a state over a stretch, whose cycles are written; return the state after its last record."""
+    """Go on from a state over a stretch, whose cycles are written; return the state after its last record.
+
+    Parameters
+    ----------
+    log : all records of the drive.
+    setup : reflector map, scanner and parameters.
+    state : before the stretch.
+    stretch : what to go over, and where its cycles are written.
+    """
     own, detected = log.detection_stamps_ns, stretch.detected
     rows = slice(*stretch.rows)
     state = _run(

@@ -39,10 +39,21 @@ def supervisor_limits(parameters: SupervisorParameters) -> SupervisorLimits:
 
 @compiled_inline
 def supervise(mode: int, belief: PoseGaussian, limits: SupervisorLimits) -> int:
-    """Mode after a scan, from the mode before it and the belief after *correct*.
+    """Mode after a scan.
 
     Fails when any 2-sigma passes its limit; recovers when all are below their limit divided by R_B, so that the mode
     does not flicker. A covariance that is not a number fails.
+
+    Parameters
+    ----------
+    mode : before the scan.
+    belief : after *correct*.
+    limits : Err_p, Err_o and R_B.
+
+    Notes
+    -----
+    fail if 2 sqrt(P_ii) > Err_i, operational again if all 2 sqrt(P_ii) < Err_i / R_B: Sobreira et al. 2016,
+    Algorithm 4, lines 5 and 11.
     """
     if not limits.enabled:
         return OPERATIONAL

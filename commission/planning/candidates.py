@@ -64,7 +64,18 @@ def mounting_heights(centers: FloatArray, options: CandidateOptions) -> FloatArr
 
 
 def clear_of(centers: FloatArray, path: FloatArray, distance: float) -> BoolArray:
-    """Whether places (C, 2) are farther than a distance [m] from all points (N, 2) of a path."""
+    """Whether places are farther than a distance from all points of a path.
+
+    Parameters
+    ----------
+    centers : (C, 2) places [m], map frame.
+    path : (N, 2) points [m], map frame.
+    distance : [m]
+
+    Returns
+    -------
+    clear : (C,) array.
+    """
     if len(path) == 0 or len(centers) == 0:
         return np.ones(len(centers), dtype=np.bool_)
     nearest, _ = cKDTree(path).query(centers)

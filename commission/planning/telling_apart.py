@@ -45,7 +45,15 @@ def chosen_places(
     scanner: Scanner,
     options: AmbiguityOptions,
 ) -> tuple[ChosenPlace, ...]:
-    """List the places that the demands name: starts of the routes, stations, spots."""
+    """List the places that the demands name: starts of the routes, stations, spots.
+
+    Parameters
+    ----------
+    demands : what must be unambiguous.
+    planned : routes that count, with their drives.
+    stations : of the project.
+    scanner, options : say which headings are tried where a spot names none.
+    """
     places: list[ChosenPlace] = []
     if demands.unambiguous_starts:
         places += [ChosenPlace(f"start of {route.name!r}", route.drive.poses[:1]) for route in planned]

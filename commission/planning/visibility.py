@@ -232,7 +232,15 @@ def _each_array(targets: Targets, changed: Callable[[NDArray[Any]], NDArray[Any]
 
 
 def replace_target(targets: Targets, index: int, reflector: Reflector, model: VisibilityModel) -> None:
-    """Write one reflector and its shadow map into `targets`, in place; it must need no more bins than there are."""
+    """Write one reflector and its shadow map into a table of reflectors.
+
+    Parameters
+    ----------
+    targets : the table, changed in place.
+    index : row of the reflector.
+    reflector : the new one; it must need no more bins than the table has.
+    model : scanner, walls and options.
+    """
     nearest, farthest, promised = _limits(reflector, model.scanner, model.options)
     is_flat = reflector.kind == "flat"
     targets.centers[index] = reflector.x, reflector.y

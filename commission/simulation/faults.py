@@ -28,12 +28,25 @@ def cover(record: Record) -> Record:
 
 
 def covered(records: Iterable[Record], start_ns: int, end_ns: int) -> Iterator[Record]:
-    """Cover all reflectors from `start_ns` to before `end_ns` (stamps of the records)."""
+    """Cover all reflectors for a while.
+
+    Parameters
+    ----------
+    records : in the order of their stamps.
+    start_ns, end_ns : first stamp that is covered, first that is not any more [ns].
+    """
     return (cover(record) if start_ns <= record.stamp_ns < end_ns else record for record in records)
 
 
 def scans_dropped(records: Iterable[Record], share: float, rng: np.random.Generator) -> Iterator[Record]:
-    """Lose a share [0..1] of scans and detections; motion and reference still arrive."""
+    """Lose scans and detections at random; motion and reference still arrive.
+
+    Parameters
+    ----------
+    records : in the order of their stamps.
+    share : of scans and detections that are lost [0..1].
+    rng : one uniform number for each of them.
+    """
     for record in records:
         if isinstance(record, Scan | Detections) and rng.uniform() < share:
             continue
@@ -41,7 +54,13 @@ def scans_dropped(records: Iterable[Record], share: float, rng: np.random.Genera
 
 
 def odometry_stuck(records: Iterable[Record], start_ns: int, end_ns: int) -> Iterator[Record]:
-    """Report a standing vehicle from `start_ns` to before `end_ns`, whatever it does: a torn encoder cable."""
+    """Report a standing vehicle for a while, whatever it does: a torn encoder cable.
+
+    Parameters
+    ----------
+    records : in the order of their stamps.
+    start_ns, end_ns : first stamp at which it stands, first at which it does not any more [ns].
+    """
     for record in records:
         if isinstance(record, Odometry) and start_ns <= record.stamp_ns < end_ns:
             yield replace(record, displacement=np.zeros(3))

@@ -39,7 +39,19 @@ class Start:
 
 
 def start_of(project: Project, route_name: str, options: DriveOptions = DEFAULTS) -> Start:
-    """Return where a drive starts and how far the true start may lie from it; raises UsageError (unknown route)."""
+    """Return where a drive starts and how far the true start may lie from it.
+
+    Parameters
+    ----------
+    project : site and vehicle.
+    route_name : which route.
+    options : sigmas of the start, and limits of the motion.
+
+    Raises
+    ------
+    UsageError
+        there is no such route.
+    """
     route = project.route(route_name)
     pose = legs_of(route, project.vehicle, options.limits)[0].start_pose
     return Start(pose, frozen(options.start_sigma, (3,), "start sigmas"))

@@ -15,7 +15,20 @@ LARGEST = 1e9
 
 
 def at_least(value: float, limit: float, name: str, unit: str = "") -> None:
-    """Raise ValueError unless `limit` <= `value` <= LARGEST."""
+    """Check `limit` <= `value` <= LARGEST.
+
+    Parameters
+    ----------
+    value : what was found.
+    limit : smallest value.
+    name : what the message calls it.
+    unit : what the message adds to the limit.
+
+    Raises
+    ------
+    ValueError
+        otherwise; NaN is refused, too.
+    """
     if value > LARGEST:
         raise ValueError(f"{name} is {value:g}; expected at most {LARGEST:g}{unit and ' ' + unit}")
     if not value >= limit:
@@ -23,7 +36,20 @@ def at_least(value: float, limit: float, name: str, unit: str = "") -> None:
 
 
 def above(value: float, limit: float, name: str, unit: str = "") -> None:
-    """Raise ValueError unless `limit` < `value` <= LARGEST."""
+    """Check `limit` < `value` <= LARGEST.
+
+    Parameters
+    ----------
+    value : what was found.
+    limit : what it must exceed.
+    name : what the message calls it.
+    unit : what the message adds to the limit.
+
+    Raises
+    ------
+    ValueError
+        otherwise; NaN is refused, too.
+    """
     if value > LARGEST:
         raise ValueError(f"{name} is {value:g}; expected at most {LARGEST:g}{unit and ' ' + unit}")
     if not value > limit:
@@ -31,7 +57,20 @@ def above(value: float, limit: float, name: str, unit: str = "") -> None:
 
 
 def between(value: float, limits: tuple[float, float], name: str, unit: str = "") -> None:
-    """Raise ValueError unless limits[0] <= `value` <= limits[1]."""
+    """Check limits[0] <= `value` <= limits[1].
+
+    Parameters
+    ----------
+    value : what was found.
+    limits : smallest and largest value.
+    name : what the message calls it.
+    unit : what the message adds to the limit.
+
+    Raises
+    ------
+    ValueError
+        otherwise; NaN is refused, too.
+    """
     low, high = limits
     if not (low <= value <= high):
         raise ValueError(f"{name} is {value:g}; expected {low:g} to {high:g}{unit and ' ' + unit}")

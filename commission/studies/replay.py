@@ -74,7 +74,12 @@ class ReplayResult:
 
 
 def replay(project: Project, log: RecordLog, initial: Belief, *, detected: DetectionLog | None = None) -> ReplayResult:
-    """Localize a whole recording and judge the result: `localize`, then `judge`; parameters and errors as there."""
+    """Localize a whole recording and judge the result: `localize`, then `judge`.
+
+    Parameters
+    ----------
+    project, log, initial, detected : as in `localize`.
+    """
     return judge(project, log, localize(project, log, initial, detected=detected))
 
 

@@ -74,7 +74,14 @@ def delete(reflectors: ReflectorMap, ids: Collection[str]) -> ReflectorMap:
 
 
 def move(reflectors: ReflectorMap, ids: Collection[str], offset: tuple[float, float]) -> ReflectorMap:
-    """Shift the selection by `offset` [m, m], map frame."""
+    """Shift the selection.
+
+    Parameters
+    ----------
+    reflectors : those there are.
+    ids : the selection.
+    offset : [m, m], map frame.
+    """
     dx, dy = offset
     return _change(reflectors, ids, lambda r: replace(r, x=r.x + dx, y=r.y + dy))
 
@@ -85,7 +92,15 @@ def place(reflectors: ReflectorMap, positions: Mapping[str, tuple[float, float]]
 
 
 def turn(reflectors: ReflectorMap, ids: Collection[str], pivot: tuple[float, float], angle: float) -> ReflectorMap:
-    """Turn the selection, flat plates' headings included, around `pivot` [m, m] by `angle` [rad]."""
+    """Turn the selection, flat plates' headings included, around a point.
+
+    Parameters
+    ----------
+    reflectors : those there are.
+    ids : the selection.
+    pivot : what it turns around [m, m], map frame.
+    angle : counterclockwise [rad].
+    """
     c, s = math.cos(angle), math.sin(angle)
 
     def turned(r: Reflector) -> Reflector:
@@ -97,23 +112,57 @@ def turn(reflectors: ReflectorMap, ids: Collection[str], pivot: tuple[float, flo
 
 
 def mirror(reflectors: ReflectorMap, ids: Collection[str], axis: Axis) -> ReflectorMap:
-    """Mirror the selection about an axis, flat plates' headings included; twice gives back what was."""
+    """Mirror the selection about an axis, flat plates' headings included; twice gives back what was.
+
+    Parameters
+    ----------
+    reflectors : those there are.
+    ids : the selection.
+    axis : a line on the floor.
+    """
     return _change(reflectors, ids, lambda r: _mirrored(r, axis))
 
 
 def duplicate(reflectors: ReflectorMap, ids: Collection[str], offset: tuple[float, float]) -> Added:
-    """Copy the selection, locked ones too, shifted by `offset` [m, m]; the copies have fresh ids and are not locked."""
+    """Copy the selection, locked ones too, shifted; the copies have fresh ids and are not locked.
+
+    Parameters
+    ----------
+    reflectors : those there are.
+    ids : the selection.
+    offset : of the copies [m, m], map frame.
+    """
     return repeat(reflectors, ids, offset, 1)
 
 
 def duplicate_mirrored(reflectors: ReflectorMap, ids: Collection[str], axis: Axis) -> Added:
-    """Copy the selection, locked ones too, to the other side of an axis."""
+    """Copy the selection, locked ones too, to the other side of an axis.
+
+    Parameters
+    ----------
+    reflectors : those there are.
+    ids : the selection.
+    axis : a line on the floor.
+    """
     originals = _selected(reflectors, ids)
     return _append_copies(reflectors, [(r, _mirrored(r, axis)) for r in originals])
 
 
 def repeat(reflectors: ReflectorMap, ids: Collection[str], step: tuple[float, float], count: int) -> Added:
-    """Copy the selection `count` times, each copy `step` [m, m] from the one before: an array along a line."""
+    """Copy the selection several times, each copy a step from the one before: an array along a line.
+
+    Parameters
+    ----------
+    reflectors : those there are.
+    ids : the selection.
+    step : from each copy to the next [m, m], map frame.
+    count : copies of each, 0 or more.
+
+    Raises
+    ------
+    UsageError
+        a negative count, or more than MOST_COPIES copies in total.
+    """
     originals = _selected(reflectors, ids)
     if count < 0 or count * len(originals) > MOST_COPIES:
         raise UsageError(f"{count} x {len(originals)} copies; expected 0 to {MOST_COPIES}")
@@ -173,7 +222,14 @@ def set_values(reflectors: ReflectorMap, ids: Collection[str], values: Mapping[s
 
 
 def set_locked(reflectors: ReflectorMap, ids: Collection[str], locked: bool) -> ReflectorMap:
-    """Lock or unlock the selection."""
+    """Lock or unlock the selection.
+
+    Parameters
+    ----------
+    reflectors : those there are.
+    ids : the selection.
+    locked : whether edits leave them alone.
+    """
     chosen = _known(reflectors, ids)
     return ReflectorMap(tuple(replace(r, locked=locked) if r.id in chosen else r for r in reflectors.reflectors))
 

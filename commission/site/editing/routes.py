@@ -58,7 +58,19 @@ def segment_of(points: ArrayLike, curve: Curve = Curve.THROUGH) -> Segment:
 
 
 def new_route(name: str, points: ArrayLike, curve: Curve = Curve.THROUGH, speed: float = 0.5) -> Route:
-    """Route of one forward segment along clicked points; see `segment_of`."""
+    """Route of one forward segment along clicked points.
+
+    Parameters
+    ----------
+    name : no other route may have it.
+    points, curve : as in `segment_of`.
+    speed : [m/s]
+
+    Raises
+    ------
+    ValueError
+        fewer than two different points.
+    """
     return Route(name, (segment_of(points, curve),), speed)
 
 
@@ -68,7 +80,19 @@ def fresh_name(routes: Sequence[Route], like: str = "Route 0") -> str:
 
 
 def put(routes: tuple[Route, ...], route: Route, name: str | None = None) -> tuple[Route, ...]:
-    """Add a route, or replace the one called `name`; raises UsageError when that is missing or the new name in use."""
+    """Add a route, or replace another one.
+
+    Parameters
+    ----------
+    routes : those there are.
+    route : the new one.
+    name : of the one that is replaced; None adds.
+
+    Raises
+    ------
+    UsageError
+        there is no route of that name, or another one has the new name already.
+    """
     if route.name in {other.name for other in routes} - {name}:
         raise UsageError(f"route name {route.name!r} is used already; expected another name")
     if name is None:
@@ -84,7 +108,15 @@ def remove(routes: tuple[Route, ...], name: str) -> tuple[Route, ...]:
 
 
 def append(route: Route, points: ArrayLike, direction: Direction, curve: Curve = Curve.THROUGH) -> Route:
-    """Go on from the end of a route along clicked points [m], the end itself not among them."""
+    """Go on from the end of a route along clicked points.
+
+    Parameters
+    ----------
+    route : the route.
+    points : (N, 2) array [m], map frame; the end of the route is not among them.
+    direction : in which the vehicle drives there.
+    curve : through or near the points between the first and the last.
+    """
     end = route.segments[-1].control_points[-1]
     added = segment_of(np.vstack((end, np.asarray(points, dtype=np.float64).reshape(-1, 2))), curve)
     return replace(route, segments=(*route.segments, replace(added, direction=direction)))
@@ -115,7 +147,14 @@ def move_point(route: Route, segment: int, point: int, to: tuple[float, float]) 
 
 
 def insert_point(route: Route, segment: int, near: tuple[float, float]) -> Route:
-    """Insert a control point where the curve passes nearest to a place [m, m]; the curve itself stays as it is."""
+    """Insert a control point where the curve passes nearest to a place; the curve itself stays as it is.
+
+    Parameters
+    ----------
+    route : the route.
+    segment : index.
+    near : the place [m, m], map frame.
+    """
     old = _segment_at(route, segment)
     u = _nearest_parameter(old.spline(), near)
     times = BEZIER if is_bezier(old) else 1
@@ -124,6 +163,11 @@ def insert_point(route: Route, segment: int, near: tuple[float, float]) -> Route
 
 def delete_point(route: Route, segment: int, point: int) -> Route:
     """Delete a control point, or a joint of a Bezier curve with its handles.
+
+    Parameters
+    ----------
+    route : the route.
+    segment, point : index of the segment and of its control point.
 
     Raises
     ------
@@ -156,7 +200,19 @@ def delete_point(route: Route, segment: int, point: int) -> Route:
 
 
 def split_segment(route: Route, segment: int, near: tuple[float, float]) -> Route:
-    """Cut a segment in two where it passes nearest to a place [m, m], so that its parts can be driven differently."""
+    """Cut a segment in two where it passes nearest to a place, so that its parts can be driven differently.
+
+    Parameters
+    ----------
+    route : the route.
+    segment : index.
+    near : the place [m, m], map frame.
+
+    Raises
+    ------
+    UsageError
+        the nearest place is an end of the segment.
+    """
     old = _segment_at(route, segment)
     try:
         parts = split(old.spline(), _nearest_parameter(old.spline(), near))
@@ -167,12 +223,26 @@ def split_segment(route: Route, segment: int, near: tuple[float, float]) -> Rout
 
 
 def set_direction(route: Route, segment: int, direction: Direction) -> Route:
-    """Drive a segment with the vehicle's front or its rear ahead."""
+    """Drive a segment with the vehicle's front or its rear ahead.
+
+    Parameters
+    ----------
+    route : the route.
+    segment : index.
+    direction : which of the two.
+    """
     return _with_segment(route, segment, replace(_segment_at(route, segment), direction=direction))
 
 
 def set_speed(route: Route, segment: int, speed: float | None) -> Route:
-    """Set the speed of a segment [m/s]; None: that of the route."""
+    """Set the speed of a segment.
+
+    Parameters
+    ----------
+    route : the route.
+    segment : index.
+    speed : [m/s]; None: that of the route.
+    """
     return _with_segment(route, segment, replace(_segment_at(route, segment), speed=speed))
 
 

@@ -109,7 +109,15 @@ def on_wall(reflector: Reflector, wall: WallPoint) -> Reflector:
 def snap_to_wall(
     reflectors: ReflectorMap, ids: Collection[str], grid: OccupancyGrid, reach: float = REACH
 ) -> ReflectorMap:
-    """Put the selection against the nearest walls; what is locked or has no wall within `reach` [m] stays."""
+    """Put the selection against the nearest walls; what is locked or has no wall near it stays.
+
+    Parameters
+    ----------
+    reflectors : those there are.
+    ids : the selection.
+    grid : of the floor map.
+    reach : largest distance to a wall [m].
+    """
     locked = edits.locked_among(reflectors, ids)
     chosen = frozenset(ids).difference(locked)
 
