@@ -43,21 +43,26 @@ class Ambiguity:
     """Difference of heading from which two poses at one place are different [deg]."""
     headings: int = 8
     """Evenly spaced headings that are tried at each point; a scanner that sees all around needs one."""
+    force: bool = False
+    """Whether files in DIR that this command did not write are overwritten; its own earlier results always are."""
 
     def run(self) -> None:
         """Compute, write, and tell in a few lines what was found."""
-        from commission.io.ambiguity_files import write_ambiguity
+        from commission.io.ambiguity_files import FILES, write_ambiguity
+        from commission.io.overwriting import result_folder
         from commission.io.project_file import load_project
         from commission.planning.ambiguity import AmbiguityOptions
         from commission.studies.ambiguity import ambiguity_of, summary
 
+        out = result_folder(self.out, "ambiguity", FILES, force=self.force, sources=(self.project,))
         project = load_project(self.project)
         try:
             options = AmbiguityOptions(self.tolerance, self.separation, math.radians(self.turn), self.headings)
             found = ambiguity_of(project, options, spacing=self.spacing, routes=self.route or None)
         except ValueError as error:
             raise UsageError(str(error)) from None
-        write_ambiguity(self.out, found, project.reflectors, summary(found))
+        with out.writing() as folder:
+            write_ambiguity(folder, found, project.reflectors, summary(found))
         lines = [*_cold_start(found.floor, project.reflectors), *_tracking(found.routes, project.reflectors)]
         sys.stdout.write("\n".join([*lines, f"Written to   {self.out}"]) + "\n")
 

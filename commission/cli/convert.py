@@ -22,7 +22,7 @@ class Convert:
     source: Annotated[Positional[Path], arg(metavar="IN")]
     """File or folder to read."""
     target: Annotated[Positional[Path], arg(metavar="OUT")]
-    """File or folder to write; a project that is there keeps what IN does not hold."""
+    """File or folder to write; what is there already stays unless --force is given."""
     vehicle_type: Annotated[str | None, arg(metavar="NAME")] = None
     """LIF: vehicle type whose edges are read. None: the one with the most edges."""
     layout: Annotated[str | None, arg(metavar="NAME")] = None
@@ -37,6 +37,9 @@ class Convert:
     """Model: axis that points up. None: y for .glb, z for the others."""
     resolution: float = 0.05
     """Drawing or model: edge of a cell of the map [m]."""
+    force: bool = False
+    """Whether a file or recording that is there is replaced. A project that is there then takes what IN holds in place
+    of its own, and keeps the rest."""
 
     def run(self) -> None:
         """Convert, and tell what was made up, doubted or lost."""
@@ -51,6 +54,6 @@ class Convert:
             up=self.up,
             resolution=self.resolution,
         )
-        for line in convert_file(self.source, self.target, options):
+        for line in convert_file(self.source, self.target, options, force=self.force):
             sys.stdout.write(f"Note         {line}\n")
         sys.stdout.write(f"Written to   {self.target}\n")

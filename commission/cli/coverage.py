@@ -42,16 +42,20 @@ class Coverage:
     """Largest angle between a flat reflector's normal and the ray [deg]."""
     ellipses: float | None = None
     """Distance between the points whose 1-sigma ellipses are written to ellipses.csv [m]. None: no ellipses."""
+    force: bool = False
+    """Whether files in DIR that this command did not write are overwritten; its own earlier results always are."""
 
     def run(self) -> None:
         """Compute, write, and tell in a few lines what was found."""
-        from commission.io.coverage_files import write_coverage, write_ellipses
+        from commission.io.coverage_files import FILES, write_coverage, write_ellipses
+        from commission.io.overwriting import result_folder
         from commission.io.project_file import load_project
         from commission.planning.visibility import VisibilityOptions
         from commission.studies.coverage import coverage_of, drivable, ellipses_of, summary
 
         if self.ellipses is not None and not 0.0 < self.ellipses < math.inf:
             raise UsageError(f"--ellipses is {self.ellipses}; expected metres greater than 0")
+        out = result_folder(self.out, "coverage", FILES, force=self.force, sources=(self.project,))
         project = load_project(self.project)
         try:
             options = self._options(project)
@@ -60,9 +64,11 @@ class Coverage:
         except ValueError as error:
             raise UsageError(str(error)) from None
         entries = summary(project, found)
-        write_coverage(self.out, found, drivable(project, found), entries)
-        if self.ellipses is not None:
-            write_ellipses(self.out, ellipses_of(project, found, self.ellipses, visibility))
+        ellipses = None if self.ellipses is None else ellipses_of(project, found, self.ellipses, visibility)
+        with out.writing() as folder:
+            write_coverage(folder, found, drivable(project, found), entries)
+            if ellipses is not None:
+                write_ellipses(folder, ellipses)
         sys.stdout.write("\n".join([*_report(entries), f"Written to   {self.out}"]) + "\n")
 
     def _options(self, project: Project) -> FixOptions:

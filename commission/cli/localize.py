@@ -34,18 +34,23 @@ class Localize:
     start of the project's first route, with 1-sigma 0.02 m and 0.01 rad."""
     set: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="GROUP.KEY=VALUE")] = ()
     """A parameter of the localizer in place of the project's, in SI units and radians."""
+    force: bool = False
+    """Whether files in DIR that this command did not write are overwritten; its own earlier results always are."""
 
     def run(self) -> None:
         """Localize, write, and tell in a few lines how it went."""
         given = None if self.initial_pose is None else initial_pose(self.initial_pose)
 
+        from commission.io.overwriting import result_folder
         from commission.io.project_file import apply_settings, load_project
         from commission.io.recordings.base import load_log
-        from commission.io.results import write_results
+        from commission.io.results import DETECTIONS, ESTIMATES, SUMMARY, write_results
         from commission.localization import whole_run
         from commission.studies.replay import judge, localize, summary
         from commission.studies.start import start_of
 
+        names, sources = (ESTIMATES, DETECTIONS, SUMMARY), (self.recording, self.project)
+        out = result_folder(self.out, "localize", names, force=self.force, sources=sources)
         project = load_project(self.project)
         project = dataclasses.replace(project, parameters=apply_settings(project.parameters, self.set))
         log = load_log(self.recording)
@@ -57,7 +62,8 @@ class Localize:
         microseconds_per_cycle = (time.perf_counter() - started) * 1e6 / len(arrays)
         result = judge(project, log, arrays)
 
-        write_results(self.out, result.run, project.reflectors, summary(result, microseconds_per_cycle))
+        with out.writing() as folder:
+            write_results(folder, result.run, project.reflectors, summary(result, microseconds_per_cycle))
         limit = project.parameters.supervisor.position_limit
         sys.stdout.write("\n".join([*_report(result, start, limit), f"Written to   {self.out}"]) + "\n")
 

@@ -40,6 +40,7 @@ def parse(commands: Mapping[str, type[Command]], arguments: Sequence[str] | None
     UsageError
         the words are no command; its text is what tyro says, without tyro's frame.
     """
+    _refuse_empty(sys.argv[1:] if arguments is None else arguments)
     complaint = io.StringIO()
     try:
         with contextlib.redirect_stderr(complaint):
@@ -51,6 +52,21 @@ def parse(commands: Mapping[str, type[Command]], arguments: Sequence[str] | None
             sys.stdout.flush()
             raise
         raise UsageError(_without_frame(complaint.getvalue())) from None
+
+
+def _refuse_empty(words: Sequence[str]) -> None:
+    """Raise UsageError for a word without a letter, as `--out "$FOLDER"` gives where the variable is not set.
+
+    As a path it would be the folder that one stands in.
+    """
+    for index, word in enumerate(words):
+        option, equals, value = word.partition("=")
+        if not word.strip():
+            before = words[index - 1] if index else ""
+            name = before if before.startswith("--") else f"argument {index + 1}"
+            raise UsageError(f"{name} is empty; expected a value")
+        if word.startswith("--") and equals and not value.strip():
+            raise UsageError(f"{option} is empty; expected a value")
 
 
 def _without_frame(complaint: str) -> str:

@@ -76,14 +76,18 @@ class Place:
     """Rectangle without reflectors, by two opposite corners, map frame [m]. Beside those of the project."""
     seed: int = 1
     """Seed of the search: the same seed gives the same layout."""
+    force: bool = False
+    """Whether a project that is in PROJECT2 already is replaced."""
 
     def run(self) -> None:
         """Search, write, and tell what was found."""
-        from commission.io.project_file import load_project, save_project
+        from commission.io.project_copy import refuse_to_replace, save_copy
+        from commission.io.project_file import load_project
         from commission.planning.placement import place
 
         if self.out.resolve() == self.project.resolve():
             raise UsageError(f"--out is the project itself, {self.out}; expected another folder")
+        refuse_to_replace(self.out, force=self.force)
         project = load_project(self.project)
         try:
             options = self._options(project)
@@ -93,8 +97,9 @@ class Place:
         if not routes:
             raise UsageError("the project has no route that counts; expected one to place reflectors for")
         found = place(project, routes, options)
-        save_project(dataclasses.replace(project, reflectors=found.reflectors), self.out)
-        sys.stdout.write("\n".join([*_report(found), f"Written to   {self.out}"]) + "\n")
+        kept = save_copy(dataclasses.replace(project, reflectors=found.reflectors), self.out, force=self.force)
+        notes = [] if kept is None else [f"Note         unsaved edits of the project that was there are kept in {kept}"]
+        sys.stdout.write("\n".join([*_report(found), *notes, f"Written to   {self.out}"]) + "\n")
 
     def _options(self, project: Project) -> PlacementOptions:
         """Options of the search; raises ValueError for a number out of range."""

@@ -47,6 +47,8 @@ class Predict:
     """Block this many reflectors, each time the one on which most depends then, and write failures.csv [reflectors]."""
     every_route: bool = False
     """Whether --what-if and --failures ask about all routes of the project; the prediction is that of one."""
+    force: bool = False
+    """Whether files in DIR that this command did not write are overwritten; its own earlier results always are."""
 
     def run(self) -> None:
         """Predict, write, and tell in a few lines what is to be expected."""
@@ -55,12 +57,14 @@ class Predict:
         if self.failures < 0:
             raise UsageError(f"--failures is {self.failures}; expected 0 or more reflectors")
 
-        from commission.io.prediction_files import write_prediction
+        from commission.io.overwriting import result_folder
+        from commission.io.prediction_files import FILES, write_prediction
         from commission.io.project_file import load_project
         from commission.planning.route_prediction import plan_route, predict_route
         from commission.planning.station_accuracy import station_accuracies
         from commission.planning.true_error import predict_errors
 
+        out = result_folder(self.out, "predict", FILES, force=self.force, sources=(self.project,))
         project = load_project(self.project)
         if self.route is None and not project.routes:
             raise UsageError("the project has no route; expected one to predict along")
@@ -70,8 +74,9 @@ class Predict:
         errors = predict_errors(planned, prediction)
         stations = station_accuracies(prediction, errors, project.stations)
         lines = [*_report(name, prediction, errors), *_at_stations(stations)]
-        lines += self._what_if(project, planned)
-        write_prediction(self.out, name, prediction, errors, stations)
+        with out.writing() as folder:
+            lines += self._what_if(project, planned, folder)
+            write_prediction(folder, name, prediction, errors, stations)
         sys.stdout.write("\n".join([*lines, f"Written to   {self.out}"]) + "\n")
 
     def _options(self) -> PredictionOptions:
@@ -79,7 +84,7 @@ class Predict:
 
         return PredictionOptions(blocked_per_m=self.blocked_per_m)
 
-    def _what_if(self, project: Project, planned: PlannedRoute) -> list[str]:
+    def _what_if(self, project: Project, planned: PlannedRoute, folder: Path) -> list[str]:
         """Let reflectors fail as the options ask for, write what that does, and tell it."""
         from commission.io.prediction_files import write_dependents, write_failures
         from commission.planning.dependence import Failure, FailureOptions, dependences, worst_failures
@@ -90,11 +95,11 @@ class Predict:
             routes = [plan_route(project, route.name, self._options()) for route in project.routes]
         if self.what_if is not None:
             ranked = dependences(routes, FailureOptions(Failure(self.what_if)))
-            write_dependents(self.out, ranked, project.reflectors)
+            write_dependents(folder, ranked, project.reflectors)
             lines += _most_needed(ranked, project.reflectors)
         if self.failures:
             worst = worst_failures(routes, self.failures)
-            write_failures(self.out, worst, project.reflectors)
+            write_failures(folder, worst, project.reflectors)
             lines += _one_after_the_other(worst, project.reflectors)
         return lines
 

@@ -39,16 +39,20 @@ class Simulate:
     """People walking about. None: as many as the project says."""
     cover: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="START,DURATION")] = ()
     """A time during which all reflectors are covered: start and length [s]."""
+    force: bool = False
+    """Whether a recording that is in DIR already is replaced."""
 
     def run(self) -> None:
         """Simulate, write, and tell in two lines what was written."""
         if self.seed < 0:
             raise UsageError(f"--seed is {self.seed}; expected 0 or more")
 
+        from commission.io.overwriting import refuse_recording
         from commission.io.project_file import load_project
         from commission.io.recordings.csv_writer import write_recording
         from commission.simulation.scenario import records
 
+        refuse_recording(self.out, force=self.force)
         project = load_project(self.project)
         route = self._route(project)
         project = dataclasses.replace(project, disturbances=self._disturbances(project))

@@ -21,6 +21,8 @@ IMAGE = "ambiguity.png"
 PAIRS = "ambiguous_pairs.csv"
 NEIGHBORS = "neighbors.csv"
 SUMMARY = "summary.json"
+FILES = (ARRAYS, TABLE, IMAGE, PAIRS, NEIGHBORS, SUMMARY)
+"""All that is written."""
 
 TOO_FEW = (200, 60, 60)
 """Color of floor from which fewer than two reflectors are visible."""

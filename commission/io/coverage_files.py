@@ -22,6 +22,8 @@ TABLE = "coverage.csv"
 IMAGE = "coverage.png"
 SUMMARY = "summary.json"
 ELLIPSES = "ellipses.csv"
+FILES = (ARRAYS, TABLE, IMAGE, SUMMARY, ELLIPSES)
+"""All that may be written."""
 ELLIPSE_COLUMNS = ("x", "y", "semi_major_m", "semi_minor_m", "angle_rad")
 
 UNITS = {

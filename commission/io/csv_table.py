@@ -20,13 +20,12 @@ from commission.errors import FileFormatError
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.io.findings import Findings
 from commission.io.reading import cannot_read, check_size, decoded
-from commission.site.checks import LARGEST
+from commission.site.checks import LARGEST, STAMP_LIMIT
 
 SIZE_LIMIT = 64_000_000_000
 """Bytes of a table; a day of odometry at 1 kHz has about 5,000,000,000."""
 LINE_LIMIT = 100_000
 """Characters in one line: nothing that is a table has more."""
-_STAMP_LIMIT = 2**62
 _THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2}(\.[0-9]{3})+")
 _GROUPED = re.compile(r"[-+]?[0-9]{1,3}(\.[0-9]{3})+,[0-9]*")
 _STATED_DELIMITER = re.compile(r"sep=([,;\t|])?", re.IGNORECASE)
@@ -115,17 +114,19 @@ class Block:
         """(N,) time stamps of a column [ns]."""
         try:
             values = np.array(list(map(int, self.columns[column])), dtype=np.int64)
-            if (np.abs(values) < _STAMP_LIMIT).all() and not _has_underscore(self.columns[column]):
+            if ((values > -STAMP_LIMIT) & (values < STAMP_LIMIT)).all() and not _has_underscore(self.columns[column]):
                 return values
         except (ValueError, OverflowError):
             pass
         for row, cell in enumerate(self.texts(column)):
             try:
-                good = abs(int(cell)) < _STAMP_LIMIT and "_" not in cell
+                good = abs(int(cell)) < STAMP_LIMIT and "_" not in cell
             except ValueError:
                 good = False
             if not good:
-                raise self.error(row, column, f"is {shortened(cell)}", "a whole number of nanoseconds")
+                raise self.error(
+                    row, column, f"is {shortened(cell)}", f"a whole number of nanoseconds, less than {STAMP_LIMIT}"
+                )
         raise AssertionError("a column is wrong, yet each of its cells is right")
 
 

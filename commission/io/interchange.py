@@ -13,6 +13,7 @@ from pathlib import Path
 
 from commission.errors import FileFormatError, UsageError
 from commission.io import mesh
+from commission.io.atomic import staged
 from commission.io.dxf import read_drawing
 from commission.io.findings import Findings
 from commission.io.imk import read_imk, write_imk
@@ -20,6 +21,8 @@ from commission.io.json_document import read_json
 from commission.io.lif import read_lif
 from commission.io.lif_writer import write_lif
 from commission.io.map_server import read_floor_map, write_floor_map
+from commission.io.overwriting import refuse_files, refuse_recording
+from commission.io.project_copy import refuse_to_replace
 from commission.io.project_file import FILE_NAME, load_project, project_file, save_project
 from commission.io.recordings.base import open_recording
 from commission.io.recordings.csv_writer import write_recording
@@ -60,6 +63,16 @@ TARGETS: dict[Kind, tuple[Kind, ...]] = {
     Kind.RECORDING: (Kind.RECORDING,),
 }
 """Into which kinds each kind can be converted."""
+
+_CALLED = {
+    Kind.PROJECT: "the folder of a project",
+    Kind.TABLE: "a name that ends with .csv for a reflector table",
+    Kind.IMK: "one that ends with .imk for a SICK layout",
+    Kind.LIF: "one that ends with .lif for a VDMA LIF layout",
+    Kind.MAP: "one that ends with .yaml for a floor map",
+    Kind.RECORDING: "a folder, since a recording is written as a folder of tables",
+}
+"""How a target of each kind is called."""
 
 _SUFFIXES = {
     ".csv": Kind.TABLE,
@@ -154,7 +167,7 @@ def kind_of_target(path: Path, source: Kind) -> Kind:
     return kind
 
 
-def convert_file(source: Path, target: Path, options: ConvertOptions) -> tuple[str, ...]:
+def convert_file(source: Path, target: Path, options: ConvertOptions, *, force: bool = False) -> tuple[str, ...]:
     """Convert a file or folder.
 
     Parameters
@@ -163,6 +176,7 @@ def convert_file(source: Path, target: Path, options: ConvertOptions) -> tuple[s
     target : what to write. An existing project keeps what the source does not hold: reflectors and the floor map are
         replaced, routes and stations of the same name too, others stay.
     options : what the source leaves open.
+    force : whether what is there may be replaced.
 
     Returns
     -------
@@ -173,18 +187,31 @@ def convert_file(source: Path, target: Path, options: ConvertOptions) -> tuple[s
     FileFormatError
         the source is unreadable or the target cannot be written.
     UsageError
-        the one cannot become the other.
+        the one cannot become the other, or something is there that would be overwritten.
     """
     kind = kind_of_source(source)
     if kind not in TARGETS:
         raise UsageError(f"{source}: {kind} cannot be converted; expected {'; '.join(TARGETS)}")
     wanted = kind_of_target(target, kind)
     if wanted not in TARGETS[kind]:
-        remedy = "; ".join(TARGETS[kind])
-        raise UsageError(f"{target}: {kind} cannot become {wanted}; expected {remedy}")
+        problem = f"{source} is {kind} already" if wanted is kind else f"{kind} is not converted into {wanted}"
+        raise UsageError(f"{target}: {problem}; expected {', '.join(_CALLED[each] for each in TARGETS[kind])}")
     if target.exists() and source.resolve() == target.resolve():
         raise UsageError(f"{target} is the source itself; expected another place")
+    _refuse_to_overwrite(target, wanted, force=force)
     return _CONVERTERS[kind](source, target, wanted, options)
+
+
+def _refuse_to_overwrite(target: Path, wanted: Kind, *, force: bool) -> None:
+    """Raise UsageError when there is something that would be overwritten, unless that was asked for."""
+    if wanted is Kind.PROJECT:
+        refuse_to_replace(_folder(target), force=force)
+    elif wanted is Kind.RECORDING:
+        refuse_recording(target, force=force)
+    elif wanted is Kind.MAP:
+        refuse_files(target, target.with_suffix(".png"), force=force)
+    else:
+        refuse_files(target, force=force)
 
 
 def _from_project(source: Path, target: Path, wanted: Kind, _: ConvertOptions) -> tuple[str, ...]:
@@ -277,7 +304,8 @@ def _written_reflectors(
 
 def _written_map(floor_map: FloorMap, target: Path, wanted: Kind) -> tuple[str, ...]:
     if wanted is Kind.MAP:
-        write_floor_map(floor_map, target)
+        with staged(target.parent, last=target.name) as scratch:
+            write_floor_map(floor_map, scratch / target.name)
     else:
         save_project(dataclasses.replace(_existing(target), floor_map=floor_map), _folder(target))
     width, height = floor_map.size

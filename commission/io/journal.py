@@ -23,6 +23,7 @@ from commission.io.journal_lines import FORMAT
 from commission.io.journal_place import FILE_NAME, FileId, rescue_folder
 from commission.io.journal_replay import Restored, set_aside
 from commission.io.project_file import save_project
+from commission.io.project_lock import FILE_NAME as LOCK_NAME
 from commission.io.project_parts import change
 from commission.site.project import Project
 
@@ -256,7 +257,8 @@ def remove_leftovers(folder: Path) -> None:
     for place in {folder, *((folder / name).parent for name in names)}:
         remove_half_written(place, [Path(name).name for name in names])
     with suppress(OSError):
-        (folder / f"{FILE_NAME}.new").unlink(missing_ok=True)
+        for path in (folder / f"{FILE_NAME}.new", *folder.glob(f"{LOCK_NAME}.*.new")):
+            path.unlink(missing_ok=True)
 
 
 def _remove_with_folder(path: Path) -> None:

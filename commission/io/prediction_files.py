@@ -20,6 +20,8 @@ PREDICTION = "prediction.csv"
 DEPENDENTS = "dependents.csv"
 FAILURES = "failures.csv"
 SUMMARY = "summary.json"
+FILES = (PREDICTION, DEPENDENTS, FAILURES, SUMMARY)
+"""All that may be written."""
 COLUMNS = (
     *("metre", "x", "y", "theta", "two_sigma_x", "two_sigma_y", "two_sigma_theta"),
     *("visible", "on_odometry", "over_limit", "mode"),

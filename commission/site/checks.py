@@ -12,6 +12,8 @@ FARTHEST = 1e7
 """Largest coordinate [m]: any national grid fits, and no square of it overflows."""
 LARGEST = 1e9
 """No length, angle, speed or sigma that anybody means is larger; squares and products of much larger ones overflow."""
+STAMP_LIMIT = 2**62
+"""Stamps [ns] are smaller, and larger than its negative: the difference of any two fits into 64 bits."""
 
 
 def at_least(value: float, limit: float, name: str, unit: str = "") -> None:

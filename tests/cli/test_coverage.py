@@ -15,7 +15,7 @@ def test_coverage_writes_its_files_and_tells_what_it_found(commission, project, 
     assert (code, err) == (0, "")
     assert "5 reflectors" in told
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
-        *("coverage.csv", "coverage.npz", "coverage.png", "summary.json")
+        *(".commission.result", "coverage.csv", "coverage.npz", "coverage.png", "summary.json")
     ]
     entries = summary(tmp_path / "out")
     assert entries["spacing_m"] == 0.5

@@ -73,7 +73,7 @@ def test_a_port_that_is_taken_is_refused(refused, project):
     ("words", "said"),
     [
         (["--host", "0.0.0.0"], "expected a token"),
-        (["--token", ""], "the token is empty"),
+        (["--token", ""], "--token is empty"),
         (["--host", "no.such.host.invalid", "--token", "x"], "no.such.host.invalid"),
         (["--recording", os.devnull], "is no recording"),
         (["--recording", "nowhere"], "nowhere"),

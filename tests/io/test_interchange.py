@@ -48,7 +48,7 @@ def test_project_gives_and_takes_reflectors_and_routes(tmp_path: Path) -> None:
     assert any("4 reflectors are not carried" in line for line in losses)
     convert_file(tmp_path / "hall", tmp_path / "hall.imk", USUAL)
     convert_file(tmp_path / "hall.lif", tmp_path / "copy", USUAL)
-    (report,) = convert_file(tmp_path / "hall.imk", tmp_path / "copy", USUAL)
+    (report,) = convert_file(tmp_path / "hall.imk", tmp_path / "copy", USUAL, force=True)
     assert report == "reflectors: 4 added, 0 changed, 0 removed, 0 as before"
     copy = load_project(tmp_path / "copy")
     assert copy.reflectors == REFLECTORS
@@ -61,7 +61,7 @@ def test_layout_leaves_alone_what_it_cannot_say_about_the_reflectors_of_a_projec
     noted = replace(first, height=1.8, note="pillar 7")
     save_project(Project(reflectors=ReflectorMap((noted, *rest))), tmp_path / "hall")
     write_imk(ReflectorMap((replace(first, x=9.0), *rest[:-1])), tmp_path / "hall.imk")
-    assert convert_file(tmp_path / "hall.imk", tmp_path / "hall", USUAL) == (
+    assert convert_file(tmp_path / "hall.imk", tmp_path / "hall", USUAL, force=True) == (
         "reflectors: 0 added, 1 changed, 1 removed, 2 as before",
     )
     assert load_project(tmp_path / "hall").reflectors.reflectors == (replace(noted, x=9.0), *rest[:-1])
@@ -72,7 +72,7 @@ def test_order_is_added_to_the_routes_of_a_project(tmp_path: Path) -> None:
     (tmp_path / "order.json").write_text(json.dumps(ORDER))
     assert kind_of_source(tmp_path / "order.json") is Kind.ORDER
     assert "1 routes and 0 stations read, 1 other routes kept" in convert_file(
-        tmp_path / "order.json", tmp_path / "hall", USUAL
+        tmp_path / "order.json", tmp_path / "hall", USUAL, force=True
     )
     assert [route.name for route in load_project(tmp_path / "hall").routes] == ["Loop", "order-7"]
 
@@ -101,18 +101,37 @@ def test_recording_is_copied_into_a_csv_folder(tmp_path: Path) -> None:
     ("source", "target", "error", "message"),
     [
         ("absent.csv", "b.imk", FileFormatError, "does not exist; expected a file or folder to convert"),
-        ("a.csv", "b.lif", UsageError, r"a reflector table \(.csv, .tsv\) cannot become a VDMA LIF"),
+        ("a.csv", "b.lif", UsageError, r"a reflector table \(.csv, .tsv\) is not converted into a VDMA LIF"),
         ("a.csv", "a.csv", UsageError, "is the source itself"),
-        ("map.yaml", "b.csv", UsageError, "a floor map .* cannot become a reflector table"),
+        ("map.yaml", "b.csv", UsageError, "a floor map .* is not converted into a reflector table"),
         ("notes.doc", "out", FileFormatError, "ends in '.doc', which is not read; expected a folder, or a file that"),
         ("broken.json", "out", FileFormatError, "is no JSON"),
-        ("plan.dxf", "b.csv", UsageError, "cannot become a reflector table"),
+        (
+            "plan.dxf",
+            "b.csv",
+            UsageError,
+            "is not converted into a reflector table .*; expected one that ends with .yaml",
+        ),
+        (
+            "drive",
+            "b.csv",
+            UsageError,
+            r"recording is not converted into a .* \(.csv, .tsv\); expected a folder, since a recor",
+        ),
+        (
+            "hall",
+            "b",
+            UsageError,
+            "hall is a project already; expected a name that ends with .csv for a reflector table",
+        ),
     ],
 )
 def test_what_cannot_be_converted_is_one_line(
     tmp_path: Path, source: str, target: str, error: type[CommissionError], message: str
 ) -> None:
     write_reflectors(REFLECTORS, tmp_path / "a.csv")
+    write_recording(tmp_path / "drive", [Odometry(0, np.zeros(3))])
+    save_project(Project(), tmp_path / "hall")
     for name in ("map.yaml", "notes.doc", "broken.json", "plan.dxf"):
         (tmp_path / name).write_text("{")
     with pytest.raises(error, match=message) as caught:
@@ -125,7 +144,7 @@ def test_table_of_a_spreadsheet_goes_into_a_project_and_leaves_alone_what_it_has
     noted = replace(first, note="pillar 7")
     save_project(Project(reflectors=ReflectorMap((noted, *rest))), tmp_path / "hall")
     (tmp_path / "survey.csv").write_text(f"Nr;X [mm];Y [mm]\n{first.id};9000,5;{1000 * first.y:.0f}\n")
-    report = convert_file(tmp_path / "survey.csv", tmp_path / "hall", USUAL)
+    report = convert_file(tmp_path / "survey.csv", tmp_path / "hall", USUAL, force=True)
     assert "the table has no radius; 40 mm is assumed" in report
     (kept,) = load_project(tmp_path / "hall").reflectors.reflectors
     assert kept == replace(noted, x=9.0005)

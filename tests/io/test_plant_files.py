@@ -207,7 +207,7 @@ def test_model_with_y_up_is_suspected_and_read_once_that_is_said(tmp_path: Path)
     convert_file(path, tmp_path / "map.yaml", ConvertOptions(up="y"))
     assert read_floor_map(tmp_path / "map.yaml").size == pytest.approx((22.0, 12.0))
     with pytest.raises(UsageError, match="up is 'x'; expected y or z"):
-        convert_file(path, tmp_path / "map.yaml", ConvertOptions(up="x"))
+        convert_file(path, tmp_path / "other.yaml", ConvertOptions(up="x"))
 
 
 def test_glb_is_in_metres_unless_another_unit_is_said(tmp_path: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import shutil
-import tempfile
 import zipfile
 from collections.abc import Iterable
 from contextlib import ExitStack
@@ -17,6 +16,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from commission.errors import FileFormatError
+from commission.io.atomic import cannot_write, staged
 from commission.io.recordings.csv_folder import (
     DETECTION_COLUMNS,
     DETECTIONS,
@@ -43,17 +43,16 @@ def write_recording(folder: Path, records: Iterable[Record]) -> None:
         the folder cannot be written, or a scan has other beams than the first one.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".recording.", dir=folder) as scratch:
-            names = _write_all(Path(scratch), records, folder)
-            for name in (DETECTIONS, SCANS, REFERENCE, ODOMETRY):
-                if name in names:
-                    (Path(scratch) / name).replace(folder / name)
-                else:
-                    (folder / name).unlink(missing_ok=True)
+        with staged(folder, last=ODOMETRY) as scratch:
+            names = _write_all(scratch, records, folder)
+            for path in scratch.iterdir():
+                if path.name not in names:
+                    path.unlink()
+        for name in (DETECTIONS, SCANS, REFERENCE):
+            if name not in names:
+                (folder / name).unlink(missing_ok=True)
     except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
-        raise FileFormatError(folder, "", found, "a writable place with free space") from error
+        raise cannot_write(folder, error) from error
 
 
 def _write_all(scratch: Path, records: Iterable[Record], folder: Path) -> set[str]:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from commission.errors import FileFormatError
 from commission.io.reading import cannot_read, check_size
+from commission.site.checks import STAMP_LIMIT
 from commission.site.record_log import ScanLog
 
 BEAM_LIMIT = 100_000
@@ -216,9 +217,15 @@ class ScanArchive:
             row, beam = (int(i) for i in np.argwhere(ranges < 0.0)[0])
             found = f"is {ranges[row, beam]:g} in row {start + row}, beam {beam}"
             raise self._error("ranges", found, "0 m or more, NaN where nothing came back")
+        stamps = arrays["stamp_ns"]
+        # An unsigned stamp near 2^64 would become a negative one.
+        beyond = np.flatnonzero((stamps >= STAMP_LIMIT) | (stamps <= -STAMP_LIMIT))
+        if len(beyond):
+            found = f"is {stamps[beyond[0]]} in row {start + int(beyond[0])}"
+            raise self._error("stamp_ns", found, f"nanoseconds, less than {STAMP_LIMIT}")
         intensities, reflector = arrays.get("intensities"), arrays.get("reflector")
         return ScanLog(
-            stamps_ns=arrays["stamp_ns"].astype(np.int64),
+            stamps_ns=stamps.astype(np.int64),
             ranges=ranges,
             angle_min=self.angle_min,
             angle_increment=self.angle_increment,

@@ -165,6 +165,10 @@ ODOMETRY_ERRORS = [
     ("stamp_ns,dx,dy,dtheta\n9,0,0,0\n9,0,0,0\n", "line 3, column stamp_ns: is 9 after 9; expected later than the row"),
     ("stamp_ns,dx,dy,dtheta\n0,0,0\n", "line 2: has 3 cells; expected 4 cells, one for each of: stamp_ns, dx, dy, d"),
     (f"stamp_ns,dx,dy,dtheta\n{10**30},0,0,0\n", "expected a whole number of nanoseconds"),
+    *(
+        (f"stamp_ns,dx,dy,dtheta\n{stamp},0,0,0\n", f"is '{stamp}'; expected a whole number of nanoseconds, less than")
+        for stamp in (2**62, -(2**62), 2**63 - 1, -(2**63), 2**64 - 1)
+    ),
 ]
 DETECTION_ERRORS = [
     ("0,1,\n", "line 2, column bearing: is empty; expected range and bearing, or neither"),
@@ -219,6 +223,14 @@ def test_wrong_table_is_one_line_with_line_and_column(
         ({"stamp_ns": np.array([5.0, 15.0])}, "array stamp_ns: is float64 (2,); expected int64 (N,) nanoseconds"),
         ({"stamp_ns": np.array([15, 5])}, "array stamp_ns: 5 in row 1 follows 15; expected stamps that ascend"),
         ({"stamp_ns": np.array([5, 5])}, "array stamp_ns: 5 in row 1 follows 5; expected stamps that ascend"),
+        *(
+            (
+                {"stamp_ns": np.array([5, stamp], kind)},
+                f"array stamp_ns: is {stamp} in row 1; expected nanoseconds, less",
+            )
+            for stamp, kind in ((2**62, np.int64), (2**63 - 1, np.int64), (2**64 - 1, np.uint64), (2**62, np.uint64))
+        ),
+        ({"stamp_ns": np.array([-(2**63), 5])}, f"array stamp_ns: is {-(2**63)} in row 0; expected nanoseconds, less"),
         ({"angle_min": np.float64(np.nan)}, "array angle_min: is nan; expected an angle in radians"),
         ({"angle_min": np.zeros(2)}, "array angle_min: is float64 (2,); expected one number [rad]"),
         ({"angle_increment": np.float64(0.0)}, "array angle_increment: is 0"),
@@ -230,6 +242,17 @@ def test_wrong_scans_are_one_line_with_array_found_and_expected(
     with pytest.raises(FileFormatError) as caught:
         load_log(write_scans(tmp_path, **changes))
     assert message in str(caught.value)
+
+
+def test_the_first_and_the_last_stamp_that_is_taken_keep_their_order(tmp_path: Path) -> None:
+    first, last = 1 - 2**62, 2**62 - 1
+    folder = write_scans(tmp_path, stamp_ns=np.array([first, last]))
+    (folder / "odometry.csv").write_text(f"stamp_ns,dx,dy,dtheta\n{first},0,0,0\n{last},0,0,0\n")
+    log = load_log(folder)
+    assert log.odometry_stamps_ns.tolist() == [first, last]
+    assert log.scans is not None
+    assert log.scans.stamps_ns.tolist() == [first, last]
+    assert np.diff(log.odometry_stamps_ns).tolist() == [last - first]
 
 
 def test_infinite_range_means_that_nothing_came_back(tmp_path: Path) -> None:
