@@ -5,13 +5,15 @@ It judges arrays of a finished run and runs nothing itself. An error is estimate
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from commission.compiled import compiled
 from commission.geometry.angles import difference, wrap
-from commission.geometry.arrays import BoolArray, FloatArray, IntArray
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.localization.estimate import Mode
 
 LONGEST_GAP_NS = 1_000_000_000
@@ -110,17 +112,46 @@ def nees(errors: FloatArray, covariances: FloatArray) -> FloatArray:
     nees : (K,) array; NaN where the error is unknown, infinite where the covariance is singular: the filter claims to
         know exactly what it does not.
     """
-    known = np.isfinite(errors).all(axis=1)
-    sigmas = np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
-    result = np.where(known, np.inf, np.nan)
-    rows = np.flatnonzero(known & (sigmas > 0.0).all(axis=1))
-    # Scaled to correlations, metres and radians are comparable and the determinant tells a singular matrix.
-    scaled = errors[rows] / sigmas[rows]
-    correlations = covariances[rows] / (sigmas[rows][:, :, np.newaxis] * sigmas[rows][:, np.newaxis, :])
-    regular = np.linalg.det(correlations) > SINGULAR
-    rows, scaled, correlations = rows[regular], scaled[regular], correlations[regular]
-    solved = np.linalg.solve(correlations, scaled[..., np.newaxis])[..., 0]
-    result[rows] = np.sum(scaled * solved, axis=1)
+    return _nees(read_only(errors), read_only(covariances))
+
+
+@compiled
+def _nees(errors: FloatArray, covariances: FloatArray) -> FloatArray:
+    """e^T P^-1 e by the Cholesky factor of the correlations, row by row.
+
+    Scaled to correlations, metres and radians are comparable and the determinant tells a singular matrix.
+    """
+    count, n = errors.shape
+    result = np.empty(count)
+    factor = np.zeros((n, n))
+    solved = np.zeros(n)
+    sigmas = np.zeros(n)
+    for k in range(count):
+        known = True
+        for i in range(n):
+            known = known and math.isfinite(errors[k, i])
+            sigmas[i] = math.sqrt(max(covariances[k, i, i], 0.0))
+        result[k] = math.inf if known else math.nan
+        if not known or not sigmas.min() > 0.0:
+            continue
+        determinant, total = 1.0, 0.0
+        for i in range(n):
+            for j in range(i + 1):
+                rest = covariances[k, i, j] / (sigmas[i] * sigmas[j])
+                for m in range(j):
+                    rest -= factor[i, m] * factor[j, m]
+                if i == j:
+                    determinant *= rest if rest > 0.0 else 0.0
+                    factor[i, i] = math.sqrt(rest) if rest > 0.0 else 0.0
+                else:
+                    factor[i, j] = rest / factor[j, j]
+            value = errors[k, i] / sigmas[i]
+            for m in range(i):
+                value -= factor[i, m] * solved[m]
+            solved[i] = value / factor[i, i]
+            total += solved[i] * solved[i]
+        if determinant > SINGULAR:
+            result[k] = total
     return result
 
 
@@ -170,7 +201,7 @@ class ErrorStatistics:
 
 
 def error_statistics(
-    errors: FloatArray, covariances: FloatArray, operational: BoolArray, position_limit: float
+    errors: FloatArray, covariances: FloatArray, operational: BoolArray, position_limit: float | FloatArray
 ) -> ErrorStatistics | None:
     """Judge a run by its errors.
 
@@ -179,7 +210,7 @@ def error_statistics(
     errors : (K, 3) array [m, m, rad], as `pose_errors` gives; NaN where unknown.
     covariances : (K, 3, 3) array of the estimates.
     operational : (K,) whether the mode after each cycle is `operational`.
-    position_limit : alarm limit of the supervisor, Err_p [m].
+    position_limit : alarm limit of the supervisor, Err_p [m]; or (K,) array, where it changes on the way.
 
     Returns
     -------
@@ -203,7 +234,7 @@ def error_statistics(
         anees=_mean_of_known(pose_nees) / 3.0,
         anees_position=_mean_of_known(position_nees) / 2.0,
         largest_jump=largest_jump(errors),
-        wrong_while_operational=int(np.count_nonzero(operational[known] & (distances > position_limit))),
+        wrong_while_operational=int(np.count_nonzero(operational & (distance > position_limit))),
     )
 
 

@@ -10,9 +10,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from commission.errors import JobCancelled
-from commission.localization import whole_run
+from commission.localization import growing_run, whole_run
 from commission.localization.detection_log import cycle_stamps, extract_detections
 from commission.localization.estimate import Status
+from commission.localization.growing_run import GrowingRun
 from commission.localization.localizer import Localizer
 from commission.localization.run_columns import RunColumns, Segment
 from commission.localization.setup import LocalizerSetup
@@ -231,3 +232,41 @@ def test_a_log_without_cycles_still_moves_the_state(drive: Drive) -> None:
     for record in log.records():
         localizer.feed(record)
     assert columns.final == localizer.state != state_at_start(drive.initial)
+
+
+def test_a_run_that_grows_while_it_is_driven_is_the_whole_run(drive: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growing_run, "FIRST_ROWS", 3)
+    segments = (Segment(0, SETUPS["drive"]), Segment(12, SETUPS["narrow gate"]), Segment(13, SETUPS["another map"]))
+    growing = GrowingRun(segments[0].setup, drive.initial)
+    for record in drive.log.records():
+        growing.feed(record)
+        for segment in segments[1:]:
+            if segment.first == len(growing) and growing.columns().segments[-1].first < segment.first:
+                growing.begin_segment(segment.setup)
+    columns, whole = growing.columns(), run_segments(drive.log, segments, drive.initial)
+    assert_same(columns, whole)
+    assert columns.segments == segments
+    assert columns.detected.status.tobytes() == whole.detected.status.tobytes()
+    assert columns.points_map().tobytes() == whole.points_map().tobytes()
+    assert state_before(columns, drive.log, 20) == state_before(whole, drive.log, 20)
+
+
+def test_what_a_growing_run_has_shown_never_changes_again(drive: Drive) -> None:
+    growing = GrowingRun(SETUPS["drive"], drive.initial)
+    records = list(drive.log.records())
+    for record in records[: len(records) // 2]:
+        growing.feed(record)
+    shown = growing.columns()
+    means, d2 = shown.means.tobytes(), shown.d2.tobytes()
+    assert not shown.means.flags.writeable
+    for record in records[len(records) // 2 :]:
+        growing.feed(record)
+    assert (shown.means.tobytes(), shown.d2.tobytes()) == (means, d2)
+    assert growing.columns().means[: len(shown)].tobytes() == means
+
+
+def test_a_setup_that_is_replaced_before_a_cycle_comes_begins_no_segment_of_its_own(drive: Drive) -> None:
+    growing = GrowingRun(SETUPS["drive"], drive.initial)
+    growing.begin_segment(SETUPS["another map"])
+    growing.begin_segment(SETUPS["narrow gate"])
+    assert growing.columns().segments == (Segment(0, SETUPS["narrow gate"]),)

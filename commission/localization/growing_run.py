@@ -1,0 +1,165 @@
+"""A run that is being driven: the live localizer, and the columns that grow with every scan. Not for finished logs."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.localization.detection_log import DetectionLog
+from commission.localization.detector import INLIER
+from commission.localization.estimate import Belief, Estimate, Status
+from commission.localization.localizer import Localizer
+from commission.localization.run_columns import Checkpoint, RunColumns, Segment
+from commission.localization.setup import LocalizerSetup
+from commission.localization.state import FilterState
+from commission.localization.whole_run import CHECKPOINT_CYCLES
+from commission.site.records import Record
+
+FIRST_ROWS = 1024
+"""Rows that there is room for at first; when they are full, there is room for twice as many."""
+
+
+class Cycles(NamedTuple):
+    """A row per cycle."""
+
+    stamps_ns: IntArray
+    prior_means: FloatArray
+    prior_covariances: FloatArray
+    means: FloatArray
+    covariances: FloatArray
+    modes: NDArray[np.int8]
+
+
+class DetectionRows(NamedTuple):
+    """A row per detection."""
+
+    range_bearing: FloatArray
+    beams: IntArray
+    detected: NDArray[np.int8]
+    status: NDArray[np.int8]
+    reflectors: IntArray
+    d2: FloatArray
+
+
+class GrowingRun:
+    """A localizer that is fed record by record and remembers every cycle.
+
+    Parameters
+    ----------
+    setup : reflector map, scanner and parameters; `begin_segment` changes them between two records.
+    start : belief before the first record, or the state in which another run was left.
+    """
+
+    def __init__(self, setup: LocalizerSetup, start: Belief | FilterState) -> None:
+        self._localizer = Localizer(setup, start)
+        self._segments = [Segment(0, setup)]
+        self._checkpoints = [Checkpoint(0, self._localizer.state)]
+        self._count = 0
+        n = FIRST_ROWS
+        covariances = (np.empty((n, 3, 3)), np.empty((n, 3, 3)))
+        self._cycles = Cycles(
+            np.empty(n, np.int64),
+            np.empty((n, 3)),
+            covariances[0],
+            np.empty((n, 3)),
+            covariances[1],
+            np.empty(n, np.int8),
+        )
+        self._offsets: IntArray = np.zeros(n + 1, np.int64)
+        self._detections = DetectionRows(
+            np.empty((n, 2)),
+            np.empty(n, np.int64),
+            np.empty(n, np.int8),
+            np.empty(n, np.int8),
+            np.empty(n, np.int64),
+            np.empty(n),
+        )
+
+    def __len__(self) -> int:
+        """Return the number of cycles so far."""
+        return self._count
+
+    @property
+    def state(self) -> FilterState:
+        """State after the newest record."""
+        return self._localizer.state
+
+    def begin_segment(self, setup: LocalizerSetup) -> None:
+        """Use another setup from the next record on; the state stays, and the columns say where it began.
+
+        When the newest record was a scan, the columns are those of a whole run with this segment; odometry that has
+        come since is taken in as it was.
+        """
+        self._localizer.replace_setup(setup)
+        if self._segments[-1].first == self._count:
+            self._segments.pop()
+        self._segments.append(Segment(self._count, setup))
+
+    def feed(self, record: Record) -> Estimate | None:
+        """Take in one record; arguments, result and errors are those of `Localizer.feed`."""
+        estimate = self._localizer.feed(record)
+        if estimate is not None:
+            self._append(estimate)
+            if self._count % CHECKPOINT_CYCLES == 0:
+                self._checkpoints.append(Checkpoint(self._count, self._localizer.state))
+        return estimate
+
+    def columns(self) -> RunColumns:
+        """Return the run so far: views of rows that never change again."""
+        n = self._count
+        cycles = Cycles._make(read_only(column[:n]) for column in self._cycles)
+        offsets = read_only(self._offsets[: n + 1])
+        rows = DetectionRows._make(read_only(column[: int(offsets[-1])]) for column in self._detections)
+        detected = DetectionLog(
+            stamps_ns=cycles.stamps_ns,
+            offsets=offsets,
+            range_bearing=rows.range_bearing,
+            beams=rows.beams,
+            status=rows.detected,
+        )
+        return RunColumns(
+            segments=tuple(segment for segment in self._segments if segment.first < max(n, 1)),
+            checkpoints=tuple(self._checkpoints),
+            detected=detected,
+            prior_means=cycles.prior_means,
+            prior_covariances=cycles.prior_covariances,
+            means=cycles.means,
+            covariances=cycles.covariances,
+            modes=cycles.modes,
+            status=rows.status,
+            reflector=rows.reflectors,
+            d2=rows.d2,
+            final=self._localizer.state,
+        )
+
+    def _append(self, estimate: Estimate) -> None:
+        """Write one cycle and its detections."""
+        row, first = self._count, int(self._offsets[self._count])
+        last = first + len(estimate.status)
+        if row == len(self._cycles.modes):
+            self._cycles = Cycles._make(_longer(column, row + 1) for column in self._cycles)
+            self._offsets = _longer(self._offsets, row + 2)
+        if last > len(self._detections.d2):
+            self._detections = DetectionRows._make(_longer(column, last) for column in self._detections)
+        cycles, found = self._cycles, self._detections
+        cycles.stamps_ns[row] = estimate.stamp_ns
+        cycles.prior_means[row], cycles.prior_covariances[row] = estimate.prior.mean, estimate.prior.covariance
+        cycles.means[row], cycles.covariances[row] = estimate.posterior.mean, estimate.posterior.covariance
+        cycles.modes[row] = estimate.mode
+        rejected = estimate.status == Status.OUTLIER_DETECTOR
+        found.range_bearing[first:last], found.beams[first:last] = estimate.detections, estimate.beams
+        found.detected[first:last] = np.where(rejected, estimate.status, INLIER)
+        found.status[first:last], found.reflectors[first:last] = estimate.status, estimate.reflector
+        found.d2[first:last] = estimate.d2
+        self._offsets[row + 1] = last
+        self._count = row + 1
+
+
+def _longer(column: NDArray[Any], rows: int) -> NDArray[Any]:
+    """Return a copy with room for twice the rows, at least as many as asked for."""
+    longer = np.empty((max(2 * len(column), rows), *column.shape[1:]), column.dtype)
+    longer[: len(column)] = column
+    return longer
