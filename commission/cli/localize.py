@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,8 +14,7 @@ from tyro.conf import Positional, UseAppendAction, arg
 from commission.cli.parsing import initial_pose
 
 if TYPE_CHECKING:
-    from commission.studies.replay import ReplayResult
-    from commission.studies.start import Start
+    from commission.studies.run import RunResult
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +44,7 @@ class Localize:
         from commission.io.recordings.base import load_log
         from commission.io.results import DETECTIONS, ESTIMATES, SUMMARY, write_results
         from commission.localization import whole_run
-        from commission.studies.replay import judge, localize, summary
+        from commission.studies.run import RunInput, judged_run, summary
         from commission.studies.start import start_of
 
         names, sources = (ESTIMATES, DETECTIONS, SUMMARY), (self.recording, self.project)
@@ -57,21 +55,19 @@ class Localize:
         start = start_of(project, log, given and given.pose, given and given.sigmas)
 
         whole_run.warm_up()
-        started = time.perf_counter()
-        arrays = localize(project, log, start.belief)
-        microseconds_per_cycle = (time.perf_counter() - started) * 1e6 / len(arrays)
-        result = judge(project, log, arrays)
+        result = judged_run(RunInput.of(project, log, start))
 
         with out.writing() as folder:
-            write_results(folder, result.run, project.reflectors, summary(result, microseconds_per_cycle))
-        limit = project.parameters.supervisor.position_limit
-        sys.stdout.write("\n".join([*_report(result, start, limit), f"Written to   {self.out}"]) + "\n")
+            write_results(folder, result.columns, summary(result))
+        sys.stdout.write("\n".join([*_report(result), f"Written to   {self.out}"]) + "\n")
 
 
-def _report(result: ReplayResult, start: Start, position_limit: float) -> list[str]:
+def _report(result: RunResult) -> list[str]:
     """Lines that tell a person how the run went; millimetres and degrees as is the habit."""
     from commission.localization.estimate import Status
 
+    start = result.inputs.start
+    limit = result.inputs.segments[0].setup.parameters.supervisor.position_limit
     x, y, theta = start.belief.mean
     lines = [
         f"Recording    {result.cycles} cycles in {result.duration:.1f} s",
@@ -93,11 +89,11 @@ def _report(result: ReplayResult, start: Start, position_limit: float) -> list[s
         f"{errors.position_p95 * 1e3:.1f} at 95 %, {errors.position_max * 1e3:.1f} at most{heading}",
         f"Consistency  ANEES {consistency}position {errors.anees_position:.2f} (1 is consistent, more is too sure)",
         f"Danger       {errors.wrong_while_operational} of {errors.compared} cycles operational with an error "
-        f"beyond {position_limit * 1e3:.0f} mm",
+        f"beyond {limit * 1e3:.0f} mm",
     ]
 
 
-def _longest(result: ReplayResult) -> list[str]:
+def _longest(result: RunResult) -> list[str]:
     """How long the longest fail episode is, if there is one."""
     lengths = [(episode.end_ns - episode.start_ns) * 1e-9 for episode in result.episodes]
     return [f", the longest {max(lengths):.1f} s"] if lengths else []

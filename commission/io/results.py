@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from commission.io.atomic import atomic_file, write_text
 from commission.localization.estimate import Mode, Status
 from commission.localization.run_columns import RunColumns
-from commission.site.reflectors import ReflectorMap
 
 ESTIMATES = "estimates.csv"
 DETECTIONS = "detections.csv"
@@ -31,16 +30,14 @@ UPPER_TRIANGLE = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 ROWS_AT_ONCE = 50_000
 
 
-def write_results(
-    folder: Path, run: RunColumns, reflectors: ReflectorMap, summary: Mapping[str, int | float | None]
-) -> None:
+def write_results(folder: Path, run: RunColumns, summary: Mapping[str, int | float | None]) -> None:
     """Write `estimates.csv`, `detections.csv` and `summary.json`; each is replaced whole or not at all.
 
     Parameters
     ----------
     folder : made when missing.
-    run : the filter's own state after each scan goes into the estimates, in fail mode too; beside it the mode.
-    reflectors : the map that the run was made with; its ids name the associated reflectors.
+    run : the filter's own state after each scan goes into the estimates, in fail mode too; beside it the mode. The ids
+        of the map that each of its segments was made with name the associated reflectors.
     summary : what the run came to, by key; the last file written, so that where it is the others are complete.
 
     Raises
@@ -49,7 +46,7 @@ def write_results(
         a file cannot be written.
     """
     _write_table(folder / ESTIMATES, ESTIMATE_COLUMNS, _estimate_rows(run))
-    _write_table(folder / DETECTIONS, DETECTION_COLUMNS, _detection_rows(run, reflectors))
+    _write_table(folder / DETECTIONS, DETECTION_COLUMNS, _detection_rows(run))
     write_text(folder / SUMMARY, json.dumps(dict(summary), indent=2, allow_nan=False) + "\n")
 
 
@@ -67,11 +64,9 @@ def _estimate_rows(run: RunColumns) -> Iterator[Iterable[Any]]:
     return _blocks(columns)
 
 
-def _detection_rows(run: RunColumns, reflectors: ReflectorMap) -> Iterator[Iterable[Any]]:
+def _detection_rows(run: RunColumns) -> Iterator[Iterable[Any]]:
     """Columns of some detections at a time; empty where there is no reflector, and so no distance to it."""
     points = run.points_map()
-    # The name of nobody is the last one, which is where the index -1 leads.
-    names = np.array([*(reflector.id for reflector in reflectors.reflectors), ""], dtype=object)
     distances = run.d2.astype(object)
     distances[np.isnan(run.d2)] = ""
     columns = [
@@ -79,10 +74,22 @@ def _detection_rows(run: RunColumns, reflectors: ReflectorMap) -> Iterator[Itera
         *(run.range_bearing[:, axis] for axis in range(2)),
         *(points[:, axis] for axis in range(2)),
         np.array([status.name.lower() for status in Status])[run.status],
-        names[run.reflector],
+        _reflector_ids(run),
         distances,
     ]
     return _blocks(columns)
+
+
+def _reflector_ids(run: RunColumns) -> NDArray[Any]:
+    """(n,) id of the reflector that each detection is closest to; empty for nobody."""
+    ends = (*run.firsts[1:].tolist(), len(run))
+    ids = np.empty(len(run.reflector), dtype=object)
+    for segment, end in zip(run.segments, ends, strict=True):
+        rows = slice(int(run.offsets[segment.first]), int(run.offsets[end]))
+        # The name of nobody is the last one, which is where the index -1 leads.
+        names = np.array([*(reflector.id for reflector in segment.setup.reflectors.reflectors), ""], dtype=object)
+        ids[rows] = names[run.reflector[rows]]
+    return ids
 
 
 def _blocks(columns: Sequence[NDArray[Any]]) -> Iterator[Iterable[Any]]:

@@ -1,6 +1,7 @@
 import csv
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,9 @@ from numpy.testing import assert_allclose
 from commission.errors import FileFormatError
 from commission.io.results import write_results
 from commission.localization.estimate import Belief, Mode, Status
+from commission.localization.run_columns import Segment
 from commission.localization.setup import LocalizerSetup
-from commission.localization.whole_run import run
+from commission.localization.whole_run import run, run_segments
 from commission.site.parameters import Parameters, SupervisorParameters
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry, Scan
@@ -48,9 +50,22 @@ def rows(path):
         return list(csv.DictReader(file))
 
 
+def test_each_segment_names_the_reflectors_of_its_own_map(tmp_path):
+    renamed = ReflectorMap(tuple(replace(r, id=f"new {i}") for i, r in enumerate(REFLECTORS.reflectors)))
+    segments = tuple(
+        Segment(first, LocalizerSetup(reflectors, Scanner(), Parameters()))
+        for first, reflectors in enumerate((REFLECTORS, REFLECTORS, renamed))
+    )
+    start = Belief(0, np.zeros(3), 1e-4 * np.eye(3))
+    write_results(tmp_path, run_segments(RecordLog.collect(drive()), segments, start), {})
+    found = [(row["stamp_ns"], row["reflector_id"]) for row in rows(tmp_path / "detections.csv")]
+    assert [name for stamp, name in found if stamp == "0"] == list(IDS)
+    assert [name for stamp, name in found if stamp == "200"][:3] == ["new 0", "new 1", "new 2"]
+
+
 def test_every_cycle_is_a_row_that_reads_back_to_the_last_bit(tmp_path):
     arrays = run_over(drive())
-    write_results(tmp_path, arrays, REFLECTORS, {})
+    write_results(tmp_path, arrays, {})
     table = rows(tmp_path / "estimates.csv")
     assert [int(row["stamp_ns"]) for row in table] == [0, 100, 200]
     assert [[float(row[c]) for c in ("x", "y", "theta")] for row in table] == arrays.means.tolist()
@@ -63,7 +78,7 @@ def test_every_cycle_is_a_row_that_reads_back_to_the_last_bit(tmp_path):
 
 def test_every_detection_is_a_row_with_its_place_on_the_floor_and_its_reflector(tmp_path):
     arrays = run_over(drive())
-    write_results(tmp_path, arrays, REFLECTORS, {})
+    write_results(tmp_path, arrays, {})
     table = rows(tmp_path / "detections.csv")
     assert [int(row["stamp_ns"]) for row in table] == [0, 0, 0, 200, 200, 200, 200]
     assert [row["reflector_id"] for row in table[:6]] == [*IDS, *IDS]
@@ -86,7 +101,7 @@ def test_a_rejected_cluster_names_no_reflector_and_no_distance(tmp_path):
     )
     arrays = run_over([Odometry(0, np.zeros(3)), scan])
     assert arrays.status.tolist() == [Status.OUTLIER_DETECTOR]
-    write_results(tmp_path, arrays, REFLECTORS, {})
+    write_results(tmp_path, arrays, {})
     row = rows(tmp_path / "detections.csv")[0]
     assert (row["status"], row["reflector_id"], row["d2"]) == ("outlier_detector", "", "")
 
@@ -94,7 +109,7 @@ def test_a_rejected_cluster_names_no_reflector_and_no_distance(tmp_path):
 def test_the_filter_s_own_state_goes_on_in_fail_mode(tmp_path):
     arrays = run_over(drive(), supervisor=SupervisorParameters(position_limit=1e-6))
     assert arrays.modes.tolist() == [Mode.FAIL] * 3
-    write_results(tmp_path, arrays, REFLECTORS, {})
+    write_results(tmp_path, arrays, {})
     table = rows(tmp_path / "estimates.csv")
     assert {row["mode"] for row in table} == {"fail"}
     assert float(table[-1]["x"]) == pytest.approx(0.2, abs=0.02)
@@ -102,24 +117,24 @@ def test_the_filter_s_own_state_goes_on_in_fail_mode(tmp_path):
 
 def test_the_summary_is_json_in_the_order_given(tmp_path):
     entries = {"cycles": 3, "nis_mean": None, "duration_s": 0.2}
-    write_results(tmp_path, run_over(drive()), REFLECTORS, entries)
+    write_results(tmp_path, run_over(drive()), entries)
     assert list(json.loads((tmp_path / "summary.json").read_text(encoding="utf-8")).items()) == list(entries.items())
 
 
 def test_a_run_longer_than_one_block_is_written_whole(tmp_path, monkeypatch):
     monkeypatch.setattr("commission.io.results.ROWS_AT_ONCE", 2)
-    write_results(tmp_path, run_over(drive()), REFLECTORS, {})
+    write_results(tmp_path, run_over(drive()), {})
     assert len(rows(tmp_path / "estimates.csv")) == 3
     assert len(rows(tmp_path / "detections.csv")) == 7
 
 
 def test_results_are_replaced_and_no_temporary_file_stays(tmp_path):
     for _ in range(2):
-        write_results(tmp_path, run_over(drive()), REFLECTORS, {})
+        write_results(tmp_path, run_over(drive()), {})
     assert sorted(path.name for path in tmp_path.iterdir()) == ["detections.csv", "estimates.csv", "summary.json"]
 
 
 def test_a_folder_that_is_a_file_is_an_error_that_names_it(tmp_path):
     (tmp_path / "out").write_text("", encoding="utf-8")
     with pytest.raises(FileFormatError, match="out"):
-        write_results(tmp_path / "out", run_over(drive()), REFLECTORS, {})
+        write_results(tmp_path / "out", run_over(drive()), {})

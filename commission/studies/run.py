@@ -1,0 +1,250 @@
+"""A run, judged: the localizer over a drive, and every figure of it that page and command show.
+
+From frozen inputs to a frozen result; nothing is kept, read or drawn. A figure that is wanted twice is computed here.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from commission.errors import UsageError
+from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.localization.detection_log import cycle_stamps
+from commission.localization.estimate import Mode, Status
+from commission.localization.run_columns import RunColumns, Segment
+from commission.localization.setup import LocalizerSetup
+from commission.localization.whole_run import run_segments
+from commission.progress import Progress, part, silent
+from commission.site.project import Project
+from commission.site.record_log import RecordLog
+from commission.studies.metrics import (
+    ErrorStatistics,
+    FailEpisode,
+    error_statistics,
+    fail_episodes,
+    pose_errors,
+    reference_at,
+)
+from commission.studies.start import Start
+
+Number = int | float | None
+JUDGING_SHARE = 0.1
+"""Share of the progress that the figures take."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunInput:
+    """All that a run depends on."""
+
+    log: RecordLog
+    """The drive; compared by identity."""
+    start: Start
+    """Belief before the first record, and who says so."""
+    segments: tuple[Segment, ...]
+    """Setups, from which cycle on, and whether reflectors are covered; the first one begins at cycle 0."""
+
+    @staticmethod
+    def of(project: Project, log: RecordLog, start: Start) -> RunInput:
+        """Return the input of a run with the setup of a project from start to end."""
+        return RunInput(log=log, start=start, segments=(Segment(0, LocalizerSetup.of(project)),))
+
+    def from_here_on(self, cycle: int, setup: LocalizerSetup, *, covered: bool = False) -> RunInput:
+        """Return the input of the same run up to a cycle, and of another setup (or covered reflectors) from it on."""
+        before = tuple(segment for segment in self.segments if segment.first < cycle)
+        return RunInput(log=self.log, start=self.start, segments=(*before, Segment(cycle, setup, covered)))
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RunResult:
+    """A drive localized, and judged against its reference where it has one: K cycles."""
+
+    inputs: RunInput
+    """What it was made of."""
+    columns: RunColumns
+    """Every cycle and every detection."""
+    duration: float
+    """Time from the first to the last record [s]."""
+    times: FloatArray
+    """(K,) time of each cycle after the first record [s]."""
+    references: FloatArray
+    """(K, 3) reference pose at each cycle [m, m, rad], map frame; NaN where there is none."""
+    errors: FloatArray
+    """(K, 3) estimate minus reference [m, m, rad], map frame; NaN where there is none."""
+    two_sigma: FloatArray
+    """(K, 3) 2-sigma of x [m], y [m] and heading [rad] after each cycle."""
+    counts: IntArray
+    """(K, 3) detections of each `Status` in each cycle."""
+    nis: FloatArray
+    """(K,) largest squared Mahalanobis distance of an inlier of the cycle (2 degrees of freedom); NaN without one."""
+    statistics: ErrorStatistics | None
+    """Errors in numbers; None without a reference."""
+    episodes: tuple[FailEpisode, ...]
+    """Stretches in fail mode."""
+    microseconds_per_cycle: float
+    """Time that the localizer took per cycle, detection in scans included where it was done [us]."""
+
+    @property
+    def cycles(self) -> int:
+        """Number of scans processed."""
+        return len(self.columns)
+
+    @property
+    def position_errors(self) -> FloatArray:
+        """(K,) distance to the reference [m]; NaN where there is none."""
+        return np.hypot(self.errors[:, 0], self.errors[:, 1])
+
+    @property
+    def operational_fraction(self) -> float:
+        """Share of the cycles that the vehicle was allowed to drive [0..1]."""
+        return float(np.mean(self.columns.modes == Mode.OPERATIONAL))
+
+    @property
+    def nis_mean(self) -> float:
+        """Mean squared Mahalanobis distance of the inliers (2 degrees of freedom); NaN without inliers.
+
+        The gate cuts off the tail: for a consistent filter and a gate of 95 % it is 1.68, not 2.
+        """
+        inlier = self.columns.status == Status.INLIER
+        return float(np.mean(self.columns.d2[inlier])) if inlier.any() else math.nan
+
+    def count(self, status: Status) -> int:
+        """Return the number of detections of one status."""
+        return int(self.counts[:, status].sum())
+
+
+def judged_run(
+    inputs: RunInput,
+    progress: Progress = silent,
+    *,
+    earlier: RunResult | None = None,
+    clock: Callable[[], float] = time.perf_counter,
+) -> RunResult:
+    """Localize a drive and judge the result.
+
+    Parameters
+    ----------
+    inputs : drive, start, and setups along the way.
+    progress : called every few thousand cycles.
+    earlier : result of other inputs; what the two have in common is taken from it. All figures are the same to the last
+        bit, but for the time per cycle, which is that of the cycles that were computed.
+    clock : returns seconds.
+
+    Raises
+    ------
+    UsageError
+        the drive holds neither scans nor detections, so that there is nothing to localize by.
+    """
+    log, known = inputs.log, earlier is not None and earlier.inputs.log is inputs.log
+    if len(cycle_stamps(log)) == 0:
+        raise UsageError("the recording holds no scan and no detection; expected at least one to localize by")
+    before = clock()
+    columns = run_segments(
+        log,
+        inputs.segments,
+        inputs.start.belief,
+        earlier=earlier.columns if earlier is not None and known else None,
+        progress=part(progress, 0.0, 1.0 - JUDGING_SHARE),
+    )
+    microseconds_per_cycle = (clock() - before) * 1e6 / len(columns)
+    progress(1.0 - JUDGING_SHARE, "judging the run")
+    return judge(inputs, columns, microseconds_per_cycle)
+
+
+def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) -> RunResult:
+    """Compute every figure of a run that is there; a live one may go on.
+
+    Parameters
+    ----------
+    inputs : what it was made of, and the reference poses of its drive.
+    columns : the run.
+    microseconds_per_cycle : time that the localizer took [us].
+    """
+    log = inputs.log
+    references = reference_at(columns.stamps_ns, log.reference_stamps_ns, log.reference_poses)
+    errors = pose_errors(columns.means, references)
+    statistics = error_statistics(
+        errors, columns.covariances, columns.modes == Mode.OPERATIONAL, limits_along(columns)[:, 0]
+    )
+    first_ns, last_ns = (int(stamp) for stamp in log.stamps_ns[[0, -1]])
+    times = np.asarray((columns.stamps_ns - first_ns) * 1e-9, dtype=np.float64)
+    return RunResult(
+        inputs=inputs,
+        columns=columns,
+        duration=(last_ns - first_ns) / 1e9,
+        times=read_only(times),
+        references=read_only(references),
+        errors=read_only(errors),
+        two_sigma=read_only(two_sigma_of(columns.covariances)),
+        counts=read_only(np.stack([columns.counts(status) for status in Status], axis=1)),
+        nis=read_only(largest_nis(columns)),
+        statistics=statistics,
+        episodes=fail_episodes(columns.stamps_ns, columns.modes),
+        microseconds_per_cycle=microseconds_per_cycle,
+    )
+
+
+def two_sigma_of(covariances: FloatArray) -> FloatArray:
+    """(K, 3) 2-sigma of x [m], y [m] and heading [rad] of (K, 3, 3) covariances."""
+    return 2.0 * np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
+
+
+def limits_along(columns: RunColumns) -> FloatArray:
+    """(K, 2) limits of the supervisor in each cycle: of the position [m] and of the heading [rad]."""
+    limits = np.array(
+        [
+            (segment.setup.parameters.supervisor.position_limit, segment.setup.parameters.supervisor.heading_limit)
+            for segment in columns.segments
+        ]
+    )
+    return np.repeat(limits, np.diff((*columns.firsts, len(columns))), axis=0)
+
+
+def largest_nis(columns: RunColumns) -> FloatArray:
+    """(K,) largest squared Mahalanobis distance of an inlier of each cycle; NaN in a cycle without one."""
+    nis = np.full(len(columns), -math.inf)
+    values = np.where(columns.status == Status.INLIER, columns.d2, -math.inf)
+    starts = columns.offsets[:-1]
+    some = starts < columns.offsets[1:]
+    if some.any():
+        # Cycles without detections have no rows, so that each stretch ends where the next one begins.
+        nis[some] = np.maximum.reduceat(values, starts[some])
+    nis[np.isneginf(nis)] = math.nan
+    return nis
+
+
+def summary(result: RunResult) -> dict[str, Number]:
+    """Entries of `summary.json`, by their keys.
+
+    Returns
+    -------
+    entries : the error's entries only where a reference exists; None where a number is undefined (no inlier, a
+        reference without headings, a singular covariance).
+    """
+    entries: dict[str, Number] = {
+        "cycles": result.cycles,
+        "duration_s": result.duration,
+        "inliers": result.count(Status.INLIER),
+        "outliers_detector": result.count(Status.OUTLIER_DETECTOR),
+        "outliers_association": result.count(Status.OUTLIER_ASSOCIATION),
+        "operational_fraction": result.operational_fraction,
+        "fail_episodes": len(result.episodes),
+        "nis_mean": result.nis_mean,
+        "microseconds_per_cycle": result.microseconds_per_cycle,
+    }
+    if result.statistics is not None:
+        entries |= {
+            "position_rmse_m": result.statistics.position_rmse,
+            "position_median_m": result.statistics.position_median,
+            "position_p95_m": result.statistics.position_p95,
+            "position_max_m": result.statistics.position_max,
+            "heading_rmse_rad": result.statistics.heading_rmse,
+            "anees": result.statistics.anees,
+            "anees_position": result.statistics.anees_position,
+            "wrong_while_operational": result.statistics.wrong_while_operational,
+        }
+    return {key: value if value is None or math.isfinite(value) else None for key, value in entries.items()}

@@ -1,0 +1,225 @@
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from commission.errors import UsageError
+from commission.localization.estimate import Mode, Status
+from commission.localization.localizer import Localizer
+from commission.localization.run_columns import Segment
+from commission.localization.setup import LocalizerSetup
+from commission.site.parameters import AssociationParameters, OdometryParameters, Parameters, SupervisorParameters
+from commission.site.project import Project
+from commission.site.record_log import RecordLog
+from commission.site.records import Detections, Odometry, ReferencePose
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.scanner import Scanner
+from commission.studies.run import RunInput, judge, judged_run, largest_nis, summary
+from commission.studies.start import start_of
+
+CENTERS = np.array([[2.0, 3.0], [6.0, -3.0], [9.0, 3.5], [-4.0, -2.5], [0.0, -3.0]])
+PERIOD_NS = 100_000_000
+ALWAYS = [
+    *("cycles", "duration_s", "inliers", "outliers_detector", "outliers_association", "operational_fraction"),
+    *("fail_episodes", "nis_mean", "microseconds_per_cycle"),
+]
+WITH_REFERENCE = [
+    *("position_rmse_m", "position_median_m", "position_p95_m", "position_max_m", "heading_rmse_rad"),
+    *("anees", "anees_position", "wrong_while_operational"),
+]
+
+
+def hall(**groups):
+    reflectors = tuple(Reflector(id=f"R{index}", x=x, y=y) for index, (x, y) in enumerate(CENTERS))
+    return Project(
+        reflectors=ReflectorMap(reflectors),
+        scanner=Scanner(mounting=[0.0, 0.0, 0.0], field_of_view_deg=(-180.0, 180.0)),
+        parameters=Parameters(**groups),
+    )
+
+
+def standing_still(cycles, *, reference=True, blind=(), heading=0.0):
+    """Records of a vehicle at the origin that sees every reflector, except in the cycles in which it is blind."""
+    rng = np.random.default_rng(5)
+    exact = np.stack([np.hypot(*CENTERS.T), np.arctan2(CENTERS[:, 1], CENTERS[:, 0])], axis=1)
+    for cycle in range(cycles):
+        stamp = cycle * PERIOD_NS
+        yield Odometry(stamp, np.zeros(3))
+        if reference:
+            yield ReferencePose(stamp, [0.0, 0.0, heading])
+        seen = exact + rng.normal(size=exact.shape) * [0.02, 0.004]
+        yield Detections(stamp, np.empty((0, 2)) if cycle in blind else seen)
+
+
+def replayed(project, records):
+    log = RecordLog.collect(records)
+    return judged_run(RunInput.of(project, log, start_of(project, log, (0.0, 0.0, 0.0))))
+
+
+def test_a_summary_has_the_keys_of_its_format_in_their_order_and_is_json():
+    project = hall()
+    entries = summary(replace(replayed(project, standing_still(50)), microseconds_per_cycle=1.5))
+    assert list(entries) == ALWAYS + WITH_REFERENCE
+    assert entries["cycles"] == 50
+    assert entries["duration_s"] == 4.9
+    assert entries["inliers"] + entries["outliers_association"] == 250
+    assert entries["microseconds_per_cycle"] == 1.5
+    assert json.loads(json.dumps(entries, allow_nan=False)) == entries
+    assert list(summary(replayed(project, standing_still(5, reference=False)))) == ALWAYS
+
+
+def test_what_is_undefined_is_none_in_the_summary():
+    records = [Odometry(0, np.zeros(3)), ReferencePose(0, [0.0, 0.0, math.nan]), Detections(0, np.empty((0, 2)))]
+    entries = summary(replayed(hall(), records))
+    assert [key for key, value in entries.items() if value is None] == ["nis_mean", "heading_rmse_rad", "anees"]
+
+
+def test_the_result_is_that_of_the_live_localizer_cycle_by_cycle():
+    project = hall()
+    log = RecordLog.collect(standing_still(40, blind=range(10, 15)))
+    start = start_of(project, log)
+    result = judged_run(RunInput.of(project, log, start))
+    localizer = Localizer(LocalizerSetup.of(project), start.belief)
+    estimates = [estimate for record in log.records() if (estimate := localizer.feed(record)) is not None]
+    assert [e.mode for e in estimates] == [Mode(int(mode)) for mode in result.columns.modes]
+    assert np.array_equal([e.posterior.mean for e in estimates], result.columns.means)
+    for status in Status:
+        assert sum(e.count(status) for e in estimates) == result.count(status)
+    errors = [math.hypot(*e.posterior.mean[:2]) for e in estimates]
+    assert result.statistics is not None
+    assert result.statistics.position_max == pytest.approx(max(errors), rel=1e-12)
+
+
+def test_a_standing_vehicle_that_sees_well_is_consistent_and_operational():
+    result = replayed(hall(association=AssociationParameters(gate_probability=0.95)), standing_still(2000))
+    assert result.operational_fraction == 1.0
+    assert result.episodes == ()
+    # Of a gate of 95 %: mean of a chi-square (2 degrees of freedom) cut off at 5.99. 6 sigma of 9,500 values is 0.1.
+    assert result.nis_mean == pytest.approx(1.685, abs=0.1)
+
+
+def test_a_blind_stretch_is_one_fail_episode_of_its_length():
+    # 2-sigma along the axis after t seconds is 2 * 0.005 * sqrt(t): it passes 0.1 m after 100 s of 200.
+    project = hall(odometry=OdometryParameters(forward_per_sqrt_s=0.005))
+    result = replayed(project, standing_still(3000, blind=range(500, 2500)))
+    assert len(result.episodes) == 1
+    episode = result.episodes[0]
+    assert episode.recovered
+    assert episode.start_ns == pytest.approx(1500 * PERIOD_NS, abs=20 * PERIOD_NS)
+    # Five reflectors at once are enough for the first scan to end it.
+    assert episode.end_ns == 2500 * PERIOD_NS
+    assert result.operational_fraction == pytest.approx(1.0 - (2500 - episode.start_ns / PERIOD_NS) / 3000)
+
+
+def test_a_moved_gate_goes_over_the_detections_of_the_run_before():
+    log = RecordLog.collect(standing_still(100))
+    strict, usual = (hall(association=AssociationParameters(gate_probability=p)) for p in (0.5, 0.95))
+    start = start_of(usual, log)
+    before = judged_run(RunInput.of(usual, log, start))
+    again = judged_run(RunInput.of(strict, log, start), earlier=before)
+    assert again.columns.detected is before.columns.detected
+    fresh = judged_run(RunInput.of(strict, log, start))
+    assert np.array_equal(again.columns.means, fresh.columns.means)
+    assert again.statistics == fresh.statistics
+    assert again.count(Status.INLIER) < before.count(Status.INLIER)
+
+
+def test_a_run_over_another_drive_takes_nothing_from_the_one_before():
+    project = hall()
+    one, other = (RecordLog.collect(standing_still(20, heading=heading)) for heading in (0.0, 0.01))
+    start = start_of(project, one)
+    before = judged_run(RunInput.of(project, one, start))
+    result = judged_run(RunInput.of(project, other, start), earlier=before)
+    assert result.statistics == judged_run(RunInput.of(project, other, start)).statistics
+    assert result.statistics != before.statistics
+
+
+def test_every_curve_has_the_numbers_of_its_cycles():
+    project = hall(association=AssociationParameters(gate_probability=0.7))
+    result = replayed(project, standing_still(30, blind=(7, 29)))
+    estimates = [result.columns.estimate(cycle) for cycle in range(30)]
+    assert result.times.tolist() == pytest.approx([0.1 * cycle for cycle in range(30)], abs=1e-12)
+    for cycle, estimate in enumerate(estimates):
+        accepted = [d2 for d2, status in zip(estimate.d2, estimate.status, strict=True) if status == Status.INLIER]
+        assert np.array_equal(result.nis[cycle], max(accepted, default=math.nan), equal_nan=True)
+        assert result.counts[cycle].tolist() == [estimate.count(status) for status in Status]
+        sigmas = [2.0 * math.sqrt(estimate.posterior.covariance[axis, axis]) for axis in range(3)]
+        assert result.two_sigma[cycle].tolist() == pytest.approx(sigmas, rel=1e-15)
+        assert result.position_errors[cycle] == pytest.approx(math.hypot(*estimate.posterior.mean[:2]), rel=1e-12)
+    assert math.isnan(result.nis[7])
+    assert math.isnan(result.nis[29])
+
+
+def test_the_largest_nis_of_a_cycle_is_that_of_its_inliers_alone():
+    result = replayed(hall(association=AssociationParameters(gate_probability=0.5)), standing_still(200))
+    columns = result.columns
+    assert (columns.d2 > columns.segments[0].setup.filter.gate.d2).any()
+    assert np.nanmax(result.nis) <= columns.segments[0].setup.filter.gate.d2
+    assert np.array_equal(largest_nis(columns), result.nis, equal_nan=True)
+
+
+def test_from_here_on_another_limit_decides_what_is_wrong_while_operational():
+    # 30 mm beside the reference in every cycle: between the two limits; 2-sigma is far below both.
+    loose, tight = (hall(supervisor=SupervisorParameters(position_limit=limit)) for limit in (0.05, 0.025))
+    records = [replace(r, pose=[0.03, 0.0, 0.0]) if isinstance(r, ReferencePose) else r for r in standing_still(40)]
+    log = RecordLog.collect(records)
+    inputs = RunInput.of(loose, log, start_of(loose, log, (0.0, 0.0, 0.0), (0.001, 0.001, 0.001)))
+    whole = judged_run(inputs)
+    assert whole.statistics.wrong_while_operational == 0
+    later = judged_run(inputs.from_here_on(30, LocalizerSetup.of(tight)), earlier=whole)
+    assert [segment.first for segment in later.inputs.segments] == [0, 30]
+    assert later.operational_fraction == 1.0
+    assert later.statistics.wrong_while_operational == 10
+
+
+def test_from_here_on_replaces_what_was_planned_for_later():
+    log = RecordLog.collect(standing_still(40))
+    one, other = (LocalizerSetup.of(hall(association=AssociationParameters(gate_probability=p))) for p in (0.5, 0.9))
+    inputs = RunInput.of(hall(), log, start_of(hall(), log))
+    changed = inputs.from_here_on(20, one).from_here_on(30, other, covered=True).from_here_on(25, other)
+    assert [(segment.first, segment.covered) for segment in changed.segments] == [(0, False), (20, False), (25, False)]
+    assert changed.from_here_on(0, one).segments == (Segment(0, one),)
+
+
+def test_covered_from_here_on_counts_no_detection_and_ends_in_a_fail_episode():
+    project = hall(odometry=OdometryParameters(forward_per_sqrt_s=0.005))
+    log = RecordLog.collect(standing_still(1500))
+    inputs = RunInput.of(project, log, start_of(project, log)).from_here_on(
+        100, LocalizerSetup.of(project), covered=True
+    )
+    result = judged_run(inputs)
+    assert result.counts[:100].sum() == 500
+    assert result.counts[100:].sum() == 0
+    assert [episode.recovered for episode in result.episodes] == [False]
+
+
+def test_the_time_per_cycle_is_that_of_the_localizer():
+    ticks = iter([10.0, 10.5])
+    log = RecordLog.collect(standing_still(50))
+    result = judged_run(RunInput.of(hall(), log, start_of(hall(), log)), clock=lambda: next(ticks))
+    assert result.microseconds_per_cycle == pytest.approx(0.5e6 / 50)
+    assert summary(result)["microseconds_per_cycle"] == result.microseconds_per_cycle
+
+
+def test_judging_a_finished_run_is_the_rest_of_running_it():
+    log = RecordLog.collect(standing_still(20))
+    result = judged_run(RunInput.of(hall(), log, start_of(hall(), log)))
+    again = judge(result.inputs, result.columns, 1.0)
+    assert again.statistics == result.statistics
+    assert np.array_equal(again.nis, result.nis)
+
+
+def test_a_run_says_how_far_it_is():
+    told = []
+    log = RecordLog.collect(standing_still(20))
+    judged_run(RunInput.of(hall(), log, start_of(hall(), log)), lambda share, text: told.append((share, text)))
+    shares = [share for share, _ in told]
+    assert shares == sorted(shares)
+    assert told[-1][1] == "judging the run"
+
+
+def test_a_recording_in_which_nothing_could_be_seen_is_refused():
+    with pytest.raises(UsageError, match="no scan and no detection"):
+        replayed(hall(), [Odometry(0, np.zeros(3))])
