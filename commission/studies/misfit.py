@@ -1,0 +1,221 @@
+"""What a localized recording says about its own setup: a mirrored or turned scanner, a range bias, late scans.
+
+The drive is localized again under each suspicion, and what fits far better is named with what cures it. It finds gross
+mistakes of a setup (scans late by less than about 80 ms fit as well); fine figures are the business of a calibration.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from commission.geometry.angles import wrap
+from commission.geometry.arrays import FloatArray, read_only
+from commission.localization import whole_run
+from commission.localization.detection_log import DetectionLog
+from commission.localization.estimate import Belief, Status
+from commission.localization.run_columns import RunColumns
+from commission.localization.setup import LocalizerSetup
+from commission.progress import Progress, silent
+from commission.site.record_log import RecordLog
+from commission.studies.plausibility import Finding
+
+JUDGED_CYCLES = 6000
+"""Scans from the start of the drive that are localized under each suspicion: four minutes at 25 per second."""
+POOR_SHARE = 0.6
+"""Share of accepted detections below which the mounting itself is suspected."""
+GOOD_SHARE = 0.8
+"""Share above which a suspicion is confirmed."""
+BETTER = 0.94
+"""A suspicion must lower the misfit to this share of what it was."""
+SURE = 40.0
+"""It must lower the sum of the squared Mahalanobis distances by this much: 6 sigma of one parameter (chi-square)."""
+LOST_WINDOW_S = 5.0
+LOST_SHARE = 0.4
+"""Accepted share over a window of 5 s below which the vehicle is probably lost [0..1]."""
+_CLIPPED_AT = 4.0
+"""A detection counts at most this often the gate: false ones weigh the same under every suspicion."""
+_TURN = "set the heading of scanner.mounting to {:+.3f} rad"
+_MOUNTINGS = (
+    ("mirrored", -1.0, 0.0, "the scanner is mounted upside down (or the map is mirrored)", "negate the bearings"),
+    ("turned by 90 deg", 1.0, 0.5 * math.pi, "the scanner is turned to the left", _TURN),
+    ("turned by -90 deg", 1.0, -0.5 * math.pi, "the scanner is turned to the right", _TURN),
+    ("turned by 180 deg", 1.0, math.pi, "the scanner looks to the rear", _TURN),
+)
+_BIASES_M = np.arange(-0.12, 0.1201, 0.02)
+_LAGS_S = np.arange(-0.4, 0.4001, 0.02)
+_SMALLEST_LAG_S = 0.03
+_VALLEY = 1.06
+"""Lags whose misfit is at most this often the least one are as good: a steady drive hardly tells them apart."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MisfitInput:
+    """All that the study reads."""
+
+    log: RecordLog
+    """The recording."""
+    setup: LocalizerSetup
+    """Reflectors, scanner and parameters of the run."""
+    initial: Belief
+    """Belief before the first record."""
+    run: RunColumns
+    """The run with them."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    """How well a drive fits under one suspicion."""
+
+    accepted: float
+    """Share of the detector's detections that are accepted [0..1]."""
+    misfit: float
+    """Mean squared Mahalanobis distance of all of them to their likeliest reflectors, each clipped."""
+    count: int
+    """Number of detections."""
+
+    def is_far_better_than(self, other: _Fit) -> bool:
+        """Whether this suspicion explains the drive, and the other one does not."""
+        gain = self.count * (other.misfit - self.misfit)
+        accepts = self.accepted >= max(POOR_SHARE, other.accepted - 0.02)
+        return accepts and gain > SURE and self.misfit < BETTER * other.misfit
+
+
+def misfit(inputs: MisfitInput, progress: Progress = silent) -> tuple[Finding, ...]:
+    """Judge whether the recording fits the site much better once the setup is another one.
+
+    Parameters
+    ----------
+    inputs : the recording and what it is localized with.
+    progress : told which suspicion is looked into; may raise to cancel.
+
+    Returns
+    -------
+    findings : none where the setup fits, or where nothing fits better.
+    """
+    lost = tuple(_lost(inputs.run))
+    detected = inputs.run.detected.part(0, min(JUDGED_CYCLES, len(inputs.run)))
+    if not len(detected.range_bearing):
+        return lost
+    progress(0.0, "as recorded")
+    before = _fit(inputs, detected)
+    progress(0.1, "mounting")
+    mounting = tuple(_mounting(inputs, detected, before)) if before.accepted < POOR_SHARE else ()
+    if mounting:
+        return (*lost, *mounting)
+    progress(0.3, "range bias")
+    biases = tuple(_range_bias(inputs, detected, before))
+    progress(0.5, "clock offset")
+    lags = tuple(_lag(inputs, detected, before))
+    progress(1.0, "")
+    return (*lost, *biases, *lags)
+
+
+def _lost(run: RunColumns) -> Iterator[Finding]:
+    """Say from when on most detections fit no reflector, to the end of the drive."""
+    judged = run.counts(Status.INLIER) + run.counts(Status.OUTLIER_ASSOCIATION)
+    accepted = run.counts(Status.INLIER)
+    if not judged.sum():
+        return
+    times = (run.stamps_ns - run.stamps_ns[0]) * 1e-9
+    first = np.searchsorted(times, times - LOST_WINDOW_S)
+    sums = [np.concatenate(([0], np.cumsum(counts))) for counts in (accepted, judged)]
+    good, all_ = (total[1:] - total[first] for total in sums)
+    fits = np.flatnonzero((all_ == 0) | (good >= LOST_SHARE * all_))
+    since = int(fits[-1]) + 1 if len(fits) else 0
+    if since == len(run):
+        return
+    rejected = 1.0 - accepted[since:].sum() / max(1, judged[since:].sum())
+    yield Finding(
+        found=f"{100.0 * rejected:.0f} % of the detections are rejected from {times[since]:.1f} s on",
+        probably="the vehicle is lost there, whatever its covariance says, or most of what it detects is no reflector",
+        remedy="look at what happens just before, and at the other notes",
+    )
+
+
+def _mounting(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iterator[Finding]:
+    fits: list[tuple[_Fit, str, str, str, float]] = []
+    for name, sign, turn, meaning, cure in _MOUNTINGS:
+        seen = np.array(detected.range_bearing)
+        seen[:, 1] = wrap(sign * seen[:, 1] + turn)
+        fits.append((_fit(inputs, replace(detected, range_bearing=read_only(seen))), name, meaning, cure, turn))
+    best, name, meaning, cure, turn = max(fits, key=lambda fit: fit[0].accepted)
+    if best.accepted < GOOD_SHARE or best.accepted < before.accepted + 0.2:
+        return
+    heading = float(wrap(inputs.setup.scanner.mounting[2] + turn))
+    yield Finding(
+        found=f"{100.0 * before.accepted:.0f} % of the detections fit the reflectors, "
+        f"{100.0 * best.accepted:.0f} % once they are {name}",
+        probably=meaning,
+        remedy=cure.format(heading),
+    )
+
+
+def _range_bias(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iterator[Finding]:
+    present = inputs.setup.parameters.observation.range_bias
+
+    def fit_of(bias: float) -> _Fit:
+        seen = np.array(detected.range_bearing)
+        seen[:, 0] -= bias
+        return _fit(inputs, replace(detected, range_bearing=read_only(seen)))
+
+    bias, fit = _best(_BIASES_M, fit_of)
+    if abs(bias) < 0.5 * inputs.setup.parameters.observation.range_sigma or not fit.is_far_better_than(before):
+        return
+    yield Finding(
+        found=f"ranges are {bias * 1e3:+.0f} mm off on average ({100.0 * before.accepted:.0f} % of the detections are "
+        f"accepted, {100.0 * fit.accepted:.0f} % without that)",
+        probably="the scanner has a range bias; reflective tape often causes one",
+        remedy=f"observation.range_bias = {present + bias:.3f}",
+    )
+
+
+def _lag(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iterator[Finding]:
+    def fit_of(lag: float) -> _Fit:
+        return _fit(inputs, replace(detected, stamps_ns=read_only(detected.stamps_ns - round(lag * 1e9))))
+
+    fits = [fit_of(float(lag)) for lag in _LAGS_S]
+    values = np.array([fit.misfit for fit in fits])
+    # The middle of the valley: the least value of a flat one is anywhere in it.
+    lag = float(_LAGS_S[values <= _VALLEY * values.min()].mean())
+    fit = fit_of(lag)
+    if abs(lag) < _SMALLEST_LAG_S or not fit.is_far_better_than(before):
+        return
+    yield Finding(
+        found=f"the scans fit the odometry best when they are taken {abs(lag) * 1e3:.0f} ms "
+        f"{'earlier' if lag > 0.0 else 'later'} than stamped (misfit {before.misfit:.2f} becomes {fit.misfit:.2f})",
+        probably=f"the scans lag behind the odometry by about {lag * 1e3:.0f} ms"
+        if lag > 0.0
+        else f"the odometry lags behind the scans by about {-lag * 1e3:.0f} ms",
+        remedy=f"shift the stamps of the scans by {-lag * 1e3:+.0f} ms",
+    )
+
+
+def _best(candidates: FloatArray, fit_of: Callable[[float], _Fit]) -> tuple[float, _Fit]:
+    """Candidate with the least misfit, refined by the parabola through it and its neighbors."""
+    fits = [fit_of(float(candidate)) for candidate in candidates]
+    values = np.array([fit.misfit for fit in fits])
+    index = int(values.argmin())
+    if 0 < index < len(values) - 1:
+        left, middle, right = values[index - 1 : index + 2]
+        curvature = left - 2.0 * middle + right
+        if curvature > 0.0:
+            step = float(candidates[1] - candidates[0])
+            refined = float(candidates[index]) + 0.5 * step * float(left - right) / float(curvature)
+            return refined, fit_of(refined)
+    return float(candidates[index]), fits[index]
+
+
+def _fit(inputs: MisfitInput, detected: DetectionLog) -> _Fit:
+    run = whole_run.run(inputs.log, inputs.setup, inputs.initial, detected=detected)
+    judged = run.status != Status.OUTLIER_DETECTOR
+    total = int(np.count_nonzero(judged))
+    d2 = np.nan_to_num(run.d2[judged], nan=math.inf)
+    return _Fit(
+        accepted=float(np.count_nonzero(run.status[judged] == Status.INLIER)) / max(1, total),
+        misfit=float(np.minimum(d2, _CLIPPED_AT * inputs.setup.filter.gate.d2).sum()) / max(1, total),
+        count=total,
+    )

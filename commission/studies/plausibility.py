@@ -1,0 +1,330 @@
+"""Whether a recording can be what it says: units, clocks, gaps, thresholds. Judged before anything is localized.
+
+A finding names what was found, what it probably is, and how to correct it. Nothing is corrected here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from commission.geometry.angles import wrap
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.progress import Progress, silent
+from commission.site.project import Project
+from commission.site.record_log import RecordLog
+from commission.site.scanner import Scanner
+
+FASTEST = 15.0
+"""Speed beyond which no vehicle of this kind drives [m/s]."""
+FASTEST_TURN = 10.0
+"""Rate beyond which none turns [rad/s]."""
+LONGEST_GAP_S = 1.0
+"""Pause of the odometry from which it is told [s], while scans go on."""
+RATE_RATIO = 1.3
+"""Factor by which the step of the beams, or a rate that is higher, may differ from the project's scanner."""
+THINNED = 4.0
+"""Factor by which the rate may be lower: recorders often keep each second or third scan only."""
+_PERIODS_S = (0.0005, 5.0)
+"""Usual time between two records of one kind [s]."""
+_FULL_SHARE = 0.99
+_TOLD_GAPS = 3
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """Something about a recording that cannot be as it says."""
+
+    found: str
+    """What was found, with figures and units."""
+    probably: str
+    """What it probably is."""
+    remedy: str
+    """How to correct it."""
+
+    def __str__(self) -> str:
+        """All of it in one line."""
+        return f"{self.found}: {self.probably}; {self.remedy}"
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PlausibilityInput:
+    """All that the study reads."""
+
+    log: RecordLog
+    """The recording."""
+    scanner: Scanner
+    """The project's scanner."""
+    intensity_threshold: float
+    """Echo strength from which a beam counts as reflective [sensor's unit]."""
+
+    @staticmethod
+    def of(project: Project, log: RecordLog) -> PlausibilityInput:
+        """Pick what the study reads from a project."""
+        threshold = project.parameters.detector.intensity_threshold
+        return PlausibilityInput(log=log, scanner=project.scanner, intensity_threshold=threshold)
+
+
+def plausibility(inputs: PlausibilityInput, progress: Progress = silent) -> tuple[Finding, ...]:
+    """Judge a recording before it is localized.
+
+    Parameters
+    ----------
+    inputs : the recording and what the project says about its scanner.
+    progress : told which check is done; may raise to cancel.
+
+    Returns
+    -------
+    findings : none for a sound recording.
+    """
+    checks: tuple[tuple[str, Callable[[PlausibilityInput], Iterator[Finding]]], ...] = (
+        ("time units", _time_units),
+        ("clocks", _clocks),
+        ("odometry", _odometry),
+        ("gaps", _gaps),
+        ("detections", _detections),
+        ("scans", _scans),
+        ("reference", _reference),
+    )
+    findings: list[Finding] = []
+    for done, (name, check) in enumerate(checks):
+        progress(done / len(checks), name)
+        findings.extend(check(inputs))
+    progress(1.0, "")
+    return tuple(findings)
+
+
+def _kinds(log: RecordLog) -> tuple[tuple[str, IntArray], ...]:
+    """Name and stamps [ns] of each kind of record that the recording has."""
+    scans = np.empty(0, np.int64) if log.scans is None else log.scans.stamps_ns
+    kinds = (
+        ("odometry", log.odometry_stamps_ns),
+        ("detections", log.detection_stamps_ns),
+        ("scans", scans),
+        ("reference poses", log.reference_stamps_ns),
+    )
+    return tuple((name, stamps) for name, stamps in kinds if len(stamps))
+
+
+def _time_units(inputs: PlausibilityInput) -> Iterator[Finding]:
+    for name, stamps in _kinds(inputs.log):
+        period = _period_s(stamps)
+        if math.isnan(period) or _PERIODS_S[0] <= period <= _PERIODS_S[1]:
+            continue
+        units = {"microseconds": 1e3, "milliseconds": 1e6, "seconds": 1e9, "picoseconds": 1e-3}
+        unit = next((u for u, f in units.items() if _PERIODS_S[0] <= period * f <= _PERIODS_S[1]), None)
+        yield Finding(
+            found=f"{name} come every {period:.3g} s by their stamps",
+            probably=f"the stamps are in {unit}" if unit else "the stamps are no times",
+            remedy=f"expected nanoseconds{f' (multiply by {units[unit]:g})' if unit else ''}",
+        )
+
+
+def _period_s(stamps_ns: IntArray) -> float:
+    """Median time between two different stamps [s]; NaN of fewer than two."""
+    steps = np.diff(stamps_ns)
+    steps = steps[steps > 0]
+    return float(np.median(steps)) * 1e-9 if len(steps) else math.nan
+
+
+def _clocks(inputs: PlausibilityInput) -> Iterator[Finding]:
+    kinds = _kinds(inputs.log)
+    first = int(kinds[0][1][0]) if kinds else 0
+    for name, stamps in kinds[1:]:
+        begin, end = kinds[0][1][[0, -1]].tolist()
+        its_begin, its_end = int(stamps[0]), int(stamps[-1])
+        shift_s = (begin - its_begin) * 1e-9
+        if stamps[0] <= end and stamps[-1] >= begin:
+            continue
+        yield Finding(
+            found=f"{kinds[0][0]} last {_span(begin, end, first)}, {name} {_span(its_begin, its_end, first)}",
+            probably="they were stamped by two clocks, since they do not overlap in time",
+            remedy=f"if both began together, shift the stamps of the {name} by {shift_s:+.3f} s",
+        )
+
+
+def _span(begin_ns: int, end_ns: int, zero_ns: int) -> str:
+    return f"from {(begin_ns - zero_ns) * 1e-9:.1f} to {(end_ns - zero_ns) * 1e-9:.1f} s"
+
+
+def _odometry(inputs: PlausibilityInput) -> Iterator[Finding]:
+    stamps, rows = inputs.log.odometry_stamps_ns, inputs.log.displacements
+    seconds = np.diff(stamps) * 1e-9
+    usable = seconds > 0.0
+    if usable.sum() < 2 or not _PERIODS_S[0] <= _period_s(stamps) <= _PERIODS_S[1]:
+        return
+    dt, motion = seconds[usable], rows[1:][usable]
+    speed = _high(np.hypot(motion[:, 0], motion[:, 1]) / dt)
+    turn = _high(np.abs(motion[:, 2]) / dt)
+    if speed > FASTEST:
+        yield Finding(
+            found=f"the odometry moves at up to {np.max(np.hypot(motion[:, 0], motion[:, 1]) / dt):.0f} m/s",
+            probably=_instead_of_displacements(rows, stamps),
+            remedy="expected dx, dy [m] and dtheta [rad] since the row before, in the base frame of the row before",
+        )
+    elif turn > FASTEST_TURN:
+        in_degrees = math.radians(turn) <= FASTEST_TURN
+        yield Finding(
+            found=f"the odometry turns at up to {turn:.0f} rad/s",
+            probably="dtheta is in degrees" if in_degrees else "dtheta is no motion since the row before",
+            remedy="expected dtheta in radians since the row before",
+        )
+
+
+def _instead_of_displacements(rows: FloatArray, stamps_ns: IntArray) -> str:
+    """What rows that are no displacements [m, m, rad] probably hold."""
+    dt = np.maximum(np.diff(stamps_ns) * 1e-9, 1e-9)
+    steps = np.diff(rows, axis=0)
+    length = np.hypot(steps[:, 0], steps[:, 1])
+    size = np.hypot(rows[1:, 0], rows[1:, 1])
+    # What is measured in the vehicle's own frame points ahead; a way across the hall hardly does so all the time, and
+    # where it does, it grows.
+    is_ahead = np.mean(rows[:, 1] ** 2) < 0.01 * np.mean(rows[:, 0] ** 2)
+    is_growing = abs(float(rows[-1, 0] - rows[0, 0])) > 0.9 * float(np.ptp(rows[:, 0])) > 0.0
+    if (not is_ahead or is_growing) and _high(length / dt) <= FASTEST:
+        # A vehicle moves along its heading: that of a pose and the way to the next one agree, forward or in reverse.
+        moving = length > 0.25 * np.quantile(length, 0.9)
+        course = np.arctan2(steps[moving, 1], steps[moving, 0])
+        if moving.any() and np.median(np.abs(np.sin(course - rows[:-1][moving, 2]))) < 0.3:
+            return "dx, dy, dtheta hold poses, not the motion since the row before"
+    if _high(size) <= FASTEST / 3.0:
+        return "dx, dy, dtheta hold velocities, not displacements (multiply each row by its time since the row before)"
+    if _high(size / dt) <= 1000.0 * FASTEST:
+        return "dx and dy are in millimetres"
+    return "dx, dy, dtheta hold something else than motion"
+
+
+def _high(values: FloatArray) -> float:
+    """Value that all but a hundredth stay below: single wild rows are no unit."""
+    return float(np.quantile(values, 0.99)) if len(values) else 0.0
+
+
+def _gaps(inputs: PlausibilityInput) -> Iterator[Finding]:
+    """Stretches in which scans go on and odometry does not."""
+    stamps = inputs.log.odometry_stamps_ns
+    seen = np.concatenate([s for name, s in _kinds(inputs.log) if name in ("detections", "scans")] or [stamps[:0]])
+    if len(stamps) < 2 or not len(seen) or seen.max() < stamps[0] or seen.min() > stamps[-1]:
+        return
+    longest = max(LONGEST_GAP_S, 5.0 * _period_s(stamps))
+    edges = np.concatenate([[min(seen.min(), stamps[0])], stamps, [max(seen.max(), stamps[-1])]])
+    long = np.flatnonzero(np.diff(edges) * 1e-9 > longest)
+    start = int(min(seen.min(), stamps[0]))
+    for gap in long[:_TOLD_GAPS]:
+        begin, end = int(edges[gap]), int(edges[gap + 1])
+        is_end = gap == len(edges) - 2
+        yield Finding(
+            found=f"the odometry {'ends at' if is_end else 'pauses from'} {(begin - start) * 1e-9:.1f} s"
+            f"{'' if is_end else f' to {(end - start) * 1e-9:.1f} s'}, and scans go on"
+            f"{f' to {(end - start) * 1e-9:.1f} s' if is_end else ''}",
+            probably="records are lost; how the vehicle drove meanwhile is not known",
+            remedy="record the odometry throughout, or cut the recording there",
+        )
+    if len(long) > _TOLD_GAPS:
+        yield Finding(
+            found=f"the odometry has {len(long) - _TOLD_GAPS} more pauses of over {longest:.1f} s",
+            probably="records are lost",
+            remedy="record the odometry throughout",
+        )
+
+
+def _detections(inputs: PlausibilityInput) -> Iterator[Finding]:
+    ranges, bearings = inputs.log.range_bearing.T
+    if not len(ranges):
+        return
+    if np.abs(bearings).max() > 2.0 * math.pi + 1e-6:
+        yield Finding(
+            found=f"bearings reach {np.abs(bearings).max():.1f} rad",
+            probably="they are in degrees",
+            remedy="expected radians, counter-clockwise",
+        )
+    yield from _ranges("detections", ranges, inputs.scanner)
+
+
+def _ranges(name: str, ranges: FloatArray, scanner: Scanner) -> Iterator[Finding]:
+    """Ranges beyond what the scanner measures; `ranges` holds no NaN."""
+    farthest = scanner.range[1]
+    beyond = float(np.mean(ranges > 1.05 * farthest)) if len(ranges) else 0.0
+    if beyond <= 0.01:
+        return
+    typical = float(np.median(ranges))
+    in_millimetres = typical > 10.0 * farthest
+    yield Finding(
+        found=f"{100.0 * beyond:.0f} % of the ranges of {name} are beyond the scanner's {farthest:g} m"
+        f" (typical: {typical:.4g} m)",
+        probably="they are in millimetres" if in_millimetres else "another scanner was recorded",
+        remedy="expected metres" if in_millimetres else "correct the project's scanner (range)",
+    )
+
+
+def _scans(inputs: PlausibilityInput) -> Iterator[Finding]:
+    scans, scanner = inputs.log.scans, inputs.scanner
+    if scans is None or not len(scans.stamps_ns):
+        return
+    # A few scans spread over the drive tell as much as all of them.
+    chosen = np.unique(np.linspace(0, len(scans.stamps_ns) - 1, 200).astype(int))
+    ranges = np.asarray(scans.ranges[chosen], dtype=np.float64)
+    returned = np.isfinite(ranges)
+    yield from _ranges("scans", ranges[returned], scanner)
+    if scans.intensities is not None and scans.reflector is None and returned.any():
+        yield from _intensities(
+            np.asarray(scans.intensities[chosen], dtype=np.float64)[returned], inputs.intensity_threshold
+        )
+    step, expected = abs(scans.angle_increment), scanner.angle_increment
+    if not expected / RATE_RATIO <= step <= expected * RATE_RATIO:
+        yield Finding(
+            found=f"the scans have {ranges.shape[1]} beams {math.degrees(step):.3g} deg apart",
+            probably=f"another scanner was recorded than the project's ({scanner.resolution_deg:g} deg)",
+            remedy="correct the project's scanner (resolution_deg), by which the detector counts beams",
+        )
+    period = _period_s(scans.stamps_ns)
+    if not math.isnan(period) and not scanner.rate / THINNED <= 1.0 / period <= scanner.rate * RATE_RATIO:
+        yield Finding(
+            found=f"the scans come {1.0 / period:.3g} times a second",
+            probably=f"the project's scanner ({scanner.rate:g} per second) is another one, or scans are lost",
+            remedy="correct the project's scanner (rate) for virtual drives and predictions",
+        )
+
+
+def _intensities(values: FloatArray, threshold: float) -> Iterator[Finding]:
+    share = float(np.mean(values >= threshold))
+    low, high = float(values.min()), float(values.max())
+    where = f"detector.intensity_threshold {threshold:g} (intensities are {low:.4g} to {high:.4g})"
+    if share > _FULL_SHARE:
+        yield Finding(
+            found=f"{100.0 * share:.0f} % of the beams reach {where}",
+            probably="every wall counts as a reflector",
+            remedy="set the threshold between the intensities of walls and of reflectors",
+        )
+    elif share == 0.0:
+        yield Finding(
+            found=f"no beam reaches {where}",
+            probably="no reflector can be detected",
+            remedy="set the threshold between the intensities of walls and of reflectors",
+        )
+
+
+def _reference(inputs: PlausibilityInput) -> Iterator[Finding]:
+    """Find headings in degrees by the way from pose to pose: one in radians that was never wrapped is large, too."""
+    poses = inputs.log.reference_poses
+    known = poses[np.isfinite(poses).all(axis=1)]
+    if len(known) < 2 or np.abs(known[:, 2]).max() <= math.pi + 0.1:
+        return
+    steps = np.diff(known[:, :2], axis=0)
+    length = np.hypot(steps[:, 0], steps[:, 1])
+    moving = length > max(0.25 * float(np.quantile(length, 0.9)), 1e-4)
+    if not moving.any():
+        return
+    course = np.arctan2(steps[moving, 1], steps[moving, 0])
+    as_radians, as_degrees = (
+        float(np.median(np.abs(wrap(2.0 * (course - theta)))))  # twice the angle: forward and reverse are alike
+        for theta in (known[:-1, 2][moving], np.radians(known[:-1, 2][moving]))
+    )
+    if as_degrees < 0.3 < as_radians:
+        yield Finding(
+            found=f"headings of the reference reach {np.abs(known[:, 2]).max():.1f} rad, not the way it drives",
+            probably="they are in degrees",
+            remedy="expected theta in radians",
+        )

@@ -1,0 +1,88 @@
+"""Gross mistakes of a setup are found in a recording and named with what cures them; a right setup is left alone."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from commission.localization import whole_run
+from commission.localization.setup import LocalizerSetup
+from commission.site.record_log import RecordLog
+from commission.studies.misfit import MisfitInput, misfit
+from commission.studies.plausibility import Finding
+from tests.studies.recorded import PROJECT, drive, start
+
+SETUP = LocalizerSetup.of(PROJECT)
+
+
+def judged(log: RecordLog) -> tuple[Finding, ...]:
+    run = whole_run.run(log, SETUP, start())
+    return misfit(MisfitInput(log=log, setup=SETUP, initial=start(), run=run))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_right_setup_is_left_alone(seed: int) -> None:
+    assert judged(drive(seed=seed)) == ()
+
+
+@pytest.mark.parametrize(
+    ("mistake", "remedy"),
+    [
+        ({"mirrored": True}, "negate the bearings"),
+        ({"turned": 0.5 * math.pi}, "set the heading of scanner.mounting to +1.571 rad"),
+        ({"turned": -0.5 * math.pi}, "set the heading of scanner.mounting to -1.571 rad"),
+        ({"turned": math.pi}, "set the heading of scanner.mounting to"),
+    ],
+)
+def test_mirrored_or_turned_scanner_is_named(mistake: dict[str, Any], remedy: str) -> None:
+    findings = judged(drive(**mistake))
+    assert remedy in findings[-1].remedy
+    assert "lost" in findings[0].probably
+
+
+@pytest.mark.parametrize("bias", [-0.04, 0.03, 0.06])
+def test_range_bias_is_named_to_two_millimetres(bias: float) -> None:
+    (finding,) = (f for f in judged(drive(bias=bias)) if "bias" in f.probably)
+    # 4,200 ranges of 10 mm noise: the rest is the step of the search.
+    assert float(finding.remedy.removeprefix("observation.range_bias = ")) == pytest.approx(bias, abs=0.002)
+
+
+@pytest.mark.parametrize("late_s", [0.1, -0.1, 0.14])
+def test_late_or_early_scans_are_named_to_a_fifth_of_a_tenth(late_s: float) -> None:
+    (finding,) = judged(drive(late_s=late_s))
+    assert "scans lag" in finding.probably if late_s > 0 else "odometry lags" in finding.probably
+    milliseconds = float(finding.remedy.removeprefix("shift the stamps of the scans by ").removesuffix(" ms"))
+    assert milliseconds == pytest.approx(-1e3 * late_s, abs=20.0)
+
+
+def test_drive_without_detections_has_nothing_to_say() -> None:
+    log = drive(5.0)
+    empty = RecordLog(
+        odometry_stamps_ns=log.odometry_stamps_ns,
+        displacements=log.displacements,
+        detection_stamps_ns=log.detection_stamps_ns,
+        detection_offsets=np.zeros(len(log.detection_stamps_ns) + 1, np.int64),
+    )
+    assert judged(empty) == ()
+
+
+def test_from_when_on_a_vehicle_is_lost_is_said() -> None:
+    log = drive(60.0)
+    # From 30 s on somebody has moved all reflectors by a metre: nothing fits any more.
+    rows = slice(int(log.detection_offsets[300]), None)
+    seen = np.array(log.range_bearing)
+    seen[rows, 0] += 1.0
+    moved = RecordLog(
+        odometry_stamps_ns=log.odometry_stamps_ns,
+        displacements=log.displacements,
+        detection_stamps_ns=log.detection_stamps_ns,
+        detection_offsets=log.detection_offsets,
+        range_bearing=seen,
+    )
+    finding = judged(moved)[0]
+    since = float(finding.found.split(" from ")[1].removesuffix(" s on"))
+    # The window of 5 s holds 40 % of good scans until 3 s after the change.
+    assert since == pytest.approx(33.0, abs=0.3)

@@ -1,0 +1,155 @@
+"""A recording that cannot be what it says is named, with what it probably is; a sound one is passed in silence."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from commission.errors import JobCancelled
+from commission.site.record_log import RecordLog
+from commission.studies.plausibility import Finding, PlausibilityInput, plausibility
+from tests.studies.recorded import PROJECT, SECOND, drive, pose_at, scan_log
+
+
+def judged(log: RecordLog) -> tuple[Finding, ...]:
+    return plausibility(PlausibilityInput.of(PROJECT, log))
+
+
+def only(log: RecordLog) -> Finding:
+    (finding,) = judged(log)
+    return finding
+
+
+def with_scans(**scans: object) -> RecordLog:
+    log = drive(20.0)
+    return dataclasses.replace(
+        log,
+        scans=scan_log(**scans),
+        detection_stamps_ns=log.detection_stamps_ns[:0],
+        detection_offsets=np.zeros(1, np.int64),
+        range_bearing=np.empty((0, 2)),
+    )
+
+
+MIXED = np.tile(np.where(np.arange(720) % 60 == 0, 0.9, 0.1), (200, 1))
+
+
+def test_sound_recordings_pass_in_silence() -> None:
+    assert judged(drive()) == ()
+    assert judged(with_scans(intensities=MIXED)) == ()
+    # Recorders often keep each second scan only.
+    assert judged(with_scans(intensities=MIXED[:100], rate=5.0)) == ()
+
+
+def test_poses_in_the_odometry_are_told_with_the_speed_that_they_would_be() -> None:
+    log = drive()
+    finding = only(dataclasses.replace(log, displacements=pose_at(log.odometry_stamps_ns * 1e-9)))
+    # The oval reaches 15 m from the origin: 15 m in 20 ms.
+    assert "m/s" in finding.found
+    assert "poses" in finding.probably
+
+
+def test_velocities_in_the_odometry_are_told() -> None:
+    log = drive()
+    assert "velocities" in only(dataclasses.replace(log, displacements=log.displacements * 50.0)).probably
+
+
+def test_millimetres_and_degrees_in_the_odometry_are_told() -> None:
+    log = drive()
+    assert "millimetres" in only(dataclasses.replace(log, displacements=log.displacements * (1e3, 1e3, 1.0))).probably
+    turning = log.displacements.copy()
+    turning[:, 2] = np.degrees(turning[:, 2] * 3.0)
+    assert "degrees" in only(dataclasses.replace(log, displacements=turning)).probably
+
+
+@pytest.mark.parametrize(("unit", "divisor"), [("microseconds", 1_000), ("milliseconds", 1_000_000)])
+def test_stamps_in_another_unit_are_told_for_each_kind_of_record(unit: str, divisor: int) -> None:
+    log = drive()
+    findings = judged(
+        dataclasses.replace(
+            log,
+            odometry_stamps_ns=log.odometry_stamps_ns // divisor,
+            detection_stamps_ns=log.detection_stamps_ns // divisor,
+            reference_stamps_ns=log.reference_stamps_ns // divisor,
+        )
+    )
+    assert [finding.probably for finding in findings] == [f"the stamps are in {unit}"] * 3
+
+
+def test_clocks_that_do_not_overlap_are_told_with_the_shift() -> None:
+    log = drive()
+    finding = only(dataclasses.replace(log, detection_stamps_ns=log.detection_stamps_ns + 1_700_000_000 * SECOND))
+    assert "two clocks" in finding.probably
+    assert "-1700000000.100 s" in finding.remedy
+
+
+def test_odometry_that_ends_or_pauses_while_scans_go_on_is_told() -> None:
+    log = drive()
+    early = log.odometry_stamps_ns < 40 * SECOND
+    cut = dataclasses.replace(
+        log, odometry_stamps_ns=log.odometry_stamps_ns[early], displacements=log.displacements[early]
+    )
+    assert "the odometry ends at 40.0 s, and scans go on to 59.9 s" in only(cut).found
+    there = (log.odometry_stamps_ns < 20 * SECOND) | (log.odometry_stamps_ns > 22 * SECOND)
+    paused = dataclasses.replace(
+        log, odometry_stamps_ns=log.odometry_stamps_ns[there], displacements=log.displacements[there]
+    )
+    assert "pauses from 20.0 s to 22.0 s" in only(paused).found
+
+
+@pytest.mark.parametrize(("pause_ns", "told"), [(900_000_000, False), (1_100_000_000, True)])
+def test_pause_of_the_odometry_is_told_from_one_second_on(pause_ns: int, told: bool) -> None:
+    log = drive()
+    gone = (log.odometry_stamps_ns > 20 * SECOND) & (log.odometry_stamps_ns < 20 * SECOND + pause_ns)
+    paused = dataclasses.replace(
+        log, odometry_stamps_ns=log.odometry_stamps_ns[~gone], displacements=log.displacements[~gone]
+    )
+    assert bool(judged(paused)) is told
+
+
+def test_bearings_in_degrees_and_ranges_in_millimetres_are_told() -> None:
+    log = drive()
+    assert (
+        "in degrees" in only(dataclasses.replace(log, range_bearing=np.degrees(log.range_bearing) * (0.02, 1))).probably
+    )
+    assert "in millimetres" in only(dataclasses.replace(log, range_bearing=log.range_bearing * (1000.0, 1))).probably
+
+
+@pytest.mark.parametrize("ranges", [5000.0, 40.0])
+def test_ranges_of_scans_beyond_the_scanner_are_told(ranges: float) -> None:
+    finding = only(with_scans(intensities=MIXED, ranges=ranges))
+    assert ("in millimetres" if ranges > 1000.0 else "another scanner") in finding.probably
+
+
+def test_threshold_that_all_or_no_beams_reach_is_told_with_the_intensities() -> None:
+    bright = only(with_scans(intensities=60.0 + 100.0 * MIXED))
+    assert bright.found == "100 % of the beams reach detector.intensity_threshold 0.5 (intensities are 70 to 150)"
+    assert "no beam reaches" in only(with_scans(intensities=0.1 * MIXED)).found
+
+
+def test_step_and_rate_of_another_scanner_are_told() -> None:
+    assert "0.25 deg apart" in only(with_scans(intensities=MIXED, step_deg=0.25)).found
+    assert "25 times a second" in only(with_scans(intensities=MIXED, rate=25.0)).found
+
+
+def test_reference_in_degrees_is_told_and_one_that_was_never_wrapped_is_not() -> None:
+    log = drive(120.0)
+    assert np.abs(log.reference_poses[:, 2]).max() > 2.0 * math.pi
+    assert judged(log) == ()
+    degrees = log.reference_poses * (1.0, 1.0, 180.0 / math.pi)
+    assert "in degrees" in only(dataclasses.replace(log, reference_poses=degrees)).probably
+
+
+def test_empty_recording_is_passed() -> None:
+    assert judged(RecordLog(odometry_stamps_ns=np.empty(0, np.int64), displacements=np.empty((0, 3)))) == ()
+
+
+def test_study_can_be_cancelled() -> None:
+    def cancel(_fraction: float, _message: str = "") -> None:
+        raise JobCancelled("stopped")
+
+    with pytest.raises(JobCancelled):
+        plausibility(PlausibilityInput.of(PROJECT, drive(1.0)), cancel)
