@@ -13,7 +13,7 @@ import tyro
 
 import commission
 from commission.errors import UsageError
-from commission.site.checks import LARGEST
+from commission.site.quantity import LARGEST
 
 FRAME = "│╭╮╰╯"
 RULES = ("─", "╭", "╰")

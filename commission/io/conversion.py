@@ -18,7 +18,7 @@ import numpy as np
 
 from commission.errors import CommissionError, FileFormatError
 from commission.io.yaml_document import KeyPath, YamlDocument
-from commission.site.checks import field_hints
+from commission.site.fields import field_hints
 
 Value = TypeVar("Value")
 
@@ -65,29 +65,6 @@ def convert(document: YamlDocument, cls: type[Value], key_path: KeyPath = (), *,
         raise _explained(document, key_path, cls, str(error)) from error
     except (CommissionError, OverflowError, ArithmeticError) as error:
         raise _explained(document, key_path, cls, str(error)) from error
-
-
-def convert_setting(text: str, value: Any, cls: type, name: str) -> Any:
-    """Convert one value for a field of a dataclass.
-
-    Parameters
-    ----------
-    text : how the user calls the field, for the message.
-    value : parsed value.
-    cls, name : dataclass and its field.
-
-    Raises
-    ------
-    ValueError
-        `text is 'fast'; expected a number (1-sigma noise of ... [m])`.
-    """
-    try:
-        return msgspec.convert(value, typing.get_type_hints(cls)[name], dec_hook=_array)
-    except msgspec.ValidationError as error:
-        match = _EXPECTED.match(str(error))
-        expected = _in_words(match["expected"]) if match else str(error)
-        meaning = field_hints(cls).get(name, "")
-        raise ValueError(f"{text} is {_shown(value)}; expected {expected} ({meaning.rstrip('.')})") from error
 
 
 def _array(kind: Any, value: Any) -> Any:
@@ -163,7 +140,10 @@ def _explained(document: YamlDocument, key_path: KeyPath, cls: type, message: st
             steps = (*steps, named[0])
     if steps:
         # The place already names the key: `scanner.rate: is 0` instead of `scanner.rate: scanner.rate is 0`.
-        problem = re.sub(rf"^(\w+\.)?{re.escape(str(steps[-1]))} (?=is |has |reach )", "", problem)
+        named = re.match(rf"(?:.*[.: ])?{re.escape(str(steps[-1]))}(?P<element>(?:\[\d+\])*) (?=is |has )", problem)
+        if named is not None:
+            problem = problem[named.end() :]
+            steps = (*steps, *(int(index) for index in re.findall(r"\d+", named["element"])))
     return document.error((*key_path, *steps), problem, _with_hint(remedy, cls, steps))
 
 

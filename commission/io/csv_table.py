@@ -20,7 +20,7 @@ from commission.errors import FileFormatError
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.io.findings import Findings
 from commission.io.reading import cannot_read, check_size, decoded
-from commission.site.checks import LARGEST, STAMP_LIMIT
+from commission.site.quantity import LARGEST, STAMP_LIMIT
 
 SIZE_LIMIT = 64_000_000_000
 """Bytes of a table; a day of odometry at 1 kHz has about 5,000,000,000."""

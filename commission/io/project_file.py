@@ -14,7 +14,7 @@ from typing import Any
 
 from commission.errors import FileFormatError, ProjectError, UsageError
 from commission.io.atomic import staged, write_text
-from commission.io.conversion import convert, convert_setting, keys_of
+from commission.io.conversion import convert
 from commission.io.findings import Findings
 from commission.io.map_server import read_floor_map, write_floor_map
 from commission.io.project_text import project_text
@@ -22,6 +22,7 @@ from commission.io.reading import cannot_read, inside
 from commission.io.reflector_tables import read_reflectors, write_reflectors
 from commission.io.yaml_document import YamlDocument, read_yaml, scalar
 from commission.site.disturbances import Disturbances
+from commission.site.fields import with_field
 from commission.site.floor_map import FloorMap
 from commission.site.layout_brief import LayoutBrief
 from commission.site.parameters import Parameters
@@ -187,28 +188,16 @@ def apply_settings(parameters: Parameters, settings: Sequence[str]) -> Parameter
         unknown group or key (lists the known ones) or a value that the key refuses.
     """
     for setting in settings:
-        parameters = _apply_setting(parameters, setting)
+        name, equals, text = (part.strip() for part in setting.partition("="))
+        if not equals or "." not in name:
+            raise UsageError(
+                f"setting {setting!r} is no group.key=value; expected for example observation.range_sigma=0.02"
+            )
+        try:
+            parameters = with_field(parameters, name, scalar(text), "parameter")
+        except ValueError as error:
+            raise UsageError(str(error)) from error
     return parameters
-
-
-def _apply_setting(parameters: Parameters, setting: str) -> Parameters:
-    name, equals, text = (part.strip() for part in setting.partition("="))
-    group, _, key = name.partition(".")
-    if not equals or not key:
-        raise UsageError(
-            f"setting {setting!r} is no group.key=value; expected for example observation.range_sigma=0.02"
-        )
-    if group not in keys_of(Parameters):
-        raise UsageError(f"{name}: no group is called {group!r}; expected one of: {', '.join(keys_of(Parameters))}")
-    values = getattr(parameters, group)
-    if key not in keys_of(type(values)):
-        known = ", ".join(f"{group}.{known}" for known in keys_of(type(values)))
-        raise UsageError(f"{name} is no parameter; expected one of: {known}")
-    try:
-        value = convert_setting(name, scalar(text), type(values), key)
-        return dataclasses.replace(parameters, **{group: dataclasses.replace(values, **{key: value})})
-    except ValueError as error:
-        raise UsageError(str(error)) from error
 
 
 def _read_document(yaml_path: Path) -> tuple[YamlDocument, ProjectDocument]:

@@ -16,12 +16,11 @@ import numpy as np
 import yaml
 
 from commission.io.yaml_document import scalar
-from commission.site.checks import field_hints
+from commission.site.fields import fields_of
 from commission.site.layout_brief import LayoutBrief
 from commission.site.project import Project
 
 _PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_./ ()-]*")
-_UNIT = re.compile(r"\[([^\],]+)\]")
 _WIDTH = 110
 """A list that fits on a line of this width is written on one."""
 
@@ -58,11 +57,10 @@ def project_text(project: Project, schema: int, floor_map: str | None, reflector
 
 def _fields(value: Any, indent: str) -> Iterator[str]:
     """Lines of a dataclass; what is None is left out."""
-    hints = field_hints(type(value))
-    for field in dataclasses.fields(value):
-        content = getattr(value, field.name)
+    for name, info in fields_of(type(value)).items():
+        content = getattr(value, name)
         if content is not None:
-            yield from _entry(field.name, content, indent, ", ".join(_UNIT.findall(hints.get(field.name, ""))))
+            yield from _entry(name, content, indent, info.unit)
 
 
 def _entry(key: str, content: Any, indent: str, unit: str) -> Iterator[str]:

@@ -15,7 +15,7 @@ import yaml
 
 from commission.errors import FileFormatError
 from commission.io.reading import read_text
-from commission.site.checks import LARGEST
+from commission.site.quantity import LARGEST
 
 SIZE_LIMIT = 4_000_000
 """Bytes of a YAML file; a project with 1,000 routes has about 500,000."""

@@ -1,23 +1,18 @@
-"""Range checks shared by the values of a site, and the hint of a field. Each check says what was found and expected."""
+"""Range checks: of the fields of a value by what stands beside them, and of single numbers. Each says what it found."""
 
 from __future__ import annotations
 
-import ast
-import functools
-import inspect
-import itertools
-import textwrap
+import typing
+from typing import Any
 
-FARTHEST = 1e7
-"""Largest coordinate [m]: any national grid fits, and no square of it overflows."""
-LARGEST = 1e9
-"""No length, angle, speed or sigma that anybody means is larger; squares and products of much larger ones overflow."""
-STAMP_LIMIT = 2**62
-"""Stamps [ns] are smaller, and larger than its negative: the difference of any two fits into 64 bits."""
+import numpy as np
+
+from commission.site.fields import described
+from commission.site.quantity import Bounds, Choice, Quantity
 
 
 def at_least(value: float, limit: float, name: str, unit: str = "") -> None:
-    """Check `limit` <= `value` <= LARGEST.
+    """Check `limit` <= `value` <= `quantity.LARGEST`.
 
     Parameters
     ----------
@@ -31,14 +26,11 @@ def at_least(value: float, limit: float, name: str, unit: str = "") -> None:
     ValueError
         otherwise; NaN is refused, too.
     """
-    if value > LARGEST:
-        raise ValueError(f"{name} is {value:g}; expected at most {LARGEST:g}{unit and ' ' + unit}")
-    if not value >= limit:
-        raise ValueError(f"{name} is {value:g}; expected {limit:g}{unit and ' ' + unit} or more")
+    Bounds.at_least(limit).check(value, name, unit)
 
 
 def above(value: float, limit: float, name: str, unit: str = "") -> None:
-    """Check `limit` < `value` <= LARGEST.
+    """Check `limit` < `value` <= `quantity.LARGEST`.
 
     Parameters
     ----------
@@ -52,10 +44,7 @@ def above(value: float, limit: float, name: str, unit: str = "") -> None:
     ValueError
         otherwise; NaN is refused, too.
     """
-    if value > LARGEST:
-        raise ValueError(f"{name} is {value:g}; expected at most {LARGEST:g}{unit and ' ' + unit}")
-    if not value > limit:
-        raise ValueError(f"{name} is {value:g}; expected more than {limit:g}{unit and ' ' + unit}")
+    Bounds.above(limit).check(value, name, unit)
 
 
 def between(value: float, limits: tuple[float, float], name: str, unit: str = "") -> None:
@@ -73,24 +62,41 @@ def between(value: float, limits: tuple[float, float], name: str, unit: str = ""
     ValueError
         otherwise; NaN is refused, too.
     """
-    low, high = limits
-    if not (low <= value <= high):
-        raise ValueError(f"{name} is {value:g}; expected {low:g} to {high:g}{unit and ' ' + unit}")
+    Bounds.between(*limits).check(value, name, unit)
 
 
-@functools.cache
-def field_hints(cls: type) -> dict[str, str]:
-    """Docstring under each field of a dataclass, by the field's name: help of commands and widgets, written once."""
-    tree = ast.parse(textwrap.dedent(inspect.getsource(cls)))
-    body = next(node for node in tree.body if isinstance(node, ast.ClassDef)).body
-    hints: dict[str, str] = {}
-    for statement, following in itertools.pairwise(body):
-        if (
-            isinstance(statement, ast.AnnAssign)
-            and isinstance(statement.target, ast.Name)
-            and isinstance(following, ast.Expr)
-            and isinstance(following.value, ast.Constant)
-            and isinstance(following.value.value, str)
-        ):
-            hints[statement.target.id] = " ".join(following.value.value.split())
-    return hints
+def check_fields(value: object, prefix: str = "") -> None:
+    """Raise ValueError unless each number of a value is within its bounds and each word is one of its options.
+
+    Parameters
+    ----------
+    value : a dataclass, from its `__post_init__`.
+    prefix : what stands before the field's name in the message: `scanner.`.
+    """
+    for name, descriptions in described(type(value)):
+        content = getattr(value, name)
+        if content is None:
+            continue
+        if isinstance(descriptions[0], Choice) and descriptions[0].options:
+            if content not in descriptions[0].options:
+                options = " or ".join(repr(option) for option in descriptions[0].options)
+                raise ValueError(f"{prefix}{name} is {content!r}; expected {options}")
+        elif isinstance(descriptions[0], Quantity):
+            _check_numbers(content, typing.cast("tuple[Quantity, ...]", descriptions), prefix + name)
+
+
+def _check_numbers(content: Any, quantities: tuple[Quantity, ...], name: str) -> None:
+    if isinstance(content, np.ndarray):
+        if len(quantities) == 1 and (content.size == 0 or _within(content, quantities[0])):
+            return
+        content = content.tolist()
+    if not isinstance(content, tuple | list):
+        quantities[0].bounds.check(content, name, quantities[0].unit)
+        return
+    for index, element in enumerate(content):
+        own = quantities if len(quantities) == 1 else quantities[index : index + 1]
+        _check_numbers(element, own, f"{name}[{index}]")
+
+
+def _within(numbers: np.ndarray[Any, Any], quantity: Quantity) -> bool:
+    return float(numbers.min()) in quantity.bounds and float(numbers.max()) in quantity.bounds

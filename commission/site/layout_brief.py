@@ -8,8 +8,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import Annotated
 
-from commission.site.checks import above, at_least
+from commission.site.checks import check_fields
+from commission.site.quantity import (
+    DEGREES,
+    MILLIMETRES,
+    NOT_NEGATIVE,
+    POSITIVE,
+    Bounds,
+    Group,
+    Quantity,
+    Switch,
+)
 from commission.site.routes import Route
 
 Rectangle = tuple[float, float, float, float]
@@ -28,81 +39,93 @@ def low_high(area: Rectangle) -> tuple[tuple[float, float], tuple[float, float]]
 class AllowedHeights:
     """At which heights a reflector may be put up in a part of the hall."""
 
-    lowest: float
-    """Least height of its middle above the floor [m]."""
-    highest: float
-    """Greatest one [m]."""
-    area: Rectangle | None = None
-    """The part of the hall, by x and y of two opposite corners [m]; none: everywhere."""
+    lowest: Annotated[float, Quantity(label="From", unit="m", bounds=NOT_NEGATIVE, decimals=4)]
+    """Least height of its middle above the floor."""
+    highest: Annotated[float, Quantity(label="To", unit="m", decimals=4)]
+    """Greatest height of its middle."""
+    area: Annotated[Rectangle | None, Quantity(label="Area", unit="m", decimals=4)] = None
+    """The part of the hall, by x and y of two opposite corners; none: everywhere."""
 
     def __post_init__(self) -> None:
-        at_least(self.lowest, 0.0, "allowed_heights.lowest", "m")
-        if not self.lowest <= self.highest < math.inf:
+        check_fields(self, "allowed_heights.")
+        if not self.lowest <= self.highest:
             raise ValueError(f"allowed_heights are {self.lowest:g} to {self.highest:g} m; expected lowest <= highest")
-        if self.area is not None and not all(map(math.isfinite, self.area)):
-            raise ValueError(f"allowed_heights.area is {self.area}; expected finite metres")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CandidateOptions:
     """Where reflectors may be put up, and which kind."""
 
-    spacing: float = 1.0
-    """Distance between neighboring candidates on one face of a wall or pillar [m]."""
-    radius: float = 0.04
-    """Radius of the reflectors to be put up [m]."""
-    height: float = 0.2
-    """Height of the scanner's beams above the floor [m]: that of the middle of a reflector, where it is allowed."""
-    gap: float = 0.02
-    """Distance left between a reflector's surface and the wall [m]."""
-    clearance: float = 0.3
-    """Distance left between a reflector and the vehicle on its routes [m]."""
-    keep_out: tuple[Rectangle, ...] = ()
-    """Areas without reflectors: x and y of two opposite corners each [m]."""
-    length: float = 0.2
-    """Length of the reflectors [m]: a beam must still meet one whose middle is higher or lower than the beams."""
+    spacing: Annotated[
+        float, Quantity(label="Try every", unit="m", bounds=POSITIVE, step=0.1, entry=(0.1, 20.0), decimals=4)
+    ] = 1.0
+    """Distance along the walls between the places that are tried: finer finds fewer and takes longer."""
+    radius: Annotated[
+        float,
+        Quantity(
+            label="Radius",
+            unit="m",
+            shown=MILLIMETRES,
+            bounds=POSITIVE,
+            step=1.0,
+            entry=(5.0, 500.0),
+            decimals=4,
+        ),
+    ] = 0.04
+    """Radius of the reflectors to be put up."""
+    height: Annotated[
+        float, Quantity(label="Height", unit="m", bounds=NOT_NEGATIVE, step=0.01, entry=(0.0, 10.0), decimals=4)
+    ] = 0.2
+    """Height of the scanner's beams above the floor, and of the middle of the reflectors where it is allowed."""
+    gap: Annotated[float, Quantity(label="Off the wall", unit="m", bounds=NOT_NEGATIVE, decimals=4)] = 0.02
+    """Distance left between a reflector's surface and the wall."""
+    clearance: Annotated[
+        float,
+        Quantity(label="Clear of routes", unit="m", bounds=NOT_NEGATIVE, step=0.05, entry=(0.0, 10.0), decimals=4),
+    ] = 0.3
+    """Distance left between a reflector and the vehicle on its routes."""
+    keep_out: Annotated[tuple[Rectangle, ...], Quantity(label="Keep out", unit="m", decimals=4)] = ()
+    """Areas without reflectors: x and y of two opposite corners each."""
+    length: Annotated[float, Quantity(label="Length", unit="m", bounds=POSITIVE, decimals=4)] = 0.2
+    """Length of the reflectors: one whose middle is not at the height of the beams must still be met by them."""
     allowed_heights: tuple[AllowedHeights, ...] = ()
     """Heights that are allowed for the middle of a reflector; of several for one place all count."""
 
     def __post_init__(self) -> None:
-        above(self.spacing, 0.0, "candidates.spacing", "m")
-        above(self.radius, 0.0, "candidates.radius", "m")
-        at_least(self.height, 0.0, "candidates.height", "m")
-        at_least(self.gap, 0.0, "candidates.gap", "m")
-        at_least(self.clearance, 0.0, "candidates.clearance", "m")
-        above(self.length, 0.0, "candidates.length", "m")
-        if not all(math.isfinite(value) for rectangle in self.keep_out for value in rectangle):
-            raise ValueError(f"candidates.keep_out is {self.keep_out}; expected finite metres")
+        check_fields(self, "candidates.")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Demands:
     """What the reflectors must achieve at every scan of the routes, and where a vehicle may be switched on."""
 
-    visible: int = 2
-    """Reflectors that must be visible."""
-    survive_failure: bool = True
+    visible: Annotated[int, Quantity(label="Visible, at least", bounds=Bounds.at_least(1), step=1, entry=(1, 20))] = 2
+    """Reflectors that must be visible everywhere on the routes."""
+    survive_failure: Annotated[bool, Switch("One may fail")] = True
     """Whether all demands must hold as well with any single reflector blocked."""
-    position_limit: float | None = None
-    """Largest 2-sigma of x and of y [m]. None: the supervisor's. Stations add what they require."""
-    heading_limit: float | None = None
-    """Largest 2-sigma of the heading [rad]. None: the supervisor's."""
-    spacing: float = 0.5
-    """Smallest distance between two reflectors [m]."""
-    unambiguous_stations: bool = False
+    position_limit: Annotated[
+        float | None,
+        Quantity(label="2σ x, y", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=1.0, entry=(1.0, 10_000.0)),
+    ] = None
+    """Largest 2-sigma of x and of y on the routes. None: the supervisor's. Stations add what they require."""
+    heading_limit: Annotated[
+        float | None,
+        Quantity(label="2σ heading", unit="rad", shown=DEGREES, bounds=POSITIVE, step=0.01, entry=(0.01, 90.0)),
+    ] = None
+    """Largest 2-sigma of the heading on the routes. None: the supervisor's."""
+    spacing: Annotated[
+        float, Quantity(label="Apart", unit="m", bounds=NOT_NEGATIVE, step=0.05, entry=(0.0, 100.0), decimals=4)
+    ] = 0.5
+    """Smallest distance between two reflectors."""
+    unambiguous_stations: Annotated[bool, Switch("Unique stations")] = False
     """Whether a vehicle that is switched on at a station must see which place it is."""
-    unambiguous_starts: bool = False
+    unambiguous_starts: Annotated[bool, Switch("Unique starts")] = False
     """Whether a vehicle that is switched on at the start of a route must see which place it is."""
-    unambiguous_spots: tuple[Spot, ...] = ()
+    unambiguous_spots: Annotated[tuple[Spot, ...], Quantity(label="Unique spots", unit="m, m, rad", decimals=6)] = ()
     """Further spots at which it must."""
 
     def __post_init__(self) -> None:
-        at_least(self.visible, 1, "demands.visible")
-        if self.position_limit is not None:
-            above(self.position_limit, 0.0, "demands.position_limit", "m")
-        if self.heading_limit is not None:
-            above(self.heading_limit, 0.0, "demands.heading_limit", "rad")
-        at_least(self.spacing, 0.0, "demands.spacing", "m")
+        check_fields(self, "demands.")
         for spot in self.unambiguous_spots:
             if len(spot) not in (2, 3) or not all(math.isfinite(value) for value in spot):
                 raise ValueError(f"demands.unambiguous_spots has {spot}; expected x, y [m] and maybe a heading [rad]")
@@ -112,9 +135,9 @@ class Demands:
 class LayoutBrief:
     """What is asked of a suggested layout."""
 
-    demands: Demands = field(default_factory=Demands)
+    demands: Annotated[Demands, Group("Demands")] = field(default_factory=Demands)
     """What must hold."""
-    candidates: CandidateOptions = field(default_factory=CandidateOptions)
+    candidates: Annotated[CandidateOptions, Group("Where they may stand")] = field(default_factory=CandidateOptions)
     """Where reflectors may be put up."""
     ignored_routes: tuple[str, ...] = ()
     """Names of the routes on which the demands need not hold."""

@@ -2,15 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from enum import StrEnum
+from typing import Annotated
 
 import numpy as np
 
 from commission.errors import ProjectError
 from commission.geometry.arrays import FloatArray, frozen
-from commission.site.checks import FARTHEST, at_least
+from commission.site.checks import check_fields
+from commission.site.quantity import (
+    COORDINATE,
+    DEGREES,
+    MILLIMETRES,
+    NOT_NEGATIVE,
+    Bounds,
+    Choice,
+    Quantity,
+    Switch,
+    Words,
+)
+
+_RADIUS = Bounds(0.0, 1.0, excludes_low=True)
 
 
 class ReflectorKind(StrEnum):
@@ -24,43 +37,37 @@ class ReflectorKind(StrEnum):
 class Reflector:
     """One reflector on the floor plan."""
 
-    id: str
+    id: Annotated[str, Words("Name")]
     """Name, unique within the map."""
-    x: float
-    """Center, x in the map frame [m]."""
-    y: float
-    """Center, y in the map frame [m]."""
-    radius: float = 0.04
-    """Radius of a cylinder, half the width of a flat plate [m]."""
-    kind: ReflectorKind = ReflectorKind.CYLINDER
+    x: Annotated[float, Quantity(label="x", unit="m", bounds=COORDINATE, decimals=4)]
+    """Center, x in the map frame."""
+    y: Annotated[float, Quantity(label="y", unit="m", bounds=COORDINATE, decimals=4)]
+    """Center, y in the map frame."""
+    radius: Annotated[
+        float, Quantity(label="Radius", unit="m", shown=MILLIMETRES, bounds=_RADIUS, step=0.1, decimals=4)
+    ] = 0.04
+    """Radius of a cylinder, half the width of a flat plate."""
+    kind: Annotated[ReflectorKind, Choice("Kind")] = ReflectorKind.CYLINDER
     """`cylinder` or `flat`."""
-    heading: float = 0.0
-    """Direction that a flat plate faces, map frame [rad]."""
-    height: float = 0.2
-    """Height of its middle above the floor [m]."""
-    sigma: float = 0.0
-    """1-sigma uncertainty of its surveyed position, each axis [m]."""
-    layer: str = ""
+    heading: Annotated[float, Quantity(label="Faces", unit="rad", shown=DEGREES, step=0.01, decimals=6)] = 0.0
+    """Direction that a flat plate faces, map frame."""
+    height: Annotated[float, Quantity(label="Height", unit="m", decimals=4)] = 0.2
+    """Height of its middle above the floor."""
+    sigma: Annotated[float, Quantity(label="Survey 1σ", unit="m", shown=MILLIMETRES, bounds=NOT_NEGATIVE, step=0.1)] = (
+        0.0
+    )
+    """1-sigma uncertainty of its surveyed position, each axis."""
+    layer: Annotated[str, Words("Layer")] = ""
     """Group of reflectors that belong together."""
-    note: str = ""
+    note: Annotated[str, Words("Note")] = ""
     """Free text."""
-    locked: bool = False
+    locked: Annotated[bool, Switch("Locked")] = False
     """Whether edits leave it as it is, until it is unlocked."""
 
     def __post_init__(self) -> None:
         if not self.id:
             raise ValueError("id is empty; expected a name")
-        for name in ("x", "y", "heading", "height"):
-            if not math.isfinite(getattr(self, name)):
-                raise ValueError(f"{name} is {getattr(self, name)}; expected a finite number")
-        if max(abs(self.x), abs(self.y)) > FARTHEST:
-            name = "x" if abs(self.x) > FARTHEST else "y"
-            raise ValueError(
-                f"{name} is {getattr(self, name):g}; expected at most {FARTHEST:g} m from the map's origin"
-            )
-        if not 0.0 < self.radius <= 1.0:
-            raise ValueError(f"radius is {self.radius:g}; expected more than 0 and at most 1 m")
-        at_least(self.sigma, 0.0, "sigma", "m")
+        check_fields(self)
 
 
 @dataclass(frozen=True, slots=True)

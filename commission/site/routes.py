@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-
-import numpy as np
+from typing import Annotated
 
 from commission.errors import ProjectError
 from commission.geometry.arrays import FloatArray, equal_fields, frozen
 from commission.geometry.splines import Spline
-from commission.site.checks import FARTHEST, between
+from commission.site.checks import check_fields
+from commission.site.quantity import COORDINATE, Bounds, Choice, Quantity, Words
 
-SPEEDS = (0.001, 100.0)
-"""Slowest and fastest planned speed [m/s]: a slower route would never end in a virtual drive."""
-WEIGHTS = (1e-6, 1e6)
-"""Smallest and largest weight of a control point [1]: beyond, a curve loses its digits."""
+SPEEDS = Bounds.between(0.001, 100.0)
+"""Planned speeds [m/s]: a slower route would never end in a virtual drive."""
+WEIGHTS = Bounds.between(1e-6, 1e6)
+"""Weights of a control point [1]: beyond, a curve loses its digits."""
 
 
 class Direction(StrEnum):
@@ -30,18 +30,18 @@ class Direction(StrEnum):
 class Segment:
     """One curve of a route, driven without a stop."""
 
-    control_points: FloatArray
-    """(N, 2) control points of the curve [m], map frame."""
-    direction: Direction = Direction.FORWARD
-    """`forward` or `reverse`."""
+    control_points: Annotated[FloatArray, Quantity(label="Control points", unit="m", bounds=COORDINATE, decimals=4)]
+    """(N, 2) control points of the curve, map frame."""
+    direction: Annotated[Direction, Choice("Segment")] = Direction.FORWARD
+    """Whether the vehicle's front or its rear goes ahead: `forward` or `reverse`."""
     degree: int = 3
     """Degree of the B-spline."""
-    knots: FloatArray | None = None
-    """(N + degree + 1,) knots, clamped; none: uniform in [0, 1]."""
-    weights: FloatArray | None = None
+    knots: Annotated[FloatArray | None, Quantity(label="Knots", decimals=9)] = None
+    """(N + degree + 1,) knots, clamped; none: uniform in 0 to 1."""
+    weights: Annotated[FloatArray | None, Quantity(label="Weights", bounds=WEIGHTS)] = None
     """(N,) positive weights (NURBS); none: all 1."""
-    speed: float | None = None
-    """Speed on this segment [m/s]; none: the route's."""
+    speed: Annotated[float | None, Quantity(label="Speed", unit="m/s", bounds=SPEEDS, step=0.01)] = None
+    """Speed on this segment; none: the route's."""
 
     def __post_init__(self) -> None:
         object.__setattr__(
@@ -49,17 +49,10 @@ class Segment:
             "control_points",
             frozen(self.control_points, (None, 2), "control_points"),
         )
-        if self.control_points.size and np.abs(self.control_points).max() > FARTHEST:
-            found = np.abs(self.control_points).max()
-            raise ValueError(f"control_points reach {found:g} m; expected at most {FARTHEST:g} m from the map's origin")
         for name in ("knots", "weights"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(getattr(self, name), (None,), name))
-        if self.weights is not None and self.weights.size:
-            between(float(self.weights.min()), WEIGHTS, "weights: smallest")
-            between(float(self.weights.max()), WEIGHTS, "weights: largest")
-        if self.speed is not None:
-            between(self.speed, SPEEDS, "speed", "m/s")
+        check_fields(self)
         self.spline()
 
     def __eq__(self, other: object) -> bool:
@@ -75,19 +68,19 @@ class Segment:
 class Route:
     """Segments driven one after the other; where the direction changes the vehicle stops."""
 
-    name: str
+    name: Annotated[str, Words("Route")]
     """Name, unique within the project."""
     segments: tuple[Segment, ...]
     """The curves; each starts where the one before ends."""
-    speed: float = 0.5
-    """Speed [m/s] of segments that name none."""
+    speed: Annotated[float, Quantity(label="Speed", unit="m/s", bounds=SPEEDS, step=0.01)] = 0.5
+    """Speed of segments that name none."""
 
     def __post_init__(self) -> None:
         if not self.name:
             raise ValueError("a route's name is empty; expected text")
         if not self.segments:
             raise ValueError(f"route {self.name!r} has no segments; expected 1 or more")
-        between(self.speed, SPEEDS, f"speed of route {self.name!r}", "m/s")
+        check_fields(self, f"route {self.name!r}: ")
         for index, (before, after) in enumerate(zip(self.segments, self.segments[1:], strict=False)):
             gap = math.dist(before.control_points[-1], after.control_points[0])
             if gap > 0.01:

@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Annotated
 
 from commission.geometry.arrays import FloatArray, equal_fields, frozen
-from commission.site.checks import above, at_least, between
+from commission.site.checks import check_fields
+from commission.site.quantity import (
+    AS_DEGREES,
+    BARE,
+    DEGREES,
+    MILLIMETRES,
+    NOT_NEGATIVE,
+    POSITIVE,
+    Bounds,
+    Quantity,
+)
 
 LONGEST_RANGE = 10_000.0
 """No laser scanner measures farther [m]."""
@@ -16,45 +27,78 @@ LONGEST_RANGE = 10_000.0
 class Scanner:
     """A 2D laser scanner on the vehicle."""
 
-    mounting: FloatArray = field(default_factory=lambda: frozen([0.0, 0.0, 0.0], (3,), "scanner.mounting"))
-    """(3,) `T_base_scanner`: x [m], y [m] and heading [rad] of the scanner in the base frame."""
-    field_of_view_deg: tuple[float, float] = (-135.0, 135.0)
-    """First and last bearing [deg], scanner frame, counter-clockwise; a full turn is -180 to 180."""
-    resolution_deg: float = 0.5
-    """Step between neighboring beams [deg]."""
-    rate: float = 25.0
-    """Scans per second [1/s]."""
-    range: tuple[float, float] = (0.05, 30.0)
-    """Smallest and largest range at which the scanner measures [m]."""
-    range_sigma: float = 0.01
-    """1-sigma noise of each beam's range [m]."""
-    bearing_sigma_deg: float = 0.05
-    """1-sigma noise of each beam's bearing [deg]."""
-    beam_width_deg: float = 0.25
-    """Divergence of a beam: a reflector is met when any part of the beam touches it [deg]."""
-    reflector_range: float = 20.0
-    """Range up to which the scanner tells reflectors from other things [m]."""
+    mounting: Annotated[
+        FloatArray,
+        Quantity(label="Mounted at x", unit="m", decimals=4),
+        Quantity(label="Mounted at y", unit="m", decimals=4),
+        Quantity(label="Faces", unit="rad", shown=DEGREES, step=0.01, decimals=6),
+    ] = field(default_factory=lambda: frozen([0.0, 0.0, 0.0], (3,), "scanner.mounting"))
+    """(3,) `T_base_scanner`: x, y and heading of the scanner in the base frame."""
+    field_of_view_deg: Annotated[
+        tuple[float, float],
+        Quantity(label="First bearing", unit="deg", shown=AS_DEGREES, step=0.1, decimals=6),
+        Quantity(label="Last bearing", unit="deg", shown=AS_DEGREES, step=0.1, decimals=6),
+    ] = (-135.0, 135.0)
+    """First and last bearing, scanner frame, counter-clockwise; a full turn is -180 to 180."""
+    # The last of thousands of beams is at thousands of steps: one step in a file needs all its digits.
+    resolution_deg: Annotated[
+        float,
+        Quantity(
+            label="Resolution",
+            unit="deg",
+            shown=AS_DEGREES,
+            bounds=Bounds.between(0.01, 10.0),
+            step=0.0001,
+            decimals=12,
+        ),
+    ] = 0.5
+    """Step between neighboring beams."""
+    rate: Annotated[
+        float,
+        Quantity(
+            label="Scans per s",
+            unit="scans/s",
+            shown=BARE,
+            bounds=Bounds.between(0.1, 1000.0),
+            step=0.01,
+            decimals=9,
+        ),
+    ] = 25.0
+    """Scans per second."""
+    range: Annotated[
+        tuple[float, float],
+        Quantity(label="Range from", unit="m", bounds=NOT_NEGATIVE, step=0.01, decimals=4),
+        Quantity(label="Range to", unit="m", bounds=Bounds.between(0.0, LONGEST_RANGE), step=0.01, decimals=4),
+    ] = (0.05, 30.0)
+    """Smallest and largest range at which the scanner measures."""
+    range_sigma: Annotated[
+        float, Quantity(label="Range 1σ", unit="m", shown=MILLIMETRES, bounds=NOT_NEGATIVE, step=0.1)
+    ] = 0.01
+    """1-sigma noise of each beam's range."""
+    bearing_sigma_deg: Annotated[
+        float, Quantity(label="Bearing 1σ", unit="deg", shown=AS_DEGREES, bounds=NOT_NEGATIVE, step=0.001)
+    ] = 0.05
+    """1-sigma noise of each beam's bearing."""
+    beam_width_deg: Annotated[
+        float, Quantity(label="Beam width", unit="deg", shown=AS_DEGREES, bounds=NOT_NEGATIVE, step=0.01)
+    ] = 0.25
+    """Divergence of a beam: a reflector is met when any part of the beam touches it."""
+    reflector_range: Annotated[
+        float, Quantity(label="Reflectors to", unit="m", bounds=POSITIVE, step=0.1, decimals=4)
+    ] = 20.0
+    """Range up to which the scanner tells reflectors from other things."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mounting", frozen(self.mounting, (3,), "scanner.mounting"))
+        check_fields(self, "scanner.")
         first, last = self.field_of_view_deg
-        if not (math.isfinite(first) and math.isfinite(last) and 0.0 < last - first <= 360.0):
+        if not 0.0 < last - first <= 360.0:
             raise ValueError(
                 f"scanner.field_of_view_deg is [{first:g}, {last:g}]; expected first < last, at most 360 deg apart"
             )
-        between(self.resolution_deg, (0.01, 10.0), "scanner.resolution_deg", "deg")
-        between(self.rate, (0.1, 1000.0), "scanner.rate", "scans per second")
         nearest, farthest = self.range
-        at_least(nearest, 0.0, "scanner.range[0]", "m")
-        if not nearest < farthest <= LONGEST_RANGE:
-            raise ValueError(
-                f"scanner.range is [{nearest:g}, {farthest:g}]; "
-                f"expected smallest < largest range, at most {LONGEST_RANGE:g} m"
-            )
-        at_least(self.range_sigma, 0.0, "scanner.range_sigma", "m")
-        at_least(self.bearing_sigma_deg, 0.0, "scanner.bearing_sigma_deg", "deg")
-        at_least(self.beam_width_deg, 0.0, "scanner.beam_width_deg", "deg")
-        above(self.reflector_range, 0.0, "scanner.reflector_range", "m")
+        if not nearest < farthest:
+            raise ValueError(f"scanner.range is [{nearest:g}, {farthest:g}]; expected smallest < largest range [m]")
 
     def __eq__(self, other: object) -> bool:
         """Equal when every field is, arrays element by element."""

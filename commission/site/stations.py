@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from commission.geometry.arrays import FloatArray, frozen
-from commission.site.checks import FARTHEST, between
+from commission.site.checks import check_fields
+from commission.site.quantity import COORDINATE, DEGREES, MILLIMETRES, Bounds, Quantity, Words
 
 DOCKING = 0.01
 """Accuracy that taking over a load usually needs [m]."""
@@ -20,25 +21,31 @@ TRANSIT = 0.1
 class Station:
     """A pose that the vehicle has to reach."""
 
-    name: str
+    name: Annotated[str, Words("Name")]
     """Name, unique within the project."""
-    x: float
-    """Place of the vehicle's base, x in the map frame [m]."""
-    y: float
-    """Place of the vehicle's base, y in the map frame [m]."""
-    heading: float = 0.0
-    """Heading of the vehicle, map frame [rad]."""
-    required_accuracy: float = TRANSIT
-    """Largest allowed 2-sigma of the position there, each axis [m]: 0.01 to dock, 0.1 to pass."""
+    x: Annotated[float, Quantity(label="x", unit="m", bounds=COORDINATE, decimals=4)]
+    """Place of the vehicle's base, x in the map frame."""
+    y: Annotated[float, Quantity(label="y", unit="m", bounds=COORDINATE, decimals=4)]
+    """Place of the vehicle's base, y in the map frame."""
+    heading: Annotated[float, Quantity(label="Heading", unit="rad", shown=DEGREES, step=0.01, decimals=6)] = 0.0
+    """Heading of the vehicle, map frame."""
+    required_accuracy: Annotated[
+        float,
+        Quantity(
+            label="Within",
+            unit="m",
+            shown=MILLIMETRES,
+            bounds=Bounds.between(0.001, 10.0),
+            step=0.1,
+            decimals=4,
+        ),
+    ] = TRANSIT
+    """Largest allowed 2-sigma of the position there, each axis: 0.01 m to dock, 0.1 m to pass."""
 
     def __post_init__(self) -> None:
         if not self.name:
             raise ValueError("a station's name is empty; expected text")
-        for axis in ("x", "y"):
-            between(getattr(self, axis), (-FARTHEST, FARTHEST), axis, "m")
-        if not math.isfinite(self.heading):
-            raise ValueError(f"heading is {self.heading}; expected a finite number [rad]")
-        between(self.required_accuracy, (0.001, 10.0), "required_accuracy", "m")
+        check_fields(self)
 
     @property
     def pose(self) -> FloatArray:

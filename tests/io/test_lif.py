@@ -237,7 +237,7 @@ def test_orientation_becomes_a_direction_and_what_is_doubtful_is_said(
         ({"controlPoints": [{"x": 2, "y": 0}, {"x": 4}, {"x": 4, "y": 2}]}, "a control point has no place"),
         (
             {"controlPoints": [{"x": 2, "y": 0}, {"x": 4, "y": 0, "weight": 0}, {"x": 4, "y": 2}]},
-            "weights: smallest is 0",
+            "weights[1] is 0",
         ),
         ({"controlPoints": [{"x": 3, "y": 0}, {"x": 4, "y": 0}, {"x": 4, "y": 3}]}, "starts 1.000 m from its node"),
     ],

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from commission.errors import ProjectError, UsageError
-from commission.site.checks import field_hints
 from commission.site.disturbances import Disturbances, ShinyObject, TiltedStretch
+from commission.site.fields import field_hints
 from commission.site.floor_map import OCCUPIED, FloorMap
 from commission.site.parameters import Parameters
 from commission.site.project import Project
@@ -46,7 +46,7 @@ STRAIGHT = Segment(control_points=[[0, 0], [1, 0], [2, 0], [3, 0]])
             lambda: Station(name="Dock", x=0.0, y=0.0, heading=0.0, required_accuracy=0.0),
             "required_accuracy is 0; expected 0.001 to 10 m",
         ),
-        (lambda: ShinyObject(math.inf, 0.0), "expected finite metres"),
+        (lambda: ShinyObject(math.inf, 0.0), "shiny object's x is inf; expected -1e\\+07 to 1e\\+07 m"),
         (lambda: TiltedStretch(0.0, 0.0, -1.0), "radius is -1; expected 0 m or more"),
     ],
 )

@@ -13,7 +13,7 @@ from commission.app.base import actions as page_actions
 from commission.app.base.panel import BasePanel, Post, escaped, posting, write
 from commission.app.base.view import PageView
 from commission.app.editing import actions
-from commission.site.checks import field_hints
+from commission.site.fields import field_hints
 from commission.site.presets import SCANNERS, Origin, ScannerPreset, with_preset
 from commission.site.project import Project
 from commission.site.scanner import Scanner

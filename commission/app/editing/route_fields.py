@@ -34,7 +34,7 @@ class RouteFields:
                 "Segment", tuple(Direction), hint="Whether the vehicle's front or its rear goes ahead."
             )
             self._speed = gui.add_number(
-                "Speed [m/s]", 0.5, min=SPEEDS[0], max=SPEEDS[1], step=0.01, hint="Planned speed of this segment."
+                "Speed [m/s]", 0.5, min=SPEEDS.low, max=SPEEDS.high, step=0.01, hint="Planned speed of this segment."
             )
             for widget in (self._direction, self._speed):
                 widget.on_update(posting(post, self._driven))

@@ -21,7 +21,7 @@ from commission.app.editing.station_fields import StationFields
 from commission.app.floor_map.tool_fields import MapToolFields
 from commission.app.floor_map.tools import FEWEST
 from commission.app.run.now_panel import NowPanel
-from commission.site.checks import field_hints
+from commission.site.fields import field_hints
 from commission.site.reflectors import Reflector, ReflectorKind
 
 DEG = math.degrees(1.0)

@@ -14,7 +14,7 @@ from commission.app.base.panel import Post, posting, write
 from commission.app.editing import station_actions as actions
 from commission.app.editing.editor import Editor
 from commission.app.editing.station_gestures import station_of
-from commission.site.checks import field_hints
+from commission.site.fields import field_hints
 from commission.site.project import Project
 from commission.site.stations import DOCKING, TRANSIT, Station
 

@@ -21,7 +21,7 @@ from commission.io.dxf import Drawing, DrawingLayer
 from commission.io.dxf_units import UNITS
 from commission.io.image_map import Picture
 from commission.io.mesh import Model
-from commission.site.checks import field_hints
+from commission.site.fields import field_hints
 
 DEG = math.degrees(1.0)
 AS_STATED = "as stated"

@@ -17,7 +17,7 @@ from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.tune.actions import ParameterValue, ResetParameters, SetParameter
 from commission.app.tune.reducer import parameter
-from commission.site.checks import field_hints
+from commission.site.fields import field_hints
 from commission.site.parameters import Parameters
 
 DEG = math.degrees(1.0)

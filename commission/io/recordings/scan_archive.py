@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from commission.errors import FileFormatError
 from commission.io.reading import cannot_read, check_size
-from commission.site.checks import STAMP_LIMIT
+from commission.site.quantity import STAMP_LIMIT
 from commission.site.record_log import ScanLog
 
 BEAM_LIMIT = 100_000
