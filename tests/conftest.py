@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,66 @@ settings.register_profile("project", deadline=None)
 settings.load_profile("project")
 
 REPOSITORY = Path(__file__).resolve().parents[1]
+
+LONGEST_WITH_ALL_SEEDS_S = 3600.0
+"""Time for one test with all its seeds [s]."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the one option of the project's own."""
+    parser.addoption(
+        "--acceptance",
+        action="store_true",
+        help="run the tests that take seeds with all of them, instead of a few; and only these, unless paths are given",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Leave the other tests out when all seeds are asked for."""
+    if config.getoption("acceptance") and config.args_source is pytest.Config.ArgsSource.TESTPATHS:
+        config.args = [str(REPOSITORY / "tests" / place) for place in WITH_SEEDS]
+
+
+WITH_SEEDS = ("acceptance", "planning/test_placement_small_cases.py")
+"""Where `seeds` is used."""
+
+
+@dataclass(frozen=True, slots=True)
+class Seeds:
+    """Which virtual drives (or random cases) stand for all."""
+
+    all: bool
+    """Whether every seed is run. If not, a bound on a mean is wider by what the drives that are run scatter."""
+
+    def __call__(self, few: int, total: int) -> range:
+        """Return the first seeds, or all of them."""
+        return range(total if self.all else few)
+
+
+@pytest.fixture(scope="session")
+def seeds(request: pytest.FixtureRequest) -> Seeds:
+    """A few seeds of a test in the test command, all of them with `--acceptance`, before a figure is claimed."""
+    return Seeds(request.config.getoption("acceptance"))
+
+
+LONGEST_FIRST = ("tests/browser", "tests/acceptance", "tests/planning")
+"""Among several workers these begin, so that none waits for another one at the end."""
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Say which tests one of several workers runs one after the other: those of a file, which share what they prepare.
+
+    The tests in a browser share one worker with those that measure time: a browser without a graphics card takes the
+    cores that a measured test counts on.
+    """
+    for item in items:
+        file = item.path.relative_to(REPOSITORY).as_posix()
+        alone = file.startswith("tests/browser") or item.get_closest_marker("measures_time")
+        item.add_marker(pytest.mark.xdist_group("browser" if alone else file))
+        if config.getoption("acceptance"):
+            item.add_marker(pytest.mark.timeout(LONGEST_WITH_ALL_SEEDS_S))
+    if hasattr(config, "workerinput"):
+        items.sort(key=lambda item: not item.path.relative_to(REPOSITORY).as_posix().startswith(LONGEST_FIRST))
 
 
 @pytest.fixture(scope="session")

@@ -13,19 +13,21 @@ import pytest
 from commission.io.project_file import load_project
 from commission.simulation.scenario import virtual_drive
 from tests.acceptance.judged import Judged, judge, seen_within
+from tests.conftest import Seeds
 
 DRIVES = 20
+FEW_DRIVES = 4
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def drives(repository: Path) -> dict[int, list[Judged]]:
-    """The 20 drives, judged with each field of view [deg]."""
+def drives(repository: Path, seeds: Seeds) -> dict[int, list[Judged]]:
+    """The drives, judged with each field of view [deg]."""
     project = load_project(repository / "maps" / "laboratory")
     route = project.routes[0].name
     judged: dict[int, list[Judged]] = {360: [], 180: []}
-    for seed in range(DRIVES):
+    for seed in seeds(FEW_DRIVES, DRIVES):
         log = virtual_drive(project, route, seed)
         judged[360].append(judge(project, route, log))
         judged[180].append(judge(project, route, seen_within(log, 90.0)))
@@ -52,11 +54,14 @@ def test_half_a_turn_is_as_precise_wherever_two_reflectors_are_seen(drives: dict
 
 
 @pytest.mark.parametrize("field_of_view", [360, 180])
-def test_covariance_is_consistent_with_the_errors(drives: dict[int, list[Judged]], field_of_view: int) -> None:
-    anees = np.mean([drive.statistics.anees for drive in drives[field_of_view]])
-    anees_position = np.mean([drive.statistics.anees_position for drive in drives[field_of_view]])
-    assert 0.8 < anees < 1.25
-    assert 0.8 < anees_position < 1.25
+def test_covariance_is_consistent_with_the_errors(
+    drives: dict[int, list[Judged]], field_of_view: int, seeds: Seeds
+) -> None:
+    for of in ("anees", "anees_position"):
+        values = np.array([getattr(drive.statistics, of) for drive in drives[field_of_view]])
+        # The bounds are for the mean of 20 drives; that of a few may lie two standard errors beside it.
+        margin = 0.0 if seeds.all else 2.0 * float(values.std(ddof=1)) / np.sqrt(len(values))
+        assert 0.8 - margin < values.mean() < 1.25 + margin
 
 
 def test_nothing_is_wrong_while_operational(drives: dict[int, list[Judged]]) -> None:

@@ -1,6 +1,7 @@
 """Suggested layouts of the bundled sites: fewer reflectors than by hand, and what they promise shown by virtual drives.
 
-In each drive one reflector stands in the localizer's map and not in the hall. `bench_placement` drives fifty of them.
+In each drive one reflector stands in the localizer's map and not in the hall. Every bound is the same for few drives
+and for all: what 2-sigma promises of the cycles is kept with a wide margin.
 """
 
 from __future__ import annotations
@@ -15,6 +16,9 @@ from commission.planning.placement import Placement
 from commission.site.layout_brief import Demands
 from commission.site.project import Project
 from tests.acceptance.placed import blocked_drive, demands_met_by, suggested, verdict
+from tests.conftest import Seeds
+
+DRIVES = 50
 
 TWO_SIGMA = 0.954
 """Share of the errors within 2-sigma."""
@@ -34,21 +38,25 @@ def fewer_than_by_hand(project: Project, found: Placement) -> bool:
     return found.unmet == () and found.at_least <= found.added < len(project.reflectors)
 
 
-def test_the_shop_floor_needs_fewer_reflectors_than_drawn_by_hand_to_be_as_accurate(repository: Path) -> None:
+def test_the_shop_floor_needs_fewer_reflectors_than_drawn_by_hand_to_be_as_accurate(
+    repository: Path, seeds: Seeds
+) -> None:
     project = load_project(repository / "maps" / "shop_floor")
     demands = demands_met_by(project)
     # What drives are held against is far below the supervisor's 100 mm and 3 deg.
     assert demands.position_limit < 0.02
     placed, found = suggested(project, demands)
     assert fewer_than_by_hand(project, found)
-    check(placed, demands, range(2))
+    check(placed, demands, seeds(2, DRIVES))
 
 
-def test_the_warehouse_needs_less_than_half_of_those_drawn_by_hand_to_keep_within_limits(repository: Path) -> None:
+def test_the_warehouse_needs_less_than_half_of_those_drawn_by_hand_to_keep_within_limits(
+    repository: Path, seeds: Seeds
+) -> None:
     project = load_project(repository / "maps" / "warehouse")
     demands = replace(demands_met_by(project), position_limit=None, heading_limit=None)
-    # Half of the places in half of the time; the benchmark takes a place per metre.
-    placed, found = suggested(project, demands, spacing=2.0)
+    # Half of the places in half of the time; the figures in the README are with a place per metre.
+    placed, found = suggested(project, demands, spacing=1.0 if seeds.all else 2.0)
     assert fewer_than_by_hand(project, found)
     assert found.added < 0.5 * len(project.reflectors)
-    check(placed, demands, range(1))
+    check(placed, demands, seeds(1, DRIVES))

@@ -29,11 +29,9 @@ def wrap(angle):
     "steps.py": '''"""Steps of a filter."""
 from typing import NamedTuple
 
-import numpy as np
-
 from commission import constants
 from commission.angles import wrap
-from commission.compiled import compiled, compiled_parallel, parallel_range
+from commission.compiled import compiled
 from commission.constants import LIMIT
 
 
@@ -73,6 +71,11 @@ def fill(values):
     """Fill."""
     for i in range(len(values)):
         values[i] = i
+''',
+    "loops.py": '''"""A kernel on all cores: apart, since it takes as long to compile as all others together."""
+import numpy as np
+
+from commission.compiled import compiled_parallel, parallel_range
 
 
 @compiled_parallel
@@ -85,25 +88,33 @@ def doubled(values):
 ''',
 }
 
-SCRIPT = """
-import json, sys
-import numpy as np
-from commission import angles, steps
-state = steps.State(x=2.0, y=5.0)
-values = np.zeros(3)
-steps.fill(values)
-found = [steps.run(state), steps.predict(state), steps.correct(state), steps.scaled(2.0), angles.wrap(5.0)]
-found += steps.doubled(values).tolist()
-kernels = {name: k for m in (angles, steps) for name, k in vars(m).items() if hasattr(k, "stats")}
+REPORT = """
+import json
+kernels = {name: k for m in modules for name, k in vars(m).items() if hasattr(k, "stats")}
 compiled = sorted(name for name, k in kernels.items() if k.stats.cache_misses)
 loaded = sorted(name for name, k in kernels.items() if k.stats.cache_hits)
 print(json.dumps({"values": found, "compiled": compiled, "loaded": loaded}))
 """
 
-VALUES = [2.5, 1.0, 1.5, 20.0, 1.0, 0.0, 2.0, 4.0]
-"""By hand: (2 + 7) mod 4 = 1; 0.5 * min(5, 3) = 1.5; their sum; 10 * 2; 5 mod 4; twice 0, 1, 2."""
+SCRIPT = f"""
+import numpy as np
+from commission import angles, steps
+state = steps.State(x=2.0, y=5.0)
+steps.fill(np.zeros(3))
+found = [steps.run(state), steps.predict(state), steps.correct(state), steps.scaled(2.0), angles.wrap(5.0)]
+modules = [angles, steps]
+{REPORT}"""
 
-ALL = ["correct", "doubled", "fill", "predict", "run", "scaled", "wrap"]
+LOOPS_SCRIPT = f"""
+import numpy as np
+from commission import loops
+found, modules = loops.doubled(np.arange(3.0)).tolist(), [loops]
+{REPORT}"""
+
+VALUES = [2.5, 1.0, 1.5, 20.0, 1.0]
+"""By hand: (2 + 7) mod 4 = 1; 0.5 * min(5, 3) = 1.5; their sum; 10 * 2; 5 mod 4."""
+
+ALL = ["correct", "fill", "predict", "run", "scaled", "wrap"]
 
 
 @dataclass(frozen=True)

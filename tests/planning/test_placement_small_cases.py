@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
+from tests.conftest import Seeds
 from tests.planning.small_cases import KINDS, Verdict, judged, small_case
 
 
 @pytest.fixture(scope="module")
-def verdicts() -> list[Verdict]:
-    return [judged(small_case(seed)) for seed in range(6 * len(KINDS))]
+def verdicts(seeds: Seeds) -> list[Verdict]:
+    """Every kind of demand equally often. The bounds are the same for few cases and for all."""
+    return [judged(small_case(seed)) for seed in seeds(3 * len(KINDS), 12 * len(KINDS))]
 
 
 @pytest.mark.slow

@@ -226,6 +226,7 @@ def _answers(port: int) -> bool:
         return False
 
 
+@pytest.mark.measures_time
 def test_wrong_tokens_are_slowed_down_and_right_cookies_are_not(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connection, "WRONG_TOKEN_TAKES_S", 0.5)
     port = start(TOKEN).get_port()
@@ -253,6 +254,7 @@ def test_wrong_tokens_are_slowed_down_and_right_cookies_are_not(start: Start, mo
     until(lambda: ask(port, "GET", Cookie=cookie)[0] == 200)
 
 
+@pytest.mark.measures_time
 def test_a_wrong_cookie_is_as_slow_as_a_wrong_token_and_a_missing_one_is_not(
     start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -84,6 +84,7 @@ def test_every_new_message_is_reported_with_its_fraction(owner: Owner) -> None:
     ]
 
 
+@pytest.mark.measures_time
 def test_frequent_progress_does_not_flood_the_owner_but_is_kept(owner: Owner) -> None:
     seen: list[Job] = []
 

@@ -354,6 +354,7 @@ def test_forms_with_invented_names_fill_no_memory(desk: Desk) -> None:
     assert desk.kept == kept
 
 
+@pytest.mark.measures_time
 def test_a_flood_of_messages_waits_and_the_others_are_heard(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connection, "MESSAGES_PER_S", 100.0)
     for number in range(1_500):
