@@ -17,21 +17,20 @@ from commission.site.parameters import Parameters
 from commission.site.record_log import RecordLog
 from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
-
-Array = np.ndarray
-
-
-def matrix(pose: Array) -> Array:
-    c, s = math.cos(pose[2]), math.sin(pose[2])
-    return np.array([[c, -s, pose[0]], [s, c, pose[1]], [0.0, 0.0, 1.0]])
+from tests.localization.plain_observation import (
+    Array,
+    innovations,
+    jacobians,
+    log_likelihoods,
+    matrix,
+    noises,
+    observed,
+    turned,
+)
 
 
 def pose_of(T: Array) -> Array:
     return np.array([T[0, 2], T[1, 2], math.atan2(T[1, 0], T[0, 0])])
-
-
-def turned(angle: float) -> float:
-    return math.atan2(math.sin(angle), math.cos(angle))
 
 
 def rotation(angle: float) -> Array:
@@ -111,29 +110,13 @@ class PlainLocalizer:
         Q[:2, :2] += heading / 12.0 * np.outer(perpendicular, perpendicular)
         self.cov = F @ self.cov @ F.T + Q
 
-    def h(self, mean: Array, place: Array) -> Array:
-        seen = np.linalg.inv(matrix(mean) @ matrix(self.scanner.mounting)) @ [*place, 1.0]
-        return np.array([math.hypot(seen[0], seen[1]), math.atan2(seen[1], seen[0])])
-
-    def jacobian(self, mean: Array, place: Array) -> Array:
-        """Central differences: independent of the analytic one, good to about 1e-10."""
-        H = np.empty((2, 3))
-        for i in range(3):
-            step = np.zeros(3)
-            step[i] = 1e-5
-            d = self.h(mean + step, place) - self.h(mean - step, place)
-            H[:, i] = d[0] / 2e-5, turned(d[1]) / 2e-5
-        return H
-
-    def noise(self, j: int, r: float) -> Array:
-        p, sigma = self.parameters.observation, self.reflectors.reflectors[j].sigma
-        return np.diag([p.range_sigma**2 + sigma**2, p.bearing_sigma**2 + (sigma / r) ** 2])
-
-    def innovation(self, mean: Array, cov: Array, z: Array, j: int) -> tuple[Array, Array, Array, Array]:
-        place = self.reflectors.centers[j]
-        expected, H = self.h(mean, place), self.jacobian(mean, place)
-        R = self.noise(j, expected[0])
-        return np.array([z[0] - expected[0], turned(z[1] - expected[1])]), H, H @ cov @ H.T + R, R
+    def innovations(self, mean: Array, cov: Array, z: Array) -> tuple[Array, Array, Array, Array]:
+        """Of one detection against every reflector: v, H, S and R."""
+        places, mounting, p = self.reflectors.centers, self.scanner.mounting, self.parameters.observation
+        surveyed = np.array([reflector.sigma for reflector in self.reflectors.reflectors])
+        H = jacobians(mean, mounting, places)
+        R = noises((p.range_sigma, p.bearing_sigma), surveyed, observed(mean, mounting, places)[:, 0])
+        return innovations(mean, mounting, places, z), H, H @ cov @ H.transpose(0, 2, 1) + R, R
 
     def scan(self, now: float, detections: Array) -> dict:
         self.extrapolate(now)
@@ -143,17 +126,12 @@ class PlainLocalizer:
         measured = detections - [p.observation.range_bias, 0.0]
         status, chosen, d2s = [], [], []
         for z in measured:
-            best, best_d2, best_likelihood = -1, math.nan, -math.inf
-            for j in range(len(self.reflectors)):
-                v, _, S, _ = self.innovation(*prior, z, j)
-                d2 = float(v @ np.linalg.solve(S, v))
-                likelihood = -0.5 * d2 - 0.5 * np.linalg.slogdet(2.0 * math.pi * S)[1]
-                if likelihood > best_likelihood:
-                    best, best_d2, best_likelihood = j, d2, likelihood
-            inside = best >= 0 and (best_d2 <= gate or not p.association.enabled)
-            status.append("inlier" if inside else "outlier")
+            v, _, S, _ = self.innovations(*prior, z)
+            d2, likelihood = log_likelihoods(v, S)
+            best = int(np.argmax(likelihood))
+            status.append("inlier" if d2[best] <= gate or not p.association.enabled else "outlier")
             chosen.append(best)
-            d2s.append(best_d2)
+            d2s.append(float(d2[best]))
         if p.association.enabled:
             for j in set(chosen):
                 claims = [i for i in range(len(chosen)) if chosen[i] == j and status[i] == "inlier"]
@@ -162,7 +140,7 @@ class PlainLocalizer:
                         status[i] = "outlier"
         for z, j, kept in zip(measured, chosen, status, strict=True):
             if kept == "inlier":
-                v, H, S, R = self.innovation(self.mean, self.cov, z, j)
+                v, H, S, R = (of_all[j] for of_all in self.innovations(self.mean, self.cov, z))
                 K = self.cov @ H.T @ np.linalg.inv(S)
                 A = np.eye(3) - K @ H
                 self.mean = self.mean + K @ v

@@ -38,6 +38,20 @@ def one_reflector(parameters: Parameters | None = None) -> LocalizerSetup:
     return LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), Scanner(), parameters or Parameters())
 
 
+def with_close_neighbors(rng: np.random.Generator, reflectors: ReflectorMap) -> ReflectorMap:
+    """The same map with a neighbor some centimetres beside each reflector, each surveyed to another accuracy.
+
+    Only then det S decides which of two a detection belongs to.
+    """
+    every = []
+    for reflector in reflectors.reflectors:
+        own, other = rng.uniform(0.0, 0.06, 2)
+        dx, dy = rng.normal(0.0, 0.08, 2)
+        neighbor = dataclasses.replace(reflector, id=f"{reflector.id}'", x=reflector.x + dx, y=reflector.y + dy)
+        every += [dataclasses.replace(reflector, sigma=own), dataclasses.replace(neighbor, sigma=other)]
+    return ReflectorMap(tuple(every))
+
+
 @pytest.mark.parametrize(
     ("plan", "parameters"),
     [
@@ -52,7 +66,7 @@ def one_reflector(parameters: Parameters | None = None) -> LocalizerSetup:
 )
 def test_localizer_agrees_with_the_plain_one(plan: Plan, parameters: Parameters) -> None:
     rng = np.random.default_rng(11)
-    setup = LocalizerSetup(random_map(rng, 12, sigma=0.01), Scanner(mounting=MOUNTING), parameters)
+    setup = LocalizerSetup(with_close_neighbors(rng, random_map(rng, 12)), Scanner(mounting=MOUNTING), parameters)
     drive = random_drive(setup, rng, plan)
     arrays = run(drive.log, setup, drive.initial)
     plain = PlainLocalizer(setup.reflectors, setup.scanner, parameters, drive.initial).run(drive.log)

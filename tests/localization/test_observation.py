@@ -5,22 +5,31 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from commission.geometry import se2
 from commission.geometry.angles import difference
-from commission.localization.estimate import Belief
+from commission.localization.estimate import Belief, Status
+from commission.localization.localizer import Localizer
 from commission.localization.observation import (
     ObservationModel,
     expect,
     innovation_covariances,
     jacobians,
+    observation_model,
     project_detections,
     range_bearing,
     scanner_offset,
     validation_ellipses,
 )
+from commission.localization.setup import LocalizerSetup
+from commission.site.parameters import AssociationParameters, ObservationParameters, Parameters
+from commission.site.records import Detections
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.scanner import Scanner
+from tests.localization import plain_observation as plain
 
 MODEL = ObservationModel(0.3, -0.1, 0.4, 4e-4, 1.6e-5, 0.05)
 MOUNTING = np.array([MODEL.mount_x, MODEL.mount_y, MODEL.mount_theta])
@@ -51,6 +60,7 @@ def test_kernel_agrees_with_the_array_functions(pose: np.ndarray, polar: tuple[f
     expected = expect(*pose, *scanner_offset(pose[2], MODEL), *place[0], MODEL.mount_theta)
     assert abs(expected.range - range_bearing(pose, MOUNTING, place)[0, 0]) < 1e-12
     assert abs(difference(expected.bearing, range_bearing(pose, MOUNTING, place)[0, 1])) < 1e-11
+    assert -math.pi <= expected.bearing < math.pi
     H = np.array(expected[2:]).reshape(2, 3)
     np.testing.assert_allclose(H, jacobians(pose, MOUNTING, place)[0], atol=1e-10, rtol=0)
 
@@ -87,3 +97,53 @@ def test_validation_ellipse_holds_the_detections_that_the_gate_holds() -> None:
         # Only those on the edge differ, by the curvature of polar coordinates.
         assert np.mean(in_gate != in_ellipse) < 0.01
         assert np.mean(in_gate) > 0.93
+
+
+def test_drawn_gate_of_an_exact_pose_is_the_noise_of_range_bearing_and_survey_laid_on_the_floor() -> None:
+    # 8 m ahead of a scanner that looks along +y of the map, surveyed to 50 mm: along the ray 20 mm and 50 mm, across it
+    # 8 m x 4 mrad and 50 mm. The bearing's own covariance has the survey as (50 mm / 8 m)^2.
+    model = ObservationModel(0.0, 0.0, 0.0, 0.02**2, 0.004**2, 0.0)
+    belief = Belief(0, np.array([1.0, 2.0, math.pi / 2]), np.zeros((3, 3)))
+    S = innovation_covariances(belief, model, [[1.0, 10.0]], 0.05)
+    np.testing.assert_allclose(S, [np.diag([4e-4 + 25e-4, 16e-6 + 25e-4 / 64.0])], rtol=1e-12, atol=1e-15)
+    ellipses = validation_ellipses(belief, model, [[1.0, 10.0]], 0.05)
+    np.testing.assert_allclose(ellipses, [np.diag([(8.0 * 0.004) ** 2 + 25e-4, 4e-4 + 25e-4])], rtol=1e-12, atol=1e-15)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_innovation_covariances_are_those_of_plain_matrices(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(3, 3)) * [[0.3], [0.3], [0.1]]
+    pose, places = rng.uniform([-9, -9, -3], [9, 9, 3]), rng.uniform(-20, 20, (5, 2))
+    sigmas, surveyed = (math.sqrt(MODEL.range_variance), math.sqrt(MODEL.bearing_variance)), rng.uniform(0.0, 0.1, 5)
+    if np.hypot(*(places - pose[:2]).T).min() < 1.0:
+        return
+    expected = plain.innovation_covariances(pose, root @ root.T, MOUNTING, places, sigmas, surveyed)
+    found = innovation_covariances(Belief(0, pose, root @ root.T), MODEL, places, surveyed)
+    # Differences of 1e-10 against variances that are a few orders below the largest.
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-9)
+
+
+@pytest.mark.parametrize("probability", [0.5, 0.95])
+def test_drawn_outline_of_the_gate_parts_what_the_localizer_takes_from_what_it_leaves(probability: float) -> None:
+    reflectors = ReflectorMap((Reflector(id="near", x=4.0, y=1.0, sigma=0.02), Reflector(id="far", x=-3.0, y=11.0)))
+    parameters = Parameters(association=AssociationParameters(gate_probability=probability))
+    setup = LocalizerSetup(reflectors, Scanner(mounting=MOUNTING), parameters)
+    covariance = np.array([[4e-4, 1e-4, 1e-5], [1e-4, 9e-4, -2e-5], [1e-5, -2e-5, 1e-5]])
+    belief = Belief(0, np.array([0.5, -0.5, 0.3]), covariance)
+    outlines = setup.validation_outlines(belief)
+    for reflector, outline in zip(reflectors.reflectors, outlines, strict=True):
+        center = np.array([reflector.x, reflector.y])
+        # Polar coordinates bend an outline of 0.2 m at 4 m by up to 3 % of its size.
+        for size, status in ((0.96, Status.INLIER), (1.04, Status.OUTLIER_ASSOCIATION)):
+            for corner in outline[::4]:
+                seen = plain.observed(belief.mean, MOUNTING, center + size * (corner - center)[np.newaxis])
+                estimate = Localizer(setup, belief).feed(Detections(0, seen))
+                assert estimate is not None
+                assert estimate.status.tolist() == [status], (reflector.id, size, estimate.d2)
+
+
+def test_kernels_are_given_the_mounting_and_the_variances_of_the_parameters() -> None:
+    given_ones = ObservationParameters(range_sigma=0.03, bearing_sigma=0.005, range_bias=-0.01)
+    found = observation_model(Scanner(mounting=[0.5, -0.2, 0.1]), given_ones)
+    assert found == pytest.approx((0.5, -0.2, 0.1, 9e-4, 2.5e-5, -0.01), rel=1e-12)

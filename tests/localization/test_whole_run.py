@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from commission.localization.detection_log import extract_detections
-from commission.localization.estimate import Belief, Estimate, Status
+from commission.localization.estimate import Belief, Estimate, Mode, Status
 from commission.localization.localizer import Localizer
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import state_at_start
 from commission.localization.whole_run import run
-from commission.site.parameters import AssociationParameters, Parameters
+from commission.site.parameters import AssociationParameters, Parameters, SupervisorParameters
 from commission.site.record_log import RecordLog
 from commission.site.scanner import Scanner
 from tests.localization.drives import Plan, random_drive, random_map
@@ -59,6 +59,22 @@ def test_whole_run_equals_live_localizer_to_the_last_bit(plan: Plan, filtered: b
     for cycle, estimate in enumerate(estimates):
         assert_same_estimate(estimate, arrays.estimate(cycle))
     assert localizer.state == arrays.final
+
+
+def test_withheld_output_of_a_whole_run_is_that_of_the_live_localizer() -> None:
+    rng = np.random.default_rng(9)
+    setup = setup_of(rng, Parameters(supervisor=SupervisorParameters(position_limit=0.02)))
+    drive = random_drive(setup, rng, Plan(scans=600, reach=6.0))
+    arrays = run(drive.log, setup, drive.initial)
+    localizer = Localizer(setup, drive.initial)
+    estimates = [estimate for estimate in map(localizer.feed, drive.log.records()) if estimate is not None]
+    # It fails at once, recovers, and fails again.
+    assert (estimates[0].mode, np.count_nonzero(np.diff(arrays.modes))) == (Mode.FAIL, 3)
+    given = drive.initial
+    for cycle, estimate in enumerate(estimates):
+        assert_same_estimate(estimate, arrays.estimate(cycle))
+        given = given if estimate.mode is Mode.FAIL else estimate.posterior
+        assert bits(estimate.output) == bits(given)
 
 
 def test_moved_gate_replays_the_filter_over_kept_detections() -> None:

@@ -1,0 +1,237 @@
+"""Faults of the estimators: powers and factors, signs, limits, the frame and the wrap of an angle, what is kept."""
+
+from tests.tools.mutants.mutant import Mutant
+
+FOLDER, TESTS = "commission/localization/", "tests/localization/"
+PLAIN = TESTS + "test_localizer.py::test_localizer_agrees_with_the_plain_one"
+TIE = TESTS + "test_association.py::test_of_two_close_reflectors_the_likelier_one_is_taken_on_either_side_of_the_tie"
+BY_HAND = (
+    "test_observation.py::test_drawn_gate_of_an_exact_pose_is_the_noise_of_range_bearing_and_survey_laid_on_the_floor"
+)
+OUTLINE = "test_observation.py::test_drawn_outline_of_the_gate_parts_what_the_localizer_takes_from_what_it_leaves"
+RADIUS = "test_association.py::test_radius_that_is_searched_is_no_larger_than_it_must_be_along_a_ray_and_across_it"
+VIEWPOINT = "test_association.py::test_viewpoint_is_the_place_of_the_scanner_and_its_longest_sigma"
+RECOVERY = "test_supervisor.py::test_recovers_only_when_every_two_sigma_is_below_its_limit_divided_by_the_ratio"
+
+LOCALIZATION = (
+    Mutant(
+        name="likelihood with half of ln det S",
+        file=FOLDER + "association.py",
+        find="d2 + math.log(v.s_rr",
+        replace="d2 + 0.5 * math.log(v.s_rr",
+        tests=(PLAIN, TIE),
+    ),
+    Mutant(
+        name="likelihood without ln det S, as if all reflectors were surveyed alike",
+        file=FOLDER + "association.py",
+        find="d2 + math.log(v.s_rr * v.schur / (model.range_variance * model.bearing_variance))",
+        replace="d2",
+        tests=(PLAIN, TIE),
+    ),
+    Mutant(
+        name="gate of one degree of freedom",
+        file=FOLDER + "association.py",
+        find="chi_square_gate(parameters.gate_probability, 2)",
+        replace="chi_square_gate(parameters.gate_probability, 1)",
+        tests=(TESTS + "test_association.py::test_gate_of_the_parameters_is_that_of_two_degrees_of_freedom", PLAIN),
+    ),
+    Mutant(
+        name="range bias added instead of taken off before association",
+        file=FOLDER + "association.py",
+        find="detections[i, 0] - model.range_bias",
+        replace="detections[i, 0] + model.range_bias",
+        tests=(PLAIN,),
+    ),
+    Mutant(
+        name="the later of two equal claims of one reflector stays",
+        file=FOLDER + "association.py",
+        find="d2[other] <= best_d2",
+        replace="d2[other] < best_d2",
+        tests=(TESTS + "test_association.py::test_of_two_detections_that_are_equally_near_the_first_stays",),
+    ),
+    Mutant(
+        name="search around a detection forgets the survey",
+        file=FOLDER + "association.py",
+        find="model.range_variance + largest_variance",
+        replace="model.range_variance - largest_variance",
+        tests=(TESTS + RADIUS,),
+    ),
+    Mutant(
+        name="search goes on only where it need not",
+        file=FOLDER + "association.py",
+        find="if best != NOBODY:",
+        replace="if best == NOBODY:",
+        tests=(TESTS + "test_association.py::test_nearby_search_equals_a_plain_search_over_all_reflectors",),
+    ),
+    Mutant(
+        name="lever of the scanner turned the wrong way",
+        file=FOLDER + "association.py",
+        find="belief.xx - 2.0 * offset_y * belief.xt",
+        replace="belief.xx + 2.0 * offset_y * belief.xt",
+        tests=(TESTS + VIEWPOINT,),
+    ),
+    Mutant(
+        name="longest axis of the scanner's place from the whole difference of its variances",
+        file=FOLDER + "association.py",
+        find="half_difference = 0.5 *",
+        replace="half_difference = 1.0 *",
+        tests=(TESTS + VIEWPOINT,),
+    ),
+    Mutant(
+        name="drawn gate spreads the survey's sigma over the bearing as sigma / r",
+        file=FOLDER + "observation.py",
+        find="surveyed / np.square(distance)",
+        replace="surveyed / distance",
+        tests=(TESTS + BY_HAND, TESTS + OUTLINE),
+    ),
+    Mutant(
+        name="drawn gate without the survey in the range",
+        file=FOLDER + "observation.py",
+        find="model.range_variance + surveyed\n",
+        replace="model.range_variance\n",
+        tests=(TESTS + BY_HAND,),
+    ),
+    Mutant(
+        name="drawn gate mirrored about the ray",
+        file=FOLDER + "observation.py",
+        find="np.stack((uy, delta[:, 0]), axis=1)",
+        replace="np.stack((uy, -delta[:, 0]), axis=1)",
+        tests=(TESTS + OUTLINE,),
+    ),
+    Mutant(
+        name="drawn gate of the gate's square",
+        file=FOLDER + "setup.py",
+        find="self.filter.gate.d2**0.5",
+        replace="self.filter.gate.d2",
+        tests=(TESTS + OUTLINE,),
+    ),
+    Mutant(
+        name="bearing's sigma taken for its variance",
+        file=FOLDER + "observation.py",
+        find="parameters.bearing_sigma**2",
+        replace="parameters.bearing_sigma",
+        tests=(TESTS + "test_observation.py::test_kernels_are_given_the_mounting_and_the_variances_of_the_parameters",),
+    ),
+    Mutant(
+        name="expected bearing not wrapped",
+        file=FOLDER + "observation.py",
+        find="wrap_scalar(math.atan2(dy, dx) - theta - mount)",
+        replace="math.atan2(dy, dx) - theta - mount",
+        tests=(TESTS + "test_observation.py::test_kernel_agrees_with_the_array_functions",),
+    ),
+    Mutant(
+        name="lever of the scanner with the wrong sign in the Jacobian of the bearing",
+        file=FOLDER + "observation.py",
+        find="-(uy * offset_y + ux * offset_x) * inverse - 1.0",
+        replace="(uy * offset_y + ux * offset_x) * inverse - 1.0",
+        tests=(TESTS + "test_observation.py::test_kernel_agrees_with_the_array_functions", PLAIN),
+    ),
+    Mutant(
+        name="bearing of an innovation not wrapped",
+        file=FOLDER + "kalman.py",
+        find="wrap_scalar(measured_bearing - e.bearing)",
+        replace="measured_bearing - e.bearing",
+        tests=(PLAIN,),
+    ),
+    Mutant(
+        name="survey's variance left out of R when a bearing corrects",
+        file=FOLDER + "kalman.py",
+        find="model.bearing_variance + surveyed_variance * (",
+        replace="model.bearing_variance + 0.0 * surveyed_variance * (",
+        tests=(PLAIN, TIE),
+    ),
+    Mutant(
+        name="every correction starts from the prediction, as Algorithm 1 is printed",
+        file=FOLDER + "cycle.py",
+        find="                posterior,\n                detections[i, 0]",
+        replace="                prior,\n                detections[i, 0]",
+        tests=(PLAIN,),
+    ),
+    Mutant(
+        name="supervisor fails on one sigma of y",
+        file=FOLDER + "supervisor.py",
+        find="2.0 * math.sqrt(belief.yy)",
+        replace="1.0 * math.sqrt(belief.yy)",
+        tests=(TESTS + "test_supervisor.py::test_each_two_sigma_above_its_limit_fails",),
+    ),
+    Mutant(
+        name="supervisor recovers at the limit at which it failed",
+        file=FOLDER + "supervisor.py",
+        find="limits.position / limits.recovery_ratio, limits.heading / limits.recovery_ratio",
+        replace="limits.position, limits.heading",
+        tests=(TESTS + RECOVERY,),
+    ),
+    Mutant(
+        name="heading's lever spread as if all its error arose halfway",
+        file=FOLDER + "odometry.py",
+        find="xx += heading * my * my / 3.0",
+        replace="xx += heading * my * my / 4.0",
+        tests=(TESTS + "test_odometry.py::test_straight_motion_split_anyhow_gives_the_same_belief",),
+    ),
+    Mutant(
+        name="motion anticipated before a scan is driven a second time",
+        file=FOLDER + "odometry.py",
+        find="if motion.belief_ns != motion.odometry_ns:",
+        replace="if motion.belief_ns == motion.odometry_ns:",
+        tests=(TESTS + "test_odometry.py::test_scans_between_odometry_change_nothing_of_a_steady_motion", PLAIN),
+    ),
+    Mutant(
+        name="cluster of a full turn cut where the turn begins",
+        file=FOLDER + "detector.py",
+        find="once * step > TURN - 0.5 * step",
+        replace="once * step > TURN + 0.5 * step",
+        tests=(TESTS + "test_detector.py::test_post_is_found_where_it_stands_at_any_bearing_of_a_full_turn",),
+    ),
+    Mutant(
+        name="window of beams the other way round",
+        file=FOLDER + "detector.py",
+        find="int(parameters.min_model_error),\n        int(parameters.max_model_error)",
+        replace="int(parameters.max_model_error),\n        int(parameters.min_model_error)",
+        tests=(TESTS + "test_detector.py::test_detector_filter_is_a_window_around_equation_3",),
+    ),
+    Mutant(
+        name="central beam without the radius behind it",
+        file=FOLDER + "reflector_center.py",
+        find="return distance + radius, angle_min",
+        replace="return distance, angle_min",
+        tests=(TESTS + "test_detector.py::test_central_beam_is_the_papers_rule",),
+    ),
+    Mutant(
+        name="fitted circle pulled away from the post by what it learns of the bearing",
+        file=FOLDER + "reflector_center.py",
+        find="n_rt -= weight * echo.slope",
+        replace="n_rt += weight * echo.slope",
+        tests=(TESTS + "test_detector.py::test_bound_of_a_center_holds_for_all_of_4000_posts_and_is_nearly_reached",),
+    ),
+    Mutant(
+        name="reflector handed out by its row in the cells instead of in the map",
+        file=FOLDER + "cycle.py",
+        find="reflectors[i] = int(places[entry, 3])",
+        replace="reflectors[i] = entry",
+        tests=(PLAIN,),
+    ),
+    Mutant(
+        name="output of a fail episode is the newest pose",
+        file=FOLDER + "cycle.py",
+        find="if mode == OPERATIONAL:",
+        replace="if mode >= OPERATIONAL:",
+        tests=(
+            TESTS + "test_whole_run.py::test_withheld_output_of_a_whole_run_is_that_of_the_live_localizer",
+            TESTS + "test_localizer.py::test_output_is_withheld_in_fail_mode_while_the_filter_goes_on",
+        ),
+    ),
+    Mutant(
+        name="output of a fail episode is that of its first operational cycle",
+        file=FOLDER + "run_columns.py",
+        find="back = int(np.argmax(operational))",
+        replace="back = int(np.argmax(operational[::-1]))",
+        tests=(TESTS + "test_whole_run.py::test_withheld_output_of_a_whole_run_is_that_of_the_live_localizer",),
+    ),
+    Mutant(
+        name="wheels of a differential vehicle half as far apart when it turns",
+        file=FOLDER + "kinematics.py",
+        find="half = 0.5 * vehicle.wheel_separation",
+        replace="half = 0.25 * vehicle.wheel_separation",
+        tests=(TESTS + "test_kinematics.py::test_differential_and_tricycle_wheels_give_back_the_twist",),
+    ),
+)
