@@ -14,7 +14,7 @@ from commission.errors import UsageError
 
 if TYPE_CHECKING:
     from commission.site.reflectors import ReflectorMap
-    from commission.studies.ambiguity import FloorAmbiguity, RouteRisks
+    from commission.studies.ambiguity import AmbiguityResult, RouteRisks
 
 NAMED = 3
 """Pairs that the report names; the files have all."""
@@ -52,22 +52,25 @@ class Ambiguity:
         from commission.io.overwriting import result_folder
         from commission.io.project_file import load_project
         from commission.planning.ambiguity import AmbiguityOptions
-        from commission.studies.ambiguity import ambiguity_of, summary
+        from commission.studies.ambiguity import AmbiguityInput, SiteAmbiguity, ambiguity, misleading_neighbors, summary
+        from commission.studies.drives import DrivesInput
 
         out = result_folder(self.out, "ambiguity", FILES, force=self.force, sources=(self.project,))
         project = load_project(self.project)
+        drives = DrivesInput.of(project, self.route or tuple(route.name for route in project.routes))
         try:
             options = AmbiguityOptions(self.tolerance, self.separation, math.radians(self.turn), self.headings)
-            found = ambiguity_of(project, options, spacing=self.spacing, routes=self.route or None)
+            floor = ambiguity(AmbiguityInput.of(project, options, spacing=self.spacing))
         except ValueError as error:
             raise UsageError(str(error)) from None
+        found = SiteAmbiguity(floor, misleading_neighbors(drives))
         with out.writing() as folder:
             write_ambiguity(folder, found, project.reflectors, summary(found))
         lines = [*_cold_start(found.floor, project.reflectors), *_tracking(found.routes, project.reflectors)]
         sys.stdout.write("\n".join([*lines, f"Written to   {self.out}"]) + "\n")
 
 
-def _cold_start(found: FloorAmbiguity, reflectors: ReflectorMap) -> list[str]:
+def _cold_start(found: AmbiguityResult, reflectors: ReflectorMap) -> list[str]:
     """Lines about the floor, and the pairs that most poses confuse."""
     on, area = found.drivable, found.lattice.spacing**2
     share = 100.0 * found.ambiguous.sum() / max(on.sum(), 1)

@@ -13,8 +13,7 @@ from tyro.conf import Positional, arg
 from commission.errors import UsageError
 
 if TYPE_CHECKING:
-    from commission.planning.dilution import FixOptions
-    from commission.site.project import Project
+    from commission.studies.coverage import CoverageOptions
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,42 +49,38 @@ class Coverage:
         from commission.io.coverage_files import FILES, write_coverage, write_ellipses
         from commission.io.overwriting import result_folder
         from commission.io.project_file import load_project
-        from commission.planning.visibility import VisibilityOptions
-        from commission.studies.coverage import coverage_of, drivable, ellipses_of, summary
+        from commission.studies.coverage import CoverageInput, coverage, ellipses_of, summary
 
         if self.ellipses is not None and not 0.0 < self.ellipses < math.inf:
             raise UsageError(f"--ellipses is {self.ellipses}; expected metres greater than 0")
         out = result_folder(self.out, "coverage", FILES, force=self.force, sources=(self.project,))
         project = load_project(self.project)
         try:
-            options = self._options(project)
-            visibility = VisibilityOptions(self.min_beams, self.max_incidence)
-            found = coverage_of(project, options, spacing=self.spacing, visibility=visibility)
+            result = coverage(CoverageInput.of(project, self._options()))
         except ValueError as error:
             raise UsageError(str(error)) from None
-        entries = summary(project, found)
-        ellipses = None if self.ellipses is None else ellipses_of(project, found, self.ellipses, visibility)
+        entries = summary(result, project.parameters.supervisor)
+        ellipses = None if self.ellipses is None else ellipses_of(result, self.ellipses)
         with out.writing() as folder:
-            write_coverage(folder, found, drivable(project, found), entries)
+            write_coverage(folder, result.coverage, result.drivable, entries)
             if ellipses is not None:
                 write_ellipses(folder, ellipses)
         sys.stdout.write("\n".join([*_report(entries), f"Written to   {self.out}"]) + "\n")
 
-    def _options(self, project: Project) -> FixOptions:
-        """Options of the fix; the noise is what the project's localizer assumes."""
-        from commission.planning.dilution import Heading, Measurement, fix_options, odometry_prior
+    def _options(self) -> CoverageOptions:
+        """What is asked of every point; raises ValueError for a number out of range."""
+        from commission.planning.dilution import Heading, Measurement
+        from commission.planning.visibility import VisibilityOptions
+        from commission.studies.coverage import CoverageOptions
 
-        parameters = project.parameters
-        speed = project.routes[0].speed if project.routes else 0.5
-        position, heading = odometry_prior(parameters.odometry, self.odometry, speed)
-        return fix_options(
-            parameters.observation,
+        return CoverageOptions(
             measurement=Measurement(self.measurement),
             heading=Heading(self.heading) if isinstance(self.heading, str) else Heading.GIVEN,
             given_heading=0.0 if isinstance(self.heading, str) else math.radians(self.heading),
+            on_odometry=self.odometry,
             blocked_per_m=self.blocked_per_m,
-            prior_position_sigma=position,
-            prior_heading_sigma=heading,
+            visibility=VisibilityOptions(self.min_beams, self.max_incidence),
+            spacing=self.spacing,
         )
 
 

@@ -83,7 +83,7 @@ class Place:
         """Search, write, and tell what was found."""
         from commission.io.project_copy import refuse_to_replace, save_copy
         from commission.io.project_file import load_project
-        from commission.planning.placement import place
+        from commission.studies.placement import PlacementInput, placement
 
         if self.out.resolve() == self.project.resolve():
             raise UsageError(f"--out is the project itself, {self.out}; expected another folder")
@@ -93,10 +93,7 @@ class Place:
             options = self._options(project)
         except ValueError as error:
             raise UsageError(str(error)) from None
-        routes = self.route or project.layout.counted(project.routes)
-        if not routes:
-            raise UsageError("the project has no route that counts; expected one to place reflectors for")
-        found = place(project, routes, options)
+        found = placement(PlacementInput.of(project, options, self.route or None)).placement
         kept = save_copy(dataclasses.replace(project, reflectors=found.reflectors), self.out, force=self.force)
         notes = [] if kept is None else [f"Note         unsaved edits of the project that was there are kept in {kept}"]
         sys.stdout.write("\n".join([*_report(found), *notes, f"Written to   {self.out}"]) + "\n")

@@ -16,11 +16,12 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from commission.planning.dependence import Dependence
-    from commission.planning.route_prediction import PlannedRoute, PredictionOptions, RoutePrediction
+    from commission.planning.route_prediction import PredictionOptions, RoutePrediction
     from commission.planning.station_accuracy import StationAccuracy
     from commission.planning.true_error import PredictedErrors
     from commission.site.project import Project
     from commission.site.reflectors import ReflectorMap
+    from commission.studies.drives import PlannedDrives
 
 MOST_NEEDED = 5
 """Reflectors that the report names; the file has all."""
@@ -60,23 +61,18 @@ class Predict:
         from commission.io.overwriting import result_folder
         from commission.io.prediction_files import FILES, write_prediction
         from commission.io.project_file import load_project
-        from commission.planning.route_prediction import plan_route, predict_route
-        from commission.planning.station_accuracy import station_accuracies
-        from commission.planning.true_error import predict_errors
+        from commission.studies.prediction import PredictionInput, prediction
 
         out = result_folder(self.out, "predict", FILES, force=self.force, sources=(self.project,))
         project = load_project(self.project)
         if self.route is None and not project.routes:
             raise UsageError("the project has no route; expected one to predict along")
         name = project.routes[0].name if self.route is None else self.route
-        planned = plan_route(project, name, self._options())
-        prediction = predict_route(planned)
-        errors = predict_errors(planned, prediction)
-        stations = station_accuracies(prediction, errors, project.stations)
-        lines = [*_report(name, prediction, errors), *_at_stations(stations)]
+        found = prediction(PredictionInput.of(project, name, self._options()))
+        lines = [*_report(name, found.prediction, found.errors), *_at_stations(found.stations)]
         with out.writing() as folder:
-            lines += self._what_if(project, planned, folder)
-            write_prediction(folder, name, prediction, errors, stations)
+            lines += self._what_if(project, found.drives, folder)
+            write_prediction(folder, name, found.prediction, found.errors, found.stations)
         sys.stdout.write("\n".join([*lines, f"Written to   {self.out}"]) + "\n")
 
     def _options(self) -> PredictionOptions:
@@ -84,21 +80,23 @@ class Predict:
 
         return PredictionOptions(blocked_per_m=self.blocked_per_m)
 
-    def _what_if(self, project: Project, planned: PlannedRoute, folder: Path) -> list[str]:
+    def _what_if(self, project: Project, known: PlannedDrives, folder: Path) -> list[str]:
         """Let reflectors fail as the options ask for, write what that does, and tell it."""
         from commission.io.prediction_files import write_dependents, write_failures
-        from commission.planning.dependence import Failure, FailureOptions, dependences, worst_failures
-        from commission.planning.route_prediction import plan_route
+        from commission.planning.dependence import Failure
+        from commission.studies.drives import DrivesInput
+        from commission.studies.failures import FailuresInput, failures, worst_failures
 
-        routes, lines = [planned], list[str]()
-        if self.every_route and (self.what_if is not None or self.failures):
-            routes = [plan_route(project, route.name, self._options()) for route in project.routes]
+        drives, lines = known.inputs, list[str]()
+        if self.every_route:
+            drives = DrivesInput.of(project, (route.name for route in project.routes), self._options())
         if self.what_if is not None:
-            ranked = dependences(routes, FailureOptions(Failure(self.what_if)))
-            write_dependents(folder, ranked, project.reflectors)
-            lines += _most_needed(ranked, project.reflectors)
+            result = failures(FailuresInput(drives=drives, failure=Failure(self.what_if)), known=known)
+            known = result.drives
+            write_dependents(folder, result.ranking, project.reflectors)
+            lines += _most_needed(result.ranking, project.reflectors)
         if self.failures:
-            worst = worst_failures(routes, self.failures)
+            worst = worst_failures(drives, self.failures, known=known).ranking
             write_failures(folder, worst, project.reflectors)
             lines += _one_after_the_other(worst, project.reflectors)
         return lines

@@ -136,9 +136,10 @@ def warm_up(
     Parameters
     ----------
     steps : name shown to the user and function that calls a module's kernels once on tiny inputs.
-    progress : called with the fraction done [0..1] and the name of the step that starts; may raise to cancel.
+    progress : called with the fraction done [0..1] and "compiling" with the name of the step
+        that starts; may raise to cancel.
     """
     for done, (name, step) in enumerate(steps):
-        progress(done / len(steps), name)
+        progress(done / len(steps), f"compiling {name}")
         step()
     progress(1.0, "compiled")

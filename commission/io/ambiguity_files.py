@@ -13,7 +13,7 @@ from commission.io.atomic import atomic_file, write_text
 from commission.io.lattice_image import NO_FLOOR, lattice_image, shades
 from commission.io.table_writer import write_table
 from commission.site.reflectors import ReflectorMap
-from commission.studies.ambiguity import FloorAmbiguity, SiteAmbiguity
+from commission.studies.ambiguity import AmbiguityResult, SiteAmbiguity
 
 ARRAYS = "ambiguity.npz"
 TABLE = "ambiguity.csv"
@@ -71,7 +71,7 @@ def write_ambiguity(
     write_text(folder / SUMMARY, json.dumps(dict(summary), indent=2, allow_nan=False) + "\n")
 
 
-def ambiguity_image(found: FloorAmbiguity) -> Image.Image:
+def ambiguity_image(found: AmbiguityResult) -> Image.Image:
     """Share of ambiguous headings as a picture, north up: dark is clear, red has too few reflectors in sight."""
     colors = np.empty((len(found.lattice), 3), dtype=np.uint8)
     colors[:] = NO_FLOOR
@@ -80,7 +80,7 @@ def ambiguity_image(found: FloorAmbiguity) -> Image.Image:
     return lattice_image(found.lattice, colors)
 
 
-def _points(found: FloorAmbiguity) -> Iterator[tuple[str, ...]]:
+def _points(found: AmbiguityResult) -> Iterator[tuple[str, ...]]:
     """One row per drivable point; the partner is empty where there is none."""
     points = found.lattice.points()
     for n in np.flatnonzero(found.drivable).tolist():
@@ -88,7 +88,7 @@ def _points(found: FloorAmbiguity) -> Iterator[tuple[str, ...]]:
         yield *map(_text, points[n].tolist()), _text(float(found.share[n])), str(found.visible[n]), *partner
 
 
-def _pairs(found: FloorAmbiguity, ids: list[str]) -> Iterator[tuple[str, ...]]:
+def _pairs(found: AmbiguityResult, ids: list[str]) -> Iterator[tuple[str, ...]]:
     """One row per pair of constellations, the one that most poses see first."""
     for pair in found.cold.pairs:
         groups = (" ".join(ids[index] for index in group) for group in (pair.constellation, pair.image))

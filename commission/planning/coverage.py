@@ -22,6 +22,7 @@ from commission.planning.shadow_kernels import BitMask, Targets, see_points
 from commission.planning.visibility import VisibilityModel, build_visibility, copied, mask_words, replace_target
 from commission.progress import Progress, silent
 from commission.site.checks import above
+from commission.site.parts import Extended
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 
@@ -95,26 +96,28 @@ class Coverage:
     """One of each figure per point; as images: `image`."""
     floor: BoolArray = field(repr=False)
     """(N,) whether a point is on the floor and not in a wall."""
+    sight: BitMask = field(repr=False)
+    """(N, ceil(M / 64)) which of the M reflectors each point sees, as in `VisibilityModel.visible`."""
 
     def image(self, figure: str) -> NDArray[np.generic]:
         """One figure as a (rows, columns) array; row 0 is the lowest y."""
         return getattr(self.fixes, figure).reshape(self.lattice.rows, self.lattice.columns)
 
 
-def lattice_of(project: Project, spacing: float = 0.25) -> Lattice:
+def lattice_of(site: Extended, spacing: float = 0.25) -> Lattice:
     """Lattice over the floor map, or over reflectors and routes where there is none.
 
     Parameters
     ----------
-    project : site.
+    site : a project, or what of it says how far it reaches; its routes count where there is no map.
     spacing : distance between neighbors [m]; the points are the centers of squares of that size.
     """
     above(spacing, 0.0, "spacing", "m")
-    if project.floor_map is not None:
-        x_min, y_min, x_max, y_max = project.floor_map.occupancy().bounds()
+    if site.floor_map is not None:
+        x_min, y_min, x_max, y_max = site.floor_map.occupancy().bounds()
     else:
-        control_points = [segment.control_points for route in project.routes for segment in route.segments]
-        places = np.concatenate([project.reflectors.centers, *control_points, np.empty((0, 2))])
+        control_points = [segment.control_points for route in site.routes for segment in route.segments]
+        places = np.concatenate([site.reflectors.centers, *control_points, np.empty((0, 2))])
         places = places if len(places) else np.zeros((1, 2))
         (x_min, y_min), (x_max, y_max) = places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
     # A hair less, so that a floor of a whole number of squares gets no extra row by rounding.
@@ -133,8 +136,7 @@ def coverage(
 ) -> Coverage:
     """Visibility and dilution at every point of a lattice.
 
-    Memory: about 100 bytes per point of the lattice, and one tile (`POINTS_PER_TILE`) of masks; time is linear
-    in the area.
+    Memory: about 100 bytes per point of the lattice, and 8 more for every 64 reflectors; time is linear in the area.
 
     Parameters
     ----------
@@ -147,12 +149,13 @@ def coverage(
     kernel_model = fix_model(model.scanner, options)
     floor = ~model.caster.grid.is_occupied(points)
     scanner_points = points + np.array([kernel_model.lever_x, kernel_model.lever_y])
+    sight = np.empty((len(lattice), mask_words(len(model.reflectors))), dtype=np.uint64)
     for tile in tiles(lattice):
         progress(tile.start / len(lattice), "coverage")
-        mask = model.visible(scanner_points[tile])
-        _fill(model, kernel_model, scanner_points[tile], mask, counts[tile], figures[tile])
+        sight[tile] = model.visible(scanner_points[tile])
+        _fill(model, kernel_model, scanner_points[tile], sight[tile], counts[tile], figures[tile])
     progress(1.0, "coverage")
-    return Coverage(lattice, options, as_fixes(counts, figures), floor)
+    return Coverage(lattice, options, as_fixes(counts, figures), floor, sight)
 
 
 def tiles(lattice: Lattice) -> list[slice]:
@@ -167,26 +170,23 @@ class LiveCoverage:
     It changes in place, unlike the frozen values around it: to copy a floor's figures takes longer than to update
     them. It keeps which reflectors each point sees (8 bytes per point for every 64 reflectors), and sums a changed
     point anew from those bits; nothing is subtracted, so nothing drifts.
+
+    Parameters
+    ----------
+    model : reflectors, scanner and walls.
+    found : the coverage under it, from which it sets out; it stays as it is.
     """
 
-    def __init__(
-        self,
-        model: VisibilityModel,
-        lattice: Lattice,
-        options: FixOptions,
-        progress: Progress = silent,
-    ) -> None:
-        self._lattice, self._options = lattice, options
+    def __init__(self, model: VisibilityModel, found: Coverage) -> None:
+        lattice, fixes = found.lattice, found.fixes
+        self._lattice = lattice
         self._model = replace(model, targets=copied(model.targets))
-        self._kernel_model = fix_model(model.scanner, options)
-        points = lattice.points()
-        self._scanner_points = points + np.array([self._kernel_model.lever_x, self._kernel_model.lever_y])
-        self._mask = np.zeros((len(lattice), mask_words(len(model.reflectors))), dtype=np.uint64)
-        counts, figures = np.empty(len(lattice), np.int32), np.empty((len(lattice), FIGURES))
-        self._counts, self._figures = counts, figures
+        self._kernel_model = fix_model(model.scanner, found.options)
+        self._scanner_points = lattice.points() + np.array([self._kernel_model.lever_x, self._kernel_model.lever_y])
+        self._sight, self._counts = found.sight.copy(), fixes.visible.copy()
+        self._figures = np.stack(fixes[1:], axis=-1)
         self._changed = np.empty(len(lattice), dtype=np.int64)
-        self._coverage = Coverage(lattice, options, as_fixes(counts, figures), ~model.caster.grid.is_occupied(points))
-        self._fill_all(progress)
+        self._coverage = replace(found, fixes=as_fixes(self._counts, self._figures), sight=self._sight)
 
     @property
     def coverage(self) -> Coverage:
@@ -205,7 +205,7 @@ class LiveCoverage:
 
     def sees(self, reflector: int) -> BoolArray:
         """Whether each point sees a reflector, all around: (N,) array."""
-        return (self._mask[:, reflector >> 6] >> np.uint64(reflector & 63)) & np.uint64(1) == 1
+        return (self._sight[:, reflector >> 6] >> np.uint64(reflector & 63)) & np.uint64(1) == 1
 
     def move(self, index: int, reflector: Reflector) -> list[Window]:
         """Put a reflector elsewhere, or change it.
@@ -225,7 +225,7 @@ class LiveCoverage:
         if self._model.bins_for(reflector) > self._model.targets.clear.shape[1]:
             before = self._model
             self._model = build_visibility(reflectors, before.scanner, before.caster, before.options)
-            self._fill_all(silent)
+            self._fill_all()
             return [Window(0, self._lattice.rows, 0, self._lattice.columns)]
         targets = self._model.targets
         windows = [self._window_around(index)]
@@ -239,7 +239,7 @@ class LiveCoverage:
             np.array(windows),
             self._lattice.columns,
             self._scanner_points,
-            self._mask,
+            self._sight,
             self._changed,
         )
         fill_fixes(
@@ -247,20 +247,19 @@ class LiveCoverage:
             survey_sigmas(self._model),
             self._scanner_points,
             self._changed[:count],
-            self._mask,
+            self._sight,
             self._kernel_model,
             self._counts,
             self._figures,
         )
         return windows
 
-    def _fill_all(self, progress: Progress) -> None:
+    def _fill_all(self) -> None:
         """Compute every point anew."""
         for tile in tiles(self._lattice):
-            progress(tile.start / len(self._lattice), "coverage")
             points, model = self._scanner_points[tile], self._model
-            self._mask[tile] = model.visible(points)
-            _fill(model, self._kernel_model, points, self._mask[tile], self._counts[tile], self._figures[tile])
+            self._sight[tile] = model.visible(points)
+            _fill(model, self._kernel_model, points, self._sight[tile], self._counts[tile], self._figures[tile])
 
     def _window_around(self, index: int) -> Window:
         """Part of the lattice within reach of a reflector."""
@@ -337,5 +336,5 @@ def warm_up() -> None:
     dilution.warm_up()
     project = Project(reflectors=ReflectorMap((Reflector(id="1", x=2.0, y=0.0),)))
     model = visibility.visibility_model(project)
-    live = LiveCoverage(model, Lattice(x=0.0, y=0.0, spacing=1.0, rows=2, columns=2), FixOptions())
+    live = LiveCoverage(model, coverage(model, Lattice(x=0.0, y=0.0, spacing=1.0, rows=2, columns=2), FixOptions()))
     live.move(0, Reflector(id="1", x=1.0, y=0.0))

@@ -26,7 +26,7 @@ from commission.planning.visibility import VisibilityModel
 from commission.progress import Progress
 from commission.site.checks import at_least
 from commission.site.layout_brief import CandidateOptions, Demands
-from commission.site.project import Project
+from commission.site.parts import Equipped
 
 ROUNDS = 20
 """How often scans over a limit are asked to see one reflector more, and places to be told from their rivals."""
@@ -80,8 +80,8 @@ class LayoutSearch:
     Parameters
     ----------
     planned : the routes, with all M reflectors that stay or could be taken.
-    project : the site with these reflectors.
-    model : its visibility.
+    site : parameters, scanner and stations.
+    model : visibility of the site with these reflectors.
     kept : number of reflectors that stay; they come first.
     options : demands and effort.
     progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
@@ -90,7 +90,7 @@ class LayoutSearch:
     def __init__(
         self,
         planned: Sequence[PlannedRoute],
-        project: Project,
+        site: Equipped,
         model: VisibilityModel,
         *,
         kept: int,
@@ -98,15 +98,15 @@ class LayoutSearch:
         progress: Progress,
     ) -> None:
         self._planned, self._options, self._progress, self._fraction = planned, options, progress, 0.0
-        count, demands = len(project.reflectors), options.demands
+        count, demands = len(model.reflectors), options.demands
         self._fixed = np.arange(count) < kept
         self._covers = [route.visible.incidence(count) for route in planned]
         self._seen = [covers.any(axis=0) for covers in self._covers]
         self._base = demands.visible + int(demands.survive_failure)
         self._needs = [np.full(len(route.drive), self._base, dtype=np.int64) for route in planned]
-        self._limits = [_limits(route, project, demands) for route in planned]
-        self._conflicts = _conflicts(project.reflectors.centers, demands.spacing)
-        self._places = chosen_places(demands, planned, project.stations, project.scanner, options.ambiguity)
+        self._limits = [_limits(route, site, demands) for route in planned]
+        self._conflicts = _conflicts(model.reflectors.centers, demands.spacing)
+        self._places = chosen_places(demands, planned, site.stations, site.scanner, options.ambiguity)
         self._distinction = Distinction(model, self._places, demands.survive_failure, options.ambiguity)
         self._apart: list[BoolArray] = []
         self._quality = quality_of(planned[0]) if planned else None
@@ -307,12 +307,12 @@ def _conflicts(centers: FloatArray, spacing: float) -> tuple[IntArray, ...]:
     return tuple(np.array([b for b in others if b != a], dtype=np.int64) for a, others in enumerate(near))
 
 
-def _limits(route: PlannedRoute, project: Project, demands: Demands) -> FloatArray:
+def _limits(route: PlannedRoute, site: Equipped, demands: Demands) -> FloatArray:
     """(K, 3) largest 2-sigma of x [m], y [m] and heading [rad] at each scan."""
-    supervisor = project.parameters.supervisor
+    supervisor = site.parameters.supervisor
     position = supervisor.position_limit if demands.position_limit is None else demands.position_limit
     heading = supervisor.heading_limit if demands.heading_limit is None else demands.heading_limit
     limits = np.tile((position, position, heading), (len(route.drive), 1))
-    for station, scans in station_scans(route.drive, project.stations):
+    for station, scans in station_scans(route.drive, site.stations):
         limits[scans, :2] = np.minimum(limits[scans, :2], station.required_accuracy)
     return limits

@@ -5,19 +5,20 @@ Candidates come from `candidates`, what is demanded from `demands`; the search i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from commission.geometry.arrays import FloatArray
 from commission.planning.candidates import clear_of, mounting_heights, wall_candidates
 from commission.planning.layout_search import LayoutSearch, PlacementOptions
+from commission.planning.nominal_drive import nominal_drive
 from commission.planning.route_prediction import plan_route
 from commission.planning.unmet import Unmet
-from commission.planning.visibility import visibility_model
+from commission.planning.visibility import VisibilityOptions, build_visibility, walls_of
 from commission.progress import Progress, silent
 from commission.site.layout_brief import CandidateOptions, Demands
-from commission.site.project import Project
+from commission.site.parts import Equipped
 from commission.site.reflectors import Reflector, ReflectorMap
 
 __all__ = ["Demands", "Placement", "PlacementOptions", "Progress", "Unmet", "choose", "place"]
@@ -40,7 +41,7 @@ class Placement:
 
 
 def place(
-    project: Project,
+    site: Equipped,
     routes: tuple[str, ...] | None = None,
     options: PlacementOptions | None = None,
     progress: Progress = silent,
@@ -49,7 +50,8 @@ def place(
 
     Parameters
     ----------
-    project : site, vehicle, scanner and parameters; without a floor map there is no wall to put a reflector on.
+    site : a project, or all of it that stands in the hall and drives in it; without a floor map there is no wall to
+        put a reflector on.
     routes : names of the routes that count; all when None.
     options : demands and candidates; the defaults when None.
     progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
@@ -60,24 +62,23 @@ def place(
         unknown route.
     """
     options = options or PlacementOptions()
-    names = tuple(route.name for route in project.routes) if routes is None else routes
-    drives = [plan_route(project, name, options.prediction).drive for name in names]
+    names = tuple(route.name for route in site.routes) if routes is None else routes
+    drives = [nominal_drive(site.route(name), site.vehicle, site.scanner, options.prediction.plan) for name in names]
     path = np.concatenate([np.empty((0, 2)), *(drive.poses[:, :2] for drive in drives)])
-    return choose(project, names, _candidates(project, path, options), options, progress)
+    return choose(site, names, _candidates(site, path, options), options, progress)
 
 
 def choose(
-    project: Project,
+    site: Equipped,
     routes: tuple[str, ...],
     centers: FloatArray,
     options: PlacementOptions,
     progress: Progress = silent,
 ) -> Placement:
     """Choose among given candidates; parameters as for `place`, and `centers`, (C, 2) places [m], map frame."""
-    kept = _kept(project, options)
+    kept = _kept(site, options)
     everything = ReflectorMap((*kept, *_named(centers, kept, options.candidates)))
-    site = replace(project, reflectors=everything)
-    model = visibility_model(site)
+    model = build_visibility(everything, site.scanner, walls_of(site.floor_map), VisibilityOptions())
     planned = [plan_route(site, name, options.prediction, model) for name in routes]
     search = LayoutSearch(planned, site, model, kept=len(kept), options=options, progress=progress)
     taken = search.run()
@@ -92,20 +93,20 @@ def choose(
     )
 
 
-def _kept(project: Project, options: PlacementOptions) -> tuple[Reflector, ...]:
+def _kept(site: Equipped, options: PlacementOptions) -> tuple[Reflector, ...]:
     """Reflectors that stay: all, or the locked ones where the layout starts empty."""
-    return tuple(each for each in project.reflectors.reflectors if options.extend or each.locked)
+    return tuple(each for each in site.reflectors.reflectors if options.extend or each.locked)
 
 
-def _candidates(project: Project, path: FloatArray, options: PlacementOptions) -> FloatArray:
+def _candidates(site: Equipped, path: FloatArray, options: PlacementOptions) -> FloatArray:
     """Places on walls that no vehicle touches and that are not too near to a reflector that stays."""
-    if project.floor_map is None:
+    if site.floor_map is None:
         return np.empty((0, 2))
     given = options.candidates
-    centers = wall_candidates(project.floor_map.occupancy(), given)
-    half_width = max(abs(y) for _, y in project.vehicle.outline)
+    centers = wall_candidates(site.floor_map.occupancy(), given)
+    half_width = max(abs(y) for _, y in site.vehicle.outline)
     clear = clear_of(centers, path, half_width + given.clearance + given.radius)
-    stay = np.array([(each.x, each.y) for each in _kept(project, options)]).reshape(-1, 2)
+    stay = np.array([(each.x, each.y) for each in _kept(site, options)]).reshape(-1, 2)
     return centers[clear & clear_of(centers, stay, options.demands.spacing)]
 
 

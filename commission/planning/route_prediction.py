@@ -27,6 +27,7 @@ from commission.planning.prediction_kernels import PredictionColumns, Prediction
 from commission.planning.visibility import VisibilityModel, VisibleReflectors, visibility_model
 from commission.site.checks import above, between
 from commission.site.parameters import Parameters, SupervisorParameters
+from commission.site.parts import Driven
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
@@ -207,7 +208,7 @@ class RoutePrediction:
 
 
 def plan_route(
-    project: Project,
+    site: Driven,
     route_name: str,
     options: PredictionOptions | None = None,
     model: VisibilityModel | None = None,
@@ -216,10 +217,10 @@ def plan_route(
 
     Parameters
     ----------
-    project : site, vehicle, scanner and parameters.
+    site : a project, or what of it says how a vehicle drives and what it sees.
     route_name : which route.
     options : start and hall; the defaults when None.
-    model : of the same project, when it is at hand; made here when None.
+    model : of the same site, when it is at hand; made here when None.
 
     Raises
     ------
@@ -227,8 +228,8 @@ def plan_route(
         unknown route.
     """
     options = options or PredictionOptions()
-    model = model or visibility_model(project)
-    drive = nominal_drive(project.route(route_name), project.vehicle, project.scanner, options.plan)
+    model = model or visibility_model(site)
+    drive = nominal_drive(site.route(route_name), site.vehicle, site.scanner, options.plan)
     surveyed = np.array([reflector.sigma**2 for reflector in model.reflectors.reflectors])
     places = np.column_stack((model.reflectors.centers, surveyed))
     return PlannedRoute(
@@ -238,8 +239,8 @@ def plan_route(
         places=read_only(places),
         farthest=read_only(model.targets.farthest),
         reflectors=model.reflectors,
-        scanner=project.scanner,
-        parameters=project.parameters,
+        scanner=site.scanner,
+        parameters=site.parameters,
         options=options,
     )
 

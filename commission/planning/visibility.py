@@ -22,7 +22,8 @@ from commission.geometry.se2 import compose
 from commission.planning import shadow_kernels
 from commission.planning.shadow_kernels import BLOCK, BitMask, Targets
 from commission.site.checks import at_least, between
-from commission.site.project import Project
+from commission.site.floor_map import FloorMap
+from commission.site.parts import Sighted
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 
@@ -172,19 +173,23 @@ class VisibilityModel:
         return _bins(_limits(reflector, self.scanner, self.options)[1], self.caster.grid)
 
 
-def visibility_model(project: Project, options: VisibilityOptions | None = None) -> VisibilityModel:
-    """Prepare the reflectors and walls of a project; a project without a floor map is an open field.
+def visibility_model(site: Sighted, options: VisibilityOptions | None = None) -> VisibilityModel:
+    """Prepare the reflectors and walls of a site; one without a floor map is an open field.
 
     Parameters
     ----------
-    project : its reflectors, scanner and floor map are read.
+    site : a project, or what of it says which reflectors are seen from where.
     options : what counts as visible; the defaults when None.
     """
-    if project.floor_map is None:
-        grid = OccupancyGrid(np.zeros((1, 1), dtype=np.bool_), 1.0)
-    else:
-        grid = project.floor_map.occupancy()
-    return build_visibility(project.reflectors, project.scanner, RayCaster(grid), options or VisibilityOptions())
+    caster = walls_of(site.floor_map)
+    return build_visibility(site.reflectors, site.scanner, caster, options or VisibilityOptions())
+
+
+def walls_of(floor_map: FloorMap | None) -> RayCaster:
+    """Prepare the walls of a floor map for rays; without one there are none."""
+    if floor_map is None:
+        return RayCaster(OccupancyGrid(np.zeros((1, 1), dtype=np.bool_), 1.0))
+    return RayCaster(floor_map.occupancy())
 
 
 def build_visibility(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from commission.errors import ProjectError, UsageError
+from commission.errors import ProjectError
 from commission.site.disturbances import Disturbances
 from commission.site.floor_map import FloorMap
 from commission.site.layout_brief import LayoutBrief
 from commission.site.parameters import Parameters
 from commission.site.reflectors import ReflectorMap
-from commission.site.routes import Route
+from commission.site.routes import Route, route_named
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
 from commission.site.vehicle import DifferentialVehicle, Vehicle
@@ -51,8 +51,4 @@ class Project:
 
     def route(self, name: str) -> Route:
         """Return the route of that name; raises UsageError that lists the names there are."""
-        for route in self.routes:
-            if route.name == name:
-                return route
-        known = ", ".join(repr(route.name) for route in self.routes) or "none"
-        raise UsageError(f"no route is called {name!r}; the project has: {known}")
+        return route_named(self.routes, name)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Annotated
 
-from commission.errors import ProjectError
+from commission.errors import ProjectError, UsageError
 from commission.geometry.arrays import FloatArray, equal_fields, frozen
 from commission.geometry.splines import Spline
 from commission.site.checks import check_fields
@@ -92,3 +93,12 @@ class Route:
     def speed_of(self, segment: Segment) -> float:
         """Return the speed on a segment [m/s]."""
         return self.speed if segment.speed is None else segment.speed
+
+
+def route_named(routes: Iterable[Route], name: str) -> Route:
+    """Return the route of that name among those of a project; raises UsageError that lists the names there are."""
+    known = {route.name: route for route in routes}
+    if name not in known:
+        names = ", ".join(map(repr, known)) or "none"
+        raise UsageError(f"no route is called {name!r}; the project has: {names}")
+    return known[name]

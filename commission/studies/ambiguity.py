@@ -9,20 +9,32 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from commission.compiled import warm_up
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.planning.ambiguity import AmbiguityOptions, AmbiguousPair, ColdStart, cold_start
 from commission.planning.association_risk import NeighborRisk, neighbor_risks
 from commission.planning.coverage import Lattice, lattice_of
-from commission.planning.route_prediction import PredictionOptions, plan_route, predict_route
-from commission.planning.visibility import VisibilityModel, visibility_model
+from commission.planning.route_prediction import predict_route
+from commission.planning.visibility import VisibilityOptions, visibility_model
 from commission.progress import Progress, part, silent
+from commission.site.floor_map import FloorMap
 from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
+from commission.site.routes import Route
+from commission.site.scanner import Scanner
 from commission.studies.coverage import free_floor
+from commission.studies.drives import DrivesInput, plan_drives
+from commission.studies.inputs import StudyInput
+from commission.studies.kernels import DRIVES, SIGHT
 
 Number = int | float | None
 
-COLD_START = 0.9
-"""Share of the time that the floor takes; the rest goes to the routes."""
+COMPILING, PREPARING, PLANNING = 0.1, 0.15, 0.5
+"""Shares of the time until which kernels are compiled, walls and reflectors prepared, and drives planned."""
+SPACINGS = (0.25, 0.5, 1.0, 2.0)
+"""Distances between points where they are not chosen [m]: the first that keeps their number."""
+MOST_POINTS = 8000
+"""Points then, of the floor and its surroundings together: the time is about proportional to them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +48,7 @@ class RouteRisks:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class FloorAmbiguity:
+class AmbiguityResult:
     """Cold start over the floor."""
 
     lattice: Lattice
@@ -67,31 +79,87 @@ class FloorAmbiguity:
 class SiteAmbiguity:
     """Cold start over the floor, and tracking along the routes."""
 
-    floor: FloorAmbiguity
+    floor: AmbiguityResult
     """Where a vehicle that is switched on may take its place for another one."""
     routes: tuple[RouteRisks, ...]
     """Tracking along each route that was asked for."""
 
 
-def floor_ambiguity(
-    project: Project,
-    model: VisibilityModel,
-    lattice: Lattice,
-    options: AmbiguityOptions,
-    progress: Progress = silent,
-) -> FloorAmbiguity:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class AmbiguityInput(StudyInput):
+    """What the ambiguous places of a floor depend on."""
+
+    reflectors: ReflectorMap
+    """The reflector map."""
+    floor_map: FloorMap | None
+    """Walls and free floor."""
+    scanner: Scanner
+    """The laser scanner."""
+    routes: tuple[Route, ...]
+    """Planned routes, where there is no map: they say how far the floor reaches. Else none."""
+    options: AmbiguityOptions
+    """When two poses count as alike."""
+    visibility: VisibilityOptions
+    """What counts as visible."""
+    spacing: float | None
+    """Distance between neighboring points [m]. None: as fine as the number of points allows."""
+
+    @staticmethod
+    def of(
+        project: Project,
+        options: AmbiguityOptions | None = None,
+        *,
+        visibility: VisibilityOptions | None = None,
+        spacing: float | None = None,
+    ) -> AmbiguityInput:
+        """Take what the study reads from a project.
+
+        Parameters
+        ----------
+        project : the site.
+        options : when two poses count as alike; the defaults when None.
+        visibility : what counts as visible; the defaults when None.
+        spacing : distance between neighboring points [m]; None: as fine as the number of points allows.
+        """
+        return AmbiguityInput(
+            reflectors=project.reflectors,
+            floor_map=project.floor_map,
+            scanner=project.scanner,
+            routes=project.routes if project.floor_map is None else (),
+            options=options or AmbiguityOptions(),
+            visibility=visibility or VisibilityOptions(),
+            spacing=spacing,
+        )
+
+    def lattice(self) -> Lattice:
+        """The points that are looked at."""
+        if self.spacing is not None:
+            return lattice_of(self, self.spacing)
+        lattices = (lattice_of(self, spacing) for spacing in SPACINGS)
+        return next((lattice for lattice in lattices if len(lattice) <= MOST_POINTS), lattice_of(self, SPACINGS[-1]))
+
+
+def ambiguity(inputs: AmbiguityInput, progress: Progress = silent) -> AmbiguityResult:
     """Ask for every spot of the floor, heading by heading, whether another pose sees the same.
+
+    Spots in a wall, or on floor that the map does not know to be free, get no figures.
 
     Parameters
     ----------
-    project : the site.
-    model : what is visible there.
-    lattice : the spots; those in a wall or on floor that the map does not know to be free get no figures.
-    options : when two poses count as alike.
-    progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
+    inputs : the site, and when two poses count as alike.
+    progress : told how far it is; may raise to cancel.
+
+    Raises
+    ------
+    ValueError
+        the spacing is not above 0.
     """
-    cold = cold_start(model, lattice, options, progress)
-    drivable = free_floor(project, lattice.points())
+    lattice = inputs.lattice()
+    warm_up((SIGHT,), part(progress, 0.0, COMPILING))
+    progress(COMPILING, "sight of each reflector")
+    model = visibility_model(inputs, inputs.visibility)
+    cold = cold_start(model, lattice, inputs.options, part(progress, PREPARING, 1.0))
+    drivable = free_floor(inputs, lattice.points())
     share, partners = np.full(len(lattice), np.nan), np.full((len(lattice), 3), np.nan)
     visible = np.full(len(lattice), -1, dtype=np.int64)
     # The poses are the points outside walls, heading by heading.
@@ -103,7 +171,7 @@ def floor_ambiguity(
             known = np.isfinite(of_heading[:, 0])
             partners[points[known]] = of_heading[known]
     share[~drivable], visible[~drivable], partners[~drivable] = np.nan, -1, np.nan
-    return FloorAmbiguity(
+    return AmbiguityResult(
         lattice=lattice,
         drivable=read_only(drivable),
         share=read_only(share),
@@ -113,40 +181,22 @@ def floor_ambiguity(
     )
 
 
-def ambiguity_of(
-    project: Project,
-    options: AmbiguityOptions | None = None,
-    *,
-    spacing: float = 0.5,
-    routes: tuple[str, ...] | None = None,
-    progress: Progress = silent,
-) -> SiteAmbiguity:
-    """Ask where a site is ambiguous.
+def misleading_neighbors(inputs: DrivesInput, progress: Progress = silent) -> tuple[RouteRisks, ...]:
+    """Find along each route the neighbors that lie inside each other's gate.
 
     Parameters
     ----------
-    project : the site.
-    options : when two poses count as alike; the defaults when None.
-    spacing : distance between neighboring points of the floor [m].
-    routes : names of the routes that are tracked; all when None.
-    progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
-
-    Raises
-    ------
-    UsageError
-        unknown route.
+    inputs : the site and the routes.
+    progress : told how far it is; may raise to cancel.
     """
-    options = options or AmbiguityOptions()
-    names = tuple(route.name for route in project.routes) if routes is None else routes
-    model, lattice = visibility_model(project), lattice_of(project, spacing)
-    floor = floor_ambiguity(project, model, lattice, options, part(progress, 0.0, COLD_START))
+    warm_up(DRIVES, part(progress, 0.0, COMPILING))
+    drives = plan_drives(inputs, part(progress, COMPILING, PLANNING))
     tracked: list[RouteRisks] = []
-    for number, name in enumerate(names):
-        progress(COLD_START + (1.0 - COLD_START) * number / len(names), "neighbors")
-        planned = plan_route(project, name, PredictionOptions(), model)
-        tracked.append(RouteRisks(name, neighbor_risks(planned, predict_route(planned))))
+    for number, planned in enumerate(drives.planned):
+        progress(PLANNING + (1.0 - PLANNING) * number / len(drives.planned), "neighbors")
+        tracked.append(RouteRisks(planned.name, neighbor_risks(planned, predict_route(planned))))
     progress(1.0, "neighbors")
-    return SiteAmbiguity(floor, tuple(tracked))
+    return tuple(tracked)
 
 
 def both_ways(pairs: tuple[AmbiguousPair, ...]) -> tuple[AmbiguousPair, ...]:

@@ -6,44 +6,167 @@ The figures themselves come from `planning`; files and images are elsewhere.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from commission.compiled import warm_up
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.geometry.gaussian import ellipse_axes
-from commission.planning.coverage import Coverage, coverage, lattice_of
-from commission.planning.dilution import FixOptions
+from commission.planning.coverage import Coverage, Lattice, lattice_of
+from commission.planning.coverage import coverage as over_lattice
+from commission.planning.dilution import FixOptions, Heading, Measurement, fix_options, odometry_prior
 from commission.planning.fix_ellipses import every_nth, position_covariances
-from commission.planning.visibility import VisibilityOptions, visibility_model
-from commission.progress import Progress, silent
-from commission.site.floor_map import FREE
-from commission.site.parameters import SupervisorParameters
+from commission.planning.visibility import VisibilityModel, VisibilityOptions, visibility_model
+from commission.progress import Progress, part, silent
+from commission.site.floor_map import FREE, FloorMap
+from commission.site.parameters import ObservationParameters, OdometryParameters, SupervisorParameters
+from commission.site.parts import HasFloorMap
 from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
+from commission.site.routes import Route
+from commission.site.scanner import Scanner
+from commission.studies.inputs import StudyInput
+from commission.studies.kernels import DILUTION, SIGHT
 
 Number = int | float | None
 
+FINEST = 0.1
+"""Smallest distance between points, where it is not chosen [m]."""
+LONGEST_SIDE = 400
+"""Points along the longer side of the floor then: as many as it has pixels on a small screen."""
+ROUND_SPACINGS = (0.1, 0.2, 0.25, 0.5, 1.0, 2.0)
+"""Distances between points then [m], and whatever is needed beyond them."""
+USUAL_SPEED = 0.5
+"""Of the vehicle, where there is no route to take it from [m/s]."""
+LEAST_PRIOR = 1e-6
+"""1-sigma of what odometry promises where its noise is zero [m, rad]."""
+COMPILING, PREPARING = 0.3, 0.4
+"""Shares of the time until which kernels are compiled, and walls and reflectors prepared."""
 
-def coverage_of(
-    project: Project,
-    options: FixOptions,
-    *,
-    spacing: float = 0.25,
-    visibility: VisibilityOptions | None = None,
-    progress: Progress = silent,
-) -> Coverage:
-    """Visibility and dilution over the floor of a project.
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CoverageOptions:
+    """What is asked of every point of the floor."""
+
+    measurement: Measurement = Measurement.RANGE_BEARING
+    """What one scan measures of each reflector."""
+    heading: Heading = Heading.ALL_ROUND
+    """Heading of the vehicle at each point."""
+    given_heading: float = 0.0
+    """Heading of the vehicle where it is given [rad], map frame."""
+    on_odometry: float = 1.0
+    """Way driven on odometry since the last fix [m]; read with odometry as a prior only."""
+    blocked_per_m: float = 0.0
+    """Probability per metre of ray that a person blocks it [1/m]."""
+    visibility: VisibilityOptions = field(default_factory=VisibilityOptions)
+    """What counts as visible."""
+    spacing: float | None = None
+    """Distance between neighboring points [m]. None: a round one that keeps the picture small."""
+
+    def fix(self, observation: ObservationParameters, odometry: OdometryParameters, speed: float) -> FixOptions:
+        """What is asked of a fix, with the noise that the localizer assumes.
+
+        Parameters
+        ----------
+        observation : noise of a measurement.
+        odometry : growth of odometry's uncertainty.
+        speed : of the vehicle [m/s].
+        """
+        position, heading = odometry_prior(odometry, self.on_odometry, speed)
+        return fix_options(
+            observation,
+            measurement=self.measurement,
+            heading=self.heading,
+            given_heading=self.given_heading,
+            blocked_per_m=self.blocked_per_m,
+            prior_position_sigma=max(position, LEAST_PRIOR),
+            prior_heading_sigma=max(heading, LEAST_PRIOR),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class CoverageInput(StudyInput):
+    """What the coverage of a floor depends on."""
+
+    reflectors: ReflectorMap
+    """The reflector map."""
+    floor_map: FloorMap | None
+    """Walls and free floor."""
+    scanner: Scanner
+    """The laser scanner."""
+    routes: tuple[Route, ...]
+    """Planned routes, where there is no map: they say how far the floor reaches. Else none."""
+    fix: FixOptions
+    """Measurement model, noise and headings."""
+    visibility: VisibilityOptions
+    """What counts as visible."""
+    spacing: float | None
+    """Distance between neighboring points [m]. None: a round one that keeps the picture small."""
+
+    @staticmethod
+    def of(project: Project, options: CoverageOptions | None = None) -> CoverageInput:
+        """Take what the study reads from a project.
+
+        Raises
+        ------
+        ValueError
+            an option is out of range.
+        """
+        options = options or CoverageOptions()
+        speed = project.routes[0].speed if project.routes else USUAL_SPEED
+        return CoverageInput(
+            reflectors=project.reflectors,
+            floor_map=project.floor_map,
+            scanner=project.scanner,
+            routes=project.routes if project.floor_map is None else (),
+            fix=options.fix(project.parameters.observation, project.parameters.odometry, speed),
+            visibility=options.visibility,
+            spacing=options.spacing,
+        )
+
+    def lattice(self) -> Lattice:
+        """The points that are looked at."""
+        if self.spacing is not None:
+            return lattice_of(self, self.spacing)
+        coarse = lattice_of(self, 1.0)
+        least = max(FINEST, max(coarse.rows, coarse.columns) / LONGEST_SIDE)
+        return lattice_of(self, next((spacing for spacing in ROUND_SPACINGS if spacing >= least), least))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CoverageResult:
+    """Visibility and dilution over a floor."""
+
+    coverage: Coverage
+    """The figures at each of N points."""
+    model: VisibilityModel
+    """What is visible from where."""
+    drivable: BoolArray
+    """(N,) whether each point lies on floor that the map knows to be free; all of it without a map."""
+
+
+def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResult:
+    """Visibility and dilution over the floor of a site.
 
     Parameters
     ----------
-    project : the site.
-    options : measurement model and headings.
-    spacing : distance between neighboring points [m].
-    visibility : what counts as visible; the defaults when None.
-    progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
+    inputs : the site and what is asked.
+    progress : told how far it is; may raise to cancel.
+
+    Raises
+    ------
+    ValueError
+        the spacing is not above 0.
     """
-    return coverage(visibility_model(project, visibility), lattice_of(project, spacing), options, progress)
+    lattice = inputs.lattice()
+    warm_up((SIGHT, DILUTION), part(progress, 0.0, COMPILING))
+    progress(COMPILING, "sight of each reflector")
+    model = visibility_model(inputs, inputs.visibility)
+    found = over_lattice(model, lattice, inputs.fix, part(progress, PREPARING, 1.0))
+    floor = np.array(found.floor) if inputs.floor_map is None else free_floor(inputs, lattice.points())
+    return CoverageResult(found, model, floor)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,52 +181,42 @@ class Ellipses:
     """(N,) direction of the longer axis [rad], map frame."""
 
 
-def ellipses_of(project: Project, found: Coverage, spacing: float, visibility: VisibilityOptions) -> Ellipses:
-    """Ellipses at points of the lattice of a coverage, under its conditions.
-
-    Parameters
-    ----------
-    project, found, visibility : of `coverage_of`.
-    spacing : least distance between two of them [m].
-    """
+def ellipses_of(result: CoverageResult, spacing: float) -> Ellipses:
+    """Ellipses at points of the lattice of a coverage, under its conditions; `spacing` apart at least [m]."""
+    found = result.coverage
     chosen = every_nth(found.lattice, max(1, math.ceil(spacing / found.lattice.spacing - 1e-9)))
-    points = found.lattice.points()[chosen[drivable(project, found)[chosen]]]
-    covariances = position_covariances(visibility_model(project, visibility), points, found.options)
+    points = found.lattice.points()[chosen[result.drivable[chosen]]]
+    covariances = position_covariances(result.model, points, found.options)
     known = np.isfinite(covariances).all(axis=(1, 2))
     return Ellipses(points[known], *ellipse_axes(covariances[known]))
 
 
-def drivable(project: Project, found: Coverage) -> BoolArray:
-    """Whether each point lies on floor that the map knows to be free: (N,) array; all of it without a map."""
-    return np.array(found.floor) if project.floor_map is None else free_floor(project, found.lattice.points())
-
-
-def free_floor(project: Project, points: FloatArray) -> BoolArray:
+def free_floor(site: HasFloorMap, points: FloatArray) -> BoolArray:
     """Whether points (N, 2) [m, map frame] lie on floor that the map knows to be free; all do without a map."""
-    if project.floor_map is None:
+    if site.floor_map is None:
         return np.ones(len(points), dtype=np.bool_)
-    grid = project.floor_map.occupancy()
+    grid = site.floor_map.occupancy()
     cells = grid.cells_at(points)
-    inside = np.all((cells >= 0) & (cells < project.floor_map.cells.shape), axis=-1)
+    inside = np.all((cells >= 0) & (cells < site.floor_map.cells.shape), axis=-1)
     row, column = np.where(inside[:, np.newaxis], cells, 0).T
-    return inside & (project.floor_map.cells[row, column] == FREE)
+    return inside & (site.floor_map.cells[row, column] == FREE)
 
 
-def summary(project: Project, found: Coverage) -> dict[str, Number]:
+def summary(result: CoverageResult, limits: SupervisorParameters) -> dict[str, Number]:
     """Entries of `summary.json`, by their keys; shares are of the drivable floor, None where it has no area.
 
     Parameters
     ----------
-    project : the site; its supervisor's limits are what a fix is held against.
-    found : of `coverage_of`.
+    result : of `coverage`.
+    limits : of the supervisor, against which a fix is held.
     """
-    on = drivable(project, found)
-    fixes, limits = found.fixes, project.parameters.supervisor
+    found, on = result.coverage, result.drivable
+    fixes = found.fixes
     entries: dict[str, Number] = {
         "points": int(on.sum()),
         "spacing_m": found.lattice.spacing,
         "area_m2": float(on.sum() * found.lattice.spacing**2),
-        "reflectors": len(project.reflectors),
+        "reflectors": len(result.model.reflectors),
         "visible_mean": _mean(fixes.visible[on]),
         "visible_min": int(fixes.visible[on].min()) if on.any() else None,
     }

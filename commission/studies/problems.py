@@ -7,24 +7,37 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
 
+from commission.compiled import warm_up
 from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
 from commission.planning.route_check import FloorDistances, Way, outline_points, room_along
 from commission.planning.route_prediction import AT_STATION, FACING_STATION
+from commission.progress import Progress, silent
+from commission.site.floor_map import FloorMap
+from commission.site.parameters import Parameters
+from commission.site.parts import Told
 from commission.site.project import Project
-from commission.site.reflectors import Reflector
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.routes import Route
+from commission.site.scanner import Scanner
+from commission.site.stations import Station
+from commission.site.vehicle import Vehicle
+from commission.studies.inputs import StudyInput, is_same
+from commission.studies.kernels import ROOM
 from commission.studies.passed_stations import Passed, passed_stations
 from commission.studies.violations import CheckedRoute, Violation, ViolationKind, check_route
 
 MOST_OF_A_KIND = 50
 """Problems of one kind that are listed; the rest is counted."""
+PREPARING = 0.3
+"""Share of the time until which the floor map is prepared."""
 SAME_PLACE = 0.001
 """Two reflectors this close are one that was entered twice [m]."""
 BRIDGED_BEAMS = 2
@@ -80,62 +93,101 @@ class CheckLimits:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Findings:
-    """Problems of a project, and what the next check needs not find again."""
+class ProblemsInput(StudyInput):
+    """What the problems of a site depend on: all that stands in the hall and drives in it."""
+
+    floor_map: FloorMap | None
+    """Walls and free floor."""
+    reflectors: ReflectorMap
+    """The reflector map."""
+    routes: tuple[Route, ...]
+    """Planned routes."""
+    stations: tuple[Station, ...]
+    """Where the vehicle has to stand accurately."""
+    vehicle: Vehicle
+    """Wheels and outline."""
+    scanner: Scanner
+    """The laser scanner."""
+    parameters: Parameters
+    """Tunables of the localizer."""
+    limits: CheckLimits = field(default_factory=CheckLimits)
+    """What is expected."""
+
+    @staticmethod
+    def of(project: Project, limits: CheckLimits | None = None) -> ProblemsInput:
+        """Take what the study reads from a project."""
+        return ProblemsInput(
+            floor_map=project.floor_map,
+            reflectors=project.reflectors,
+            routes=project.routes,
+            stations=project.stations,
+            vehicle=project.vehicle,
+            scanner=project.scanner,
+            parameters=project.parameters,
+            limits=limits or CheckLimits(),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ProblemsResult:
+    """Problems of a site, and what the next check needs not find again."""
 
     problems: tuple[Problem, ...]
     """Errors first."""
-    project: Project
-    """The project that was checked."""
+    inputs: ProblemsInput
+    """What was checked."""
     floor: FloorDistances | None
-    """Its walls."""
-    limits: CheckLimits
-    """What was expected."""
+    """Its walls; none without a floor map."""
     by_route: tuple[CheckedRoute, ...]
     """Each of its routes."""
     passed: Passed
     """Which of its stations its routes pass."""
 
 
-def find_problems(
-    project: Project,
-    floor: FloorDistances | None,
-    previous: Findings | None = None,
-    limits: CheckLimits | None = None,
-) -> Findings:
-    """Check a project.
+def problems(
+    inputs: ProblemsInput, progress: Progress = silent, before: ProblemsResult | None = None
+) -> ProblemsResult:
+    """Check a site.
 
     Parameters
     ----------
-    project : what to check.
-    floor : its floor map, prepared; None, or that of another map: what needs walls is not checked yet, which is noted.
-    previous : findings of an earlier state: a route that is still the same object is not checked again.
-    limits : what is expected; the defaults when None.
+    inputs : what to check, and what is expected.
+    progress : told how far it is; may raise to cancel.
+    before : result of an earlier state: a route that is still the same object is not checked again.
     """
-    limits = limits or CheckLimits()
-    floor = floor if floor is not None and floor.floor_map is project.floor_map else None
+    progress(0.0, "preparing the floor map")
+    warm_up((ROOM,))
+    floor = _floor_of(inputs, before)
     known: dict[int, CheckedRoute] = {}
-    if previous is not None and _same_conditions(previous, project, floor, limits):
-        known = dict(zip(map(id, previous.project.routes), previous.by_route, strict=True))
-    by_route = tuple(
-        known[id(route)] if id(route) in known else check_route(route, project.vehicle, floor, limits.clearance)
-        for route in project.routes
-    )
-    passed = passed_stations(project.stations, by_route, None if previous is None else previous.passed)
+    if before is not None and _same_conditions(before, inputs, floor):
+        known = dict(zip(map(id, before.inputs.routes), before.by_route, strict=True))
+    by_route: list[CheckedRoute] = []
+    for number, route in enumerate(inputs.routes):
+        progress(PREPARING + (1.0 - PREPARING) * number / len(inputs.routes), f"checking route {route.name}")
+        checked = known.get(id(route))
+        by_route.append(checked or check_route(route, inputs.vehicle, floor, inputs.limits.clearance))
+    passed = passed_stations(inputs.stations, tuple(by_route), None if before is None else before.passed)
     found = [
-        *_map_problems(project, floor),
-        *_scanner_problems(project),
-        *_close_reflectors(project),
-        *_reflectors_and_walls(project, floor),
-        *_station_problems(project, floor),
-        *_missed_stations(project, passed),
+        *_map_problems(inputs, floor),
+        *_scanner_problems(inputs),
+        *_close_reflectors(inputs),
+        *_reflectors_and_walls(inputs, floor),
+        *_station_problems(inputs, floor),
+        *_missed_stations(inputs, passed),
         *(problem for route in by_route for problem in route_problems(route.violations)),
     ]
     order = list(Severity)
     found.sort(key=lambda problem: order.index(problem.severity))
-    return Findings(
-        problems=tuple(found), project=project, floor=floor, limits=limits, by_route=by_route, passed=passed
-    )
+    return ProblemsResult(problems=tuple(found), inputs=inputs, floor=floor, by_route=tuple(by_route), passed=passed)
+
+
+def _floor_of(inputs: ProblemsInput, before: ProblemsResult | None) -> FloorDistances | None:
+    """Walls of the floor map, prepared; those of the earlier check where they are the same."""
+    if inputs.floor_map is None:
+        return None
+    if before is not None and before.floor is not None and before.floor.floor_map is inputs.floor_map:
+        return before.floor
+    return FloorDistances(inputs.floor_map)
 
 
 def route_problems(violations: Iterable[Violation]) -> Iterable[Problem]:
@@ -174,34 +226,28 @@ def _asked_too_much(violation: Violation) -> str:
             )
 
 
-def _same_conditions(previous: Findings, project: Project, floor: FloorDistances | None, limits: CheckLimits) -> bool:
+def _same_conditions(before: ProblemsResult, inputs: ProblemsInput, floor: FloorDistances | None) -> bool:
     """Whether routes are checked as they were."""
     return (
-        previous.floor is floor
-        and previous.limits == limits
-        and (previous.project.vehicle is project.vehicle or previous.project.vehicle == project.vehicle)
+        before.floor is floor
+        and before.inputs.limits == inputs.limits
+        and is_same(before.inputs.vehicle, inputs.vehicle)
     )
 
 
-def _map_problems(project: Project, floor: FloorDistances | None) -> Iterable[Problem]:
-    if project.floor_map is None:
+def _map_problems(site: ProblemsInput, floor: FloorDistances | None) -> Iterable[Problem]:
+    if site.floor_map is None:
         text = (
             "No floor map: nothing blocks the line of sight and nothing stands in the way; expected a map of the hall"
         )
         yield Problem(severity=Severity.WARNING, text=text, subject=Subject.FLOOR_MAP)
-    elif floor is None:
-        yield Problem(
-            severity=Severity.NOTE,
-            text="The floor map is being prepared: walls are not checked yet",
-            subject=Subject.FLOOR_MAP,
-        )
-    elif not floor.grid.occupied.any():
+    elif floor is not None and not floor.grid.occupied.any():
         yield Problem(
             severity=Severity.WARNING,
             text="The floor map has no walls; expected occupied cells",
             subject=Subject.FLOOR_MAP,
         )
-    if not len(project.reflectors):
+    if not len(site.reflectors):
         yield Problem(
             severity=Severity.WARNING,
             text="No reflectors; expected at least 3 around every route",
@@ -209,9 +255,9 @@ def _map_problems(project: Project, floor: FloorDistances | None) -> Iterable[Pr
         )
 
 
-def _scanner_problems(project: Project) -> Iterable[Problem]:
+def _scanner_problems(site: ProblemsInput) -> Iterable[Problem]:
     """Beams that meet the vehicle's own outline."""
-    scanner, outline = project.scanner, np.asarray(project.vehicle.outline, dtype=np.float64)
+    scanner, outline = site.scanner, np.asarray(site.vehicle.outline, dtype=np.float64)
     position = scanner.mounting[:2]
     depth = float(np.hypot(*(outline_points(outline, 0.01) - position).T).min())
     if depth > 0.01 and _inside(position, outline):
@@ -233,12 +279,12 @@ def _scanner_problems(project: Project) -> Iterable[Problem]:
         yield Problem(severity=Severity.WARNING, text=text, subject=Subject.SCANNER)
 
 
-def _close_reflectors(project: Project) -> Iterable[Problem]:
+def _close_reflectors(site: ProblemsInput) -> Iterable[Problem]:
     """Reflectors that are one, touch, or cannot be told apart by the detector or by the association."""
-    reflectors = project.reflectors
+    reflectors = site.reflectors
     if len(reflectors) < 2:
         return ()
-    apart, gap = separation_needed(project)
+    apart, gap = separation_needed(site)
     farthest = max(apart, gap + 2.0 * float(reflectors.radii.max()))
     from scipy.spatial import KDTree
 
@@ -255,7 +301,7 @@ def _close_reflectors(project: Project) -> Iterable[Problem]:
     return _limited(islice(found, MOST_OF_A_KIND), len(near))
 
 
-def separation_needed(project: Project) -> tuple[float, float]:
+def separation_needed(site: Told) -> tuple[float, float]:
     """Distances at which two reflectors are told apart wherever the vehicle is.
 
     Returns
@@ -264,7 +310,7 @@ def separation_needed(project: Project) -> tuple[float, float]:
         supervisor is content: twice the gate's radius at the alarm limit, but for the reflectors' own uncertainty [m].
     gap : between their edges, so that the detector sees two clusters up to the scanner's range for reflectors [m].
     """
-    parameters, scanner = project.parameters, project.scanner
+    parameters, scanner = site.parameters, site.scanner
     sigma = math.hypot(0.5 * parameters.supervisor.position_limit, parameters.observation.range_sigma)
     apart = 2.0 * math.sqrt(chi_square_gate(parameters.association.gate_probability, 2)) * sigma
     angle = BRIDGED_BEAMS * scanner.angle_increment + math.radians(scanner.beam_width_deg)
@@ -290,9 +336,9 @@ def _pair_problem(first: Reflector, second: Reflector, distance: float, needed: 
     )
 
 
-def _reflectors_and_walls(project: Project, floor: FloorDistances | None) -> Iterable[Problem]:
+def _reflectors_and_walls(site: ProblemsInput, floor: FloorDistances | None) -> Iterable[Problem]:
     """Reflectors that stand inside walls, where no ray reaches them, or beside the map."""
-    reflectors = project.reflectors
+    reflectors = site.reflectors
     if floor is None or not len(reflectors):
         return ()
     grid = floor.grid
@@ -314,13 +360,13 @@ def _reflectors_and_walls(project: Project, floor: FloorDistances | None) -> Ite
     return found
 
 
-def _station_problems(project: Project, floor: FloorDistances | None) -> Iterable[Problem]:
+def _station_problems(site: ProblemsInput, floor: FloorDistances | None) -> Iterable[Problem]:
     """Stations where the vehicle does not fit."""
-    if floor is None or not project.stations:
+    if floor is None or not site.stations:
         return ()
-    poses = np.array([station.pose for station in project.stations])
+    poses = np.array([station.pose for station in site.stations])
     way = Way(poses, np.zeros(len(poses)), np.zeros(len(poses), np.int64), np.zeros(len(poses) - 1))
-    room = room_along(way, project.vehicle.outline, floor)
+    room = room_along(way, site.vehicle.outline, floor)
     return [
         Problem(
             severity=Severity.ERROR,
@@ -329,7 +375,7 @@ def _station_problems(project: Project, floor: FloorDistances | None) -> Iterabl
             ids=(station.name,),
             place=(station.x, station.y),
         )
-        for station, left in zip(project.stations, room, strict=True)
+        for station, left in zip(site.stations, room, strict=True)
         if left <= 0.0
     ]
 
@@ -362,7 +408,7 @@ def _limited(found: Iterable[Problem], count: int | None = None) -> list[Problem
     return problems
 
 
-def _missed_stations(project: Project, passed: Passed) -> Iterable[Problem]:
+def _missed_stations(site: ProblemsInput, passed: Passed) -> Iterable[Problem]:
     """Stations whose accuracy nobody checks, since no route passes them."""
     return _limited(
         Problem(
@@ -373,7 +419,7 @@ def _missed_stations(project: Project, passed: Passed) -> Iterable[Problem]:
             ids=(station.name,),
             place=(station.x, station.y),
         )
-        for station in project.stations
+        for station in site.stations
         if station.name not in passed.names
     )
 

@@ -126,7 +126,7 @@ def same(first: Coverage, second: Coverage) -> bool:
 
 def move_times(model: VisibilityModel, options: FixOptions) -> tuple[list[float], bool]:
     """Processor times of 30 moves by 0.3 m [s]; whether the end equals a full computation."""
-    live = LiveCoverage(model, LATTICE, options)
+    live = LiveCoverage(model, coverage(model, LATTICE, options))
     rng, times = np.random.default_rng(1), []
     for index in rng.integers(0, REFLECTORS, 30):
         reflector = live.reflectors.reflectors[index]

@@ -20,14 +20,13 @@ from commission.geometry.occupancy import OccupancyGrid
 from commission.io.journal import Journal
 from commission.io.journal_replay import restore
 from commission.io.project_file import save_project
-from commission.planning.route_check import FloorDistances
 from commission.site.editing import reflectors as edits
 from commission.site.editing import routes as route_edits
 from commission.site.editing import snapping
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
-from commission.studies.problems import find_problems
+from commission.studies.problems import ProblemsInput, ProblemsResult, problems
 from tests.benchmarks.bench_raycast import RESOLUTION, free_poses, plant
 
 REFLECTORS, ROUTES, LIMIT = 2000, 50, 0.1
@@ -63,15 +62,21 @@ def timed(name: str, job: Callable[[], Any], limit: float | None = LIMIT) -> tup
     return passed, result
 
 
+def checked(project: Project, before: ProblemsResult | None) -> ProblemsResult:
+    """Problems of a project, after those of an earlier state of it."""
+    return problems(ProblemsInput.of(project), before=before)
+
+
 def main() -> int:
     """Print one line per edit and return the exit code."""
     project = site(np.random.default_rng(3))
     grid = project.floor_map.occupancy() if project.floor_map is not None else None
     assert project.floor_map is not None
     assert grid is not None
-    _, floor = timed("prepare the floor map, once", lambda: FloorDistances(project.floor_map), None)
+    floor_alone = replace(project, routes=())
+    _, ready = timed("prepare the floor map, once", lambda: checked(floor_alone, None), None)
     some = [r.id for r in project.reflectors.reflectors[:200]]
-    find_problems(project, floor)
+    checked(project, ready)
     results = [
         timed(
             "place a reflector",
@@ -80,14 +85,14 @@ def main() -> int:
         timed("drag 200 reflectors", lambda: edits.move(project.reflectors, some, (0.1, 0.0))),
         timed("snap 20 reflectors to walls", lambda: snapping.snap_to_wall(project.reflectors, some[:20], grid)),
         timed("move a control point", lambda: route_edits.move_point(project.routes[0], 0, 3, (50.0, 50.0))),
-        timed("check all of it", lambda: find_problems(project, floor), None),
+        timed("check all of it", lambda: checked(project, ready), None),
     ]
-    whole = find_problems(project, floor)
+    whole = checked(project, ready)
     moved = replace(project, reflectors=edits.move(project.reflectors, some, (0.1, 0.0)))
     bent = (route_edits.move_point(project.routes[0], 0, 3, (50.0, 50.0)), *project.routes[1:])
     results += [
-        timed("check after a drag of 200 reflectors", lambda: find_problems(moved, floor, whole)),
-        timed("check after a bent route", lambda: find_problems(replace(project, routes=bent), floor, whole)),
+        timed("check after a drag of 200 reflectors", lambda: checked(moved, whole)),
+        timed("check after a bent route", lambda: checked(replace(project, routes=bent), whole)),
     ]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -65,7 +65,7 @@ OPTIONS = [
 @pytest.mark.parametrize("options", OPTIONS, ids=lambda o: f"{o.measurement}, {o.heading}")
 def test_coverage_after_many_moves_equals_a_full_recomputation_bit_for_bit(options):
     model = hall(1)
-    live = LiveCoverage(model, LATTICE, options)
+    live = LiveCoverage(model, coverage(model, LATTICE, options))
     assert_same(live.coverage, coverage(model, LATTICE, options))
     rng = np.random.default_rng(2)
     for _ in range(8):
@@ -78,10 +78,10 @@ def test_coverage_after_many_moves_equals_a_full_recomputation_bit_for_bit(optio
 
 def test_coverage_follows_a_reflector_that_grows_and_turns_into_a_plate():
     model = hall(3)
-    live = LiveCoverage(model, LATTICE, FixOptions())
+    live = LiveCoverage(model, coverage(model, LATTICE, FixOptions()))
     small = replace(model.scanner, resolution_deg=2.0, beam_width_deg=0.0, range=(0.05, 30.0), reflector_range=30.0)
     short_sighted = build_visibility(model.reflectors, small, model.caster, model.options)
-    live = LiveCoverage(short_sighted, LATTICE, FixOptions())
+    live = LiveCoverage(short_sighted, coverage(short_sighted, LATTICE, FixOptions()))
     for changes in ({"radius": 0.5}, {"kind": ReflectorKind.FLAT, "heading": 1.0}, {"sigma": 0.1}):
         live.move(4, replace(live.reflectors.reflectors[4], **changes))
         anew = build_visibility(live.reflectors, small, model.caster, model.options)
@@ -90,7 +90,7 @@ def test_coverage_follows_a_reflector_that_grows_and_turns_into_a_plate():
 
 def test_a_move_says_where_it_changed_something_and_leaves_the_model_alone():
     model = hall(4)
-    live = LiveCoverage(model, LATTICE, FixOptions())
+    live = LiveCoverage(model, coverage(model, LATTICE, FixOptions()))
     before = [np.copy(figure) for figure in live.coverage.fixes]
     x_before = model.targets.centers[3, 0]
     windows = live.move(3, replace(model.reflectors.reflectors[3], x=1.0, y=1.0))
@@ -104,7 +104,8 @@ def test_a_move_says_where_it_changed_something_and_leaves_the_model_alone():
 
 
 def test_a_reflector_dragged_off_the_floor_is_seen_from_nowhere():
-    live = LiveCoverage(hall(5), LATTICE, FixOptions())
+    model = hall(5)
+    live = LiveCoverage(model, coverage(model, LATTICE, FixOptions()))
     assert live.sees(66).any()
     live.move(66, replace(live.reflectors.reflectors[66], x=500.0))
     assert not live.sees(66).any()
@@ -114,7 +115,7 @@ def test_a_reflector_dragged_off_the_floor_is_seen_from_nowhere():
 
 def test_live_coverage_knows_who_sees_a_reflector():
     model = hall(6)
-    live = LiveCoverage(model, LATTICE, FixOptions())
+    live = LiveCoverage(model, coverage(model, LATTICE, FixOptions()))
     seen = unpack(model.visible(LATTICE.points()), 70)
     for reflector in (0, 63, 64, 69):
         assert (live.sees(reflector) == seen[:, reflector]).all()

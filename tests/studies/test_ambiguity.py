@@ -7,9 +7,19 @@ import pytest
 
 from commission.errors import UsageError
 from commission.planning.ambiguity import AmbiguityOptions
+from commission.progress import Progress, silent
 from commission.site.project import Project
 from commission.site.scanner import Scanner
-from commission.studies.ambiguity import ambiguity_of, metres_at_risk, summary
+from commission.studies.ambiguity import (
+    AmbiguityInput,
+    AmbiguityResult,
+    SiteAmbiguity,
+    ambiguity,
+    metres_at_risk,
+    misleading_neighbors,
+    summary,
+)
+from commission.studies.drives import DrivesInput
 from tests.planning.sites import open_field, reflectors_at, room
 
 ALL_AROUND = Scanner(field_of_view_deg=(-180.0, 180.0), reflector_range=20.0)
@@ -20,8 +30,14 @@ def hall(scanner=ALL_AROUND) -> Project:
     return Project(floor_map=room(12.0, 8.0), reflectors=reflectors_at(CORNERS), scanner=scanner)
 
 
+def over_floor(
+    project: Project, spacing: float, options: AmbiguityOptions | None = None, progress: Progress = silent
+) -> AmbiguityResult:
+    return ambiguity(AmbiguityInput.of(project, options, spacing=spacing), progress)
+
+
 def test_walls_have_no_figures_and_the_floor_has_all():
-    found = ambiguity_of(hall(), spacing=0.05).floor
+    found = over_floor(hall(), 0.05)
     edge = found.share.reshape(found.lattice.rows, found.lattice.columns)[0]
     assert np.isnan(edge).all()
     assert found.visible.reshape(found.lattice.rows, -1)[0].max() == -1
@@ -31,7 +47,7 @@ def test_walls_have_no_figures_and_the_floor_has_all():
 def test_the_share_is_that_of_the_headings_that_are_ambiguous():
     # Half a turn of sight sees two corners of one wall in some headings, and one corner or none in others.
     narrow = replace(ALL_AROUND, field_of_view_deg=(-60.0, 60.0))
-    found = ambiguity_of(hall(narrow), AmbiguityOptions(headings=4), spacing=1.0).floor
+    found = over_floor(hall(narrow), 1.0, AmbiguityOptions(headings=4))
     assert set(np.unique(found.share[found.drivable] * 4)) <= {0.0, 1.0, 2.0, 3.0, 4.0}
     assert found.share[found.drivable].max() > 0.0
     count = len(found.cold.poses) // 4
@@ -42,7 +58,8 @@ def test_the_share_is_that_of_the_headings_that_are_ambiguous():
 
 def test_the_summary_counts_floor_and_metres():
     project = open_field([(3.0, 2.0), (3.03, 2.0), (9.0, -2.0), (14.0, 2.5)], scanner=ALL_AROUND)
-    found = ambiguity_of(project, spacing=2.0)
+    tracked = misleading_neighbors(DrivesInput.of(project, ("Line",)))
+    found = SiteAmbiguity(over_floor(project, 2.0), tracked)
     entries = summary(found)
     assert entries["area_m2"] == 4.0 * entries["points"]
     assert entries["ambiguous_area_m2"] <= entries["area_m2"]
@@ -52,13 +69,13 @@ def test_the_summary_counts_floor_and_metres():
 
 
 def test_only_the_routes_that_are_asked_for_are_tracked():
-    assert ambiguity_of(open_field(CORNERS), spacing=5.0, routes=()).routes == ()
+    assert misleading_neighbors(DrivesInput.of(open_field(CORNERS), ())) == ()
     with pytest.raises(UsageError, match="no route is called 'Loop'"):
-        ambiguity_of(open_field(CORNERS), spacing=5.0, routes=("Loop",))
+        DrivesInput.of(open_field(CORNERS), ("Loop",))
 
 
 def test_progress_rises_to_one():
     seen = []
-    ambiguity_of(open_field(CORNERS), spacing=2.0, progress=lambda done, _: seen.append(done))
+    over_floor(open_field(CORNERS), 2.0, progress=lambda done, _: seen.append(done))
     assert seen == sorted(seen)
     assert seen[-1] == 1.0

@@ -5,12 +5,18 @@ import math
 import numpy as np
 import pytest
 
-from commission.planning.dilution import FixOptions
 from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
-from commission.studies.coverage import coverage_of, drivable, summary, within_limits
+from commission.studies.coverage import (
+    CoverageInput,
+    CoverageOptions,
+    CoverageResult,
+    coverage,
+    summary,
+    within_limits,
+)
 
 CORNERS = ReflectorMap(
     tuple(Reflector(id=str(i), x=x, y=y) for i, (x, y) in enumerate([(0.5, 0.5), (9.5, 0.5), (9.5, 5.5), (0.5, 5.5)]))
@@ -25,19 +31,26 @@ def hall() -> Project:
     return Project(floor_map=FloorMap(cells, 0.1), reflectors=CORNERS, scanner=Scanner(resolution_deg=0.1))
 
 
+def covered(project: Project, spacing: float, blocked_per_m: float = 0.0) -> CoverageResult:
+    return coverage(CoverageInput.of(project, CoverageOptions(spacing=spacing, blocked_per_m=blocked_per_m)))
+
+
+def told(project: Project, spacing: float, blocked_per_m: float = 0.0) -> dict[str, int | float | None]:
+    return summary(covered(project, spacing, blocked_per_m), project.parameters.supervisor)
+
+
 def test_floor_is_what_the_map_knows_to_be_free():
     project = hall()
-    found = coverage_of(project, FixOptions(), spacing=0.5)
-    on = drivable(project, found).reshape(12, 20)
+    on = covered(project, 0.5).drivable.reshape(12, 20)
     # The lattice has points at 0.25 m, 0.75 m, ...: none of them lies in the wall.
     assert not on[:, :4].any()
     assert on[:, 4:].all()
-    assert summary(project, found)["area_m2"] == pytest.approx(8.0 * 6.0)
+    assert told(project, 0.5)["area_m2"] == pytest.approx(8.0 * 6.0)
 
 
 def test_a_wall_between_two_pairs_of_reflectors_leaves_two_on_each_side():
     project = hall()
-    entries = summary(project, coverage_of(project, FixOptions(), spacing=0.5))
+    entries = told(project, 0.5)
     assert (entries["visible_min"], entries["visible_mean"]) == (2, 2.0)
     assert (entries["share_2_visible"], entries["share_3_visible"], entries["share_with_fix"]) == (1.0, 0.0, 1.0)
     assert "expected_visible_mean" not in entries
@@ -45,26 +58,26 @@ def test_a_wall_between_two_pairs_of_reflectors_leaves_two_on_each_side():
 
 def test_people_lower_what_is_expected_to_be_seen():
     project = hall()
-    entries = summary(project, coverage_of(project, FixOptions(blocked_per_m=0.1), spacing=0.5))
+    entries = told(project, 0.5, blocked_per_m=0.1)
     assert 0.0 < entries["two_or_more_mean"] < entries["expected_visible_mean"] < entries["visible_mean"]
 
 
 def test_without_reflectors_nothing_is_promised_and_quantiles_do_not_exist():
     project = Project(floor_map=hall().floor_map)
-    entries = summary(project, coverage_of(project, FixOptions(), spacing=1.0))
+    entries = told(project, 1.0)
     assert (entries["share_with_fix"], entries["share_within_limits"]) == (0.0, 0.0)
     assert entries["position_sigma_median_m"] is None
 
 
 def test_a_site_that_is_all_wall_has_no_shares():
     project = Project(floor_map=FloorMap(np.full((5, 5), OCCUPIED, dtype=np.int8), 1.0), reflectors=CORNERS)
-    entries = summary(project, coverage_of(project, FixOptions(), spacing=1.0))
+    entries = told(project, 1.0)
     assert (entries["points"], entries["visible_mean"], entries["heading_sigma_p95_rad"]) == (0, None, None)
 
 
 def test_two_sigma_of_position_and_of_heading_are_held_against_the_limits():
     project = hall()
-    found = coverage_of(project, FixOptions(), spacing=0.5)
+    found = covered(project, 0.5).coverage
     limits = project.parameters.supervisor
     expected = (2.0 * found.fixes.position_sigma <= 0.1) & (2.0 * found.fixes.heading_sigma <= math.radians(3.0))
     assert (within_limits(found, limits) == expected).all()

@@ -14,7 +14,15 @@ from commission.site.routes import Direction, Route, Segment
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle
-from commission.studies.problems import MOST_OF_A_KIND, Severity, Subject, find_problems, separation_needed
+from commission.studies.problems import (
+    MOST_OF_A_KIND,
+    ProblemsInput,
+    ProblemsResult,
+    Severity,
+    Subject,
+    problems,
+    separation_needed,
+)
 
 CELL = 0.05
 BOX = DifferentialVehicle(outline=((0.5, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.5, -0.3)))
@@ -40,8 +48,12 @@ def line(*points: tuple[float, float], name: str = "r", direction: Direction = D
     return Route(name, (Segment(control_points=np.array(points, float), direction=direction, degree=1),))
 
 
+def checked(project: Project, before: ProblemsResult | None = None) -> ProblemsResult:
+    return problems(ProblemsInput.of(project), before=before)
+
+
 def texts(project: Project) -> list[str]:
-    return [problem.text for problem in find_problems(project, FLOOR).problems]
+    return [problem.text for problem in checked(project).problems]
 
 
 def test_a_sound_site_has_no_problems():
@@ -49,7 +61,7 @@ def test_a_sound_site_has_no_problems():
 
 
 def test_a_route_through_a_wall_says_where_and_over_what_length():
-    findings = find_problems(replace(SITE, routes=(line((2.0, 2.0), (10.0, 2.0)),)), FLOOR)
+    findings = checked(replace(SITE, routes=(line((2.0, 2.0), (10.0, 2.0)),)))
     (error,) = [p for p in findings.problems if p.severity is Severity.ERROR]
     # From where the front (0.5 m ahead) meets the wall to where the rear leaves it: 1 m of vehicle, 0.2 m of wall.
     assert error.text.startswith("Route 'r': the vehicle's outline cuts a wall over ")
@@ -74,9 +86,9 @@ def test_little_room_is_a_warning_with_millimetres():
 
 def test_a_reverse_segment_is_checked_with_the_vehicle_turned_round():
     long = replace(BOX, outline=((0.2, 0.3), (-1.5, 0.3), (-1.5, -0.3), (0.2, -0.3)))
-    forward = find_problems(replace(SITE, vehicle=long, routes=(line((3, 2), (5, 2)),)), FLOOR).problems
+    forward = checked(replace(SITE, vehicle=long, routes=(line((3, 2), (5, 2)),))).problems
     reverse = line((3, 2), (5, 2), direction=Direction.REVERSE)
-    backward = find_problems(replace(SITE, vehicle=long, routes=(reverse,)), FLOOR).problems
+    backward = checked(replace(SITE, vehicle=long, routes=(reverse,))).problems
     assert not [p for p in forward if p.subject is Subject.ROUTE]
     assert next(p.severity for p in backward if p.subject is Subject.ROUTE) is Severity.ERROR
 
@@ -108,7 +120,7 @@ def test_a_corner_is_an_error_a_warning_or_fine_depending_on_the_vehicle():
 
     def found(vehicle, route):
         site = replace(SITE, vehicle=vehicle, routes=(route,), scanner=scanner)
-        return [(p.severity, "90 deg on the spot" in p.text) for p in find_problems(site, FLOOR).problems]
+        return [(p.severity, "90 deg on the spot" in p.text) for p in checked(site).problems]
 
     assert found(tricycle, corner) == found(tricycle, two) == [(Severity.ERROR, True)]
     assert found(wheels, corner) == [(Severity.WARNING, True)]
@@ -121,7 +133,7 @@ def test_close_reflectors_are_told_by_what_cannot_tell_them_apart():
 
     def pair(distance):
         both = ReflectorMap((Reflector(id="A", x=3.0, y=7.0), Reflector(id="B", x=3.0 + distance, y=7.0)))
-        return [(p.severity, p.text) for p in find_problems(replace(SITE, reflectors=both), FLOOR).problems]
+        return [(p.severity, p.text) for p in checked(replace(SITE, reflectors=both)).problems]
 
     assert pair(needed + 0.01) == []
     assert pair(0.0) == [(Severity.ERROR, "Reflectors 'A' and 'B' are at the same place; expected one of them")]
@@ -148,14 +160,14 @@ def test_reflectors_that_no_ray_reaches_are_inside_a_wall():
         replace(plate, id="Q", y=6, heading=0.0),
     )
     site = replace(SITE, reflectors=ReflectorMap((*some, Reflector(id="far", x=20.0, y=20.0))))
-    found = find_problems(site, FLOOR).problems
+    found = checked(site).problems
     assert [p.ids for p in found if "inside a wall" in p.text] == [("in",), ("P",)]
     assert [p.ids for p in found if "outside of the floor map" in p.text] == [("far",)]
 
 
 def test_a_station_without_room_is_an_error():
     site = replace(SITE, stations=(Station(name="Dock", x=0.6, y=4.0), Station(name="Gate", x=3.0, y=4.0)))
-    assert [p.ids for p in find_problems(site, FLOOR).problems if p.severity is Severity.ERROR] == [("Dock",)]
+    assert [p.ids for p in checked(site).problems if p.severity is Severity.ERROR] == [("Dock",)]
 
 
 def test_a_station_that_no_route_passes_is_told_since_nobody_would_check_its_accuracy():
@@ -169,11 +181,11 @@ def test_a_station_that_no_route_passes_is_told_since_nobody_would_check_its_acc
         Station(name="across", x=3.0, y=5.0, heading=0.0),
     )
     site = replace(SITE, routes=(there, back), stations=stations)
-    first = find_problems(site, FLOOR)
+    first = checked(site)
     assert [p.ids[0] for p in first.problems if "no route passes it" in p.text] == ["beside", "against", "across"]
-    again = find_problems(replace(site, name="x"), FLOOR, first)
+    again = checked(replace(site, name="x"), first)
     assert again.passed is first.passed
-    assert find_problems(replace(site, routes=(back,)), FLOOR, first).passed.names == {"reverse"}
+    assert checked(replace(site, routes=(back,)), first).passed.names == {"reverse"}
 
 
 def test_beams_into_the_vehicle_are_counted_with_their_bearings():
@@ -181,26 +193,23 @@ def test_beams_into_the_vehicle_are_counted_with_their_bearings():
     (text,) = texts(wide)
     # From the middle of the front edge everything behind +-90 deg is vehicle: 45 deg on both sides.
     assert "blocks 180 of 541 beams, between -135.0 and 135.0 deg" in text
-    (note,) = find_problems(replace(SITE, scanner=Scanner()), FLOOR).problems
+    (note,) = checked(replace(SITE, scanner=Scanner())).problems
     assert (note.severity, note.subject) == (Severity.NOTE, Subject.SCANNER)
     assert note.text.startswith("The scanner is 300 mm inside the vehicle's outline")
 
 
-def test_a_missing_or_unprepared_map_is_said():
-    assert "No floor map" in find_problems(replace(SITE, floor_map=None), FLOOR).problems[0].text
-    assert "is being prepared" in find_problems(SITE, None).problems[0].text
-    other = FloorDistances(FloorMap(np.zeros((2, 2), np.int8), 1.0))
-    assert "is being prepared" in find_problems(SITE, other).problems[0].text
-    assert "No reflectors" in find_problems(replace(SITE, reflectors=ReflectorMap()), FLOOR).problems[0].text
+def test_a_missing_map_is_said():
+    assert "No floor map" in checked(replace(SITE, floor_map=None)).problems[0].text
+    assert "No reflectors" in checked(replace(SITE, reflectors=ReflectorMap())).problems[0].text
 
 
 def test_only_what_changed_is_checked_again_with_the_same_result(monkeypatch):
     routes = (line((2, 2), (10, 2), name="a"), line((1.5, 0.7), (4.5, 0.7), name="b"))
-    before = find_problems(replace(SITE, routes=routes), FLOOR)
+    before = checked(replace(SITE, routes=routes))
     moved = replace(SITE, routes=(routes[0], line((1.5, 6), (4.5, 6), name="b")))
-    again = find_problems(moved, FLOOR, before)
-    assert again.problems == find_problems(moved, FLOOR).problems
+    again = checked(moved, before)
+    assert again.problems == checked(moved).problems
     monkeypatch.setattr("commission.studies.problems.check_route", None)
-    assert find_problems(replace(moved, name="x"), FLOOR, again).problems == again.problems
+    assert checked(replace(moved, name="x"), again).problems == again.problems
     with pytest.raises(TypeError):
-        find_problems(replace(moved, vehicle=TricycleVehicle()), FLOOR, again)
+        checked(replace(moved, vehicle=TricycleVehicle()), again)

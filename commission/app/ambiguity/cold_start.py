@@ -10,21 +10,17 @@ from numpy.typing import NDArray
 from commission.app.plan.settings import PlanSettings
 from commission.geometry.arrays import FloatArray
 from commission.planning.ambiguity import AmbiguityOptions, AmbiguousPair
-from commission.planning.coverage import Lattice, lattice_of
-from commission.planning.visibility import VisibilityOptions, visibility_model
+from commission.planning.coverage import Lattice
+from commission.planning.visibility import VisibilityOptions
 from commission.progress import Progress
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
-from commission.studies.ambiguity import FloorAmbiguity, both_ways, floor_ambiguity
+from commission.studies.ambiguity import AmbiguityInput, AmbiguityResult, ambiguity, both_ways
 
 NOTHING, UNIQUE, TOO_FEW, SOME, EVERY = range(5)
 """Classes: beside the floor; each heading tells its place; fewer than two visible somewhere, no twin; a twin at some
 headings; no heading tells its place."""
 CLASSES = EVERY + 1
-SPACINGS = (0.25, 0.5, 1.0, 2.0)
-"""Distances between the spots that are tried [m]."""
-MOST_SPOTS = 8000
-"""Spots of the floor and its surroundings together: the time of the job is about proportional to them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,22 +46,17 @@ class Ambiguity:
         return tuple(self.reflectors.reflectors[index].id for index in group)
 
 
-def spots_of(project: Project) -> Lattice:
-    """Return the lattice of spots: as fine as the number of spots allows."""
-    lattices = (lattice_of(project, spacing) for spacing in SPACINGS)
-    return next((lattice for lattice in lattices if len(lattice) <= MOST_SPOTS), lattice_of(project, SPACINGS[-1]))
-
-
 def look_alike(project: Project, settings: PlanSettings, progress: Progress) -> Ambiguity:
     """Ask for every free spot of the floor, heading by heading, whether another pose sees the same."""
-    progress(0.0, "sight of each reflector")
-    model = visibility_model(project, VisibilityOptions(min_beams=settings.min_beams))
-    options = AmbiguityOptions(tolerance=settings.tolerance)
-    found = floor_ambiguity(project, model, spots_of(project), options, progress)
+    options, visibility = (
+        AmbiguityOptions(tolerance=settings.tolerance),
+        VisibilityOptions(min_beams=settings.min_beams),
+    )
+    found = ambiguity(AmbiguityInput.of(project, options, visibility=visibility), progress)
     return Ambiguity(project.reflectors, found.lattice, _classes(found), both_ways(found.cold.pairs))
 
 
-def _classes(found: FloorAmbiguity) -> NDArray[np.uint8]:
+def _classes(found: AmbiguityResult) -> NDArray[np.uint8]:
     """Sort the spots."""
     kinds = np.where(found.ambiguous, TOO_FEW, UNIQUE)
     kinds = np.where(found.has_twin, SOME, kinds)

@@ -18,7 +18,7 @@ from commission.app.editing.editor import Editor, Grab, editors_of
 from commission.app.editing.gestures import moved
 from commission.app.placement.suggestion import LayoutWish, Suggestion, suggest
 from commission.app.plan import work
-from commission.app.plan.keys import changed_reflectors, cold_start_key, floor_key, ranking_key, route_key, site_key
+from commission.app.plan.keys import changed_reflectors, cold_start_key, floor_key, ranking_key, route_key
 from commission.app.plan.looks import cold_start_view, failure_view, heat_view, layout_view, reading_of, route_view
 from commission.app.plan.remembered import Remembered
 from commission.app.plan.settings import PlanSettings
@@ -131,9 +131,8 @@ class Planner(Service):
         """Rank once; after an edit the ranking is outdated until it is asked for again, since it takes long."""
         if self._ranking.result is None or self._ranking.key[-2:] != (plan.failure.value, plan.ranking):
             before = self._ranking.result
-            still = before is not None and is_same(self._ranking.key[:-2], site_key(project, plan))
-            planned = before.planned if before is not None and still else None
-            self._ranking.keep(ranking_key(project, plan), lambda progress: work.rank(project, plan, progress, planned))
+            known = None if before is None else before.drives
+            self._ranking.keep(ranking_key(project, plan), lambda progress: work.rank(project, plan, progress, known))
 
     def _keep_patiently(self, state: AppState) -> None:
         """Do what takes long once: other wishes and other sites wait until it is asked for again."""

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from commission.planning.route_check import FloorDistances
 from commission.progress import Progress
 from commission.site.project import Project
-from commission.studies.problems import Findings, find_problems
+from commission.studies.problems import ProblemsInput, ProblemsResult, problems
 
 
 class Checker:
-    """The newest findings, and the floor map they were made on."""
+    """The newest findings."""
 
     def __init__(self) -> None:
-        self._findings: Findings | None = None
-        self._floor: FloorDistances | None = None
+        self._found: ProblemsResult | None = None
 
-    def check(self, project: Project, progress: Progress) -> Findings:
+    def check(self, project: Project, progress: Progress) -> ProblemsResult:
         """Return what is wrong with a project.
 
         Parameters
@@ -23,11 +21,5 @@ class Checker:
         project : what to check.
         progress : called between the steps; may raise to cancel.
         """
-        floor_map = project.floor_map
-        if floor_map is None:
-            self._floor = None
-        elif self._floor is None or self._floor.floor_map is not floor_map:
-            self._floor = FloorDistances(floor_map)
-        progress(0.5, "checking")
-        self._findings = find_problems(project, self._floor, self._findings)
-        return self._findings
+        self._found = problems(ProblemsInput.of(project), progress, self._found)
+        return self._found

@@ -22,7 +22,7 @@ from commission.planning.route_profile import RouteProfile, route_profile
 from commission.progress import Progress
 from commission.site.routes import Route
 from commission.site.vehicle import Vehicle
-from commission.studies.problems import Findings, Problem
+from commission.studies.problems import Problem, ProblemsResult
 from commission.studies.violations import Violation
 
 CHECK, PROFILE = "Checking the site", "Looking along the route"
@@ -46,9 +46,9 @@ class Inspection(Service):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self._checker = Checker()
-        self._check = Upkeep[Findings](CHECK, context.jobs, Lane.QUICK, is_shown=False)
+        self._check = Upkeep[ProblemsResult](CHECK, context.jobs, Lane.QUICK, is_shown=False)
         self._profile = Upkeep[Profiles](PROFILE, context.jobs, Lane.QUICK, is_shown=False)
-        self._found: Findings | None = None
+        self._found: ProblemsResult | None = None
         self._looked_along: Profiles | None = None
         self.problems: tuple[Problem, ...] = ()
         """Errors first."""

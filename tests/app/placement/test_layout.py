@@ -163,7 +163,7 @@ def test_what_is_not_met_is_told_by_its_metres_and_its_place(project: Project) -
 
 def test_without_a_route_or_a_wall_it_is_said_what_is_missing(project: Project) -> None:
     ignoring = replace(project.layout, ignored_routes=tuple(route.name for route in project.routes))
-    with pytest.raises(UsageError, match="no route counts"):
+    with pytest.raises(UsageError, match="no route that counts"):
         suggest(replace(project, layout=ignoring), EMPTY, quietly)
     with pytest.raises(UsageError, match="no floor map"):
         suggest(replace(project, floor_map=None), EMPTY, quietly)

@@ -1,0 +1,103 @@
+"""Parts of a project, as protocols: a function says by the type of its argument what of a site it may read.
+
+A project has all of them; the frozen input of a study has those that the study may read, and no others.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from commission.site.floor_map import FloorMap
+from commission.site.parameters import Parameters
+from commission.site.reflectors import ReflectorMap
+from commission.site.routes import Route
+from commission.site.scanner import Scanner
+from commission.site.stations import Station
+from commission.site.vehicle import Vehicle
+
+
+class HasReflectors(Protocol):
+    """The reflector map."""
+
+    @property
+    def reflectors(self) -> ReflectorMap:
+        """The reflector map."""
+        ...
+
+
+class HasFloorMap(Protocol):
+    """Walls and free floor."""
+
+    @property
+    def floor_map(self) -> FloorMap | None:
+        """Walls and free floor; a site without one is an open field."""
+        ...
+
+
+class HasRoutes(Protocol):
+    """Planned routes."""
+
+    @property
+    def routes(self) -> tuple[Route, ...]:
+        """Planned routes; names are unique."""
+        ...
+
+
+class HasScanner(Protocol):
+    """The laser scanner."""
+
+    @property
+    def scanner(self) -> Scanner:
+        """The laser scanner."""
+        ...
+
+
+class HasStations(Protocol):
+    """Stations."""
+
+    @property
+    def stations(self) -> tuple[Station, ...]:
+        """Places where the vehicle has to stand accurately; names are unique."""
+        ...
+
+
+class HasVehicle(Protocol):
+    """The vehicle."""
+
+    @property
+    def vehicle(self) -> Vehicle:
+        """Wheels and outline."""
+        ...
+
+
+class HasParameters(Protocol):
+    """Parameters."""
+
+    @property
+    def parameters(self) -> Parameters:
+        """Tunables of the localizer."""
+        ...
+
+
+class Extended(HasFloorMap, HasReflectors, HasRoutes, Protocol):
+    """What says how far a site reaches."""
+
+
+class Sighted(HasFloorMap, HasReflectors, HasScanner, Protocol):
+    """What says which reflectors are seen from where."""
+
+
+class Told(HasParameters, HasScanner, Protocol):
+    """What says which reflectors are told apart."""
+
+
+class Driven(Sighted, HasVehicle, HasParameters, Protocol):
+    """What says how a vehicle drives a route, and what it sees and believes on it."""
+
+    def route(self, name: str, /) -> Route:
+        """Return the route of that name; raises UsageError that lists the names there are."""
+        ...
+
+
+class Equipped(Driven, HasRoutes, HasStations, Protocol):
+    """Everything that stands in the hall and drives in it."""

@@ -1,0 +1,19 @@
+"""Which kernels the studies need, step by step, under the names that the page shows while they compile.
+
+A study warms up what it needs as its first part, so that progress does not stand still for a minute.
+"""
+
+from __future__ import annotations
+
+from commission.geometry import spline_kernels
+from commission.planning import dilution, route_check, route_prediction, true_error, visibility
+
+SIGHT = ("lines of sight", visibility.warm_up)
+DILUTION = ("dilution", dilution.warm_up)
+CURVES = ("curves", spline_kernels.warm_up)
+PREDICTION = ("prediction", route_prediction.warm_up)
+ERRORS = ("true error", true_error.warm_up)
+ROOM = ("room along routes", route_check.warm_up)
+
+DRIVES = (SIGHT, CURVES, PREDICTION)
+"""What every prediction along a route needs."""
