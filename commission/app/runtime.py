@@ -204,7 +204,8 @@ class Runtime:
         self._due = Due.SOON
         if outcome.state.project is not before.project:
             for service in self._services:
-                service.project_changed(action, before, outcome.state)
+                # An edit that cannot be journaled stands, and so does what follows from it.
+                self._guarded(lambda service=service: service.project_changed(action, before, outcome.state))
         for effect in outcome.effects:
             self._carry_out(effect, sender)
 

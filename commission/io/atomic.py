@@ -138,7 +138,7 @@ def _missing(folder: Path) -> list[Path]:
 
 def _remove_empty(folders: list[Path]) -> None:
     """Remove those that hold nothing, the innermost first."""
-    with suppress(OSError):
+    with suppress(OSError, ValueError):
         for folder in folders:
             folder.rmdir()
 

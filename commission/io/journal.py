@@ -12,6 +12,7 @@ import os
 import threading
 import time
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,16 @@ from commission.site.project import Project
 
 SYNC_INTERVAL_S = 1.0
 """Longest time that an edit is only in the system's memory [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class News:
+    """Something about the journal that the engineer has to know."""
+
+    text: str
+    """One line."""
+    is_good: bool = False
+    """Whether all is well again."""
 
 
 class Journal:
@@ -54,8 +65,8 @@ class Journal:
         self._file: JournalFile | None = None
         self._has_map = self._needs_all = False
         self._unprotected: tuple[Project, str] | None = None
-        self._news: list[str] = []
-        self._news_once_written: list[str] = []
+        self._news: list[News] = []
+        self._news_once_written: list[News] = []
         self._lock = threading.Lock()
         self._unsynced = threading.Event()
         self._closed = threading.Event()
@@ -79,8 +90,8 @@ class Journal:
             self._see_to_file()
             self._write_down(project, what)
 
-    def check(self) -> tuple[str, ...]:
-        """Look after the journal; call it every second or so. Return what the engineer has to know, one line each.
+    def check(self) -> tuple[News, ...]:
+        """Look after the journal; call it every second or so. Return what the engineer has to know.
 
         A journal that is not there any more is begun anew, and edits for which there was no space are written down.
         """
@@ -92,12 +103,17 @@ class Journal:
                     self._write_down(*self._unprotected)
                 except FileFormatError as error:
                     if not was_unprotected:
-                        self._news.append(str(error))
+                        self._news.append(News(str(error)))
                 else:
                     if was_unprotected:
-                        self._news.append(f"all edits are in the journal again: {self.path}")
+                        self._news.append(News(f"all edits are in the journal again: {self.path}", is_good=True))
             news, self._news = tuple(self._news), []
             return news
+
+    @property
+    def kept_elsewhere(self) -> Path | None:
+        """Folder in which edits are kept while the project's own is gone; None: they are kept beside the project."""
+        return None if self.path.parent == self._folder else self.path.parent
 
     @property
     def is_protecting(self) -> bool:
@@ -166,6 +182,10 @@ class Journal:
             # The first edit of the map writes all of it: from here on the files may be of any state.
             values |= {"floor_map": change(None, project)["floor_map"]}
             has_map = True
+        if not values and self._file is None and not self._needs_all:
+            # Nothing differs from the files: a project that was read again, or an edit that was taken back.
+            self._journaled, self._unprotected = project, None
+            return
         entry = {"at": time.time(), "what": what, "change": values}
         if self._file is None:
             self._begin(entry)
@@ -194,7 +214,7 @@ class Journal:
         self._close_file()
         self._needs_all = True
         self._unprotected = self._unprotected or (self._journaled, "everything until then")
-        self._news_once_written.append(lost)
+        self._news_once_written.append(News(lost, is_good=is_elsewhere))
 
     def _begin(self, entry: dict[str, Any]) -> None:
         """Start a file with the project as it was, unless the first edit holds all of it; the lock is held."""
@@ -217,7 +237,9 @@ class Journal:
         with suppress(OSError):
             if FileId.of(self.path) not in self._replaceable:
                 kept = set_aside(self.path, "found")
-                self._news_once_written.append(f"another journal of unsaved edits lay there; it is kept as {kept}")
+                self._news_once_written.append(
+                    News(f"another journal of unsaved edits lay there; it is kept as {kept}")
+                )
 
     def _sync_forever(self) -> None:
         """Bring lines to the disk, at most once a second; a slow disk delays nobody who edits."""

@@ -61,7 +61,6 @@ def save_copy(project: Project, folder: Path, *, force: bool) -> Path | None:
 
 
 def _exists(folder: Path) -> bool:
-    try:
-        return os.path.lexists(folder)
-    except ValueError as error:
-        raise UsageError(f"{str(folder)!r} is no path ({error}); expected the path of a folder") from error
+    if "\0" in str(folder):
+        raise UsageError(f"{str(folder)!r} is no path (embedded null byte); expected the path of a folder")
+    return os.path.lexists(folder)

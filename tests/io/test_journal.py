@@ -18,7 +18,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from commission.errors import FileFormatError, ProjectError
-from commission.io.journal import Journal, remove_leftovers
+from commission.io.journal import Journal, News, remove_leftovers
 from commission.io.journal_replay import Restored, restore
 from commission.io.project_file import load_project, save_project
 from commission.io.project_parts import apply, change
@@ -150,7 +150,7 @@ def test_edits_without_space_are_written_down_as_soon_as_there_is_some(tmp_path,
         assert not journal.is_protecting
         assert journal.check() == ()
         assert given_back(tmp_path).project.name == "first"
-    assert journal.check() == (f"all edits are in the journal again: {journal.path}",)
+    assert journal.check() == (News(f"all edits are in the journal again: {journal.path}", is_good=True),)
     assert journal.is_protecting
     assert given_back(tmp_path).last_edit == "Rename again"
     assert given_back(tmp_path).project.name == "second"
@@ -216,7 +216,7 @@ def test_a_journal_that_is_lost_is_begun_anew_with_the_whole_project(tmp_path, d
         project = replace(project, name="edit 3")
         journal.append(project, "Edit 3")
     news = journal.check()
-    assert f"the journal of unsaved edits {told}; it was begun anew with the whole project" in news[0]
+    assert f"the journal of unsaved edits {told}; it was begun anew with the whole project" in news[0].text
     # Even the floor map, which was never edited: whoever deletes a journal may delete more.
     for path in (tmp_path / "map.yaml", tmp_path / "map.png"):
         path.unlink()
@@ -247,7 +247,7 @@ def test_edits_of_a_project_whose_folder_was_deleted_are_kept_where_the_news_tel
     shutil.rmtree(folder)
     (news,) = journal.check()
     place = journal.path.parent
-    assert news == f"the project's folder {folder} was deleted or moved; all edits are kept in {place}"
+    assert news.text == f"the project's folder {folder} was deleted or moved; all edits are kept in {place}"
     assert place.is_relative_to(state_home)
     assert not folder.exists()
     later = replace(project, name="later")
@@ -269,10 +269,14 @@ def test_a_folder_that_comes_back_has_the_journal_again(tmp_path, state_home):
     project, journal = started(folder)
     journal.append(replace(project, name="first"), "Rename")
     folder.rename(tmp_path / "elsewhere")
-    assert "was deleted or moved" in journal.check()[0]
+    assert "was deleted or moved" in journal.check()[0].text
     journal.append(replace(project, name="second"), "Rename")
     (tmp_path / "elsewhere").rename(folder)
-    assert journal.check() == (f"the project's folder is there again, and edits are kept in it: {folder}",)
+    assert journal.kept_elsewhere is not None
+    assert journal.check() == (
+        News(f"the project's folder is there again, and edits are kept in it: {folder}", is_good=True),
+    )
+    assert journal.kept_elsewhere is None
     assert given_back(folder).project.name == "second"
     assert list(state_home.rglob("*.journal")) == []
     assert list(folder.glob("*.found-*")) == []
@@ -301,13 +305,14 @@ def test_a_folder_that_is_gone_with_no_other_place_is_told_once_and_tried_again(
     project, journal = started(tmp_path / "hall")
     shutil.rmtree(tmp_path / "hall")
     (news,) = journal.check()
-    assert "a crash would lose this edit" in news
+    assert "a crash would lose this edit" in news.text
     assert journal.check() == ()
     assert not journal.is_protecting
     (tmp_path / "state").unlink()
     told, again = journal.check()
-    assert "all edits are kept in" in told
-    assert "all edits are in the journal again" in again
+    assert "all edits are kept in" in told.text
+    assert "all edits are in the journal again" in again.text
+    assert again.is_good
     restored = restore(tmp_path / "hall", Project())
     assert restored is not None
     assert restored.project == project

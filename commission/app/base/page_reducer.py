@@ -8,7 +8,7 @@ from commission.app.base import actions
 from commission.app.base.actions import Sender
 from commission.app.base.effects import CancelJob, FlyTo, PlaceCamera, Tell
 from commission.app.base.reducer import Outcome, reduce
-from commission.app.base.state import AppState, Step, with_maps_packed
+from commission.app.base.state import AppState, Step, refuse_read_only, with_maps_packed
 
 FAULTS_KEPT = 20
 
@@ -31,6 +31,7 @@ def undo(_action: actions.Undo, state: AppState, sender: Sender) -> Outcome:
     """Take back the newest step, unless it is another browser's."""
     if not state.undo:
         return Outcome(state)
+    refuse_read_only(state)
     step = state.undo[-1]
     if _is_anothers(step, sender, state):
         return Outcome(state, (_in_the_way(step, "undo"),))
@@ -44,6 +45,7 @@ def redo(_action: actions.Redo, state: AppState, sender: Sender) -> Outcome:
     """Make the step that was taken back last again, unless it is another browser's."""
     if not state.redo:
         return Outcome(state)
+    refuse_read_only(state)
     step = state.redo[-1]
     if _is_anothers(step, sender, state):
         return Outcome(state, (_in_the_way(step, "redo"),))

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from commission.app.base.actions import PROGRAM, Sender
 from commission.app.base.parts import Part, Parts, part_of
+from commission.errors import UsageError
 from commission.site.editing.packed_map import PackedMap
 from commission.site.project import Project
 
@@ -67,6 +68,8 @@ class AppState:
     """As on disk."""
     folder: Path | None = None
     """Where the project is written to; none: it is bundled with the program and stays as it is."""
+    read_only: str = ""
+    """Why the project cannot be edited, in one line; empty: it can."""
     greeting: str = ""
     """What each browser is told when it comes: what was restored after a crash, until it is saved."""
     undo: tuple[Step, ...] = ()
@@ -132,13 +135,26 @@ class Edit:
 
 
 def edited(state: AppState, project: Project, edit: Edit) -> AppState:
-    """Return the state after an edit: one more undo step, unless it belongs to the newest one."""
+    """Return the state after an edit: one more undo step, unless it belongs to the newest one.
+
+    Raises
+    ------
+    UsageError
+        the project is read-only.
+    """
+    refuse_read_only(state)
     step = Step(state.project, edit.name, edit.sender.browser)
     undo = state.undo if _is_merged(state, edit) else (*state.undo, step)[-UNDO_STEPS:]
     if project.floor_map is not state.project.floor_map:
         undo = with_maps_packed(undo)
     last_edit = LastEdit(edit.key, edit.sender) if edit.key else None
     return replace(state, project=project, undo=undo, redo=(), last_edit=last_edit)
+
+
+def refuse_read_only(state: AppState) -> None:
+    """Raise UsageError where the project cannot be edited."""
+    if state.read_only:
+        raise UsageError(f"this page shows the project read-only: {state.read_only}")
 
 
 def _is_merged(state: AppState, edit: Edit) -> bool:

@@ -24,7 +24,7 @@ class Save(Action):
     folder: Path | None = None
     """Where to; none: where it came from."""
     overwrite: bool = False
-    """Whether files that somebody else has changed meanwhile are replaced."""
+    """Whether files that somebody else has changed meanwhile, or another project that lies there, are replaced."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +37,21 @@ class ProjectSaved(Action):
     """Where to."""
     time_of_day: str
     """When, as the page shows it."""
+
+
+@dataclass(frozen=True, slots=True)
+class AskToReplace(Action):
+    """A copy was to be written where another project lies."""
+
+    folder: Path
+    """Where."""
+    holds: str
+    """What lies there, as a sentence goes on: `the project 'Hall'`."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeepOther(Action):
+    """What lies where a copy was to be written stays as it is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,3 +85,36 @@ class Restored(Action):
     """What was restored, in one line."""
     foreign: tuple[str, ...] = ()
     """Files that somebody else has changed since."""
+
+
+@dataclass(frozen=True, slots=True)
+class TakeOver(Action):
+    """Edit here what somebody else edits elsewhere; there it becomes read-only."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeldByOther(Action):
+    """Somebody else edits the project: here it is read-only."""
+
+    holder: str
+    """Who, where and since when, in words."""
+    was_ours: bool = False
+    """Whether it was edited here until now."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeldByUs(Action):
+    """The project is edited here from now on, as it was left elsewhere."""
+
+    project: Project
+    """As its files are."""
+
+
+@dataclass(frozen=True, slots=True)
+class Protected(Action):
+    """How unsaved edits are kept has changed."""
+
+    is_protected: bool
+    """Whether all of them are in the journal."""
+    kept_in: Path | None = None
+    """Where they are while the project's folder is gone; none: it is there."""

@@ -18,7 +18,7 @@ class WriteProject(Effect):
     folder: Path
     """Where to."""
     overwrite: bool = False
-    """Whether files that somebody else has changed meanwhile are replaced."""
+    """Whether files that somebody else has changed meanwhile, or another project that lies there, are replaced."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,3 +27,8 @@ class ReadProject(Effect):
 
     folder: Path
     """Where from."""
+
+
+@dataclass(frozen=True, slots=True)
+class TakeProjectOver(Effect):
+    """Take the project from whoever edits it elsewhere."""

@@ -1,7 +1,8 @@
-"""The folder of the project: its files, the journal beside them, and an eye on what others change there."""
+"""The folder of the project: its files and journal, who edits it, and an eye on what others change there."""
 
 from __future__ import annotations
 
+import logging
 import os
 import time
 from pathlib import Path
@@ -11,53 +12,79 @@ from commission.app.base.actions import Action, Envelope, Report, Sender
 from commission.app.base.effects import Effect
 from commission.app.base.service import Context, Due, Service
 from commission.app.base.state import AppState
-from commission.app.project.actions import ChangedOnDisk, ProjectSaved, Reloaded, Restored
-from commission.app.project.effects import ReadProject, WriteProject
+from commission.app.project.actions import (
+    AskToReplace,
+    ChangedOnDisk,
+    HeldByOther,
+    HeldByUs,
+    ProjectSaved,
+    Protected,
+    Reloaded,
+    Restored,
+)
+from commission.app.project.effects import ReadProject, TakeProjectOver, WriteProject
 from commission.app.project.state import FilesState
-from commission.io.journal import Journal
+from commission.errors import CommissionError, ProjectError, UsageError
+from commission.io.journal import Journal, remove_leftovers
+from commission.io.journal_replay import Restored as FromJournal
 from commission.io.journal_replay import restore
-from commission.io.project_file import load_project, save_project
+from commission.io.overwriting import project_in
+from commission.io.project_copy import save_copy
+from commission.io.project_file import load_project, open_project
+from commission.io.project_lock import Hold, ProjectLock
 from commission.site.project import Project
 
+log = logging.getLogger(__name__)
+
 OWN_PREFIX = ".commission."
-LOOK_AT_DISK_S = 2.0
+LOOK_AT_DISK_S = 1.0
 """Time between two looks at the project's folder [s]."""
 
 
 class ProjectFolder(Service):
-    """The files of the project that is being edited."""
+    """The files of the project that is being edited, or only shown while somebody else edits it."""
 
-    effects = (WriteProject, ReadProject)
+    effects = (WriteProject, ReadProject, TakeProjectOver)
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        folder, project = context.state.folder, context.state.project
-        self._folder = folder
-        self._restored = None if folder is None else restore(folder, project)
-        self._journal = None if folder is None else Journal(folder, project, self._restored)
-        self._listing = _listing(folder)
+        self._folder = context.state.folder
+        self._lock: ProjectLock | None = None
+        self._journal: Journal | None = None
+        self._restored: FromJournal | None = None
+        if self._folder is not None:
+            self._lock = ProjectLock(self._folder)
+            if self._lock.look() is not Hold.THEIRS:
+                self._restored = self._edit(self._folder, context.state.project)
+        self._listing = _listing(self._folder)
         self._looked_at = context.clock()
 
     def start(self) -> None:
-        """Make the edits again that a killed program left in the journal."""
-        restored = self._restored
-        if restored is not None and restored.edits:
-            self.context.post(Restored(restored.project, restored.summary(), restored.foreign_changes))
-        elif restored is not None:
-            self.context.post(Report(restored.summary()))
+        """Say who edits the project; make the edits again that a killed program left in the journal."""
+        if self._lock is None:
+            return
+        if self._journal is None:
+            self._tell_holder(was_ours=False)
+        elif self._lock.left_by is not None:
+            text = f"not let go of by {self._lock.left_by}: it may still be edited there, out of reach of this lock"
+            self.context.post(Report(text))
+        self._tell_restored()
 
     def project_changed(self, action: Action, before: AppState, after: AppState) -> None:
         """Journal an edit."""
-        self.note(after.project, name_of_edit(action, before, after))
+        if not after.read_only:
+            self.note(after.project, name_of_edit(action, before, after))
 
-    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:  # noqa: ARG002 - the protocol's
-        """Write or read the project."""
+    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:
+        """Write or read the project, or take it over."""
         match effect:
             case WriteProject(project, folder, overwrite):
-                self.save(project, folder, overwrite)
-                self.context.post(Envelope(ProjectSaved(project, folder, time.strftime("%H:%M")), sender))
+                self.save(project, folder, overwrite=overwrite, sender=sender)
             case ReadProject(folder):
                 self.context.post(Envelope(Reloaded(self.load(folder)), sender))
+            case TakeProjectOver() if self._lock is not None:
+                self._lock.take_over()
+                self._look(state)
             case _:
                 pass
 
@@ -66,32 +93,54 @@ class ProjectFolder(Service):
         now = self.context.clock()
         if now - self._looked_at >= LOOK_AT_DISK_S:
             self._looked_at = now
-            files = self.foreign_changes()
-            if files is not None and files != state.part(FilesState).foreign:
-                self.context.post(ChangedOnDisk(files))
+            self._look(state)
         return Due.NEVER
 
     def note(self, project: Project, what: str) -> None:
-        """Journal an edit; see `Journal.append`."""
-        if self._journal is not None:
-            self._journal.append(project, what)
-
-    def save(self, project: Project, folder: Path, overwrite: bool) -> None:
-        """Write a project; from then on it is kept in that folder.
+        """Journal an edit; see `Journal.append`.
 
         Raises
         ------
         ProjectError
-            somebody else has changed the files, and `overwrite` is False.
+            somebody else has taken the project over: this edit is on this page alone.
+        """
+        if self._lock is None:
+            return
+        hold = self._lock.look()
+        if hold is Hold.THEIRS:
+            self._lose()
+        if self._journal is None:
+            raise ProjectError(f"{what} is shown on this page alone: {self._lock.holder} has taken the project over")
+        try:
+            self._journal.append(project, what)
+        finally:
+            if hold is Hold.NOBODYS:
+                # A new project's folder has appeared with the edit.
+                self._lock.look()
+
+    def save(self, project: Project, folder: Path, *, overwrite: bool, sender: Sender) -> None:
+        """Write a project; from then on it is kept in that folder. Ask before another project is replaced.
+
+        Raises
+        ------
+        ProjectError
+            somebody else has changed the files and `overwrite` is False, or has taken the project over.
+        UsageError
+            the folder cannot be that of a copy.
         FileFormatError
             a file cannot be written.
         """
-        if self._journal is not None and folder == self._folder:
-            self._journal.save(project, overwrite=overwrite)
+        if self._folder is not None and os.path.abspath(folder) == os.path.abspath(self._folder):
+            folder = self._folder
+            self._save_here(project, overwrite=overwrite)
         else:
-            save_project(project, folder)
-            self._begin(folder, project)
+            found = project_in(folder)
+            if found and not overwrite:
+                self.context.post(Envelope(AskToReplace(folder, found), sender))
+                return
+            self._save_copy(project, folder, overwrite=overwrite)
         self._listing = _listing(folder)
+        self.context.post(Envelope(ProjectSaved(project, folder, time.strftime("%H:%M")), sender))
 
     def load(self, folder: Path) -> Project:
         """Read the project from its files again; the journal of what was edited until now ends.
@@ -102,40 +151,147 @@ class ProjectFolder(Service):
             a file cannot be read.
         """
         project = load_project(folder)
-        self._begin(folder, project)
+        if self._journal is not None:
+            self._journal.discard()
+            self._journal.close()
+            self._journal = Journal(folder, project)
+        self._listing = _listing(folder)
         return project
 
     def foreign_changes(self) -> tuple[str, ...] | None:
         """Return the files that somebody else has changed; none when nothing has happened since the last call."""
-        if self._journal is None:
-            return None
         listing = _listing(self._folder)
-        if listing == self._listing:
+        if self._journal is None or listing == self._listing:
             return None
         self._listing = listing
         return self._journal.foreign_changes()
-
-    def _begin(self, folder: Path, project: Project) -> None:
-        """Keep a project in a folder whose files hold it already."""
-        if self._journal is not None:
-            self._journal.discard()
-            self._journal.close()
-        self._folder, self._journal = folder, Journal(folder, project)
-        self._listing = _listing(folder)
 
     def close(self) -> None:
         """Bring the journal to the disk; it stays for the next start when something is unsaved."""
         if self._journal is not None:
             self._journal.close()
+        if self._lock is not None:
+            self._lock.release()
+
+    def _look(self, state: AppState) -> None:
+        """Find out who edits the project, look after the journal, and see what others have changed."""
+        if self._lock is None or self._folder is None:
+            return
+        hold = self._lock.look()
+        if self._journal is not None:
+            if hold is Hold.THEIRS:
+                self._lose()
+            else:
+                self._look_after_journal(state)
+        elif hold is Hold.THEIRS:
+            self._follow_holder(state)
+        elif hold is not Hold.TAKING_OVER:
+            self._begin_to_edit()
+
+    def _look_after_journal(self, state: AppState) -> None:
+        if self._journal is None:
+            return
+        for news in self._journal.check():
+            self.context.post(Report(news.text, failed=not news.is_good))
+        kept, files = self._journal.kept_elsewhere, state.part(FilesState)
+        if (self._journal.is_protecting, kept) != (files.is_protected, files.kept_in):
+            self.context.post(Protected(self._journal.is_protecting, kept))
+        foreign = self.foreign_changes()
+        if foreign is not None and foreign != files.foreign:
+            self.context.post(ChangedOnDisk(foreign))
+
+    def _follow_holder(self, state: AppState) -> None:
+        """Show what the one who edits the project has saved, and who that is."""
+        if self._lock is None or self._folder is None:
+            return
+        if str(self._lock.holder) != state.part(FilesState).holder:
+            self._tell_holder(was_ours=False)
+        listing = _listing(self._folder)
+        if listing == self._listing:
+            return
+        try:
+            project = load_project(self._folder)
+        except CommissionError:
+            return  # perhaps in the middle of a save: again at the next look
+        self._listing = listing
+        if project != state.project:
+            self.context.post(Reloaded(project))
+
+    def _begin_to_edit(self) -> None:
+        """Go on where the one who edited the project has left off, saved or not."""
+        if self._folder is None:
+            return
+        project = open_project(self._folder).project
+        self._restored = self._edit(self._folder, project)
+        self._listing = _listing(self._folder)
+        self.context.post(HeldByUs(project))
+        self._tell_restored()
+
+    def _edit(self, folder: Path, project: Project) -> FromJournal | None:
+        """Begin a journal; return what the last one held."""
+        remove_leftovers(folder)
+        restored = restore(folder, project)
+        self._journal = Journal(folder, project, restored)
+        return restored
+
+    def _lose(self) -> None:
+        """Edit no more: every edit until now is in the journal, and whoever has taken over makes it again."""
+        if self._journal is not None:
+            self._journal.close()
+            self._journal = None
+            self._listing = _listing(self._folder)
+            self._tell_holder(was_ours=True)
+
+    def _save_here(self, project: Project, *, overwrite: bool) -> None:
+        if self._lock is None or self._journal is None:
+            raise UsageError("the project is edited elsewhere; expected another folder to save a copy in")
+        if self._lock.look() is Hold.THEIRS:
+            self._lose()
+            raise ProjectError(f"not saved: {self._lock.holder} has taken the project over")
+        self._journal.save(project, overwrite=overwrite)
+        self._lock.look()
+
+    def _save_copy(self, project: Project, folder: Path, *, overwrite: bool) -> None:
+        """Write a copy; where that succeeds, let go of the folder until now."""
+        kept = save_copy(project, folder, force=overwrite)
+        if kept is not None:
+            self.context.post(Report(f"unsaved edits of the project that was there are kept in {kept}", failed=False))
+        if self._journal is not None:
+            self._journal.discard()
+            self._journal.close()
+        if self._lock is not None:
+            self._lock.release()
+        self._folder, self._lock = folder, ProjectLock(folder)
+        self._lock.look()
+        self._journal = Journal(folder, project)
+
+    def _tell_holder(self, *, was_ours: bool) -> None:
+        if self._lock is not None and self._lock.holder is not None:
+            self.context.post(HeldByOther(str(self._lock.holder), was_ours=was_ours))
+            log.warning("%s is edited by %s: read-only here", self._folder, self._lock.holder)
+
+    def _tell_restored(self) -> None:
+        """Have the edits made again that a journal held, or say that it could not be read."""
+        restored, self._restored = self._restored, None
+        if restored is not None and restored.edits:
+            self.context.post(Restored(restored.project, restored.summary(), restored.foreign_changes))
+        elif restored is not None:
+            self.context.post(Report(restored.summary()))
 
 
 def _listing(folder: Path | None) -> frozenset[tuple[str, int, int]]:
     """Names, times and sizes of the files beside the project: cheap to compare often."""
+    found: set[tuple[str, int, int]] = set()
     if folder is None or not folder.is_dir():
         return frozenset()
     with os.scandir(folder) as entries:
-        files = [entry for entry in entries if entry.is_file() and not entry.name.startswith(OWN_PREFIX)]
-        return frozenset((entry.name, entry.stat().st_mtime_ns, entry.stat().st_size) for entry in files)
+        for entry in entries:
+            try:
+                if entry.is_file() and not entry.name.startswith(OWN_PREFIX):
+                    found.add((entry.name, entry.stat().st_mtime_ns, entry.stat().st_size))
+            except OSError:
+                continue  # removed in between
+    return frozenset(found)
 
 
 def name_of_edit(action: Action, before: AppState, after: AppState) -> str:

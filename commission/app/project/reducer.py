@@ -7,9 +7,9 @@ from dataclasses import replace
 from commission.app.base.actions import Sender
 from commission.app.base.effects import Tell
 from commission.app.base.reducer import Outcome, reduce
-from commission.app.base.state import AppState, Edit, edited
+from commission.app.base.state import AppState, Edit, edited, refuse_read_only
 from commission.app.project import actions
-from commission.app.project.effects import ReadProject, WriteProject
+from commission.app.project.effects import ReadProject, TakeProjectOver, WriteProject
 from commission.app.project.state import FilesState
 from commission.errors import UsageError
 
@@ -31,13 +31,15 @@ def save(action: actions.Save, state: AppState, _sender: Sender) -> Outcome:
     folder = action.folder or state.folder
     if folder is None:
         raise UsageError("this project is bundled with the program and stays as it is; name a folder to save a copy in")
+    if folder == state.folder:
+        refuse_read_only(state)
     return Outcome(state, (WriteProject(state.project, folder, action.overwrite),))
 
 
 @reduce.register
 def project_saved(action: actions.ProjectSaved, state: AppState, _sender: Sender) -> Outcome:
     """From now on the project is kept where it was written."""
-    saved = replace(state, saved=action.project, folder=action.folder, last_edit=None, greeting="")
+    saved = replace(state, saved=action.project, folder=action.folder, read_only="", last_edit=None, greeting="")
     return Outcome(saved.with_part(FilesState(action.time_of_day)), (Tell(f"saved in {action.folder}", failed=False),))
 
 
@@ -48,6 +50,8 @@ def changed_on_disk(action: actions.ChangedOnDisk, state: AppState, _sender: Sen
     if action.files == files.foreign:
         return Outcome(state)
     text = f"changed on disk by somebody else: {', '.join(action.files)}; read it again, or save to overwrite it"
+    if files.kept_in is not None:
+        text = f"the folder {state.folder} is gone; Overwrite writes the project there anew"
     told = (Tell(text, failed=True),) if action.files else ()
     return Outcome(state.with_part(replace(files, foreign=action.files)), told)
 
@@ -62,8 +66,10 @@ def reload_project(_action: actions.Reload, state: AppState, _sender: Sender) ->
 
 @reduce.register
 def reloaded(action: actions.Reloaded, state: AppState, sender: Sender) -> Outcome:
-    """Take what the files hold: one undo step."""
+    """Take what the files hold: one undo step, unless somebody else edits them and this page only follows."""
     read = replace(state, saved=action.project).with_part(replace(state.part(FilesState), foreign=()))
+    if state.read_only:
+        return Outcome(replace(read, project=action.project, undo=(), redo=(), last_edit=None))
     return Outcome(edited(read, action.project, Edit("read again from disk", sender)))
 
 
@@ -75,3 +81,58 @@ def restored(action: actions.Restored, state: AppState, sender: Sender) -> Outco
     return Outcome(
         edited(greeted, action.project, Edit("restore unsaved edits", sender)), (Tell(action.text, failed=False),)
     )
+
+
+@reduce.register
+def ask_to_replace(action: actions.AskToReplace, state: AppState, _sender: Sender) -> Outcome:
+    """Ask before a copy replaces something."""
+    text = f"{action.folder} holds {action.holds}; it stays unless you answer Replace it"
+    return Outcome(state.with_part(replace(state.part(FilesState), question=action)), (Tell(text, failed=True),))
+
+
+@reduce.register
+def keep_other(_action: actions.KeepOther, state: AppState, _sender: Sender) -> Outcome:
+    """Replace nothing."""
+    return Outcome(state.with_part(replace(state.part(FilesState), question=None)))
+
+
+@reduce.register
+def take_over(_action: actions.TakeOver, state: AppState, _sender: Sender) -> Outcome:
+    """Take the project from whoever edits it elsewhere; nothing happens where that is nobody."""
+    return Outcome(state, (TakeProjectOver(),) if state.read_only else ())
+
+
+@reduce.register
+def held_by_other(action: actions.HeldByOther, state: AppState, _sender: Sender) -> Outcome:
+    """Show the project, but let nobody edit it."""
+    files = replace(state.part(FilesState), holder=action.holder, foreign=(), is_protected=True)
+    reason = f"it is edited by {action.holder}; Take over lets you edit it here, and makes it read-only there"
+    text = f"opened read-only: {reason}"
+    if action.was_ours:
+        text = f"taken over by {action.holder}, together with all edits made here; this page is read-only from now on"
+    held = replace(state, read_only=reason, greeting=text).with_part(files)
+    return Outcome(held, (Tell(text, failed=action.was_ours),))
+
+
+@reduce.register
+def held_by_us(action: actions.HeldByUs, state: AppState, _sender: Sender) -> Outcome:
+    """Edit the project from where it was left."""
+    files = replace(state.part(FilesState), holder="", foreign=())
+    held = replace(
+        state,
+        project=action.project,
+        saved=action.project,
+        read_only="",
+        greeting="",
+        undo=(),
+        redo=(),
+        last_edit=None,
+    )
+    return Outcome(held.with_part(files), (Tell("the project is edited here from now on", failed=False),))
+
+
+@reduce.register
+def protected(action: actions.Protected, state: AppState, _sender: Sender) -> Outcome:
+    """Show how unsaved edits are kept."""
+    files = replace(state.part(FilesState), is_protected=action.is_protected, kept_in=action.kept_in)
+    return Outcome(state.with_part(files))

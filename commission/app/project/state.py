@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
+
+from commission.app.project.actions import AskToReplace
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,3 +16,11 @@ class FilesState:
     """Time of day of the last save; empty: not saved in this session."""
     foreign: tuple[str, ...] = ()
     """Files of the project that somebody else has changed since they were read or saved."""
+    holder: str = ""
+    """Who else edits the project, in words; empty: nobody."""
+    is_protected: bool = True
+    """Whether all unsaved edits are in the journal."""
+    kept_in: Path | None = None
+    """Where unsaved edits are while the project's folder is gone; none: it is there."""
+    question: AskToReplace | None = None
+    """A copy that waits for an answer: something lies where it is to be written."""

@@ -13,7 +13,7 @@ from commission.app.base.inputs import show
 from commission.app.base.panel import BasePanel, Post, escaped, posting, shortened, write_label
 from commission.app.base.state import AppState, Step
 from commission.app.base.view import PageView
-from commission.app.project.actions import Reload, Save
+from commission.app.project.actions import Reload, Save, TakeOver
 from commission.app.project.state import FilesState
 
 LONGEST_NAME = 22
@@ -32,20 +32,27 @@ BUTTONS: tuple[Button, ...] = (
 
 def title(state: AppState) -> str:
     """Return the left end of the bar."""
-    if state.part(FilesState).foreign:
-        saved = f"changed on disk: {escaped(', '.join(state.part(FilesState).foreign))}"
-    elif state.is_changed:
-        saved = "unsaved"
-    elif state.part(FilesState).saved_at:
-        saved = f"saved {escaped(state.part(FilesState).saved_at)}"
-    else:
-        saved = "bundled project" if state.folder is None else "as on disk"
     return (
         "<div class='c-top' style='display:flex;align-items:center;padding:0 14px;gap:14px;font-size:13px;"
         "white-space:nowrap;overflow:hidden'>"
         f"<b>Commission</b><span style='opacity:.85'>{escaped(state.project.name)}</span>"
-        f"<span style='opacity:.55'>{saved}</span></div>"
+        f"<span style='opacity:.55'>{escaped(standing(state))}</span></div>"
     )
+
+
+def standing(state: AppState) -> str:
+    """Return how the project stands on disk, what is most urgent alone."""
+    files = state.part(FilesState)
+    ways = (
+        (files.holder, f"read-only: edited by {files.holder}"),
+        (not files.is_protected, "unsaved, and a crash would lose it: the journal cannot be written"),
+        (files.kept_in, f"its folder is gone; edits are kept in {files.kept_in}"),
+        (files.foreign, f"changed on disk: {', '.join(files.foreign)}"),
+        (state.is_changed, "unsaved"),
+        (files.saved_at, f"saved {files.saved_at}"),
+        (state.folder is None, "bundled project"),
+    )
+    return next((text for applies, text in ways if applies), "as on disk")
 
 
 def button_text(label: str, steps: tuple[Step, ...]) -> str:
@@ -89,6 +96,10 @@ class ProjectButtons(BasePanel):
             "Read again", hint="Take what somebody else has written; undo brings yours back.", visible=False
         )
         self._reload.on_click(posting(post, lambda _event: Reload()))
+        self._take_over = gui.add_button(
+            "Take over", hint="Edit the project here; where it is edited now, it becomes read-only.", visible=False
+        )
+        self._take_over.on_click(posting(post, lambda _event: TakeOver()))
 
     def draw_slowly(self, view: PageView) -> None:
         """Enable what can be done."""
@@ -96,7 +107,10 @@ class ProjectButtons(BasePanel):
         foreign = bool(state.part(FilesState).foreign)
         for button in (self._overwrite, self._reload):
             show(button, visible=foreign)
+        show(self._take_over, visible=bool(state.read_only))
         wanted = {"Undo": bool(state.undo), "Redo": bool(state.redo), "Save": state.is_changed and not foreign}
+        if state.read_only:
+            wanted = dict.fromkeys(wanted, False)
         for label, enabled in wanted.items():
             if self._buttons[label].disabled is enabled:
                 self._buttons[label].disabled = not enabled

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from commission.app.base import actions as page
-from commission.app.base.actions import ClickFloor, DragFloor
+from commission.app.base.actions import PROGRAM, ClickFloor, DragFloor
 from commission.app.base.state import NOTHING_SAVED, AppState
 from commission.app.editing import actions as editing
 from commission.app.editing.editor import Tool
@@ -69,10 +69,10 @@ def test_every_edit_of_the_map_survives_a_crash_before_the_first_save(tmp_path: 
         restored = restore(folder, open_project(folder).project)
         assert restored is not None
         assert restored.project == state.project
-    assert [path.name for path in folder.iterdir()] == [".commission.journal"]
+    assert sorted(path.name for path in folder.iterdir()) == [".commission.journal", ".commission.lock"]
     # One whole map, and rectangles of it.
     assert (folder / ".commission.journal").stat().st_size < 20_000
-    files.save(state.project, folder, False)
+    files.save(state.project, folder, overwrite=False, sender=PROGRAM)
     assert load_project(folder) == state.project
     assert restore(folder, load_project(folder)) is None
     files.close()

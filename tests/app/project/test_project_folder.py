@@ -1,24 +1,31 @@
 """A project kept on disk while it is edited: saved, journaled, restored, and never overwritten silently."""
 
+import os
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from commission.app.base import actions
-from commission.app.base.actions import ClickFloor, Join
-from commission.app.base.state import AppState
+from commission.app.base.actions import ClickFloor, Join, Sender
+from commission.app.base.effects import Effect
+from commission.app.base.state import NOTHING_SAVED, AppState
 from commission.app.editing import actions as editing
 from commission.app.editing.editor import Tool
-from commission.app.project.actions import ChangedOnDisk, Reload, Restored, Save
+from commission.app.project.actions import ChangedOnDisk, KeepOther, Reload, RenameProject, Restored, Save, TakeOver
 from commission.app.project.project_folder import ProjectFolder
 from commission.app.project.state import FilesState
+from commission.app.project.top_bar import standing
 from commission.app.runtime import Runtime
-from commission.errors import ProjectError
+from commission.errors import FileFormatError, ProjectError, UsageError
+from commission.io.journal import Journal
 from commission.io.journal_replay import restore
 from commission.io.project_file import load_project, save_project
+from commission.io.project_lock import ProjectLock
 from commission.site.project import Project
 from tests.app.asking import FEATURES, ME, by
+from tests.app.owning import Owner
 from tests.app.sites import room
 
 
@@ -32,6 +39,11 @@ class Kept:
         self.files = self.runtime.service(ProjectFolder)
         self.do(Join(), editing.ChooseTool(Tool.PLACE))
 
+    def start(self) -> None:
+        """Begin as the page does."""
+        self.files.start()
+        self.look()
+
     def do(self, *asked: actions.Action) -> None:
         for each in asked:
             self.runtime.handle(by(ME, each))
@@ -40,6 +52,23 @@ class Kept:
 
     def place(self, x: float, y: float) -> None:
         self.do(ClickFloor((x, y), 0.1))
+
+    def look(self) -> None:
+        """Let the service look at the folder, as it does every second."""
+        self.files._look(self.runtime.state)
+        self.do()
+        for message in self.runtime._drained():
+            self.runtime.handle(message)
+
+    def kill(self) -> None:
+        """End it as the system would: nothing is written any more, and the lock is free."""
+        assert self.files._lock is not None
+        os.close(self.files._lock._file)
+        self.files._lock._file = None
+
+    @property
+    def kept(self) -> FilesState:
+        return self.runtime.state.part(FilesState)
 
     @property
     def now(self) -> Project:
@@ -57,13 +86,13 @@ def test_every_edit_undo_and_redo_survives_a_crash_and_a_save_ends_the_journal(f
     kept.place(4.0, 3.0)
     kept.place(5.0, 3.0)
     kept.do(actions.Undo())
-    # Nothing is closed: the program is killed here.
+    kept.kill()
     restored = restore(folder, load_project(folder))
     assert restored is not None
     assert restored.project == kept.now
     assert "undo place R6" in restored.summary()
     again = Kept(folder)
-    again.do(Restored(restored.project, restored.summary()))
+    again.start()
     assert again.now == kept.now
     assert again.runtime.state.is_changed
     assert again.runtime.state.greeting == restored.summary()
@@ -118,3 +147,270 @@ def test_a_copy_saved_elsewhere_is_the_project_from_then_on(
     assert restored is not None
     assert restored.project == kept.now
     assert restore(folder, load_project(folder)) is None
+
+
+def test_a_second_server_shows_the_project_read_only_and_follows_what_the_first_one_saves(folder: Path) -> None:
+    first, second = Kept(folder), Kept(folder)
+    second.start()
+    assert second.kept.holder.startswith(f"process {os.getpid()} on ")
+    assert "opened read-only: it is edited by process" in second.runtime.state.greeting
+    first.place(4.0, 3.0)
+    for ask in (lambda: second.place(5.0, 3.0), lambda: second.do(Save()), lambda: second.do(RenameProject("Mine"))):
+        with pytest.raises(UsageError, match=r"read-only: it is edited by process \d+ on .*; Take over lets you edit"):
+            ask()
+    assert second.now == second.project
+    first.do(Save())
+    second.look()
+    assert second.now == first.now
+    assert not second.runtime.state.is_changed
+    # What it shows may be kept elsewhere, and is edited there.
+    second.do(Save(folder / "copy"))
+    assert second.runtime.state.read_only == second.kept.holder == ""
+    second.place(5.0, 3.0)
+    assert len(second.now.reflectors) == len(first.now.reflectors) + 1
+
+
+def test_whoever_takes_over_has_every_edit_and_the_first_one_becomes_read_only(folder: Path) -> None:
+    first, second = Kept(folder), Kept(folder)
+    second.start()
+    first.place(4.0, 3.0)
+    first.place(5.0, 3.0)
+    edited = first.now
+    second.do(TakeOver())
+    second.look()
+    # The first one has not looked yet: nothing is read before it has let go.
+    assert second.runtime.state.read_only
+    first.look()
+    assert first.kept.holder
+    assert "taken over by process" in first.runtime.state.greeting
+    with pytest.raises(UsageError, match="read-only"):
+        first.place(6.0, 3.0)
+    second.look()
+    assert second.now == edited
+    assert second.runtime.state.read_only == ""
+    assert "Restored 2 edits" in second.runtime.state.greeting
+    second.place(6.0, 3.0)
+    assert len(second.now.reflectors) == len(edited.reflectors) + 1
+    first.do(TakeOver())
+    second.look()
+    first.look()
+    assert first.now == second.now
+    first.do(Save())
+    assert load_project(folder) == first.now
+    first.files.close()
+    second.files.close()
+
+
+def test_an_edit_before_the_next_look_after_a_take_over_is_told_to_be_on_its_page_alone(folder: Path) -> None:
+    first, second = Kept(folder), Kept(folder)
+    second.start()
+    first.place(4.0, 3.0)
+    shared = first.now
+    second.do(TakeOver())
+    first.place(5.0, 3.0)
+    assert any("is shown on this page alone: process" in fault for fault in first.runtime.state.faults)
+    assert first.runtime.state.read_only
+    second.look()
+    assert second.now == shared
+
+
+@pytest.mark.parametrize("how", ["killed", "closed"])
+def test_a_project_whose_holder_is_gone_is_edited_by_the_one_who_waited(folder: Path, how: str) -> None:
+    first, second = Kept(folder), Kept(folder)
+    second.start()
+    first.place(4.0, 3.0)
+    if how == "killed":
+        first.kill()
+    else:
+        first.files.close()
+    second.look()
+    assert second.now == first.now
+    second.place(5.0, 3.0)
+    assert second.runtime.state.read_only == ""
+
+
+def test_an_edit_that_cannot_be_journaled_stands_and_its_effects_are_carried_out(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = Kept(folder)
+
+    def full(*_arguments: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as disk:
+        disk.setattr("commission.io.journal_file.os.write", full)
+        kept.place(4.0, 3.0)
+        kept.look()
+        assert len(kept.now.reflectors) == len(kept.project.reflectors) + 1
+        assert "a crash would lose this edit" in kept.runtime.state.faults[-1]
+        assert not kept.kept.is_protected
+        assert standing(kept.runtime.state) == "unsaved, and a crash would lose it: the journal cannot be written"
+    kept.look()
+    assert kept.kept.is_protected
+    assert standing(kept.runtime.state) == "unsaved"
+    kept.kill()
+    restored = restore(folder, load_project(folder))
+    assert restored is not None
+    assert restored.project == kept.now
+
+
+def test_the_journal_is_written_before_the_effects_of_an_edit(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = Kept(folder)
+    kept.place(4.0, 3.0)
+    seen: list[Project] = []
+
+    def look_at_journal(self: Runtime, effect: Effect, sender: Sender) -> None:
+        restored = restore(folder, kept.project)
+        assert restored is not None
+        seen.append(restored.project)
+
+    monkeypatch.setattr(Runtime, "_carry_out", look_at_journal)
+    theirs = replace(kept.now, name="Restored")
+    kept.do(Restored(theirs, "told to each browser: an effect"))
+    assert seen == [theirs]
+
+
+def test_a_deleted_folder_is_told_as_such_and_its_edits_are_kept_where_the_page_says(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+    kept = Kept(folder)
+    kept.place(4.0, 3.0)
+    shutil.rmtree(folder)
+    kept.look()
+    place = kept.kept.kept_in
+    assert place is not None
+    assert f"the project's folder {folder} was deleted or moved; all edits are kept in {place}" in (
+        kept.runtime.state.faults
+    )
+    assert standing(kept.runtime.state) == f"its folder is gone; edits are kept in {place}"
+    restored = restore(place, Project())
+    assert restored is not None
+    assert restored.project == kept.now
+    kept.do(Save(overwrite=True))
+    assert load_project(folder) == kept.now
+    kept.look()
+    assert kept.kept.kept_in is None
+    assert standing(kept.runtime.state).startswith("saved ")
+    kept.files.close()
+
+
+def test_a_deleted_journal_is_begun_anew_without_waiting_for_an_edit(folder: Path) -> None:
+    kept = Kept(folder)
+    kept.place(4.0, 3.0)
+    (folder / ".commission.journal").unlink()
+    kept.look()
+    assert "the journal of unsaved edits was deleted by somebody else" in kept.runtime.state.faults[-1]
+    kept.kill()
+    restored = restore(folder, load_project(folder))
+    assert restored is not None
+    assert restored.project == kept.now
+
+
+def test_a_copy_onto_another_project_is_asked_about_first(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    other = tmp_path_factory.mktemp("other")
+    theirs = replace(room(), name="Theirs")
+    save_project(theirs, other)
+    unsaved = Journal(other, theirs)
+    unsaved.append(replace(theirs, name="Unsaved"), "Rename")
+    unsaved.close()
+    content = unsaved.path.read_bytes()
+    kept = Kept(folder)
+    kept.place(4.0, 3.0)
+    kept.do(Save(other))
+    question = kept.kept.question
+    assert question is not None
+    assert question.holds.startswith("the project 'Theirs' and unsaved edits of a session that crashed or still runs")
+    kept.do(KeepOther())
+    assert kept.kept.question is None
+    assert load_project(other) == theirs
+    kept.do(Save(other))
+    kept.do(Save(other, overwrite=True))
+    assert kept.kept.question is None
+    assert load_project(other) == kept.now
+    (aside,) = other.glob(".commission.journal.replaced-*")
+    assert aside.read_bytes() == content
+    assert kept.runtime.state.folder == other
+    kept.files.close()
+
+
+def test_a_copy_onto_a_project_that_somebody_edits_or_onto_no_folder_is_refused(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    other = tmp_path_factory.mktemp("other")
+    save_project(replace(room(), name="Theirs"), other)
+    lock = ProjectLock(other)
+    lock.look()
+    kept = Kept(folder)
+    with pytest.raises(UsageError, match=r"holds the project 'Theirs', edited by process .*; expected another folder"):
+        kept.do(Save(other, overwrite=True))
+    (folder / "file").write_text("")
+    for place, said in (
+        (folder / "file", "is a file; expected a folder"),
+        (Path("a\0b"), r"no path \(embedded null byte"),
+    ):
+        with pytest.raises(UsageError, match=said):
+            kept.do(Save(place))
+    assert kept.runtime.state.folder == folder
+    kept.place(4.0, 3.0)
+    assert restore(folder, kept.project) is not None
+
+
+def test_a_copy_that_cannot_be_written_to_its_end_does_not_stay_and_the_project_stays_where_it_is(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = Kept(folder)
+    kept.place(4.0, 3.0)
+
+    def full(*_arguments: object) -> str:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("commission.io.project_file.project_text", full)
+    with pytest.raises(FileFormatError, match="No space left on device"):
+        kept.do(Save(folder / "new" / "copy"))
+    assert not (folder / "new").exists()
+    assert kept.runtime.state.folder == folder
+    kept.kill()
+    restored = restore(folder, kept.project)
+    assert restored is not None
+    assert restored.project == kept.now
+
+
+def test_changes_by_others_before_a_crash_are_asked_about_after_it(folder: Path) -> None:
+    kept = Kept(folder)
+    kept.place(4.0, 3.0)
+    save_project(replace(kept.project, name="Theirs"), folder)
+    kept.look()
+    assert kept.kept.foreign == ("project.yaml",)
+    kept.kill()
+    again = Kept(folder)
+    again.start()
+    assert again.kept.foreign == ("project.yaml",)
+    assert again.now == kept.now
+    with pytest.raises(ProjectError, match=r"changed on disk by somebody else: project\.yaml"):
+        again.do(Save())
+    assert load_project(folder).name == "Theirs"
+
+
+def test_a_damaged_journal_is_told_when_the_page_opens(folder: Path) -> None:
+    (folder / ".commission.journal").write_text("no journal")
+    kept = Kept(folder)
+    kept.start()
+    (aside,) = folder.glob(".commission.journal.damaged-*")
+    assert f"kept as {aside}" in kept.runtime.state.faults[-1]
+
+
+def test_a_new_project_is_locked_as_soon_as_its_folder_is_there(tmp_path: Path) -> None:
+    state = AppState(project=Project(), saved=NOTHING_SAVED, folder=tmp_path / "new")
+    first, second = (Owner(ProjectFolder, state).service for _ in range(2))
+    assert not (tmp_path / "new").exists()
+    first.note(Project(name="first"), "Rename")
+    with pytest.raises(ProjectError, match="Rename is shown on this page alone: process"):
+        second.note(Project(name="second"), "Rename")
+    restored = restore(tmp_path / "new", Project())
+    assert restored is not None
+    assert restored.project.name == "first"
+    first.close()
+    second.close()
