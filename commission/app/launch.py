@@ -11,12 +11,12 @@ from collections.abc import Callable, Generator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import FrameType
-from urllib.parse import quote
 
 import viser
 
 from commission.app.ambiguity import feature as ambiguity
 from commission.app.base import page_feature
+from commission.app.base.access import CLEAR_TEXT, Access, address_here, announced
 from commission.app.base.extent import extent_of
 from commission.app.base.server import start_server
 from commission.app.base.state import MAGNIFICATIONS, NOTHING_SAVED, AppState
@@ -68,10 +68,8 @@ SEEN_SHARE = 0.02
 
 def serve(
     project: Path,
+    access: Access,
     *,
-    host: str = "127.0.0.1",
-    port: int = 8080,
-    token: str | None = None,
     open_browser: bool = True,
     recording: Path | None = None,
     demo: bool = False,
@@ -81,7 +79,7 @@ def serve(
     Parameters
     ----------
     project : folder of the project; one that holds none, or does not exist yet, begins a new one.
-    host, port, token : where, and what a browser must bring; see `start_server`.
+    access : where, and what a browser must bring.
     open_browser : whether to open the page in this computer's browser.
     recording : what to play; none: choose on the page.
     demo : whether the project is a bundled one, which is never written to; its first route is driven at once.
@@ -95,16 +93,18 @@ def serve(
     loaded, folder = opened.project, None if demo else opened.folder
     with ExitStack() as open_things:
         # Ctrl-C may come at any moment from here on, and what is running would keep the program alive.
-        server = start_server(host, port, token)
+        token = None if access.token is None else access.token.text
+        server = start_server(access.host, access.port, token, access.public_url)
         open_things.callback(server.stop)
         source = first_source(loaded, recording, demo)
         runtime = open_page(server, loaded, folder=folder, source=source, is_new=opened.is_new)
         open_things.callback(runtime.stop)
-        address = f"http://{host}:{server.get_port()}/" + (f"?token={quote(token)}" if token else "")
         wait_for_interruption = open_things.enter_context(interruption())
-        log.info("page at %s", address)
+        log.info("page at %s", announced(access, server.get_port()))
+        if access.lets_others_in and access.public_url is None:
+            log.warning(CLEAR_TEXT)
         if open_browser:
-            webbrowser.open(address)
+            webbrowser.open(address_here(access, server.get_port()))
         wait_for_interruption()
         end_at_last()
 

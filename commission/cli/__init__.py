@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
+from commission.app.base.logs import SHOW_TRACEBACK, one_line_each
 from commission.cli import ambiguity as confusing
 from commission.cli import convert as converting
 from commission.cli import coverage as covering
@@ -26,7 +27,6 @@ from commission.errors import CommissionError
 
 EXIT_ERROR = 2
 EXIT_INTERRUPTED = 130
-SHOW_TRACEBACK = "COMMISSION_TRACEBACK"
 
 COMMANDS: dict[str, type[Command]] = {
     "demo": page.Demo,
@@ -50,7 +50,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     arguments : command and its options; those of the process when None.
     """
     try:
-        parsing.parse(COMMANDS, arguments).run()
+        command = parsing.parse(COMMANDS, arguments)
+        with one_line_each():
+            command.run()
         sys.stdout.flush()
     except KeyboardInterrupt:
         sys.exit(EXIT_INTERRUPTED)

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import logging
 import sys
-from collections.abc import Generator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from tyro.conf import Positional, arg
+from tyro.conf import Positional, UseAppendAction, arg
 
 from commission.errors import UsageError
 
@@ -23,11 +21,18 @@ class _Page:
     """Where the page is served."""
 
     host: str = "127.0.0.1"
-    """Address to listen on; any other than this computer's own needs --token."""
+    """Address to listen on; any other than this computer's own needs a token."""
     port: int = DEFAULT_PORT
     """TCP port; 0 takes a free one and prints it."""
     token: Annotated[str | None, arg(metavar="TEXT")] = None
-    """Secret that a browser must bring, at least when --host is not this computer's own. None: none is asked for."""
+    """Secret of at least 16 letters that a browser must bring; `auto` makes one and prints it. None: that of the
+    variable COMMISSION_TOKEN, or none at all, which only this computer's own address allows."""
+    token_file: Annotated[Path | None, arg(metavar="FILE")] = None
+    """File whose first line is that secret."""
+    public_url: Annotated[str | None, arg(metavar="URL")] = None
+    """Address of a proxy with TLS in front of the page, such as https://agv.example.com; needs a token."""
+    files: Annotated[UseAppendAction[tuple[Path, ...]], arg(metavar="DIR")] = ()
+    """Folder that browsers of other computers may read from and save to, beside the project's own; repeatable."""
     open: bool = True
     """Whether to open the page in this computer's browser."""
 
@@ -35,35 +40,20 @@ class _Page:
         """Serve the page until it is interrupted."""
         if not 0 <= self.port <= LAST_PORT:
             raise UsageError(f"--port is {self.port}; expected 0 to {LAST_PORT}")
+        from commission.app.base.access import Access, chosen_token
+        from commission.app.base.logs import told_on
         from commission.app.launch import serve
 
         # Ctrl-C is how the page is meant to be closed.
-        with _told_on_stdout(), contextlib.suppress(KeyboardInterrupt):
-            serve(
-                project,
+        with told_on(sys.stdout), contextlib.suppress(KeyboardInterrupt):
+            access = Access(
                 host=self.host,
                 port=self.port,
-                token=self.token,
-                open_browser=self.open,
-                recording=recording,
-                demo=demo,
+                token=chosen_token(self.token, self.token_file),
+                public_url=self.public_url,
+                files=tuple(self.files),
             )
-
-
-@contextlib.contextmanager
-def _told_on_stdout() -> Generator[None]:
-    """Let what the page logs for the user, its address above all, appear on stdout."""
-    handler = logging.StreamHandler(sys.stdout)
-    handler.setFormatter(logging.Formatter("%(message)s"))
-    logger = logging.getLogger("commission")
-    before = logger.level
-    logger.addHandler(handler)
-    logger.setLevel(logging.INFO)
-    try:
-        yield
-    finally:
-        logger.removeHandler(handler)
-        logger.setLevel(before)
+            serve(project, access, open_browser=self.open, recording=recording, demo=demo)
 
 
 @dataclass(frozen=True, kw_only=True)
