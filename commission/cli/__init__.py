@@ -15,6 +15,7 @@ from commission.app.base.logs import SHOW_TRACEBACK, one_line_each
 from commission.cli import ambiguity as confusing
 from commission.cli import convert as converting
 from commission.cli import coverage as covering
+from commission.cli import inspect as inspecting
 from commission.cli import localize as localizing
 from commission.cli import parsing
 from commission.cli import place as placing
@@ -33,6 +34,7 @@ COMMANDS: dict[str, type[Command]] = {
     "serve": page.Serve,
     "simulate": simulating.Simulate,
     "localize": localizing.Localize,
+    "inspect": inspecting.Inspect,
     "coverage": covering.Coverage,
     "predict": predicting.Predict,
     "ambiguity": confusing.Ambiguity,

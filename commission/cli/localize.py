@@ -35,16 +35,22 @@ class Localize:
     force: bool = False
     """Whether files in DIR that this command did not write are overwritten; its own earlier results always are."""
 
+    strict: bool = False
+    """Refuse a recording that cannot be what it says (units, clocks, gaps, thresholds) instead of noting it."""
+
     def run(self) -> None:
         """Localize, write, and tell in a few lines how it went."""
         given = None if self.initial_pose is None else initial_pose(self.initial_pose)
 
+        from commission.errors import SourceError
         from commission.io.overwriting import result_folder
         from commission.io.project_file import apply_settings, load_project
         from commission.io.recordings.base import load_log
         from commission.io.results import DETECTIONS, ESTIMATES, SUMMARY, write_results
         from commission.localization import whole_run
+        from commission.studies.plausibility import PlausibilityInput, plausibility
         from commission.studies.run import RunInput, judged_run, summary
+        from commission.studies.run_findings import run_findings
         from commission.studies.start import start_of
 
         names, sources = (ESTIMATES, DETECTIONS, SUMMARY), (self.recording, self.project)
@@ -53,13 +59,18 @@ class Localize:
         project = dataclasses.replace(project, parameters=apply_settings(project.parameters, self.set))
         log = load_log(self.recording)
         start = start_of(project, log, given and given.pose, given and given.sigmas)
+        if self.strict:
+            for finding in plausibility(PlausibilityInput.of(project, log)):
+                raise SourceError(f"{self.recording}: {finding}")
 
         whole_run.warm_up()
         result = judged_run(RunInput.of(project, log, start))
+        findings = [str(finding) for finding in run_findings(result)]
 
         with out.writing() as folder:
-            write_results(folder, result.columns, summary(result))
-        sys.stdout.write("\n".join([*_report(result), f"Written to   {self.out}"]) + "\n")
+            write_results(folder, result.columns, summary(result) | {"findings": findings})
+        notes = [f"Note         {finding}" for finding in findings]
+        sys.stdout.write("\n".join([*_report(result), *notes, f"Written to   {self.out}"]) + "\n")
 
 
 def _report(result: RunResult) -> list[str]:
@@ -74,9 +85,13 @@ def _report(result: RunResult) -> list[str]:
         f"Start        x {x:.3f} m, y {y:.3f} m, heading {math.degrees(theta):.1f} deg ({start.origin.value})",
         f"Detections   {result.count(Status.INLIER)} inliers, "
         f"{result.count(Status.OUTLIER_DETECTOR)} outliers of the detector, "
-        f"{result.count(Status.OUTLIER_ASSOCIATION)} of the association; mean NIS {result.nis_mean:.2f}",
-        f"Supervisor   operational {100.0 * result.operational_fraction:.1f} %; fail episodes: {len(result.episodes)}"
-        + "".join(_longest(result)),
+        f"{result.count(Status.OUTLIER_ASSOCIATION)} of the association",
+        f"NIS          mean {result.nis_mean:.2f} of the accepted ({result.nis_expected:.2f} is consistent), "
+        f"{result.nis_before_gate_mean:.2f} of all near a reflector; {100.0 * result.rejected_fraction:.1f} % rejected",
+        f"Unseen       {100.0 * result.unseen_fraction:.1f} % of the cycles without an accepted detection, "
+        f"{result.longest_unseen:.1f} s at most",
+        f"Supervisor   operational {100.0 * result.operational_fraction:.1f} %, lost "
+        f"{100.0 * result.lost_fraction:.1f} %; fail episodes: {len(result.episodes)}" + "".join(_longest(result)),
     ]
     errors = result.statistics
     if errors is None:

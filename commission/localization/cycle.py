@@ -17,9 +17,10 @@ from commission.localization.association import INLIER, NOBODY, associate
 from commission.localization.kalman import correct
 from commission.localization.odometry import OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.rejection import rejects_the_world, weigh
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
-from commission.localization.supervisor import OPERATIONAL, supervise
+from commission.localization.supervisor import FAIL, LOST, OPERATIONAL, supervise
 
 
 class Cycle(NamedTuple):
@@ -44,7 +45,15 @@ def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
     """
     belief, motion = advance(state.belief, state.motion, stamp_ns, dx, dy, dtheta, noise)
     return FilterState(
-        belief, stamp_ns, motion, state.mode, state.output, state.output_ns, stamp_ns, state.sensor_detects
+        belief,
+        stamp_ns,
+        motion,
+        state.mode,
+        state.evidence,
+        state.output,
+        state.output_ns,
+        stamp_ns,
+        state.sensor_detects,
     )
 
 
@@ -78,7 +87,8 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
 
     Notes
     -----
-    No formula: `reach`, `associate`, `correct` and `supervise` in turn: Sobreira et al. 2016, Algorithms 1, 3 and 4.
+    No formula: `reach`, `associate`, `correct` and `supervise` in turn: Sobreira et al. 2016, Algorithms 1, 3 and 4;
+    then the rule by rejections, which overrules it.
     """
     prior, motion = reach(state.belief, state.motion, stamp_ns, model.odometry)
     associate(
@@ -111,10 +121,28 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
                 model.observation,
             )
         reflectors[i] = int(places[entry, 3])
-    mode = supervise(state.mode, posterior, model.limits)
+    evidence = weigh(
+        state.evidence,
+        stamp_ns,
+        prior,
+        first,
+        last,
+        detections,
+        model.observation,
+        model.cells,
+        places,
+        cell_offsets,
+        status,
+        model.rejection,
+    )
+    was_lost = state.mode == LOST
+    mode = supervise(FAIL if was_lost else state.mode, posterior, model.limits)
+    if rejects_the_world(was_lost, evidence, model.rejection):
+        mode = LOST
     output, output_ns = state.output, state.output_ns
     if mode == OPERATIONAL:
         output, output_ns = posterior, stamp_ns
     return Cycle(
-        prior, FilterState(posterior, stamp_ns, motion, mode, output, output_ns, stamp_ns, state.sensor_detects)
+        prior,
+        FilterState(posterior, stamp_ns, motion, mode, evidence, output, output_ns, stamp_ns, state.sensor_detects),
     )

@@ -12,10 +12,14 @@ from commission.geometry.arrays import FloatArray, IntArray
 
 
 class Mode(IntEnum):
-    """State of the uncertainty supervisor (Sobreira et al. 2016, Algorithm 4)."""
+    """State of the supervisor: of its rule by the covariance (Sobreira et al. 2016, Algorithm 4) and by rejections."""
 
     OPERATIONAL = 0
+    """The vehicle may drive on the estimate."""
     FAIL = 1
+    """The covariance is too large: the output is withheld."""
+    LOST = 2
+    """Too many detections fit no reflector, however small the covariance is: the output is withheld."""
 
 
 class Status(IntEnum):
@@ -47,9 +51,9 @@ class Estimate:
     prior: Belief
     """After *predict*, before any detection of this scan; validation ellipses come from it."""
     posterior: Belief
-    """The filter's own state after *correct*; it goes on in fail mode."""
+    """The filter's own state after *correct*; it goes on whatever the mode is."""
     output: Belief
-    """What the vehicle is given: the posterior, or in fail mode the last one from before (withheld)."""
+    """What the vehicle is given: the posterior, or while not operational the last one from before (withheld)."""
     mode: Mode
     """State of the supervisor after this scan."""
     detections: FloatArray

@@ -15,6 +15,7 @@ from commission.localization.estimate import Belief
 from commission.localization.observation import ObservationModel, observation_model, validation_ellipses
 from commission.localization.odometry import OdometryNoise, odometry_noise
 from commission.localization.reflector_index import Cells, ReflectorIndex, build_index
+from commission.localization.rejection import RejectionRule, rejection_rule
 from commission.localization.supervisor import SupervisorLimits, supervisor_limits
 from commission.site.parameters import Parameters
 from commission.site.project import Project
@@ -30,6 +31,7 @@ class FilterModel(NamedTuple):
     cells: Cells
     gate: Gate
     limits: SupervisorLimits
+    rejection: RejectionRule
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +59,7 @@ class LocalizerSetup:
             index.cells,
             gate_of(self.parameters.association),
             supervisor_limits(self.parameters.supervisor),
+            rejection_rule(self.parameters.supervisor),
         )
         object.__setattr__(self, "index", index)
         object.__setattr__(self, "filter", model)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from commission.localization.estimate import Belief, Mode
 from commission.localization.odometry import AT_REST, Motion
 from commission.localization.pose_gaussian import PoseGaussian, from_belief, to_belief
+from commission.localization.rejection import NO_EVIDENCE, Evidence
 
 NO_RECORD_NS = -(2**63)
 """Stamp of the newest record before there is one: no stamp is older [ns]."""
@@ -26,6 +27,8 @@ class FilterState(NamedTuple):
     """Last odometry, and how far the belief has gone ahead of it."""
     mode: int
     """State of the supervisor after the newest scan, a `Mode`."""
+    evidence: Evidence
+    """How many detections of late were accepted and rejected."""
     output: PoseGaussian
     """What the vehicle is given: the belief of the last operational cycle, before the first one the start."""
     output_ns: int
@@ -45,6 +48,7 @@ def state_at_start(initial: Belief) -> FilterState:
         belief_ns=stamp_ns,
         motion=AT_REST,
         mode=int(Mode.OPERATIONAL),
+        evidence=NO_EVIDENCE._replace(stamp_ns=stamp_ns),
         output=belief,
         output_ns=stamp_ns,
         newest_ns=NO_RECORD_NS,

@@ -16,6 +16,7 @@ from commission.site.parameters import SupervisorParameters
 
 OPERATIONAL = int(Mode.OPERATIONAL)
 FAIL = int(Mode.FAIL)
+LOST = int(Mode.LOST)
 
 
 class SupervisorLimits(NamedTuple):

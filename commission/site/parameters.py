@@ -143,7 +143,7 @@ class AssociationParameters:
         check_fields(self, "association.")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SupervisorParameters:
     """When the estimate is no longer good enough to drive on (Algorithm 4)."""
 
@@ -163,6 +163,30 @@ class SupervisorParameters:
         float, Quantity(label="Recovery ratio", bounds=Bounds.at_least(1.0), step=0.1, slider=(1.0, 10.0))
     ] = 2.0
     """The vehicle may drive again once every 2-sigma is below its limit divided by this ratio, R_B."""
+    rejection_enabled: Annotated[bool, Switch("Lost by rejections")] = True
+    """Whether a vehicle whose detections fit no reflector counts as lost, however small its covariance is."""
+    rejection_window: Annotated[
+        float, Quantity(label="Window", unit="s", bounds=POSITIVE, step=0.1, slider=(0.1, 10.0))
+    ] = 0.6
+    """Time after which a detection counts a third in the shares of rejected ones; longer where there are few."""
+    rejection_evidence: Annotated[
+        float, Quantity(label="Evidence", unit="detections", bounds=Bounds.at_least(1.0), step=1.0, slider=(5.0, 100.0))
+    ] = 20.0
+    """Detections that the shares of rejected ones are taken of at least: a few rejected ones mean nothing."""
+    rejection_reach: Annotated[
+        float, Quantity(label="Near a reflector", unit="m", bounds=POSITIVE, step=0.1, slider=(0.1, 5.0))
+    ] = 1.0
+    """Distance up to which a rejected detection is near a reflector of the map: that one, seen from a wrong pose."""
+    rejection_near_limit: Annotated[
+        float,
+        Quantity(label="Rejected near", shown=PERCENT, bounds=Bounds.inside(0.0, 1.0), step=1.0, slider=(5.0, 95.0)),
+    ] = 0.4
+    """Share of rejected detections near reflectors, among those and the accepted, beyond which the vehicle is lost."""
+    rejection_limit: Annotated[
+        float,
+        Quantity(label="Rejected at all", shown=PERCENT, bounds=Bounds.inside(0.0, 1.0), step=1.0, slider=(5.0, 95.0)),
+    ] = 0.62
+    """Share of all rejected detections, false ones among people and shiny things too, beyond which it is lost."""
 
     def __post_init__(self) -> None:
         check_fields(self, "supervisor.")

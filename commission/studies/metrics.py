@@ -246,10 +246,10 @@ def _mean_of_known(values: FloatArray) -> float:
 
 @dataclass(frozen=True, slots=True)
 class FailEpisode:
-    """One stretch of cycles in fail mode."""
+    """One stretch of cycles in which the vehicle may not drive: the mode is `fail` or `lost`."""
 
     start_ns: int
-    """Stamp of the first cycle in fail mode [ns]."""
+    """Stamp of the first of them [ns]."""
     end_ns: int
     """Stamp of the first operational cycle after it; of the run's last cycle when it did not recover [ns]."""
     recovered: bool
@@ -257,14 +257,14 @@ class FailEpisode:
 
 
 def fail_episodes(stamps_ns: IntArray, modes: NDArray[np.integer]) -> tuple[FailEpisode, ...]:
-    """Stretches of a run in fail mode, in order.
+    """Stretches of a run in which the vehicle may not drive, in order.
 
     Parameters
     ----------
     stamps_ns : (K,) stamp of each cycle [ns].
     modes : (K,) `Mode` after each cycle.
     """
-    failing = np.concatenate([[False], modes == Mode.FAIL, [False]])
+    failing = np.concatenate([[False], modes != Mode.OPERATIONAL, [False]])
     edges = np.flatnonzero(failing[1:] != failing[:-1])
     count = len(stamps_ns)
     return tuple(

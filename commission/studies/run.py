@@ -112,6 +112,43 @@ class RunResult:
         inlier = self.columns.status == Status.INLIER
         return float(np.mean(self.columns.d2[inlier])) if inlier.any() else math.nan
 
+    @property
+    def nis_expected(self) -> float:
+        """Mean that a consistent filter has behind the gate: 2 - g e^(-g/2) / (1 - e^(-g/2)), chi-square cut at g."""
+        gate = self.columns.segments[0].setup.filter.gate
+        if not gate.enabled:
+            return 2.0
+        beyond = math.exp(-0.5 * gate.d2)
+        return 2.0 - gate.d2 * beyond / (1.0 - beyond)
+
+    @property
+    def nis_before_gate_mean(self) -> float:
+        """Mean squared Mahalanobis distance of all detections that have a reflector near, accepted or not."""
+        known = np.isfinite(self.columns.d2) & (self.columns.status != Status.OUTLIER_DETECTOR)
+        return float(np.mean(self.columns.d2[known])) if known.any() else math.nan
+
+    @property
+    def lost_fraction(self) -> float:
+        """Share of the cycles in which the supervisor says that the vehicle is lost [0..1]."""
+        return float(np.mean(self.columns.modes == Mode.LOST))
+
+    @property
+    def rejected_fraction(self) -> float:
+        """Share of the detections that the association filter rejects [0..1]; NaN without detections."""
+        accepted, rejected = self.count(Status.INLIER), self.count(Status.OUTLIER_ASSOCIATION)
+        return rejected / (accepted + rejected) if accepted + rejected else math.nan
+
+    @property
+    def unseen_fraction(self) -> float:
+        """Share of the cycles without any accepted detection [0..1]."""
+        return float(np.mean(self.counts[:, Status.INLIER] == 0))
+
+    @property
+    def longest_unseen(self) -> float:
+        """Longest time between two accepted detections, or to either end of the run [s]."""
+        seen = self.times[self.counts[:, Status.INLIER] > 0]
+        return float(np.diff(np.concatenate((self.times[:1], seen, self.times[-1:]))).max())
+
     def count(self, status: Status) -> int:
         """Return the number of detections of one status."""
         return int(self.counts[:, status].sum())
@@ -232,12 +269,19 @@ def summary(result: RunResult) -> dict[str, Number]:
         "outliers_detector": result.count(Status.OUTLIER_DETECTOR),
         "outliers_association": result.count(Status.OUTLIER_ASSOCIATION),
         "operational_fraction": result.operational_fraction,
+        "lost_fraction": result.lost_fraction,
         "fail_episodes": len(result.episodes),
         "nis_mean": result.nis_mean,
+        "nis_expected": result.nis_expected,
+        "nis_before_gate_mean": result.nis_before_gate_mean,
+        "rejected_fraction": result.rejected_fraction,
+        "unseen_fraction": result.unseen_fraction,
+        "longest_unseen_s": result.longest_unseen,
         "microseconds_per_cycle": result.microseconds_per_cycle,
     }
     if result.statistics is not None:
         entries |= {
+            "reference_cycles": result.statistics.compared,
             "position_rmse_m": result.statistics.position_rmse,
             "position_median_m": result.statistics.position_median,
             "position_p95_m": result.statistics.position_p95,

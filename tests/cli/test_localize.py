@@ -6,10 +6,18 @@ import pytest
 
 KEYS = [
     *("cycles", "duration_s", "inliers", "outliers_detector", "outliers_association", "operational_fraction"),
-    *("fail_episodes", "nis_mean", "microseconds_per_cycle"),
+    *("lost_fraction", "fail_episodes", "nis_mean", "nis_expected", "nis_before_gate_mean"),
+    *("rejected_fraction", "unseen_fraction", "longest_unseen_s", "microseconds_per_cycle"),
 ]
 KEYS_WITH_REFERENCE = [
-    *("position_rmse_m", "position_median_m", "position_p95_m", "position_max_m", "heading_rmse_rad"),
+    *(
+        "reference_cycles",
+        "position_rmse_m",
+        "position_median_m",
+        "position_p95_m",
+        "position_max_m",
+        "heading_rmse_rad",
+    ),
     *("anees", "anees_position", "wrong_while_operational"),
 ]
 ESTIMATES = "stamp_ns,x,y,theta,var_x,cov_xy,cov_xtheta,var_y,cov_ytheta,var_theta,mode,inliers,outliers"
@@ -26,7 +34,7 @@ def test_the_results_are_those_of_the_recording(commission, project, recording, 
     code, told, err = commission("localize", project, recording, "--out", out)
     assert (code, err) == (0, "")
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    assert list(summary) == KEYS + KEYS_WITH_REFERENCE
+    assert list(summary) == [*KEYS, *KEYS_WITH_REFERENCE, "findings"]
     assert summary["cycles"] == 61
     assert summary["duration_s"] == pytest.approx(12.0)
     assert summary["inliers"] + summary["outliers_association"] == 61 * 5
@@ -61,7 +69,7 @@ def test_without_a_reference_the_errors_are_left_out_and_the_route_says_where_it
     assert code == 0
     assert "start of the first route" in told
     assert "errors are unknown" in told
-    assert list(json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))) == KEYS
+    assert list(json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))) == [*KEYS, "findings"]
 
 
 @pytest.mark.parametrize("form", [["--initial-pose", "-0.1,0.1,-0.01"], ["--initial-pose=-0.1,0.1,-0.01,0.2,0.2,0.1"]])

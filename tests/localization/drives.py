@@ -43,6 +43,8 @@ class Plan:
     reach: float = 15.0
     beams: int = 0
     """Beams of raw scans; 0: the sensor detects."""
+    slip: float = 0.0
+    """Turn that the odometry reports and the vehicle does not make, halfway [rad]."""
     both_after: int = -1
     """Scan from which the sensor also sends detections of its own."""
 
@@ -92,7 +94,8 @@ def random_drive(setup: LocalizerSetup, rng: np.random.Generator, plan: Plan) ->
             between = se2.compose(pose, se2.exp(share * se2.log(happened)))
             _scan(records, truth, pending.pop(0), between, setup, rng, plan)
         pose = se2.compose(pose, happened)
-        records.append(Odometry(stamp, moved))
+        slips = plan.slip != 0.0 and 0 <= stamp - stop_ns // 2 < plan.odometry_ns
+        records.append(Odometry(stamp, moved + np.array([0.0, 0.0, plan.slip]) if slips else moved))
         while pending and pending[0] == stamp:
             _scan(records, truth, pending.pop(0), pose, setup, rng, plan)
     return Drive(records, Belief(0, start, covariance), np.array(truth))

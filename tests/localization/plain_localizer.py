@@ -52,6 +52,8 @@ class PlainLocalizer:
         self.odometry_s: float | None = None
         self.belief_s = self.period_s = 0.0
         self.last_move, self.ahead = np.eye(3), np.eye(3)
+        self.was_lost, self.counted_at = False, self.initial.stamp_ns * 1e-9
+        self.weights: dict[int | None, list[tuple[float, bool]]] = {1: [], None: []}
 
     def run(self, log: RecordLog) -> list[dict]:
         events = [(stamp, 0, k) for k, stamp in enumerate(log.odometry_stamps_ns)]
@@ -147,6 +149,7 @@ class PlainLocalizer:
                 self.mean[2] = turned(self.mean[2])
                 self.cov = A @ self.cov @ A.T + K @ R @ K.T
         self.supervise()
+        self.count_rejections(now, prior[0], measured, status)
         return {
             "mean": self.mean.copy(),
             "cov": self.cov.copy(),
@@ -158,10 +161,38 @@ class PlainLocalizer:
             "d2": d2s,
         }
 
+    def count_rejections(self, now: float, prior: Array, measured: Array, status: list[str]) -> None:
+        """The rule by rejections, over lists: every past detection keeps a weight that is forgotten."""
+        p = self.parameters.supervisor
+        place = prior[:2] + rotation(prior[2]) @ self.scanner.mounting[:2]
+        fresh = []
+        for (distance, bearing), kept in zip(measured, status, strict=True):
+            angle = prior[2] + self.scanner.mounting[2] + bearing
+            seen = place + distance * np.array([math.cos(angle), math.sin(angle)])
+            nearest = np.linalg.norm(self.reflectors.centers - seen, axis=1).min() if len(self.reflectors) else math.inf
+            fresh.append((kept == "inlier", kept == "inlier" or nearest <= p.rejection_reach))
+        shares = []
+        for which, limit in ((1, p.rejection_near_limit), (None, p.rejection_limit)):
+            weights = self.weights[which]
+            total = sum(weight for weight, _ in weights)
+            kept = math.exp(-(now - self.counted_at) / p.rejection_window)
+            if total > 0.0:
+                kept = max(kept, min(1.0, p.rejection_evidence / total))
+            weights[:] = [(weight * kept, accepted) for weight, accepted in weights]
+            weights += [(1.0, accepted) for accepted, near in fresh if which is None or near]
+            rejected = sum(weight for weight, accepted in weights if not accepted)
+            shares.append(rejected / max(sum(weight for weight, _ in weights), p.rejection_evidence) / limit)
+        self.counted_at = now
+        if p.enabled and p.rejection_enabled:
+            over = max(shares) > 1.0 or (self.was_lost and max(shares) >= 0.5)
+            self.mode, self.was_lost = ("lost" if over else self.mode), over
+
     def supervise(self) -> None:
         p = self.parameters.supervisor
         spread = 2.0 * np.sqrt(np.diag(self.cov))
         limits = np.array([p.position_limit, p.position_limit, p.heading_limit])
+        if self.mode == "lost":
+            self.mode = "fail"
         if self.mode == "operational" and (spread > limits).any():
             self.mode = "fail"
         elif self.mode == "fail" and (spread < limits / p.recovery_ratio).all():

@@ -61,8 +61,9 @@ def with_close_neighbors(rng: np.random.Generator, reflectors: ReflectorMap) -> 
         (Plan(scans=40, clutter=1.0), Parameters(association=AssociationParameters(enabled=False))),
         (Plan(scans=40, reach=3.0), Parameters(supervisor=SupervisorParameters(position_limit=0.03))),
         (Plan(scans=40, clutter=5.0), Parameters(odometry=OdometryParameters(forward_per_sqrt_s=0.3))),
+        (Plan(scans=80, clutter=1.0, slip=0.1), Parameters(supervisor=SupervisorParameters(rejection_window=0.2))),
     ],
-    ids=["clutter", "between odometry", "fast scans", "no association filter", "few in reach", "uncertain"],
+    ids=["clutter", "between odometry", "fast scans", "no association filter", "few in reach", "uncertain", "slip"],
 )
 def test_localizer_agrees_with_the_plain_one(plan: Plan, parameters: Parameters) -> None:
     rng = np.random.default_rng(11)

@@ -23,10 +23,18 @@ CENTERS = np.array([[2.0, 3.0], [6.0, -3.0], [9.0, 3.5], [-4.0, -2.5], [0.0, -3.
 PERIOD_NS = 100_000_000
 ALWAYS = [
     *("cycles", "duration_s", "inliers", "outliers_detector", "outliers_association", "operational_fraction"),
-    *("fail_episodes", "nis_mean", "microseconds_per_cycle"),
+    *("lost_fraction", "fail_episodes", "nis_mean", "nis_expected", "nis_before_gate_mean"),
+    *("rejected_fraction", "unseen_fraction", "longest_unseen_s", "microseconds_per_cycle"),
 ]
 WITH_REFERENCE = [
-    *("position_rmse_m", "position_median_m", "position_p95_m", "position_max_m", "heading_rmse_rad"),
+    *(
+        "reference_cycles",
+        "position_rmse_m",
+        "position_median_m",
+        "position_p95_m",
+        "position_max_m",
+        "heading_rmse_rad",
+    ),
     *("anees", "anees_position", "wrong_while_operational"),
 ]
 
@@ -73,7 +81,8 @@ def test_a_summary_has_the_keys_of_its_format_in_their_order_and_is_json():
 def test_what_is_undefined_is_none_in_the_summary():
     records = [Odometry(0, np.zeros(3)), ReferencePose(0, [0.0, 0.0, math.nan]), Detections(0, np.empty((0, 2)))]
     entries = summary(replayed(hall(), records))
-    assert [key for key, value in entries.items() if value is None] == ["nis_mean", "heading_rmse_rad", "anees"]
+    undefined = ["nis_mean", "nis_before_gate_mean", "rejected_fraction", "heading_rmse_rad", "anees"]
+    assert [key for key, value in entries.items() if value is None] == undefined
 
 
 def test_the_result_is_that_of_the_live_localizer_cycle_by_cycle():
@@ -98,6 +107,23 @@ def test_a_standing_vehicle_that_sees_well_is_consistent_and_operational():
     assert result.episodes == ()
     # Of a gate of 95 %: mean of a chi-square (2 degrees of freedom) cut off at 5.99. 6 sigma of 9,500 values is 0.1.
     assert result.nis_mean == pytest.approx(1.685, abs=0.1)
+
+
+@pytest.mark.parametrize(("probability", "expected"), [(0.95, 1.6847), (0.99, 1.9070), (0.5, 0.6137)])
+def test_expected_nis_is_the_mean_of_a_chi_square_cut_off_at_the_gate(probability, expected):
+    # By integration of x e^(-x/2) / 2 over 0 ... gate (5.991, 9.210, 1.386), over the gate's probability.
+    project = hall(association=AssociationParameters(gate_probability=probability))
+    assert replayed(project, standing_still(3)).nis_expected == pytest.approx(expected, abs=1e-4)
+
+
+def test_shares_are_those_of_the_detections_and_cycles():
+    result = replayed(hall(), standing_still(400, blind=range(100, 150)))
+    inliers, outliers = result.count(Status.INLIER), result.count(Status.OUTLIER_ASSOCIATION)
+    assert result.rejected_fraction == pytest.approx(outliers / (inliers + outliers))
+    assert result.unseen_fraction == pytest.approx(50 / 400)
+    # From the last scan that saw something to the first one that does again.
+    assert result.longest_unseen == pytest.approx(51 * PERIOD_NS * 1e-9)
+    assert result.lost_fraction == 0.0
 
 
 def test_a_blind_stretch_is_one_fail_episode_of_its_length():

@@ -1,4 +1,4 @@
-"""The supervisor's badge in the bar at the top: operational or fail, and 2-sigma against its limits."""
+"""The supervisor's badge in the bar at the top: operational, fail or lost, and 2-sigma against its limits."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ def badge_text(view: PageView) -> tuple[str, str, str]:
         f"2σ {max(x, y) * 1000:.0f} / {limits.position_limit * 1000:.0f} mm"
         f" &nbsp; {math.degrees(heading):.2f} / {math.degrees(limits.heading_limit):.1f} °"
     )
-    if run.mode is Mode.FAIL:
+    if run.mode is not Mode.OPERATIONAL:
         lived = [episode for episode in run.episodes if episode[0] <= run.time]
         since = f" {run.time - lived[-1][0]:.0f} s" if lived else ""
-        return f"FAIL{since}", beside, theme.FAIL_COLOR
+        return f"{run.mode.name}{since}", beside, theme.FAIL_COLOR
     return "OPERATIONAL", beside, theme.OPERATIONAL_COLOR
 
 

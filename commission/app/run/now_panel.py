@@ -12,13 +12,20 @@ from commission.app.run.view import RunView
 from commission.localization.estimate import Mode, Status
 from commission.site.parameters import SupervisorParameters
 
+MODES = {
+    Mode.OPERATIONAL: "operational",
+    Mode.FAIL: "fail: too uncertain, output withheld",
+    Mode.LOST: "lost: rejects what it sees, output withheld",
+}
+"""What the page says of each."""
+
 
 def rows(run: RunView, limits: SupervisorParameters) -> list[tuple[str, str]]:
     """Return what the panel shows, line by line."""
     x, y, heading = run.pose
     lived = [episode for episode in run.episodes if episode[0] <= run.time]
     shown = [
-        ("Mode", "fail: output withheld" if run.mode is Mode.FAIL else "operational"),
+        ("Mode", MODES[run.mode]),
         ("Fail episodes so far", str(len(lived))),
         ("Position x, y", f"{x:.3f}, {y:.3f} m"),
         ("Heading", f"{round(math.degrees(heading), 2) + 0.0:.2f} °"),

@@ -1,0 +1,108 @@
+"""What a recording holds, kind by kind: how many records, at which rate, over which time, with which values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.site.record_log import RecordLog
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Channel:
+    """All records of one kind."""
+
+    name: str
+    """What they are."""
+    records: int
+    """How many."""
+    begin_s: float
+    """Time of the first one after the recording's first record [s]."""
+    end_s: float
+    """The same of the last one [s]."""
+    rate: float
+    """Records per second, by the median time between two; NaN of fewer than two."""
+    longest_pause_s: float
+    """Longest time between two [s]; NaN of fewer than two."""
+    values: str
+    """Ranges of what they measure, with units."""
+
+    @property
+    def text(self) -> str:
+        """All of it in one line."""
+        pace = "" if np.isnan(self.rate) else f", {self.rate:.4g}/s, longest pause {self.longest_pause_s:.3g} s"
+        return f"{self.records} from {self.begin_s:.2f} to {self.end_s:.2f} s{pace}; {self.values}"
+
+
+def channels(log: RecordLog) -> tuple[Channel, ...]:
+    """Return what a recording holds, one entry for each kind of record that it has."""
+    found: list[Channel] = []
+    if len(log.odometry_stamps_ns):
+        found.append(_channel(log, "odometry", log.odometry_stamps_ns, _odometry_values(log)))
+    if len(log.detection_stamps_ns):
+        values = f"{len(log.range_bearing)} reflectors"
+        if len(log.range_bearing):
+            values += f", {_spans(log.range_bearing, ('range', 'bearing'), ('m', 'rad'))}"
+        found.append(_channel(log, "detections", log.detection_stamps_ns, values))
+    if log.scans is not None and len(log.scans.stamps_ns):
+        found.append(_channel(log, "scans", log.scans.stamps_ns, _scan_values(log)))
+    if len(log.reference_stamps_ns):
+        values = _spans(log.reference_poses, ("x", "y", "theta"), ("m", "m", "rad"))
+        found.append(_channel(log, "reference", log.reference_stamps_ns, values))
+    return tuple(found)
+
+
+def _channel(log: RecordLog, name: str, stamps_ns: IntArray, values: str) -> Channel:
+    zero = int(log.stamps_ns[0])
+    steps = np.diff(stamps_ns) * 1e-9
+    positive = steps[steps > 0.0]
+    return Channel(
+        name=name,
+        records=len(stamps_ns),
+        begin_s=(int(stamps_ns[0]) - zero) * 1e-9,
+        end_s=(int(stamps_ns[-1]) - zero) * 1e-9,
+        rate=1.0 / float(np.median(positive)) if len(positive) else float("nan"),
+        longest_pause_s=float(steps.max()) if len(steps) else float("nan"),
+        values=values,
+    )
+
+
+def _odometry_values(log: RecordLog) -> str:
+    seconds = np.diff(log.odometry_stamps_ns) * 1e-9
+    usable = seconds > 0.0
+    moved = log.displacements[1:][usable]
+    if not len(moved):
+        return "no motion"
+    speeds = np.hypot(moved[:, 0], moved[:, 1]) / seconds[usable]
+    turns = np.abs(moved[:, 2]) / seconds[usable]
+    way = float(np.hypot(log.displacements[:, 0], log.displacements[:, 1]).sum())
+    return f"{way:.1f} m driven, speed up to {speeds.max():.3g} m/s, turning up to {turns.max():.3g} rad/s"
+
+
+def _scan_values(log: RecordLog) -> str:
+    scans = log.scans
+    if scans is None:
+        return ""
+    chosen = np.unique(np.linspace(0, len(scans.stamps_ns) - 1, 200).astype(int))
+    ranges = np.asarray(scans.ranges[chosen], dtype=np.float64)
+    hit = np.isfinite(ranges)
+    parts = [f"{ranges.shape[1]} beams {np.degrees(abs(scans.angle_increment)):.4g} deg apart"]
+    if hit.any():
+        parts.append(f"range {ranges[hit].min():.4g} to {ranges[hit].max():.4g} m")
+    if scans.intensities is not None and hit.any():
+        strengths = np.asarray(scans.intensities[chosen], dtype=np.float64)[hit]
+        parts.append(f"intensity {strengths.min():.4g} to {strengths.max():.4g}")
+    if scans.reflector is not None:
+        parts.append(f"{100.0 * float(np.mean(scans.reflector[chosen])):.2g} % of the beams flagged as reflector")
+    return ", ".join(parts)
+
+
+def _spans(values: FloatArray, names: tuple[str, ...], units: tuple[str, ...]) -> str:
+    """Smallest and largest value of each column; NaN left out."""
+    parts: list[str] = []
+    for column, (name, unit) in enumerate(zip(names, units, strict=True)):
+        known = values[:, column][np.isfinite(values[:, column])]
+        parts.append(f"{name} {known.min():.4g} to {known.max():.4g} {unit}" if len(known) else f"{name} unknown")
+    return ", ".join(parts)

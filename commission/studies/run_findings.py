@@ -1,0 +1,43 @@
+"""What looks wrong about a run, in words: the recording before it was localized, and what localizing it says."""
+
+from __future__ import annotations
+
+from commission.progress import Progress, part, silent
+from commission.studies.misfit import MisfitInput, misfit
+from commission.studies.plausibility import Finding, PlausibilityInput, plausibility
+from commission.studies.run import RunResult
+
+JUDGED_BEFORE = 0.2
+"""Share of the progress of what is judged before localizing."""
+
+
+def recording_input(result: RunResult) -> PlausibilityInput:
+    """Return what is read to judge the recording of a run."""
+    setup = result.inputs.segments[0].setup
+    return PlausibilityInput(
+        log=result.inputs.log,
+        scanner=setup.scanner,
+        intensity_threshold=setup.parameters.detector.intensity_threshold,
+    )
+
+
+def run_findings(result: RunResult, progress: Progress = silent) -> tuple[Finding, ...]:
+    """Judge a run that is done.
+
+    Parameters
+    ----------
+    result : the run; what its first setup says about scanner and thresholds is held against the recording.
+    progress : told which check is done; may raise to cancel.
+
+    Returns
+    -------
+    findings : none where nothing looks wrong.
+    """
+    inputs = MisfitInput(
+        log=result.inputs.log,
+        setup=result.inputs.segments[0].setup,
+        initial=result.inputs.start.belief,
+        run=result.columns,
+    )
+    before = plausibility(recording_input(result), part(progress, 0.0, JUDGED_BEFORE))
+    return (*before, *misfit(inputs, part(progress, JUDGED_BEFORE, 1.0)))

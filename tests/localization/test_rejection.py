@@ -1,0 +1,136 @@
+"""The supervisor's rule by rejections: numbers by hand on both sides of its limits, and drives with a slip."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from commission.geometry.angles import difference
+from commission.localization.estimate import Belief, Mode
+from commission.localization.localizer import Localizer
+from commission.localization.rejection import NO_EVIDENCE, Evidence, RejectionRule, rejects_the_world
+from commission.localization.setup import LocalizerSetup
+from commission.localization.whole_run import run
+from commission.site.parameters import Parameters, SupervisorParameters
+from commission.site.records import Detections, Odometry, Scan
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.scanner import Scanner
+from tests.localization.drives import Plan, random_drive, random_map
+
+RULE = RejectionRule(True, 1.0, 20.0, 1.0, 0.4, 0.62)
+SECOND = 1_000_000_000
+
+
+def evidence(accepted: float, near: float, rejected: float) -> Evidence:
+    return Evidence(0, accepted, near, accepted, rejected)
+
+
+@pytest.mark.parametrize(
+    ("accepted", "near", "rejected", "lost"),
+    [
+        (60.0, 39.0, 39.0, False),  # 39.4 % near
+        (60.0, 41.0, 41.0, True),  # 40.6 % near
+        (60.0, 0.0, 97.0, False),  # 61.8 % of all
+        (60.0, 0.0, 99.0, True),  # 62.3 % of all
+        (0.0, 7.0, 7.0, False),  # 7 of at least 20: 35 %
+        (0.0, 9.0, 9.0, True),  # 9 of at least 20: 45 %
+        (0.0, 0.0, 12.0, False),  # 12 of at least 20: 60 %
+        (0.0, 0.0, 13.0, True),  # 65 %
+        (0.0, 0.0, 0.0, False),
+    ],
+)
+def test_vehicle_is_lost_beyond_either_limit(accepted: float, near: float, rejected: float, lost: bool) -> None:
+    assert rejects_the_world(False, evidence(accepted, near, rejected), RULE) is lost
+    assert not rejects_the_world(False, evidence(accepted, near, rejected), RULE._replace(enabled=False))
+
+
+@pytest.mark.parametrize(
+    ("near", "rejected", "lost"),
+    [(26.0, 26.0, True), (24.0, 24.0, False), (0.0, 46.0, True), (0.0, 44.0, False)],
+)
+def test_lost_vehicle_is_believed_again_only_well_below_both_limits(near: float, rejected: float, lost: bool) -> None:
+    # Half of the limits: 20 % near (25 of 125), 31 % of all (44.9 of 144.9).
+    assert rejects_the_world(True, evidence(100.0, near, rejected), RULE) is lost
+
+
+def lonely(**supervisor: float) -> Localizer:
+    """One that stands still before a single reflector, 5 m ahead."""
+    parameters = dataclasses.replace(Parameters(), supervisor=SupervisorParameters(**supervisor))
+    setup = LocalizerSetup(ReflectorMap((Reflector(id="A", x=5.0, y=0.0),)), Scanner(), parameters)
+    localizer = Localizer(setup, Belief(0, np.zeros(3), 1e-6 * np.eye(3)))
+    localizer.feed(Odometry(0, np.zeros(3)))
+    return localizer
+
+
+@pytest.mark.parametrize(("aside", "near"), [(0.99, 1.0), (1.01, 0.0)])
+def test_rejected_detection_is_near_within_reach_of_a_reflector(aside: float, near: float) -> None:
+    localizer = lonely(rejection_reach=1.0)
+    localizer.feed(Detections(SECOND, np.array([[math.hypot(5.0, aside), math.atan2(aside, 5.0)]])))
+    counted = localizer.state.evidence
+    assert (counted.rejected, counted.near_rejected) == (1.0, near)
+    assert (counted.accepted, counted.near_accepted) == (0.0, 0.0)
+
+
+def test_evidence_is_forgotten_to_a_third_in_a_window_but_not_below_what_it_takes() -> None:
+    localizer = lonely(rejection_window=2.0, rejection_evidence=4.0)
+    far = np.tile([[9.0, 1.0]], (30, 1))
+    localizer.feed(Detections(SECOND, far))
+    assert localizer.state.evidence.rejected == 30.0
+    localizer.feed(Detections(3 * SECOND, np.empty((0, 2))))
+    assert localizer.state.evidence.rejected == pytest.approx(30.0 / math.e)
+    localizer.feed(Detections(60 * SECOND, np.empty((0, 2))))
+    # However long ago they were, four are kept.
+    assert localizer.state.evidence.rejected == pytest.approx(4.0)
+
+
+def test_nothing_is_counted_before_the_first_scan() -> None:
+    assert lonely().state.evidence == NO_EVIDENCE._replace(stamp_ns=0)
+
+
+def test_what_the_detector_filter_rejects_does_not_count() -> None:
+    localizer = lonely()
+    flags = np.zeros(720, dtype=np.bool_)
+    flags[300:340] = True  # 20 degrees wide at 5 m: a wall
+    ranges = np.full(720, 5.0, dtype=np.float32)
+    localizer.feed(
+        Scan(stamp_ns=SECOND, ranges=ranges, angle_min=-math.pi, angle_increment=math.pi / 360.0, reflector=flags)
+    )
+    counted = localizer.state.evidence
+    assert (counted.accepted, counted.rejected) == (0.0, 0.0)
+    assert counted.stamp_ns == SECOND
+
+
+@pytest.mark.parametrize("degrees", [3.0, 5.0, 8.0, -5.0])
+@pytest.mark.parametrize("seed", range(4))
+def test_slip_is_said_within_fifteen_cycles_of_danger(degrees: float, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    setup = LocalizerSetup(random_map(rng, 25), Scanner(), Parameters())
+    drive = random_drive(setup, rng, Plan(scans=200, clutter=1.0, slip=math.radians(degrees)))
+    columns = run(drive.log, setup, drive.initial)
+    error = columns.means - drive.truth
+    distance, heading = np.hypot(error[:, 0], error[:, 1]), np.abs(difference(columns.means[:, 2], drive.truth[:, 2]))
+    wrong = (distance > 0.1) | (heading > math.radians(3.0))
+    assert np.count_nonzero(wrong & (columns.modes == Mode.OPERATIONAL)) <= 15
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_drive_without_a_slip_is_never_lost(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    setup = LocalizerSetup(random_map(rng, 25), Scanner(), Parameters())
+    drive = random_drive(setup, rng, Plan(scans=200, clutter=1.0))
+    assert not (run(drive.log, setup, drive.initial).modes == Mode.LOST).any()
+
+
+def test_output_is_withheld_while_lost_and_the_filter_goes_on() -> None:
+    rng = np.random.default_rng(1)
+    setup = LocalizerSetup(random_map(rng, 25), Scanner(), Parameters())
+    drive = random_drive(setup, rng, Plan(scans=200, clutter=1.0, slip=math.radians(8.0)))
+    columns = run(drive.log, setup, drive.initial)
+    first = int(np.flatnonzero(columns.modes == Mode.LOST)[0])
+    withheld = columns.estimate(first + 5)
+    assert withheld.mode is Mode.LOST
+    assert withheld.output.stamp_ns == columns.stamps_ns[first - 1]
+    assert withheld.posterior.stamp_ns == columns.stamps_ns[first + 5]
