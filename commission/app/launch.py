@@ -18,7 +18,8 @@ from commission.app.ambiguity import feature as ambiguity
 from commission.app.base import page_feature
 from commission.app.base.access import CLEAR_TEXT, Access, address_here, announced
 from commission.app.base.extent import extent_of
-from commission.app.base.server import start_server
+from commission.app.base.reach import EVERYWHERE, Reach
+from commission.app.base.server import PageServer, start_server
 from commission.app.base.state import MAGNIFICATIONS, NOTHING_SAVED, AppState
 from commission.app.coverage import feature as coverage
 from commission.app.editing import feature as editing
@@ -97,7 +98,8 @@ def serve(
         server = start_server(access.host, access.port, token, access.public_url)
         open_things.callback(server.stop)
         source = first_source(loaded, recording, demo)
-        runtime = open_page(server, loaded, folder=folder, source=source, is_new=opened.is_new)
+        reach = Reach.within((folder, *access.files)) if access.lets_others_in else EVERYWHERE
+        runtime = open_page(server, loaded, folder=folder, source=source, is_new=opened.is_new, reach=reach)
         open_things.callback(runtime.stop)
         wait_for_interruption = open_things.enter_context(interruption())
         log.info("page at %s", announced(access, server.get_port()))
@@ -159,12 +161,13 @@ def first_source(project: Project, recording: Path | None, demo: bool) -> Source
 
 
 def open_page(
-    server: viser.ViserServer,
+    server: PageServer,
     project: Project,
     *,
     folder: Path | None = None,
     source: Source | None = None,
     is_new: bool = False,
+    reach: Reach = EVERYWHERE,
 ) -> Runtime:
     """Fill a server with the page of a project and start its owner thread; returns at once.
 
@@ -176,12 +179,14 @@ def open_page(
         journal there are made again.
     source : what drives at once; none: nothing yet.
     is_new : whether nothing of the project is on disk yet.
+    reach : where browsers may read and write.
     """
     greeting = f"A new project in {folder}: it is empty until you load a map or place something" if is_new else ""
     state = AppState(
         project=project,
         saved=NOTHING_SAVED if is_new else project,
         folder=folder,
+        reach=reach,
         hidden=frozenset({AccumulatedLayer.name}),
         magnify=seen_magnification(project),
         greeting=greeting,
@@ -197,6 +202,7 @@ def open_page(
     def disconnected(client: viser.ClientHandle) -> None:
         runtime.post(BrowserLeft(client.client_id))
 
+    server.alive = lambda: {"owner_s": runtime.silent_for()}
     runtime.start(page)
     return runtime
 

@@ -15,7 +15,7 @@ import numpy as np
 import viser
 from viser import ClientHandle, GuiApi, GuiTabHandle, PanelHandle
 
-from commission.app.base import theme
+from commission.app.base import theme, viser_private
 from commission.app.base.actions import Sender
 from commission.app.base.cameras import Cameras
 from commission.app.base.effects import Effect, FlyTo, PlaceCamera, SendFile, Tell
@@ -26,6 +26,7 @@ from commission.app.base.panel import Panel, Post
 from commission.app.base.pointer import floor_drag, take_clicks
 from commission.app.base.state import AppState
 from commission.app.base.view import Followed, PageView
+from commission.io.bundled import bundled_folder
 from commission.site.project import Project
 
 TOLD_FOR_S = 6.0
@@ -73,6 +74,8 @@ class Page:
         self._browsers: dict[int, BrowserPage] = {}
         docked = sorted((panel for feature in features for panel in feature.panels), key=lambda panel: panel.rank)
         self._own = tuple(panel for panel in docked if panel.own)
+        script = (bundled_folder("web_assets") / "page.js").read_text(encoding="utf-8")
+        viser_private.run_on_pages(server, script)
         with server.atomic():
             server.gui.configure_theme(
                 dark_mode=True, show_logo=False, show_share_button=False, brand_color=theme.BRAND
@@ -166,8 +169,8 @@ class Page:
         """Do one thing that only the page can do; nothing happens in a browser that has gone."""
         own = [number for number in self._browsers if number == sender.browser]
         match effect:
-            case Tell(text, failed):
-                self._tell(text, failed=failed)
+            case Tell(text, failed, everywhere):
+                self._tell(text, None if everywhere else sender.browser, failed=failed)
             case PlaceCamera(camera, everywhere):
                 for number in self._browsers if everywhere else own:
                     self._cameras.show(number, camera)
@@ -180,9 +183,11 @@ class Page:
             case _:
                 raise TypeError(f"nobody carries out {type(effect).__name__}; expected a service that names it")
 
-    def _tell(self, text: str, *, failed: bool) -> None:
-        """Notify every browser."""
-        for client in self._server.get_clients().values():
+    def _tell(self, text: str, browser: int | None, *, failed: bool) -> None:
+        """Notify one browser, or all of them; those that are leaving hear nothing, and disturb nobody."""
+        for number, client in self._server.get_clients().items():
+            if browser not in (None, number):
+                continue
             client.add_notification(
                 "Problem" if failed else "Done",
                 text,

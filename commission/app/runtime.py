@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -32,6 +33,10 @@ FRAME_S = 0.04
 """Shortest time between two pictures: 25 Hz [s]."""
 SLOW_FRAME_S = 0.2
 """The same for plots, trails and numbers [s]."""
+AFTER_A_FAULT_S = 0.2
+"""Pause of the owner thread after a fault that it could not even tell [s]."""
+SAME_FAULT_AFTER_S = 5.0
+"""Time after which everybody is told the same fault again [s]."""
 
 REDUCERS = (page_reducer,)
 """Modules with the handlers of the actions that no feature owns."""
@@ -100,7 +105,8 @@ class Runtime:
         self._page: PageLike | None = None
         self._shown: Project | None = None
         self._due = Due.SOON
-        self._drawn_at = self._drawn_slowly_at = clock()
+        self._drawn_at = self._drawn_slowly_at = self._turned_at = clock()
+        self._told = "", -math.inf
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._loop, name="owner", daemon=True)
 
@@ -133,21 +139,47 @@ class Runtime:
     def _loop(self) -> None:
         self._guarded(self._show_site)
         while not self._stopped.is_set():
-            for message in self._drained():
-                self._guarded(lambda message=message: self.handle(message))
-            self._guarded(self.tick)
+            try:
+                self._turn()
+            except Exception:  # nothing ends this thread but `stop`
+                log.exception("a fault of the owner thread")
+                self._stopped.wait(AFTER_A_FAULT_S)
 
-    def _guarded(self, what: Callable[[], None]) -> None:
-        """Do something; whatever goes wrong is shown, and the page lives on."""
+    def _turn(self) -> None:
+        """Do what has arrived and what is due."""
+        messages = self._drained()
+        self._turned_at = self._clock()
+        for message in messages:
+            self._guarded(lambda message=message: self.handle(message), _sender_of(message))
+        self._guarded(self.tick)
+
+    def silent_for(self) -> float:
+        """Return the time since the owner thread has last begun a turn [s]; any thread may ask."""
+        return self._clock() - self._turned_at
+
+    def _guarded(self, what: Callable[[], None], sender: Sender = PROGRAM) -> None:
+        """Do something; whatever goes wrong is told to who asked for it, and the page lives on."""
         try:
             what()
         except Exception as error:
-            if isinstance(error, CommissionError | ValueError):
-                text = str(error)
-            else:  # a mistake of ours and not of the user's: where was it?
-                log.exception("a fault on the page")
-                text = f"{type(error).__name__}: {error}"
-            self._apply(Report(text))
+            report = _reported(error, sender)
+            if self._has_just_been_told(report, sender):
+                return
+            try:
+                self._apply(report, sender)
+            except Exception:
+                log.exception("a fault while telling '%s'", report.text)
+
+    def _has_just_been_told(self, report: Report, sender: Sender) -> bool:
+        """Whether the program would tell everybody the same again: what fails while drawing fails 25 times a second."""
+        if sender.browser is not None:
+            return False
+        before, at = self._told
+        now = self._clock()
+        if report.text == before and now - at < SAME_FAULT_AFTER_S:
+            return True
+        self._told = report.text, now
+        return False
 
     def _drained(self) -> list[Message]:
         """Wait until something is due and return what has arrived; of seeks and drags in a row only the newest."""
@@ -249,6 +281,30 @@ class Runtime:
         if self._page is not None:
             self._shown = self.state.project
             self._page.show_site(self.state)
+
+
+def _reported(error: Exception, sender: Sender) -> Report:
+    """Return what is told of an error; where a mistake of ours was is written to the log, too."""
+    if isinstance(error, CommissionError):
+        return Report(str(error))
+    is_value = isinstance(error, ValueError)
+    if is_value and sender.browser is not None:  # a handler refuses what a person asked for
+        return Report(str(error))
+    log.error("a fault on the page", exc_info=error)
+    kind = type(error).__name__
+    listed = f"a fault of the program ({kind}); its log says where"
+    return Report(str(error) if is_value else f"{kind}: {error}", listed=listed)
+
+
+def _sender_of(message: Message) -> Sender:
+    """Return who is told when a message leads to an error."""
+    match message:
+        case Envelope(_, sender):
+            return sender
+        case BrowserCame(number) | BrowserLeft(number):
+            return Sender(number)
+        case _:
+            return PROGRAM
 
 
 def _told(job: Job) -> Action:

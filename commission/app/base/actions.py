@@ -154,12 +154,15 @@ class StopJob(Action):
 
 @dataclass(frozen=True, slots=True)
 class Report(Action):
-    """Something went wrong outside the owner thread, or is good to know."""
+    """Something was refused or went wrong, or is good to know: told to who asked, or to all where nobody did."""
 
     text: str
     """One line."""
     failed: bool = True
-    """Whether it is a problem that stays listed."""
+    """Whether it is a problem."""
+    listed: str = ""
+    """What stays listed for all browsers of a problem that one of them has; it quotes no file. Empty: nothing. What
+    the program itself reports is listed as it is."""
 
 
 @dataclass(frozen=True, slots=True)

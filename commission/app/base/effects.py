@@ -27,12 +27,14 @@ class CancelJob(Effect):
 
 @dataclass(frozen=True, slots=True)
 class Tell(Effect):
-    """Show a notification in every browser."""
+    """Show a notification in the browser that asked, or in all of them where the program itself did."""
 
     text: str
-    """One line."""
+    """One line; what a file holds is told to nobody but who asked for the file."""
     failed: bool
     """Whether something went wrong."""
+    everywhere: bool = False
+    """Whether all browsers are told whoever asked."""
 
 
 @dataclass(frozen=True, slots=True)

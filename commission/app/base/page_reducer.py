@@ -101,13 +101,14 @@ def stop_job(action: actions.StopJob, state: AppState, _sender: Sender) -> Outco
 
 
 @reduce.register
-def report(action: actions.Report, state: AppState, _sender: Sender) -> Outcome:
-    """Tell everybody; what failed stays listed."""
+def report(action: actions.Report, state: AppState, sender: Sender) -> Outcome:
+    """Tell who asked, or everybody; what failed is listed where it concerns everybody."""
     text = " ".join(action.text.split())
     told = (Tell(text, action.failed),)
-    if not action.failed:
+    listed = text if sender.browser is None else action.listed
+    if not action.failed or not listed:
         return Outcome(state, told)
-    return Outcome(replace(state, faults=(*state.faults, text)[-FAULTS_KEPT:]), told)
+    return Outcome(replace(state, faults=(*state.faults, listed)[-FAULTS_KEPT:]), told)
 
 
 @reduce.register

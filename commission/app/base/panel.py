@@ -9,8 +9,9 @@ from typing import Any, Protocol, TypeAlias
 
 from viser import CommandEvent, GuiButtonHandle, GuiEvent
 
-from commission.app.base.actions import Action, Envelope, Sender
+from commission.app.base.actions import Action, Envelope, Report, Sender
 from commission.app.base.view import PageView
+from commission.errors import CommissionError
 
 Post: TypeAlias = Callable[[Envelope], None]
 
@@ -52,8 +53,13 @@ def posting(post: Post, make: Callable[[Any], Action]) -> Callable[[Any], None]:
     """
 
     def callback(event: GuiEvent[Any] | CommandEvent) -> None:
-        if event.client is not None:
-            post(from_browser(make(event), event.client.client_id))
+        if event.client is None:
+            return
+        try:
+            action = make(event)
+        except (CommissionError, ValueError) as error:
+            action = Report(str(error))
+        post(from_browser(action, event.client.client_id))
 
     return callback
 

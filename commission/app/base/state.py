@@ -11,6 +11,7 @@ from pathlib import Path
 
 from commission.app.base.actions import PROGRAM, Sender
 from commission.app.base.parts import Part, Parts, part_of
+from commission.app.base.reach import EVERYWHERE, Reach
 from commission.errors import UsageError
 from commission.site.editing.packed_map import PackedMap
 from commission.site.project import Project
@@ -70,6 +71,8 @@ class AppState:
     """Where the project is written to; none: it is bundled with the program and stays as it is."""
     read_only: str = ""
     """Why the project cannot be edited, in one line; empty: it can."""
+    reach: Reach = EVERYWHERE
+    """Where browsers may read and write."""
     greeting: str = ""
     """What each browser is told when it comes: what was restored after a crash, until it is saved."""
     undo: tuple[Step, ...] = ()

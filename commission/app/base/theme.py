@@ -191,4 +191,7 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 @media (max-height:800px){{:root{{--c-bottom:{LOW_BOTTOM_PX}px}}
  div:has(>div>.c-bottom)>:nth-child(n+7),div:has(>div>.c-route)>:nth-child(n+2){{zoom:.78}}}}
 .c-note{{font-size:11.5px;opacity:.7;line-height:1.35}}
+.c-stale .c-badge{{background:{IDLE_COLOR}!important;font-size:0!important;letter-spacing:0!important}}
+.c-stale .c-badge::after{{content:var(--c-stale);font-size:13px}}
+.c-stale .c-beside{{visibility:hidden}}
 </style>"""

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from commission.app.base.actions import Action, Envelope, Sender
 from commission.app.base.effects import Effect
 from commission.app.base.jobs import Lane
+from commission.app.base.reach import Reach
 from commission.app.base.service import Context, Service
 from commission.app.base.state import AppState
 from commission.app.base.uploads import Upload
@@ -33,13 +34,14 @@ class ExchangeService(Service):
         super().__init__(context)
         self._exports = itertools.count(1)
 
-    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:  # noqa: ARG002 - the service's
+    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:
         """Start or stop work on behalf of a browser."""
         match effect:
-            case ReadFile(number):
+            case ReadFile(number, source):
+                within = _within(source, state.reach, sender)
 
                 def read_it(progress: Progress) -> Action:
-                    return _answer(effect, self._telling(progress, number, sender))
+                    return _answer(effect, within, self._telling(progress, number, sender))
 
                 self._start(sender, read_it, number, key=_reading_of(sender))
             case ExportProject(wanted, project):
@@ -85,9 +87,14 @@ def _reading_of(sender: Sender) -> tuple[object, ...]:
     return "import", sender.browser
 
 
-def _answer(asked: ReadFile, progress: Progress) -> Action:
+def _within(source: ImportSource, reach: Reach, sender: Sender) -> ImportSource:
+    """Return what a browser may read; a file of this computer as it is after all links."""
+    return ServerFile(reach.checked(source.path, sender)) if isinstance(source, ServerFile) else source
+
+
+def _answer(asked: ReadFile, source: ImportSource, progress: Progress) -> Action:
     """Read a file and compare it."""
-    imported = read(asked.source, asked.choice, progress)
+    imported = read(source, asked.choice, progress)
     progress(0.9, "comparing")
     return actions.ImportRead(asked.number, asked.choice, imported, compare(asked.project, imported))
 

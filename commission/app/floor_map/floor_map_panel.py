@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
 from typing import Any
 
 from viser import GuiApi, GuiEvent
 
 from commission.app.base import actions as page_actions
 from commission.app.base.panel import BasePanel, Post, escaped, from_browser, posting
+from commission.app.base.reach import typed_path
 from commission.app.base.uploads import Uploads
 from commission.app.base.view import PageView
 from commission.app.floor_map import actions
@@ -41,7 +40,7 @@ class FloorMapPanel(BasePanel):
                 typed = path.value.strip()
                 if not typed:
                     return page_actions.Report("no file was named; expected its path on the server's computer")
-                return actions.OpenMap(MapFile(Path(os.path.expanduser(typed))))
+                return actions.OpenMap(MapFile(typed_path(typed)))
 
             opened.on_click(posting(post, open_path))
             Uploads(gui, lambda browser, text: post(from_browser(actions.MapFailed(text), browser))).add(

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
-from commission.app.base.actions import Action, Envelope, Sender
+from commission.app.base.actions import PROGRAM, Action, Envelope, Sender
 from commission.app.base.effects import Effect
 from commission.app.base.jobs import Lane
+from commission.app.base.reach import EVERYWHERE, Reach
 from commission.app.base.service import Service
 from commission.app.base.state import AppState
 from commission.app.floor_map.actions import ImageMissing, MapFailed, MapMade, MapOpened
@@ -31,11 +33,12 @@ class MapService(Service):
 
     effects = (ReadMapFile, DrawMap, StopMapWork)
 
-    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:  # noqa: ARG002 - the service's
+    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:
         """Start or stop the work; its outcome is the action that follows, on behalf of who asked."""
         match effect:
             case ReadMapFile():
-                self._start(effect.job, lambda progress: read(effect, progress), sender)
+                asked = replace(effect, file=_within(effect.file, state.reach, sender))
+                self._start(asked.job, lambda progress: read(asked, progress, state.reach, sender), sender)
             case DrawMap():
                 self._start(effect.job, lambda progress: draw(effect, progress), sender)
             case _:
@@ -45,20 +48,26 @@ class MapService(Service):
         self.context.jobs.start(name, work, then=lambda action: Envelope(action, sender), key=KEY, lane=Lane.FILES)
 
 
-def read(effect: ReadMapFile, progress: Progress) -> Action:
+def _within(file: MapFile, reach: Reach, sender: Sender) -> MapFile:
+    """Return what a browser may read; a file of this computer as it is after all links."""
+    return MapFile(reach.checked(file.source, sender)) if isinstance(file.source, Path) else file
+
+
+def read(effect: ReadMapFile, progress: Progress, reach: Reach = EVERYWHERE, sender: Sender = PROGRAM) -> Action:
     """Read a file; what a person can mend comes back as `MapFailed`.
 
     Parameters
     ----------
     effect : which file, and how.
     progress : told how far the reading is; raises to cancel.
+    reach, sender : where who asked may read: a map names the file of its image.
     """
     file = effect.file
     progress(0.0, "")
     try:
         with _path_of(file) as path:
             if file.ending in MAP_ENDINGS:
-                return _read_map(effect, path)
+                return _read_map(effect, path, reach, sender)
             return MapOpened(file, _read(effect, path, progress), effect.reading)
     except JobError:
         raise
@@ -110,10 +119,11 @@ def _read(effect: ReadMapFile, path: Path, progress: Progress) -> Read:
     raise FileFormatError(path, "", f"ends in {path.suffix!r}", f"a floor map: {known}")
 
 
-def _read_map(effect: ReadMapFile, path: Path) -> Action:
+def _read_map(effect: ReadMapFile, path: Path, reach: Reach, sender: Sender) -> Action:
     """Read a `map_server` map: its image lies beside it, or was sent, too."""
     file, image = effect.file, effect.image
     if isinstance(file.source, Path):
+        reach.checked(path.parent / image_name(path), sender)
         return MapMade(file, read_floor_map(path))
     name = image_name(path)
     if image is None or image.name != name:

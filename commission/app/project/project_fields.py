@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
 from viser import GuiApi
 
 from commission.app.base import actions
 from commission.app.base.inputs import show, write_html
 from commission.app.base.panel import BasePanel, Post, escaped, posting, write
+from commission.app.base.reach import typed_path
 from commission.app.base.view import PageView
 from commission.app.project.actions import AskToReplace, KeepOther, RenameProject, Save
 from commission.app.project.state import FilesState
@@ -31,7 +29,7 @@ class ProjectFields(BasePanel):
             posting(
                 post,
                 lambda _event: (
-                    Save(Path(os.path.expanduser(folder.value.strip())))
+                    Save(typed_path(folder.value))
                     if folder.value.strip()
                     else actions.Report("no folder was named; expected the path of a folder")
                 ),

@@ -79,6 +79,8 @@ class ProjectFolder(Service):
         """Write or read the project, or take it over."""
         match effect:
             case WriteProject(project, folder, overwrite):
+                is_own = state.folder is not None and os.path.abspath(folder) == os.path.abspath(state.folder)
+                folder = folder if is_own else state.reach.checked(folder, sender)
                 self.save(project, folder, overwrite=overwrite, sender=sender)
             case ReadProject(folder):
                 self.context.post(Envelope(Reloaded(self.load(folder)), sender))

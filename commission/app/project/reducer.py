@@ -40,7 +40,8 @@ def save(action: actions.Save, state: AppState, _sender: Sender) -> Outcome:
 def project_saved(action: actions.ProjectSaved, state: AppState, _sender: Sender) -> Outcome:
     """From now on the project is kept where it was written."""
     saved = replace(state, saved=action.project, folder=action.folder, read_only="", last_edit=None, greeting="")
-    return Outcome(saved.with_part(FilesState(action.time_of_day)), (Tell(f"saved in {action.folder}", failed=False),))
+    told = Tell(f"saved in {action.folder}", failed=False, everywhere=True)
+    return Outcome(saved.with_part(FilesState(action.time_of_day)), (told,))
 
 
 @reduce.register

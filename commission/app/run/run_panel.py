@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from viser import GuiApi
 
 from commission.app.base import actions
 from commission.app.base.panel import BasePanel, Post, escaped, posting
+from commission.app.base.reach import typed_path
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.run.actions import ChooseSource, Cover, Recording, Repeat, Restart, VirtualDrive
@@ -76,7 +75,7 @@ class RunPanel(BasePanel):
             posting(
                 post,
                 lambda _event: (
-                    ChooseSource(Recording(Path(path.value.strip()).expanduser()))
+                    ChooseSource(Recording(typed_path(path.value)))
                     if path.value.strip()
                     else actions.Report("no recording was named; expected the path of a folder")
                 ),

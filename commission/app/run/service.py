@@ -8,13 +8,13 @@ from typing import TypeAlias
 import numpy as np
 
 from commission import compiled
-from commission.app.base.actions import Action, Sender
+from commission.app.base.actions import Action, Envelope, Report, Sender
 from commission.app.base.effects import Effect
 from commission.app.base.service import IDLE_S, Context, Due, Service
 from commission.app.base.state import AppState
 from commission.app.base.view import Followed
 from commission.app.run import drives
-from commission.app.run.actions import ChooseSource, Play, Source
+from commission.app.run.actions import ChooseSource, Play, Recording, Source
 from commission.app.run.effects import LoadSource, MoveTo, ProcessOneScan
 from commission.app.run.history import episodes
 from commission.app.run.session import Drive, Session
@@ -102,21 +102,32 @@ class RunService(Service):
             self.session.set_setup(LocalizerSetup.of(after.project))
             self._predict()
 
-    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:  # noqa: ARG002 - the service's
+    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:
         """Load a drive, or move over the one that is there."""
         session = self.session
         if session is not None:
             session.covered = state.part(RunState).covered
         match effect:
             case LoadSource(source):
-                project, prepare = state.project, self._prepare
-                self._jobs.start(PREPARE, lambda progress: prepare(project, source, progress), then=self._begin)
+                self._load(source, state, sender)
             case MoveTo(seconds, afresh) if session is not None:
                 session.seek(seconds, afresh=afresh)
             case ProcessOneScan() if session is not None:
                 session.step()
             case _:
                 pass
+
+    def _load(self, source: Source, state: AppState, sender: Sender) -> None:
+        """Prepare a drive; why it cannot be is told to who asked."""
+        if isinstance(source, Recording):
+            source = Recording(state.reach.checked(source.path, sender))
+        project, prepare = state.project, self._prepare
+        self._jobs.start(
+            PREPARE,
+            lambda progress: prepare(project, source, progress),
+            then=self._begin,
+            failed=lambda job: Envelope(Report(f"{job.name}: {job.error}", listed=f"{job.name} failed"), sender),
+        )
 
     def _begin(self, drive: Drive) -> Action:
         """Run the localizer over a new drive, playing."""

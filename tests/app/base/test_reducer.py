@@ -139,7 +139,7 @@ def test_a_hidden_layer_can_be_shown_again(state: AppState) -> None:
 
 
 def test_problems_are_listed_on_one_line_each_and_bounded(state: AppState) -> None:
-    reported = after(state, *(actions.Report(f"a\nb {i}") for i in range(50))).state
+    reported = after(state, *(actions.Report(f"a\nb {i}") for i in range(50)), browser=None).state
     assert len(reported.faults) == FAULTS_KEPT
     assert reported.faults[-1] == "a b 49"
     assert after(reported, ClearFaults()).state.faults == ()
