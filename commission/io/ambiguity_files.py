@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from PIL import Image
 
 from commission.io.atomic import atomic_file, write_text
 from commission.io.lattice_image import NO_FLOOR, lattice_image, shades
-from commission.io.table_writer import write_table
+from commission.io.table_writer import angle, figure, place, write_table
 from commission.site.reflectors import ReflectorMap
 from commission.studies.ambiguity import AmbiguityResult, SiteAmbiguity
 
@@ -84,15 +84,15 @@ def _points(found: AmbiguityResult) -> Iterator[tuple[str, ...]]:
     """One row per drivable point; the partner is empty where there is none."""
     points = found.lattice.points()
     for n in np.flatnonzero(found.drivable).tolist():
-        partner = (_text(value) for value in found.partners[n].tolist())
-        yield *map(_text, points[n].tolist()), _text(float(found.share[n])), str(found.visible[n]), *partner
+        share, visible = figure(float(found.share[n])), str(found.visible[n])
+        yield *map(place, points[n].tolist()), share, visible, *_pose(found.partners[n].tolist())
 
 
 def _pairs(found: AmbiguityResult, ids: list[str]) -> Iterator[tuple[str, ...]]:
     """One row per pair of constellations, the one that most poses see first."""
     for pair in found.cold.pairs:
         groups = (" ".join(ids[index] for index in group) for group in (pair.constellation, pair.image))
-        yield *groups, str(pair.poses), *map(_text, pair.example), *map(_text, pair.partner)
+        yield *groups, str(pair.poses), *_pose(pair.example), *_pose(pair.partner)
 
 
 def _neighbors(found: SiteAmbiguity, ids: list[str]) -> Iterator[tuple[str, ...]]:
@@ -101,13 +101,14 @@ def _neighbors(found: SiteAmbiguity, ids: list[str]) -> Iterator[tuple[str, ...]
         for risk in each.risks:
             metres = np.unique(risk.metres.astype(np.int64))
             yield (
-                *(each.route, ids[risk.reflector], ids[risk.neighbor], _text(risk.worst)),
-                _text(float(risk.metres[int(np.argmax(risk.probability))])),
+                *(each.route, ids[risk.reflector], ids[risk.neighbor], figure(risk.worst)),
+                place(float(risk.metres[int(np.argmax(risk.probability))])),
                 str(len(risk.scans)),
                 " ".join(map(str, metres.tolist())),
             )
 
 
-def _text(value: float) -> str:
-    """Six significant digits, empty where there is none."""
-    return f"{value:.6g}" if np.isfinite(value) else ""
+def _pose(pose: Sequence[float]) -> tuple[str, str, str]:
+    """Cells of x, y and heading; empty where there is none."""
+    x, y, theta = pose
+    return place(x), place(y), angle(theta)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from PIL import Image
 from commission.geometry.arrays import BoolArray
 from commission.io.atomic import atomic_file, write_text
 from commission.io.lattice_image import NO_FLOOR, lattice_image, shades
-from commission.io.table_writer import write_table
+from commission.io.table_writer import angle, figure, place, write_table
 from commission.planning.coverage import Coverage
 from commission.studies.coverage import Ellipses
 
@@ -82,8 +82,9 @@ def write_ellipses(folder: Path, found: Ellipses) -> None:
     FileFormatError
         the file cannot be written.
     """
-    columns = (*found.points.T, *found.semi_axes.T, found.angles)
-    write_table(folder / ELLIPSES, ELLIPSE_COLUMNS, zip(*map(_texts, columns), strict=True))
+    columns = [_cells(place, column) for column in found.points.T]
+    columns += [_cells(figure, column) for column in found.semi_axes.T]
+    write_table(folder / ELLIPSES, ELLIPSE_COLUMNS, zip(*columns, _cells(angle, found.angles), strict=True))
 
 
 def heat_image(found: Coverage, drivable: BoolArray) -> Image.Image:
@@ -105,11 +106,10 @@ def _rows(found: Coverage, drivable: BoolArray) -> Iterator[tuple[str, ...]]:
     points = found.lattice.points()
     for start in range(0, len(rows), ROWS_AT_ONCE):
         block = rows[start : start + ROWS_AT_ONCE]
-        columns = [_texts(points[block, axis]) for axis in range(2)]
-        columns += [_texts(getattr(found.fixes, name)[block]) for name in UNITS]
+        columns = [_cells(place, points[block, axis]) for axis in range(2)]
+        columns += [_cells(figure, getattr(found.fixes, name)[block]) for name in UNITS]
         yield from zip(*columns, strict=True)
 
 
-def _texts(values: NDArray[np.generic]) -> list[str]:
-    """Six significant digits, empty where infinite."""
-    return [f"{value:.6g}" if np.isfinite(value) else "" for value in values.tolist()]
+def _cells(cell: Callable[[float], str], values: NDArray[np.generic]) -> list[str]:
+    return [cell(value) for value in values.tolist()]

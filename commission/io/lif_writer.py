@@ -18,6 +18,7 @@ from commission.geometry.angles import wrap_scalar
 from commission.geometry.splines import clamped_uniform_knots
 from commission.io.atomic import write_text
 from commission.io.findings import Findings
+from commission.site.fields import in_file
 from commission.site.project import Project
 from commission.site.routes import Direction, Route, Segment
 from commission.site.stations import Station
@@ -46,6 +47,7 @@ def write_lif(project: Project, path: Path, *, exported_at: datetime | None = No
         the file cannot be written.
     """
     found = Findings()
+    project = in_file(project)
     vehicle = f"commission.{project.vehicle.kind}"
     nodes = _Nodes()
     edges = [
@@ -143,7 +145,8 @@ def _properties(route: Route, segment: Segment, vehicle: str, found: Findings) -
         "maxSpeed": float(route.speed_of(segment)),
         "trajectory": {
             "degree": segment.degree,
-            "knotVector": [float(knot) for knot in knots],
+            # As a project has them: thirds have no end.
+            "knotVector": [round(float(knot), 9) for knot in knots],
             "controlPoints": [
                 {"x": float(x), "y": float(y), **({} if weight == 1.0 else {"weight": float(weight)})}
                 for (x, y), weight in zip(segment.control_points, weights, strict=True)
@@ -154,7 +157,11 @@ def _properties(route: Route, segment: Segment, vehicle: str, found: Findings) -
 
 def _station(station: Station, node: str) -> dict[str, Any]:
     """Station served from a node; its heading lies within [-pi, pi], as LIF demands."""
-    heading = station.heading if abs(station.heading) <= math.pi else wrap_scalar(station.heading)
+    heading = station.heading
+    if abs(heading) > math.pi:
+        wrapped = wrap_scalar(heading)
+        # Toward zero: half a turn, rounded up, would be more than half a turn.
+        heading = math.copysign(math.floor(abs(wrapped) * 1e6) / 1e6, wrapped)
     position = {"x": float(station.x), "y": float(station.y), "theta": float(heading)}
     return {"stationId": station.name, "interactionNodeIds": [node], "stationPosition": position}
 

@@ -29,6 +29,7 @@ from commission.io.findings import Findings, shown
 from commission.io.reading import check_size, inside
 from commission.io.yaml_document import YamlDocument, read_yaml
 from commission.site.checks import above, between
+from commission.site.fields import in_file
 from commission.site.floor_map import FREE, MOST_CELLS, OCCUPIED, UNKNOWN, FloorMap
 
 CELL_LIMIT = MOST_CELLS
@@ -124,7 +125,7 @@ def write_floor_map(floor_map: FloorMap, path: Path) -> None:
 
     Parameters
     ----------
-    floor_map : what to write; reading it again gives an equal one.
+    floor_map : what to write; reading it again gives an equal one, but for the rounding of files.
     path : the YAML file.
     """
     gray = np.full(floor_map.cells.shape, _GRAY[UNKNOWN], dtype=np.uint8)
@@ -134,11 +135,12 @@ def write_floor_map(floor_map: FloorMap, path: Path) -> None:
     Image.fromarray(np.flipud(gray)).save(image, format="PNG", optimize=True)
     image_path = path.with_suffix(".png")
     write_bytes(image_path, image.getvalue())
-    x, y, yaw = (repr(float(v)) for v in floor_map.origin)
+    placed = in_file(floor_map)
+    x, y, yaw = (repr(float(v)) for v in placed.origin)
     write_text(
         path,
         f"image: {image_path.name}\n"
-        f"resolution: {float(floor_map.resolution)!r}  # metres per pixel\n"
+        f"resolution: {float(placed.resolution)!r}  # metres per pixel\n"
         f"origin: [{x}, {y}, {yaw}]  # x [m], y [m], yaw [rad] of the lower-left corner\n"
         "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\nmode: trinary\n",
     )

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from commission.io.atomic import write_text
-from commission.io.table_writer import write_table
-from commission.planning.dependence import Dependence
+from commission.io.table_writer import angle, figure, place, write_table
+from commission.planning.dependence import Dependence, RouteDependence
 from commission.planning.route_prediction import RoutePrediction
 from commission.planning.station_accuracy import StationAccuracy
 from commission.planning.true_error import PredictedErrors
@@ -53,17 +53,18 @@ def write_prediction(
         a file cannot be written.
     """
     metres = prediction.per_metre()
+    x, y, theta = prediction.drive.poses[metres.first].T.tolist()
     columns = [
-        metres.metre,
-        *prediction.drive.poses[metres.first].T,
-        *metres.two_sigma.T,
-        metres.seen,
-        metres.on_odometry,
-        np.isin(metres.metre, prediction.failing_metres()).astype(np.int64),
-        np.where(metres.fails, "fail", "operational"),
-        *errors.per_metre(metres).T,
+        metres.metre.tolist(),
+        *(map(place, x), map(place, y), map(angle, theta)),
+        *(map(figure, column) for column in metres.two_sigma.T.tolist()),
+        metres.seen.tolist(),
+        map(figure, metres.on_odometry.tolist()),
+        np.isin(metres.metre, prediction.failing_metres()).astype(np.int64).tolist(),
+        np.where(metres.fails, "fail", "operational").tolist(),
+        *(map(figure, column) for column in errors.per_metre(metres).T.tolist()),
     ]
-    write_table(folder / PREDICTION, COLUMNS, zip(*(column.tolist() for column in columns), strict=True))
+    write_table(folder / PREDICTION, COLUMNS, zip(*columns, strict=True))
     entries = {**summary(route, prediction, errors), "stations": [_station_entry(station) for station in stations]}
     write_text(folder / SUMMARY, json.dumps(entries, indent=2, allow_nan=False) + "\n")
 
@@ -129,7 +130,14 @@ def write_dependents(folder: Path, ranked: Sequence[Dependence], reflectors: Ref
         the file cannot be written.
     """
     rows = (
-        (reflectors.reflectors[each.reflector].id, each.failure, part.route, len(part.metres), part.load, metres)
+        (
+            reflectors.reflectors[each.reflector].id,
+            each.failure,
+            part.route,
+            len(part.metres),
+            figure(part.load),
+            metres,
+        )
         for each in ranked
         for part in each.routes
         for metres in (" ".join(map(str, part.metres.tolist())),)
@@ -152,9 +160,13 @@ def write_failures(folder: Path, failures: Sequence[Dependence], reflectors: Ref
         the file cannot be written.
     """
     rows = (
-        (number, reflectors.reflectors[each.reflector].id, part.route, len(part.metres), part.load, metres)
+        (number, reflectors.reflectors[each.reflector].id, *_part(part))
         for number, each in enumerate(failures, start=1)
         for part in each.routes
-        for metres in (" ".join(map(str, part.metres.tolist())),)
     )
     write_table(folder / FAILURES, FAILURE_COLUMNS, rows)
+
+
+def _part(part: RouteDependence) -> tuple[str, int, str, str]:
+    """Cells of what fails on one route."""
+    return part.route, len(part.metres), figure(part.load), " ".join(map(str, part.metres.tolist()))

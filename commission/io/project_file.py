@@ -22,7 +22,7 @@ from commission.io.reading import cannot_read, inside
 from commission.io.reflector_tables import read_reflectors, write_reflectors
 from commission.io.yaml_document import YamlDocument, read_yaml, scalar
 from commission.site.disturbances import Disturbances
-from commission.site.fields import with_field
+from commission.site.fields import in_file, with_field
 from commission.site.floor_map import FloorMap
 from commission.site.layout_brief import LayoutBrief
 from commission.site.parameters import Parameters
@@ -255,13 +255,13 @@ def _normal(folder: Path, name: str) -> str:
 
 def _holds_map(path: Path, folder: Path, floor_map: FloorMap) -> bool:
     try:
-        return read_floor_map(path, folder) == floor_map
+        return read_floor_map(path, folder) == in_file(floor_map)
     except FileFormatError:
         return False
 
 
 def _holds_table(path: Path, reflectors: ReflectorMap) -> bool:
     try:
-        return read_reflectors(path) == reflectors
+        return read_reflectors(path) == in_file(reflectors)
     except FileFormatError:
         return False

@@ -1,5 +1,7 @@
 """Text of `project.yaml`: the same project always gives the same text, one value a line, units as comments.
 
+Numbers are rounded as their `Quantity` says: what is read and written again does not drift.
+
 Only the writing side; `project_file` reads it and owns the format's version.
 """
 
@@ -9,6 +11,7 @@ import dataclasses
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from enum import StrEnum
 from typing import Any
 
@@ -16,9 +19,10 @@ import numpy as np
 import yaml
 
 from commission.io.yaml_document import scalar
-from commission.site.fields import fields_of
+from commission.site.fields import fields_of, in_file
 from commission.site.layout_brief import LayoutBrief
 from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
 
 _PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_./ ()-]*")
 _WIDTH = 110
@@ -34,6 +38,7 @@ def project_text(project: Project, schema: int, floor_map: str | None, reflector
     schema : version of the format.
     floor_map, reflectors : names of those files, relative to the project's folder.
     """
+    project = in_file(replace(project, floor_map=None, reflectors=ReflectorMap()))
     lines = [
         f"schema: {schema}",
         f"name: {_text(project.name)}",

@@ -13,6 +13,7 @@ from commission.errors import FileFormatError
 from commission.io.atomic import write_text
 from commission.io.csv_table import Block, read_table, shortened
 from commission.io.findings import Findings
+from commission.site.fields import in_file
 from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
 
 REQUIRED = ("id", "x", "y", "radius")
@@ -79,22 +80,21 @@ def _with_radians(reflectors: list[Reflector], found: Findings | None) -> tuple[
 
 
 def write_reflectors(reflectors: ReflectorMap, path: Path) -> None:
-    """Write a reflector table; optional columns are left out while all of their values are the usual ones."""
+    """Write a reflector table: tenths of a millimetre, and no optional column whose values are all the usual ones."""
+    rounded = [in_file(reflector) for reflector in reflectors.reflectors]
     usual = Reflector(id="usual", x=0.0, y=0.0)
-    optional = [
-        name for name in OPTIONAL if any(getattr(r, name) != getattr(usual, name) for r in reflectors.reflectors)
-    ]
+    optional = [name for name in OPTIONAL if any(getattr(r, name) != getattr(usual, name) for r in rounded)]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([*REQUIRED, *optional])
-    for reflector in reflectors.reflectors:
+    for reflector in rounded:
         cells = [_written(path, reflector, name) for name in (*REQUIRED, *optional)]
         writer.writerow(cells)
     write_text(path, text.getvalue())
 
 
 def _written(path: Path, reflector: Reflector, name: str) -> str:
-    """Cell that reads back as the same value."""
+    """Cell that reads back as the value."""
     value = getattr(reflector, name)
     if isinstance(value, bool):
         return _YES[0] if value else _NO[0]

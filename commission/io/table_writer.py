@@ -4,10 +4,26 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from commission.io.atomic import atomic_file
+
+
+def place(value: float) -> str:
+    """Cell of a coordinate [m], in tenths of a millimetre whatever grid it belongs to; empty unless it is finite."""
+    return repr(round(value, 4) + 0.0) if math.isfinite(value) else ""
+
+
+def angle(value: float) -> str:
+    """Cell of an angle [rad], in microradians; empty unless it is finite."""
+    return repr(round(value, 6) + 0.0) if math.isfinite(value) else ""
+
+
+def figure(value: float) -> str:
+    """Cell of what is no place: six significant digits; empty unless it is finite."""
+    return f"{value:.6g}" if math.isfinite(value) else ""
 
 
 def write_table(path: Path, header: Sequence[str], rows: Iterable[Iterable[object]]) -> None:

@@ -22,7 +22,7 @@ from typing import Annotated, Any, TypeVar
 import numpy as np
 
 from commission.errors import ProjectError, UsageError
-from commission.site.quantity import Choice, Description, Group, Quantity, Switch, Words
+from commission.site.quantity import LARGEST, Bounds, Choice, Description, Group, Quantity, Switch, Words
 
 Value = TypeVar("Value")
 
@@ -64,13 +64,14 @@ class FieldInfo:
 
     @property
     def unit(self) -> str:
-        """Unit in files, of several numbers `m, m, rad`; of a plain number its bounds, where they say anything."""
+        """Unit in files, of several numbers `m, m, rad`; of a share or a ratio its bounds."""
         quantities = [each for each in self.descriptions if isinstance(each, Quantity)]
         units = [each.unit for each in quantities]
         if any(units):
             return units[0] if len(set(units)) == 1 else ", ".join(units)
-        words = {each.bounds.words() for each in quantities if self.kind is not int}
-        return "" if len(words) != 1 or "a finite number" in words else words.pop()
+        bounds = quantities[0].bounds if len(quantities) == 1 and self.kind is float else Bounds()
+        is_ratio = bounds.high <= 1.0 or (bounds.low > 0.0 and bounds.high == LARGEST)
+        return bounds.words() if is_ratio else ""
 
     @property
     def help(self) -> str:

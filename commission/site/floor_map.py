@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray, equal_fields, frozen
 from commission.geometry.occupancy import OccupancyGrid
+from commission.site.checks import check_fields
+from commission.site.quantity import COORDINATE, DEGREES, Quantity
 
 UNKNOWN = -1
 FREE = 0
@@ -25,10 +28,16 @@ class FloorMap:
 
     cells: NDArray[np.int8]
     """(H, W) UNKNOWN, FREE or OCCUPIED; row 0 is the lowest y of the grid's own frame."""
-    resolution: float
-    """Edge of a cell [m]."""
-    origin: FloatArray = field(default_factory=lambda: frozen([0.0, 0.0, 0.0], (3,), "origin"))
-    """(3,) pose of the lower-left corner of cell (0, 0) in the map frame [m, m, rad]."""
+    # Thousands of cells lie side by side: a tenth of a millimetre each would move the last ones by a hand.
+    resolution: Annotated[float, Quantity(label="Cell", unit="m", decimals=9)]
+    """Edge of a cell."""
+    origin: Annotated[
+        FloatArray,
+        Quantity(label="Origin x", unit="m", bounds=COORDINATE, decimals=4),
+        Quantity(label="Origin y", unit="m", bounds=COORDINATE, decimals=4),
+        Quantity(label="Turned by", unit="rad", shown=DEGREES, decimals=6),
+    ] = field(default_factory=lambda: frozen([0.0, 0.0, 0.0], (3,), "origin"))
+    """(3,) pose of the lower-left corner of cell (0, 0) in the map frame."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.resolution) and self.resolution > 0.0):
@@ -36,6 +45,7 @@ class FloorMap:
         if self.cells.ndim != 2 or 0 in self.cells.shape:
             raise ValueError(f"cells have shape {self.cells.shape}; expected rows x columns, each 1 or more")
         object.__setattr__(self, "origin", frozen(self.origin, (3,), "origin"))
+        check_fields(self)
         cells = np.ascontiguousarray(self.cells, dtype=np.int8)
         cells.setflags(write=False)
         object.__setattr__(self, "cells", cells)

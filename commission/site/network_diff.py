@@ -7,6 +7,7 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
+from commission.site.fields import in_file
 from commission.site.routes import Route, Segment
 from commission.site.stations import Station
 
@@ -59,7 +60,8 @@ def difference(before: tuple[T, ...], after: tuple[T, ...]) -> NamedDiff[T]:
     """
     old = {value.name: value for value in before}
     new = {value.name for value in after}
-    changed = tuple(Change(old[v.name], v) for v in after if v.name in old and old[v.name] != v)
+    # Compared as files have them: what was exported and comes back is no change.
+    changed = tuple(Change(old[v.name], v) for v in after if v.name in old and in_file(old[v.name]) != in_file(v))
     return NamedDiff(
         added=tuple(value for value in after if value.name not in old),
         changed=changed,

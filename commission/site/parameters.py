@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import Annotated
 
@@ -157,7 +156,7 @@ class SupervisorParameters:
     heading_limit: Annotated[
         float,
         Quantity(label="2σ heading", unit="rad", shown=DEGREES, bounds=POSITIVE, step=0.1, slider=(0.1, 15.0)),
-    ] = math.radians(3.0)
+    ] = 0.05236  # 3 degrees, as a file has it
     """Largest allowed 2-sigma of the heading, Err_o."""
     recovery_ratio: Annotated[
         float, Quantity(label="Recovery ratio", bounds=Bounds.at_least(1.0), step=0.1, slider=(1.0, 10.0))

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.site.editing.names import fresh_names
+from commission.site.fields import in_file
 from commission.site.reflectors import Reflector, ReflectorMap
 
 SAME_PLACE = 0.05
@@ -83,7 +84,8 @@ def difference(
     silent = [f.name for f in dataclasses.fields(Reflector) if fields is not None and f.name not in (*fields, "id")]
     pairs = [_pair(partners.get(reflector.id), reflector, silent) for reflector in after.reflectors]
     kept = {old.id for old in partners.values()}
-    changed = tuple(ReflectorChange(old, new) for old, new in pairs if old is not None and old != new)
+    # Compared as files have them: what was exported and comes back is no change.
+    changed = tuple(ReflectorChange(old, new) for old, new in pairs if old is not None and in_file(old) != in_file(new))
     return ReflectorDiff(
         added=tuple(new for old, new in pairs if old is None),
         changed=changed,

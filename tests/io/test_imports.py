@@ -155,9 +155,9 @@ MAPS = st.lists(
     st.builds(
         Reflector,
         id=st.from_regex(r"[A-Za-z<>&'/][A-Za-z0-9<>&'/;, ]{0,8}[A-Za-z0-9>]", fullmatch=True),
-        x=st.floats(-1e4, 1e4),
-        y=st.floats(-1e4, 1e4),
-        radius=st.floats(0.001, 1.0),
+        x=st.integers(-(10**8), 10**8).map(lambda tenths: tenths / 1e4),
+        y=st.integers(-(10**8), 10**8).map(lambda tenths: tenths / 1e4),
+        radius=st.integers(10, 10**4).map(lambda tenths: tenths / 1e4),
         note=st.text(st.characters(min_codepoint=33, max_codepoint=0x2FFF, exclude_categories=("C", "Z")), max_size=9),
         locked=st.booleans(),
     ),

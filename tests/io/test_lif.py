@@ -17,6 +17,7 @@ from commission.errors import CommissionError, FileFormatError, UsageError
 from commission.geometry.splines import clamped_uniform_knots
 from commission.io.lif import read_lif
 from commission.io.lif_writer import write_lif
+from commission.site.fields import in_file
 from commission.site.floor_map import FloorMap
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -72,7 +73,7 @@ def spelled_out(route: Route) -> tuple[str, list[Segment]]:
         n = len(segment.control_points)
         knots = clamped_uniform_knots(segment.degree, n) if segment.knots is None else segment.knots
         weights = np.ones(n) if segment.weights is None else segment.weights
-        return replace(segment, knots=knots, weights=weights, speed=route.speed_of(segment))
+        return replace(segment, knots=np.round(knots, 9), weights=weights, speed=route.speed_of(segment))
 
     return route.name, [full(segment) for segment in route.segments]
 
@@ -90,7 +91,7 @@ def routes(draw: st.DrawFn) -> Route:
     return Route(draw(NAME.filter(lambda name: name == name.strip())), tuple(chain), draw(SPEED))
 
 
-@given(several=st.lists(routes(), max_size=3, unique_by=lambda route: route.name))
+@given(several=st.lists(routes().map(in_file), max_size=3, unique_by=lambda route: route.name))
 def test_routes_that_are_written_and_read_again_are_equal(
     tmp_path_factory: pytest.TempPathFactory, several: list[Route]
 ) -> None:
@@ -98,6 +99,20 @@ def test_routes_that_are_written_and_read_again_are_equal(
     write_lif(Project(routes=tuple(several)), path)
     again = read_lif(path)
     assert [spelled_out(route) for route in again.routes] == [spelled_out(route) for route in several]
+
+
+@given(route=routes())
+def test_a_layout_is_written_in_tenths_of_a_millimetre_and_does_not_drift(
+    tmp_path_factory: pytest.TempPathFactory, route: Route
+) -> None:
+    path = tmp_path_factory.mktemp("layout") / "layout.lif"
+    exported = datetime(2026, 1, 1, tzinfo=UTC)
+    write_lif(Project(name="hall", routes=(route,)), path, exported_at=exported)
+    first, text = read_lif(path).routes[0], path.read_text(encoding="utf-8")
+    for new, old in zip(first.segments, route.segments, strict=True):
+        assert np.abs(new.control_points - old.control_points).max() <= 0.5001e-4
+    write_lif(Project(name="hall", routes=(first,)), path, exported_at=exported)
+    assert path.read_text(encoding="utf-8") == text
 
 
 def test_stations_are_written_and_read_again(tmp_path: Path) -> None:
@@ -116,6 +131,17 @@ def test_stations_are_written_and_read_again(tmp_path: Path) -> None:
     again = read_lif(tmp_path / "out.lif").stations
     assert [(s.name, s.x, s.y) for s in again] == [(s.name, s.x, s.y) for s in expected]
     assert [s.heading for s in again] == pytest.approx([s.heading for s in expected])
+
+
+@pytest.mark.parametrize("heading", [math.pi, -math.pi, 3.1415926, 3.0 * math.pi, 100.0, -3.2])
+def test_a_heading_is_within_half_a_turn_however_it_is_rounded(tmp_path: Path, heading: float) -> None:
+    station = Station(name="Dock", x=2.0, y=0.0, heading=heading)
+    write_lif(Project(stations=(station,)), tmp_path / "out.lif")
+    written = json.loads((tmp_path / "out.lif").read_text(encoding="utf-8"))["layouts"][0]["stations"][0]
+    theta = written["stationPosition"]["theta"]
+    assert abs(theta) <= math.pi
+    assert abs(math.remainder(theta - heading, 2.0 * math.pi)) < 2e-6
+    assert theta == round(theta, 6)
 
 
 def test_what_lif_cannot_carry_is_said(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from commission.errors import CommissionError, FileFormatError
 from commission.io import project_archive
 from commission.io.exports import Format, export
 from commission.io.project_archive import read_project_archive
+from commission.site.fields import in_file
 from commission.site.project import Project
 from tests.app.sites import room
 from tests.io.projects import projects
@@ -30,9 +31,9 @@ def written(folder: Path, files: dict[str, str]) -> Path:
     return path
 
 
-@given(project=projects())
+@given(project=projects().map(in_file))
 @settings(max_examples=40)
-def test_project_that_was_exported_and_imported_again_is_equal(
+def test_project_as_a_file_has_it_is_equal_when_it_is_exported_and_imported_again(
     tmp_path_factory: pytest.TempPathFactory, project: Project
 ) -> None:
     path = tmp_path_factory.mktemp("sent") / "hall.zip"

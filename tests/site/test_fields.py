@@ -89,7 +89,8 @@ def test_help_of_a_field_names_its_unit_or_its_bounds():
     assert field_info(Parameters(), "supervisor.recovery_ratio").unit == "1 or more"
     assert fields_of(Scanner)["mounting"].unit == "m, m, rad"
     assert fields_of(Scanner)["field_of_view_deg"].unit == "deg"
-    assert fields_of(Disturbances)["people"].unit == ""
+    assert fields_of(Disturbances)["dropped_scans"].unit == "0 to 1"
+    assert fields_of(Disturbances)["people"].unit == fields_of(Disturbances)["glints_per_scan"].unit == ""
 
 
 def test_a_field_is_read_and_set_by_its_dotted_name():

@@ -13,7 +13,8 @@ from commission.site.stations import Station
 
 LINE = Segment(control_points=np.array([[0.0, 0.0], [4.0, 0.0]]), degree=1)
 LOOP, DOCK, PARK = Route("Loop", (LINE,)), Route("Dock", (LINE,), 0.3), Route("Park", (LINE,), 1.0)
-ONE = st.builds(Station, name=st.sampled_from("ABCDEFG"), x=st.floats(0, 1), y=st.floats(0, 1))
+METRES = st.integers(0, 10**4).map(lambda tenths: tenths / 1e4)
+ONE = st.builds(Station, name=st.sampled_from("ABCDEFG"), x=METRES, y=METRES)
 SEVERAL = st.lists(ONE, max_size=6, unique_by=lambda s: s.name).map(tuple)
 
 
@@ -23,6 +24,12 @@ def test_added_changed_and_removed_routes_are_told_apart() -> None:
     assert diff == NamedDiff((PARK,), (Change(DOCK, faster),), (LOOP,), 0)
     assert merged((LOOP, DOCK), diff, remove=False) == (LOOP, faster, PARK)
     assert merged((LOOP, DOCK), diff, remove=True) == (faster, PARK)
+
+
+def test_what_a_file_rounds_away_is_no_change() -> None:
+    exact = Station(name="A", x=5.640000000000006, y=0.1 + 0.2)
+    assert not difference((exact,), (Station(name="A", x=5.64, y=0.3),))
+    assert difference((exact,), (Station(name="A", x=5.6401, y=0.3),)).changed
 
 
 @given(before=SEVERAL, after=SEVERAL)

@@ -11,7 +11,8 @@ from commission.site.reflector_diff import ReflectorChange, ReflectorDiff, diffe
 from commission.site.reflectors import Reflector, ReflectorMap
 
 A, B, C = Reflector(id="A", x=0.0, y=0.0), Reflector(id="B", x=5.0, y=0.0), Reflector(id="C", x=0.0, y=5.0)
-ONE = st.builds(Reflector, id=st.sampled_from("ABCDEFG"), x=st.floats(0, 1), y=st.floats(0, 1))
+METRES = st.integers(0, 10**4).map(lambda tenths: tenths / 1e4)
+ONE = st.builds(Reflector, id=st.sampled_from("ABCDEFG"), x=METRES, y=METRES)
 MAPS = st.lists(ONE, max_size=6, unique_by=lambda r: r.id).map(lambda rs: ReflectorMap(tuple(rs)))
 
 
@@ -22,6 +23,13 @@ def test_added_changed_and_removed_reflectors_are_told_apart() -> None:
     assert diff == ReflectorDiff((new,), (ReflectorChange(B, moved),), (C,), 1)
     assert diff.changed[0].fields == ("x", "y")
     assert diff.changed[0].moved == pytest.approx(0.5)
+
+
+def test_what_a_file_rounds_away_is_no_change() -> None:
+    exact = replace(A, x=5.640000000000006, heading=1.0 / 3.0)
+    rounded = replace(A, x=5.64, heading=0.333333)
+    assert not difference(ReflectorMap((exact,)), ReflectorMap((rounded,)))
+    assert difference(ReflectorMap((exact,)), ReflectorMap((replace(rounded, x=5.6401),))).changed
 
 
 def test_reflector_that_only_changed_its_name_is_recognized_by_its_place() -> None:
