@@ -28,7 +28,6 @@ from commission.app.failures import feature as failures
 from commission.app.floor_map import feature as floor_map
 from commission.app.page import Page
 from commission.app.placement import feature as placement
-from commission.app.plan import feature as plan
 from commission.app.prediction import feature as prediction
 from commission.app.problems import feature as problems
 from commission.app.project import feature as project
@@ -55,7 +54,6 @@ FEATURES = (
     failures.FEATURE,
     ambiguity.FEATURE,
     placement.FEATURE,
-    plan.FEATURE,
     run.FEATURE,
     tune.FEATURE,
 )

@@ -275,7 +275,7 @@ class Runtime:
     def view(self, *, whole: bool = True) -> PageView:
         """Return everything the page shows; `whole` with what is drawn slowly, too."""
         parts = (part for service in self._services for part in service.parts(slowly=whole))
-        return view_of(self.state, *parts, jobs=self._jobs.running())
+        return view_of(self.state, *parts, jobs=self._jobs.running(), waiting=self._jobs.waiting())
 
     def _show_site(self) -> None:
         if self._page is not None:

@@ -57,7 +57,7 @@ class Ambiguity:
 
         out = result_folder(self.out, "ambiguity", FILES, force=self.force, sources=(self.project,))
         project = load_project(self.project)
-        drives = DrivesInput.of(project, self.route or tuple(route.name for route in project.routes))
+        drives = DrivesInput.of(project, self.route or None)
         try:
             options = AmbiguityOptions(self.tolerance, self.separation, math.radians(self.turn), self.headings)
             floor = ambiguity(AmbiguityInput.of(project, options, spacing=self.spacing))

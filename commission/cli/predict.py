@@ -89,7 +89,7 @@ class Predict:
 
         drives, lines = known.inputs, list[str]()
         if self.every_route:
-            drives = DrivesInput.of(project, (route.name for route in project.routes), self._options())
+            drives = DrivesInput.of(project, None, self._options())
         if self.what_if is not None:
             result = failures(FailuresInput(drives=drives, failure=Failure(self.what_if)), known=known)
             known = result.drives

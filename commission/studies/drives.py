@@ -45,7 +45,7 @@ class DrivesInput(StudyInput):
     @staticmethod
     def of(
         project: Project,
-        names: Iterable[str],
+        names: Iterable[str] | None = None,
         prediction: PredictionOptions | None = None,
         visibility: VisibilityOptions | None = None,
     ) -> DrivesInput:
@@ -54,7 +54,7 @@ class DrivesInput(StudyInput):
         Parameters
         ----------
         project : the site.
-        names : of the routes.
+        names : of the routes; all when None.
         prediction : where a prediction starts, and what it expects of the hall; the defaults when None.
         visibility : what counts as visible; the defaults when None.
 
@@ -69,7 +69,7 @@ class DrivesInput(StudyInput):
             scanner=project.scanner,
             vehicle=project.vehicle,
             parameters=project.parameters,
-            routes=tuple(map(project.route, names)),
+            routes=project.routes if names is None else tuple(map(project.route, names)),
             prediction=prediction or PredictionOptions(),
             visibility=visibility or VisibilityOptions(),
         )

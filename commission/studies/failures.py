@@ -55,7 +55,7 @@ class FailuresInput(StudyInput):
         """
         names = [reflector.id for reflector in project.reflectors.reflectors]
         return FailuresInput(
-            drives=DrivesInput.of(project, (route.name for route in project.routes), prediction, visibility),
+            drives=DrivesInput.of(project, None, prediction, visibility),
             failure=failure,
             fallen=tuple(names.index(name) for name in fallen if name in names),
         )

@@ -1,8 +1,8 @@
 """How closely the page follows a dragged reflector with a heatmap on: the warehouse, 120 reflectors.
 
-First the planner alone, from a place of the drag to its picture; then the whole server, at the rate of a hand's drag:
-required are 5 heatmaps a second. At last a browser under a real mouse, where a machine without a graphics card is bound
-by its own few frames a second: printed, not required. Run: python -m tests.benchmarks.bench_plan
+First the service of the heatmap alone, from a place of the drag to its picture; then the whole server, at the rate of
+a hand's drag: required are 5 heatmaps a second. At last a browser under a real mouse, where a machine without a
+graphics card is bound by its own few frames a second: printed, not required. Run: python -m tests.benchmarks.bench_plan
 """
 
 from __future__ import annotations
@@ -15,14 +15,15 @@ import numpy as np
 from playwright.sync_api import sync_playwright
 
 from commission.app.base.actions import DragFloor, Envelope, Sender
+from commission.app.base.floor_picture import FloorPicture
 from commission.app.base.server import start_server
 from commission.app.base.state import AppState
+from commission.app.coverage.actions import SetCoverage
 from commission.app.coverage.scale import picture
+from commission.app.coverage.service import CoverageService
+from commission.app.coverage.settings import NAME, CoverageSettings, Figure
 from commission.app.editing.editor import Drag, Editor, Grab
 from commission.app.launch import open_page
-from commission.app.plan.actions import SetPlan
-from commission.app.plan.planner import Planner
-from commission.app.plan.settings import Figure, PlanSettings
 from commission.app.runtime import BrowserCame
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
@@ -65,19 +66,19 @@ def central(project: Project) -> Reflector:
     return project.reflectors.reflectors[int(np.argmin(np.hypot(*(centers - centers.mean(axis=0)).T)))]
 
 
-def measure_server(project: Project, settings: PlanSettings) -> None:
-    """Print how long the planner takes from a place of a drag to the picture."""
-    state = AppState(project, project).joined(1).with_part(settings)
-    owner = Owner(Planner, state)
+def measure_server(project: Project, settings: CoverageSettings) -> None:
+    """Print how long the service takes from a place of a drag to the picture."""
+    state = AppState(project, project).joined(1).with_part(settings).with_part(FloorPicture(owner=NAME))
+    owner = Owner(CoverageService, state)
     owner.settle(state)
-    planner = owner.service
+    service = owner.service
     reflector, times = central(project), []
     for number in range(DRAGS):
         drag = Drag(Grab.REFLECTORS, (0.0, 0.0), (0.0, 0.05 * (number + 1)))
         state = state.with_browser(1, Editor(selected=(reflector.id,), drag=drag))
         start = time.perf_counter()
-        planner.follow(state)
-        heat = planner.view.heat
+        service.follow(state)
+        heat = service.view.heat
         assert heat is not None
         picture(heat.classes, heat.scale, 0.8)
         times.append(time.perf_counter() - start)
@@ -95,8 +96,8 @@ def measure_browser(project: Project, size: tuple[int, int]) -> None:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
         page = OpenPage(browser, server, size)
         page.open(nodes=["/floor/map", "/reflectors/marks"])
-        runtime.post(SetPlan("figure", Figure.POSITION_DOP.value))
-        until(lambda: runtime.service(Planner).view.heat is not None)
+        runtime.post(SetCoverage("figure", Figure.POSITION_DOP.value))
+        until(lambda: runtime.service(CoverageService).view.heat is not None)
         page.wait_until_drawn(["/plan/heat"])
         reflector = central(project)
         x, y = page.pixel_of((reflector.x, reflector.y))
@@ -108,9 +109,8 @@ def measure_browser(project: Project, size: tuple[int, int]) -> None:
             step += 1
             page.page.mouse.move(x + 2 * step % 120, y + step % 60)
             page.page.wait_for_timeout(40)
-            views[id(runtime.service(Planner).view.heat)] = runtime.service(
-                Planner
-            ).view.heat  # kept, so that no other one gets its number
+            heat = runtime.service(CoverageService).view.heat
+            views[id(heat)] = heat  # kept, so that no other one gets its number
         seconds = time.monotonic() - start
         page.page.mouse.up()
         maps, frames = page.page.evaluate("[window.__maps.size, window.__frames]")
@@ -130,8 +130,8 @@ def measure_runtime(project: Project) -> float:
     server = start_server("127.0.0.1", 0)
     runtime = open_page(server, project)
     runtime.post(BrowserCame(1))
-    runtime.post(SetPlan("figure", Figure.POSITION_DOP.value))
-    until(lambda: runtime.service(Planner).view.heat is not None)
+    runtime.post(SetCoverage("figure", Figure.POSITION_DOP.value))
+    until(lambda: runtime.service(CoverageService).view.heat is not None)
     reflector, seen = central(project), set[int]()
     place, keep, start, step = (reflector.x, reflector.y), [], time.monotonic(), 0
     cpu = time.process_time()
@@ -140,7 +140,7 @@ def measure_runtime(project: Project) -> float:
         runtime.post(Envelope(DragFloor("update" if step else "start", place, now, 0.3), Sender(1)))
         time.sleep(0.05)
         step += 1
-        heat = runtime.service(Planner).view.heat
+        heat = runtime.service(CoverageService).view.heat
         if id(heat) not in seen:
             seen.add(id(heat))
             keep.append(heat)  # kept, so that no other one gets its number
@@ -158,9 +158,9 @@ def main() -> int:
     """Print and return the exit code."""
     project = load_project(bundled_folder("maps") / "warehouse")
     for settings in (
-        PlanSettings(figure=Figure.POSITION_DOP),
-        PlanSettings(figure=Figure.POSITION_SIGMA, ellipse_grid=True),
-        PlanSettings(figure=Figure.POSITION_SIGMA, heading=Heading.WORST),
+        CoverageSettings(figure=Figure.POSITION_DOP),
+        CoverageSettings(figure=Figure.POSITION_SIGMA, ellipse_grid=True),
+        CoverageSettings(figure=Figure.POSITION_SIGMA, heading=Heading.WORST),
     ):
         measure_server(project, settings)
     passed = measure_runtime(project) >= REQUIRED

@@ -10,8 +10,6 @@ from commission.app.base.server import start_server
 from commission.app.base.state import AppState
 from commission.app.editing.editor import Editor, editor_of
 from commission.app.launch import open_page
-from commission.app.plan.planner import Planner
-from commission.app.plan.view import PlanView
 from commission.app.run.actions import Source
 from commission.app.run.service import RunService
 from commission.app.run.session import Session
@@ -36,11 +34,6 @@ class Served:
     def editor(self, browser: int) -> Editor:
         """How a browser edits."""
         return editor_of(self.state, browser)
-
-    @property
-    def plan(self) -> PlanView:
-        """What the step Plan has found."""
-        return self.runtime.service(Planner).view
 
     @property
     def session(self) -> Session | None:

@@ -12,9 +12,13 @@ from playwright.sync_api import Browser
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from commission.app.coverage.scale import FIRST
+from commission.app.coverage.service import CoverageService
+from commission.app.coverage.settings import Figure
+from commission.app.coverage.view import CoverageView, HeatView
 from commission.app.placement.reducer import ACCEPT
-from commission.app.plan.settings import Figure
-from commission.app.plan.view import HeatView
+from commission.app.placement.service import PlacementService
+from commission.app.placement.view import LayoutView
+from commission.app.prediction.service import PredictionService
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
 from tests.browser.page import SMALL, OpenPage
@@ -31,8 +35,16 @@ class OpenSite(Served):
         super().__init__(self.project)
 
     @property
+    def floor(self) -> CoverageView:
+        return self.runtime.service(CoverageService).view
+
+    @property
     def heat(self) -> HeatView | None:
-        return self.plan.heat
+        return self.floor.heat
+
+    @property
+    def layout(self) -> LayoutView | None:
+        return self.runtime.service(PlacementService).view
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +96,7 @@ def test_a_heatmap_is_switched_on_seen_and_read(page: OpenPage, site: OpenSite) 
     assert nearest == int(heat.classes.ravel()[index]) - FIRST, (seen, ramp.tolist())
     page.click_at(spot)
     page.wait_for_text("Clicked at x, y")
-    reading = site.plan.reading
+    reading = site.floor.reading
     assert reading is not None
     assert abs(reading.place[0] - spot[0]) < 0.2
     assert abs(reading.place[1] - spot[1]) < 0.2
@@ -107,7 +119,7 @@ def test_a_route_is_predicted_over_its_metres(page: OpenPage, site: OpenSite) ->
     page.fold("Along a route")
     page.choose("Route", site.project.routes[0].name)
     page.wait_for_text("Supervisor stops")
-    assert site.plan.route is not None
+    assert site.runtime.service(PredictionService).view is not None
     assert page.errors == []
 
 
@@ -125,7 +137,7 @@ def test_a_layout_is_suggested_accepted_and_taken_back(page: OpenPage, site: Ope
     project = site.runtime.state.project
     page.press("Suggest reflectors")
     page.wait_for_text("Fewest possible")
-    found = site.plan.layout
+    found = site.layout
     assert found is not None
     placement = found.suggestion.placement
     assert 0 < placement.at_least <= placement.added < len(whole.reflectors)
@@ -135,7 +147,7 @@ def test_a_layout_is_suggested_accepted_and_taken_back(page: OpenPage, site: Ope
     site.until(lambda: site.runtime.state.project is not project)
     assert site.runtime.state.project.reflectors == placement.reflectors
     assert site.runtime.state.undo[-1].name == ACCEPT
-    site.until(lambda: site.plan.layout is None)
+    site.until(lambda: site.layout is None)
     site.until(lambda: site.heat is not None and site.heat is not before and not site.heat.outdated)
     page.page.get_by_role("button", name="Undo").first.click()
     site.until(lambda: site.runtime.state.project is project)

@@ -16,11 +16,16 @@ from pathlib import Path
 
 from playwright.sync_api import Browser, sync_playwright
 
+from commission.app.ambiguity.service import AmbiguityService
 from commission.app.base.actions import Envelope, Sender
+from commission.app.coverage.service import CoverageService
 from commission.app.editing.actions import SelectReflectors
 from commission.app.editing.editor import Tool, editors_of
-from commission.app.plan.actions import SetLayout, SetPlan
-from commission.app.plan.planner import Planner
+from commission.app.failures.actions import ShowFailure
+from commission.app.failures.service import FailureService
+from commission.app.placement.actions import SetLayout
+from commission.app.placement.service import PlacementService
+from commission.app.prediction.service import PredictionService
 from commission.app.run.actions import Cover, Play, Seek, VirtualDrive
 from commission.app.run.service import RunService
 from commission.app.runtime import Runtime
@@ -114,7 +119,7 @@ def heatmap(page: OpenPage, runtime: Runtime) -> None:
     """The position error all over the floor."""
     page.open_tab("Plan")
     page.choose("Show", "Position error, 1σ [mm]")
-    until(lambda: runtime.service(Planner).view.heat is not None)
+    until(lambda: runtime.service(CoverageService).view.heat is not None)
 
 
 def predicted(page: OpenPage, runtime: Runtime) -> None:
@@ -122,7 +127,7 @@ def predicted(page: OpenPage, runtime: Runtime) -> None:
     page.open_tab("Plan")
     page.fold("Along a route")
     page.choose("Route", runtime.state.project.routes[1].name)
-    until(lambda: runtime.service(Planner).view.route is not None)
+    until(lambda: runtime.service(PredictionService).view is not None)
 
 
 def suggested(page: OpenPage, runtime: Runtime) -> None:
@@ -132,7 +137,7 @@ def suggested(page: OpenPage, runtime: Runtime) -> None:
     page.fold("Suggested layout")
     runtime.post(SetLayout("extend", value=False))
     page.press("Suggest reflectors")
-    until(lambda: runtime.service(Planner).view.layout is not None)
+    until(lambda: runtime.service(PlacementService).view is not None)
 
 
 def ambiguous(page: OpenPage, runtime: Runtime) -> None:
@@ -141,7 +146,7 @@ def ambiguous(page: OpenPage, runtime: Runtime) -> None:
     page.fold("Heatmap of the floor")
     page.fold("Ambiguous places")
     page.press("Find ambiguous places")
-    until(lambda: runtime.service(Planner).view.cold_start is not None)
+    until(lambda: runtime.service(AmbiguityService).view is not None)
 
 
 def along(page: OpenPage, runtime: Runtime) -> None:
@@ -173,16 +178,11 @@ def failing(page: OpenPage, runtime: Runtime) -> None:
     page.fold("Heatmap of the floor")
     page.fold("What if one reflector fails")
     page.press("Rank reflectors")
-    until(lambda: runtime.service(Planner).view.failures is not None)
-    failures = runtime.service(Planner).view.failures
-    if failures is not None:
-        runtime.post(SetPlan("failed", failures.names[0]))
-    until(
-        lambda: (
-            runtime.service(Planner).view.failures is not None
-            and runtime.service(Planner).view.failures.chosen is not None
-        )
-    )
+    service = runtime.service(FailureService)
+    until(lambda: service.view is not None)
+    if service.view is not None:
+        runtime.post(ShowFailure(service.view.names[0]))
+    until(lambda: service.view is not None and service.view.chosen is not None)
 
 
 def equipment(page: OpenPage, _runtime: Runtime) -> None:

@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 from viser import ImageHandle, LabelHandle, LineSegmentsHandle, SceneApi, SceneNodeHandle
 
 from commission.app.ambiguity.cold_start import CLASSES, EVERY, SOME, TOO_FEW, UNIQUE
+from commission.app.ambiguity.view import ColdStartView, TwinsView
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, Points, outline_segments, stroke_segments
 from commission.app.base.extent import extent_of
+from commission.app.base.floor_picture import FloorPicture
 from commission.app.base.layer import BaseLayer
 from commission.app.base.view import PageView
-from commission.app.plan.settings import PlanSettings
-from commission.app.plan.view import ColdStartView, TwinsView, plan_of
 from commission.app.run.vehicle_layer import heading_mark
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
@@ -75,12 +75,11 @@ class AmbiguityLayer(BaseLayer):
 
     def draw(self, view: PageView) -> None:
         """Draw what has changed."""
-        plan = plan_of(view)
-        state = view.state
-        found, visible = plan.cold_start, self.name not in state.hidden
-        if (found, state.part(PlanSettings).opacity) != self._shown:
-            self._shown = found, state.part(PlanSettings).opacity
-            self._draw(found, state.part(PlanSettings).opacity, visible=visible)
+        found, state = view.part(ColdStartView), view.state
+        opacity, visible = state.part(FloorPicture).opacity, self.name not in state.hidden
+        if (found, opacity) != self._shown:
+            self._shown = found, opacity
+            self._draw(found, opacity, visible=visible)
         twins = None if found is None else found.twins
         if twins is not self._twins:
             self._twins = twins
@@ -145,8 +144,8 @@ class AmbiguityLayer(BaseLayer):
 
     def is_used(self, view: PageView) -> bool:
         """Whether a pair is shown."""
-        plan = plan_of(view)
-        return plan.cold_start is not None and plan.cold_start.twins is not None
+        found = view.part(ColdStartView)
+        return found is not None and found.twins is not None
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return map, rings and labels."""

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from viser import GuiApi, GuiFolderHandle
 
+from commission.app.ambiguity.service import COLD_START
+from commission.app.ambiguity.settings import AmbiguitySettings, DropPlaces, FindPlaces, SetAmbiguity, ShowPair
+from commission.app.ambiguity.view import ColdStartView
 from commission.app.base import theme
 from commission.app.base.inputs import Inputs, Text, WorkBar
 from commission.app.base.panel import BasePanel, Post, posting
 from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
-from commission.app.plan.actions import SetPlan
-from commission.app.plan.planner import COLD_START
-from commission.app.plan.settings import PlanSettings
-from commission.app.plan.view import ColdStartView, plan_of
 
 MOST_PAIRS = 15
 MOST_NAMES = 6
@@ -28,21 +27,21 @@ class ColdStartPanel(BasePanel):
     """
 
     def __init__(self, gui: GuiApi, post: Post, folder: GuiFolderHandle) -> None:
-        self._inputs = Inputs(gui, post, SetPlan, lambda state, name: getattr(state.part(PlanSettings), name))
+        self._inputs = Inputs(gui, post, SetAmbiguity, lambda state, name: getattr(state.part(AmbiguitySettings), name))
         hint = "Largest distance at which a reflector still counts as standing where its look-alike does."
         tolerance = gui.add_number("Tolerance [mm]", 100, min=5, max=2000, step=5, hint=hint)
         self._inputs.number("tolerance", 1000.0, tolerance)
         hint = "Look for places from which the reflectors look as they do from somewhere else."
         ask = gui.add_button("Find ambiguous places", hint=hint)
-        ask.on_click(posting(post, lambda _event: SetPlan("cold_start", value=True)))
-        self._work = WorkBar(gui, post, COLD_START, SetPlan("cold_start", value=False))
+        ask.on_click(posting(post, lambda _event: FindPlaces()))
+        self._work = WorkBar(gui, post, COLD_START, DropPlaces())
         self._text = Text(gui)
-        self._pairs = Rows(gui, folder, post, lambda index: SetPlan("pair", index))
+        self._pairs = Rows(gui, folder, post, ShowPair)
         self._shown: tuple[ColdStartView | None, int] | None = None
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow settings, progress and result."""
-        found, chosen = plan_of(view).cold_start, view.state.part(PlanSettings).pair
+        found, chosen = view.part(ColdStartView), view.state.part(AmbiguitySettings).pair
         self._inputs.follow(view.state)
         self._work.follow(view)
         if self._shown == (found, chosen):

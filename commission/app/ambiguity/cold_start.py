@@ -1,4 +1,4 @@
-"""Where a vehicle that is switched on could take its place for another one: the job, its map, its pairs."""
+"""Where a vehicle that is switched on could take its place for another one: its map, its pairs."""
 
 from __future__ import annotations
 
@@ -7,13 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.app.plan.settings import PlanSettings
 from commission.geometry.arrays import FloatArray
-from commission.planning.ambiguity import AmbiguityOptions, AmbiguousPair
+from commission.planning.ambiguity import AmbiguousPair
 from commission.planning.coverage import Lattice
-from commission.planning.visibility import VisibilityOptions
 from commission.progress import Progress
-from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.studies.ambiguity import AmbiguityInput, AmbiguityResult, ambiguity, both_ways
 
@@ -46,14 +43,10 @@ class Ambiguity:
         return tuple(self.reflectors.reflectors[index].id for index in group)
 
 
-def look_alike(project: Project, settings: PlanSettings, progress: Progress) -> Ambiguity:
+def look_alike(inputs: AmbiguityInput, progress: Progress) -> Ambiguity:
     """Ask for every free spot of the floor, heading by heading, whether another pose sees the same."""
-    options, visibility = (
-        AmbiguityOptions(tolerance=settings.tolerance),
-        VisibilityOptions(min_beams=settings.min_beams),
-    )
-    found = ambiguity(AmbiguityInput.of(project, options, visibility=visibility), progress)
-    return Ambiguity(project.reflectors, found.lattice, _classes(found), both_ways(found.cold.pairs))
+    found = ambiguity(inputs, progress)
+    return Ambiguity(inputs.reflectors, found.lattice, _classes(found), both_ways(found.cold.pairs))
 
 
 def _classes(found: AmbiguityResult) -> NDArray[np.uint8]:

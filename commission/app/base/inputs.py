@@ -9,14 +9,14 @@ from typing import Any, TypeAlias, TypeVar
 from viser import GuiApi, GuiInputHandle
 
 from commission.app.base.actions import Action
-from commission.app.base.panel import Post, posting, write
+from commission.app.base.panel import Post, escaped, posting, write
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.plan.settings import PlanValue
 
 Choice = TypeVar("Choice", bound=StrEnum)
+Setting: TypeAlias = bool | int | float | str | None
 Read: TypeAlias = Callable[[AppState, str], Any]
-Make: TypeAlias = Callable[[str, PlanValue], Action]
+Make: TypeAlias = Callable[[str, Setting], Action]
 
 
 class Inputs:
@@ -38,7 +38,7 @@ class Inputs:
         self,
         name: str,
         widget: GuiInputHandle[Any],
-        meant: Callable[[Any], PlanValue],
+        meant: Callable[[Any], Setting],
         shown: Callable[[AppState], Any],
     ) -> None:
         """Connect a widget.
@@ -91,7 +91,7 @@ class Inputs:
 
 
 class WorkBar:
-    """Progress of a job while it runs, with a button that cancels it.
+    """How far a job is, what it does, or what it waits for, with a button that cancels it; nothing without a job.
 
     Parameters
     ----------
@@ -103,16 +103,25 @@ class WorkBar:
     def __init__(self, gui: GuiApi, post: Post, name: str, cancel: Action) -> None:
         self.name = name
         self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
+        self._note = gui.add_html("", visible=False)
         self._cancel = gui.add_button("Cancel", color="gray", visible=False)
         self._cancel.on_click(posting(post, lambda _event: cancel))
 
     def follow(self, view: PageView) -> bool:
         """Show how far the job is; return whether it runs."""
-        job = next((job for job in view.jobs if job.name.startswith(self.name)), None)
-        for widget in (self._bar, self._cancel):
-            show(widget, visible=job is not None)
+        job, waiting = (
+            next((each for each in jobs if each.name == self.name), None) for jobs in (view.jobs, view.waiting)
+        )
+        show(self._bar, visible=job is not None)
+        show(self._cancel, visible=job is not None or waiting is not None)
+        note = ""
         if job is not None:
             write(self._bar, 100.0 * job.fraction)
+            note = f"{job.message} {job.fraction:.0%}"
+        elif waiting is not None:
+            ahead = next((each for each in view.jobs if each.lane is waiting.lane), None)
+            note = "waiting" if ahead is None else f"first: {ahead.name} {ahead.fraction:.0%}"
+        write_html(self._note, note and f"<div class='c-note' style='padding:2px 6px'>{escaped(note)}</div>")
         return job is not None
 
 

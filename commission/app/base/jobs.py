@@ -13,7 +13,7 @@ import logging
 import math
 import threading
 import time
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from queue import SimpleQueue
@@ -65,6 +65,9 @@ class Job:
 
     key: Hashable = None
     """What a newer job must share with it to end it."""
+
+    lane: Lane = Lane.USUAL
+    """In which it waits."""
 
     is_shown: bool = True
     """Whether the page shows it: not what is too quick, or started too often."""
@@ -129,17 +132,11 @@ class Jobs:
     post : takes each `JobReport`, from the thread in which it arises. It should only put it into the owner's queue.
         Reports about one job arrive in order. Progress is thinned out; a change of state or message never is.
     failed : from a job that failed to the action that says so, for all jobs that do not see to it themselves.
-    numbers : where the jobs' numbers come from; runners that report to the same owner share it.
     """
 
-    def __init__(
-        self,
-        post: Callable[[JobReport], None],
-        failed: Callable[[Job], object] = _nothing,
-        numbers: Iterator[int] | None = None,
-    ) -> None:
+    def __init__(self, post: Callable[[JobReport], None], failed: Callable[[Job], object] = _nothing) -> None:
         self._post, self._failed = post, failed
-        self._numbers = itertools.count(1) if numbers is None else numbers
+        self._numbers = itertools.count(1)
         # Held while a report is posted, so that they arrive in order; re-entrant, in case `post` looks at the jobs.
         self._lock = threading.RLock()
         self._unfinished: dict[int, Job] = {}
@@ -186,7 +183,7 @@ class Jobs:
                 raise JobError(f"{name} cannot start: the program is closing")
             key = name if key is None else key
             self.cancel(key)
-            job = Job(next(self._numbers), name, key, is_shown)
+            job = Job(next(self._numbers), name, key, lane, is_shown)
             self._continuations[job.number] = _Continuation(key, then, failed or self._failed, stopped)
             self._record(job)
             self._lane(lane).put((job.number, work))
@@ -240,8 +237,15 @@ class Jobs:
             return tuple(self._unfinished.values())
 
     def running(self) -> tuple[Job, ...]:
-        """Jobs that the page shows, oldest first."""
-        return tuple(job for job in self.unfinished() if job.is_shown and job.state is JobState.RUNNING)
+        """Jobs that run and that the page shows, oldest first."""
+        return self._shown(JobState.RUNNING)
+
+    def waiting(self) -> tuple[Job, ...]:
+        """Jobs that wait and that the page shows, oldest first."""
+        return self._shown(JobState.WAITING)
+
+    def _shown(self, state: JobState) -> tuple[Job, ...]:
+        return tuple(job for job in self.unfinished() if job.is_shown and job.state is state)
 
     def close(self, timeout: float = 2.0) -> bool:
         """Cancel everything and wait for the workers, at most `timeout` seconds in all; whether they have ended."""

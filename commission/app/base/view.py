@@ -25,6 +25,8 @@ class PageView:
     """The page's own state."""
     jobs: tuple[Job, ...] = ()
     """Background work under way."""
+    waiting: tuple[Job, ...] = ()
+    """Background work that has not begun."""
     parts: Parts = field(default_factory=dict[type, object])
     """What services have found, one value of each type."""
 
@@ -34,6 +36,13 @@ class PageView:
         return part if isinstance(part, kind) else None
 
 
-def view_of(state: AppState, *parts: object, jobs: tuple[Job, ...] = ()) -> PageView:
-    """Return a view with these parts, each found by its type."""
-    return PageView(state, jobs, {type(part): part for part in parts})
+def view_of(state: AppState, *parts: object, jobs: tuple[Job, ...] = (), waiting: tuple[Job, ...] = ()) -> PageView:
+    """Return a view with these parts, each found by its type.
+
+    Parameters
+    ----------
+    state : the page's own.
+    parts : what services have found.
+    jobs, waiting : background work under way, and what has not begun.
+    """
+    return PageView(state, jobs, waiting, {type(part): part for part in parts})

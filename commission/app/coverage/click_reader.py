@@ -6,7 +6,7 @@ from viser import SceneApi, SceneClickEvent
 
 from commission.app.base.panel import BasePanel, Post, from_browser
 from commission.app.base.pointer import on_floor, reach_of
-from commission.app.plan.actions import ReadFloor
+from commission.app.coverage.actions import ReadFloor
 
 
 class ClickReader(BasePanel):

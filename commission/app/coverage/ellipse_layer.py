@@ -8,7 +8,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, outline_segments
 from commission.app.base.layer import BaseLayer
 from commission.app.base.view import PageView
-from commission.app.plan.view import EllipseView, plan_of
+from commission.app.coverage.view import EllipseView, coverage_of
 from commission.geometry.gaussian import ellipse_points
 
 POINTS = 32
@@ -34,8 +34,7 @@ class FixEllipseLayer(BaseLayer):
 
     def draw(self, view: PageView) -> None:
         """Draw the ellipses anew where they have changed."""
-        plan = plan_of(view)
-        found = plan.ellipses
+        found = coverage_of(view).ellipses
         if found is self._shown:
             return
         self._shown = found

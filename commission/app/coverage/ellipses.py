@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from commission.app.plan.settings import Place
-from commission.app.plan.view import EllipseView
-from commission.app.plan.work import Covered
+from commission.app.coverage.following import Covered
+from commission.app.coverage.settings import Place
+from commission.app.coverage.view import EllipseView
 from commission.geometry.arrays import IntArray
 from commission.geometry.gaussian import ellipse_axes
 from commission.planning.fix_ellipses import every_nth, position_covariances
@@ -39,7 +39,13 @@ def ellipses(covered: Covered, places: tuple[Place, ...], factor: float, *, grid
     # Who asks for one sees it; of a grid, a few huge ones would hide all others.
     most = LARGEST * lattice.spacing * max(lattice.rows, lattice.columns)
     shown = known & (np.isin(chosen, near) | (lengths <= most))
-    return EllipseView(points[shown], covariances[shown], factor, int((~known).sum()), int((known & ~shown).sum()))
+    return EllipseView(
+        centers=points[shown],
+        covariances=covariances[shown],
+        factor=factor,
+        without_fix=int((~known).sum()),
+        too_large=int((known & ~shown).sum()),
+    )
 
 
 def _coarse(covered: Covered) -> IntArray:

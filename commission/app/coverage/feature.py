@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from commission.app.base.feature import LEGEND, PLAN, Docked, Feature
+from commission.app.coverage import reducer
 from commission.app.coverage.click_reader import ClickReader
 from commission.app.coverage.ellipse_layer import FixEllipseLayer
 from commission.app.coverage.heat_layer import HeatLayer
 from commission.app.coverage.heat_legend import HeatLegend
 from commission.app.coverage.heatmap_panel import HeatmapPanel
+from commission.app.coverage.service import CoverageService
 
 FEATURE = Feature(
     "coverage",
+    reducers=(reducer,),
+    services=(CoverageService,),
     layers=(HeatLayer, FixEllipseLayer),
     panels=(
         Docked(lambda at: HeatmapPanel(at.gui, at.post), PLAN, 10, folder="Heatmap of the floor", is_open=True),

@@ -5,12 +5,13 @@ from __future__ import annotations
 from viser import ImageHandle, LabelHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
+from commission.app.base.floor_picture import FloorPicture
 from commission.app.base.layer import BaseLayer
 from commission.app.base.view import PageView
 from commission.app.coverage.scale import picture
+from commission.app.coverage.settings import CoverageSettings
+from commission.app.coverage.view import HeatView, Reading, coverage_of
 from commission.app.coverage.words import value_text
-from commission.app.plan.settings import PlanSettings
-from commission.app.plan.view import HeatView, Reading, plan_of
 from commission.planning.dilution import Measurement
 
 
@@ -30,15 +31,14 @@ class HeatLayer(BaseLayer):
 
     def draw(self, view: PageView) -> None:
         """Draw the picture anew where it or its opacity has changed."""
-        plan = plan_of(view)
-        state = view.state
-        visible = self.name not in state.hidden
-        if (plan.heat, state.part(PlanSettings).opacity) != self._shown:
-            before, self._shown = self._shown[0], (plan.heat, state.part(PlanSettings).opacity)
-            self._draw(plan.heat, before, state.part(PlanSettings).opacity, visible=visible)
-        if (plan.reading, plan.heat) != self._read:
-            self._read = (plan.reading, plan.heat)
-            self._write(plan.reading, plan.heat, state.part(PlanSettings).measurement, visible=visible)
+        found, state = coverage_of(view), view.state
+        opacity, visible = state.part(FloorPicture).opacity, self.name not in state.hidden
+        if (found.heat, opacity) != self._shown:
+            before, self._shown = self._shown[0], (found.heat, opacity)
+            self._draw(found.heat, before, opacity, visible=visible)
+        if (found.reading, found.heat) != self._read:
+            self._read = (found.reading, found.heat)
+            self._write(found.reading, found.heat, state.part(CoverageSettings).measurement, visible=visible)
 
     def _draw(self, heat: HeatView | None, before: HeatView | None, opacity: float, *, visible: bool) -> None:
         """Exchange the picture's content, or the picture itself where its place is another one."""

@@ -6,13 +6,16 @@ import math
 
 from viser import GuiApi
 
+from commission.app.base.conditions import Conditions, SetCondition
+from commission.app.base.floor_picture import FloorPicture, SetOpacity
 from commission.app.base.inputs import Inputs, WorkBar, show
 from commission.app.base.panel import BasePanel, Post, posting
+from commission.app.base.state import AppState
 from commission.app.base.view import PageView
+from commission.app.coverage.actions import ClearEllipses, SetCoverage
+from commission.app.coverage.service import COVERAGE
+from commission.app.coverage.settings import CoverageSettings, Figure, shown_figure
 from commission.app.coverage.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES
-from commission.app.plan.actions import ClearEllipses, SetPlan
-from commission.app.plan.planner import COVERAGE
-from commission.app.plan.settings import Figure, PlanSettings
 from commission.planning.dilution import Heading, Measurement
 
 FACTORS = (1.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
@@ -23,10 +26,12 @@ class HeatmapPanel(BasePanel):
     """Widgets of the heatmap."""
 
     def __init__(self, gui: GuiApi, post: Post) -> None:
-        self._inputs = inputs = Inputs(gui, post, SetPlan, lambda state, name: getattr(state.part(PlanSettings), name))
+        self._inputs = inputs = Inputs(gui, post, SetCoverage, _setting)
+        self._floor = Inputs(gui, post, lambda _name, value: SetOpacity(float(value or 0.0)), _of_picture)
+        self._conditions = Inputs(gui, post, SetCondition, lambda state, name: getattr(state.part(Conditions), name))
         inputs.choice("figure", "Show", FIGURE_NAMES, "What the floor is colored by.")
-        self._work = WorkBar(gui, post, COVERAGE, SetPlan("figure", Figure.NONE.value))
-        inputs.number("opacity", 100.0, gui.add_slider("Opacity [%]", 10, 100, 5, 80))
+        self._work = WorkBar(gui, post, COVERAGE, SetCoverage("figure", Figure.NONE.value))
+        self._floor.number("opacity", 100.0, gui.add_slider("Opacity [%]", 10, 100, 5, 80))
         hint = "Heading of the vehicle, where the scanner does not see all around."
         inputs.choice("heading", "Heading", HEADING_NAMES, hint)
         hint = "Direction in which the vehicle looks; 0 is along x, counterclockwise."
@@ -38,9 +43,11 @@ class HeatmapPanel(BasePanel):
         odometry = gui.add_number("Odometry [m]", 1.0, min=0.1, max=100.0, step=0.1, hint=hint)
         self._odometry = inputs.number("on_odometry", 1.0, odometry)
         hint = "Chance that somebody stands in a metre of the way from scanner to reflector."
-        inputs.number("blocked_per_m", 100.0, gui.add_number("People [%/m]", 0, min=0, max=50, step=0.1, hint=hint))
+        people = gui.add_number("People [%/m]", 0, min=0, max=50, step=0.1, hint=hint)
+        self._conditions.number("blocked_per_m", 100.0, people)
         hint = "Beams that must hit a reflector for certain, so that it passes the detector filter (equation 3)."
-        inputs.count("min_beams", gui.add_number("Beams at least", 1, min=1, max=20, step=1, hint=hint))
+        beams = gui.add_number("Beams at least", 1, min=1, max=20, step=1, hint=hint)
+        self._conditions.count("min_beams", beams)
 
         with gui.add_folder("Ellipses of a fix", expand_by_default=False):
             self._add_ellipses(gui, post)
@@ -56,16 +63,26 @@ class HeatmapPanel(BasePanel):
             "ellipse_factor",
             drawn,
             lambda text: meant[text],
-            lambda state: f"{state.part(PlanSettings).ellipse_factor:g}x",
+            lambda state: f"{state.part(CoverageSettings).ellipse_factor:g}x",
         )
         self._clear = gui.add_button("Clear", color="gray", hint="Drop the ellipses of clicks.")
         self._clear.on_click(posting(post, lambda _event: ClearEllipses()))
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow settings and progress."""
-        plan = view.state.part(PlanSettings)
-        self._inputs.follow(view.state)
+        settings = view.state.part(CoverageSettings)
+        for inputs in (self._inputs, self._floor, self._conditions):
+            inputs.follow(view.state)
         self._work.follow(view)
-        self._clear.disabled = not plan.spots
-        show(self._given, visible=plan.heading is Heading.GIVEN)
-        show(self._odometry, visible=plan.measurement is Measurement.RANGE_BEARING_PRIOR)
+        self._clear.disabled = not settings.spots
+        show(self._given, visible=settings.heading is Heading.GIVEN)
+        show(self._odometry, visible=settings.measurement is Measurement.RANGE_BEARING_PRIOR)
+
+
+def _setting(state: AppState, name: str) -> object:
+    """Read a setting of the heatmap; it shows nothing while another feature has the floor."""
+    return shown_figure(state) if name == "figure" else getattr(state.part(CoverageSettings), name)
+
+
+def _of_picture(state: AppState, name: str) -> object:
+    return getattr(state.part(FloorPicture), name)

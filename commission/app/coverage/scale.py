@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from commission.app.plan.settings import Figure
+from commission.app.base.ramp import colors
+from commission.app.coverage.settings import Figure
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.planning.dilution import Measurement
 
@@ -24,21 +25,6 @@ NICE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
 HATCH = 3
 """Width of a stripe, in points of the lattice."""
 NO_FIX_COLORS = ((228, 92, 60), (58, 22, 22))
-# Anchors of viridis (van der Walt & Smith 2015, public domain), dark to bright.
-ANCHORS = np.array(
-    [
-        (68, 1, 84),
-        (71, 44, 122),
-        (59, 81, 139),
-        (44, 113, 142),
-        (33, 144, 141),
-        (39, 173, 129),
-        (92, 200, 99),
-        (170, 220, 50),
-        (253, 231, 37),
-    ],
-    dtype=np.float64,
-)
 COUNTS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
 PERCENT = (50.0, 70.0, 80.0, 90.0, 95.0, 98.0, 99.0, 99.9)
 
@@ -103,12 +89,6 @@ class Scale:
         steps = np.digitize(shown * (1.0 + 1e-12), self.bounds).astype(np.uint8)
         found = np.where(is_fix(self.figure, values), steps + FIRST, NO_FIX)
         return np.where(floor, found, NOTHING).astype(np.uint8)
-
-
-def colors(count: int) -> NDArray[np.uint8]:
-    """Return `count` colors from dark to bright in even steps: (count, 3) array."""
-    at = np.linspace(0.0, len(ANCHORS) - 1.0, count)
-    return np.stack([np.interp(at, np.arange(len(ANCHORS)), channel) for channel in ANCHORS.T], axis=1).astype(np.uint8)
 
 
 def is_fix(figure: Figure, values: ArrayLike) -> BoolArray:

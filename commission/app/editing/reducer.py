@@ -27,7 +27,7 @@ from commission.app.editing.station_actions import DeleteStation, MoveStation, P
 from commission.app.editing.station_gestures import moved_station, station_at
 from commission.app.floor_map import tools as map_tools
 from commission.app.floor_map.actions import FinishShape
-from commission.app.plan.actions import FreeAreas, KeepOut
+from commission.app.placement.actions import FreeAreas, KeepOut
 from commission.errors import UsageError
 from commission.site.editing import reflectors as edits
 from commission.site.editing.snapping import snap_to_wall

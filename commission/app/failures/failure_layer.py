@@ -10,7 +10,7 @@ from commission.app.base.drawing import NO_SEGMENTS, crosses, outline_segments, 
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
 from commission.app.base.view import PageView
-from commission.app.plan.view import FailureView, plan_of
+from commission.app.failures.view import FailureView
 from commission.site.project import Project
 
 RING_POINTS = 32
@@ -43,16 +43,16 @@ class FailingLayer(BaseLayer):
 
     def draw(self, view: PageView) -> None:
         """Draw what depends on the chosen reflector."""
-        plan = plan_of(view)
-        if plan.failures is self._shown:
+        found = view.part(FailureView)
+        if found is self._shown:
             return
-        self._shown = plan.failures
-        lines = () if plan.failures is None else plan.failures.failing
+        self._shown = found
+        lines = () if found is None else found.failing
         height = theme.Height.REFERENCE
         self._metres.points = np.concatenate([NO_SEGMENTS, *(polyline_segments(line, height) for line in lines)])
-        fallen = np.empty((0, 2)) if plan.failures is None else plan.failures.fallen_places
+        fallen = np.empty((0, 2)) if found is None else found.fallen_places
         self._fallen.points = stroke_segments(crosses(fallen, 1.5 * self._mark), theme.Height.LABEL)
-        place = None if plan.failures is None else plan.failures.place
+        place = None if found is None else found.place
         if place is None:
             self._ring.points = NO_SEGMENTS
             return
@@ -62,8 +62,8 @@ class FailingLayer(BaseLayer):
 
     def is_used(self, view: PageView) -> bool:
         """Whether a reflector's failure is shown, or one that came before."""
-        plan = plan_of(view)
-        return plan.failures is not None and (plan.failures.place is not None or bool(plan.failures.fallen))
+        found = view.part(FailureView)
+        return found is not None and (found.place is not None or bool(found.fallen))
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return ring, metres and crosses."""

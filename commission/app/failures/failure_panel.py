@@ -7,15 +7,21 @@ from typing import Any
 from viser import GuiApi, GuiDropdownHandle
 
 from commission.app.base.actions import Action
-from commission.app.base.inputs import Inputs, Text, WorkBar, show
+from commission.app.base.inputs import Inputs, Setting, Text, WorkBar, show
+from commission.app.base.numbers import metres_text
 from commission.app.base.panel import BasePanel, Post, escaped, posting, table
 from commission.app.base.view import PageView
-from commission.app.coverage.words import FAILURE_NAMES, metres_text
-from commission.app.plan.actions import AlsoFails, SetPlan
-from commission.app.plan.planner import RANKING
-from commission.app.plan.settings import PlanSettings
-from commission.app.plan.view import FailureView, plan_of
+from commission.app.failures.actions import AlsoFails, ChooseFailure, DropRanking, RankReflectors, ShowFailure
+from commission.app.failures.service import RANKING
+from commission.app.failures.settings import FailureSettings
+from commission.app.failures.view import FailureView
+from commission.planning.dependence import Failure
 
+FAILURE_NAMES: dict[Failure, str] = {
+    Failure.BLOCKED: "blocked",
+    Failure.DIRTY: "dirty",
+    Failure.MOVED: "moved by 5 cm",
+}
 NO_REFLECTOR = "none"
 RANKED_SHOWN = 10
 
@@ -24,14 +30,14 @@ class FailurePanel(BasePanel):
     """Widgets of the ranking."""
 
     def __init__(self, gui: GuiApi, post: Post) -> None:
-        self._inputs = Inputs(gui, post, SetPlan, lambda state, name: getattr(state.part(PlanSettings), name))
+        self._inputs = Inputs(gui, post, _asked, lambda state, name: getattr(state.part(FailureSettings), name))
         self._inputs.choice("failure", "Each is", FAILURE_NAMES, "What happens to each reflector in turn.")
         rank = gui.add_button("Rank reflectors", hint="Let each fail on every route, and rank what depends on it.")
-        rank.on_click(posting(post, lambda _event: SetPlan("ranking", value=True)))
+        rank.on_click(posting(post, lambda _event: RankReflectors()))
         hint = "Let the one that is shown, else the first of the list, fail for good, and rank the others."
         self._next = gui.add_button("Next failure after it", color="gray", visible=False, hint=hint)
         self._next.on_click(posting(post, self._failing_next))
-        self._work = WorkBar(gui, post, RANKING, SetPlan("ranking", value=False))
+        self._work = WorkBar(gui, post, RANKING, DropRanking())
         self._failed: GuiDropdownHandle[Any] = gui.add_dropdown(
             "Show", (NO_REFLECTOR,), visible=False, hint="Reflector whose failing metres are drawn; or click on it."
         )
@@ -40,8 +46,8 @@ class FailurePanel(BasePanel):
             self._failed,
             lambda name: "" if name == NO_REFLECTOR else name,
             lambda state: (
-                state.part(PlanSettings).failed
-                if state.part(PlanSettings).failed in self._failed.options
+                state.part(FailureSettings).failed
+                if state.part(FailureSettings).failed in self._failed.options
                 else NO_REFLECTOR
             ),
         )
@@ -52,12 +58,12 @@ class FailurePanel(BasePanel):
         """Let one fail of the ranking that is seen; it may have been dropped since it was drawn."""
         failures = self._failures
         if failures is None or not failures.names:
-            return SetPlan("ranking", value=True)
+            return RankReflectors()
         return AlsoFails(failures.failed if failures.chosen is not None else failures.names[0])
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow settings, progress and result."""
-        failures = self._failures = plan_of(view).failures
+        failures = self._failures = view.part(FailureView)
         options = (NO_REFLECTOR, *(() if failures is None else failures.names))
         if self._failed.options != options:
             self._failed.options = options
@@ -66,6 +72,11 @@ class FailurePanel(BasePanel):
         is_running = self._work.follow(view)
         show(self._next, visible=len(options) > 1 and not is_running)
         self._table.write((failures,), lambda: "" if failures is None else ranking_table(failures))
+
+
+def _asked(name: str, value: Setting) -> Action:
+    """The action of an input."""
+    return ChooseFailure(str(value)) if name == "failure" else ShowFailure(str(value))
 
 
 def ranking_table(failures: FailureView) -> str:

@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from commission.app.base.feature import PLAN, Docked, Feature
+from commission.app.failures import reducer
+from commission.app.failures.click_reader import ClickReader
 from commission.app.failures.failure_layer import FailingLayer
 from commission.app.failures.failure_panel import FailurePanel
+from commission.app.failures.service import FailureService
 
 FEATURE = Feature(
     "failures",
+    reducers=(reducer,),
+    services=(FailureService,),
     layers=(FailingLayer,),
-    panels=(Docked(lambda at: FailurePanel(at.gui, at.post), PLAN, 30, folder="What if one reflector fails"),),
+    panels=(
+        Docked(lambda at: FailurePanel(at.gui, at.post), PLAN, 30, folder="What if one reflector fails"),
+        Docked(lambda at: ClickReader(at.scene, at.post), None, 91),
+    ),
 )

@@ -16,10 +16,11 @@ from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing.actions import ChooseTool
 from commission.app.editing.editor import Tool
-from commission.app.placement.suggestion import LayoutWish, Suggestion
-from commission.app.plan.actions import AcceptLayout, AskLayout, CountRoute, DiscardLayout, FreeAreas, SetLayout
-from commission.app.plan.planner import LAYOUT
-from commission.app.plan.view import LayoutView, plan_of
+from commission.app.placement.actions import AcceptLayout, AskLayout, CountRoute, DiscardLayout, FreeAreas, SetLayout
+from commission.app.placement.service import LAYOUT
+from commission.app.placement.view import LayoutView
+from commission.app.placement.wish import LayoutWish
+from commission.studies.placement import PlacementResult
 
 DEG, MM = math.degrees(1.0), 1000.0
 POSITION, HEADING = "demands.position_limit", "demands.heading_limit"
@@ -51,7 +52,7 @@ class LayoutPanel(BasePanel):
     def __init__(self, gui: GuiApi, post: Post) -> None:
         self._gui, self._post = gui, post
         self._inputs = Inputs(gui, post, SetLayout, option_of)
-        self._suggestion: Suggestion | None = None
+        self._suggestion: PlacementResult | None = None
         self._shown: LayoutView | None = None
         self._routes: dict[str, Any] = {}
         # What was found stands above the demands: below them, it would be out of sight on a small screen.
@@ -126,7 +127,7 @@ class LayoutPanel(BasePanel):
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow wishes, progress and what was found."""
-        state, found = view.state, plan_of(view).layout
+        state, found = view.state, view.part(LayoutView)
         self._inputs.follow(state)
         self._follow_routes(state)
         count = len(state.project.layout.candidates.keep_out)
@@ -187,7 +188,7 @@ def found_text(found: LayoutView) -> str:
     return f"<div class='c-layout' style='padding:2px 10px 4px 6px'>{table(rows)}{notes_html}</div>"
 
 
-def _unmet_lines(suggestion: Suggestion) -> list[tuple[str, theme.Color]]:
+def _unmet_lines(suggestion: PlacementResult) -> list[tuple[str, theme.Color]]:
     return [
         (f"{each.route}, {each.first} to {each.last} m: {REASONS.get(each.reason, each.reason)}", theme.WARNING_LINE)
         for each in suggestion.unmet[:MOST_UNMET]

@@ -9,9 +9,10 @@ from commission.app.base.effects import Tell
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing.reducer import with_reflectors
-from commission.app.placement.suggestion import SMALLEST_AREA, LayoutWish, with_option
-from commission.app.plan import actions
+from commission.app.placement import actions
+from commission.app.placement.wish import SMALLEST_AREA, LayoutWish, placement_input
 from commission.errors import UsageError
+from commission.site.fields import with_field
 from commission.site.layout_brief import LayoutBrief, Rectangle, low_high
 
 ACCEPT = "accept suggested layout"
@@ -35,7 +36,9 @@ def set_layout(action: actions.SetLayout, state: AppState, sender: Sender) -> Ou
         return _wishing(state, replace(state.part(LayoutWish), extend=bool(action.value)))
     words = action.name.rpartition(".")[2].replace("_", " ")
     edit = Edit(f"set {words} of the layout", sender, f"layout.{action.name}")
-    return _asking(state, with_option(state.project.layout, action.name, action.value), edit)
+    return _asking(
+        state, with_field(state.project.layout, action.name, action.value, "option of the suggested layout"), edit
+    )
 
 
 @reduce.register
@@ -49,7 +52,7 @@ def count_route(action: actions.CountRoute, state: AppState, sender: Sender) -> 
 
 
 def _keeping_out(state: AppState, areas: tuple[Rectangle, ...], edit: Edit) -> Outcome:
-    return _asking(state, with_option(state.project.layout, "candidates.keep_out", areas), edit)
+    return _asking(state, with_field(state.project.layout, "candidates.keep_out", areas), edit)
 
 
 @reduce.register
@@ -76,20 +79,23 @@ def _contains(area: Rectangle, place: tuple[float, float]) -> bool:
 
 @reduce.register
 def ask_layout(_action: actions.AskLayout, state: AppState, _sender: Sender) -> Outcome:
-    return _wishing(state, replace(state.part(LayoutWish), wanted=True, asked=state.part(LayoutWish).asked + 1))
+    """Look for a layout for the site as it is now; raises UsageError where none can be found."""
+    wish = state.part(LayoutWish)
+    inputs = placement_input(state.project, extend=wish.extend)
+    return _wishing(state, replace(wish, inputs=inputs, asked=wish.asked + 1))
 
 
 @reduce.register
 def discard_layout(_action: actions.DiscardLayout, state: AppState, _sender: Sender) -> Outcome:
-    return _wishing(state, replace(state.part(LayoutWish), wanted=False))
+    return _wishing(state, replace(state.part(LayoutWish), inputs=None))
 
 
 @reduce.register
 def accept_layout(action: actions.AcceptLayout, state: AppState, sender: Sender) -> Outcome:
     suggestion = action.suggestion
-    if suggestion.site.reflectors is not state.project.reflectors:
+    if suggestion.inputs.reflectors is not state.project.reflectors:
         raise UsageError("the reflectors have changed since the layout was suggested; suggest it again")
-    dropped = state.with_part(replace(state.part(LayoutWish), wanted=False))
+    dropped = state.with_part(replace(state.part(LayoutWish), inputs=None))
     accepted = with_reflectors(dropped, suggestion.placement.reflectors, Edit(ACCEPT, sender))
     return replace(accepted, effects=(*accepted.effects, Tell(_told(action), failed=False)))
 

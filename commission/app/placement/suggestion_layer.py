@@ -19,7 +19,7 @@ from commission.app.base.drawing import (
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
 from commission.app.base.view import PageView
-from commission.app.plan.view import LayoutView, plan_of
+from commission.app.placement.view import LayoutView
 from commission.geometry.arrays import FloatArray
 from commission.site.layout_brief import Rectangle, low_high
 from commission.site.project import Project
@@ -83,17 +83,16 @@ class SuggestionLayer(BaseLayer):
 
     def draw(self, view: PageView) -> None:
         """Draw what has changed."""
-        plan = plan_of(view)
-        state = view.state
+        found, state = view.part(LayoutView), view.state
         areas = state.project.layout.candidates.keep_out
         if areas != self._areas:
             self._areas = areas
             self._keep_outs.points = self._outlined(self._areas)
-        if plan.layout is self._shown:
+        if found is self._shown:
             return
-        self._shown = plan.layout
+        self._shown = found
         nothing = np.empty((0, 2))
-        suggestion = None if plan.layout is None else plan.layout.suggestion
+        suggestion = None if found is None else found.suggestion
         added, removed = (nothing, nothing) if suggestion is None else (suggestion.added, suggestion.removed)
         self._ghosts.point_size = 1.2 * self._mark
         self._ghosts.points = lift(added, theme.Height.LABEL)
@@ -118,9 +117,7 @@ class SuggestionLayer(BaseLayer):
 
     def is_used(self, view: PageView) -> bool:
         """Whether there is a suggestion, or an area without reflectors."""
-        plan = plan_of(view)
-        state = view.state
-        return plan.layout is not None or bool(state.project.layout.candidates.keep_out)
+        return view.part(LayoutView) is not None or bool(view.state.project.layout.candidates.keep_out)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return ghosts, marks and areas."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from commission.app.base import theme
 from commission.app.base.panel import escaped, table
-from commission.app.plan.view import RouteView
 from commission.app.prediction.driven import Driven
 from commission.app.prediction.load_colors import load_classes, palette
 from commission.app.prediction.tracks import Axis, Limited, Plain, limited, plain, round_up
+from commission.app.prediction.view import RouteView
 from commission.planning.station_accuracy import StationAccuracy
 
 MOST_BARS = 120

@@ -12,7 +12,7 @@ from commission.app.base.drawing import NO_POINTS, lift, thinned
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
 from commission.app.base.view import PageView
-from commission.app.plan.view import RouteView, plan_of
+from commission.app.prediction.view import RouteView
 from commission.geometry.arrays import FloatArray
 from commission.planning.route_prediction import RoutePrediction
 from commission.site.project import Project
@@ -93,16 +93,15 @@ class EventLayer(BaseLayer):
 
     def draw(self, view: PageView) -> None:
         """Draw the marks anew where the prediction has changed."""
-        plan = plan_of(view)
-        state = view.state
-        if plan.route is self._shown:
+        route, state = view.part(RouteView), view.state
+        if route is self._shown:
             return
-        self._shown = plan.route
-        found = () if plan.route is None else events(plan.route)
+        self._shown = route
+        found = () if route is None else events(route)
         for color, cloud in self._clouds.items():
             places = np.array([event.place for event in found if event.kind == color]).reshape(-1, 2)
-            if color == theme.RISK and plan.route is not None:
-                places = _risky(plan.route)
+            if color == theme.RISK and route is not None:
+                places = _risky(route)
             cloud.point_size = (1.0 if color == theme.RISK else 2.0) * self._mark
             cloud.points = lift(places, theme.Height.TRAIL)
         for label in self._labels:
@@ -124,8 +123,7 @@ class EventLayer(BaseLayer):
 
     def is_used(self, view: PageView) -> bool:
         """Whether something happens on the route."""
-        plan = plan_of(view)
-        route = plan.route
+        route = view.part(RouteView)
         return route is not None and bool(route.risks or route.stations or len(route.prediction.trips()))
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:

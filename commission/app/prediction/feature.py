@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
-from commission.app.base.feature import PLAN, Docked, Feature
+from commission.app.base.feature import LEGEND, PLAN, Docked, Feature
+from commission.app.prediction import reducer
 from commission.app.prediction.event_layer import EventLayer
+from commission.app.prediction.load_legend import LoadLegend
 from commission.app.prediction.ribbon_layer import RibbonLayer
 from commission.app.prediction.route_panel import RoutePanel
+from commission.app.prediction.service import PredictionService
 
 FEATURE = Feature(
     "prediction",
+    reducers=(reducer,),
+    services=(PredictionService,),
     layers=(RibbonLayer, EventLayer),
-    panels=(Docked(lambda at: RoutePanel(at.gui, at.post, at.container), PLAN, 20, folder="Along a route"),),
+    panels=(
+        Docked(lambda at: RoutePanel(at.gui, at.post, at.container), PLAN, 20, folder="Along a route"),
+        Docked(lambda at: LoadLegend(at.gui), LEGEND, 14),
+    ),
 )

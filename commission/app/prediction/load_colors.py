@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from commission.app.base import theme
+from commission.app.base.ramp import colors
 from commission.app.base.theme import Color
-from commission.app.coverage.scale import colors
 from commission.geometry.arrays import FloatArray, IntArray
 
 BOUNDS = (0.05, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0)

@@ -1,4 +1,4 @@
-"""What the step Plan expects along a route: a ribbon in the colors of its load. What happens on it is in `events`."""
+"""What is expected along a route: a ribbon in the colors of its load. What happens on it is in `events`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, stroke_segments
 from commission.app.base.layer import BaseLayer
 from commission.app.base.view import PageView
-from commission.app.plan.view import plan_of
 from commission.app.prediction.load_colors import load_classes, palette
+from commission.app.prediction.view import RouteView
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.planning.route_prediction import RoutePrediction
 
@@ -60,8 +60,8 @@ class RibbonLayer(BaseLayer):
 
     def draw(self, view: PageView) -> None:
         """Draw the ribbon anew where the prediction has changed."""
-        plan = plan_of(view)
-        prediction = None if plan.route is None else plan.route.prediction
+        route = view.part(RouteView)
+        prediction = None if route is None else route.prediction
         if prediction is self._shown:
             return
         self._shown = prediction

@@ -9,16 +9,15 @@ from viser import GuiApi, GuiDropdownHandle, GuiFolderHandle
 from commission.app.base import theme
 from commission.app.base.actions import Action, LookAt, Report
 from commission.app.base.inputs import Inputs, Text, WorkBar
+from commission.app.base.numbers import metres_text
 from commission.app.base.panel import BasePanel, Post
 from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
-from commission.app.coverage.words import metres_text
-from commission.app.plan.actions import SetPlan
-from commission.app.plan.planner import PREDICTION
-from commission.app.plan.settings import PlanSettings
-from commission.app.plan.view import RiskView, RouteView, plan_of
 from commission.app.prediction.chart import chart
 from commission.app.prediction.driven import driven
+from commission.app.prediction.service import PREDICTION
+from commission.app.prediction.settings import PredictionSettings, PredictRoute
+from commission.app.prediction.view import RiskView, RouteView
 from commission.app.run.view import RunView
 
 NO_ROUTE = "Off"
@@ -37,7 +36,12 @@ class RoutePanel(BasePanel):
     """
 
     def __init__(self, gui: GuiApi, post: Post, folder: GuiFolderHandle) -> None:
-        self._inputs = Inputs(gui, post, SetPlan, lambda state, name: getattr(state.part(PlanSettings), name))
+        self._inputs = Inputs(
+            gui,
+            post,
+            lambda _name, value: PredictRoute(str(value)),
+            lambda state, _: state.part(PredictionSettings).route,
+        )
         self._risks: tuple[RiskView, ...] = ()
         self._add(gui, post)
         self._rows = Rows(gui, folder, post, self._showing)
@@ -51,10 +55,12 @@ class RoutePanel(BasePanel):
             self._route,
             lambda name: "" if name == NO_ROUTE else name,
             lambda state: (
-                state.part(PlanSettings).route if state.part(PlanSettings).route in self._route.options else NO_ROUTE
+                state.part(PredictionSettings).route
+                if state.part(PredictionSettings).route in self._route.options
+                else NO_ROUTE
             ),
         )
-        self._work = WorkBar(gui, post, PREDICTION, SetPlan("route", ""))
+        self._work = WorkBar(gui, post, PREDICTION, PredictRoute(""))
         self._chart = Text(gui)
         self._neighbors = Text(gui)
 
@@ -71,7 +77,7 @@ class RoutePanel(BasePanel):
             self._route.options = names
         self._inputs.follow(view.state)
         self._work.follow(view)
-        route, run = plan_of(view).route, view.part(RunView)
+        route, run = view.part(RouteView), view.part(RunView)
         self._show_risks(() if route is None else route.risks)
         self._neighbors.write((route,), lambda: "" if route is None else _risk_text(route))
         if route is None:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.app.base import theme
+from commission.app.base.numbers import number_text
 from commission.app.base.panel import escaped
-from commission.app.coverage.words import number_text
 from commission.geometry.arrays import FloatArray
 
 WIDTH, LEFT = 270, 30

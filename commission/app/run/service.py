@@ -27,7 +27,7 @@ from commission.progress import Progress
 from commission.simulation import follower, scan
 from commission.site.project import Project
 
-PREPARE, COMPILE, PREDICT = "Preparing the drive", "Compiling", "Predicting the rest"
+PREPARE, COMPILE, PREDICT = "Preparing the drive", "Getting ready", "Predicting the rest"
 PLAYING_REST_S, SEEKING_REST_S = 0.04, 0.001
 LONGEST_STEP_S = 0.25
 """Time that the play clock moves at most at once [s]: a long pause of the owner thread is not made up for."""

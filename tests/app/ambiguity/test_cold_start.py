@@ -7,17 +7,19 @@ import numpy as np
 import pytest
 
 from commission.app.ambiguity.ambiguity_layer import MAP_COLORS, ambiguity_picture
+from commission.app.ambiguity.ambiguity_legend import cold_start_scale
 from commission.app.ambiguity.cold_start import EVERY, NOTHING, SOME, TOO_FEW, UNIQUE, Ambiguity, look_alike
-from commission.app.base.state import AppState
-from commission.app.coverage.heat_legend import cold_start_scale
-from commission.app.plan.actions import SetPlan
-from commission.app.plan.settings import Figure, PlanSettings
+from commission.app.ambiguity.service import AmbiguityService
+from commission.app.ambiguity.settings import AmbiguitySettings, DropPlaces, FindPlaces, SetAmbiguity, ShowPair
+from commission.app.base.conditions import SetCondition
+from commission.app.coverage.actions import SetCoverage
+from commission.progress import silent
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
-from tests.app.asking import after
-from tests.app.plan.test_planner import Bench
+from commission.studies.ambiguity import AmbiguityInput
+from tests.app.bench import Bench
 
 
 def symmetric_hall() -> Project:
@@ -31,12 +33,12 @@ def symmetric_hall() -> Project:
 
 
 def found_in(project: Project) -> Ambiguity:
-    return look_alike(project, PlanSettings(), lambda _fraction, _message: None)
+    return look_alike(AmbiguityInput.of(project), silent)
 
 
 @pytest.fixture
-def bench() -> Iterator[Bench]:
-    bench = Bench(symmetric_hall())
+def bench() -> Iterator[Bench[AmbiguityService]]:
+    bench = Bench(AmbiguityService, symmetric_hall())
     yield bench
     bench.close()
 
@@ -72,30 +74,30 @@ def test_a_pair_is_listed_once_whichever_is_taken_for_the_other() -> None:
     assert len(groups) == len({frozenset(group) for group in groups})
 
 
-def test_it_is_looked_for_once_and_outdated_after_an_edit(bench: Bench) -> None:
-    bench.ask(cold_start=1)
-    found = bench.found().cold_start
+def test_it_is_looked_for_once_and_outdated_after_an_edit(bench: Bench[AmbiguityService]) -> None:
+    bench.ask(FindPlaces())
+    found = bench.found()
     assert found is not None
     assert found.is_drawn
     assert not found.outdated
     bench.move(0, 0.5)
     assert not bench.jobs.unfinished()
-    after = bench.view.cold_start
+    after = bench.view
     assert after is not None
     assert after.outdated
-    bench.ask(cold_start=2)
-    again = bench.found().cold_start
+    bench.ask(FindPlaces())
+    again = bench.found()
     assert again is not None
     assert not again.ambiguity.pairs
-    bench.ask(cold_start=0)
-    assert bench.view.cold_start is None
+    bench.ask(DropPlaces())
+    assert bench.view is None
 
 
-def test_a_chosen_pair_shows_two_poses_that_see_the_same(bench: Bench) -> None:
-    bench.ask(cold_start=1)
+def test_a_chosen_pair_shows_two_poses_that_see_the_same(bench: Bench[AmbiguityService]) -> None:
+    bench.ask(FindPlaces())
     bench.found()
-    bench.ask(pair=0)
-    view = bench.view.cold_start
+    bench.ask(ShowPair(0))
+    view = bench.view
     assert view is not None
     assert view.twins is not None
     seen = [np.hypot(*(group - pose[:2]).T) for group, pose in zip(view.twins.groups, view.twins.poses, strict=True)]
@@ -103,30 +105,42 @@ def test_a_chosen_pair_shows_two_poses_that_see_the_same(bench: Bench) -> None:
     assert np.hypot(*np.subtract(*view.twins.poses)[:2]) > 0.5
 
 
-def test_its_map_takes_the_place_of_the_heatmap_and_leaves_it_when_one_is_chosen(bench: Bench) -> None:
-    state = AppState(bench.state.project, bench.state.project)
-    state = after(state, SetPlan("figure", "visible"), SetPlan("cold_start", value=True)).state
-    assert state.part(PlanSettings).figure is Figure.NONE
-    bench.ask(cold_start=1)
-    bench.found()
-    bench.ask(figure=Figure.VISIBLE)
-    view = bench.found().cold_start
-    assert view is not None
-    assert not view.is_drawn
+def test_its_map_takes_the_floor_from_the_heatmap_and_leaves_it_when_one_is_chosen(
+    bench: Bench[AmbiguityService],
+) -> None:
+    bench.ask(SetCoverage("figure", "visible"), FindPlaces())
+    assert bench.found().is_drawn
+    bench.ask(SetCoverage("figure", "visible"))
+    assert not bench.view.is_drawn
+    bench.ask(SetCoverage("figure", ""))
+    assert bench.view.is_drawn
 
 
-def test_a_second_click_on_a_pair_hides_it(bench: Bench) -> None:
-    state = AppState(bench.state.project, bench.state.project)
-    state = after(state, SetPlan("pair", 3)).state
-    assert state.part(PlanSettings).pair == 3
-    assert after(state, SetPlan("pair", 3)).state.part(PlanSettings).pair == -1
+def test_a_second_click_on_a_pair_hides_it(bench: Bench[AmbiguityService]) -> None:
+    bench.ask(ShowPair(3))
+    assert bench.state.part(AmbiguitySettings).pair == 3
+    bench.ask(ShowPair(3))
+    assert bench.state.part(AmbiguitySettings).pair == -1
 
 
-def test_picture_and_legend_have_each_class(bench: Bench) -> None:
+@pytest.mark.parametrize("change", [SetAmbiguity("tolerance", 0.3), SetCondition("min_beams", 3)])
+def test_under_other_conditions_it_is_outdated_until_asked_again(
+    bench: Bench[AmbiguityService], change: SetAmbiguity | SetCondition
+) -> None:
+    bench.ask(FindPlaces())
+    assert not bench.found().outdated
+    bench.ask(change)
+    assert not bench.jobs.unfinished()
+    assert bench.view.outdated
+    bench.ask(FindPlaces())
+    assert not bench.found().outdated
+
+
+def test_picture_and_legend_have_each_class(bench: Bench[AmbiguityService]) -> None:
     picture = ambiguity_picture(np.array([[NOTHING, UNIQUE, TOO_FEW, SOME, EVERY]], np.uint8), 0.5)
     assert picture[0, 0, 3] == 0
     assert {tuple(color[:3]) for color in picture[0].tolist()[4:]} == set(MAP_COLORS.values())
-    bench.ask(cold_start=1)
-    found = bench.found().cold_start
+    bench.ask(FindPlaces())
+    found = bench.found()
     assert found is not None
     assert "100.0 %" in cold_start_scale(found)

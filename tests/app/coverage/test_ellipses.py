@@ -7,39 +7,44 @@ import numpy as np
 import pytest
 
 from commission.app.base.actions import Action
+from commission.app.base.conditions import Conditions
+from commission.app.base.floor_picture import SetOpacity
 from commission.app.base.state import AppState
+from commission.app.coverage.actions import ClearEllipses, ReadFloor, SetCoverage
 from commission.app.coverage.ellipses import ellipses
+from commission.app.coverage.following import Covered, cover
 from commission.app.coverage.heat_legend import ellipse_note
+from commission.app.coverage.service import CoverageService
+from commission.app.coverage.settings import CoverageSettings
 from commission.app.editing.actions import ChooseTool
 from commission.app.editing.editor import Tool
-from commission.app.plan.actions import ClearEllipses, ReadFloor, SetPlan
-from commission.app.plan.settings import Figure, PlanSettings
-from commission.app.plan.work import Covered, cover
 from commission.geometry.gaussian import ellipse_axes
 from commission.planning.dilution import Heading
+from commission.progress import silent
 from commission.site.project import Project
 from commission.site.scanner import Scanner
+from commission.studies.coverage import CoverageInput
 from tests.app.asking import after as outcome
 from tests.app.asking import joined
-from tests.app.plan.test_planner import Bench
+from tests.app.bench import Bench
 
 SPOTS = ((2.0, 2.0), (6.0, 6.0), (10.0, 4.0))
 
 
 @pytest.fixture
-def bench(project: Project) -> Iterator[Bench]:
-    bench = Bench(project)
+def bench(project: Project) -> Iterator[Bench[CoverageService]]:
+    bench = Bench(CoverageService, project)
     yield bench
     bench.close()
 
 
 def covered(project: Project, heading: Heading) -> Covered:
-    settings = PlanSettings(figure=Figure.POSITION_SIGMA, heading=heading, given_heading=0.7)
-    return cover(project, settings, lambda _fraction, _message: None)
+    options = CoverageSettings(heading=heading, given_heading=0.7).options(Conditions())
+    return cover(CoverageInput.of(project, options), silent)
 
 
-def after(project: Project, *wishes: Action) -> PlanSettings:
-    return outcome(joined(AppState(project, project)), *wishes).state.part(PlanSettings)
+def after(project: Project, *wishes: Action) -> CoverageSettings:
+    return outcome(joined(AppState(project, project)), *wishes).state.part(CoverageSettings)
 
 
 @pytest.mark.parametrize("heading", list(Heading))
@@ -70,10 +75,10 @@ def test_of_a_grid_those_are_left_out_that_would_hide_the_others(project: Projec
     assert len(ellipses(found, SPOTS, 3000.0, grid=False).centers) == len(SPOTS)
 
 
-def test_ellipses_follow_a_moved_reflector(bench: Bench) -> None:
-    bench.ask(figure=Figure.POSITION_SIGMA, spots=SPOTS)
+def test_ellipses_follow_a_moved_reflector(bench: Bench[CoverageService]) -> None:
+    bench.ask(SetCoverage("figure", "position_sigma"), *(ReadFloor(spot, 0.01) for spot in SPOTS))
     before = bench.found().ellipses
-    bench.ask(opacity=0.5)
+    bench.ask(SetOpacity(0.5))
     assert bench.view.ellipses is before
     bench.move(0, 0.7)
     moved = bench.view.ellipses
@@ -86,7 +91,7 @@ def test_ellipses_follow_a_moved_reflector(bench: Bench) -> None:
 
 def test_a_click_on_the_heatmap_leaves_an_ellipse_and_one_on_a_reflector_does_not(project: Project) -> None:
     reflector = project.reflectors.reflectors[0]
-    on = SetPlan("figure", "visible")
+    on = SetCoverage("figure", "visible")
     assert after(project, ReadFloor((2.0, 2.0), 0.1)).spots == ()
     plan = after(project, on, ReadFloor((2.0, 2.0), 0.1), ReadFloor((reflector.x, reflector.y), 0.1))
     assert plan.spots == ((2.0, 2.0),)
@@ -94,7 +99,7 @@ def test_a_click_on_the_heatmap_leaves_an_ellipse_and_one_on_a_reflector_does_no
 
 
 def test_a_click_of_another_tool_reads_nothing(project: Project) -> None:
-    plan = after(project, SetPlan("figure", "visible"), ChooseTool(Tool.MEASURE), ReadFloor((2.0, 2.0), 0.1))
+    plan = after(project, SetCoverage("figure", "visible"), ChooseTool(Tool.MEASURE), ReadFloor((2.0, 2.0), 0.1))
     assert plan.probe is None
     assert plan.spots == ()
 

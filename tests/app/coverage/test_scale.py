@@ -12,7 +12,7 @@ from commission.app.coverage.scale import (
     round_bounds,
     scale_for,
 )
-from commission.app.plan.settings import Figure
+from commission.app.coverage.settings import Figure
 
 FLOOR = np.ones(4, bool)
 

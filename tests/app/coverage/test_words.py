@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from commission.app.coverage.settings import Figure
 from commission.app.coverage.words import value_text
-from commission.app.plan.settings import Figure
 from commission.planning.dilution import Measurement
 
 

@@ -16,11 +16,7 @@ from commission.app.editing.actions import (
     SelectControlPoint,
 )
 from commission.app.editing.editor import ControlPoint, Editor, Tool
-from commission.app.placement.placement_panel import found_text
-from commission.app.placement.reducer import ACCEPT
-from commission.app.placement.suggestion import LayoutWish, Suggestion, suggest, with_option
-from commission.app.placement.suggestion_layer import hatch
-from commission.app.plan.actions import (
+from commission.app.placement.actions import (
     AcceptLayout,
     AskLayout,
     CountRoute,
@@ -29,19 +25,25 @@ from commission.app.plan.actions import (
     KeepOut,
     SetLayout,
 )
-from commission.app.plan.view import LayoutView
+from commission.app.placement.placement_panel import found_text
+from commission.app.placement.reducer import ACCEPT
+from commission.app.placement.service import PlacementService
+from commission.app.placement.suggestion_layer import hatch
+from commission.app.placement.view import LayoutView, layout_view
+from commission.app.placement.wish import LayoutWish, placement_input
 from commission.errors import UsageError
+from commission.site.fields import with_field
 from commission.site.layout_brief import Rectangle
 from commission.site.project import Project
+from commission.studies.placement import PlacementResult, placement
 from tests.app.asking import ME, by, joined
 from tests.app.asking import after as outcome
-from tests.app.plan.test_planner import Bench
-
-EMPTY = LayoutWish(extend=False)
+from tests.app.bench import Bench
 
 
-def quietly(_fraction: float, _message: str) -> None:
-    pass
+def suggest(project: Project) -> PlacementResult:
+    """What is suggested where the layout starts empty."""
+    return placement(placement_input(project, extend=False))
 
 
 def after(state: AppState, *asked: Action | Envelope) -> AppState:
@@ -49,7 +51,7 @@ def after(state: AppState, *asked: Action | Envelope) -> AppState:
 
 
 def asking(project: Project, name: str, value: object) -> Project:
-    return replace(project, layout=with_option(project.layout, name, value))
+    return replace(project, layout=with_field(project.layout, name, value))
 
 
 def kept_out(state: AppState) -> tuple[Rectangle, ...]:
@@ -57,13 +59,13 @@ def kept_out(state: AppState) -> tuple[Rectangle, ...]:
 
 
 @pytest.fixture(scope="module")
-def suggestion(project: Project) -> Suggestion:
-    return suggest(project, EMPTY, quietly)
+def suggestion(project: Project) -> PlacementResult:
+    return suggest(project)
 
 
 @pytest.fixture
-def bench(project: Project) -> Iterator[Bench]:
-    bench = Bench(project)
+def bench(project: Project) -> Iterator[Bench[PlacementService]]:
+    bench = Bench(PlacementService, project)
     yield bench
     bench.close()
 
@@ -133,26 +135,28 @@ def test_a_click_is_no_area_and_all_areas_are_freed_together(project: Project) -
     assert kept_out(after(state, FreeAreas())) == ()
 
 
-def test_a_suggestion_keeps_out_of_the_areas_and_clear_of_what_stays(project: Project, suggestion: Suggestion) -> None:
+def test_a_suggestion_keeps_out_of_the_areas_and_clear_of_what_stays(
+    project: Project, suggestion: PlacementResult
+) -> None:
     assert len(suggestion.added) == suggestion.placement.added > 0
     x, y = suggestion.added[0]
     area = (x - 1.0, y - 1.0, x + 1.0, y + 1.0)
-    elsewhere = suggest(asking(project, "candidates.keep_out", (area,)), EMPTY, quietly).added
+    elsewhere = suggest(asking(project, "candidates.keep_out", (area,))).added
     assert not np.any(np.all(np.abs(elsewhere - (x, y)) < 1.0, axis=1))
 
 
-def test_starting_empty_takes_down_all_but_the_locked_ones(project: Project, suggestion: Suggestion) -> None:
+def test_starting_empty_takes_down_all_but_the_locked_ones(project: Project, suggestion: PlacementResult) -> None:
     assert len(suggestion.removed) == len(project.reflectors)
     first = replace(project.reflectors.reflectors[0], locked=True)
     locked = replace(project.reflectors, reflectors=(first, *project.reflectors.reflectors[1:]))
-    found = suggest(replace(project, reflectors=locked), EMPTY, quietly)
+    found = suggest(replace(project, reflectors=locked))
     assert found.placement.reflectors.reflectors[0] is first
     assert len(found.removed) == len(project.reflectors) - 1
 
 
 def test_what_is_not_met_is_told_by_its_metres_and_its_place(project: Project) -> None:
     wanting = asking(asking(project, "demands.visible", 9), "candidates.spacing", 8.0)
-    found = suggest(wanting, EMPTY, quietly)
+    found = suggest(wanting)
     assert found.unmet
     for stretch in found.unmet:
         assert stretch.first < stretch.last
@@ -164,52 +168,57 @@ def test_what_is_not_met_is_told_by_its_metres_and_its_place(project: Project) -
 def test_without_a_route_or_a_wall_it_is_said_what_is_missing(project: Project) -> None:
     ignoring = replace(project.layout, ignored_routes=tuple(route.name for route in project.routes))
     with pytest.raises(UsageError, match="no route that counts"):
-        suggest(replace(project, layout=ignoring), EMPTY, quietly)
+        suggest(replace(project, layout=ignoring))
+    open_field = replace(project, floor_map=None)
     with pytest.raises(UsageError, match="no floor map"):
-        suggest(replace(project, floor_map=None), EMPTY, quietly)
+        suggest(open_field)
+    with pytest.raises(UsageError, match="no floor map"):
+        after(AppState(open_field, open_field), AskLayout())
 
 
-def test_accepting_is_one_undo_step_and_undo_brings_the_old_ones_back(project: Project, suggestion: Suggestion) -> None:
+def test_accepting_is_one_undo_step_and_undo_brings_the_old_ones_back(
+    project: Project, suggestion: PlacementResult
+) -> None:
     state = after(AppState(project, project), AskLayout())
     accepted = after(state, AcceptLayout(suggestion))
     assert [step.name for step in accepted.undo] == [ACCEPT]
     assert accepted.project.reflectors == suggestion.placement.reflectors
-    assert not accepted.part(LayoutWish).wanted
+    assert accepted.part(LayoutWish).inputs is None
     assert after(accepted, Undo()).project is project
 
 
-def test_a_layout_for_other_reflectors_is_not_accepted(project: Project, suggestion: Suggestion) -> None:
+def test_a_layout_for_other_reflectors_is_not_accepted(project: Project, suggestion: PlacementResult) -> None:
     other = replace(project, reflectors=replace(project.reflectors, reflectors=project.reflectors.reflectors[1:]))
     with pytest.raises(UsageError, match="suggest it again"):
         after(AppState(other, other), AcceptLayout(suggestion))
 
 
-def test_it_is_looked_for_in_the_background_shown_and_dropped(bench: Bench) -> None:
+def test_it_is_looked_for_in_the_background_shown_and_dropped(bench: Bench[PlacementService]) -> None:
     project = bench.state.project
     bench.state = after(bench.state, SetLayout("extend", value=False), AskLayout())
     bench.service.follow(bench.state)
-    found = bench.found().layout
+    found = bench.found()
     assert found is not None
     assert not found.outdated
     assert bench.state.project is project
     bench.move(0, 0.5)
     assert not bench.jobs.unfinished()
-    moved = bench.service.view.layout
+    moved = bench.view
     assert moved is not None
     assert moved.outdated
     bench.state = after(bench.state, DiscardLayout())
     bench.service.follow(bench.state)
-    assert bench.service.view.layout is None
+    assert bench.view is None
 
 
-def test_asking_again_drops_what_was_found_and_looks_anew(bench: Bench) -> None:
+def test_asking_again_drops_what_was_found_and_looks_anew(bench: Bench[PlacementService]) -> None:
     bench.state = after(bench.state, AskLayout())
     bench.service.follow(bench.state)
-    first = bench.found().layout
+    first = bench.found()
     bench.state = after(bench.state, DiscardLayout(), AskLayout())
     bench.service.follow(bench.state)
-    assert bench.service.view.layout is None
-    second = bench.found().layout
+    assert bench.view is None
+    second = bench.found()
     assert first is not None
     assert second is not None
     assert second.suggestion is not first.suggestion
@@ -223,3 +232,34 @@ def test_a_cross_and_a_hatch_stay_within_their_places() -> None:
     assert strokes[..., 0].max() <= 5.0 + 1e-9
     assert strokes[..., 1].min() >= 2.0 - 1e-9
     assert strokes[..., 1].max() <= 4.0 + 1e-9
+
+
+def told(suggestion: PlacementResult, project: Project, **wish: bool) -> tuple[bool, bool]:
+    found = layout_view(suggestion, project, LayoutWish(**({"extend": False} | wish)))  # type: ignore[arg-type]
+    return found.outdated, found.wished_otherwise
+
+
+def test_a_suggestion_is_held_against_the_site_and_the_wishes_of_now(
+    project: Project, suggestion: PlacementResult
+) -> None:
+    assert told(suggestion, project) == (False, False)
+    assert told(suggestion, replace(project, name="Other")) == (False, False)
+    assert told(suggestion, project, extend=True) == (False, True)
+    assert told(suggestion, asking(project, "demands.visible", 3)) == (False, True)
+    supervisor = replace(project.parameters.supervisor, position_limit=0.05)
+    stricter = replace(project, parameters=replace(project.parameters, supervisor=supervisor))
+    assert told(suggestion, stricter) == (True, False)
+    slower = replace(project, routes=tuple(replace(route, speed=0.2) for route in project.routes))
+    assert told(suggestion, slower) == (True, False)
+    another = replace(project, routes=(*project.routes, replace(project.routes[0], name="Another")))
+    assert told(suggestion, another) == (False, True)
+    assert told(suggestion, asking(another, "ignored_routes", ("Another",))) == (False, False)
+
+
+def test_the_site_is_taken_as_it_was_when_it_was_asked_for(bench: Bench[PlacementService]) -> None:
+    before = bench.state.project.reflectors
+    bench.ask(AskLayout())
+    bench.move(0, 0.5)
+    found = bench.found()
+    assert found.suggestion.inputs.reflectors is before
+    assert found.outdated

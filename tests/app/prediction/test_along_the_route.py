@@ -5,16 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commission.app.plan.looks import route_view
-from commission.app.plan.settings import PlanSettings
-from commission.app.plan.view import RouteView, stretches
-from commission.app.plan.work import predict
 from commission.app.prediction.chart import chart
 from commission.app.prediction.driven import driven
 from commission.app.prediction.event_layer import events, place_at
 from commission.app.prediction.load_colors import BOUNDS, load_classes, palette
 from commission.app.prediction.ribbon_layer import pieces
 from commission.app.prediction.tracks import round_up
+from commission.app.prediction.view import RouteView, route_view
 from commission.app.run.session import Drive, Session
 from commission.localization.setup import LocalizerSetup
 from commission.planning.route_prediction import RoutePrediction, plan_route, predict_route
@@ -22,6 +19,8 @@ from commission.planning.true_error import predict_errors
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.site.stations import Station
+from commission.studies.prediction import PredictionInput
+from commission.studies.prediction import prediction as prediction_study
 
 
 @pytest.fixture(scope="module")
@@ -55,13 +54,6 @@ def test_a_load_above_the_limit_has_a_color_outside_of_the_ramp() -> None:
     assert (below, above) == (len(palette()) - 2, len(palette()) - 1)
 
 
-def test_stretches_are_cut_where_nothing_fails() -> None:
-    points = np.arange(12.0).reshape(6, 2)
-    found = stretches(points, np.array([True, True, False, False, True, False]))
-    assert [len(part) for part in found] == [2, 1]
-    assert stretches(points, np.zeros(6, bool)) == ()
-
-
 def test_a_run_there_and_back_is_laid_over_the_metres_it_was_driven(
     session: Session, prediction: RoutePrediction
 ) -> None:
@@ -85,8 +77,7 @@ def strict(project: Project) -> Project:
 
 def expected(project: Project) -> RouteView:
     """What the page shows of the first route."""
-    settings = PlanSettings(route=project.routes[0].name)
-    return route_view(predict(project, settings, lambda _fraction, _message: None), outdated=False)
+    return route_view(prediction_study(PredictionInput.of(project, project.routes[0].name)), outdated=False)
 
 
 def test_the_chart_says_where_the_supervisor_stops_and_draws_it(project: Project) -> None:

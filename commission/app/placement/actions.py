@@ -1,46 +1,13 @@
-"""What a person can ask for in the step Plan, as frozen values."""
+"""What a person can ask about a suggested layout, as frozen values."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from commission.app.base.actions import Action
-from commission.app.placement.suggestion import Suggestion
-from commission.app.plan.settings import Place, PlanValue
+from commission.app.base.actions import Action, Point
+from commission.app.base.inputs import Setting
 from commission.site.layout_brief import Rectangle
-
-
-@dataclass(frozen=True, slots=True)
-class SetPlan(Action):
-    """Change one setting of the step Plan."""
-
-    name: str
-    """Field of `PlanSettings`."""
-    value: PlanValue
-    """New value, SI and radians."""
-
-
-@dataclass(frozen=True, slots=True)
-class ReadFloor(Action):
-    """Read the values at a place of the floor, or ask for a reflector there."""
-
-    place: Place
-    """Where it was clicked [m], map frame."""
-    reach: float
-    """How near to a reflector counts as on it [m]: some pixels at the browser's zoom."""
-
-
-@dataclass(frozen=True, slots=True)
-class ClearEllipses(Action):
-    """Drop the ellipses that were asked for by clicks."""
-
-
-@dataclass(frozen=True, slots=True)
-class AlsoFails(Action):
-    """Let a reflector fail beside those that have failed already, and rank the others again."""
-
-    name: str
-    """Its id."""
+from commission.studies.placement import PlacementResult
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +16,7 @@ class SetLayout(Action):
 
     name: str
     """`extend`, or `group.name` of the demands or candidates of `LayoutBrief`."""
-    value: PlanValue
+    value: Setting
     """New value, SI and radians."""
 
 
@@ -75,7 +42,7 @@ class KeepOut(Action):
 class FreeAreas(Action):
     """Allow new reflectors again where they were kept out."""
 
-    place: Place | None = None
+    place: Point | None = None
     """In the areas around this place [m]; none: everywhere."""
 
 
@@ -93,5 +60,5 @@ class DiscardLayout(Action):
 class AcceptLayout(Action):
     """Put up the suggested reflectors."""
 
-    suggestion: Suggestion
+    suggestion: PlacementResult
     """What was seen on the page when it was accepted."""

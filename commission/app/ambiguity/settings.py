@@ -1,0 +1,55 @@
+"""What is asked about ambiguous places: one frozen value in the page's state, and the actions that change it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from commission.app.base.actions import Action
+from commission.app.base.inputs import Setting
+from commission.site.checks import above
+
+NAME = "ambiguity"
+"""Of the feature."""
+
+
+@dataclass(frozen=True, slots=True)
+class AmbiguitySettings:
+    """Whether ambiguous places are wanted, and which pair is shown."""
+
+    asked: int = 0
+    """Number of times ambiguous places were asked for; 0: they are not wanted."""
+    tolerance: float = 0.1
+    """Distance up to which a reflector counts as standing where a look-alike of it does [m]."""
+    pair: int = -1
+    """Which pair of look-alikes is shown, counted in the order of the list; -1: none."""
+
+    def __post_init__(self) -> None:
+        above(self.tolerance, 0.0, "tolerance", "m")
+
+
+@dataclass(frozen=True, slots=True)
+class SetAmbiguity(Action):
+    """Change one setting."""
+
+    name: str
+    """Field of `AmbiguitySettings`."""
+    value: Setting
+    """New value, SI."""
+
+
+@dataclass(frozen=True, slots=True)
+class FindPlaces(Action):
+    """Look for ambiguous places."""
+
+
+@dataclass(frozen=True, slots=True)
+class DropPlaces(Action):
+    """Stop looking for ambiguous places, or forget them."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShowPair(Action):
+    """Show one pair of look-alikes; the one that is shown is hidden."""
+
+    index: int
+    """In the order of the list."""

@@ -1,0 +1,70 @@
+"""A coverage that follows reflectors while they are dragged: the study's result, and what it takes to keep it up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from commission.geometry.arrays import BoolArray
+from commission.planning import coverage as coverage_kernels
+from commission.planning.coverage import LiveCoverage
+from commission.progress import Progress, part
+from commission.site.reflectors import ReflectorMap
+from commission.studies.coverage import CoverageInput, coverage
+
+MOST_MOVED = 12
+"""Reflectors that are moved one by one; the floor is computed anew when more have changed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Covered:
+    """A coverage that can be kept up to date."""
+
+    live: LiveCoverage
+    """The figures; whoever holds this result may move reflectors."""
+    floor: BoolArray
+    """(N,) where a vehicle could stand."""
+
+    def follow(self, before: CoverageInput, now: CoverageInput) -> bool:
+        """Move the reflectors that were moved, where nothing else is different.
+
+        Parameters
+        ----------
+        before : what the figures are of.
+        now : what they should be of.
+
+        Returns
+        -------
+        followed : whether they are; else they are as they were.
+        """
+        if replace(now, reflectors=before.reflectors) != before:
+            return False
+        changed = changed_reflectors(self.live.reflectors, now.reflectors)
+        # Without a floor map the reflectors say how far the floor reaches.
+        if changed is None or (now.floor_map is None and now.lattice() != self.live.coverage.lattice):
+            return False
+        for index in changed:
+            self.live.move(index, now.reflectors.reflectors[index])
+        return True
+
+
+def cover(inputs: CoverageInput, progress: Progress) -> Covered:
+    """Compute the coverage of the floor, and keep what it takes to follow reflectors.
+
+    Parameters
+    ----------
+    inputs : the site and what is asked.
+    progress : told how far it is; may raise to cancel.
+    """
+    found = coverage(inputs, part(progress, 0.0, 0.95))
+    progress(0.95, "compiling moved reflectors")
+    coverage_kernels.warm_up()
+    return Covered(LiveCoverage(found.model, found.coverage), found.drivable)
+
+
+def changed_reflectors(before: ReflectorMap, after: ReflectorMap) -> list[int] | None:
+    """Return the indices of the reflectors that changed; none when there are other ones, or too many."""
+    if len(before) != len(after):
+        return None
+    pairs = zip(before.reflectors, after.reflectors, strict=True)
+    changed = [index for index, (old, new) in enumerate(pairs) if old != new]
+    return changed if len(changed) <= MOST_MOVED else None

@@ -1,0 +1,44 @@
+"""Looks for a layout when it is asked for, and makes the view."""
+
+from __future__ import annotations
+
+from commission.app.base.jobs import Lane
+from commission.app.base.kept import Kept
+from commission.app.base.remembered import Remembered
+from commission.app.base.service import Context, Due, Service
+from commission.app.base.state import AppState
+from commission.app.placement.view import LayoutView, layout_view
+from commission.app.placement.wish import LayoutWish
+from commission.studies.placement import PlacementInput, PlacementResult, placement
+
+LAYOUT = "Suggested layout"
+"""Name of the job."""
+
+
+class PlacementService(Service):
+    """The layout that was asked for last."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._kept = Kept[PlacementInput, PlacementResult](LAYOUT, context.jobs, Lane.PATIENT)
+        self._asked = 0
+        self._remembered = Remembered[LayoutView]()
+        self.view: LayoutView | None = None
+        """What there is now; the same value as long as nothing changes."""
+
+    def parts(self, *, slowly: bool) -> tuple[object, ...]:  # noqa: ARG002 - the protocol's
+        """Return what there is now."""
+        return () if self.view is None else (self.view,)
+
+    def follow(self, state: AppState) -> Due:
+        """Look once for each time that it is asked for; what was found before is dropped then."""
+        wish, before = state.part(LayoutWish), self.view
+        inputs = wish.inputs
+        if inputs is None or wish.asked != self._asked:
+            self._asked = wish.asked
+            self._kept.drop()
+        if inputs is not None:
+            self._kept.ask(wish.asked, inputs, lambda progress: placement(inputs, progress))
+        found, project = self._kept.result, state.project
+        self.view = self._remembered.of((found, project, wish), lambda: found and layout_view(found, project, wish))
+        return Due.NEVER if self.view is before else Due.SOON
