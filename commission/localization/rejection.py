@@ -95,7 +95,8 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
 
     Notes
     -----
-    n <- n max(exp(-dt / window), min(1, fewest / n)) + count: exponential forgetting that waits where there is little.
+    n <- n max(exp(-dt / window), min(1, fewest / n)) + count: exponential forgetting that waits where there is little,
+    derived from a mean over the window.
     """
     accepted, rejected, near = 0.0, 0.0, 0.0
     for i in range(first, last):

@@ -50,11 +50,25 @@ class RunInput:
 
     @staticmethod
     def of(project: Project, log: RecordLog, start: Start) -> RunInput:
-        """Return the input of a run with the setup of a project from start to end."""
+        """Return the input of a run with the setup of a project from start to end.
+
+        Parameters
+        ----------
+        project : reflectors, scanner and parameters.
+        log : all records of the drive.
+        start : belief before the first record, and where it comes from.
+        """
         return RunInput(log=log, start=start, segments=(Segment(0, LocalizerSetup.of(project)),))
 
     def from_here_on(self, cycle: int, setup: LocalizerSetup, *, covered: bool = False) -> RunInput:
-        """Return the input of the same run up to a cycle, and of another setup (or covered reflectors) from it on."""
+        """Return the input of the same run up to a cycle, and of another setup from it on.
+
+        Parameters
+        ----------
+        cycle : first one with the other setup.
+        setup : the other setup.
+        covered : whether its reflectors are covered.
+        """
         before = tuple(segment for segment in self.segments if segment.first < cycle)
         return RunInput(log=self.log, start=self.start, segments=(*before, Segment(cycle, setup, covered)))
 
