@@ -6,8 +6,8 @@ those it is given.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import ExitStack
+from collections.abc import Generator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -144,8 +144,8 @@ class Page:
                 drawn.draw(view)
                 if slowly:
                     drawn.draw_slowly(view)
-        for browser in self._browsers.values():
-            with browser.client.atomic():
+        for number, browser in self._browsers.items():
+            with self._if_there(number), browser.client.atomic():
                 for panel in browser.panels:
                     panel.draw(view)
                     if slowly:
@@ -173,15 +173,31 @@ class Page:
                 self._tell(text, None if everywhere else sender.browser, failed=failed)
             case PlaceCamera(camera, everywhere):
                 for number in self._browsers if everywhere else own:
-                    self._cameras.show(number, camera)
+                    with self._if_there(number), suppress(ValueError):  # it may look from where it looks at
+                        self._cameras.show(number, camera)
             case FlyTo(place):
                 for number in own:
-                    self._cameras.look_at(number, place)
+                    with self._if_there(number), suppress(ValueError):
+                        self._cameras.look_at(number, place)
             case SendFile(name, content):
                 for number in own:
-                    self._browsers[number].client.send_file_download(name, content, save_immediately=True)
+                    with self._if_there(number):
+                        self._browsers[number].client.send_file_download(name, content, save_immediately=True)
             case _:
                 raise TypeError(f"nobody carries out {type(effect).__name__}; expected a service that names it")
+
+    @contextmanager
+    def _if_there(self, browser: int) -> Generator[None]:
+        """Do something in one browser; that it leaves meanwhile is no fault, and nobody else's business.
+
+        viser takes down what a browser has of its own as soon as that browser has gone, which the owner thread, in the
+        middle of a picture, does not know yet.
+        """
+        try:
+            yield
+        except (RuntimeError, KeyError):
+            if browser in self._server.get_clients():
+                raise
 
     def _tell(self, text: str, browser: int | None, *, failed: bool) -> None:
         """Notify one browser, or all of them; those that are leaving hear nothing, and disturb nobody."""
@@ -200,12 +216,12 @@ class Page:
         client = self._server.get_clients().get(browser)
         if client is None:
             return
-        with client.atomic():
+        with self._if_there(browser), client.atomic():
             tabs = self._tabs
             panels = tuple(self._made(panel, client.gui, panel.tab and tabs[panel.tab], client) for panel in self._own)
-        self._browsers[browser] = BrowserPage(client, panels)
-        take_clicks(client, self._post)
-        self._cameras.connected(client)
+            self._browsers[browser] = BrowserPage(client, panels)
+            take_clicks(client, self._post)
+            self._cameras.connected(client)
 
     def disconnected(self, browser: int) -> None:
         """Forget a browser."""

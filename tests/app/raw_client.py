@@ -14,7 +14,9 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 CAMERA = {
-    **{name: (0.0, 0.0, 1.0) for name in ("position", "look_at", "up_direction")},
+    "position": (0.0, 0.0, 1.0),
+    "look_at": (0.0, 0.0, 0.0),
+    "up_direction": (0.0, 1.0, 0.0),
     "wxyz": (1.0, 0.0, 0.0, 0.0),
     **dict.fromkeys(("fov", "near", "far"), 1.0),
     **dict.fromkeys(("image_height", "image_width"), 100),

@@ -27,6 +27,8 @@ SHOWN_AGAIN_AFTER_S = 1.5
 TOLD_EVERY_S = 0.5
 """Shortest time between two notes to one browser [s]: a flood of refusals is one note with their number."""
 TOLD_FOR_S = 8.0
+NEAREST_LOOK_M = 1e-9
+"""Distance at which a camera looks at nothing any more [m]; to turn it would divide by that."""
 GONE = "what was pressed or changed is no longer on the page; nothing was done"
 
 
@@ -80,6 +82,10 @@ class Seam:
 
     @_check.register
     def _check_camera(self, message: wire.ViewerCameraMessage, _number: int) -> Refusal | None:
+        if math.dist(message.position, message.look_at) < NEAREST_LOOK_M:
+            return Refusal("a camera looks at the place where it is; expected another one")
+        if math.hypot(*message.up_direction) < NEAREST_LOOK_M:
+            return Refusal("a camera has no up; expected a direction")
         return _rotation_refusal(message.wxyz)
 
     @_check.register

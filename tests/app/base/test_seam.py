@@ -215,6 +215,8 @@ BAD_MESSAGES: dict[str, dict[str, Any]] = {
     "a drag with the fourth button": {"type": "SceneNodeDragMessage", **DRAG, "button": "fourth"},
     "a click without a ray": {"type": "ScenePointerMessage", **CLICK, "ray_origin": None},
     "a rectangle with one corner": {"type": "ScenePointerMessage", **CLICK, "event_type": "rect-select"},
+    "a camera that looks at itself": {"type": "ViewerCameraMessage", **CAMERA, "look_at": CAMERA["position"]},
+    "a camera without up": {"type": "ViewerCameraMessage", **CAMERA, "up_direction": [0.0, 0.0, 0.0]},
     "a camera of no size": {"type": "ViewerCameraMessage", **CAMERA, "image_height": 0},
     "a camera that looks nowhere": {"type": "ViewerCameraMessage", **CAMERA, "look_at": [math.nan, 0.0, 0.0]},
     "a camera with too few numbers": {"type": "ViewerCameraMessage", **CAMERA, "wxyz": [1.0, 0.0]},
