@@ -71,3 +71,8 @@ def test_outlines_come_in_a_batch_with_one_scale_each() -> None:
     assert outlines.shape == (2, 12, 2)
     np.testing.assert_allclose(np.linalg.norm(outlines, axis=-1), [[1.0] * 12, [3.0] * 12])
     assert gaussian.ellipse_points(np.zeros((0, 2)), np.zeros((0, 2, 2))).shape == (0, 48, 2)
+
+
+def test_outline_goes_round_once_counterclockwise_from_the_end_of_the_longer_axis() -> None:
+    outline = gaussian.ellipse_points([[1.0, 1.0]], [np.diag([4.0, 1.0])], 2.0, 4)[0]
+    np.testing.assert_allclose(outline, [[5.0, 1.0], [1.0, 3.0], [-3.0, 1.0], [1.0, -1.0]], atol=1e-12)

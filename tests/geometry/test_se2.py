@@ -103,3 +103,23 @@ def test_wrong_shapes_are_named() -> None:
         se2.inverse([1.0, 2.0])
     with pytest.raises(ValueError, match=r"points have shape \(3,\); expected \(\.\.\., 2\)"):
         se2.transform_points([0.0, 0.0, 0.0], [1.0, 2.0, 3.0])
+
+
+def test_headings_stay_within_half_a_turn() -> None:
+    turned = np.array([0.0, 0.0, 3.0])
+    for pose in (se2.relative(turned, -turned), se2.compose(turned, turned), se2.inverse([0.0, 0.0, -math.pi])):
+        assert -math.pi <= pose[2] < math.pi
+    assert se2.relative(turned, -turned)[2] == pytest.approx(2.0 * math.pi - 6.0)
+    assert se2.inverse_scalars(0.0, 0.0, -math.pi)[2] == -math.pi
+    assert se2.compose_scalars(0.0, 0.0, 3.0, 0.0, 0.0, 3.0)[2] == pytest.approx(6.0 - 2.0 * math.pi)
+
+
+@pytest.mark.parametrize("w", [9.99e-4, -9.99e-4, 3e-4, 1e-5])
+def test_series_near_zero_are_the_closed_forms_to_the_last_bits(w: float) -> None:
+    # sin(w) / w and (1 - cos w) / w = w/2 (sin(w/2) / (w/2))^2 lose nothing to cancellation; w/2 cot(w/2) neither.
+    along, across = math.sin(w) / w, 2.0 * math.sin(0.5 * w) ** 2 / w
+    cotangent = 0.5 * w / math.tan(0.5 * w)
+    for found in (se2.exp([1.0, 0.0, w]), se2.exp_scalars(1.0, 0.0, w)):
+        assert found[:2] == pytest.approx([along, across], rel=1e-15)
+    for found in (se2.log([1.0, 0.0, w]), se2.log_scalars(1.0, 0.0, w)):
+        assert found[:2] == pytest.approx([cotangent, -0.5 * w], rel=1e-15)

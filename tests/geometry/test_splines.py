@@ -221,6 +221,19 @@ def test_catmull_rom_passes_through_its_points_with_continuous_heading() -> None
     assert spline.heading(0.0) == pytest.approx(0.0, abs=1e-12)
 
 
+def test_catmull_rom_is_the_curve_of_barry_and_goldman() -> None:
+    points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 4.0], [-3.0, 5.0]])
+    # Barry, Goldman 1988: a pyramid of linear interpolations, over knots as far apart as the roots of the chords.
+    t = np.concatenate(([0.0], np.cumsum(np.sqrt(np.hypot(*np.diff(points, axis=0).T)))))
+    spline = catmull_rom(points)
+    for share in (0.1, 0.5, 0.8):
+        u = t[1] + share * (t[2] - t[1])
+        a = [((t[i + 1] - u) * points[i] + (u - t[i]) * points[i + 1]) / (t[i + 1] - t[i]) for i in range(3)]
+        b = [((t[i + 2] - u) * a[i] + (u - t[i]) * a[i + 1]) / (t[i + 2] - t[i]) for i in range(2)]
+        expected = ((t[2] - u) * b[0] + (u - t[1]) * b[1]) / (t[2] - t[1])
+        np.testing.assert_allclose(spline.point(u / t[-1]), expected, atol=1e-12)
+
+
 def test_catmull_rom_of_points_on_a_line_is_the_line() -> None:
     spline = catmull_rom([[0, 0], [1, 1], [5, 5], [6, 6]])
     np.testing.assert_allclose(spline.heading(INNER), math.pi / 4)

@@ -9,9 +9,9 @@ import numpy as np
 
 from commission.planning.ambiguity import ambiguous_poses
 from commission.planning.placement import Placement, PlacementOptions, choose
-from commission.planning.route_prediction import PlannedRoute, plan_route, restricted, station_scans
-from commission.planning.true_error import two_sigma_of
-from commission.planning.visibility import visibility_model
+from commission.planning.route_prediction import PlannedRoute, plan_route, predict_route
+from commission.planning.true_error import predict_errors
+from commission.planning.visibility import VisibleReflectors, visibility_model
 from commission.site.layout_brief import Demands
 from commission.site.parameters import OdometryParameters, Parameters
 from commission.site.project import Project
@@ -60,15 +60,17 @@ class SmallCase:
         )
 
     def _within_limits(self, site: Project, planned: PlannedRoute, left: set[int]) -> bool:
-        supervisor, demands = site.parameters.supervisor, self.demands
+        supervisor, demands, drive = site.parameters.supervisor, self.demands, planned.drive
         position = demands.position_limit or supervisor.position_limit
-        limits = np.tile(
-            (position, position, demands.heading_limit or supervisor.heading_limit), (len(planned.drive), 1)
-        )
-        for station, scans in station_scans(planned.drive, site.stations):
-            limits[scans, :2] = np.minimum(limits[scans, :2], station.required_accuracy)
-        kept = np.isin(np.arange(len(self.centers)), list(left))
-        return bool(np.all(two_sigma_of(restricted(planned, kept)) <= limits))
+        limits = np.tile((position, position, demands.heading_limit or supervisor.heading_limit), (len(drive), 1))
+        for station in site.stations:
+            there = np.hypot(*(drive.poses[:, :2] - (station.x, station.y)).T) <= 0.2
+            limits[there, :2] = np.minimum(limits[there, :2], station.required_accuracy)
+        few = only(planned, left)
+        prediction = predict_route(few)
+        said, true = prediction.covariances, predict_errors(few, prediction).squares
+        variances = np.maximum(*(np.diagonal(each, axis1=1, axis2=2) for each in (said, true)))
+        return bool(np.all(2.0 * np.sqrt(variances) <= limits))
 
     def _clear(self, site: Project, left: set[int]) -> bool:
         poses = [plan_route(site, ROUTE).drive.poses[0]] if self.demands.unambiguous_starts else []
@@ -77,6 +79,14 @@ class SmallCase:
             return True
         layout = ReflectorMap(tuple(site.reflectors.reflectors[i] for i in sorted(left)))
         return not ambiguous_poses(visibility_model(replace(site, reflectors=layout)), poses).ambiguous.any()
+
+
+def only(planned: PlannedRoute, left: set[int]) -> PlannedRoute:
+    """A planned route that sees no other reflectors than these."""
+    stays = np.isin(planned.visible.indices, list(left))
+    scans = np.repeat(np.arange(len(planned.drive)), planned.visible.counts())[stays]
+    offsets = np.searchsorted(scans, np.arange(len(planned.drive) + 1))
+    return replace(planned, visible=VisibleReflectors(offsets, planned.visible.indices[stays]))
 
 
 def small_case(seed: int) -> SmallCase:

@@ -1,16 +1,17 @@
 """Neighbors along a route: found where the gates meet, with the probability of a mistake."""
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from scipy.special import ndtr
+from scipy.stats import norm
 
-from commission.geometry.angles import difference
-from commission.geometry.gaussian import chi_square_gate
-from commission.localization.estimate import Belief
-from commission.localization.observation import innovation_covariances, range_bearing
 from commission.planning.association_risk import neighbor_risks
 from commission.planning.route_prediction import plan_route, predict_route
-from tests.planning.sites import open_field
+from commission.site.reflectors import ReflectorMap
+from tests.localization import plain_observation as plain
+from tests.planning.sites import open_field, reflectors_at
 
 CLOSE = ((3.0, 3.0), (8.0, -2.0), (12.0, 2.5), (12.05, 2.5), (18.0, -3.0))
 
@@ -28,34 +29,49 @@ def test_only_reflectors_close_to_each_other_are_named():
     assert risks_of([CLOSE[i] for i in (0, 1, 2, 4)])[2] == ()
 
 
-def test_separation_is_that_of_the_innovation_covariance():
-    planned, prediction, risks = risks_of(CLOSE)
-    risk = next(risk for risk in risks if risk.reflector == 2)
-    centers, gate = planned.places[:, :2], chi_square_gate(0.95, 2)
-    for scan, probability in list(zip(risk.scans.tolist(), risk.probability, strict=True))[::20]:
-        pose = planned.drive.poses[scan]
-        belief = Belief(0, pose, prediction.prior_covariances[scan])
-        own, other = range_bearing(pose, planned.scanner.mounting, centers[2:4])
-        d = np.array([other[0] - own[0], difference(other[1], own[1])])
-        squared = d @ np.linalg.solve(innovation_covariances(belief, planned.model().observation, centers[2:3])[0], d)
-        assert squared <= gate
-        assert probability == pytest.approx(ndtr(-0.5 * np.sqrt(squared)), rel=1e-9)
+def separations(planned, prediction, scan: int) -> np.ndarray:
+    """(M, M) squared Mahalanobis distance of each reflector's expected observation from that of another; diagonal 0."""
+    pose, mounting, observation = planned.drive.poses[scan], planned.scanner.mounting, planned.parameters.observation
+    centers, surveyed = planned.places[:, :2], np.sqrt(planned.places[:, 2])
+    sigmas = observation.range_sigma, observation.bearing_sigma
+    S = plain.innovation_covariances(pose, prediction.prior_covariances[scan], mounting, centers, sigmas, surveyed)
+    seen = plain.observed(pose, mounting, centers)
+    d = seen[np.newaxis] - seen[:, np.newaxis]
+    d[..., 1] = plain.turned(d[..., 1])
+    return np.einsum("ijk,ikl,ijl->ij", d, np.linalg.inv(S), d)
+
+
+def surveyed(*sigmas: float):
+    """Two reflectors close to each other, with 1-sigma of their places."""
+    places = reflectors_at([CLOSE[2], CLOSE[3], CLOSE[0]]).reflectors
+    given = tuple(replace(r, sigma=sigma) for r, sigma in zip(places, (*sigmas, 0.0), strict=True))
+    planned = plan_route(replace(open_field(()), reflectors=ReflectorMap(given)), "Line")
+    prediction = predict_route(planned)
+    return planned, prediction, neighbor_risks(planned, prediction)
+
+
+@pytest.mark.parametrize("sigmas", [(0.0, 0.0), (0.0, 0.1), (0.1, 0.02)])
+def test_probability_is_that_of_half_the_distance_in_the_reflectors_own_gate(sigmas: tuple[float, float]):
+    planned, prediction, risks = surveyed(*sigmas)
+    assert {(0, 1), (1, 0)} <= {(risk.reflector, risk.neighbor) for risk in risks}
+    # The gate of 95 % of two degrees of freedom is -2 ln 0.05.
+    gate = -2.0 * math.log(0.05)
+    for risk in risks:
+        for scan, probability in list(zip(risk.scans.tolist(), risk.probability, strict=True))[::20]:
+            squared = separations(planned, prediction, scan)[risk.reflector, risk.neighbor]
+            assert squared <= gate
+            # Differences of 1e-10 in the oracle's Jacobian.
+            assert probability == pytest.approx(norm.sf(0.5 * math.sqrt(squared)), rel=1e-5)
 
 
 def test_no_neighbor_within_a_gate_is_missed():
     planned, prediction, risks = risks_of(CLOSE)
     found = {(risk.reflector, risk.neighbor): set(risk.scans.tolist()) for risk in risks}
-    centers, gate = planned.places[:, :2], chi_square_gate(0.95, 2)
     for scan in range(0, len(planned.drive), 37):
-        pose = planned.drive.poses[scan]
-        belief = Belief(0, pose, prediction.prior_covariances[scan])
-        observed = range_bearing(pose, planned.scanner.mounting, centers)
-        S = innovation_covariances(belief, planned.model().observation, centers)
+        inside = separations(planned, prediction, scan) <= -2.0 * math.log(0.05)
         for i in planned.visible.of(scan).tolist():
-            for j in set(range(len(centers))) - {i}:
-                d = np.array([observed[j, 0] - observed[i, 0], difference(observed[j, 1], observed[i, 1])])
-                inside = d @ np.linalg.solve(S[i], d) <= gate
-                assert inside == (scan in found.get((i, j), set()))
+            for j in set(range(len(CLOSE))) - {i}:
+                assert inside[i, j] == (scan in found.get((i, j), set()))
 
 
 def test_the_nearer_the_neighbor_the_likelier_the_mistake():

@@ -8,8 +8,8 @@ import pytest
 from commission.errors import UsageError
 from commission.planning.ambiguity import ambiguous_poses
 from commission.planning.placement import Demands, PlacementOptions, place
-from commission.planning.route_prediction import plan_route, restricted
-from commission.planning.true_error import two_sigma_of
+from commission.planning.route_prediction import plan_route, predict_route
+from commission.planning.true_error import predict_errors
 from commission.planning.visibility import visibility_model
 from commission.site.layout_brief import CandidateOptions
 from commission.site.parameters import OdometryParameters, Parameters
@@ -30,16 +30,26 @@ def hall(**changes) -> Project:
 
 
 def holds(project: Project, reflectors: ReflectorMap, demands: Demands) -> bool:
-    """Whether a layout meets the demands, by predictions of its own."""
-    site = replace(project, reflectors=reflectors)
-    planned = plan_route(site, project.routes[0].name)
+    """Whether a layout meets the demands: sites without each of its reflectors, planned and predicted anew."""
+    planned = plan_route(replace(project, reflectors=reflectors), project.routes[0].name)
     if planned.visible.counts().min() < demands.visible + demands.survive_failure:
         return False
     limit = demands.position_limit or project.parameters.supervisor.position_limit
     heading = demands.heading_limit or project.parameters.supervisor.heading_limit
-    everyone = np.arange(len(reflectors))
-    left = [everyone >= 0, *(everyone != gone for gone in everyone if demands.survive_failure)]
-    return all(bool(np.all(two_sigma_of(restricted(planned, kept)) <= (limit, limit, heading))) for kept in left)
+    limits = np.tile((limit, limit, heading), (len(planned.drive), 1))
+    for station in project.stations:
+        there = np.hypot(*(planned.drive.poses[:, :2] - (station.x, station.y)).T) <= 0.2
+        limits[there, :2] = np.minimum(limits[there, :2], station.required_accuracy)
+    layouts = [reflectors, *(without_each(reflectors) if demands.survive_failure else ())]
+    return all(bool(np.all(said_and_true(replace(project, reflectors=layout)) <= limits)) for layout in layouts)
+
+
+def said_and_true(site: Project) -> np.ndarray:
+    """(K, 3) 2-sigma that the filter will say, or of its error where that is larger."""
+    planned = plan_route(site, site.routes[0].name)
+    prediction = predict_route(planned)
+    said, true = prediction.covariances, predict_errors(planned, prediction).squares
+    return 2.0 * np.sqrt(np.maximum(*(np.diagonal(each, axis1=1, axis2=2) for each in (said, true))))
 
 
 def test_a_suggested_layout_meets_its_demands_and_its_spacing():
@@ -56,9 +66,12 @@ def test_a_suggested_layout_meets_its_demands_and_its_spacing():
     assert np.abs(centers[:, 1] - 4.0).min() > 0.6
 
 
+POOR = Parameters(odometry=OdometryParameters(heading_per_sqrt_m=0.05, forward_per_sqrt_m=0.05))
+"""So poor odometry that two distant reflectors do not hold the pose."""
+
+
 def test_tight_limits_ask_for_more_reflectors_than_sight_alone():
-    # So poor odometry that two distant reflectors do not hold the pose.
-    project = hall(parameters=Parameters(odometry=OdometryParameters(heading_per_sqrt_m=0.05, forward_per_sqrt_m=0.05)))
+    project = hall(parameters=POOR)
     loose, tight = (
         Demands(visible=1, survive_failure=False),
         Demands(visible=1, survive_failure=False, position_limit=0.03),
@@ -67,6 +80,30 @@ def test_tight_limits_ask_for_more_reflectors_than_sight_alone():
     assert few.added < more.added
     assert more.unmet == ()
     assert holds(project, more.reflectors, tight)
+
+
+def test_limits_hold_without_any_single_reflector_where_that_is_demanded():
+    demands = Demands(visible=1, position_limit=0.05)
+    fragile = place(hall(parameters=POOR), options=PlacementOptions(demands=replace(demands, survive_failure=False)))
+    sturdy = place(hall(parameters=POOR), options=PlacementOptions(demands=demands))
+    assert sturdy.unmet == ()
+    assert holds(hall(parameters=POOR), sturdy.reflectors, demands)
+    # Two in sight everywhere are not enough of a reason: the limit asks for more.
+    by_sight = place(hall(parameters=POOR), options=PlacementOptions(demands=replace(demands, position_limit=1.0)))
+    assert not holds(hall(parameters=POOR), by_sight.reflectors, demands)
+    assert fragile.added < sturdy.added
+
+
+def test_a_station_gets_the_accuracy_that_it_requires():
+    station = Station(name="Dock", x=9.0, y=4.0, required_accuracy=0.02)
+    demands = Demands(visible=1, survive_failure=False)
+    without, with_dock = (
+        place(hall(parameters=POOR, stations=stations), options=PlacementOptions(demands=demands))
+        for stations in ((), (station,))
+    )
+    assert with_dock.unmet == ()
+    assert holds(hall(parameters=POOR, stations=(station,)), with_dock.reflectors, demands)
+    assert not holds(hall(parameters=POOR, stations=(station,)), without.reflectors, demands)
 
 
 def test_extending_keeps_what_there_is_and_adds_fewer():

@@ -11,11 +11,20 @@ from commission.geometry.gaussian import chi_square_gate
 from commission.localization import whole_run
 from commission.localization.estimate import Belief
 from commission.localization.setup import LocalizerSetup
-from commission.planning.nominal_drive import DrivePlan, nominal_drive
-from commission.planning.route_prediction import Damage, PredictionOptions, plan_route, predict_route
-from commission.site.parameters import AssociationParameters, OdometryParameters, Parameters
+from commission.planning.nominal_drive import DrivePlan, NominalDrive, nominal_drive
+from commission.planning.route_prediction import (
+    Damage,
+    PredictionOptions,
+    RoutePrediction,
+    plan_route,
+    predict_route,
+    restricted,
+    station_scans,
+)
+from commission.site.parameters import AssociationParameters, OdometryParameters, Parameters, SupervisorParameters
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry
+from commission.site.stations import Station
 from tests.planning.sites import open_field
 
 LINE = ((2.0, 3.0), (6.0, -3.0), (11.0, 3.5), (15.0, -2.5), (19.0, 3.0))
@@ -140,3 +149,72 @@ def test_gate_probability_is_the_probability_of_a_detection():
     tight, wide = (predict_route(plan_route(each, "Line")).two_sigma.mean() for each in (gated, project))
     assert tight > 1.1 * wide
     assert chi_square_gate(0.7, 2) < chi_square_gate(0.95, 2)
+
+
+def by_hand(position_sigma: list[float], heading_sigma: list[float], bias: list[float], modes: list[int]):
+    """A prediction along the x-axis with these numbers; limits of 100 mm and 50 mrad."""
+    count = len(modes)
+    poses = np.zeros((count, 3))
+    poses[:, 0] = 0.75 * np.arange(count)
+    covariances = np.zeros((count, 3, 3))
+    covariances[:, 1, 1], covariances[:, 2, 2] = np.square(position_sigma), np.square(heading_sigma)
+    means = poses.copy()
+    means[:, 1] += bias
+    return RoutePrediction(
+        drive=NominalDrive(np.arange(count) * 100_000_000, poses, poses[:, 0]),
+        limits=SupervisorParameters(position_limit=0.1, heading_limit=0.05),
+        prior_covariances=covariances,
+        means=means,
+        covariances=covariances,
+        modes=np.array(modes, dtype=np.int8),
+        seen=np.full(count, 2),
+        on_odometry=np.zeros(count),
+    )
+
+
+def test_load_is_bias_and_two_sigma_as_a_share_of_the_limit_of_the_worst_axis():
+    found = by_hand([0.01, 0.049, 0.051, 0.03, 0.0], [0.0, 0.0, 0.0, 0.0, 0.02], [0.0, 0.0, 0.0, 0.045, 0.0], [0] * 5)
+    # 20 mm, 98 mm, 102 mm, 60 + 45 mm of 100 mm; 40 mrad of 50 mrad.
+    np.testing.assert_allclose(found.load, [0.2, 0.98, 1.02, 1.05, 0.8])
+    np.testing.assert_allclose(found.two_sigma[:, 1], [0.02, 0.098, 0.102, 0.06, 0.0])
+    np.testing.assert_allclose(found.bias[:, 1], [0.0, 0.0, 0.0, 0.045, 0.0])
+    assert found.over_limit().tolist() == [False, False, True, True, False]
+
+
+def test_a_metre_fails_where_the_load_is_above_one_or_the_supervisor_says_so():
+    sigma = [0.01, 0.01, 0.06, 0.01, 0.01, 0.01]
+    # Scans every 0.75 m: over the limit at 1.5 m, in fail mode from 1.5 to 2.25 m and at the end.
+    found = by_hand(sigma, [0.0] * 6, [0.0] * 6, [0, 0, 1, 1, 0, 1])
+    assert found.failing_metres().tolist() == [1, 2, 3]
+    assert (found.trips().tolist(), found.recoveries().tolist()) == ([1.5, 3.75], [3.0])
+    per_metre = found.per_metre()
+    assert per_metre.fails.tolist() == [False, True, True, True]
+    np.testing.assert_allclose(per_metre.two_sigma[:, 1], [0.02, 0.12, 0.02, 0.02])
+    # Bias alone is no matter of the supervisor's mode.
+    assert by_hand(sigma[:2], [0.0] * 2, [0.09, -0.09], [0, 0]).failing_metres().tolist() == [0]
+
+
+def test_a_station_is_reached_within_its_distance_and_looking_its_way():
+    turns = np.radians([0.0, 29.9, 30.1, -29.9, 180.0])
+    poses = np.column_stack((np.zeros(5), np.zeros(5), turns))
+    drive = NominalDrive(np.arange(5), poses, np.arange(5.0))
+
+    def scans_at(x: float, y: float, heading: float) -> list[int]:
+        station = Station(name="S", x=x, y=y, heading=heading)
+        return [scan for _, scans in station_scans(drive, (station,)) for scan in scans.tolist()]
+
+    assert scans_at(0.0, 0.199, 0.0) == [0, 1, 3]
+    assert scans_at(-0.2, 0.0, 0.0) == [0, 1, 3]
+    assert scans_at(0.201, 0.0, 0.0) == []
+    # Across half a turn, and beside the route.
+    assert scans_at(0.0, 0.0, math.radians(-160.0)) == [4]
+
+
+def test_a_restricted_route_is_that_of_a_site_with_only_those_reflectors():
+    kept = np.array([True, False, True, False, True])
+    planned = plan_route(open_field(LINE), "Line")
+    few = restricted(planned, kept)
+    for scan in range(0, len(planned.drive), 50):
+        assert few.visible.of(scan).tolist() == [m for m in planned.visible.of(scan).tolist() if kept[m]]
+    alone = plan_route(open_field([place for place, stays in zip(LINE, kept, strict=True) if stays]), "Line")
+    np.testing.assert_array_equal(predict_route(few).covariances, predict_route(alone).covariances)

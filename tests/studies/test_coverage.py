@@ -1,11 +1,13 @@
 """The coverage study: what it counts as floor, and what its summary says of it."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
+from commission.site.parameters import SupervisorParameters
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
@@ -75,9 +77,35 @@ def test_a_site_that_is_all_wall_has_no_shares():
     assert (entries["points"], entries["visible_mean"], entries["heading_sigma_p95_rad"]) == (0, None, None)
 
 
+def with_figures(found: CoverageResult, **figures: list[float]) -> CoverageResult:
+    """The same floor, of which the first points have other figures, and are all that counts as drivable."""
+    fixes, on = found.coverage.fixes, np.zeros(len(found.drivable), dtype=np.bool_)
+    changed = {}
+    for name, values in figures.items():
+        changed[name] = np.array(getattr(fixes, name), dtype=np.float64)
+        changed[name][: len(values)] = values
+        on[: len(values)] = True
+    return replace(found, coverage=replace(found.coverage, fixes=fixes._replace(**changed)), drivable=on)
+
+
 def test_two_sigma_of_position_and_of_heading_are_held_against_the_limits():
-    project = hall()
-    found = covered(project, 0.5).coverage
-    limits = project.parameters.supervisor
-    expected = (2.0 * found.fixes.position_sigma <= 0.1) & (2.0 * found.fixes.heading_sigma <= math.radians(3.0))
-    assert (within_limits(found, limits) == expected).all()
+    # Limits of 100 mm and 3 degrees: half of each, a hair more and a hair less.
+    position = [0.05, 0.0501, 0.0499, 0.01, 0.01, 0.06, math.inf]
+    heading = np.radians([0.1, 0.1, 1.5, 1.501, 1.499, 1.6, 0.1]).tolist()
+    found = with_figures(covered(hall(), 0.5), position_sigma=position, heading_sigma=heading)
+    limits = SupervisorParameters(position_limit=0.1, heading_limit=math.radians(3.0) + 1e-12)
+    expected = [True, False, True, False, True, False, False]
+    assert within_limits(found.coverage, limits)[:7].tolist() == expected
+    entries = summary(found, limits)
+    assert entries["share_within_limits"] == pytest.approx(3 / 7)
+    assert entries["share_with_fix"] == pytest.approx(6 / 7)
+
+
+def test_quantiles_are_those_of_the_drivable_floor_and_none_where_they_have_no_fix():
+    tenths = [0.01 * n for n in range(1, 21)]
+    found = with_figures(covered(hall(), 0.5), position_sigma=tenths, heading_sigma=[*tenths[:18], math.inf, math.inf])
+    entries = summary(found, SupervisorParameters())
+    # The value that half (19 of 20) do not exceed, of 10, 20, ... 200 mm.
+    assert (entries["position_sigma_median_m"], entries["position_sigma_p95_m"]) == pytest.approx((0.11, 0.2))
+    assert entries["heading_sigma_median_rad"] == pytest.approx(0.11)
+    assert entries["heading_sigma_p95_rad"] is None

@@ -99,6 +99,19 @@ def test_statistics_of_a_run_worked_out_by_hand():
     assert found.wrong_while_operational == 1
 
 
+@pytest.mark.parametrize(("distance", "wrong"), [(0.0999, 0), (0.1, 0), (0.1001, 1), (0.19, 1), (0.21, 1)])
+def test_wrong_while_operational_are_errors_beyond_the_limit_that_nobody_is_warned_of(distance, wrong):
+    errors = np.array([[distance, 0.0, 0.0], [0.0, -distance, 0.0], [0.0, 0.0, 3.0]])
+    operational = np.array([True, False, True])
+    found = metrics.error_statistics(errors, identity_covariances(3), operational, 0.1)
+    assert found is not None
+    assert found.wrong_while_operational == wrong
+    # The first limit holds the second cycle, which is in fail mode, and not the first.
+    along = metrics.error_statistics(errors, identity_covariances(3), ~operational, np.array([9.0, 0.1, 9.0]))
+    assert along is not None
+    assert along.wrong_while_operational == wrong
+
+
 def test_a_run_without_any_reference_has_no_statistics():
     nothing = np.full((3, 3), math.nan)
     assert metrics.error_statistics(nothing, identity_covariances(3), np.ones(3, bool), 0.1) is None

@@ -105,7 +105,18 @@ def environment(tree: Path) -> dict[str, str]:
 
 def ran(tree: Path, tests: Iterable[str]) -> tuple[int, str]:
     """Exit code and output of pytest over some tests of a tree."""
-    command = [sys.executable, "-m", "pytest", "-q", "-rfE", "-p", "no:cacheprovider", "--tb=line", *tests]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-rfE",
+        "-p",
+        "no:cacheprovider",
+        "--tb=line",
+        "--hypothesis-seed=0",
+        *tests,
+    ]
     try:
         done = subprocess.run(
             command, cwd=tree, env=environment(tree), capture_output=True, text=True, timeout=LONGEST, check=False

@@ -115,6 +115,16 @@ def test_the_handle_moves_the_selection_by_as_much_as_itself(state: AppState) ->
     assert (reflector(moved.state, "R1").x, reflector(moved.state, "R1").y) == pytest.approx(now)
 
 
+def test_the_handle_stands_in_the_middle_of_what_moves_with_it(state: AppState) -> None:
+    # Of R1 (0.25, 2), R2 (0.25, 6.5) and R3 (11.75, 1.5) the second is locked: the middle of the others is (6, 1.75).
+    locked = after(state, click(0.25, 6.5), actions.SetSelected("locked", True)).state
+    three = after(locked, click(0.25, 2.0), click(0.25, 6.5, add=True), click(11.75, 1.5, add=True)).state
+    assert editor(three).selected == ("R1", "R2", "R3")
+    moved = after(three, actions.DragSelection("start", (6.0, 1.75)), actions.DragSelection("end", (6.5, 2.5))).state
+    places = [(r.x, r.y) for r in moved.project.reflectors.reflectors]
+    assert places == [pytest.approx(p) for p in ((0.75, 2.75), (0.25, 6.5), (12.25, 2.25), (11.75, 5.5))]
+
+
 def test_what_is_locked_stays_and_the_page_says_so(state: AppState) -> None:
     locked = after(state, click(0.25, 2.0), actions.SetSelected("locked", True)).state
     result = after(locked, actions.DeleteSelected())

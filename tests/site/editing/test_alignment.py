@@ -72,6 +72,16 @@ def test_the_map_alone_moves_when_the_rest_is_in_plant_coordinates_already() -> 
     assert replace(after, floor_map=before.floor_map) == before
 
 
+def test_a_map_whose_origin_is_turned_already_is_turned_on_from_there() -> None:
+    before = site()
+    assert before.floor_map is not None
+    lying = replace(before, floor_map=replace(before.floor_map, origin=np.array([3.0, -2.0, 0.5])))
+    after = aligned(lying, TURNED, everything=False)
+    assert after.floor_map is not None
+    # A quarter turn takes (3, -2) to (2, 3).
+    np.testing.assert_allclose(after.floor_map.origin, (102.0, 53.0, 0.5 + math.pi / 2))
+
+
 def test_everything_that_was_placed_on_the_map_goes_with_it() -> None:
     before = site()
     after = aligned(before, TURNED, everything=True)

@@ -107,6 +107,26 @@ def test_a_mirrored_plate_faces_the_mirrored_way():
     assert math.degrees(mirrored.heading) == pytest.approx(150)
 
 
+def test_a_plate_that_is_turned_about_a_pivot_moves_and_faces_the_turned_way():
+    plate = Reflector(id="P", x=3.0, y=1.0, kind=ReflectorKind.FLAT, heading=math.radians(170))
+    post = Reflector(id="C", x=1.0, y=2.0, heading=0.5)
+    turned = edits.turn(ReflectorMap((plate, post)), ["P", "C"], (1.0, 1.0), math.radians(90)).reflectors
+    assert [(r.x, r.y) for r in turned] == [pytest.approx((1.0, 3.0)), pytest.approx((0.0, 1.0))]
+    # 260 degrees, wrapped; a post faces everywhere.
+    assert (math.degrees(turned[0].heading), turned[1].heading) == (pytest.approx(-100), 0.5)
+
+
+def test_an_array_has_each_copy_one_step_from_the_one_before_and_none_is_locked():
+    two = (Reflector(id="R1", x=1.0, y=2.0, locked=True), Reflector(id="R2", x=4.0, y=2.0))
+    added = edits.repeat(ReflectorMap(two), ["R1", "R2"], (0.5, -1.0), 3)
+    placed = [(r.id, r.x, r.y, r.locked) for r in added.reflectors.reflectors[2:]]
+    assert placed == [
+        *(("R3", 1.5, 1.0, False), ("R4", 4.5, 1.0, False), ("R5", 2.0, 0.0, False)),
+        *(("R6", 5.0, 0.0, False), ("R7", 2.5, -1.0, False), ("R8", 5.5, -1.0, False)),
+    ]
+    assert added.reflectors.reflectors[0].locked
+
+
 def test_a_mirrored_copy_leaves_the_original():
     added = edits.duplicate_mirrored(ReflectorMap((Reflector(id="R1", x=1.0, y=2.0),)), ["R1"], edits.Axis(0, 0, 0))
     assert [(r.id, r.x, r.y) for r in added.reflectors.reflectors] == [("R1", 1.0, 2.0), ("R2", 1.0, -2.0)]

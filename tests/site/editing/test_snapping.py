@@ -114,6 +114,12 @@ def test_a_point_lines_up_with_the_nearest_row_and_column():
     assert snapping.align(ReflectorMap(), (1.0, 2.0), 0.1) == snapping.Alignment(1.0, 2.0, None, None)
 
 
+def test_a_row_attracts_up_to_its_reach_and_not_beyond():
+    others = ReflectorMap((Reflector(id="A", x=1.0, y=5.0),))
+    assert snapping.align(others, (1.25, 0.0), 0.25).x_of == "A"
+    assert snapping.align(others, (1.25001, 0.0), 0.25).x_of is None
+
+
 def test_a_reach_or_spacing_of_nothing_is_refused():
     with pytest.raises(UsageError, match="reach is 0 m"):
         snapping.nearest_wall(half_plane(0.0), (5.0, 5.0), 0.0)

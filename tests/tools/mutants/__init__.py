@@ -1,8 +1,13 @@
 """The deliberate faults, one module per room: each is a kind that tests have missed before, or might."""
 
+from tests.tools.mutants.app import APP
+from tests.tools.mutants.geometry import GEOMETRY
 from tests.tools.mutants.localization import LOCALIZATION
 from tests.tools.mutants.mutant import Mutant
+from tests.tools.mutants.planning import PLANNING
+from tests.tools.mutants.site import SITE
+from tests.tools.mutants.studies import STUDIES
 
-MUTANTS: tuple[Mutant, ...] = (*LOCALIZATION,)
+MUTANTS: tuple[Mutant, ...] = (*GEOMETRY, *SITE, *LOCALIZATION, *PLANNING, *STUDIES, *APP)
 
 __all__ = ["MUTANTS", "Mutant"]

@@ -1,0 +1,98 @@
+"""Faults of the studies: twice a limit, half a sigma, the wrong cycles, what a figure is the mean of."""
+
+from tests.tools.mutants.mutant import Mutant
+
+FOLDER, TESTS = "commission/studies/", "tests/studies/"
+
+STUDIES = (
+    Mutant(
+        name="wrong while operational only beyond twice the limit",
+        file=FOLDER + "metrics.py",
+        find="operational & (distance > position_limit)",
+        replace="operational & (distance > 2.0 * position_limit)",
+        tests=(
+            TESTS
+            + "test_metrics.py::test_wrong_while_operational_are_errors_beyond_the_limit_that_nobody_is_warned_of",
+            TESTS + "test_run.py::test_from_here_on_another_limit_decides_what_is_wrong_while_operational",
+        ),
+    ),
+    Mutant(
+        name="wrong while operational counted in fail mode",
+        file=FOLDER + "metrics.py",
+        find="operational & (distance > position_limit)",
+        replace="~operational & (distance > position_limit)",
+        tests=(
+            TESTS
+            + "test_metrics.py::test_wrong_while_operational_are_errors_beyond_the_limit_that_nobody_is_warned_of",
+        ),
+    ),
+    Mutant(
+        name="wrong while operational at the limit itself",
+        file=FOLDER + "metrics.py",
+        find="operational & (distance > position_limit)",
+        replace="operational & (distance >= position_limit)",
+        tests=(
+            TESTS
+            + "test_metrics.py::test_wrong_while_operational_are_errors_beyond_the_limit_that_nobody_is_warned_of",
+        ),
+    ),
+    Mutant(
+        name="wrong while operational by the limit of the heading",
+        file=FOLDER + "run.py",
+        find="limits_along(columns)[:, 0]",
+        replace="limits_along(columns)[:, 1]",
+        tests=(TESTS + "test_run.py::test_from_here_on_another_limit_decides_what_is_wrong_while_operational",),
+    ),
+    Mutant(
+        name="error is reference minus estimate",
+        file=FOLDER + "metrics.py",
+        find="errors = means - references",
+        replace="errors = references - means",
+        tests=(TESTS + "test_metrics.py::test_heading_error_is_the_short_turn",),
+    ),
+    Mutant(
+        name="ANEES of the position over three degrees of freedom",
+        file=FOLDER + "metrics.py",
+        find="_mean_of_known(position_nees) / 2.0",
+        replace="_mean_of_known(position_nees) / 3.0",
+        tests=(TESTS + "test_metrics.py::test_statistics_of_a_run_worked_out_by_hand",),
+    ),
+    Mutant(
+        name="2-sigma of a run is one",
+        file=FOLDER + "run.py",
+        find="return 2.0 * np.sqrt",
+        replace="return 1.0 * np.sqrt",
+        tests=(TESTS + "test_run.py::test_every_curve_has_the_numbers_of_its_cycles",),
+    ),
+    Mutant(
+        name="largest NIS counts what the gate rejects",
+        file=FOLDER + "run.py",
+        find="np.where(columns.status == Status.INLIER, columns.d2, -math.inf)",
+        replace="np.where(np.isfinite(columns.d2), columns.d2, -math.inf)",
+        tests=(
+            TESTS + "test_run.py::test_every_curve_has_the_numbers_of_its_cycles",
+            TESTS + "test_run.py::test_the_largest_nis_of_a_cycle_is_that_of_its_inliers_alone",
+        ),
+    ),
+    Mutant(
+        name="one sigma of the position within the limits",
+        file=FOLDER + "coverage.py",
+        find="2.0 * found.fixes.position_sigma",
+        replace="1.0 * found.fixes.position_sigma",
+        tests=(TESTS + "test_coverage.py::test_two_sigma_of_position_and_of_heading_are_held_against_the_limits",),
+    ),
+    Mutant(
+        name="one sigma of the heading within the limits",
+        file=FOLDER + "coverage.py",
+        find="2.0 * found.fixes.heading_sigma",
+        replace="1.0 * found.fixes.heading_sigma",
+        tests=(TESTS + "test_coverage.py::test_two_sigma_of_position_and_of_heading_are_held_against_the_limits",),
+    ),
+    Mutant(
+        name="vehicle that starts in reverse looks ahead",
+        file=FOLDER + "start.py",
+        find="math.pi if segment.direction is Direction.REVERSE else 0.0",
+        replace="0.0",
+        tests=(TESTS + "test_start.py::test_a_route_that_starts_in_reverse_has_the_vehicle_face_backward",),
+    ),
+)
