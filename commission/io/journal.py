@@ -8,9 +8,9 @@ is begun anew with everything. What it gives back is the business of `journal_re
 
 from __future__ import annotations
 
-import os
 import threading
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -121,11 +121,11 @@ class Journal:
         return self._unprotected is None
 
     def save(self, project: Project, *, overwrite: bool = False) -> None:
-        """Save the project and remove the journal.
+        """Save the project and remove the journal, but for edits that come meanwhile: call it from any thread.
 
         Parameters
         ----------
-        project : what to save.
+        project : what to save: the project of the last `append`, or an earlier one.
         overwrite : whether files that somebody else has changed since they were read or saved are replaced.
 
         Raises
@@ -140,20 +140,22 @@ class Journal:
             raise ProjectError(
                 f"changed on disk by somebody else: {', '.join(foreign)}; expected as read or last saved"
             )
-        # Where there is no space for the journal there may be some for the project, which then is safe.
-        with suppress(FileFormatError):
-            self.append(project, "Save")
         with self._lock:
-            if self._file is not None:
-                # A save that is killed halfway leaves files of two states; the mark says that they are our own.
-                with suppress(FileFormatError):
-                    self._file.append({"saving": True})
-                self._file.sync()
+            self._mark_saving()
+            bring_to_disk = self._syncing()
+        bring_to_disk()
+        try:
             save_project(project, self._folder)
-            self._on_disk = Fingerprint.of(self._folder)
-            self._saved = self._journaled = project
+        except FileFormatError:
+            with self._lock, suppress(FileFormatError):
+                if self._file is not None:
+                    self._file.append({"saving": False})
+            raise
+        on_disk = Fingerprint.of(self._folder)
+        with self._lock:
+            self._on_disk, self._saved = on_disk, project
             self._folder_was_there = True
-            self._remove()
+            self._begin_after_save(project)
 
     def foreign_changes(self) -> tuple[str, ...]:
         """Files that somebody else has changed since they were read or last saved."""
@@ -173,6 +175,32 @@ class Journal:
             self._syncer.join()
         with self._lock:
             self._close_file()
+
+    def _mark_saving(self) -> None:
+        """Write down that a save begins: where it is killed halfway, files of two states are our own.
+
+        What is to be saved must be in the journal then. Where that has no space there may be some for the project.
+        """
+        with suppress(FileFormatError):
+            self._see_to_file()
+            if self._file is None:
+                self._needs_all = True
+                self._write_down(*(self._unprotected or (self._journaled, "Save")))
+            if self._file is not None:
+                self._file.append({"saving": True})
+
+    def _begin_after_save(self, project: Project) -> None:
+        """Remove the journal of what is saved; edits that came meanwhile begin the next one."""
+        if self._unprotected is None and self._journaled == project:
+            self._remove()
+            return
+        later = self._unprotected or (self._journaled, "edits while it was saved")
+        self._close_file()
+        self.path = self._folder / FILE_NAME
+        self._journaled, self._has_map, self._needs_all = project, False, False
+        self._unprotected = later
+        with suppress(FileFormatError):
+            self._write_down(*later)
 
     def _write_down(self, project: Project, what: str) -> None:
         """Append an edit, or begin a file with it; the lock is held."""
@@ -247,12 +275,13 @@ class Journal:
             self._unsynced.wait()
             self._unsynced.clear()
             with self._lock:
-                descriptor = None if self._file is None else os.dup(self._file.descriptor)
-            if descriptor is not None:
-                with suppress(OSError):
-                    os.fsync(descriptor)
-                os.close(descriptor)
+                bring_to_disk = self._syncing()
+            bring_to_disk()
             self._closed.wait(0.5 * SYNC_INTERVAL_S)
+
+    def _syncing(self) -> Callable[[], None]:
+        """Return what brings the file to the disk, to be called without the lock."""
+        return (lambda: None) if self._file is None else self._file.syncing()
 
     def _remove(self) -> None:
         """Remove the file, as its edits are saved or not wanted; the lock is held."""
@@ -268,7 +297,7 @@ class Journal:
         if self._file is not None:
             if self._file.problem() != CHANGED:
                 self._replaceable.add(FileId.of(self._file.descriptor))
-            self._file.sync()
+            self._file.syncing()()
             self._file.close()
             self._file = None
 

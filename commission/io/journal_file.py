@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -43,14 +43,16 @@ class JournalFile:
             raise not_protected(path, error) from error
         try:
             self.append(*entries)
-            os.fsync(self.descriptor)
+            if os.path.lexists(path):
+                # What is replaced may be all there is of a crashed session; else the first edit need not wait for it.
+                os.fsync(self.descriptor)
             beginning.replace(path)
         except (OSError, FileFormatError) as error:
             self.close()
             with suppress(OSError):
                 beginning.unlink()
             raise not_protected(path, error) from error
-        sync_folder(path.parent)
+        self._is_new = True
 
     def append(self, *entries: dict[str, Any]) -> None:
         """Write lines in one call of the system, all of them or (on a full disk) none; raises FileFormatError."""
@@ -76,10 +78,22 @@ class JournalFile:
             return "was replaced by somebody else"
         return "" if os.fstat(self.descriptor).st_size == self._size else CHANGED
 
-    def sync(self) -> None:
-        """Bring it to the disk, where the disk takes it."""
-        with suppress(OSError):
-            os.fsync(self.descriptor)
+    def syncing(self) -> Callable[[], None]:
+        """Return what brings all that is written until now to the disk; it may take long, and outlive the file."""
+        try:
+            descriptor, is_new = os.dup(self.descriptor), self._is_new
+        except OSError:
+            return lambda: None
+        self._is_new = False
+
+        def bring_to_disk() -> None:
+            with suppress(OSError):
+                os.fsync(descriptor)
+            os.close(descriptor)
+            if is_new:
+                sync_folder(self._path.parent)
+
+        return bring_to_disk
 
     def close(self) -> None:
         """Let go of it."""
@@ -88,7 +102,6 @@ class JournalFile:
     def remove(self) -> None:
         """Let go of it and remove it, unless its name has come to stand for another file."""
         is_ours = "replaced" not in self.problem()
-        self.sync()
         self.close()
         if is_ours:
             self._path.unlink(missing_ok=True)

@@ -20,6 +20,7 @@ from commission.io.journal_lines import FORMAT, OLDEST_FORMAT, Lines, Place, ent
 from commission.io.journal_place import FILE_NAME, FileId, rescue_folder
 from commission.io.project_parts import apply
 from commission.io.reading import cannot_read, check_size
+from commission.site.fields import in_file
 from commission.site.project import Project
 
 SIZE_LIMIT = 2_000_000_000
@@ -195,7 +196,7 @@ class _Replay:
                 if self._is_foreign_version():
                     return
                 self._digests = tuple((str(name), str(digest)) for name, digest in entry["on_disk"])
-            self._saving = "saving" in entry
+            self._saving = bool(entry.get("saving", self._saving))
             if "change" in entry and self._make(entry["change"], place.number) and "what" in entry:
                 self._what, self._at = str(entry["what"]), datetime.fromtimestamp(float(entry["at"]))
                 self._edits += bool(entry["change"])
@@ -219,7 +220,7 @@ class _Replay:
     @property
     def is_saved(self) -> bool:
         """Whether the project's files hold all of it: killed when all was saved, but for removing the journal."""
-        return self._saving and self._project == self._loaded
+        return self._saving and self._loaded in (self._project, in_file(self._project))
 
     @property
     def damage(self) -> str:

@@ -37,6 +37,8 @@ class Lane(StrEnum):
     """Milliseconds: what follows every edit."""
     FILES = "files"
     """A file that somebody has just sent, or asked for."""
+    SAVING = "saving"
+    """The project's own files: they wait for nothing else."""
     USUAL = "usual"
     """Seconds."""
     PATIENT = "patient"

@@ -30,5 +30,15 @@ class ReadProject(Effect):
 
 
 @dataclass(frozen=True, slots=True)
+class KeepProjectIn(Effect):
+    """Keep the project where a copy of it was written, from now on."""
+
+    project: Project
+    """What was written."""
+    folder: Path
+    """Where to."""
+
+
+@dataclass(frozen=True, slots=True)
 class TakeProjectOver(Effect):
     """Take the project from whoever edits it elsewhere."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import time
+from contextlib import suppress
 from pathlib import Path
 
 from commission.app.base import actions
@@ -22,9 +23,10 @@ from commission.app.project.actions import (
     Reloaded,
     Restored,
 )
-from commission.app.project.effects import ReadProject, TakeProjectOver, WriteProject
+from commission.app.project.effects import KeepProjectIn, ReadProject, TakeProjectOver, WriteProject
 from commission.app.project.state import FilesState
-from commission.errors import CommissionError, ProjectError, UsageError
+from commission.app.project.writer import Writer
+from commission.errors import CommissionError, FileFormatError, ProjectError, UsageError
 from commission.io.journal import Journal, remove_leftovers
 from commission.io.journal_replay import Restored as FromJournal
 from commission.io.journal_replay import restore
@@ -39,12 +41,14 @@ log = logging.getLogger(__name__)
 OWN_PREFIX = ".commission."
 LOOK_AT_DISK_S = 1.0
 """Time between two looks at the project's folder [s]."""
+WRITTEN_WITHIN_S = 5.0
+"""Longest time that is left to a save which is under way, when the program ends or the files are read again [s]."""
 
 
 class ProjectFolder(Service):
     """The files of the project that is being edited, or only shown while somebody else edits it."""
 
-    effects = (WriteProject, ReadProject, TakeProjectOver)
+    effects = (WriteProject, ReadProject, TakeProjectOver, KeepProjectIn)
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -58,6 +62,7 @@ class ProjectFolder(Service):
                 self._restored = self._edit(self._folder, context.state.project)
         self._listing = _listing(self._folder)
         self._looked_at = context.clock()
+        self._writer = Writer(context)
 
     def start(self) -> None:
         """Say who edits the project; make the edits again that a killed program left in the journal."""
@@ -82,6 +87,8 @@ class ProjectFolder(Service):
                 is_own = state.folder is not None and os.path.abspath(folder) == os.path.abspath(state.folder)
                 folder = folder if is_own else state.reach.checked(folder, sender)
                 self.save(project, folder, overwrite=overwrite, sender=sender)
+            case KeepProjectIn(project, folder):
+                self._keep_in(folder, project, state.project)
             case ReadProject(folder):
                 self.context.post(Envelope(Reloaded(self.load(folder)), sender))
             case TakeProjectOver() if self._lock is not None:
@@ -108,7 +115,8 @@ class ProjectFolder(Service):
         """
         if self._lock is None:
             return
-        hold = self._lock.look()
+        # Whoever takes over waits until what is being written is complete: the lock is let go of by looking at it.
+        hold = Hold.OURS if self._writer.is_busy else self._lock.look()
         if hold is Hold.THEIRS:
             self._lose()
         if self._journal is None:
@@ -121,28 +129,35 @@ class ProjectFolder(Service):
                 self._lock.look()
 
     def save(self, project: Project, folder: Path, *, overwrite: bool, sender: Sender) -> None:
-        """Write a project; from then on it is kept in that folder. Ask before another project is replaced.
+        """Write a project in the background: edits are journaled meanwhile. What came of it is posted.
 
         Raises
         ------
         ProjectError
-            somebody else has changed the files and `overwrite` is False, or has taken the project over.
+            somebody else has taken the project over.
         UsageError
-            the folder cannot be that of a copy.
-        FileFormatError
-            a file cannot be written.
+            the project is edited elsewhere.
         """
-        if self._folder is not None and os.path.abspath(folder) == os.path.abspath(self._folder):
-            folder = self._folder
-            self._save_here(project, overwrite=overwrite)
-        else:
-            found = project_in(folder)
-            if found and not overwrite:
-                self.context.post(Envelope(AskToReplace(folder, found), sender))
-                return
-            self._save_copy(project, folder, overwrite=overwrite)
-        self._listing = _listing(folder)
-        self.context.post(Envelope(ProjectSaved(project, folder, time.strftime("%H:%M")), sender))
+        journal = self._journal
+        if self._folder is None or os.path.abspath(folder) != os.path.abspath(self._folder):
+            self._writer.put(lambda: _copied(project, folder, overwrite=overwrite), sender)
+            return
+        if journal is None or self._lock is None:
+            raise UsageError("the project is edited elsewhere; expected another folder to save a copy in")
+        if not self._writer.is_busy and self._lock.look() is Hold.THEIRS:
+            self._lose()
+            raise ProjectError(f"not saved: {self._lock.holder} has taken the project over")
+        place = self._folder
+
+        def write() -> list[Action]:
+            journal.save(project, overwrite=overwrite)
+            return [ProjectSaved(project, place, time.strftime("%H:%M"))]
+
+        self._writer.put(write, sender)
+
+    def wait(self, seconds: float = WRITTEN_WITHIN_S) -> None:
+        """Wait until all is written that was asked for, at most so long [s]."""
+        self._writer.wait(seconds)
 
     def load(self, folder: Path) -> Project:
         """Read the project from its files again; the journal of what was edited until now ends.
@@ -152,6 +167,7 @@ class ProjectFolder(Service):
         FileFormatError
             a file cannot be read.
         """
+        self.wait()
         project = load_project(folder)
         if self._journal is not None:
             self._journal.discard()
@@ -170,14 +186,18 @@ class ProjectFolder(Service):
 
     def close(self) -> None:
         """Bring the journal to the disk; it stays for the next start when something is unsaved."""
+        self.wait()
         if self._journal is not None:
             self._journal.close()
         if self._lock is not None:
             self._lock.release()
 
     def _look(self, state: AppState) -> None:
-        """Find out who edits the project, look after the journal, and see what others have changed."""
-        if self._lock is None or self._folder is None:
+        """Find out who edits the project, look after the journal, and see what others have changed.
+
+        While files are written, they are neither ours nor those of somebody else, and the lock is not let go of.
+        """
+        if self._lock is None or self._folder is None or self._writer.is_busy:
             return
         hold = self._lock.look()
         if self._journal is not None:
@@ -244,28 +264,19 @@ class ProjectFolder(Service):
             self._listing = _listing(self._folder)
             self._tell_holder(was_ours=True)
 
-    def _save_here(self, project: Project, *, overwrite: bool) -> None:
-        if self._lock is None or self._journal is None:
-            raise UsageError("the project is edited elsewhere; expected another folder to save a copy in")
-        if self._lock.look() is Hold.THEIRS:
-            self._lose()
-            raise ProjectError(f"not saved: {self._lock.holder} has taken the project over")
-        self._journal.save(project, overwrite=overwrite)
-        self._lock.look()
-
-    def _save_copy(self, project: Project, folder: Path, *, overwrite: bool) -> None:
-        """Write a copy; where that succeeds, let go of the folder until now."""
-        kept = save_copy(project, folder, force=overwrite)
-        if kept is not None:
-            self.context.post(Report(f"unsaved edits of the project that was there are kept in {kept}", failed=False))
+    def _keep_in(self, folder: Path, saved: Project, now: Project) -> None:
+        """Keep the project where a copy of it was written, and let go of the folder until now."""
+        lock, journal = ProjectLock(folder), Journal(folder, saved)
+        lock.look()
+        with suppress(FileFormatError):
+            journal.append(now, "edits while it was saved")
         if self._journal is not None:
             self._journal.discard()
             self._journal.close()
         if self._lock is not None:
             self._lock.release()
-        self._folder, self._lock = folder, ProjectLock(folder)
-        self._lock.look()
-        self._journal = Journal(folder, project)
+        self._folder, self._lock, self._journal = folder, lock, journal
+        self._listing = _listing(folder)
 
     def _tell_holder(self, *, was_ours: bool) -> None:
         if self._lock is not None and self._lock.holder is not None:
@@ -279,6 +290,17 @@ class ProjectFolder(Service):
             self.context.post(Restored(restored.project, restored.summary(), restored.foreign_changes))
         elif restored is not None:
             self.context.post(Report(restored.summary()))
+
+
+def _copied(project: Project, folder: Path, *, overwrite: bool) -> list[Action]:
+    """Write a copy, or ask before another project is replaced; returns what came of it."""
+    found = project_in(folder)
+    if found and not overwrite:
+        return [AskToReplace(folder, found)]
+    kept = save_copy(project, folder, force=overwrite)
+    aside = f"unsaved edits of the project that was there are kept in {kept}"
+    told: list[Action] = [] if kept is None else [Report(aside, failed=False)]
+    return [*told, ProjectSaved(project, folder, time.strftime("%H:%M"))]
 
 
 def _listing(folder: Path | None) -> frozenset[tuple[str, int, int]]:

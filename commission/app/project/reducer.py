@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from commission.app.base.actions import Sender
-from commission.app.base.effects import Tell
+from commission.app.base.effects import Effect, Tell
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited, refuse_read_only
 from commission.app.project import actions
-from commission.app.project.effects import ReadProject, TakeProjectOver, WriteProject
+from commission.app.project.effects import KeepProjectIn, ReadProject, TakeProjectOver, WriteProject
 from commission.app.project.state import FilesState
 from commission.errors import UsageError
 
@@ -39,9 +39,11 @@ def save(action: actions.Save, state: AppState, _sender: Sender) -> Outcome:
 @reduce.register
 def project_saved(action: actions.ProjectSaved, state: AppState, _sender: Sender) -> Outcome:
     """From now on the project is kept where it was written."""
+    is_elsewhere = action.folder != state.folder
     saved = replace(state, saved=action.project, folder=action.folder, read_only="", last_edit=None, greeting="")
+    keep: tuple[Effect, ...] = (KeepProjectIn(action.project, action.folder),) if is_elsewhere else ()
     told = Tell(f"saved in {action.folder}", failed=False, everywhere=True)
-    return Outcome(saved.with_part(FilesState(action.time_of_day)), (told,))
+    return Outcome(saved.with_part(FilesState(action.time_of_day)), (*keep, told))
 
 
 @reduce.register

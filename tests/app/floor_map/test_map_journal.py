@@ -16,6 +16,7 @@ from commission.app.floor_map.draft import MapFile
 from commission.app.project.project_folder import ProjectFolder
 from commission.io.journal_replay import restore
 from commission.io.project_file import load_project, open_project
+from commission.site.fields import in_file
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from tests.app.asking import after, joined
 from tests.app.owning import Owner
@@ -73,6 +74,7 @@ def test_every_edit_of_the_map_survives_a_crash_before_the_first_save(tmp_path: 
     # One whole map, and rectangles of it.
     assert (folder / ".commission.journal").stat().st_size < 20_000
     files.save(state.project, folder, overwrite=False, sender=PROGRAM)
-    assert load_project(folder) == state.project
+    files.wait(60.0)
+    assert load_project(folder) == in_file(state.project)
     assert restore(folder, load_project(folder)) is None
     files.close()
