@@ -23,10 +23,10 @@ from commission.app.base.jobs import JobReport, Jobs, JobState
 from commission.app.base.service import Context
 from commission.app.base.state import AppState
 from commission.app.editing import actions as editing
-from commission.app.editing.editor import Tool
-from commission.app.floor_map.actions import FinishShape, MapOpened
+from commission.app.floor_map.actions import MapOpened
 from commission.app.floor_map.draft import MapDraft, MapFile
 from commission.app.floor_map.effects import DrawMap, ReadMapFile, StopMapWork
+from commission.app.floor_map.tools import EraseTool, WallTool
 from commission.app.floor_map.work import MapService
 from commission.geometry import rasterize
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
@@ -61,17 +61,17 @@ def edit() -> bool:
 
         def wall(reach: float) -> Callable[[], float]:
             def draw() -> float:
-                done(editing.ChooseTool(Tool.WALL))
+                done(editing.ChooseTool(WallTool()))
                 start = rng.uniform((20, 20), (180, 80))
                 points = start + np.array([(0.0, 0.0), (reach, 0.2 * reach), (reach, 0.4 * reach)])
                 points = np.clip(points, 1.0, (199.0, 99.0))
                 clicks = [ClickFloor((float(x), float(y)), REACH) for x, y in points]
-                return done(*clicks, FinishShape())
+                return done(*clicks, editing.Finish())
 
             return draw
 
         def erase() -> float:
-            done(editing.ChooseTool(Tool.ERASE))
+            done(editing.ChooseTool(EraseTool()))
             x, y = (float(value) for value in rng.uniform((5, 5), (170, 70)))
             area = ((x, y), (x + 25.0, y + 20.0))
             return done(*(DragFloor(phase, *area, REACH) for phase in ("start", "end")))

@@ -20,7 +20,8 @@ from playwright.sync_api import sync_playwright
 from websockets.exceptions import ConnectionClosed
 
 from commission.app.base.server import start_server
-from commission.app.editing.editor import Tool, editor_of
+from commission.app.editing.editor import editor_of
+from commission.app.editing.site_tools import PlaceTool
 from commission.app.launch import open_page
 from commission.io.project_file import load_project, save_project
 from tests.app.raw_client import RawClient
@@ -69,8 +70,8 @@ def main() -> int:
         one, other = (OpenPage(browser, server, SMALL) for browser in browsers)
         client = one.open(nodes=("/floor/map",)).client_id
         other.open(nodes=("/floor/map",))
-        one.press(Tool.PLACE.value)
-        while editor_of(runtime.state, client).tool is not Tool.PLACE or len(runtime.state.browsers) < 2:
+        one.press(PlaceTool().value)
+        while editor_of(runtime.state, client).tool is not PlaceTool() or len(runtime.state.browsers) < 2:
             time.sleep(0.05)
         listener = Listener(server)
         to_server: list[float] = []

@@ -16,7 +16,7 @@ import numpy as np
 from commission.app.base import actions
 from commission.app.base.actions import ClickFloor, DragFloor
 from commission.app.editing import actions as editing
-from commission.app.editing.editor import Tool
+from commission.app.editing.site_tools import PlaceTool
 from commission.site.editing import reflectors as edits
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.project import Project
@@ -52,9 +52,9 @@ def main() -> None:
             return done(DragFloor("start", start, start, REACH), DragFloor("end", start, end, REACH))
 
         def place() -> float:
-            done(editing.ChooseTool(Tool.PLACE))
+            done(editing.ChooseTool(PlaceTool()))
             spent = done(ClickFloor((50.0, 0.5), REACH))
-            done(editing.ChooseTool(Tool.SELECT))
+            done(editing.ChooseTool(None))
             return spent
 
         gestures: dict[str, Callable[[], float]] = {

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from commission.app.editing.editor import Tool
+from commission.app.editing.tool import Tool
+from commission.app.floor_map.align_tool import AlignTool, NamedPoint
 from commission.app.floor_map.draft import MapLoading
+from commission.app.floor_map.tools import WallTool
 from commission.io.map_server import read_floor_map, write_floor_map
 from commission.io.project_file import load_project, open_project
 from commission.site.floor_map import OCCUPIED, FloorMap
@@ -43,8 +45,14 @@ def site(tmp_path: Path) -> Iterator[NewSite]:
 
 
 def choose(site: NewSite, page: OpenPage, client: int, tool: Tool) -> None:
-    page.press(tool.value)
-    site.until(lambda: site.editor(client).tool is tool)
+    page.press(tool.name)
+    site.until(lambda: site.editor(client).tool == tool)
+
+
+def known(site: NewSite, client: int) -> tuple[NamedPoint, ...]:
+    """Return the points to align by."""
+    tool = site.editor(client).tool
+    return tool.known if isinstance(tool, AlignTool) else ()
 
 
 def click(site: NewSite, page: OpenPage, client: int, place: tuple[float, float], points: Callable[[], int]) -> None:
@@ -82,9 +90,9 @@ def test_a_real_map_is_loaded_into_an_empty_folder_drawn_on_saved_and_read_again
     page.press("Redo load floor map 3.yaml")
     site.until(lambda: site.state.project is loaded)
     page.wait_until_drawn(FLOOR)
-    choose(site, page, client, Tool.WALL)
+    choose(site, page, client, WallTool())
     for place in ((-10.0, 10.0), (0.0, 15.0), (6.0, 15.0)):
-        click(site, page, client, place, lambda: len(site.editor(client).draft))
+        click(site, page, client, place, lambda: len(site.editor(client).points))
     page.page.keyboard.press("Enter")
     site.until(lambda: site.state.undo[-1].name == "draw wall")
     assert site.floor_map.occupancy().is_occupied([(-5.0, 12.5), (3.0, 15.0)]).all()
@@ -157,10 +165,10 @@ def test_an_image_is_placed_by_clicks_and_the_map_moved_onto_the_plants_coordina
     assert site.floor_map.resolution == pytest.approx(0.1, rel=0.01)
     assert (site.floor_map.cells == OCCUPIED).sum() == (pixels == 0).sum()
     page.wait_until_drawn(FLOOR)
-    choose(site, page, client, Tool.ALIGN)
+    choose(site, page, client, AlignTool())
     for place in ((0.0, 0.0), (20.0, 0.0)):
-        click(site, page, client, place, lambda: len(site.editor(client).alignment.points))
-    points = site.editor(client).alignment.points
+        click(site, page, client, place, lambda: len(known(site, client)))
+    points = known(site, client)
     origin = site.floor_map.origin
     distance = points[1].at[0] - points[0].at[0]
     for label, place in (("A x, y [m]", (100.0, 50.0)), ("B x, y [m]", (100.0, 50.0 + distance))):
@@ -168,7 +176,7 @@ def test_an_image_is_placed_by_clicks_and_the_map_moved_onto_the_plants_coordina
             field.fill(f"{value:.3f}")
             field.press("Tab")
     plants = ((100.0, 50.0), (100.0, round(50.0 + distance, 3)))
-    site.until(lambda: tuple(p.plant for p in site.editor(client).alignment.points) == plants)
+    site.until(lambda: tuple(p.plant for p in known(site, client)) == plants)
     page.press("Move and turn")
     site.until(lambda: site.state.undo[-1].name == "align to A and B")
     (x, y), (dx, dy) = points[0].at, (origin[0] - points[0].at[0], origin[1] - points[0].at[1])

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commission.app.editing.editor import Tool
+from commission.app.editing.site_tools import PlaceTool, RouteTool
 from commission.app.run.actions import SetSpeed
 from commission.io.project_file import load_project
 from tests.browser.page import OpenPage
@@ -87,7 +87,7 @@ def choose_the_equipment(site: NewSite, page: OpenPage) -> None:
 
 
 def place_the_reflectors(site: NewSite, page: OpenPage, client: int) -> None:
-    choose(site, page, client, Tool.PLACE)
+    choose(site, page, client, PlaceTool())
     for place in NEAR_WALLS:
         click(site, page, client, place, lambda: len(site.state.project.reflectors))
     reflectors = site.state.project.reflectors
@@ -99,9 +99,9 @@ def place_the_reflectors(site: NewSite, page: OpenPage, client: int) -> None:
 
 
 def draw_the_route(site: NewSite, page: OpenPage, client: int) -> None:
-    choose(site, page, client, Tool.ROUTE)
+    choose(site, page, client, RouteTool())
     for place in AROUND:
-        click(site, page, client, place, lambda: len(site.editor(client).draft))
+        click(site, page, client, place, lambda: len(site.editor(client).points))
     page.press("Finish the route")
     site.until(lambda: len(site.state.project.routes) == 1)
 

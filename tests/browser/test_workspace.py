@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from commission.app.editing.editor import Tool
+from commission.app.editing.site_tools import MeasureTool, PlaceTool
+from commission.app.editing.tool import Tool
 from commission.io.project_file import load_project, save_project
 from tests.app.sites import room
 from tests.browser.page import OpenPage
@@ -39,14 +40,14 @@ def site(tmp_path: Path) -> Iterator[OpenSite]:
 
 
 def choose(site: OpenSite, page: OpenPage, client: int, tool: Tool) -> None:
-    page.press(tool.value)
-    site.until(lambda: site.editor(client).tool is tool)
+    page.press(tool.name)
+    site.until(lambda: site.editor(client).tool == tool)
 
 
 def test_reflectors_are_placed_dragged_undone_redone_and_saved(site: OpenSite, window: Callable[..., OpenPage]) -> None:
     page = window(site.server)
     client = page.open(nodes=NODES).client_id
-    choose(site, page, client, Tool.PLACE)
+    choose(site, page, client, PlaceTool())
     page.click_at((4.0, 0.3))
     site.until(lambda: len(site.centers) == 5)
     page.click_at((8.0, 7.6))
@@ -54,7 +55,7 @@ def test_reflectors_are_placed_dragged_undone_redone_and_saved(site: OpenSite, w
     # Both touch the wall that they were clicked near to; a click is good for a pixel or two.
     np.testing.assert_allclose(site.centers[4:, 1], [WALL + RADIUS, 8.0 - WALL - RADIUS], atol=1e-9)
     np.testing.assert_allclose(site.centers[4:, 0], [4.0, 8.0], atol=0.05)
-    choose(site, page, client, Tool.SELECT)
+    choose(site, page, client, None)
     placed = site.state.project
     page.drag(site.centers[5], (6.0, 5.0))
     site.until(lambda: site.state.project is not placed)
@@ -93,6 +94,6 @@ def test_typed_values_change_a_reflector_and_another_browser_sees_it(
     other.wait_for_text("Undo set radius of R1")
     page.click_at((6.0, 6.5))
     site.until(lambda: site.editor(client).selected == ())
-    choose(site, page, client, Tool.MEASURE)
+    choose(site, page, client, MeasureTool())
     page.page.keyboard.press("Escape")
-    site.until(lambda: site.editor(client).tool is Tool.SELECT)
+    site.until(lambda: site.editor(client).tool is None)

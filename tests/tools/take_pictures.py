@@ -20,9 +20,11 @@ from commission.app.ambiguity.service import AmbiguityService
 from commission.app.base.actions import Envelope, Sender
 from commission.app.coverage.service import CoverageService
 from commission.app.editing.actions import SelectReflectors
-from commission.app.editing.editor import Tool, editors_of
+from commission.app.editing.editor import editors_of
+from commission.app.editing.site_tools import MeasureTool, StationTool
 from commission.app.failures.actions import ShowFailure
 from commission.app.failures.service import FailureService
+from commission.app.floor_map.tools import ObstacleTool
 from commission.app.placement.actions import SetLayout
 from commission.app.placement.service import PlacementService
 from commission.app.prediction.service import PredictionService
@@ -107,12 +109,12 @@ def on_route(page: OpenPage, runtime: Runtime) -> None:
 
 def measured(page: OpenPage, runtime: Runtime) -> None:
     """A distance has been measured."""
-    page.press(Tool.MEASURE.value)
-    until(lambda: any(editor.tool is Tool.MEASURE for editor in editors_of(runtime.state)))
+    page.press(MeasureTool().value)
+    until(lambda: any(isinstance(editor.tool, MeasureTool) for editor in editors_of(runtime.state)))
     first, second = runtime.state.project.reflectors.reflectors[:2]
     for reflector in (first, second):
         page.click_at((reflector.x, reflector.y))
-    until(lambda: any(len(editor.measured) == 2 for editor in editors_of(runtime.state)))
+    until(lambda: any(len(editor.points) == 2 for editor in editors_of(runtime.state)))
 
 
 def heatmap(page: OpenPage, runtime: Runtime) -> None:
@@ -165,11 +167,11 @@ def files(page: OpenPage, _runtime: Runtime) -> None:
 
 def drawing(page: OpenPage, runtime: Runtime) -> None:
     """An obstacle is being drawn."""
-    page.press(Tool.OBSTACLE.value)
-    until(lambda: any(editor.tool is Tool.OBSTACLE for editor in editors_of(runtime.state)))
+    page.press(ObstacleTool().value)
+    until(lambda: any(isinstance(editor.tool, ObstacleTool) for editor in editors_of(runtime.state)))
     for count, place in enumerate(((9.0, 4.0), (11.0, 4.0), (10.0, 5.5)), start=1):
         page.click_at(place)
-        until(lambda count=count: any(len(editor.draft) == count for editor in editors_of(runtime.state)))
+        until(lambda count=count: any(len(editor.points) == count for editor in editors_of(runtime.state)))
 
 
 def failing(page: OpenPage, runtime: Runtime) -> None:
@@ -196,8 +198,8 @@ def equipment(page: OpenPage, _runtime: Runtime) -> None:
 
 def at_station(page: OpenPage, runtime: Runtime) -> None:
     """A station has been placed, and is selected."""
-    page.press(Tool.STATION.value)
-    until(lambda: any(editor.tool is Tool.STATION for editor in editors_of(runtime.state)))
+    page.press(StationTool().value)
+    until(lambda: any(isinstance(editor.tool, StationTool) for editor in editors_of(runtime.state)))
     page.click_at((9.0, 6.5))
     until(lambda: len(runtime.state.project.stations) == 1)
     page.page.locator(".c-fold").click()

@@ -10,7 +10,7 @@ from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState
 from commission.app.coverage.actions import ClearEllipses, ReadFloor, SetCoverage
 from commission.app.coverage.settings import NAME, CoverageSettings, shown_figure
-from commission.app.editing.editor import Tool, editor_of
+from commission.app.editing.editor import editor_of
 from commission.app.editing.gestures import reflector_at
 from commission.site.fields import with_field
 
@@ -31,7 +31,7 @@ def set_coverage(action: SetCoverage, state: AppState, _sender: Sender) -> Outco
 @reduce.register
 def read_floor(action: ReadFloor, state: AppState, sender: Sender) -> Outcome:
     """Read values where there is a heatmap; each click beside the reflectors leaves an ellipse."""
-    if editor_of(state, sender.browser).tool is not Tool.SELECT:
+    if editor_of(state, sender.browser).tool is not None:
         return Outcome(state)
     settings = state.part(CoverageSettings)
     if not shown_figure(state):

@@ -5,19 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from commission.app.base.actions import Action, Phase, Point
-from commission.app.editing.editor import ControlPoint, Snapping, Tool
+from commission.app.editing.editor import ControlPoint, Snapping
+from commission.app.editing.tool import Tool
 from commission.site.routes import Direction
 from commission.site.scanner import Scanner
 from commission.site.vehicle import Vehicle
-from commission.studies.problems import Problem
 
 
 @dataclass(frozen=True, slots=True)
 class ChooseTool(Action):
     """Change what a click does."""
 
-    tool: Tool
-    """What a click does from now on."""
+    tool: Tool | None
+    """What a click does from now on; none: it selects."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,11 +110,6 @@ class Finish(Action):
 
 
 @dataclass(frozen=True, slots=True)
-class FinishRoute(Action):
-    """Make a route of the points drawn so far."""
-
-
-@dataclass(frozen=True, slots=True)
 class SelectControlPoint(Action):
     """Select a control point and its route."""
 
@@ -186,11 +181,3 @@ class SetScanner(Action):
 
     scanner: Scanner
     """The new one."""
-
-
-@dataclass(frozen=True, slots=True)
-class ShowProblem(Action):
-    """Select what a problem is about and go to its place."""
-
-    problem: Problem
-    """Which one."""

@@ -5,8 +5,6 @@ It draws from the state only; the project itself is drawn by the layers, for eve
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections.abc import Callable, Coroutine
 from typing import Any
 
@@ -17,53 +15,21 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_POINTS, NO_SEGMENTS, lift, outline_segments, polyline_segments, rings
 from commission.app.base.extent import extent_of
 from commission.app.base.panel import BasePanel, Post, from_browser
+from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing import actions
-from commission.app.editing.editor import Editor, Grab, Tool, measurement
+from commission.app.editing.editor import Editor, Grab
 from commission.app.editing.gestures import moved, selected_of
 from commission.app.editing.route_gestures import curve, moved_route
 from commission.app.editing.station_gestures import heading_tip, moved_station
 from commission.app.editing.station_layer import station_marks
-from commission.app.floor_map.tools import AREA_TOOLS
+from commission.app.editing.tool import Label
 from commission.geometry.arrays import FloatArray
-from commission.site.editing.routes import segment_of
 from commission.site.project import Project
 from commission.site.stations import Station
 
 HANDLE_FROM = 14.0
 """Size of the selection's handle, in sizes of a mark."""
-
-
-def map_lines(editor: Editor) -> list[FloatArray]:
-    """Return (N, 2) polylines [m] that show a shape of the floor map while its points are clicked."""
-    points = np.array(editor.draft).reshape(-1, 2)
-    if editor.tool is Tool.ALIGN:
-        return [np.array([point.at for point in editor.alignment.points]).reshape(-1, 2)]
-    if len(points) < 2:
-        return []
-    if editor.tool is Tool.WALL:
-        return [points, *wall_sides(points, editor.pen.thickness)]
-    return [np.concatenate([points, points[:1]])] if editor.tool in AREA_TOOLS else []
-
-
-def wall_sides(points: FloatArray, thickness: float) -> list[FloatArray]:
-    """Return the outlines of the straight pieces of a wall along (N, 2) points [m]."""
-    sides: list[FloatArray] = []
-    for start, end in itertools.pairwise(points):
-        length = float(np.hypot(*(end - start)))
-        if length > 0.0:
-            across = 0.5 * thickness / length * np.array([start[1] - end[1], end[0] - start[0]])
-            corners = (start + across, end + across, end - across, start - across, start + across)
-            sides.append(np.array(corners))
-    return sides
-
-
-def millimeters(editor: Editor) -> str:
-    """Return a measurement as it is written beside its line."""
-    found = measurement(editor)
-    if found is None:
-        return ""
-    return f"{found.distance:.3f} m, {math.degrees(found.bearing):.1f}°  (dx {found.dx:.3f} m, dy {found.dy:.3f} m)"
 
 
 class Overlay(BasePanel):
@@ -93,8 +59,7 @@ class Overlay(BasePanel):
             point_shading="flat",
             precision="float32",
         )
-        self._label: LabelHandle | None = None
-        self._letters: list[LabelHandle] = []
+        self._labels: list[LabelHandle] = []
         self._handle = scene.add_transform_controls(
             "/editing/handle",
             active_axes=(True, True, False),
@@ -128,24 +93,23 @@ class Overlay(BasePanel):
         station = moved_station(project, editor)
         ringed = np.concatenate([centers, _point_place(project, editor), _places(station)])
         self._selected.points = outline_segments(rings(ringed, 1.5 * size), theme.Height.EDITING)
-        self._preview.points = self._preview_of(project, editor, size)
+        self._preview.points = self._preview_of(view.state, editor, size)
         self._draw_points(project, editor, size)
-        self._write(editor)
-        self._name_points(editor)
+        self._write(() if editor.tool is None else editor.tool.labels())
         self._draw_handle(centers, editor, size)
 
     def _draw_handle(self, centers: FloatArray, editor: Editor, size: float) -> None:
         """Put the handle at the middle of the selection, except while it is being dragged itself."""
-        wanted = bool(len(centers)) and editor.tool is Tool.SELECT and (editor.drag is None or self._dragging)
+        wanted = bool(len(centers)) and editor.tool is None and (editor.drag is None or self._dragging)
         self._handle.visible = wanted
         if wanted and not self._dragging:
             self._handle.scale = HANDLE_FROM * size
             x, y = (float(value) for value in centers.mean(axis=0))
             self._handle.position = (x, y, theme.Height.EDITING)
 
-    def _preview_of(self, project: Project, editor: Editor, size: float) -> np.ndarray:
+    def _preview_of(self, state: AppState, editor: Editor, size: float) -> np.ndarray:
         """Return the lines of what is being dragged, drawn or measured."""
-        height = theme.Height.EDITING
+        project, height = state.project, theme.Height.EDITING
         lines: list[np.ndarray] = []
         drag = editor.drag
         if drag is not None and drag.grab is Grab.REFLECTORS:
@@ -165,17 +129,13 @@ class Overlay(BasePanel):
             for segment in moved_route(project, editor):
                 lines.append(polyline_segments(segment.control_points, height))
                 lines.append(polyline_segments(curve(segment), height))
-        if editor.tool is Tool.ROUTE and len(set(editor.draft)) > 1:
-            lines.append(polyline_segments(curve(segment_of(editor.draft)), height))
-        lines += [polyline_segments(line, height) for line in map_lines(editor)]
-        if len(editor.measured) == 2:
-            lines.append(polyline_segments(np.array(editor.measured), height))
+        if editor.tool is not None:
+            lines += [polyline_segments(line, height) for line in editor.tool.sketch(state, self._browser)]
         return np.concatenate(lines) if lines else NO_SEGMENTS
 
     def _draw_points(self, project: Project, editor: Editor, size: float) -> None:
         """Show the control points of the selected route, or the points drawn or measured so far."""
-        aligned = [point.at for point in editor.alignment.points]
-        places = [np.array(points).reshape(-1, 2) for points in (editor.draft, editor.measured, aligned)]
+        places = [np.array(() if editor.tool is None else editor.tool.marks(), dtype=np.float64).reshape(-1, 2)]
         if editor.point is not None:
             places += [segment.control_points for segment in moved_route(project, editor)]
         station = moved_station(project, editor)
@@ -184,32 +144,15 @@ class Overlay(BasePanel):
         self._points.point_size = size
         self._points.points = lift(np.concatenate(places), theme.Height.EDITING)
 
-    def _write(self, editor: Editor) -> None:
-        """Write a measurement beside its line."""
-        text = millimeters(editor)
-        if not text:
-            if self._label is not None:
-                self._label.remove()
-                self._label = None
-            return
-        middle = np.mean(editor.measured, axis=0)
-        place = (float(middle[0]), float(middle[1]), theme.Height.EDITING)
-        if self._label is None:
-            self._label = self._scene.add_label("/editing/label", text, position=place)
-        self._label.text, self._label.position = text, place
-
-    def _name_points(self, editor: Editor) -> None:
-        """Write A and B beside the points to align by."""
-        points = editor.alignment.points if editor.tool is Tool.ALIGN else ()
-        while len(self._letters) > len(points):
-            self._letters.pop().remove()
-        for index, point in enumerate(points):
-            place = (*point.at, theme.Height.EDITING)
-            if index < len(self._letters):
-                self._letters[index].position = place
-            else:
-                name = f"/editing/point/{index}"
-                self._letters.append(self._scene.add_label(name, "AB"[index], position=place))
+    def _write(self, labels: tuple[Label, ...]) -> None:
+        """Write the words of the tool in use."""
+        while len(self._labels) > len(labels):
+            self._labels.pop().remove()
+        for index, (text, place) in enumerate(labels):
+            position = (*place, theme.Height.EDITING)
+            if index == len(self._labels):
+                self._labels.append(self._scene.add_label(f"/editing/label/{index}", text, position=position))
+            self._labels[index].text, self._labels[index].position = text, position
 
 
 def _places(station: Station | None) -> FloatArray:

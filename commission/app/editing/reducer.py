@@ -12,22 +12,17 @@ from commission.app.base.effects import FlyTo, Tell
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing import actions
-from commission.app.editing.editor import AlignmentDraft, Drag, Editor, Grab, Tool, editor_of
+from commission.app.editing.editor import Drag, Editor, Grab, editor_of
 from commission.app.editing.gestures import (
     grabbed,
-    marked_place,
     moved,
     reflector_at,
     reflectors_in,
     selected_of,
-    to_place,
 )
 from commission.app.editing.route_gestures import route_at
-from commission.app.editing.station_actions import DeleteStation, MoveStation, PlaceStation
+from commission.app.editing.station_actions import DeleteStation, MoveStation
 from commission.app.editing.station_gestures import moved_station, station_at
-from commission.app.floor_map import tools as map_tools
-from commission.app.floor_map.actions import FinishShape
-from commission.app.placement.actions import FreeAreas, KeepOut
 from commission.errors import UsageError
 from commission.site.editing import reflectors as edits
 from commission.site.editing.snapping import snap_to_wall
@@ -69,9 +64,7 @@ def _telling_of_locked(state: AppState, ids: tuple[str, ...], outcome: Outcome) 
 
 @reduce.register
 def choose_tool(action: actions.ChooseTool, state: AppState, sender: Sender) -> Outcome:
-    editor = replace(
-        editor_of(state, sender.browser), tool=action.tool, drag=None, draft=(), measured=(), alignment=AlignmentDraft()
-    )
+    editor = replace(editor_of(state, sender.browser), tool=action.tool, drag=None)
     return Outcome(state.with_browser(sender.browser, editor))
 
 
@@ -85,10 +78,11 @@ def choose_snapping(action: actions.ChooseSnapping, state: AppState, sender: Sen
 @reduce.register
 def cancel(_action: actions.Cancel, state: AppState, sender: Sender) -> Outcome:
     editor = editor_of(state, sender.browser)
-    if editor.drag is not None or editor.draft or editor.measured or editor.alignment.points:
-        editor = replace(editor, drag=None, draft=(), measured=(), alignment=AlignmentDraft())
-    elif editor.tool is not Tool.SELECT:
-        editor = replace(editor, tool=Tool.SELECT)
+    tool = editor.tool
+    if editor.drag is not None or (tool is not None and tool.is_half_done):
+        editor = replace(editor, drag=None, tool=None if tool is None else type(tool)())
+    elif tool is not None:
+        editor = replace(editor, tool=None)
     else:
         editor = editor.selecting()
     return Outcome(state.with_browser(sender.browser, editor))
@@ -96,31 +90,16 @@ def cancel(_action: actions.Cancel, state: AppState, sender: Sender) -> Outcome:
 
 @reduce.register
 def finish(_action: actions.Finish, state: AppState, sender: Sender) -> Outcome:
-    is_route = editor_of(state, sender.browser).tool is Tool.ROUTE
-    return reduce(actions.FinishRoute() if is_route else FinishShape(), state, sender)
+    tool = editor_of(state, sender.browser).tool
+    return Outcome(state) if tool is None else tool.finished(state, sender)
 
 
 @reduce.register
 def click_floor(action: ClickFloor, state: AppState, sender: Sender) -> Outcome:
     editor = replace(editor_of(state, sender.browser), reach=action.reach, last_click=action.place, drag=None)
-    if editor.tool in map_tools.TOOLS:
-        return map_tools.clicked(state, editor, action, sender)
-    resting = state.with_browser(sender.browser, editor)
-    match editor.tool:
-        case Tool.PLACE:
-            return _placed(state, editor, action, sender)
-        case Tool.STATION:
-            return reduce(PlaceStation(action.place, action.reach), resting, sender)
-        case Tool.KEEP_OUT:
-            return reduce(FreeAreas(action.place), resting, sender)
-        case Tool.ROUTE:
-            editor = replace(editor, draft=(*editor.draft, action.place))
-        case Tool.MEASURE:
-            before = editor.measured if len(editor.measured) == 1 else ()
-            editor = replace(editor, measured=(*before, marked_place(state.project, action.place, editor.reach)))
-        case _:
-            editor = _picked(state, editor, action)
-    return Outcome(state.with_browser(sender.browser, editor))
+    if editor.tool is None:
+        return Outcome(state.with_browser(sender.browser, _picked(state, editor, action)))
+    return editor.tool.clicked(state.with_browser(sender.browser, editor), action, sender)
 
 
 def _picked(state: AppState, editor: Editor, action: ClickFloor) -> Editor:
@@ -139,27 +118,15 @@ def _picked(state: AppState, editor: Editor, action: ClickFloor) -> Editor:
     return editor.selecting(point=route_at(state.project, action.place, action.reach))
 
 
-def _placed(state: AppState, editor: Editor, action: ClickFloor, sender: Sender) -> Outcome:
-    """Place a reflector where the click is attracted to."""
-    like = to_place(state.project, action.place, editor)
-    added = edits.add(state.project.reflectors, [(like.x, like.y)], like)
-    outcome = with_reflectors(state, added.reflectors, Edit(f"place {added.ids[0]}", sender))
-    selecting = outcome.state.with_browser(sender.browser, editor.selecting(added.ids))
-    return replace(outcome, state=selecting)
-
-
 @reduce.register
 def drag_floor(action: DragFloor, state: AppState, sender: Sender) -> Outcome:
     editor = editor_of(state, sender.browser)
-    if editor.tool in map_tools.AREA_TOOLS:
-        return map_tools.dragged(state, editor, action, sender)
-    if editor.tool not in {Tool.SELECT, Tool.KEEP_OUT}:
-        return Outcome(state)
+    if editor.tool is not None:
+        return editor.tool.dragged(state, action, sender)
     drag = editor.drag
     if action.phase == "start" or drag is None:
-        begun, whole = replace(editor, reach=action.reach), Drag(Grab.RECTANGLE, action.start, action.now, action.add)
-        takes_hold = editor.tool is Tool.SELECT
-        editor = grabbed(state.project, begun, whole) if takes_hold else replace(begun, drag=whole)
+        begun = replace(editor, reach=action.reach)
+        editor = grabbed(state.project, begun, Drag(Grab.RECTANGLE, action.start, action.now, action.add))
     else:
         editor = replace(editor, drag=replace(drag, now=action.now))
     if action.phase != "end":
@@ -218,12 +185,10 @@ def _moved(state: AppState, editor: Editor, resting: AppState, sender: Sender) -
 
 
 def _enclosed(state: AppState, editor: Editor, resting: AppState, sender: Sender) -> Outcome:
-    """Select what lies in the rectangle, or keep it free of reflectors."""
+    """Select what lies in the rectangle."""
     drag = editor.drag
     if drag is None:
         return Outcome(resting)
-    if editor.tool is Tool.KEEP_OUT:
-        return reduce(KeepOut((*drag.start, *drag.now)), resting, sender)
     inside = reflectors_in(state.project.reflectors, drag.start, drag.now)
     kept = editor.selected if drag.add else ()
     chosen = (*kept, *(name for name in inside if name not in kept))

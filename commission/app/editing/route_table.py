@@ -15,10 +15,10 @@ from commission.app.base.view import PageView
 from commission.app.editing import actions
 from commission.app.editing.editor import ControlPoint, Editor
 from commission.app.editing.station_actions import SelectStation
-from commission.app.problems.view import inspection_of
 from commission.site.project import Project
 from commission.site.routes import Direction, Route
 from commission.site.stations import Station
+from commission.studies.problems import ProblemsResult
 
 MOST_ROWS = 60
 """Rows that are shown; the others are found by a part of their name."""
@@ -74,12 +74,14 @@ class RouteTable(BasePanel):
         """Show routes and stations in the order of the project."""
         project, editor = view.state.project, view.state.of_browser(self._browser, Editor)
         chosen = "" if editor.point is None else editor.point.route
-        drawn = (project.routes, project.stations, inspection_of(view).violations)
+        findings = view.part(ProblemsResult)
+        drawn = (project.routes, project.stations, findings)
         asked = (self._find.value, chosen, editor.station)
         if self._drawn and self._drawn[-1] == asked and all(a is b for a, b in zip(self._drawn, drawn, strict=False)):
             return
         self._drawn = (*drawn, asked)
-        violations = Counter(violation.route for violation in inspection_of(view).violations)
+        violated = [v for route in findings.by_route for v in route.violations] if findings is not None else []
+        violations = Counter(violation.route for violation in violated)
         found = rows(project, violations, self._find.value.strip().lower())
         self._shown = found[:MOST_ROWS]
         more = f", the first {MOST_ROWS} shown" if len(found) > MOST_ROWS else ""
@@ -87,7 +89,7 @@ class RouteTable(BasePanel):
             f"<div class='c-note' style='padding:2px 6px'>{len(project.routes)} routes, "
             f"{len(project.stations)} stations{more}</div>"
         )
-        fatal = {violation.route for violation in inspection_of(view).violations if violation.is_fatal}
+        fatal = {violation.route for violation in violated if violation.is_fatal}
         self._rows.show([(row.text, _color(row, chosen, editor.station, violations, fatal)) for row in self._shown])
 
     def _selecting(self, index: int) -> page_actions.Action:

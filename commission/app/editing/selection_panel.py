@@ -1,10 +1,10 @@
-"""What one browser edits: its tools, the values of what it has selected, and the run's numbers when that is nothing."""
+"""What one browser has selected: its values, and what can be done with it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from viser import GuiApi, GuiEvent, GuiInputHandle
@@ -14,13 +14,11 @@ from commission.app.base import theme
 from commission.app.base.panel import BasePanel, Post, escaped, posting, table
 from commission.app.base.view import PageView
 from commission.app.editing import actions
-from commission.app.editing.editor import MAP_TOOLS, SITE_TOOLS, Editor, Tool, measurement
+from commission.app.editing.editor import Editor
 from commission.app.editing.gestures import selected_of
 from commission.app.editing.route_fields import RouteFields
+from commission.app.editing.site_tools import measurement
 from commission.app.editing.station_fields import StationFields
-from commission.app.floor_map.tool_fields import MapToolFields
-from commission.app.floor_map.tools import FEWEST
-from commission.app.run.now_panel import NowPanel
 from commission.site.fields import field_hints
 from commission.site.reflectors import Reflector, ReflectorKind
 
@@ -48,7 +46,6 @@ NUMBERS = {
     "sigma": Field("Survey 1σ [mm]", 1000.0, 0.1),
 }
 TEXTS = {"id": "Name", "layer": "Layer", "note": "Note"}
-FINISHED = {Tool.WALL: "wall", Tool.OBSTACLE: "obstacle", Tool.ERASE: "area to erase"}
 ALONE = ("id", "x", "y")
 """Fields that several reflectors cannot share."""
 
@@ -60,7 +57,7 @@ def in_page_units(name: str, value: float) -> float:
 
 
 class SelectionPanel(BasePanel):
-    """Tools, snapping, values and buttons.
+    """Values of what is selected, and buttons.
 
     Parameters
     ----------
@@ -71,18 +68,8 @@ class SelectionPanel(BasePanel):
 
     def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
         self._gui, self._post, self._browser = gui, post, browser
-        self._editor = Editor()
         self._reflectors: tuple[Reflector, ...] = ()
         self._drawn: tuple[object, ...] = ()
-        gui.add_html(theme.WIDE.replace("c-wide", "c-wide c-tools"))
-        tools = gui.add_button_group("", tuple(tool.value for tool in SITE_TOOLS))
-        tools.on_click(posting(post, lambda event: actions.ChooseTool(Tool(event.target.value))))
-        gui.add_html(theme.WIDE)
-        map_tools = gui.add_button_group("", tuple(tool.value for tool in MAP_TOOLS))
-        map_tools.on_click(posting(post, lambda event: actions.ChooseTool(Tool(event.target.value))))
-        self._finish = gui.add_button("Finish the route", visible=False, hint="Make it of the points clicked (Enter).")
-        self._finish.on_click(posting(post, lambda _event: actions.Finish()))
-        self._map_tools = MapToolFields(gui, post, browser)
         self._head = gui.add_html("")
         self._fields: dict[str, GuiInputHandle[Any]] = {}
         self._add_fields()
@@ -95,10 +82,6 @@ class SelectionPanel(BasePanel):
             self._add_repeat()
         self._route = RouteFields(gui, post, browser)
         self._station = StationFields(gui, post, browser)
-        self._now = NowPanel(gui)
-        with gui.add_folder("Snapping", expand_by_default=False):
-            self._add_snapping()
-        self._add_commands()
 
     def _add_fields(self) -> None:
         """Add an input for each value of a reflector, in the order in which one thinks of them."""
@@ -170,62 +153,15 @@ class SelectionPanel(BasePanel):
             )
         )
 
-    def _add_snapping(self) -> None:
-        gui = self._gui
-        self._walls = gui.add_checkbox("To walls", True, hint="Against the nearest wall, a flat plate facing away.")
-        self._neighbors = gui.add_checkbox("To neighbors", False, hint="Onto rows and columns of other reflectors.")
-        self._grid = gui.add_number("Grid [m]", 0.0, min=0.0, max=100.0, step=0.01, hint="0: no grid.")
-        for widget in (self._walls, self._neighbors, self._grid):
-            widget.on_update(posting(self._post, lambda _event: self._snapping()))
-
-    def _snapping(self) -> page_actions.Action:
-        """Return the action of the snapping's widgets together."""
-        snapping = replace(
-            self._editor.snapping,
-            walls=self._walls.value,
-            neighbors=self._neighbors.value,
-            grid=float(self._grid.value),
-        )
-        return actions.ChooseSnapping(snapping)
-
-    def _add_commands(self) -> None:
-        """Add keys for what the hand does most."""
-        gui, post = self._gui, self._post
-        commands: tuple[tuple[str, Any, Any, page_actions.Action], ...] = (
-            ("Select", "V", None, actions.ChooseTool(Tool.SELECT)),
-            ("Place reflectors", "R", None, actions.ChooseTool(Tool.PLACE)),
-            ("Draw a route", "T", None, actions.ChooseTool(Tool.ROUTE)),
-            ("Place stations", "K", None, actions.ChooseTool(Tool.STATION)),
-            ("Measure", "M", None, actions.ChooseTool(Tool.MEASURE)),
-            ("Erase walls", "X", None, actions.ChooseTool(Tool.ERASE)),
-            ("Draw a wall", "L", None, actions.ChooseTool(Tool.WALL)),
-            ("Draw an obstacle", "O", None, actions.ChooseTool(Tool.OBSTACLE)),
-            ("Finish what is drawn", "enter", None, actions.Finish()),
-            ("Cancel", "escape", None, actions.Cancel()),
-            ("Delete the selection", "delete", None, actions.DeleteSelected()),
-            ("Duplicate the selection", "D", "cmd/ctrl+shift", actions.DuplicateSelected()),
-        )
-        for label, key, modifier, action in commands:
-            command = gui.add_command(label, hotkey=key, modifier=modifier)
-            command.on_trigger(posting(post, lambda _event, action=action: action))
-
     def draw_slowly(self, view: PageView) -> None:
         """Show what is selected."""
         editor = view.state.of_browser(self._browser, Editor)
-        self._editor = editor
-        if not editor.has_selection:
-            self._now.draw_slowly(view)
         drawn = (view.state.project, editor, len(view.state.browsers))
         if self._drawn and self._drawn[0] is drawn[0] and self._drawn[1:] == drawn[1:]:
             return
         self._drawn = drawn
         self._reflectors = selected_of(view.state.project, editor)
-        self._finish.visible = len(editor.draft) >= FEWEST.get(editor.tool, 2)
-        if self._finish.visible:
-            self._finish.label = f"Finish the {FINISHED.get(editor.tool, 'route')}"
-        self._map_tools.show(editor)
         self._head.content = _company(self._browser, len(view.state.browsers)) + _head(editor, self._reflectors)
-        self._now.visible = not editor.has_selection
         self._buttons.visible = self._copies.visible = bool(self._reflectors)
         for name, widget in self._fields.items():
             shown = bool(self._reflectors) and (len(self._reflectors) == 1 or name not in ALONE)

@@ -11,16 +11,15 @@ from commission.app.base.effects import FlyTo
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing import actions
-from commission.app.editing.editor import ControlPoint, Editor, Point, Tool, editor_of
-from commission.app.editing.route_gestures import control_point_at, route_of, segment_of
+from commission.app.editing.editor import ControlPoint, Editor, Point, editor_of
+from commission.app.editing.route_gestures import route_of, segment_of
 from commission.errors import UsageError
 from commission.site.editing import routes as edits
 from commission.site.layout_brief import LayoutBrief
 from commission.site.routes import Route, Segment
-from commission.studies.problems import Subject
 
 
-def _with_routes(
+def with_routes(
     state: AppState,
     routes: tuple[Route, ...],
     edit: Edit,
@@ -44,16 +43,6 @@ def _selected(state: AppState, sender: Sender) -> tuple[Editor, Route, Segment, 
 
 
 @reduce.register
-def finish_route(_action: actions.FinishRoute, state: AppState, sender: Sender) -> Outcome:
-    editor = editor_of(state, sender.browser)
-    name = edits.fresh_name(state.project.routes)
-    route = edits.new_route(name, editor.draft)
-    done = state.with_browser(sender.browser, replace(editor, draft=(), tool=Tool.SELECT))
-    routes = edits.put(state.project.routes, route)
-    return _with_routes(done, routes, Edit(f"draw {name}", sender), ControlPoint(name))
-
-
-@reduce.register
 def select_control_point(action: actions.SelectControlPoint, state: AppState, sender: Sender) -> Outcome:
     editor = editor_of(state, sender.browser).selecting(point=action.point)
     selecting = state.with_browser(sender.browser, editor)
@@ -72,7 +61,7 @@ def insert_control_point(_action: actions.InsertControlPoint, state: AppState, s
     gaps = np.hypot(*(inserted.segments[point.segment].control_points - near).T)
     edit = Edit(f"insert point in {route.name}", sender)
     nearest = replace(point, index=int(np.argmin(gaps)))
-    return _with_routes(state, edits.put(state.project.routes, inserted, route.name), edit, nearest)
+    return with_routes(state, edits.put(state.project.routes, inserted, route.name), edit, nearest)
 
 
 @reduce.register
@@ -81,7 +70,7 @@ def split_segment(_action: actions.SplitSegment, state: AppState, sender: Sender
     cut = edits.split_segment(route, point.segment, _where(editor, segment, point))
     routes = edits.put(state.project.routes, cut, route.name)
     behind = ControlPoint(route.name, point.segment + 1)
-    return _with_routes(state, routes, Edit(f"split {route.name}", sender), behind)
+    return with_routes(state, routes, Edit(f"split {route.name}", sender), behind)
 
 
 @reduce.register
@@ -90,7 +79,7 @@ def delete_control_point(_action: actions.DeleteControlPoint, state: AppState, s
     fewer = edits.delete_point(route, point.segment, point.index)
     edit = Edit(f"delete point of {route.name}", sender)
     before = replace(point, index=max(point.index - 1, 0))
-    return _with_routes(state, edits.put(state.project.routes, fewer, route.name), edit, before)
+    return with_routes(state, edits.put(state.project.routes, fewer, route.name), edit, before)
 
 
 @reduce.register
@@ -98,7 +87,7 @@ def place_control_point(action: actions.PlaceControlPoint, state: AppState, send
     _, route, _, point = _selected(state, sender)
     bent = edits.move_point(route, point.segment, point.index, action.place)
     edit = Edit(f"move point of {route.name}", sender, "" if action.dragged else str(point))
-    return _with_routes(state, edits.put(state.project.routes, bent, route.name), edit, point)
+    return with_routes(state, edits.put(state.project.routes, bent, route.name), edit, point)
 
 
 @reduce.register
@@ -109,7 +98,7 @@ def set_segment(action: actions.SetSegment, state: AppState, sender: Sender) -> 
     changed = edits.set_direction(route, point.segment, action.direction)
     changed = edits.set_speed(changed, point.segment, action.speed)
     edit = Edit(f"set drive of {route.name}", sender, f"{route.name}:{point.segment}:drive")
-    return _with_routes(state, edits.put(state.project.routes, changed, route.name), edit, point)
+    return with_routes(state, edits.put(state.project.routes, changed, route.name), edit, point)
 
 
 @reduce.register
@@ -120,7 +109,7 @@ def rename_route(action: actions.RenameRoute, state: AppState, sender: Sender) -
     routes = edits.put(state.project.routes, replace(route, name=action.name), route.name)
     edit = Edit(f"rename {route.name}", sender)
     layout = state.project.layout.renamed(route.name, action.name)
-    return _with_routes(state, routes, edit, replace(point, route=action.name), layout)
+    return with_routes(state, routes, edit, replace(point, route=action.name), layout)
 
 
 @reduce.register
@@ -128,7 +117,7 @@ def delete_route(_action: actions.DeleteRoute, state: AppState, sender: Sender) 
     _, route, _, _ = _selected(state, sender)
     routes = edits.remove(state.project.routes, route.name)
     layout = state.project.layout.renamed(route.name, None)
-    return _with_routes(state, routes, Edit(f"delete {route.name}", sender), None, layout)
+    return with_routes(state, routes, Edit(f"delete {route.name}", sender), None, layout)
 
 
 def _where(editor: Editor, segment: Segment, point: ControlPoint) -> Point:
@@ -153,18 +142,3 @@ def set_scanner(action: actions.SetScanner, state: AppState, sender: Sender) -> 
         return Outcome(state)
     edit = Edit("change the scanner", sender, "scanner")
     return Outcome(edited(state, replace(state.project, scanner=action.scanner), edit))
-
-
-@reduce.register
-def show_problem(action: actions.ShowProblem, state: AppState, sender: Sender) -> Outcome:
-    problem = action.problem
-    editor = replace(editor_of(state, sender.browser), tool=Tool.SELECT).selecting()
-    if problem.subject is Subject.REFLECTOR:
-        editor = editor.selecting(problem.ids)
-    elif problem.subject is Subject.STATION and problem.ids:
-        editor = editor.selecting(station=problem.ids[0])
-    elif problem.subject is Subject.ROUTE and problem.ids:
-        near = problem.place or (0.0, 0.0)
-        editor = editor.selecting(point=control_point_at(state.project, problem.ids[0], near, float("inf")))
-    there = () if problem.place is None else (FlyTo(problem.place),)
-    return Outcome(state.with_browser(sender.browser, editor), there)

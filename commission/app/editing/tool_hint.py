@@ -7,68 +7,20 @@ import math
 from viser import GuiApi
 
 from commission.app.base.panel import BasePanel, escaped
+from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.editing.editor import Editor, Tool
+from commission.app.editing.editor import Editor, editor_of
 from commission.app.editing.gestures import moved, selected_of
 from commission.app.editing.station_gestures import moved_station
-from commission.app.floor_map.tools import alignment_of
 from commission.site.project import Project
 
 
-def hint(project: Project, editor: Editor) -> str:
-    """Return what the tool in use expects; empty when there is nothing to say."""
+def hint(state: AppState, browser: int) -> str:
+    """Return where what is dragged comes to lie, or what the tool in use expects; empty: nothing to say."""
+    editor = editor_of(state, browser)
     if editor.drag is not None and (editor.selected or editor.station):
-        return _dragging(project, editor)
-    match editor.tool:
-        case Tool.SELECT:
-            said = ""
-        case Tool.PLACE:
-            where = " at the nearest wall" if editor.snapping.walls else ""
-            said = f"Place: click on the floor for a reflector{where} &nbsp; (Esc ends)"
-        case Tool.ROUTE:
-            points = len(editor.draft)
-            ready = ", Enter makes a route of them" if points > 1 else ""
-            said = f"Route: click its points, {points} so far{ready} &nbsp; (Esc drops them)"
-        case Tool.STATION:
-            said = "Station: click where the vehicle has to stand, on a route it looks along it &nbsp; (Esc ends)"
-        case Tool.MEASURE:
-            which = "second" if len(editor.measured) == 1 else "first"
-            said = f"Measure: click the {which} point &nbsp; (Esc ends)"
-        case Tool.KEEP_OUT:
-            said = "Keep out: drag over an area without new reflectors, click one to free it &nbsp; (Esc ends)"
-        case Tool.ERASE | Tool.OBSTACLE:
-            said = f"{editor.tool}: drag a rectangle, or click corners{_so_far(editor, 3)} &nbsp; (Esc ends)"
-        case Tool.WALL:
-            thickness = f"{1000.0 * editor.pen.thickness:g} mm thick"
-            said = f"Wall, {thickness}: click its points{_so_far(editor, 2)} &nbsp; (Esc ends)"
-        case Tool.ALIGN:
-            which = ("A", "B")[len(editor.alignment.points)] if len(editor.alignment.points) < 2 else ""
-            click = (
-                f"click {which}, a corner or a reflector of known plant coordinates" if which else "type coordinates"
-            )
-            said = f"Align: {click} &nbsp; (Esc ends)"
-        case Tool.CALIBRATE:
-            said = "Image: click two points of known distance, far apart; then type it on the left &nbsp; (Esc ends)"
-    return said
-
-
-def _aligning(editor: Editor) -> str:
-    """Say which point comes next, or how well the two fit."""
-    points, found = len(editor.alignment.points), alignment_of(editor.alignment)
-    if points < 2:
-        return f"click {'AB'[points]}, a corner or a reflector of known plant coordinates"
-    if found is None:
-        return "A and B are too close to each other"
-    difference = f"{1000.0 * found.residual:+.0f} mm ({100.0 * found.share:.2f} %)"
-    return f"type the plant's coordinates of A and B; their distances differ by {difference}"
-
-
-def _so_far(editor: Editor, needed: int) -> str:
-    """Say how many points there are, and what Enter makes of them."""
-    points = len(editor.draft)
-    if points == 0:
-        return ""
-    return f", {points} so far" + (", Enter finishes" if points >= needed else "")
+        return _dragging(state.project, editor)
+    return "" if editor.tool is None else editor.tool.hint(state, browser)
 
 
 def _dragging(project: Project, editor: Editor) -> str:
@@ -97,7 +49,7 @@ class ToolHint(BasePanel):
 
     def draw(self, view: PageView) -> None:
         """Follow the editor without delay."""
-        text = hint(view.state.project, view.state.of_browser(self._browser, Editor))
+        text = hint(view.state, self._browser)
         if text == self._shown:
             return
         self._shown = text

@@ -7,7 +7,7 @@ from dataclasses import replace
 from commission.app.base.actions import Sender
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState
-from commission.app.editing.editor import Tool, editor_of
+from commission.app.editing.editor import editor_of
 from commission.app.editing.gestures import reflector_at
 from commission.app.failures.actions import (
     AlsoFails,
@@ -52,7 +52,7 @@ def show_failure(action: ShowFailure, state: AppState, _sender: Sender) -> Outco
 def click_reflector(action: ClickReflector, state: AppState, sender: Sender) -> Outcome:
     """A click on a ranked reflector asks for what depends on it."""
     settings = state.part(FailureSettings)
-    if not settings.ranking or editor_of(state, sender.browser).tool is not Tool.SELECT:
+    if not settings.ranking or editor_of(state, sender.browser).tool is not None:
         return Outcome(state)
     name = reflector_at(state.project.reflectors, action.place, action.reach)
     return Outcome(state if name is None else state.with_part(replace(settings, failed=name)))

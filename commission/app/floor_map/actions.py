@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from commission.app.base.actions import Action
-from commission.app.editing.editor import MapPen, Point
+from commission.app.base.actions import Action, Point
 from commission.app.floor_map.draft import MapFile, Read, ReadOptions
+from commission.app.floor_map.pen import MapPen
 from commission.site.floor_map import FloorMap
 
 OptionValue: TypeAlias = float | bool | tuple[str, ...] | tuple[float, ...]
@@ -65,11 +65,6 @@ class SetPen(Action):
 
     pen: MapPen
     """How they draw from now on."""
-
-
-@dataclass(frozen=True, slots=True)
-class FinishShape(Action):
-    """Draw the wall or the obstacle, or erase the area, whose points were clicked."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
 from typing import TypeAlias
 
+from commission.app.base.actions import Point
 from commission.app.base.uploads import Upload
-from commission.app.editing.editor import Point
 from commission.io.dxf import Drawing
 from commission.io.dxf_units import UNITS
 from commission.io.image_map import ImagePlacement, Picture

@@ -12,8 +12,9 @@ from commission.app.base.extent import extent_of
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.base.uploads import Upload
-from commission.app.editing.editor import Tool, editor_of
-from commission.app.floor_map import actions, tools
+from commission.app.editing.editor import editor_of, with_tool
+from commission.app.floor_map import actions, align_tool
+from commission.app.floor_map.align_tool import AlignTool
 from commission.app.floor_map.draft import (
     ENDINGS,
     MAP_ENDINGS,
@@ -25,6 +26,7 @@ from commission.app.floor_map.draft import (
     WaitingMap,
 )
 from commission.app.floor_map.effects import DrawMap, ReadMapFile, StopMapWork
+from commission.app.floor_map.tools import CalibrateTool
 from commission.errors import UsageError
 from commission.io.image_map import Picture
 from commission.io.mesh import Model
@@ -98,7 +100,7 @@ def _stage(picture: Picture, project: Project) -> Stage:
 @reduce.register
 def click_picture(_action: actions.ClickPicture, state: AppState, sender: Sender) -> Outcome:
     draft = _draft(state)
-    editor = replace(editor_of(state, sender.browser), tool=Tool.CALIBRATE, drag=None, draft=(), measured=())
+    editor = replace(editor_of(state, sender.browser), tool=CalibrateTool(), drag=None)
     cleared = state.with_part(replace(state.part(MapLoading), draft=replace(draft, pixels=())))
     return Outcome(cleared.with_browser(sender.browser, editor), (PlaceCamera(Camera.FIT),))
 
@@ -138,37 +140,30 @@ def discard_map(_action: actions.DiscardMap, state: AppState, _sender: Sender) -
 
 @reduce.register
 def set_pen(action: actions.SetPen, state: AppState, sender: Sender) -> Outcome:
-    return Outcome(state.with_browser(sender.browser, replace(editor_of(state, sender.browser), pen=action.pen)))
-
-
-@reduce.register
-def finish_shape(_action: actions.FinishShape, state: AppState, sender: Sender) -> Outcome:
-    return tools.finished(state, sender)
+    return Outcome(state.with_browser(sender.browser, action.pen))
 
 
 @reduce.register
 def set_plant_point(action: actions.SetPlantPoint, state: AppState, sender: Sender) -> Outcome:
-    points = list(editor_of(state, sender.browser).alignment.points)
-    if action.index < len(points):
-        points[action.index] = replace(points[action.index], plant=action.plant, name=action.name)
-    return _aligning(state, sender, points=tuple(points))
+    tool = editor_of(state, sender.browser).tool
+    if not isinstance(tool, AlignTool) or action.index >= len(tool.known):
+        return Outcome(state)
+    known = list(tool.known)
+    known[action.index] = replace(known[action.index], plant=action.plant, name=action.name)
+    return Outcome(with_tool(state, sender, replace(tool, known=tuple(known))))
 
 
 @reduce.register
 def set_aligned(action: actions.SetAligned, state: AppState, sender: Sender) -> Outcome:
-    return _aligning(state, sender, everything=action.everything)
-
-
-def _aligning(state: AppState, sender: Sender, **changes: Any) -> Outcome:
-    """Change what one browser aligns by."""
-    editor = editor_of(state, sender.browser)
-    alignment = replace(editor.alignment, **changes)
-    return Outcome(state.with_browser(sender.browser, replace(editor, alignment=alignment)))
+    tool = editor_of(state, sender.browser).tool
+    if not isinstance(tool, AlignTool):
+        return Outcome(state)
+    return Outcome(with_tool(state, sender, replace(tool, everything=action.everything)))
 
 
 @reduce.register
 def align_map(_action: actions.AlignMap, state: AppState, sender: Sender) -> Outcome:
-    return tools.align_map(state, sender)
+    return align_tool.align_map(state, sender)
 
 
 @reduce.register
@@ -186,8 +181,8 @@ def _without_calibration(state: AppState) -> AppState:
     """Return the state with nobody clicking on a picture that is not there any more."""
     for browser in state.browsers:
         editor = editor_of(state, browser)
-        if editor.tool is Tool.CALIBRATE:
-            state = state.with_browser(browser, replace(editor, tool=Tool.SELECT))
+        if isinstance(editor.tool, CalibrateTool):
+            state = state.with_browser(browser, replace(editor, tool=None))
     return state
 
 

@@ -4,30 +4,58 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 from viser import GuiApi, GuiEvent
 
 from commission.app.base import actions as page_actions
-from commission.app.base.panel import Post, posting, table, write
-from commission.app.editing.editor import AlignmentDraft, Editor, MapPen, NamedPoint, Tool
+from commission.app.base import theme
+from commission.app.base.inputs import show
+from commission.app.base.panel import BasePanel, Post, posting, table, write
+from commission.app.base.view import PageView
+from commission.app.editing.actions import ChooseTool
+from commission.app.editing.editor import editor_of
+from commission.app.editing.tool import Tool
 from commission.app.floor_map import actions
-from commission.app.floor_map.tools import alignment_of
+from commission.app.floor_map.align_tool import LETTERS, AlignTool, NamedPoint
+from commission.app.floor_map.pen import MapPen
+from commission.app.floor_map.tools import EraseTool, ObstacleTool, WallTool
 from commission.site.editing.alignment import DOUBTFUL, WRONG
 
 FREE, UNKNOWN = "free", "unknown"
 MAP_ONLY, EVERYTHING = "the map alone", "what is on it, too"
-LETTERS = "AB"
+MAP_TOOLS: tuple[Tool, ...] = (EraseTool(), WallTool(), ObstacleTool(), AlignTool())
+"""In the order of their buttons."""
+KEYS: tuple[tuple[str, Literal["X", "L", "O"], Tool], ...] = (
+    ("Erase walls", "X", EraseTool()),
+    ("Draw a wall", "L", WallTool()),
+    ("Draw an obstacle", "O", ObstacleTool()),
+)
+"""What a key does."""
 LONGEST_NAME = 40
 """Letters of a point's name that are kept."""
 
 
-class MapToolFields:
+class MapToolButtons(BasePanel):
+    """Buttons and keys that choose one of the floor map's tools."""
+
+    def __init__(self, gui: GuiApi, post: Post) -> None:
+        gui.add_html(theme.WIDE)
+        buttons = gui.add_button_group("", tuple(tool.name for tool in MAP_TOOLS))
+        named = {tool.name: tool for tool in MAP_TOOLS}
+        buttons.on_click(posting(post, lambda event: ChooseTool(named[event.target.value])))
+        for label, key, tool in KEYS:
+            command = gui.add_command(label, hotkey=key)
+            command.on_trigger(posting(post, lambda _event, tool=tool: ChooseTool(tool)))
+
+
+class MapToolFields(BasePanel):
     """Thickness, what erased cells become, points and their plant coordinates; only what the tool in use needs."""
 
     def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
         self._gui, self._post, self._browser = gui, post, browser
         self._pen = MapPen()
+        self._shown: tuple[MapPen, Tool | None] | None = None
         self._thickness = gui.add_number(
             "Thickness [mm]",
             100.0,
@@ -78,45 +106,44 @@ class MapToolFields:
             widget.on_update(posting(self._post, typed))
         return name, plant
 
-    def show(self, editor: Editor) -> None:
-        """Follow the editor."""
-        self._pen = editor.pen
-        for widget, tool in (
-            (self._thickness, Tool.WALL),
-            (self._becomes, Tool.ERASE),
-            (self._folder, Tool.ALIGN),
-        ):
-            if widget.visible is not (editor.tool is tool):
-                widget.visible = editor.tool is tool
-        write(self._thickness, round(1000.0 * editor.pen.thickness, 3))
-        write(self._becomes, UNKNOWN if editor.pen.to_unknown else FREE)
-        if editor.tool is Tool.ALIGN:
-            self._show_alignment(editor.alignment)
+    def draw_slowly(self, view: PageView) -> None:
+        """Show what the tool in use needs."""
+        pen, tool = view.state.of_browser(self._browser, MapPen), editor_of(view.state, self._browser).tool
+        if self._shown == (pen, tool):
+            return
+        self._shown, self._pen = (pen, tool), pen
+        show(self._thickness, visible=isinstance(tool, WallTool))
+        show(self._becomes, visible=isinstance(tool, EraseTool))
+        show(self._folder, visible=isinstance(tool, AlignTool))
+        write(self._thickness, round(1000.0 * pen.thickness, 3))
+        write(self._becomes, UNKNOWN if pen.to_unknown else FREE)
+        if isinstance(tool, AlignTool):
+            self._show_alignment(tool)
 
-    def _show_alignment(self, draft: AlignmentDraft) -> None:
+    def _show_alignment(self, tool: AlignTool) -> None:
         for index, widgets in enumerate(self._points):
-            known = index < len(draft.points)
-            point = draft.points[index] if known else NamedPoint((0.0, 0.0), (0.0, 0.0))
+            known = index < len(tool.known)
+            point = tool.known[index] if known else NamedPoint((0.0, 0.0), (0.0, 0.0))
             plant = (round(point.plant[0], 4), round(point.plant[1], 4))
             for widget, value in zip(widgets, (point.name, plant), strict=True):
                 write(widget, value)
                 if widget.disabled is known:
                     widget.disabled = not known
-        write(self._moves, EVERYTHING if draft.everything else MAP_ONLY)
-        self._said.content = f"<div style='padding:2px 6px'>{alignment_text(draft)}</div>"
-        found = alignment_of(draft)
+        write(self._moves, EVERYTHING if tool.everything else MAP_ONLY)
+        self._said.content = f"<div style='padding:2px 6px'>{alignment_text(tool)}</div>"
+        found = tool.alignment()
         self._align.disabled = found is None or found.share > WRONG
 
 
-def alignment_text(draft: AlignmentDraft) -> str:
+def alignment_text(tool: AlignTool) -> str:
     """Return what the points say, as html."""
     clicked = [
         (f"{letter} on the map", f"{point.at[0]:.3f}, {point.at[1]:.3f} m")
-        for letter, point in zip(LETTERS, draft.points, strict=False)
+        for letter, point in zip(LETTERS, tool.known, strict=False)
     ]
-    found = alignment_of(draft)
+    found = tool.alignment()
     if found is None:
-        missing = f"click {LETTERS[len(draft.points)]}" if len(draft.points) < 2 else "they are too close to each other"
+        missing = f"click {LETTERS[len(tool.known)]}" if len(tool.known) < 2 else "they are too close to each other"
         return f"{table(clicked)}<div class='c-note'>Points: {missing}</div>"
     color = "#ff8a80" if found.share > WRONG else "#ffb74d" if found.share > DOUBTFUL else "inherit"
     residual = f"<span style='color:{color}'>{1000.0 * found.residual:+.0f} mm ({100.0 * found.share:.2f} %)</span>"

@@ -1,149 +1,151 @@
-"""What clicks and drags mean for the floor map: areas erased and filled, walls drawn, points to align by. Pure."""
+"""The tools for the floor map: areas erased and filled, walls drawn, points clicked on an image. Pure."""
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
+import itertools
+from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
-from commission.app.base.actions import Camera, ClickFloor, DragFloor, Sender
-from commission.app.base.effects import PlaceCamera, Tell
+from commission.app.base.actions import ClickFloor, DragFloor, Point, Sender
+from commission.app.base.effects import Tell
 from commission.app.base.reducer import Outcome
 from commission.app.base.state import AppState, Edit, edited
-from commission.app.editing.editor import (
-    MAP_TOOLS,
-    AlignmentDraft,
-    Drag,
-    Editor,
-    Grab,
-    NamedPoint,
-    Point,
-    Tool,
-    editor_of,
-)
-from commission.app.editing.gestures import marked_place
+from commission.app.editing.drawing_tools import DrawingTool, area_dragged
+from commission.app.editing.editor import with_tool
+from commission.app.editing.tool import Tool
 from commission.app.floor_map.draft import MapLoading
-from commission.app.run.state import RunState
+from commission.app.floor_map.pen import MapPen
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
-from commission.site.editing.alignment import DOUBTFUL, Alignment, KnownPoint, align, aligned
 from commission.site.editing.floor_map import draw_obstacle, draw_wall, fill
 from commission.site.floor_map import FREE, UNKNOWN, FloorMap
 
-TOOLS = (*MAP_TOOLS, Tool.CALIBRATE)
-"""Tools whose clicks mean something here."""
-AREA_TOOLS = (Tool.ERASE, Tool.OBSTACLE)
-"""Tools that take a rectangle by a drag as well as a polygon by clicks."""
-NAMES = {Tool.ERASE: "erase", Tool.OBSTACLE: "draw obstacle", Tool.WALL: "draw wall"}
-"""What an edit is called."""
-FEWEST = {Tool.ERASE: 3, Tool.OBSTACLE: 3, Tool.WALL: 2}
-"""Points that a shape needs."""
+
+@dataclass(frozen=True, slots=True)
+class ShapeTool(DrawingTool):
+    """Changes the floor map where a shape is drawn; the tool stays, for the next shape."""
+
+    does: ClassVar[str] = ""
+    """What an edit is called."""
+
+    def made(self, state: AppState, points: tuple[Point, ...], sender: Sender) -> Outcome:
+        """Change the map: one undo step."""
+        resting = with_tool(state, sender, type(self)())
+        before, corners = state.project.floor_map, np.array(points, dtype=np.float64).reshape(-1, 2)
+        after = self.changed(before, corners, state.of_browser(sender.browser, MapPen))
+        if after is before:
+            return Outcome(resting, (Tell(f"nothing to {self.does} there", failed=False),))
+        return Outcome(edited(resting, replace(state.project, floor_map=after), Edit(self.does, sender)))
+
+    def changed(self, floor_map: FloorMap | None, corners: FloatArray, pen: MapPen) -> FloorMap:
+        """Return the map with the shape whose (N, 2) corners [m] these are."""
+        raise NotImplementedError
 
 
-def clicked(state: AppState, editor: Editor, action: ClickFloor, sender: Sender) -> Outcome:
-    """Return what follows from a click with one of the floor map's tools."""
-    match editor.tool:
-        case Tool.ALIGN:
-            place = marked_place(state.project, action.place, editor.reach)
-            editor = replace(editor, alignment=with_point(editor.alignment, place))
-        case Tool.CALIBRATE:
-            draft = state.part(MapLoading).draft
-            if draft is None:
-                return Outcome(state.with_browser(sender.browser, replace(editor, tool=Tool.SELECT)))
-            state = state.with_part(replace(state.part(MapLoading), draft=draft.clicked(action.place)))
-        case _:
-            editor = replace(editor, draft=(*editor.draft, action.place))
-    return Outcome(state.with_browser(sender.browser, editor))
+@dataclass(frozen=True, slots=True)
+class AreaTool(ShapeTool):
+    """Takes a rectangle by a drag as well as a polygon by clicks."""
+
+    fewest = 3
+
+    def dragged(self, state: AppState, drag: DragFloor, sender: Sender) -> Outcome:
+        """Draw a rectangle."""
+        state, is_drawn = area_dragged(state, drag, sender)
+        if not is_drawn:
+            return Outcome(state)
+        (x0, y0), (x1, y1) = drag.start, drag.now
+        return self.made(state, ((x0, y0), (x1, y0), (x1, y1), (x0, y1)), sender)
+
+    def hint(self, state: AppState, browser: int) -> str:  # noqa: ARG002 - the tool's
+        """Say how an area is drawn."""
+        return f"{self.name}: drag a rectangle, or click corners{self.so_far()} &nbsp; (Esc ends)"
+
+    def sketch(self, state: AppState, browser: int) -> list[FloatArray]:  # noqa: ARG002 - the tool's
+        """Return the closed outline."""
+        return [np.array([*self.points, self.points[0]])] if len(self.points) > 1 else []
 
 
-def dragged(state: AppState, editor: Editor, action: DragFloor, sender: Sender) -> Outcome:
-    """Return what follows from a drag: a rectangle grows, and is erased or filled when it ends."""
-    if action.phase != "end":
-        drag = Drag(Grab.RECTANGLE, action.start, action.now)
-        return Outcome(state.with_browser(sender.browser, replace(editor, drag=drag, reach=action.reach)))
-    resting = state.with_browser(sender.browser, replace(editor, drag=None))
-    (x0, y0), (x1, y1) = action.start, action.now
-    if x0 == x1 or y0 == y1:
-        return Outcome(resting)
-    return drawn(resting, sender, ((x0, y0), (x1, y0), (x1, y1), (x0, y1)))
+@dataclass(frozen=True, slots=True)
+class EraseTool(AreaTool):
+    """Erases walls."""
 
+    name = "Erase"
+    makes = "area to erase"
+    does = "erase"
 
-def drawn(state: AppState, sender: Sender, points: tuple[Point, ...]) -> Outcome:
-    """Return what follows from a finished shape: one undo step. The tool stays, for the next one."""
-    editor = editor_of(state, sender.browser)
-    resting = state.with_browser(sender.browser, replace(editor, draft=()))
-    before, corners = state.project.floor_map, np.array(points, dtype=np.float64).reshape(-1, 2)
-    after = _with_shape(before, editor, corners)
-    if after is before:
-        return Outcome(resting, (Tell(f"nothing to {NAMES[editor.tool]} there", failed=False),))
-    project = replace(state.project, floor_map=after)
-    return Outcome(edited(resting, project, Edit(NAMES[editor.tool], sender)))
-
-
-def _with_shape(floor_map: FloorMap | None, editor: Editor, corners: FloatArray) -> FloorMap:
-    match editor.tool:
-        case Tool.WALL:
-            return draw_wall(floor_map, corners, editor.pen.thickness)
-        case Tool.OBSTACLE:
-            return draw_obstacle(floor_map, corners)
-        case Tool.ERASE if floor_map is not None:
-            return fill(floor_map, corners, UNKNOWN if editor.pen.to_unknown else FREE)
-        case Tool.ERASE:
+    def changed(self, floor_map: FloorMap | None, corners: FloatArray, pen: MapPen) -> FloorMap:
+        """Return the map with the area free or unknown."""
+        if floor_map is None:
             raise UsageError("the project has no floor map to erase in; expected one")
-        case _:
-            raise UsageError(f"the tool {editor.tool} draws no shape; expected Erase, Wall or Obstacle")
+        return fill(floor_map, corners, UNKNOWN if pen.to_unknown else FREE)
 
 
-def finished(state: AppState, sender: Sender) -> Outcome:
-    """Return what follows from Enter: the shape of the points clicked so far."""
-    editor = editor_of(state, sender.browser)
-    if editor.tool not in FEWEST:
-        return Outcome(state)
-    if len(set(editor.draft)) < FEWEST[editor.tool]:
-        wanted, found = FEWEST[editor.tool], len(set(editor.draft))
-        raise UsageError(f"{found} points were clicked; expected {wanted} or more to {NAMES[editor.tool]}")
-    return drawn(state, sender, editor.draft)
+@dataclass(frozen=True, slots=True)
+class ObstacleTool(AreaTool):
+    """Draws obstacles."""
+
+    name = "Obstacle"
+    makes = "obstacle"
+    does = "draw obstacle"
+
+    def changed(self, floor_map: FloorMap | None, corners: FloatArray, pen: MapPen) -> FloorMap:  # noqa: ARG002
+        """Return the map with the area occupied."""
+        return draw_obstacle(floor_map, corners)
 
 
-def with_point(alignment: AlignmentDraft, place: Point) -> AlignmentDraft:
-    """Return the points after a click: A, then B, then the nearer one is moved and keeps what was typed for it."""
-    points = alignment.points
-    if len(points) < 2:
-        return replace(alignment, points=(*points, NamedPoint(place, place)))
-    nearer = min((0, 1), key=lambda index: math.dist(points[index].at, place))
-    old = points[nearer]
-    new = replace(old, at=place, plant=place if old.plant == old.at else old.plant)
-    return replace(alignment, points=tuple(new if point is old else point for point in points))
+@dataclass(frozen=True, slots=True)
+class WallTool(ShapeTool):
+    """Draws walls."""
+
+    name = "Wall"
+    makes = "wall"
+    does = "draw wall"
+    fewest = 2
+
+    def changed(self, floor_map: FloorMap | None, corners: FloatArray, pen: MapPen) -> FloorMap:
+        """Return the map with a wall along the points."""
+        return draw_wall(floor_map, corners, pen.thickness)
+
+    def hint(self, state: AppState, browser: int) -> str:
+        """Say how thick the wall is, and how many points there are."""
+        thickness = f"{1000.0 * state.of_browser(browser, MapPen).thickness:g} mm thick"
+        return f"Wall, {thickness}: click its points{self.so_far()} &nbsp; (Esc ends)"
+
+    def sketch(self, state: AppState, browser: int) -> list[FloatArray]:
+        """Return the middle line and both sides."""
+        if len(self.points) < 2:
+            return []
+        points = np.array(self.points)
+        return [points, *wall_sides(points, state.of_browser(browser, MapPen).thickness)]
 
 
-def alignment_of(draft: AlignmentDraft) -> Alignment | None:
-    """Return how the points move the map; none before there are two that say so."""
-    if len(draft.points) < 2:
-        return None
-    try:
-        a, b = (KnownPoint(point.at, point.plant) for point in draft.points)
-        return align(a, b)
-    except UsageError:
-        return None
+def wall_sides(points: FloatArray, thickness: float) -> list[FloatArray]:
+    """Return the outlines of the straight pieces of a wall along (N, 2) points [m]."""
+    sides: list[FloatArray] = []
+    for start, end in itertools.pairwise(points):
+        length = float(np.hypot(*(end - start)))
+        if length > 0.0:
+            across = 0.5 * thickness / length * np.array([start[1] - end[1], end[0] - start[0]])
+            corners = (start + across, end + across, end - across, start - across, start + across)
+            sides.append(np.array(corners))
+    return sides
 
 
-def align_map(state: AppState, sender: Sender) -> Outcome:
-    """Return what follows from moving and turning the map: one undo step, and everybody sees it whole."""
-    editor = editor_of(state, sender.browser)
-    draft = editor.alignment
-    if len(draft.points) < 2:
-        raise UsageError(f"{len(draft.points)} points were clicked; expected A and B")
-    a, b = (KnownPoint(point.at, point.plant) for point in draft.points)
-    found = align(a, b)
-    project = aligned(state.project, found, everything=draft.everything)
-    names = " and ".join(point.name or letter for letter, point in zip("AB", draft.points, strict=True))
-    resting = state.with_browser(sender.browser, replace(editor, tool=Tool.SELECT, alignment=AlignmentDraft()))
-    after = edited(resting, project, Edit(f"align to {names}", sender))
-    told = f"aligned to {names}, each {abs(500.0 * found.residual):.0f} mm off"
-    if found.share > DOUBTFUL:
-        told += f"; that is {100.0 * found.share:.1f} % of their distance: look at the points and their numbers"
-    if draft.everything and state.part(RunState).source is not None:
-        told += "; what drives does so in the old coordinates: start it again"
-    told_them = Tell(told, failed=found.share > DOUBTFUL)
-    return Outcome(after, (told_them, PlaceCamera(Camera.FIT, everywhere=True)))
+@dataclass(frozen=True, slots=True)
+class CalibrateTool(Tool):
+    """Takes two points of an image whose scale is not known; it comes with such an image."""
+
+    name = "Calibrate"
+
+    def clicked(self, state: AppState, click: ClickFloor, sender: Sender) -> Outcome:
+        """Take a point of the image; without one the tool is put away."""
+        loading = state.part(MapLoading)
+        if loading.draft is None:
+            return Outcome(with_tool(state, sender, None))
+        return Outcome(state.with_part(replace(loading, draft=loading.draft.clicked(click.place))))
+
+    def hint(self, state: AppState, browser: int) -> str:  # noqa: ARG002 - the tool's
+        """Say what is clicked."""
+        return "Image: click two points of known distance, far apart; then type it on the left &nbsp; (Esc ends)"

@@ -15,8 +15,8 @@ from commission.app.base.rows import Rows
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing.actions import ChooseTool
-from commission.app.editing.editor import Tool
 from commission.app.placement.actions import AcceptLayout, AskLayout, CountRoute, DiscardLayout, FreeAreas, SetLayout
+from commission.app.placement.keep_out_tool import KeepOutTool
 from commission.app.placement.service import LAYOUT
 from commission.app.placement.view import LayoutView
 from commission.app.placement.wish import LayoutWish
@@ -108,7 +108,7 @@ class LayoutPanel(BasePanel):
         areas.on_click(
             posting(
                 self._post,
-                lambda event: ChooseTool(Tool.KEEP_OUT) if event.target.value == DRAW else FreeAreas(None),
+                lambda event: ChooseTool(KeepOutTool()) if event.target.value == DRAW else FreeAreas(None),
             )
         )
 

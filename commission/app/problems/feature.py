@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from commission.app.base.feature import PROBLEMS, Docked, Feature
+from commission.app.base.feature import PROBLEMS, ROUTE, Docked, Feature
+from commission.app.problems import reducer
 from commission.app.problems.inspection import Inspection
 from commission.app.problems.problems_panel import ProblemsPanel
+from commission.app.problems.route_plots import RoutePlots
 from commission.app.problems.violation_layer import ViolationLayer
 
 FEATURE = Feature(
     "problems",
+    reducers=(reducer,),
     services=(Inspection,),
     layers=(ViolationLayer,),
-    panels=(Docked(lambda at: ProblemsPanel(at.gui, at.post, at.container), PROBLEMS),),
+    panels=(
+        Docked(lambda at: ProblemsPanel(at.gui, at.post, at.container), PROBLEMS),
+        Docked(lambda at: RoutePlots(at.gui, at.browser), ROUTE, own=True),
+    ),
 )

@@ -57,7 +57,8 @@ class Inspection(Service):
 
     def parts(self, *, slowly: bool) -> tuple[object, ...]:  # noqa: ARG002 - the protocol's
         """Return what was found."""
-        return (InspectionView(self.problems, self.violations, self.profiles),)
+        view = InspectionView(self.problems, self.violations, self.profiles)
+        return (view,) if self._found is None else (view, self._found)
 
     def _take_results(self) -> None:
         """Sort what was found; what failed leaves what there was before."""

@@ -9,7 +9,7 @@ from commission.app.base.actions import ClearFaults
 from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
-from commission.app.editing.actions import ShowProblem
+from commission.app.problems.actions import ShowProblem
 from commission.app.problems.view import inspection_of
 from commission.studies.problems import Problem, Severity
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from commission.app.base.feature import RUN, TIME, Docked, Feature
+from commission.app.base.feature import RUN, SELECTION, TIME, Docked, Feature
 from commission.app.run import reducer
 from commission.app.run.accumulated_layer import AccumulatedLayer
 from commission.app.run.badge import Badge
 from commission.app.run.detection_layer import DetectionLayer
 from commission.app.run.gate_layer import GateLayer
+from commission.app.run.now_panel import NowPanel
 from commission.app.run.plots import Plots
 from commission.app.run.run_panel import RunPanel
 from commission.app.run.scan_layer import ScanLayer
@@ -34,6 +35,7 @@ FEATURE = Feature(
     ),
     panels=(
         Docked(lambda at: Badge(at.gui), None, 10),
+        Docked(lambda at: NowPanel(at.gui, at.browser), SELECTION, 60, own=True),
         Docked(lambda at: RunPanel(at.gui, at.post, at.state), RUN),
         Docked(lambda at: TimeLine(at.gui, at.post, at.state.part(RunState).speed), TIME, 10),
         Docked(lambda at: Plots(at.gui), TIME, 20),

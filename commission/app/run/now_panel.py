@@ -6,8 +6,10 @@ import math
 
 from viser import GuiApi
 
+from commission.app.base.inputs import show
 from commission.app.base.panel import BasePanel, table
 from commission.app.base.view import PageView
+from commission.app.editing.editor import editor_of
 from commission.app.run.view import RunView
 from commission.localization.estimate import Mode, Status
 from commission.site.parameters import SupervisorParameters
@@ -55,24 +57,17 @@ def rows(run: RunView, limits: SupervisorParameters) -> list[tuple[str, str]]:
 
 
 class NowPanel(BasePanel):
-    """Numbers of the newest cycle."""
+    """Numbers of the newest cycle, as long as a browser has nothing selected whose values take the room."""
 
-    def __init__(self, gui: GuiApi) -> None:
+    def __init__(self, gui: GuiApi, browser: int) -> None:
+        self._browser = browser
         self._html = gui.add_html("<div class='c-note'>Numbers appear with the first scan.</div>")
-
-    @property
-    def visible(self) -> bool:
-        """Whether they are shown."""
-        return self._html.visible
-
-    @visible.setter
-    def visible(self, visible: bool) -> None:
-        if self._html.visible is not visible:
-            self._html.visible = visible
 
     def draw_slowly(self, view: PageView) -> None:
         """Show the numbers."""
+        is_shown = not editor_of(view.state, self._browser).has_selection
+        show(self._html, visible=is_shown)
         run = view.part(RunView)
-        if run is not None:
+        if run is not None and is_shown:
             shown = table(rows(run, view.state.project.parameters.supervisor))
             self._html.content = f"<div class='c-now' style='padding:2px 14px 2px 6px'>{shown}</div>"

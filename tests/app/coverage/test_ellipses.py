@@ -17,7 +17,7 @@ from commission.app.coverage.heat_legend import ellipse_note
 from commission.app.coverage.service import CoverageService
 from commission.app.coverage.settings import CoverageSettings
 from commission.app.editing.actions import ChooseTool
-from commission.app.editing.editor import Tool
+from commission.app.editing.site_tools import MeasureTool
 from commission.geometry.gaussian import ellipse_axes
 from commission.planning.dilution import Heading
 from commission.progress import silent
@@ -99,7 +99,7 @@ def test_a_click_on_the_heatmap_leaves_an_ellipse_and_one_on_a_reflector_does_no
 
 
 def test_a_click_of_another_tool_reads_nothing(project: Project) -> None:
-    plan = after(project, SetCoverage("figure", "visible"), ChooseTool(Tool.MEASURE), ReadFloor((2.0, 2.0), 0.1))
+    plan = after(project, SetCoverage("figure", "visible"), ChooseTool(MeasureTool()), ReadFloor((2.0, 2.0), 0.1))
     assert plan.probe is None
     assert plan.spots == ()
 

@@ -10,7 +10,9 @@ from commission.app.base.actions import ClickFloor, DragFloor, Envelope, Leave
 from commission.app.base.effects import FlyTo, Tell
 from commission.app.base.state import AppState
 from commission.app.editing import actions
-from commission.app.editing.editor import ControlPoint, Editor, Snapping, Tool, measurement
+from commission.app.editing.editor import ControlPoint, Editor, Snapping
+from commission.app.editing.site_tools import MeasureTool, PlaceTool, RouteTool, StationTool, measurement
+from commission.app.editing.tool import Tool
 from commission.errors import UsageError
 from commission.site.reflectors import Reflector
 from commission.site.routes import Direction
@@ -18,6 +20,7 @@ from tests.app.asking import ME, OTHER, after, by, joined
 from tests.app.sites import room
 
 REACH = 0.15
+PLACE = PlaceTool()
 RADIUS = 0.04
 
 
@@ -37,7 +40,7 @@ def drag(start: tuple[float, float], end: tuple[float, float], *, add: bool = Fa
     return tuple(DragFloor(phase, start, now, REACH, add) for phase, now in steps)
 
 
-def place(tool: Tool = Tool.PLACE, browser: int = ME) -> Envelope:
+def place(tool: Tool = PLACE, browser: int = ME) -> Envelope:
     return by(browser, actions.ChooseTool(tool))
 
 
@@ -163,8 +166,8 @@ def test_editing_nothing_is_refused_with_what_is_expected(state: AppState) -> No
 
 def test_each_browser_has_its_own_selection_and_tool(state: AppState) -> None:
     result = after(state, place(), click(0.25, 2.0, browser=OTHER)).state
-    assert editor(result).tool is Tool.PLACE
-    assert editor(result, OTHER).tool is Tool.SELECT
+    assert isinstance(editor(result).tool, PlaceTool)
+    assert editor(result, OTHER).tool is None
     assert editor(result, OTHER).selected == ("R1",)
     assert OTHER not in after(result, by(OTHER, Leave())).state.browsers
 
@@ -189,7 +192,7 @@ def test_a_selection_survives_what_another_browser_deletes(state: AppState) -> N
 
 def test_a_route_is_drawn_by_clicks_and_its_points_are_dragged(state: AppState) -> None:
     clicks = [click(x, y) for x, y in ((1.0, 5.0), (3.0, 5.0), (4.0, 6.0), (6.0, 6.0))]
-    drawn = after(state, place(Tool.ROUTE), *clicks, actions.FinishRoute()).state
+    drawn = after(state, place(RouteTool()), *clicks, actions.Finish()).state
     route = drawn.project.routes[-1]
     assert editor(drawn).point == ControlPoint(route.name)
     assert drawn.undo[-1].name == f"draw {route.name}"
@@ -224,7 +227,7 @@ def test_a_control_point_is_inserted_without_bending_the_curve_and_deleted_again
 
 
 def test_a_measurement_says_distance_bearing_dx_and_dy_and_snaps_to_centers(state: AppState) -> None:
-    result = after(state, place(Tool.MEASURE), click(0.3, 2.05), click(3.25, 6.0)).state
+    result = after(state, place(MeasureTool()), click(0.3, 2.05), click(3.25, 6.0)).state
     found = measurement(editor(result))
     assert found is not None
     assert (found.dx, found.dy) == (3.0, 4.0)
@@ -235,19 +238,19 @@ def test_a_measurement_says_distance_bearing_dx_and_dy_and_snaps_to_centers(stat
 
 def test_a_measurement_snaps_to_the_corners_of_walls_and_to_stations(state: AppState) -> None:
     # The room's inner corner, and the pillar that begins at x 7.5 m, y 3.5 m; cells of 50 mm.
-    result = after(state, place(Tool.MEASURE), click(0.2, 0.1), click(7.45, 3.58)).state
-    assert editor(result).measured == (pytest.approx((0.15, 0.15)), pytest.approx((7.5, 3.5)))
-    stationed = after(state, place(Tool.STATION), click(3.0, 5.0), place(Tool.MEASURE), click(3.1, 5.05)).state
-    assert editor(stationed).measured == ((3.0, 5.0),)
+    result = after(state, place(MeasureTool()), click(0.2, 0.1), click(7.45, 3.58)).state
+    assert editor(result).points == (pytest.approx((0.15, 0.15)), pytest.approx((7.5, 3.5)))
+    stationed = after(state, place(StationTool()), click(3.0, 5.0), place(MeasureTool()), click(3.1, 5.05)).state
+    assert editor(stationed).points == ((3.0, 5.0),)
     assert editor(stationed).last_click == (3.1, 5.05)
 
 
 def test_escape_drops_what_is_half_done_then_the_tool_then_the_selection(state: AppState) -> None:
-    drawing = after(state, click(0.25, 2.0), place(Tool.ROUTE), click(1.0, 1.0)).state
+    drawing = after(state, click(0.25, 2.0), place(RouteTool()), click(1.0, 1.0)).state
     first = after(drawing, actions.Cancel()).state
-    assert (editor(first).draft, editor(first).tool) == ((), Tool.ROUTE)
+    assert (editor(first).points, editor(first).tool) == ((), RouteTool())
     second = after(first, actions.Cancel()).state
-    assert (editor(second).tool, editor(second).selected) == (Tool.SELECT, ("R1",))
+    assert (editor(second).tool, editor(second).selected) == (None, ("R1",))
     assert editor(after(second, actions.Cancel()).state).selected == ()
 
 

@@ -13,12 +13,14 @@ from commission.app.base.server import start_server
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing import actions
-from commission.app.editing.editor import ControlPoint, Editor, Tool
+from commission.app.editing.editor import ControlPoint, Editor
 from commission.app.editing.route_table import RouteTable
+from commission.app.editing.site_tools import StationTool
 from commission.app.editing.station_actions import AlignStation, DeleteStation, SelectStation, SetStation
 from commission.app.editing.station_gestures import heading_tip
 from commission.app.editing.station_layer import StationLayer
 from commission.app.editing.tool_hint import hint
+from commission.app.problems.actions import ShowProblem
 from commission.errors import UsageError
 from commission.site.stations import Station
 from commission.studies.problems import Problem, Severity, Subject
@@ -45,13 +47,13 @@ def drag(start: tuple[float, float], end: tuple[float, float]) -> tuple[DragFloo
 @pytest.fixture
 def state() -> AppState:
     project = room()
-    return after(joined(AppState(project, project, folder=Path("hall"))), actions.ChooseTool(Tool.STATION))
+    return after(joined(AppState(project, project, folder=Path("hall"))), actions.ChooseTool(StationTool()))
 
 
 @pytest.fixture
 def placed(state: AppState) -> AppState:
     """One station in the open, selected."""
-    return after(state, click(3.0, 5.0), actions.ChooseTool(Tool.SELECT))
+    return after(state, click(3.0, 5.0), actions.ChooseTool(None))
 
 
 def station(state: AppState, index: int = -1) -> Station:
@@ -99,7 +101,7 @@ def test_while_it_is_dragged_the_page_says_where_it_would_stand(placed: AppState
     begin, _ = drag((3.0, 5.0), (4.0, 6.0))
     on = DragFloor("update", (3.0, 5.0), (4.0, 6.0), REACH)
     dragging = after(placed, begin, on)
-    assert hint(dragging.project, editor(dragging)) == "Station 1 to x 4.000 m, y 6.000 m, heading 0.0°"
+    assert hint(dragging, ME) == "Station 1 to x 4.000 m, y 6.000 m, heading 0.0°"
 
 
 def test_name_pose_and_accuracy_are_typed_and_typing_is_one_step(placed: AppState) -> None:
@@ -116,11 +118,11 @@ def test_name_pose_and_accuracy_are_typed_and_typing_is_one_step(placed: AppStat
     with pytest.raises(ValueError, match="required_accuracy"):
         after(typed, SetStation("required_accuracy", 0.0))
     with pytest.raises(UsageError, match="used already"):
-        after(typed, actions.ChooseTool(Tool.STATION), click(1.0, 6.0), SetStation("name", "Dock"))
+        after(typed, actions.ChooseTool(StationTool()), click(1.0, 6.0), SetStation("name", "Dock"))
 
 
 def test_a_new_station_is_as_accurate_as_the_one_before(placed: AppState) -> None:
-    docks = after(placed, SetStation("required_accuracy", 0.01), actions.ChooseTool(Tool.STATION), click(5, 6))
+    docks = after(placed, SetStation("required_accuracy", 0.01), actions.ChooseTool(StationTool()), click(5, 6))
     assert station(docks).required_accuracy == 0.01
 
 
@@ -160,7 +162,7 @@ def test_a_problem_of_a_station_selects_it_and_flies_there(placed: AppState) -> 
     problem = Problem(
         severity=Severity.ERROR, text="cut", subject=Subject.STATION, ids=("Station 1",), place=(3.0, 5.0)
     )
-    result = outcome(placed, by(OTHER, actions.ShowProblem(problem)))
+    result = outcome(placed, by(OTHER, ShowProblem(problem)))
     assert editor(result.state, OTHER).station == "Station 1"
     assert result.effects == (FlyTo((3.0, 5.0)),)
 

@@ -17,8 +17,8 @@ from commission.app.base.jobs import Job
 from commission.app.base.server import start_server
 from commission.app.base.state import AppState
 from commission.app.base.view import view_of
-from commission.app.editing.editor import AlignmentDraft, NamedPoint
 from commission.app.floor_map import actions
+from commission.app.floor_map.align_tool import AlignTool, NamedPoint
 from commission.app.floor_map.draft import MapDraft, MapFile, MapLoading, MapOptions, Stage, WaitingMap
 from commission.app.floor_map.draft_fields import MOST_LAYERS, MapDraftFields, facts, layers_by_size
 from commission.app.floor_map.draft_layer import INK, PAPER, MapDraftLayer, preview
@@ -149,7 +149,7 @@ def test_names_of_files_are_shown_as_text() -> None:
     assert "<img" not in text
     assert text.count("&lt;img") == 4
     assert all("<img" not in value for _, value in facts(DRAFTS["drawing"]))
-    named = AlignmentDraft((NamedPoint((0.0, 0.0), (0.0, 0.0), NASTY), NamedPoint((9.0, 0.0), (9.0, 0.0))))
+    named = AlignTool(known=(NamedPoint((0.0, 0.0), (0.0, 0.0), NASTY), NamedPoint((9.0, 0.0), (9.0, 0.0))))
     assert "<img" not in alignment_text(named)
 
 
@@ -164,7 +164,7 @@ def test_facts_tell_how_large_a_file_makes_the_hall() -> None:
 def test_the_difference_of_distances_is_told_in_millimetres_with_what_is_allowed() -> None:
     def text(plant: float) -> str:
         a, b = NamedPoint((0.0, 0.0), (0.0, 0.0)), NamedPoint((10.0, 0.0), (plant, 0.0))
-        return alignment_text(AlignmentDraft((a, b)))
+        return alignment_text(AlignTool(known=(a, b)))
 
     assert "+5 mm (0.05 %)" in text(10.005)
     assert "More than 0.2 %" in text(10.05)

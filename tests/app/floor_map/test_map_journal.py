@@ -10,9 +10,11 @@ from commission.app.base import actions as page
 from commission.app.base.actions import PROGRAM, ClickFloor, DragFloor
 from commission.app.base.state import NOTHING_SAVED, AppState
 from commission.app.editing import actions as editing
-from commission.app.editing.editor import Tool
+from commission.app.editing.site_tools import PlaceTool
 from commission.app.floor_map import actions
+from commission.app.floor_map.align_tool import AlignTool
 from commission.app.floor_map.draft import MapFile
+from commission.app.floor_map.tools import EraseTool, ObstacleTool, WallTool
 from commission.app.project.project_folder import ProjectFolder
 from commission.io.journal_replay import restore
 from commission.io.project_file import load_project, open_project
@@ -32,22 +34,22 @@ def hall() -> FloorMap:
 
 WISHES: tuple[page.Action, ...] = (
     actions.MapMade(MapFile(Path("hall.yaml")), hall()),
-    editing.ChooseTool(Tool.WALL),
+    editing.ChooseTool(WallTool()),
     ClickFloor((2.0, 2.0), REACH),
     ClickFloor((6.0, 4.0), REACH),
     editing.Finish(),
-    editing.ChooseTool(Tool.ERASE),
+    editing.ChooseTool(EraseTool()),
     DragFloor("end", (5.0, 3.0), (7.0, 5.0), REACH),
-    editing.ChooseTool(Tool.PLACE),
+    editing.ChooseTool(PlaceTool()),
     ClickFloor((3.0, 6.0), REACH),
-    editing.ChooseTool(Tool.ALIGN),
+    editing.ChooseTool(AlignTool()),
     ClickFloor((1.0, 1.0), REACH),
     ClickFloor((11.0, 1.0), REACH),
     actions.SetPlantPoint(0, (50.0, 7.0)),
     actions.SetPlantPoint(1, (50.0, 17.0)),
     actions.SetAligned(everything=True),
     actions.AlignMap(),
-    editing.ChooseTool(Tool.OBSTACLE),
+    editing.ChooseTool(ObstacleTool()),
     DragFloor("end", (45.0, 10.0), (46.0, 11.0), REACH),
     page.Undo(),
     page.Undo(),

@@ -15,10 +15,14 @@ from commission.app.base.reducer import Outcome
 from commission.app.base.state import MAP_BYTES, AppState
 from commission.app.base.uploads import Upload
 from commission.app.editing import actions as editing
-from commission.app.editing.editor import Editor, MapPen, Tool
+from commission.app.editing.editor import Editor
+from commission.app.editing.tool import Tool
 from commission.app.floor_map import actions
+from commission.app.floor_map.align_tool import AlignTool, NamedPoint
 from commission.app.floor_map.draft import MapDraft, MapFile, MapLoading, ReadOptions
 from commission.app.floor_map.effects import DrawMap, ReadMapFile, StopMapWork
+from commission.app.floor_map.pen import MapPen
+from commission.app.floor_map.tools import CalibrateTool, EraseTool, ObstacleTool, WallTool
 from commission.errors import UsageError
 from commission.io.dxf import Drawing
 from commission.io.image_map import Picture
@@ -46,6 +50,12 @@ def click(x: float, y: float) -> ClickFloor:
 
 def use(tool: Tool) -> editing.ChooseTool:
     return editing.ChooseTool(tool)
+
+
+def known(state: AppState) -> tuple[NamedPoint, ...]:
+    tool = state.of_browser(ME, Editor).tool
+    assert isinstance(tool, AlignTool)
+    return tool.known
 
 
 def cells(state: AppState) -> np.ndarray:
@@ -102,7 +112,7 @@ def test_trouble_leaves_the_project_as_it_is_and_goes_with_the_next_file(state: 
 def test_an_image_is_placed_by_two_clicks_a_distance_and_an_axis(state: AppState) -> None:
     opened = after(state, actions.MapOpened(PLAN, PICTURE, ReadOptions()))
     assert opened.effects == (PlaceCamera(Camera.FIT),)
-    assert opened.state.of_browser(ME, Editor).tool is Tool.CALIBRATE
+    assert isinstance(opened.state.of_browser(ME, Editor).tool, CalibrateTool)
     stage = draft(opened.state).stage
     # The image lies in the middle of the room of 12 x 8 m, where everybody sees it.
     assert stage.pixel_at((6.0, 4.0)) == pytest.approx((100.0, 50.0))
@@ -123,7 +133,7 @@ def test_an_image_is_placed_by_two_clicks_a_distance_and_an_axis(state: AppState
     moved = after(placed, click(*stage.place_of((12.0, 12.0)))).state
     assert [tuple(np.round(p, 6)) for p in draft(moved).pixels] == [(10.0, 90.0), (12.0, 12.0)]
     made = after(placed, actions.MapMade(PLAN, PICTURE.floor_map(placement))).state
-    assert made.of_browser(ME, Editor).tool is Tool.SELECT
+    assert made.of_browser(ME, Editor).tool is None
     assert made.part(MapLoading).draft is None
 
 
@@ -160,19 +170,19 @@ def test_stopping_and_discarding_end_the_work_and_change_nothing(state: AppState
     assert after(opened, actions.StopMapJob()) == Outcome(opened, (StopMapWork(),))
     gone = after(opened, actions.DiscardMap())
     assert gone.effects == (StopMapWork(),)
-    assert (gone.state.part(MapLoading).draft, gone.state.of_browser(ME, Editor).tool) == (None, Tool.SELECT)
+    assert (gone.state.part(MapLoading).draft, gone.state.of_browser(ME, Editor).tool) == (None, None)
     assert gone.state.project is state.project
 
 
 def test_a_wall_is_drawn_by_clicks_and_enter_in_one_undo_step(state: AppState) -> None:
     thick = actions.SetPen(MapPen(thickness=0.2))
-    clicked = after(state, use(Tool.WALL), thick, click(3.0, 2.0), click(5.0, 2.0)).state
+    clicked = after(state, use(WallTool()), thick, click(3.0, 2.0), click(5.0, 2.0)).state
     assert clicked.project is state.project
     drawn = after(clicked, editing.Finish()).state
     assert [step.name for step in drawn.undo] == ["draw wall"]
     assert (cells(drawn)[38:42, 60:100] == OCCUPIED).all()
     assert (cells(state)[38:42, 60:100] == FREE).all()
-    assert (drawn.of_browser(ME, Editor).tool, drawn.of_browser(ME, Editor).draft) == (Tool.WALL, ())
+    assert (drawn.of_browser(ME, Editor).tool, drawn.of_browser(ME, Editor).points) == (WallTool(), ())
     np.testing.assert_array_equal(cells(after(drawn, page.Undo()).state), cells(state))
     np.testing.assert_array_equal(cells(after(drawn, page.Undo(), page.Redo()).state), cells(drawn))
 
@@ -185,58 +195,58 @@ def rectangle(start: tuple[float, float], end: tuple[float, float]) -> tuple[Dra
 def test_clutter_is_erased_by_a_rectangle_and_a_polygon_becomes_an_obstacle(state: AppState) -> None:
     # The room has a pillar at columns 150 to 169 and rows 70 to 83.
     start, update, end = rectangle((7.0, 3.0), (9.0, 5.0))
-    half = after(state, use(Tool.ERASE), start, update).state
+    half = after(state, use(EraseTool()), start, update).state
     assert half.project is state.project
     erased = after(half, end).state
     assert (cells(erased)[70:84, 150:170] == FREE).all()
     assert erased.of_browser(ME, Editor).drag is None
     corners = (click(2.0, 5.0), click(3.0, 5.0), click(3.0, 6.0), click(2.0, 6.0))
-    filled = after(erased, use(Tool.OBSTACLE), *corners, editing.Finish()).state
+    filled = after(erased, use(ObstacleTool()), *corners, editing.Finish()).state
     assert (cells(filled)[100:120, 40:60] == OCCUPIED).all()
     assert [step.name for step in filled.undo] == ["erase", "draw obstacle"]
     unknown = actions.SetPen(MapPen(to_unknown=True))
-    forgotten = after(filled, use(Tool.ERASE), unknown, *rectangle((2.0, 5.0), (3.0, 6.0))).state
+    forgotten = after(filled, use(EraseTool()), unknown, *rectangle((2.0, 5.0), (3.0, 6.0))).state
     assert (cells(forgotten)[100:120, 40:60] == UNKNOWN).all()
 
 
 def test_erasing_where_nothing_is_says_so_and_is_no_step(state: AppState) -> None:
-    result = after(state, use(Tool.ERASE), *rectangle((3.0, 5.0), (4.0, 6.0)))
+    result = after(state, use(EraseTool()), *rectangle((3.0, 5.0), (4.0, 6.0)))
     assert result.state.project is state.project
     assert result.effects == (Tell("nothing to erase there", failed=False),)
 
 
 def test_too_few_points_are_refused_and_kept(state: AppState) -> None:
-    clicked = after(state, use(Tool.OBSTACLE), click(2.0, 5.0), click(3.0, 5.0)).state
-    with pytest.raises(UsageError, match="2 points were clicked; expected 3 or more to draw obstacle"):
+    clicked = after(state, use(ObstacleTool()), click(2.0, 5.0), click(3.0, 5.0)).state
+    with pytest.raises(UsageError, match="2 points were clicked; expected 3 or more to make the obstacle"):
         after(clicked, editing.Finish())
-    assert len(clicked.of_browser(ME, Editor).draft) == 2
-    assert after(clicked, editing.Cancel()).state.of_browser(ME, Editor).draft == ()
+    assert len(clicked.of_browser(ME, Editor).points) == 2
+    assert after(clicked, editing.Cancel()).state.of_browser(ME, Editor).points == ()
 
 
 def test_walls_can_be_drawn_before_there_is_a_map() -> None:
     empty = joined(AppState(Project(name="New"), Project(name="New")))
-    drawn = after(empty, use(Tool.WALL), click(0.0, 0.0), click(10.0, 0.0), editing.Finish()).state
+    drawn = after(empty, use(WallTool()), click(0.0, 0.0), click(10.0, 0.0), editing.Finish()).state
     assert drawn.project.floor_map is not None
     with pytest.raises(UsageError, match="no floor map to erase in"):
-        after(empty, use(Tool.ERASE), *rectangle((0.0, 0.0), (1.0, 1.0)))
+        after(empty, use(EraseTool()), *rectangle((0.0, 0.0), (1.0, 1.0)))
 
 
 def test_points_to_align_by_snap_to_reflectors_and_to_corners_of_walls(state: AppState) -> None:
     # R1 stands at (0.25, 2.0); the pillar's corner lies at (7.5, 3.5).
-    clicked = after(state, use(Tool.ALIGN), click(0.3, 2.05), click(7.55, 3.42)).state
-    assert [point.at for point in clicked.of_browser(ME, Editor).alignment.points] == [
+    clicked = after(state, use(AlignTool()), click(0.3, 2.05), click(7.55, 3.42)).state
+    assert [point.at for point in known(clicked)] == [
         (0.25, 2.0),
         pytest.approx((7.5, 3.5)),
     ]
     again = after(clicked, click(4.0, 4.0)).state
-    assert [point.at for point in again.of_browser(ME, Editor).alignment.points] == [(0.25, 2.0), (4.0, 4.0)]
+    assert [point.at for point in known(again)] == [(0.25, 2.0), (4.0, 4.0)]
 
 
 def aligning(state: AppState, *, everything: bool, stretch: float = 1.0) -> Outcome:
     """Turn the room by a quarter about R1, which comes to lie at (100, 50)."""
     return after(
         state,
-        use(Tool.ALIGN),
+        use(AlignTool()),
         click(0.25, 2.0),
         click(10.25, 2.0),
         # In any order: nothing that was typed gets lost behind what is typed next.
@@ -257,7 +267,7 @@ def test_the_map_is_aligned_in_one_undo_step_alone_or_with_all_that_is_on_it(sta
     np.testing.assert_allclose(together.state.project.reflectors.centers[0], (100.0, 50.0), atol=1e-12)
     assert after(together.state, page.Undo()).state.project is state.project
     assert PlaceCamera(Camera.FIT, everywhere=True) in together.effects
-    assert together.state.of_browser(ME, Editor).tool is Tool.SELECT
+    assert together.state.of_browser(ME, Editor).tool is None
 
 
 def test_a_doubtful_distance_is_told_and_a_wrong_one_refused(state: AppState) -> None:
@@ -272,7 +282,7 @@ def test_maps_of_many_undo_steps_take_bounded_memory_and_all_come_back() -> None
     side = 4000
     first = FloorMap(np.zeros((side, side), np.int8), 0.05)
     project = Project(name="Large", floor_map=first)
-    state = after(joined(AppState(project, project)), use(Tool.OBSTACLE)).state
+    state = after(joined(AppState(project, project)), use(ObstacleTool())).state
     steps = MAP_BYTES // side**2 + 3
     seen = [first]
     for number in range(steps):

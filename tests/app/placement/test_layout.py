@@ -15,7 +15,7 @@ from commission.app.editing.actions import (
     RenameRoute,
     SelectControlPoint,
 )
-from commission.app.editing.editor import ControlPoint, Editor, Tool
+from commission.app.editing.editor import ControlPoint, Editor
 from commission.app.placement.actions import (
     AcceptLayout,
     AskLayout,
@@ -25,6 +25,7 @@ from commission.app.placement.actions import (
     KeepOut,
     SetLayout,
 )
+from commission.app.placement.keep_out_tool import KeepOutTool
 from commission.app.placement.placement_panel import found_text
 from commission.app.placement.reducer import ACCEPT
 from commission.app.placement.service import PlacementService
@@ -121,7 +122,7 @@ def test_demands_that_do_not_exist_or_are_out_of_range_are_refused(project: Proj
 
 def test_an_area_is_drawn_by_a_drag_and_freed_by_a_click_in_it(project: Project) -> None:
     drag = [DragFloor(phase, (4.0, 5.0), (2.0, 7.0), 0.1) for phase in ("start", "update", "end")]
-    state = after(joined(AppState(project, project)), ChooseTool(Tool.KEEP_OUT), *drag)
+    state = after(joined(AppState(project, project)), ChooseTool(KeepOutTool()), *drag)
     assert kept_out(state) == ((2.0, 5.0, 4.0, 7.0),)
     assert [step.name for step in state.undo] == ["keep an area free of reflectors"]
     assert state.of_browser(ME, Editor).selected == ()

@@ -13,7 +13,7 @@ from commission.app.base.actions import ClickFloor, Join, Sender
 from commission.app.base.effects import Effect, Tell
 from commission.app.base.state import NOTHING_SAVED, AppState
 from commission.app.editing import actions as editing
-from commission.app.editing.editor import Tool
+from commission.app.editing.site_tools import PlaceTool
 from commission.app.project.actions import ChangedOnDisk, KeepOther, Reload, RenameProject, Restored, Save, TakeOver
 from commission.app.project.project_folder import ProjectFolder
 from commission.app.project.state import FilesState
@@ -50,7 +50,7 @@ class Kept:
         state = AppState(project=self.project, saved=self.project, folder=folder)
         self.runtime = Runtime(state, [feature for feature in FEATURES if feature.name != "run"])
         self.files = self.runtime.service(ProjectFolder)
-        self.do(Join(), editing.ChooseTool(Tool.PLACE))
+        self.do(Join(), editing.ChooseTool(PlaceTool()))
 
     def start(self) -> None:
         """Begin as the page does."""

@@ -9,7 +9,7 @@ from commission.app.base.server import start_server
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView, view_of
 from commission.app.editing.editor import ControlPoint, Editor
-from commission.app.editing.route_plots import CHARTS, NOTHING, RoutePlots, flags, span, summary
+from commission.app.problems.route_plots import CHARTS, NOTHING, RoutePlots, flags, span, summary
 from commission.app.problems.view import InspectionView
 from commission.app.problems.violation_layer import ViolationLayer
 from commission.planning.route_profile import route_profile

@@ -1,0 +1,95 @@
+"""Buttons and keys of the tools for the site, and what attracts while one places something."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, TypeAlias
+
+from viser import GuiApi
+
+from commission.app.base import theme
+from commission.app.base.actions import Action
+from commission.app.base.inputs import show
+from commission.app.base.panel import BasePanel, Post, posting, write_label
+from commission.app.base.view import PageView
+from commission.app.editing.actions import (
+    Cancel,
+    ChooseSnapping,
+    ChooseTool,
+    DeleteSelected,
+    DuplicateSelected,
+    Finish,
+)
+from commission.app.editing.editor import Snapping, editor_of
+from commission.app.editing.site_tools import SITE_TOOLS, MeasureTool, PlaceTool, RouteTool, StationTool
+from commission.app.editing.tool import Tool
+
+SELECT = "Select"
+"""On the button that puts the tool away."""
+
+Command: TypeAlias = tuple[str, Any, Any, Action]
+"""Label, key and modifier as viser calls them, and what the key asks for."""
+
+COMMANDS: tuple[Command, ...] = (
+    ("Select", "V", None, ChooseTool(None)),
+    ("Place reflectors", "R", None, ChooseTool(PlaceTool())),
+    ("Draw a route", "T", None, ChooseTool(RouteTool())),
+    ("Place stations", "K", None, ChooseTool(StationTool())),
+    ("Measure", "M", None, ChooseTool(MeasureTool())),
+    ("Finish what is drawn", "enter", None, Finish()),
+    ("Cancel", "escape", None, Cancel()),
+    ("Delete the selection", "delete", None, DeleteSelected()),
+    ("Duplicate the selection", "D", "cmd/ctrl+shift", DuplicateSelected()),
+)
+
+
+class ToolButtons(BasePanel):
+    """A row of buttons, and keys for what the hand does most."""
+
+    def __init__(self, gui: GuiApi, post: Post) -> None:
+        gui.add_html(theme.WIDE.replace("c-wide", "c-wide c-tools"))
+        named: dict[str, Tool | None] = {SELECT: None, **{tool.name: tool for tool in SITE_TOOLS}}
+        buttons = gui.add_button_group("", tuple(named))
+        buttons.on_click(posting(post, lambda event: ChooseTool(named[event.target.value])))
+        for label, key, modifier, action in COMMANDS:
+            command = gui.add_command(label, hotkey=key, modifier=modifier)
+            command.on_trigger(posting(post, lambda _event, action=action: action))
+
+
+class FinishButton(BasePanel):
+    """Makes something of the points that were clicked, once there are enough."""
+
+    def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
+        self._browser = browser
+        self._finish = gui.add_button("Finish the route", visible=False, hint="Make it of the points clicked (Enter).")
+        self._finish.on_click(posting(post, lambda _event: Finish()))
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Follow the tool in use."""
+        tool = editor_of(view.state, self._browser).tool
+        is_enough = tool is not None and bool(tool.makes) and len(tool.points) >= tool.fewest
+        show(self._finish, visible=is_enough)
+        if tool is not None and is_enough:
+            write_label(self._finish, f"Finish the {tool.makes}")
+
+
+class SnappingPanel(BasePanel):
+    """What attracts a reflector that is placed or dragged."""
+
+    def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
+        self._browser = browser
+        self._snapping = Snapping()
+        self._walls = gui.add_checkbox("To walls", True, hint="Against the nearest wall, a flat plate facing away.")
+        self._neighbors = gui.add_checkbox("To neighbors", False, hint="Onto rows and columns of other reflectors.")
+        self._grid = gui.add_number("Grid [m]", 0.0, min=0.0, max=100.0, step=0.01, hint="0: no grid.")
+        for widget in (self._walls, self._neighbors, self._grid):
+            widget.on_update(posting(post, lambda _event: self._chosen()))
+
+    def _chosen(self) -> ChooseSnapping:
+        """Return the action of the widgets together."""
+        walls, neighbors, grid = self._walls.value, self._neighbors.value, float(self._grid.value)
+        return ChooseSnapping(replace(self._snapping, walls=walls, neighbors=neighbors, grid=grid))
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Follow the editor."""
+        self._snapping = editor_of(view.state, self._browser).snapping

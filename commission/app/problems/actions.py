@@ -1,0 +1,16 @@
+"""What a person can ask for about problems of the site, as frozen values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from commission.app.base.actions import Action
+from commission.studies.problems import Problem
+
+
+@dataclass(frozen=True, slots=True)
+class ShowProblem(Action):
+    """Select what a problem is about and go to its place."""
+
+    problem: Problem
+    """Which one."""
