@@ -82,10 +82,12 @@ def read(port: int, seconds: float) -> None:
             with suppress(OSError, WebSocketException, TimeoutError):
                 reader = RawClient(Address(port))  # type: ignore[arg-type]
                 leaves_at = min(end, time.monotonic() + chance.uniform(2.0, 20.0))
-                while time.monotonic() < leaves_at:
-                    reader.hear(2.0)
-                    reader.heard.clear()
-                reader.close()
+                try:
+                    while time.monotonic() < leaves_at:
+                        reader.hear(max(leaves_at - time.monotonic(), 0.1))
+                        reader.heard.clear()
+                finally:
+                    reader.close()
 
     threads = [threading.Thread(target=come_and_go, args=(seed,)) for seed in range(READERS)]
     for thread in threads:
