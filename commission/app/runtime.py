@@ -293,7 +293,8 @@ def _reported(error: Exception, sender: Sender) -> Report:
     log.error("a fault on the page", exc_info=error)
     kind = type(error).__name__
     listed = f"a fault of the program ({kind}); its log says where"
-    return Report(str(error) if is_value else f"{kind}: {error}", listed=listed)
+    text = str(error) if is_value else f"a fault of the program ({kind}: {error}); its log says where"
+    return Report(text, listed=listed)
 
 
 def _sender_of(message: Message) -> Sender:

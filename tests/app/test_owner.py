@@ -211,7 +211,7 @@ def test_an_error_while_an_error_is_told_is_logged(owner: Owner, caplog: pytest.
 def test_what_fails_at_every_turn_is_told_once_in_five_seconds(owner: Owner, monkeypatch: pytest.MonkeyPatch) -> None:
     owner.broken.add("follow")
     time.sleep(0.5)
-    assert owner.window.told == [(None, "RuntimeError: follow is broken")]
+    assert owner.window.told == [(None, "a fault of the program (RuntimeError: follow is broken); its log says where")]
     monkeypatch.setattr(runtime_module, "SAME_FAULT_AFTER_S", 0.0)
     owner.until(lambda: len(owner.window.told) > 1)
 

@@ -341,4 +341,7 @@ class Jobs:
 def _one_line(problem: Exception) -> str:
     """What went wrong, for the user; the class's name helps where the text was not written by us."""
     text = " ".join(str(problem).split())
-    return text if text and isinstance(problem, CommissionError) else f"{type(problem).__name__}: {text}".rstrip(": ")
+    if text and isinstance(problem, CommissionError):
+        return text
+    named = f"{type(problem).__name__}: {text}".rstrip(": ")
+    return f"a fault of the program ({named}); its log says where"
