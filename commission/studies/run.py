@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.localization import whole_run
 from commission.localization.detection_log import cycle_stamps
 from commission.localization.estimate import Mode, Status
 from commission.localization.run_columns import RunColumns, Segment
@@ -27,6 +28,7 @@ from commission.studies.metrics import (
     FailEpisode,
     error_statistics,
     fail_episodes,
+    nees,
     pose_errors,
     reference_at,
 )
@@ -60,17 +62,40 @@ class RunInput:
         """
         return RunInput(log=log, start=start, segments=(Segment(0, LocalizerSetup.of(project)),))
 
-    def from_here_on(self, cycle: int, setup: LocalizerSetup, *, covered: bool = False) -> RunInput:
-        """Return the input of the same run up to a cycle, and of another setup from it on.
+    def with_setup(self, setup: LocalizerSetup, first: int = 0) -> RunInput:
+        """Return the input of the same run with another setup from a cycle on; what is covered stays covered.
 
         Parameters
         ----------
-        cycle : first one with the other setup.
         setup : the other setup.
-        covered : whether its reflectors are covered.
+        first : first cycle with it.
         """
-        before = tuple(segment for segment in self.segments if segment.first < cycle)
-        return RunInput(log=self.log, start=self.start, segments=(*before, Segment(cycle, setup, covered)))
+        return self._changed(first, lambda segment: replace(segment, setup=setup))
+
+    def with_cover(self, first: int, *, covered: bool) -> RunInput:
+        """Return the input of the same run with all reflectors covered, or none, from a cycle on; setups stay.
+
+        Parameters
+        ----------
+        first : first cycle of that.
+        covered : whether all reflectors are covered.
+        """
+        return self._changed(first, lambda segment: replace(segment, covered=covered))
+
+    def segment(self, cycle: int) -> Segment:
+        """Return the segment of a cycle."""
+        return next(segment for segment in reversed(self.segments) if segment.first <= cycle)
+
+    def _changed(self, first: int, change: Callable[[Segment], Segment]) -> RunInput:
+        """Change all segments from a cycle on; where one no longer differs from the one before, they are one."""
+        split = (*(s for s in self.segments if s.first < first), replace(self.segment(first), first=first))
+        later = (segment for segment in self.segments if segment.first > first)
+        changed = [change(segment) if segment.first >= first else segment for segment in (*split, *later)]
+        kept = [changed[0]]
+        for segment in changed[1:]:
+            if (segment.setup, segment.covered) != (kept[-1].setup, kept[-1].covered):
+                kept.append(segment)
+        return replace(self, segments=tuple(kept))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -89,6 +114,8 @@ class RunResult:
     """(K, 3) reference pose at each cycle [m, m, rad], map frame; NaN where there is none."""
     errors: FloatArray
     """(K, 3) estimate minus reference [m, m, rad], map frame; NaN where there is none."""
+    position_errors: FloatArray
+    """(K,) distance to the reference [m]; NaN where there is none."""
     two_sigma: FloatArray
     """(K, 3) 2-sigma of x [m], y [m] and heading [rad] after each cycle."""
     counts: IntArray
@@ -106,11 +133,6 @@ class RunResult:
     def cycles(self) -> int:
         """Number of scans processed."""
         return len(self.columns)
-
-    @property
-    def position_errors(self) -> FloatArray:
-        """(K,) distance to the reference [m]; NaN where there is none."""
-        return np.hypot(self.errors[:, 0], self.errors[:, 1])
 
     @property
     def operational_fraction(self) -> float:
@@ -166,6 +188,13 @@ class RunResult:
     def count(self, status: Status) -> int:
         """Return the number of detections of one status."""
         return int(self.counts[:, status].sum())
+
+
+def warm_up() -> None:
+    """Compile everything that a run needs."""
+    whole_run.warm_up()
+    nees(np.zeros((1, 3)), np.eye(3)[np.newaxis])
+    nees(np.zeros((1, 2)), np.eye(2)[np.newaxis])
 
 
 def judged_run(
@@ -230,6 +259,7 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
         times=read_only(times),
         references=read_only(references),
         errors=read_only(errors),
+        position_errors=read_only(np.hypot(errors[:, 0], errors[:, 1])),
         two_sigma=read_only(two_sigma_of(columns.covariances)),
         counts=read_only(np.stack([columns.counts(status) for status in Status], axis=1)),
         nis=read_only(largest_nis(columns)),

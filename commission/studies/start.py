@@ -30,6 +30,7 @@ class StartOrigin(StrEnum):
     GIVEN = "as given"
     REFERENCE = "first reference pose"
     ROUTE = "start of the first route"
+    DRIVE = "start of the virtual drive"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

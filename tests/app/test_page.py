@@ -1,5 +1,6 @@
 """Handlers of the page on a real server, without a browser: what a person's click posts, and what is drawn."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -20,16 +21,16 @@ from commission.app.project.top_bar import title
 from commission.app.run.actions import Seek
 from commission.app.run.badge import badge_text
 from commission.app.run.now_panel import rows
+from commission.app.run.playback import Playback
 from commission.app.run.run_panel import NO_ROUTE, RunPanel
-from commission.app.run.session import Drive, Session
-from commission.app.run.time_line import strip
 from commission.app.run.vehicle_layer import VehicleLayer
+from commission.app.run.view import RunView
 from commission.app.tune.reducer import parameter, with_parameter
 from commission.app.tune.tune_panel import KNOBS, SWITCHES, TunePanel, meant, shown
-from commission.localization.estimate import Mode
-from commission.localization.setup import LocalizerSetup
+from commission.localization.estimate import Mode, Status
 from commission.site.presets import SCANNERS, ScannerPreset
 from commission.site.project import Project
+from commission.studies.run import RunResult
 from tests.app.asking import FEATURES, taking
 
 NASTY = "<script>alert('hall')</script>"
@@ -43,12 +44,11 @@ def server():
 
 
 @pytest.fixture
-def session(drive: Drive, project: Project) -> Session:
-    session = Session(drive, LocalizerSetup.of(project))
-    session.seek(3.0)
-    while session.seeking is not None:
-        session.advance(0.0)
-    return session
+def run(result: RunResult) -> RunView:
+    """The run three seconds after its start."""
+    playback = Playback(result)
+    playback.seek(3.0)
+    return playback.view(covered=False)
 
 
 def change(widget: Any, value: Any, client: object | None) -> None:
@@ -58,13 +58,13 @@ def change(widget: Any, value: Any, client: object | None) -> None:
         callback(SimpleNamespace(client=client, client_id=None, target=widget))
 
 
-def test_the_whole_page_is_built_and_draws_a_run(server: viser.ViserServer, project: Project, session: Session) -> None:
+def test_the_whole_page_is_built_and_draws_a_run(server: viser.ViserServer, project: Project, run: RunView) -> None:
     state = AppState(project, project)
     page = Page(server, lambda _action: None, state, FEATURES)
     page.show_site(state)
-    page.draw(view_of(state, session.view()), slowly=True)
+    page.draw(view_of(state, run), slowly=True)
     hidden = replace(state, hidden=frozenset({"Scan"}))
-    page.draw(view_of(hidden, session.view()), slowly=True)
+    page.draw(view_of(hidden, run), slowly=True)
 
 
 def test_the_page_stands_before_any_run_exists(server: viser.ViserServer) -> None:
@@ -123,8 +123,8 @@ def test_names_from_files_are_never_read_as_html(project: Project) -> None:
     assert "<script" not in escaped(NASTY)
 
 
-def test_the_badge_says_operational_fail_or_that_nothing_runs(session: Session, project: Project) -> None:
-    state, run = AppState(project, project), session.view()
+def test_the_badge_says_operational_fail_or_that_nothing_runs(run: RunView, project: Project) -> None:
+    state = AppState(project, project)
     assert badge_text(view_of(state))[0] == "NO RUN"
     assert badge_text(view_of(state, run))[0] == "OPERATIONAL"
     word, beside, _ = badge_text(view_of(state, replace(run, mode=Mode.FAIL)))
@@ -137,17 +137,26 @@ def test_what_is_being_prepared_is_said_where_the_badge_is(project: Project) -> 
     assert badge_text(view)[:2] == ("PREPARING", "Compiling: &lt;rays&gt; 40%")
 
 
-def test_every_number_of_the_newest_cycle_is_shown(session: Session, project: Project) -> None:
-    run = session.view()
-    shown_rows = dict(rows(run, project.parameters.supervisor))
-    assert shown_rows["Inliers"] == str(run.series.counts[-1, 0])
-    assert shown_rows["Position error"].endswith(" mm")
-
-
-def test_each_fail_episode_is_marked_on_the_time_line(session: Session) -> None:
-    bar = strip(replace(session.view(), episodes=((1.0, 2.0), (5.0, 5.0))))
-    assert bar.count("<rect") == 3
-    assert "data-episodes='2'" in bar
+def test_every_number_of_the_newest_cycle_is_shown(run: RunView, project: Project) -> None:
+    newest, result = run.newest, run.result
+    assert (run.lived, result.times[newest]) == (31, pytest.approx(3.0))
+    estimate = result.columns.estimate(newest)
+    sigmas = 2.0 * np.sqrt(np.diag(estimate.posterior.covariance))
+    x, y, heading = estimate.posterior.mean
+    assert dict(rows(run)) == {
+        "Mode": "operational",
+        "Fail episodes so far": "0",
+        "Position x, y": f"{x:.3f}, {y:.3f} m",
+        "Heading": f"{math.degrees(heading):.2f} °",
+        "2σ x / limit": f"{1000.0 * sigmas[0]:.1f} / 100 mm",
+        "2σ y / limit": f"{1000.0 * sigmas[1]:.1f} / 100 mm",
+        "2σ heading / limit": f"{math.degrees(sigmas[2]):.2f} / 3.0 °",
+        "Inliers": str(estimate.count(Status.INLIER)),
+        "Outliers by beams, gate": "0, 0",
+        "Largest NIS / gate": f"{estimate.d2.max():.2f} / 5.99",
+        "Cycle time": f"{result.microseconds_per_cycle:.1f} µs, mean of the drive",
+        "Position error": f"{1000.0 * math.hypot(*result.errors[newest, :2]):.1f} mm",
+    }
 
 
 def test_times_are_shown_as_minutes_and_hours() -> None:

@@ -27,24 +27,21 @@ from commission.app.run.actions import (
     Source,
     VirtualDrive,
 )
+from commission.app.run.drives import Drive
 from commission.app.run.service import RunService
-from commission.app.run.session import Drive, Session
 from commission.app.run.state import RunState
 from commission.app.run.view import RunView
 from commission.app.runtime import BrowserCame, BrowserLeft, Runtime
 from commission.app.tune.actions import SetParameter
 from commission.errors import FileFormatError
-from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress
 from commission.site.project import Project
 from tests.app.asking import FEATURES, by
 
-EPISODES = ((1.0, 2.0),)
-
 
 def cycles(view: PageView) -> int:
     run = view.part(RunView)
-    return 0 if run is None else len(run.series)
+    return 0 if run is None else run.lived
 
 
 class Pictures:
@@ -108,7 +105,7 @@ class Bench:
         self.runtime = Runtime(AppState(project, project, folder=Path("hall")), self._features())
 
     def _features(self) -> list[Feature]:
-        run = partial(RunService, prepare=self._prepare, predict=self._predict, compile_all=lambda _progress: None)
+        run = partial(RunService, prepare=self._prepare, compile_all=lambda _progress: None)
         others = [feature for feature in FEATURES if feature.name not in ("run", "project")]
         return [
             *others,
@@ -124,12 +121,13 @@ class Bench:
             raise FileFormatError(source.path, "", "not a recording", "a folder with odometry.csv")
         return self.drive
 
-    def _predict(self, _drive: Drive, _setup: LocalizerSetup) -> tuple[tuple[float, float], ...]:
-        return EPISODES
+    @property
+    def run(self) -> RunView | None:
+        return self.runtime.service(RunService).view()
 
     @property
-    def session(self) -> Session | None:
-        return self.runtime.service(RunService).session
+    def lived(self) -> int:
+        return 0 if self.run is None else self.run.lived
 
     def post(self, *asked: Action | Envelope) -> None:
         for each in asked:
@@ -145,7 +143,7 @@ class Bench:
 
     def play(self) -> None:
         self.post(ChooseSource(VirtualDrive("There and back")))
-        self.until(lambda: self.session is not None and self.session.cycles > 0)
+        self.until(lambda: self.lived > 0)
 
 
 @pytest.fixture
@@ -160,11 +158,6 @@ def test_a_chosen_drive_plays_by_itself_and_pictures_follow(bench: Bench) -> Non
     bench.play()
     bench.until(lambda: any(cycles(view) > 3 for view in bench.page.views))
     assert bench.runtime.state.part(RunState).playing
-
-
-def test_the_prediction_of_the_rest_reaches_the_time_line(bench: Bench) -> None:
-    bench.play()
-    bench.until(lambda: bench.session is not None and bench.session.predicted == EPISODES)
 
 
 def test_pictures_come_at_most_25_times_a_second(bench: Bench) -> None:
@@ -204,29 +197,26 @@ def test_a_value_out_of_range_is_told_and_changes_nothing(bench: Bench) -> None:
 def test_of_many_seeks_in_a_row_the_last_one_counts(bench: Bench) -> None:
     bench.play()
     bench.post(Play(playing=False), *(Seek(0.1 * k) for k in range(50)))
-    session = bench.session
-    assert session is not None
-    bench.until(lambda: session.seeking is None and abs(session.view().time - 4.9) < 1e-6)
+    bench.until(lambda: bench.run is not None and abs(bench.run.time - 4.9) < 1e-6)
 
 
 def test_the_drive_stops_at_its_end_or_starts_again(bench: Bench) -> None:
     bench.play()
     bench.post(Repeat(repeat=False), SetSpeed(50.0))
     bench.until(lambda: not bench.runtime.state.part(RunState).playing)
-    session = bench.session
-    assert session is not None and session.at_end
+    assert bench.run is not None
+    assert bench.run.at_end
     bench.post(Repeat(repeat=True), Play(playing=True))
-    bench.until(lambda: not session.at_end)
+    bench.until(lambda: bench.run is not None and 0.0 < bench.run.time < 0.5 * bench.run.duration)
+    assert bench.runtime.state.part(RunState).playing
 
 
 def test_covering_reaches_the_next_scan(bench: Bench) -> None:
     bench.play()
     bench.post(Cover(covered=True))
-    session = bench.session
-    assert session is not None
 
     def sees_nothing() -> bool:
-        estimate = session.view().estimate
+        estimate = None if bench.run is None else bench.run.estimate
         return estimate is not None and len(estimate.status) == 0
 
     bench.until(sees_nothing)
@@ -250,7 +240,7 @@ def test_each_browser_has_its_own_view(bench: Bench) -> None:
 
 def test_a_job_in_sight_is_stopped_by_its_button_and_what_there_was_stays(bench: Bench) -> None:
     bench.play()
-    before = bench.session
+    before = bench.run
     started, end = threading.Event(), threading.Event()
 
     def prepare(_project: Project, _source: Source, progress: Progress) -> Drive:
@@ -268,5 +258,7 @@ def test_a_job_in_sight_is_stopped_by_its_button_and_what_there_was_stays(bench:
     bench.post(actions.StopJob(job.number))
     bench.until(lambda: not bench.page.views[-1].jobs)
     end.set()
-    assert bench.session is before
+    assert bench.run is not None
+    assert before is not None
+    assert bench.run.result is before.result
     assert bench.page.told == []

@@ -150,7 +150,7 @@ def soak(minutes: float) -> Measured:
     server = start_server("127.0.0.1", 0)
     runtime = open_page(server, project, source=VirtualDrive(project.routes[0].name))
     end = time.monotonic() + 120.0
-    while runtime.service(RunService).session is None and time.monotonic() < end:
+    while runtime.service(RunService).view() is None and time.monotonic() < end:
         time.sleep(0.1)
     runtime.post(SetSpeed(SPEED))
     seconds = 60.0 * minutes

@@ -12,7 +12,7 @@ from commission.app.editing.editor import Editor, editor_of
 from commission.app.launch import open_page
 from commission.app.run.actions import Source
 from commission.app.run.service import RunService
-from commission.app.run.session import Session
+from commission.app.run.view import RunView
 from commission.app.runtime import Runtime
 from commission.site.project import Project
 
@@ -36,9 +36,9 @@ class Served:
         return editor_of(self.state, browser)
 
     @property
-    def session(self) -> Session | None:
-        """The run."""
-        return self.runtime.service(RunService).session
+    def view(self) -> RunView | None:
+        """The run as it is now."""
+        return self.runtime.service(RunService).view()
 
     def until(self, reached: Callable[[], bool], seconds: float = 120.0) -> None:
         """Wait until something has happened on the server; compilation may be included."""

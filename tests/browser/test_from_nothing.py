@@ -109,13 +109,12 @@ def draw_the_route(site: NewSite, page: OpenPage, client: int) -> None:
 def drive(site: NewSite, page: OpenPage) -> None:
     page.open_tab("Run")
     page.press("Drive")
-    site.until(lambda: site.session is not None)
+    site.until(lambda: site.view is not None)
     site.runtime.post(SetSpeed(50.0))
-    site.until(lambda: site.session is not None and site.session.at_end)
+    site.until(lambda: site.view is not None and site.view.at_end)
     page.wait_for_text("OPERATIONAL")
-    session = site.session
-    assert session is not None
-    series = session.view().series
-    assert len(series) > 500
-    assert not series.failed.any()
-    assert series.error.max() < 0.1
+    run = site.view
+    assert run is not None
+    assert run.lived == run.result.cycles > 500
+    assert run.result.episodes == ()
+    assert run.result.position_errors.max() < 0.1

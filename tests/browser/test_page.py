@@ -10,9 +10,9 @@ import pytest
 from playwright.sync_api import Browser
 
 from commission.app.base.panel import clock
-from commission.app.run.actions import Cover, Play, Restart, Seek, SetSpeed, VirtualDrive
-from commission.app.run.session import Session
+from commission.app.run.actions import Play, Restart, Seek, SetSpeed, VirtualDrive
 from commission.app.run.state import RunState
+from commission.app.run.view import RunView
 from commission.app.tune.actions import ResetParameters
 from commission.app.tune.reducer import with_parameter
 from commission.site.project import Project
@@ -28,13 +28,13 @@ class OpenRun(Served):
 
     def __init__(self, project: Project) -> None:
         super().__init__(project, source=VirtualDrive(project.routes[0].name))
-        self.until(lambda: super(OpenRun, self).session is not None)
+        self.until(lambda: super(OpenRun, self).view is not None)
 
     @property
-    def session(self) -> Session:
-        session = super().session
-        assert session is not None
-        return session
+    def view(self) -> RunView:
+        view = super().view
+        assert view is not None
+        return view
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,6 @@ def page(browser: Browser, run: OpenRun) -> Iterator[OpenPage]:
 def from_the_start(run: OpenRun, page: OpenPage) -> None:
     """Each test finds the drive playing from its start with the saved parameters."""
     run.runtime.post(ResetParameters())
-    run.runtime.post(Cover(covered=False))
     run.runtime.post(Restart())
     run.runtime.post(SetSpeed(1.0))
     run.runtime.post(Play(playing=True))
@@ -72,8 +71,8 @@ def wait_for_badge(page: OpenPage, word: str) -> None:
 
 def settled_clock(run: OpenRun) -> str:
     """Time that every browser shows once the run is paused."""
-    run.until(lambda: not run.runtime.state.part(RunState).playing and run.session.seeking is None)
-    return clock(run.session.view().time)
+    run.until(lambda: not run.runtime.state.part(RunState).playing)
+    return clock(run.view.time)
 
 
 def vehicle_in(page: OpenPage) -> np.ndarray:
@@ -108,13 +107,14 @@ def test_the_gate_slider_widens_the_validation_areas(run: OpenRun, page: OpenPag
     run.runtime.post(Play(playing=False))
     # Some way from the start, where the initial uncertainty no longer shrinks from scan to scan.
     run.runtime.post(Seek(2.0))
-    run.until(lambda: run.session.seeking is None and run.session.view().time == pytest.approx(2.0))
-    before = np.ptp(run.session.view().gates, axis=1).mean()
+    run.until(lambda: run.view.time == pytest.approx(2.0))
+    before, at = np.ptp(run.view.gates, axis=1).mean(), run.view.lived
     page.open_tab("Tune")
     page.fill("Gate [%]", "99.99")
     run.until(lambda: run.runtime.state.project.parameters.association.gate_probability == pytest.approx(0.9999))
-    page.press("Step")
-    run.until(lambda: np.ptp(run.session.view().gates, axis=1).mean() > 1.5 * before)
+    # Nothing has to be played again: the whole drive is there with the new gate, and the cursor is where it was.
+    run.until(lambda: np.ptp(run.view.gates, axis=1).mean() > 1.5 * before)
+    assert run.view.lived == at
     page.press("Undo set gate probability")
     run.until(lambda: run.runtime.state.project.parameters.association.gate_probability == 0.95)
     page.page.wait_for_function("() => [...document.querySelectorAll('input')].some(i => i.value === '95')")
@@ -126,10 +126,39 @@ def test_the_time_line_seeks_and_play_and_pause_obey(run: OpenRun, page: OpenPag
     track = page.page.locator("div:has(> div > .c-bottom) .mantine-Slider-track").first.bounding_box()
     assert track is not None
     page.page.mouse.click(track["x"] + 0.5 * track["width"], track["y"] + 0.5 * track["height"])
-    half = 0.5 * run.session.view().duration
-    run.until(lambda: run.session.seeking is None and abs(run.session.view().time - half) < 0.05 * half)
+    half = 0.5 * run.view.duration
+    run.until(lambda: abs(run.view.time - half) < 0.05 * half)
     page.press("Play")
-    run.until(lambda: run.session.view().time > 1.1 * half)
+    run.until(lambda: run.view.time > 1.1 * half)
+    page.press("Reverse")
+    run.until(lambda: run.view.time < half)
+    page.press("Pause")
+    run.until(lambda: not run.runtime.state.part(RunState).playing)
+    at = run.view.lived
+    page.press("Back")
+    run.until(lambda: run.view.lived == at - 1)
+    page.press("Step")
+    run.until(lambda: run.view.lived == at)
+
+
+def test_edits_from_here_on_leave_what_was_lived_and_are_marked(run: OpenRun, page: OpenPage) -> None:
+    run.runtime.post(Play(playing=False))
+    run.runtime.post(Seek(2.0))
+    run.until(lambda: run.view.time == pytest.approx(2.0))
+    at, before = run.view.lived, run.view.result
+    page.open_tab("Tune")
+    # The step Run has the same switch; the hidden one has no role.
+    switch = page.page.get_by_role("checkbox", name="Edits from here on")
+    switch.click()
+    page.fill("Gate [%]", "60")
+    run.until(lambda: run.view.result is not before)
+    assert [segment.first for segment in run.view.result.columns.segments] == [0, at]
+    np.testing.assert_array_equal(run.view.result.columns.means[:at], before.columns.means[:at])
+    page.page.wait_for_function("() => document.querySelector('.c-strip').dataset.edits === '1'")
+    said = page.page.locator(".c-note:visible")
+    said.filter(has_text="Changed on the way at 00:02").wait_for()
+    switch.click()
+    said.filter(has_text="Acts on the whole drive").wait_for()
 
 
 def test_two_browsers_see_the_same_run_each_in_its_own_view(

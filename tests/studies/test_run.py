@@ -8,7 +8,6 @@ import pytest
 from commission.errors import UsageError
 from commission.localization.estimate import Mode, Status
 from commission.localization.localizer import Localizer
-from commission.localization.run_columns import Segment
 from commission.localization.setup import LocalizerSetup
 from commission.site.parameters import AssociationParameters, OdometryParameters, Parameters, SupervisorParameters
 from commission.site.project import Project
@@ -194,27 +193,55 @@ def test_from_here_on_another_limit_decides_what_is_wrong_while_operational():
     inputs = RunInput.of(loose, log, start_of(loose, log, (0.0, 0.0, 0.0), (0.001, 0.001, 0.001)))
     whole = judged_run(inputs)
     assert whole.statistics.wrong_while_operational == 0
-    later = judged_run(inputs.from_here_on(30, LocalizerSetup.of(tight)), earlier=whole)
+    later = judged_run(inputs.with_setup(LocalizerSetup.of(tight), 30), earlier=whole)
     assert [segment.first for segment in later.inputs.segments] == [0, 30]
     assert later.operational_fraction == 1.0
     assert later.statistics.wrong_while_operational == 10
 
 
-def test_from_here_on_replaces_what_was_planned_for_later():
+def gate(probability):
+    return LocalizerSetup.of(hall(association=AssociationParameters(gate_probability=probability)))
+
+
+def planned(inputs):
+    """First cycle, gate and cover of each segment."""
+    return [(s.first, s.setup.parameters.association.gate_probability, s.covered) for s in inputs.segments]
+
+
+@pytest.fixture
+def inputs():
     log = RecordLog.collect(standing_still(40))
-    one, other = (LocalizerSetup.of(hall(association=AssociationParameters(gate_probability=p))) for p in (0.5, 0.9))
-    inputs = RunInput.of(hall(), log, start_of(hall(), log))
-    changed = inputs.from_here_on(20, one).from_here_on(30, other, covered=True).from_here_on(25, other)
-    assert [(segment.first, segment.covered) for segment in changed.segments] == [(0, False), (20, False), (25, False)]
-    assert changed.from_here_on(0, one).segments == (Segment(0, one),)
+    project = hall(association=AssociationParameters(gate_probability=0.95))
+    return RunInput.of(project, log, start_of(project, log))
+
+
+def test_a_setup_from_here_on_replaces_those_that_were_planned_for_later(inputs):
+    changed = inputs.with_setup(gate(0.5), 20).with_setup(gate(0.9), 30).with_setup(gate(0.8), 25)
+    assert planned(changed) == [(0, 0.95, False), (20, 0.5, False), (25, 0.8, False)]
+
+
+def test_a_setup_from_the_start_leaves_what_is_covered(inputs):
+    covered = inputs.with_cover(10, covered=True).with_setup(gate(0.5), 15).with_cover(20, covered=False)
+    assert planned(covered) == [(0, 0.95, False), (10, 0.95, True), (15, 0.5, True), (20, 0.5, False)]
+    assert planned(covered.with_setup(gate(0.9))) == [(0, 0.9, False), (10, 0.9, True), (20, 0.9, False)]
+
+
+def test_a_cover_from_here_on_leaves_the_setups(inputs):
+    changed = inputs.with_setup(gate(0.5), 20).with_cover(10, covered=True)
+    assert planned(changed) == [(0, 0.95, False), (10, 0.95, True), (20, 0.5, True)]
+    assert planned(changed.with_cover(20, covered=False)) == [(0, 0.95, False), (10, 0.95, True), (20, 0.5, False)]
+    assert planned(changed.with_cover(0, covered=False)) == [(0, 0.95, False), (20, 0.5, False)]
+
+
+def test_a_change_that_changes_nothing_makes_no_segment(inputs):
+    assert planned(inputs.with_setup(gate(0.95), 7)) == planned(inputs.with_cover(7, covered=False)) == planned(inputs)
+    assert inputs.with_setup(gate(0.95), 7) == inputs
 
 
 def test_covered_from_here_on_counts_no_detection_and_ends_in_a_fail_episode():
     project = hall(odometry=OdometryParameters(forward_per_sqrt_s=0.005))
     log = RecordLog.collect(standing_still(1500))
-    inputs = RunInput.of(project, log, start_of(project, log)).from_here_on(
-        100, LocalizerSetup.of(project), covered=True
-    )
+    inputs = RunInput.of(project, log, start_of(project, log)).with_cover(100, covered=True)
     result = judged_run(inputs)
     assert result.counts[:100].sum() == 500
     assert result.counts[100:].sum() == 0

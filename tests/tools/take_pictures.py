@@ -250,8 +250,8 @@ PICTURES = (
 
 
 def _is_at(runtime: Runtime, seconds: float) -> bool:
-    session = runtime.service(RunService).session
-    return session is not None and session.seeking is None and session.view().time >= seconds - 0.1
+    view = runtime.service(RunService).view()
+    return view is not None and view.time >= seconds - 0.1
 
 
 @contextmanager
@@ -259,7 +259,7 @@ def served(site: str) -> Iterator[Served]:
     """A page of a bundled site, as `commission demo` opens it."""
     project = load_project(bundled_folder("maps") / site)
     page = Served(project, source=VirtualDrive(project.routes[0].name))
-    page.until(lambda: page.runtime.service(RunService).session is not None)
+    page.until(lambda: page.runtime.service(RunService).view() is not None)
     try:
         yield page
     finally:

@@ -35,6 +35,8 @@ class Lane(StrEnum):
 
     QUICK = "quick"
     """Milliseconds: what follows every edit."""
+    RUN = "run"
+    """The drive on the page, localized again after an edit: nobody waits for it, and it waits for nobody."""
     FILES = "files"
     """A file that somebody has just sent, or asked for."""
     SAVING = "saving"

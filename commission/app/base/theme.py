@@ -150,12 +150,13 @@ div:has(>div>.c-top) button{{height:26px!important;padding:0 10px!important;font
 div:has(>div>.c-bottom){{display:grid;grid-template-columns:repeat(24,minmax(0,1fr));align-items:center;
  padding-top:2px!important}}
 div:has(>div>.c-bottom)>:nth-child(-n+5){{grid-row:1}}
-div:has(>div>.c-bottom)>:nth-child(1){{grid-column:12}}
-div:has(>div>.c-bottom)>:nth-child(2){{grid-column:1/span 6;padding-left:var(--c-tabs)!important}}
-div:has(>div>.c-bottom)>:nth-child(3){{grid-column:7/span 2}}
-div:has(>div>.c-bottom)>:nth-child(4){{grid-column:9/span 3}}
-div:has(>div>.c-bottom)>:nth-child(5){{grid-column:13/span 12}}
-div:has(>div>.c-bottom)>:nth-child(6){{grid-column:13/span 12;margin:-9px 0 2px!important;
+div:has(>div>.c-bottom)>:nth-child(1){{grid-column:13}}
+div:has(>div>.c-bottom)>:nth-child(2){{grid-column:1/span 7;padding-left:var(--c-tabs)!important}}
+div:has(>div>.c-bottom)>:nth-child(2) button{{padding:0 5px!important}}
+div:has(>div>.c-bottom)>:nth-child(3){{grid-column:8/span 2}}
+div:has(>div>.c-bottom)>:nth-child(4){{grid-column:10/span 3}}
+div:has(>div>.c-bottom)>:nth-child(5){{grid-column:14/span 11}}
+div:has(>div>.c-bottom)>:nth-child(6){{grid-column:14/span 11;margin:-9px 0 2px!important;
  padding:0 67px 0 18px!important}}
 div:has(>div>.c-bottom)>:nth-child(n+7){{grid-column:span 4}}
 :root:has(.c-fold input:checked){{--c-bottom:{FOLDED_PX}px}}

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from commission.app.base.jobs import Job
 from commission.app.base.parts import Part, Parts
 from commission.app.base.state import AppState
+from commission.geometry.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,6 +16,16 @@ class Followed:
 
     place: tuple[float, float]
     """Where it is [m], map frame."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LivedPath:
+    """Where something has been so far, and how well that was known: for whoever lays it beside what was expected."""
+
+    poses: FloatArray
+    """(K, 3) `T_map_base` [m, m, rad]."""
+    two_sigma: FloatArray
+    """(K, 3) 2-sigma of x [m], y [m] and heading [rad]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from commission.app.run.view import Series
+from commission.app.base.view import LivedPath
 from commission.geometry.arrays import FloatArray
 from commission.planning.route_prediction import RoutePrediction
 
@@ -28,22 +28,23 @@ class Driven:
     """(N, 3) 2-sigma of x [m], y [m] and heading [rad], the largest since the row before."""
 
 
-def driven(series: Series, prediction: RoutePrediction) -> Driven | None:
+def driven(lived: LivedPath, prediction: RoutePrediction) -> Driven | None:
     """Find the metre of the route for each cycle of a run.
 
     Parameters
     ----------
-    series : the run so far.
+    lived : the run so far.
     prediction : of the route.
 
     Returns
     -------
     driven : as far as the run follows the route from its start; none when it does not.
     """
-    if not len(series):
+    cycles = len(lived.poses)
+    if not cycles:
         return None
-    starts = np.arange(0, len(series), max(1, -(-len(series) // MOST_CYCLES)))
-    places, two_sigma = series.means[starts, :2], np.maximum.reduceat(series.two_sigma, starts, axis=0)
+    starts = np.arange(0, cycles, max(1, -(-cycles // MOST_CYCLES)))
+    places, two_sigma = lived.poses[starts, :2], np.maximum.reduceat(lived.two_sigma, starts, axis=0)
     drive = prediction.drive
     metres, reached = np.empty(len(starts)), 0
     for number, place in enumerate(places):

@@ -12,13 +12,12 @@ from commission.app.base.inputs import Inputs, Text, WorkBar
 from commission.app.base.numbers import metres_text
 from commission.app.base.panel import BasePanel, Post
 from commission.app.base.rows import Rows
-from commission.app.base.view import PageView
+from commission.app.base.view import LivedPath, PageView
 from commission.app.prediction.chart import chart
 from commission.app.prediction.driven import driven
 from commission.app.prediction.service import PREDICTION
 from commission.app.prediction.settings import PredictionSettings, PredictRoute
 from commission.app.prediction.view import RiskView, RouteView
-from commission.app.run.view import RunView
 
 NO_ROUTE = "Off"
 MOST_RISKS = 12
@@ -77,15 +76,15 @@ class RoutePanel(BasePanel):
             self._route.options = names
         self._inputs.follow(view.state)
         self._work.follow(view)
-        route, run = view.part(RouteView), view.part(RunView)
+        route, lived = view.part(RouteView), view.part(LivedPath)
         self._show_risks(() if route is None else route.risks)
         self._neighbors.write((route,), lambda: "" if route is None else _risk_text(route))
         if route is None:
             self._chart.write((None,), str)
             return
-        cycles = 0 if run is None else len(run.series) // CYCLES_PER_CHART
+        cycles = 0 if lived is None else len(lived.poses) // CYCLES_PER_CHART
         self._chart.write(
-            (route, cycles), lambda: chart(route, None if run is None else driven(run.series, route.prediction))
+            (route, cycles), lambda: chart(route, None if lived is None else driven(lived, route.prediction))
         )
 
     def _show_risks(self, risks: tuple[RiskView, ...]) -> None:

@@ -46,11 +46,16 @@ class Play(Action):
 
     playing: bool | None = None
     """Whether it runs; none: the other way round."""
+    backward: bool = False
+    """Whether it runs backward."""
 
 
 @dataclass(frozen=True, slots=True)
 class StepScan(Action):
-    """Pause and process one more scan."""
+    """Pause and go on by one scan."""
+
+    back: bool = False
+    """Whether to the scan before."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +80,7 @@ class Seek(Action):
 
 @dataclass(frozen=True, slots=True)
 class Restart(Action):
-    """Go back to the start, the initial pose and its uncertainty."""
+    """Run the whole drive with the setup of now, nothing covered on the way, and go to its start."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +92,16 @@ class Repeat(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class EditFromHereOn(Action):
+    """Whether edits act from the cursor on, and not on the whole drive."""
+
+    from_here_on: bool
+    """From the cursor on."""
+
+
+@dataclass(frozen=True, slots=True)
 class Cover(Action):
-    """Cover or uncover every reflector of the hall, from the next scan on."""
+    """Cover or uncover every reflector of the hall, from the cursor on."""
 
     covered: bool
     """Whether no reflector can be seen."""

@@ -15,17 +15,18 @@ from commission.localization.estimate import Mode
 
 def badge_text(view: PageView) -> tuple[str, str, str]:
     """Return the badge's word, what stands beside it, and its color."""
-    run, limits = view.part(RunView), view.state.project.parameters.supervisor
+    run = view.part(RunView)
     if run is None or run.estimate is None:
         under_way = [escaped(job.line) for job in view.jobs]
         return ("PREPARING" if under_way else "NO RUN"), "; ".join(under_way), theme.IDLE_COLOR
-    x, y, heading = run.series.two_sigma[-1]
+    limits = run.segment.setup.parameters.supervisor
+    x, y, heading = run.result.two_sigma[run.newest]
     beside = (
         f"2σ {max(x, y) * 1000:.0f} / {limits.position_limit * 1000:.0f} mm"
         f" &nbsp; {math.degrees(heading):.2f} / {math.degrees(limits.heading_limit):.1f} °"
     )
     if run.mode is not Mode.OPERATIONAL:
-        lived = [episode for episode in run.episodes if episode[0] <= run.time]
+        lived = run.lived_episodes
         since = f" {run.time - lived[-1][0]:.0f} s" if lived else ""
         return f"{run.mode.name}{since}", beside, theme.FAIL_COLOR
     return "OPERATIONAL", beside, theme.OPERATIONAL_COLOR

@@ -5,20 +5,26 @@ Runs as a background job: plain values in, a plain value out.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import numpy as np
+from dataclasses import dataclass, replace
 
 from commission.app.run.actions import Recording, Source, VirtualDrive
-from commission.app.run.session import Drive
 from commission.errors import SourceError
-from commission.geometry.arrays import frozen
 from commission.io.recordings.base import load_log
-from commission.localization.estimate import Belief
 from commission.progress import Progress
 from commission.simulation import scenario
 from commission.site.project import Project
-from commission.studies.start import start_of
+from commission.site.record_log import RecordLog
+from commission.studies.start import Start, StartOrigin, belief_at, start_of
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """What a run goes over."""
+
+    log: RecordLog
+    """All records."""
+    start: Start
+    """Where the vehicle is said to be at the start, and how well that is known."""
 
 
 def prepare(project: Project, source: Source, progress: Progress) -> Drive:
@@ -45,8 +51,7 @@ def _simulated(project: Project, source: VirtualDrive, progress: Progress) -> Dr
         project = replace(project, disturbances=replace(project.disturbances, people=source.people))
     start = scenario.start_of(project, source.route)
     log = scenario.virtual_drive(project, source.route, source.seed, progress=progress)
-    covariance = frozen(np.diag(np.square(start.sigmas)), (3, 3), "initial covariance")
-    return Drive(log, Belief(int(log.stamps_ns[0]), start.pose, covariance))
+    return Drive(log, Start(belief_at(int(log.stamps_ns[0]), start.pose, start.sigmas.tolist()), StartOrigin.DRIVE))
 
 
 def _recorded(project: Project, source: Recording, progress: Progress) -> Drive:
@@ -54,4 +59,4 @@ def _recorded(project: Project, source: Recording, progress: Progress) -> Drive:
     log = load_log(source.path)
     if log.scans is None and not len(log.detection_stamps_ns):
         raise SourceError(f"{source.path} holds no scan; expected scans.npz or detections.csv")
-    return Drive(log, start_of(project, log).belief)
+    return Drive(log, start_of(project, log))

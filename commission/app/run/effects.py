@@ -18,14 +18,36 @@ class LoadSource(Effect):
 
 @dataclass(frozen=True, slots=True)
 class MoveTo(Effect):
-    """Bring the run to a time of the drive."""
+    """Bring the cursor to a time of the drive."""
 
     time: float
     """Seconds after its start [s]."""
-    afresh: bool = False
-    """Whether it begins again at the initial pose even when the time is ahead."""
 
 
 @dataclass(frozen=True, slots=True)
-class ProcessOneScan(Effect):
-    """Let the localizer process one more scan."""
+class MoveByScans(Effect):
+    """Bring the cursor to another scan."""
+
+    scans: int
+    """How many scans ahead; back where negative."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlayOn(Effect):
+    """Begin at the other end where the drive is over in the direction in which it is to be played."""
+
+    backward: bool
+    """Whether time runs backward."""
+
+
+@dataclass(frozen=True, slots=True)
+class CoverFromHere(Effect):
+    """Cover or uncover every reflector from the cursor on."""
+
+    covered: bool
+    """Whether no reflector can be seen."""
+
+
+@dataclass(frozen=True, slots=True)
+class RunAfresh(Effect):
+    """Run the whole drive with the setup of now, nothing covered, and go to its start."""

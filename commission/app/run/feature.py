@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from commission.app.base.feature import RUN, SELECTION, TIME, Docked, Feature
+from commission.app.base.feature import RUN, SELECTION, TIME, TUNE, Docked, Feature
 from commission.app.run import reducer
 from commission.app.run.accumulated_layer import AccumulatedLayer
 from commission.app.run.badge import Badge
 from commission.app.run.detection_layer import DetectionLayer
+from commission.app.run.edits_panel import EditsPanel
 from commission.app.run.gate_layer import GateLayer
 from commission.app.run.now_panel import NowPanel
 from commission.app.run.plots import Plots
@@ -37,6 +38,8 @@ FEATURE = Feature(
         Docked(lambda at: Badge(at.gui), None, 10),
         Docked(lambda at: NowPanel(at.gui, at.browser), SELECTION, 60, own=True),
         Docked(lambda at: RunPanel(at.gui, at.post, at.state), RUN),
+        Docked(lambda at: EditsPanel(at.gui, at.post, at.state), RUN, 10),
+        Docked(lambda at: EditsPanel(at.gui, at.post, at.state), TUNE, -10),
         Docked(lambda at: TimeLine(at.gui, at.post, at.state.part(RunState).speed), TIME, 10),
         Docked(lambda at: Plots(at.gui), TIME, 20),
     ),

@@ -12,7 +12,6 @@ from commission.app.base.view import PageView
 from commission.app.editing.editor import editor_of
 from commission.app.run.view import RunView
 from commission.localization.estimate import Mode, Status
-from commission.site.parameters import SupervisorParameters
 
 MODES = {
     Mode.OPERATIONAL: "operational",
@@ -22,24 +21,24 @@ MODES = {
 """What the page says of each."""
 
 
-def rows(run: RunView, limits: SupervisorParameters) -> list[tuple[str, str]]:
+def rows(run: RunView) -> list[tuple[str, str]]:
     """Return what the panel shows, line by line."""
     x, y, heading = run.pose
-    lived = [episode for episode in run.episodes if episode[0] <= run.time]
     shown = [
         ("Mode", MODES[run.mode]),
-        ("Fail episodes so far", str(len(lived))),
+        ("Fail episodes so far", str(len(run.lived_episodes))),
         ("Position x, y", f"{x:.3f}, {y:.3f} m"),
         ("Heading", f"{round(math.degrees(heading), 2) + 0.0:.2f} °"),
     ]
     if run.estimate is None:
         return shown
-    sigma_x, sigma_y, sigma_heading = run.series.two_sigma[-1]
+    result, newest = run.result, run.newest
+    limits = run.segment.setup.parameters.supervisor
+    sigma_x, sigma_y, sigma_heading = result.two_sigma[newest]
     limit_mm = f"{limits.position_limit * 1000:.0f} mm"
     estimate = run.estimate
-    inlier = estimate.status == Status.INLIER
-    nis = f"{estimate.d2[inlier].max():.2f}" if inlier.any() else "none seen"
-    error = run.series.error[-1]
+    nis = f"{result.nis[newest]:.2f}" if math.isfinite(result.nis[newest]) else "none seen"
+    error = result.position_errors[newest]
     shown += [
         ("2σ x / limit", f"{sigma_x * 1000:.1f} / {limit_mm}"),
         ("2σ y / limit", f"{sigma_y * 1000:.1f} / {limit_mm}"),
@@ -50,7 +49,7 @@ def rows(run: RunView, limits: SupervisorParameters) -> list[tuple[str, str]]:
             f"{estimate.count(Status.OUTLIER_DETECTOR)}, {estimate.count(Status.OUTLIER_ASSOCIATION)}",
         ),
         ("Largest NIS / gate", f"{nis} / {estimate.gate:.2f}"),
-        ("Cycle time", f"{run.series.microseconds[-1]:.0f} µs"),
+        ("Cycle time", f"{result.microseconds_per_cycle:.1f} µs, mean of the drive"),
         ("Position error", f"{error * 1000:.1f} mm" if math.isfinite(error) else "no reference"),
     ]
     return shown
@@ -69,5 +68,5 @@ class NowPanel(BasePanel):
         show(self._html, visible=is_shown)
         run = view.part(RunView)
         if run is not None and is_shown:
-            shown = table(rows(run, view.state.project.parameters.supervisor))
+            shown = table(rows(run))
             self._html.content = f"<div class='c-now' style='padding:2px 14px 2px 6px'>{shown}</div>"

@@ -1,162 +1,35 @@
-"""Plots over the drive: uncertainty against its limits, gate, counts, time, error; fail episodes as red areas."""
+"""Plots over the whole drive: uncertainty against its limits, gate, counts, errors; fail episodes as red areas.
+
+What is lived is drawn solid, what is computed behind the cursor pale.
+"""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 from viser import GuiApi, GuiUplotHandle, uplot
 
-from commission.app.base import theme
 from commission.app.base.panel import BasePanel
 from commission.app.base.view import PageView
-from commission.app.run.view import RunView, Series
+from commission.app.run.charts import CHARTS, LIMIT, TURQUOISE, Chart, ceiling
+from commission.app.run.curves import BINS, Curve
+from commission.app.run.view import RunView, Stretch
 from commission.geometry.arrays import FloatArray
-from commission.geometry.gaussian import chi_square_gate
-from commission.localization.estimate import Status
 from commission.site.parameters import Parameters
+from commission.studies.run import RunResult
 
-BINS = 400
 HEIGHT_PX = 150
 ROOM_PX = 44
 """Room for the numbers beside a vertical axis: five figures and a comma."""
-TURQUOISE, ORANGE = "#4dc4ff", "#ffb454"
-LIMIT = theme.css(theme.POSE)
-
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """One curve of a plot."""
-
-    label: str
-    """Its name and unit."""
-    color: str
-    """CSS color."""
-    values: Callable[[Series, Parameters], FloatArray]
-    """From the run so far to one value per cycle, in the plot's unit."""
-    is_limit: bool = False
-    """Whether it is a threshold, drawn dashed."""
-
-
-@dataclass(frozen=True, slots=True)
-class Chart:
-    """One plot."""
-
-    title: str
-    """Title with the unit."""
-    lines: tuple[Line, ...]
-    """Its curves."""
-    span: Callable[[Parameters], tuple[float, float]] | None = None
-    """Smallest and largest value shown, in the plot's unit; none: as the curves need."""
-    is_logarithmic: bool = False
-    """Whether the vertical axis is logarithmic: a good run lies far below its limits."""
-    is_typical: bool = False
-    """Whether a curve shows the median of each stretch of the drive and not its largest value."""
-
-
-def _gate(parameters: Parameters) -> float:
-    return chi_square_gate(parameters.association.gate_probability, 2)
-
-
-def _constant(series: Series, value: float) -> FloatArray:
-    return np.full(len(series), value)
-
-
-def _decade_below(value: float) -> float:
-    """The power of ten below: where a logarithmic axis has a label anyway."""
-    return 10.0 ** math.floor(math.log10(value))
-
-
-CHARTS = (
-    Chart(
-        "2σ of x, y [mm]",
-        (
-            Line("x [mm]", TURQUOISE, lambda s, _p: s.two_sigma[:, 0] * 1000.0),
-            Line("y [mm]", ORANGE, lambda s, _p: s.two_sigma[:, 1] * 1000.0),
-            Line("limit", LIMIT, lambda s, p: _constant(s, p.supervisor.position_limit * 1000.0), is_limit=True),
-        ),
-        lambda p: (5.0 * p.supervisor.position_limit, 3000.0 * p.supervisor.position_limit),
-        is_logarithmic=True,
-    ),
-    Chart(
-        "2σ of heading [°]",
-        (
-            Line("heading [°]", TURQUOISE, lambda s, _p: np.degrees(s.two_sigma[:, 2])),
-            Line("limit", LIMIT, lambda s, p: _constant(s, math.degrees(p.supervisor.heading_limit)), is_limit=True),
-        ),
-        lambda p: (
-            _decade_below(0.005 * math.degrees(p.supervisor.heading_limit)),
-            3.0 * math.degrees(p.supervisor.heading_limit),
-        ),
-        is_logarithmic=True,
-    ),
-    Chart(
-        "NIS against gate",
-        (
-            Line("largest NIS of a scan's inliers", TURQUOISE, lambda s, _p: s.nis),
-            Line("gate", LIMIT, lambda s, p: _constant(s, _gate(p)), is_limit=True),
-        ),
-        lambda p: (0.0, 1.4 * _gate(p)),
-    ),
-    Chart(
-        "Inliers, outliers per scan",
-        (
-            Line("inliers", theme.css(theme.INLIER), lambda s, _p: s.counts[:, Status.INLIER].astype(float)),
-            Line(
-                "outliers",
-                theme.css(theme.OUTLIER_ASSOCIATION),
-                lambda s, _p: s.counts[:, Status.OUTLIER_DETECTOR :].sum(axis=1).astype(float),
-            ),
-            # The axis reaches up to this at least: uPlot would give curves of zeros one up to 100.
-            Line("", "transparent", lambda s, _p: _constant(s, 4.0), is_limit=True),
-        ),
-    ),
-    Chart(
-        "Cycle time [µs]", (Line("median cycle time [µs]", TURQUOISE, lambda s, _p: s.microseconds),), is_typical=True
-    ),
-    Chart(
-        "Position error [mm]",
-        (Line("error against reference [mm]", theme.css(theme.REFERENCE), lambda s, _p: s.error * 1000.0),),
-    ),
-)
-
-
-def binned(times: FloatArray, values: FloatArray, duration: float, *, typical: bool = False) -> FloatArray:
-    """Return the largest value (or the median) in each of `BINS` equal stretches of the drive.
-
-    Parameters
-    ----------
-    times : (K,) array [s], ascending.
-    values : (K,) array; NaN where unknown.
-    duration : length of the drive [s].
-    typical : median instead of the largest value.
-
-    Returns
-    -------
-    levels : (BINS,) array; NaN where nothing is known. However long the drive, no peak is lost.
-    """
-    levels = np.full(BINS, np.nan)
-    known = np.isfinite(values)
-    bins = np.minimum((times[known] * (BINS / max(duration, 1e-9))).astype(np.int64), BINS - 1)
-    order = np.lexsort((values[known], bins))
-    bins, ranked = bins[order], values[known][order]
-    filled_bins, first, count = np.unique(bins, return_index=True, return_counts=True)
-    levels[filled_bins] = ranked[first + (count // 2 if typical else count - 1)]
-    return levels
-
-
-def carried(levels: FloatArray, now: float, duration: float) -> FloatArray:
-    """Carry the last value over empty stretches up to now; NaN ahead, where uPlot draws nothing.
-
-    A drive with fewer scans than stretches has empty ones between them, over which uPlot would draw a slope.
-    """
-    reached = min(BINS, int(now * (BINS / max(duration, 1e-9))) + 1)
-    latest = np.maximum.accumulate(np.where(np.isfinite(levels), np.arange(BINS), -1))
-    curve = np.where(latest >= 0, levels[np.maximum(latest, 0)], np.nan)
-    curve[reached:] = np.nan
-    return curve
+EDIT = "#c08bff"
+"""Where an edit acts from, or reflectors are covered."""
+PALE = "59"
+"""Opacity of what lies behind the cursor, as the last two digits of a CSS color: a third."""
+HIDDEN: uplot.Series_Points = {"show": False}
+__all__ = ["EDIT", "HEIGHT_PX", "LIMIT", "ROOM_PX", "TURQUOISE", "Plots", "axis_style"]
 
 
 class Plots(BasePanel):
@@ -167,16 +40,20 @@ class Plots(BasePanel):
         self._plots: list[GuiUplotHandle] = []
         self._duration = 0.0
         self._turn = 1
-        self._spans: tuple[tuple[float, float] | None, ...] = ()
+        self._spans: tuple[tuple[float, float], ...] = ()
         self._axis = np.linspace(0.0, 1.0, BINS)
+        self._result: RunResult | None = None
+        self._curves: list[list[Curve]] = []
+        self._limits: list[list[FloatArray]] = []
         for chart in CHARTS:
-            empty = tuple(np.full(2, np.nan) for _ in range(len(chart.lines) + 4))
+            series = _series(chart)
+            empty = tuple(np.full(2, np.nan) for _ in series[1:])
             self._plots.append(
                 gui.add_uplot(
-                    (np.array([0.0, 1.0]), *empty[1:]),
-                    _series(chart),
+                    (np.array([0.0, 1.0]), *empty),
+                    series,
                     title=chart.title,
-                    scales=_scales(1.0, None, chart),
+                    scales=_scales(1.0, (0.1, 1.0), chart),
                     axes=(axis_style(20), axis_style(ROOM_PX)),
                     legend={"show": False},
                     cursor={"sync": {"key": "run"}, "drag": {"x": True, "y": False}},
@@ -186,64 +63,96 @@ class Plots(BasePanel):
             )
 
     def draw_slowly(self, view: PageView) -> None:
-        """Draw the drive so far."""
+        """Draw the whole drive, cut at the cursor."""
         run = view.part(RunView)
         if run is None or run.duration <= 0.0:
             return
-        parameters = view.state.project.parameters
-        spans = tuple(None if chart.span is None else chart.span(parameters) for chart in CHARTS)
+        if run.result is not self._result:
+            self._take(run.result)
+        spans = tuple(map(_span, CHARTS, self._curves, itertools.repeat(run.segment.setup.parameters)))
         if run.duration != self._duration or spans != self._spans:
             # A new scale rebuilds the chart and forgets the zoom: only when it must.
             self._duration, self._spans = run.duration, spans
             self._axis = np.linspace(0.0, run.duration, BINS)
             for plot, span, chart in zip(self._plots, spans, CHARTS, strict=True):
                 plot.scales = _scales(run.duration, span, chart)
-        failing = np.zeros(BINS)
-        for start, end in run.episodes:
-            failing[(self._axis >= start) & (self._axis <= max(end, start + run.duration / BINS))] = 1.0
-        now = np.where(np.abs(self._axis - run.time) <= 0.5 * run.duration / BINS, 1.0, 0.0)
         self._turn = -self._turn
-        waking = np.full(BINS, 2.0 + self._turn)
-        for chart, plot, span in zip(CHARTS, self._plots, spans, strict=True):
-            curves = _curves(chart, run, parameters)
-            if span is not None:
-                curves = [np.clip(curve, *span) for curve in curves]
-            plot.data = (self._axis, *curves, failing, now, waking)
+        marks = (
+            self._areas(run.lived_episodes),
+            self._areas(run.coming_episodes),
+            self._lines((run.time,)),
+            self._lines(run.edits),
+            np.full(BINS, 2.0 + self._turn),
+        )
+        for plot, span, curves, limits in zip(self._plots, spans, self._curves, self._limits, strict=True):
+            parts = [part for curve in curves for part in curve.cut(run.time, run.lived)] + limits
+            plot.data = (self._axis, *(np.clip(part, *span) for part in parts), *marks)
+
+    def _take(self, result: RunResult) -> None:
+        """Prepare the curves of another run."""
+        self._result = result
+        columns = result.columns
+        times = np.linspace(0.0, result.duration, BINS)
+        cycles = np.maximum(np.searchsorted(result.times, times, side="right") - 1, 0)
+        segments = np.searchsorted(columns.firsts, cycles, side="right") - 1
+        parameters = [segment.setup.parameters for segment in columns.segments]
+        self._curves = [
+            [Curve(result.times, line.values(result), result.duration) for line in chart.lines] for chart in CHARTS
+        ]
+        self._limits = [
+            [np.array([limit.value(each) for each in parameters])[segments] for limit in chart.limits]
+            for chart in CHARTS
+        ]
+
+    def _areas(self, stretches: tuple[Stretch, ...]) -> FloatArray:
+        """(BINS,) 1 in each stretch, at least one of the axis's points wide, 0 elsewhere."""
+        areas = np.zeros(BINS)
+        for start, end in stretches:
+            areas[(self._axis >= start) & (self._axis <= max(end, start + self._duration / BINS))] = 1.0
+        return areas
+
+    def _lines(self, times: tuple[float, ...]) -> FloatArray:
+        """(BINS,) 1 at the axis's point nearest to each time, 0 elsewhere."""
+        lines = np.zeros(BINS)
+        for time in times:
+            lines[int(np.argmin(np.abs(self._axis - time)))] = 1.0
+        return lines
 
 
-def _curves(chart: Chart, run: RunView, parameters: Parameters) -> list[FloatArray]:
-    """One array per line of a chart."""
-    curves: list[FloatArray] = []
-    for line in chart.lines:
-        values = line.values(run.series, parameters)
-        if line.is_limit:
-            curves.append(np.full(BINS, values[0] if len(values) else np.nan))
-        else:
-            levels = binned(run.series.times, values, run.duration, typical=chart.is_typical)
-            curves.append(carried(levels, run.time, run.duration))
-    return curves
+def _span(chart: Chart, curves: Sequence[Curve], parameters: Parameters) -> tuple[float, float]:
+    """Smallest and largest value shown."""
+    if chart.span is not None:
+        return chart.span(parameters)
+    return 0.0, ceiling(max([chart.least, *(curve.largest for curve in curves if math.isfinite(curve.largest))]))
 
 
 def _series(chart: Chart) -> tuple[uplot.Series, ...]:
-    lines = [
-        uplot.Series(label=line.label, stroke=line.color, width=1, points={"show": False}, dash=(5, 4))
-        if line.is_limit
-        else uplot.Series(label=line.label, stroke=line.color, width=1, points={"show": False})
-        for line in chart.lines
+    lines: list[uplot.Series] = []
+    for line in chart.lines:
+        lines += [
+            uplot.Series(label=line.label, stroke=line.color, width=1.5, points=HIDDEN),
+            uplot.Series(label=f"{line.label}, behind the cursor", stroke=line.color + PALE, width=1, points=HIDDEN),
+        ]
+    limits = [
+        uplot.Series(label=limit.label, stroke=limit.color, width=1, points=HIDDEN, dash=(5, 4))
+        for limit in chart.limits
     ]
     return (
         uplot.Series(label="time [s]"),
         *lines,
-        uplot.Series(label="fail", scale="flag", fill="rgba(220,40,40,.28)", points={"show": False}),
-        uplot.Series(label="now", scale="flag", stroke="#e8eaee", width=1, points={"show": False}),
+        *limits,
+        uplot.Series(label="fail", scale="flag", fill="rgba(220,40,40,.28)", points=HIDDEN),
+        uplot.Series(label="fail behind the cursor", scale="flag", fill="rgba(220,40,40,.10)", points=HIDDEN),
+        uplot.Series(label="now", scale="flag", stroke="#e8eaee", width=1, points=HIDDEN),
+        uplot.Series(label="edited from here on", scale="flag", stroke=EDIT, width=1, dash=(2, 2), points=HIDDEN),
         # uPlot lays out its axes only when a scale changes: a chart that was made before the browser knew its width
         # would stay without labels. This series is never seen, and changes its scale each time.
-        uplot.Series(label="", scale="waking", points={"show": False}),
+        uplot.Series(label="", scale="waking", points=HIDDEN),
     )
 
 
-def _scales(duration: float, span: tuple[float, float] | None, chart: Chart) -> dict[str, uplot.Scale]:
-    value: uplot.Scale = {} if span is None else {"range": span}
+def _scales(duration: float, span: tuple[float, float], chart: Chart) -> dict[str, uplot.Scale]:
+    value: uplot.Scale = {"range": span}
     if chart.is_logarithmic:
         value["distr"] = 3
     # The flags' scale starts above zero: their zero line stays outside of the plot.

@@ -9,7 +9,7 @@ from commission.app.base.actions import Sender
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState
 from commission.app.run import actions
-from commission.app.run.effects import LoadSource, MoveTo, ProcessOneScan
+from commission.app.run.effects import CoverFromHere, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
 from commission.app.run.state import SPEEDS, RunState
 
 
@@ -30,13 +30,15 @@ def choose_source(action: actions.ChooseSource, state: AppState, _sender: Sender
 def play(action: actions.Play, state: AppState, _sender: Sender) -> Outcome:
     """Start or stop the play clock."""
     playing = not state.part(RunState).playing if action.playing is None else action.playing
-    return Outcome(_with(state, playing=playing))
+    backward = action.backward and playing
+    effects = (PlayOn(backward),) if playing else ()
+    return Outcome(_with(state, playing=playing, backward=backward), effects)
 
 
 @reduce.register
-def step_scan(_action: actions.StepScan, state: AppState, _sender: Sender) -> Outcome:
-    """Pause and go on by one scan."""
-    return Outcome(_with(state, playing=False), (ProcessOneScan(),))
+def step_scan(action: actions.StepScan, state: AppState, _sender: Sender) -> Outcome:
+    """Pause and go on, or back, by one scan."""
+    return Outcome(_with(state, playing=False), (MoveByScans(-1 if action.back else 1),))
 
 
 @reduce.register
@@ -58,7 +60,7 @@ def seek(action: actions.Seek, state: AppState, _sender: Sender) -> Outcome:
 @reduce.register
 def restart(_action: actions.Restart, state: AppState, _sender: Sender) -> Outcome:
     """Begin again."""
-    return Outcome(state, (MoveTo(0.0, afresh=True),))
+    return Outcome(state, (RunAfresh(),))
 
 
 @reduce.register
@@ -70,4 +72,10 @@ def repeat(action: actions.Repeat, state: AppState, _sender: Sender) -> Outcome:
 @reduce.register
 def cover(action: actions.Cover, state: AppState, _sender: Sender) -> Outcome:
     """Cover or uncover the reflectors."""
-    return Outcome(_with(state, covered=action.covered))
+    return Outcome(state, (CoverFromHere(action.covered),))
+
+
+@reduce.register
+def edit_from_here_on(action: actions.EditFromHereOn, state: AppState, _sender: Sender) -> Outcome:
+    """Choose what edits act on."""
+    return Outcome(_with(state, from_here_on=action.from_here_on))

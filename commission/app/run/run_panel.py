@@ -29,8 +29,8 @@ class RunPanel(BasePanel):
         with gui.add_folder("During the run"):
             self._cover = gui.add_checkbox(
                 "Cover reflectors",
-                state.part(RunState).covered,
-                hint="From the next scan on no reflector is seen, as if someone had covered them all.",
+                False,
+                hint="From here on no reflector is seen, as if someone had covered them all.",
             )
             self._cover.on_update(posting(post, lambda event: Cover(bool(event.target.value))))
             self._repeat = gui.add_checkbox(
@@ -38,7 +38,9 @@ class RunPanel(BasePanel):
             )
             self._repeat.on_update(posting(post, lambda event: Repeat(bool(event.target.value))))
             restart = gui.add_button(
-                "Restart", hint="Back to the start, the initial pose and its uncertainty.", color="gray"
+                "Restart",
+                hint="Back to the start: the whole drive with the setup of now, nothing covered on the way.",
+                color="gray",
             )
             restart.on_click(posting(post, lambda _event: Restart()))
 
@@ -99,14 +101,12 @@ class RunPanel(BasePanel):
             self._shown = content
             self._now.content = content
         jobs = view.jobs
+        self._progress.visible = bool(jobs)
+        if jobs:
+            self._progress.value = 100.0 * min(max(jobs[0].fraction, 0.0), 1.0)
         run = view.part(RunView)
-        seeking = None if run is None else run.seeking
-        fraction = jobs[0].fraction if jobs else seeking
-        self._progress.visible = fraction is not None
-        if fraction is not None:
-            self._progress.value = 100.0 * min(max(fraction, 0.0), 1.0)
-        if self._cover.value is not view.state.part(RunState).covered:
-            self._cover.value = view.state.part(RunState).covered
+        if run is not None and self._cover.value is not run.covered:
+            self._cover.value = run.covered
         if self._repeat.value is not view.state.part(RunState).repeat:
             self._repeat.value = view.state.part(RunState).repeat
 
@@ -126,8 +126,5 @@ def _now(view: PageView) -> str:
     else:
         what = "Nothing drives yet: choose a virtual drive or a recording."
     under_way = [escaped(job.line) for job in view.jobs]
-    run = view.part(RunView)
-    if run is not None and run.seeking is not None:
-        under_way.append(f"Replaying {run.seeking:.0%}")
     note = f"<br><span class='c-note'>{'; '.join(under_way)}</span>" if under_way else ""
     return f"<div style='font-size:12.5px;padding:2px 4px'>{what}{note}</div>"

@@ -1,49 +1,41 @@
-"""Brings the run in step with what is asked of it: loads what drives, feeds the localizer, looks ahead."""
+"""Brings the run in step with what is asked of it: loads what drives, localizes it whole, moves the cursor over it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import TypeAlias
 
-import numpy as np
-
 from commission import compiled
 from commission.app.base.actions import Action, Envelope, Report, Sender
 from commission.app.base.effects import Effect
+from commission.app.base.jobs import Job, Lane
 from commission.app.base.service import IDLE_S, Context, Due, Service
 from commission.app.base.state import AppState
-from commission.app.base.view import Followed
+from commission.app.base.view import Followed, LivedPath
 from commission.app.run import drives
 from commission.app.run.actions import ChooseSource, Play, Recording, Source
-from commission.app.run.effects import LoadSource, MoveTo, ProcessOneScan
-from commission.app.run.history import episodes
-from commission.app.run.session import Drive, Session
+from commission.app.run.drives import Drive
+from commission.app.run.effects import CoverFromHere, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
+from commission.app.run.playback import Playback
 from commission.app.run.state import RunState
+from commission.app.run.view import RunView
 from commission.geometry import rasterize, se2, spline_kernels
-from commission.localization import localizer, whole_run
-from commission.localization.estimate import Mode
+from commission.localization.run_columns import Segment
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress
 from commission.simulation import follower, scan
 from commission.site.project import Project
+from commission.studies import run
+from commission.studies.run import RunInput, RunResult, judged_run
 
-PREPARE, COMPILE, PREDICT = "Preparing the drive", "Getting ready", "Predicting the rest"
-PLAYING_REST_S, SEEKING_REST_S = 0.04, 0.001
+PREPARE, COMPILE, LOCALIZE = "Preparing the drive", "Getting ready", "Localizing"
+PLAYING_REST_S = 0.04
 LONGEST_STEP_S = 0.25
 """Time that the play clock moves at most at once [s]: a long pause of the owner thread is not made up for."""
-READS = ("reflectors", "scanner", "vehicle", "parameters")
+READS = ("reflectors", "scanner", "parameters")
 """Parts of the project that the localizer is set up with."""
 
-Episodes: TypeAlias = tuple[tuple[float, float], ...]
 Prepare: TypeAlias = Callable[[Project, Source, Progress], Drive]
-Predict: TypeAlias = Callable[[Drive, LocalizerSetup], Episodes]
-
-
-def predicted_episodes(drive: Drive, setup: LocalizerSetup) -> Episodes:
-    """Fail episodes [s] of the whole drive with these parameters."""
-    run = whole_run.run(drive.log, setup, drive.initial)
-    times = (run.stamps_ns - drive.log.stamps_ns[0]) * 1e-9
-    return episodes(times, np.asarray(run.modes) == Mode.FAIL)
 
 
 def compile_kernels(progress: Progress) -> None:
@@ -53,39 +45,37 @@ def compile_kernels(progress: Progress) -> None:
         ("curves", spline_kernels.warm_up),
         ("virtual vehicle", follower.warm_up),
         ("virtual scanner", scan.warm_up),
-        ("localizer", localizer.warm_up),
-        ("prediction", whole_run.warm_up),
+        ("localizer", run.warm_up),
         ("drawing", rasterize.warm_up),
     )
     compiled.warm_up(steps, progress)
 
 
 class RunService(Service):
-    """The drive that is there, and the localizer that runs over it.
+    """The drive that is there, localized whole, and the cursor over it.
 
     Parameters
     ----------
     context : what it is made with.
     prepare : from a source to a drive; others only in tests.
-    predict : fail episodes of a whole run.
     compile_all : compiles all kernels that a run needs.
     """
 
-    effects = (LoadSource, MoveTo, ProcessOneScan)
+    effects = (LoadSource, MoveTo, MoveByScans, PlayOn, CoverFromHere, RunAfresh)
 
     def __init__(
         self,
         context: Context,
         prepare: Prepare = drives.prepare,
-        predict: Predict = predicted_episodes,
         compile_all: Callable[[Progress], None] = compile_kernels,
     ) -> None:
         super().__init__(context)
-        self.session: Session | None = None
-        self._prepare, self._predict_episodes, self._compile = prepare, predict, compile_all
+        self.playback: Playback | None = None
+        self._prepare, self._compile = prepare, compile_all
         self._jobs = context.jobs
         self._followed_at = context.clock()
-        self._setup_project = context.state.project
+        self._project = context.state.project
+        self._wanted: RunInput | None = None
 
     def start(self) -> None:
         """Compile, and load what the page begins with."""
@@ -95,27 +85,52 @@ class RunService(Service):
             self.context.post(ChooseSource(source))
 
     def project_changed(self, action: Action, before: AppState, after: AppState) -> None:  # noqa: ARG002 - the service's
-        """Let the localizer go on with what is different."""
-        self._setup_project = after.project
+        """Run again with what is different: from the start, or from here on where that is asked for."""
+        self._project = after.project
         is_same = all(getattr(before.project, part) is getattr(after.project, part) for part in READS)
-        if self.session is not None and not is_same:
-            self.session.set_setup(LocalizerSetup.of(after.project))
-            self._predict()
+        if self._wanted is None or is_same:
+            return
+        first = self._cursor() if after.part(RunState).from_here_on else 0
+        if first == 0 or not self._is_over(first):
+            self._localize(self._wanted.with_setup(LocalizerSetup.of(after.project), first))
 
     def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:
         """Load a drive, or move over the one that is there."""
-        session = self.session
-        if session is not None:
-            session.covered = state.part(RunState).covered
+        playback = self.playback
         match effect:
             case LoadSource(source):
                 self._load(source, state, sender)
-            case MoveTo(seconds, afresh) if session is not None:
-                session.seek(seconds, afresh=afresh)
-            case ProcessOneScan() if session is not None:
-                session.step()
+            case MoveTo(seconds) if playback is not None:
+                playback.seek(seconds)
+            case MoveByScans(scans) if playback is not None:
+                playback.step(scans)
+            case CoverFromHere(covered):
+                self._cover(self._cursor(), sender, covered=covered)
+            case PlayOn(backward) if playback is not None:
+                if playback.at_start if backward else playback.at_end:
+                    playback.seek(playback.result.duration if backward else 0.0)
+            case RunAfresh() if playback is not None and self._wanted is not None:
+                playback.seek(0.0)
+                setup = LocalizerSetup.of(state.project)
+                self._localize(RunInput(log=self._wanted.log, start=self._wanted.start, segments=(Segment(0, setup),)))
             case _:
                 pass
+
+    def _cursor(self) -> int:
+        """Return the number of cycles up to the cursor; none while the drive that is wanted is not on the page yet."""
+        return self.playback.lived if self.playback is not None and self._is_on_page() else 0
+
+    def _is_on_page(self) -> bool:
+        """Whether the page shows the drive that is wanted."""
+        return (
+            self._wanted is not None
+            and self.playback is not None
+            and self._wanted.log is self.playback.result.inputs.log
+        )
+
+    def _is_over(self, cycle: int) -> bool:
+        """Whether no cycle is left to act on."""
+        return self.playback is not None and self._is_on_page() and cycle >= self.playback.result.cycles
 
     def _load(self, source: Source, state: AppState, sender: Sender) -> None:
         """Prepare a drive; why it cannot be is told to who asked."""
@@ -129,57 +144,81 @@ class RunService(Service):
             failed=lambda job: Envelope(Report(f"{job.name}: {job.error}", listed=f"{job.name} failed"), sender),
         )
 
-    def _begin(self, drive: Drive) -> Action:
-        """Run the localizer over a new drive, playing."""
-        self.session = Session(drive, LocalizerSetup.of(self._setup_project))
-        self._predict()
+    def _cover(self, first: int, sender: Sender, *, covered: bool) -> None:
+        """Cover or uncover the reflectors from a cycle on."""
+        if self._wanted is None:
+            return
+        if self._is_over(first):
+            told = Report("the drive is over; reflectors can be covered before its end", failed=False)
+            self.context.post(Envelope(told, sender))
+            return
+        self._localize(self._wanted.with_cover(first, covered=covered))
+
+    def _begin(self, drive: Drive) -> None:
+        """Localize a new drive; the run before stays on the page until that is done."""
+        setup = LocalizerSetup.of(self._project)
+        self._localize(RunInput(log=drive.log, start=drive.start, segments=(Segment(0, setup),)))
+
+    def _localize(self, wanted: RunInput) -> None:
+        """Localize the whole drive in the background, unless that is what is there, or under way."""
+        if wanted == self._wanted:
+            return
+        self._wanted = wanted
+        earlier = None if self.playback is None else self.playback.result
+        self._jobs.start(
+            LOCALIZE,
+            lambda progress: judged_run(wanted, progress, earlier=earlier),
+            then=self._take,
+            failed=self._give_up,
+            stopped=self._give_up,
+            lane=Lane.RUN,
+        )
+
+    def _give_up(self, job: Job | None = None) -> Action | None:
+        """Go on with the run that is there, since another one failed or was stopped; say why."""
+        self._wanted = None if self.playback is None else self.playback.result.inputs
+        return None if job is None else Report(f"{job.name}: {job.error}")
+
+    def _take(self, result: RunResult) -> Action | None:
+        """Show a run: over the same drive where the cursor is, over a new one from its start, playing."""
+        playback = self.playback
+        if playback is not None and playback.result.inputs.log is result.inputs.log:
+            playback.replace(result)
+            return None
+        self.playback = Playback(result)
         return Play(playing=True)
 
-    def _predict(self) -> None:
-        """Look ahead in the background: where the supervisor will stop the vehicle with these parameters."""
-        session = self.session
-        if session is None:
-            return
-        drive, setup, predict = session.drive, session.setup, self._predict_episodes
-
-        def work(progress: Progress) -> Episodes:
-            progress(0.0, "")
-            return predict(drive, setup)
-
-        def take(found: Episodes) -> None:
-            session.predicted = found
-
-        self._jobs.start(PREDICT, work, then=take, is_shown=False)
-
     def follow(self, state: AppState) -> Due:
-        """Process the records that are due, and see to the end of the drive."""
+        """Move the cursor by the time that has passed, and see to the end of the drive."""
         now = self.context.clock()
         elapsed, self._followed_at = now - self._followed_at, now
-        session, asked = self.session, state.part(RunState)
-        if session is None:
+        playback, asked = self.playback, state.part(RunState)
+        if playback is None or not asked.playing:
             return Due.NEVER
-        session.covered = asked.covered
-        if not asked.playing and session.seeking is None:
-            return Due.NEVER
-        cycles = session.advance(min(elapsed, LONGEST_STEP_S) * asked.speed)
-        if session.at_end and session.seeking is None and asked.playing:
+        before = playback.lived
+        direction = -1.0 if asked.backward else 1.0
+        playback.advance(min(elapsed, LONGEST_STEP_S) * asked.speed * direction)
+        if playback.at_start if asked.backward else playback.at_end:
             if asked.repeat:
-                session.seek(0.0, afresh=True)
+                playback.seek(playback.result.duration if asked.backward else 0.0)
             else:
                 self.context.post(Play(playing=False))
-        return Due.SOON if cycles else Due.SLOWLY
+        return Due.SOON if playback.lived != before else Due.SLOWLY
 
     def rest(self, state: AppState) -> float:
         """Return the time until something is due again [s]."""
-        if self.session is None:
-            return IDLE_S
-        if self.session.seeking is not None:
-            return SEEKING_REST_S
-        return PLAYING_REST_S if state.part(RunState).playing else IDLE_S
+        return PLAYING_REST_S if self.playback is not None and state.part(RunState).playing else IDLE_S
+
+    def view(self, *, whole: bool = True) -> RunView | None:
+        """Return the run as it is now, `whole` with every detection so far; none before there is one."""
+        if self.playback is None or self._wanted is None:
+            return None
+        return self.playback.view(covered=self._wanted.segment(self._cursor()).covered, whole=whole)
 
     def parts(self, *, slowly: bool) -> tuple[object, ...]:
-        """Return the run as it is now, and the place that cameras follow."""
-        if self.session is None:
+        """Return the run as it is now, the place that cameras follow, and what is driven so far."""
+        view = self.view(whole=slowly)
+        if view is None:
             return ()
-        run = self.session.view(whole=slowly)
-        return run, Followed((float(run.pose[0]), float(run.pose[1])))
+        lived = LivedPath(view.result.columns.means[: view.lived], view.result.two_sigma[: view.lived])
+        return view, Followed((float(view.pose[0]), float(view.pose[1]))), lived

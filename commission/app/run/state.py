@@ -20,7 +20,9 @@ class RunState:
     """Whether the play clock runs."""
     speed: float = 1.0
     """Factor of the play clock against real time."""
+    backward: bool = False
+    """Whether it runs backward."""
     repeat: bool = False
     """Whether the drive starts again at its end."""
-    covered: bool = False
-    """Whether every reflector is covered."""
+    from_here_on: bool = False
+    """Whether an edit acts from the cursor on, and not on the whole drive."""

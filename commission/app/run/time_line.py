@@ -1,4 +1,4 @@
-"""The strip under the floor: play, pause, step, speed, the time line with its fail episodes."""
+"""The strip under the floor: play and step, forward and back, speed, the time line with its fail episodes."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ from commission.app.base import actions, theme
 from commission.app.base.panel import BasePanel, Post, clock, posting
 from commission.app.base.view import PageView
 from commission.app.run.actions import Play, Restart, Seek, SetSpeed, StepScan
+from commission.app.run.plots import EDIT
 from commission.app.run.state import SPEEDS, RunState
 from commission.app.run.view import RunView
 
-PLAY, PAUSE, STEP = "Play", "Pause", "Step"
+PLAY, PAUSE, STEP, BACK, REVERSE = "Play", "Pause", "Step", "Back", "Reverse"
 FOLD = (
     "<div class='c-bottom'><label class='c-fold' title='Fold the plots away, or show them'>"
     "<input type='checkbox' aria-label='Fold the plots away'></label></div>"
@@ -24,21 +25,26 @@ SHORTEST_SHOWN = 0.3
 
 
 def strip(run: RunView | None) -> str:
-    """Return the drive as a bar: grey what lies ahead, green what was operational, red each fail episode."""
+    """Return the drive as a bar: grey what lies ahead, green what was operational, red each fail episode.
+
+    What is computed behind the cursor is pale, and is not counted; ticks stand where edits act from.
+    """
     if run is None or run.duration <= 0.0:
         return "<div class='c-strip' style='height:8px'></div>"
     percent = 100.0 / run.duration
     done = min(100.0, run.time * percent)
     parts = [f"<rect x='0' y='0' width='{done:.2f}' height='8' fill='{theme.OPERATIONAL_COLOR}'/>"]
-    for start, end in run.episodes:
-        width = max(SHORTEST_SHOWN, (end - start) * percent)
-        opacity = 1.0 if start <= run.time else 0.45
-        parts.append(
-            f"<rect x='{min(start * percent, 100.0 - width):.2f}' y='0' width='{width:.2f}' height='8' "
-            f"fill='{theme.FAIL_COLOR}' opacity='{opacity}'/>"
-        )
+    for stretches, opacity in ((run.lived_episodes, 1.0), (run.coming_episodes, 0.45)):
+        for start, end in stretches:
+            width = max(SHORTEST_SHOWN, (end - start) * percent)
+            parts.append(
+                f"<rect x='{min(start * percent, 100.0 - width):.2f}' y='0' width='{width:.2f}' height='8' "
+                f"fill='{theme.FAIL_COLOR}' opacity='{opacity}'/>"
+            )
+    parts += [f"<rect x='{at * percent:.2f}' y='0' width='0.2' height='8' fill='{EDIT}'/>" for at in run.edits]
     return (
-        f"<div class='c-strip' data-episodes='{len(run.episodes)}'>"
+        f"<div class='c-strip' data-episodes='{len(run.lived_episodes)}' data-coming='{len(run.coming_episodes)}' "
+        f"data-edits='{len(run.edits)}'>"
         "<svg width='100%' height='8' viewBox='0 0 100 8' preserveAspectRatio='none' "
         f"style='display:block;background:#33363c'>{''.join(parts)}</svg></div>"
     )
@@ -49,7 +55,7 @@ class TimeLine(BasePanel):
 
     def __init__(self, gui: GuiApi, post: Post, speed: float) -> None:
         gui.add_html(FOLD)
-        buttons = gui.add_button_group("", (PLAY, PAUSE, STEP))
+        buttons = gui.add_button_group("", (REVERSE, BACK, PAUSE, STEP, PLAY))
         buttons.on_click(posting(post, lambda event: _clicked(event.target.value)))
         self._speed = gui.add_dropdown(
             "", tuple(_factor(s) for s in SPEEDS), initial_value=_factor(speed), hint="Speed of the play clock."
@@ -60,10 +66,12 @@ class TimeLine(BasePanel):
         self._slider.on_update(posting(post, lambda event: Seek(float(event.target.value))))
         self._strip = gui.add_html(strip(None))
         self._shown = ("", "")
-        keys: tuple[tuple[str, Literal["P", "N", "B"], actions.Action], ...] = (
+        keys: tuple[tuple[str, Literal["P", "N", "V", "R", "B"], actions.Action], ...] = (
             ("Play or pause", "P", Play()),
             ("One scan further", "N", StepScan()),
-            ("Restart the drive", "B", Restart()),
+            ("One scan back", "V", StepScan(back=True)),
+            ("Play backward", "R", Play(playing=True, backward=True)),
+            ("Run the drive afresh", "B", Restart()),
         )
         for label, key, action in keys:
             gui.add_command(label, hotkey=key).on_trigger(posting(post, lambda _event, action=action: action))
@@ -76,12 +84,14 @@ class TimeLine(BasePanel):
         if self._slider.max != run.duration and run.duration > 0.0:
             self._slider.max = run.duration
         shown_time = round(min(run.time, run.duration), 2)
-        if abs(self._slider.value - shown_time) > 0.005 and run.seeking is None:
+        if abs(self._slider.value - shown_time) > 0.005:
             self._slider.value = shown_time
         if view.state.part(RunState).speed != float(self._speed.value.rstrip("x")):
             self._speed.value = _factor(view.state.part(RunState).speed)
-        state = "seeking" if run.seeking is not None else "at the end" if run.at_end else ""
-        state = state or ("playing" if view.state.part(RunState).playing else "paused")
+        asked = view.state.part(RunState)
+        state = (
+            "backward" if asked.backward else "playing" if asked.playing else "at the end" if run.at_end else "paused"
+        )
         text = (
             "<div class='c-clock' style='font-size:12px;white-space:nowrap;font-variant-numeric:tabular-nums'>"
             f"<b>{clock(run.time)}</b> / {clock(run.duration)} <span style='opacity:.6'>{state}</span></div>"
@@ -93,12 +103,19 @@ class TimeLine(BasePanel):
             self._strip.content = bar
 
 
+def _state(asked: RunState, *, at_end: bool) -> str:
+    """Say what the play clock does."""
+    if asked.playing:
+        return "playing backward" if asked.backward else "playing"
+    return "at the end" if at_end else "paused"
+
+
 def _factor(speed: float) -> str:
     return f"{speed:g}x"
 
 
 def _clicked(label: Any) -> actions.Action:
     """From the button's label to what it means."""
-    if label == STEP:
-        return StepScan()
-    return Play(label == PLAY)
+    if label in (STEP, BACK):
+        return StepScan(back=label == BACK)
+    return Play(playing=label != PAUSE, backward=label == REVERSE)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
@@ -31,7 +32,9 @@ class TrailLayer(BaseLayer):
         run = view.part(RunView)
         if run is None:
             return
-        self._line.points = polyline_segments(thinned(run.series.means[:, :2], MOST_POINTS), theme.Height.TRAIL)
+        self._line.points = polyline_segments(
+            thinned(run.result.columns.means[: run.lived, :2], MOST_POINTS), theme.Height.TRAIL
+        )
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the line."""
@@ -56,7 +59,9 @@ class ReferenceLayer(BaseLayer):
         run = view.part(RunView)
         if run is None:
             return
-        self._line.points = polyline_segments(thinned(run.references, MOST_POINTS), theme.Height.REFERENCE)
+        lived = run.result.references[: run.lived, :2]
+        known = lived[np.isfinite(lived[:, 0])]
+        self._line.points = polyline_segments(thinned(known, MOST_POINTS), theme.Height.REFERENCE)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the line."""

@@ -1,40 +1,17 @@
-"""What the run has come to, as panels and layers draw it: frozen, newest wins."""
+"""The run as panels and layers draw it: the whole result, and where in it the page is. Frozen, newest wins."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TypeAlias
 
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Estimate, Mode
+from commission.localization.run_columns import Segment
+from commission.studies.run import RunResult
 
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Series:
-    """What is known about each cycle of the drive so far; one row per scan, views of the run's own arrays."""
-
-    times: FloatArray
-    """(K,) time of each scan after the start of the drive [s]."""
-    means: FloatArray
-    """(K, 3) estimated pose of base in map [m, m, rad]."""
-    two_sigma: FloatArray
-    """(K, 3) 2-sigma of x [m], y [m] and heading [rad]."""
-    nis: FloatArray
-    """(K,) largest squared Mahalanobis distance of the scan's inliers; 0 where there is none."""
-    counts: NDArray[np.int64]
-    """(K, 3) detections of each `Status`."""
-    failed: NDArray[np.bool_]
-    """(K,) whether the supervisor was in fail mode."""
-    microseconds: FloatArray
-    """(K,) time that the localizer took for the cycle [us]."""
-    error: FloatArray
-    """(K,) position error against the reference [m]; NaN where there is none."""
-
-    def __len__(self) -> int:
-        """Return the number of cycles."""
-        return len(self.times)
+Stretch: TypeAlias = tuple[float, float]
+"""From when to when after the start of the drive [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,14 +24,16 @@ class Accumulated:
     """(M, 2) points [m], map frame."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RunView:
-    """The run as it is now."""
+    """The run as it is now: what lies before the cursor is lived, what lies behind it is computed only."""
 
+    result: RunResult
+    """The whole drive, localized and judged."""
+    lived: int
+    """Number of cycles up to the cursor."""
     time: float
-    """Time of the play clock after the start of the drive [s]."""
-    duration: float
-    """Length of the drive [s]."""
+    """The cursor: time after the start of the drive [s]."""
     pose: FloatArray
     """(3,) pose at which the vehicle is drawn: the filter's own [m, m, rad]."""
     covariance: FloatArray
@@ -63,21 +42,59 @@ class RunView:
     """State of the supervisor."""
     estimate: Estimate | None
     """The newest cycle; none before the first."""
+    segment: Segment
+    """What the newest cycle was made with."""
+    covered: bool
+    """Whether every reflector is covered from the next cycle on, as asked for."""
     scan_map: FloatArray
     """(B, 2) end points of the newest scan's beams [m], map frame."""
     gates: FloatArray
     """(R, n, 2) outlines of the validation areas of the reflectors in view [m], map frame."""
-    reference: FloatArray | None
-    """(3,) reference pose of the newest cycle [m, m, rad], where there is one."""
-    references: FloatArray
-    """(L, 2) reference positions so far [m], map frame."""
-    series: Series
-    """Every cycle so far."""
     accumulated: Accumulated | None
     """Every detection so far; none in views that are drawn at the full rate."""
-    episodes: tuple[tuple[float, float], ...]
-    """Start and end of each fail episode [s]: as lived up to now, as predicted for the rest."""
-    seeking: float | None = None
-    """Share of a seek that is done [0..1]; none when none is under way."""
-    at_end: bool = False
-    """Whether the drive is over."""
+
+    @property
+    def duration(self) -> float:
+        """Length of the drive [s]."""
+        return self.result.duration
+
+    @property
+    def at_end(self) -> bool:
+        """Whether the drive is over."""
+        return self.time >= self.duration
+
+    @property
+    def newest(self) -> int:
+        """Index of the newest cycle; -1 before the first."""
+        return self.lived - 1
+
+    @property
+    def lived_episodes(self) -> tuple[Stretch, ...]:
+        """Fail episodes that have begun, up to the cursor."""
+        return tuple((start, min(end, self.time)) for start, end in self._episodes() if self._has_begun(start))
+
+    @property
+    def coming_episodes(self) -> tuple[Stretch, ...]:
+        """What is computed of fail episodes behind the cursor: of one that has begun only its rest."""
+        return tuple(
+            (max(start, self.time) if self._has_begun(start) else start, end)
+            for start, end in self._episodes()
+            if not self._has_begun(start) or end > self.time
+        )
+
+    @property
+    def edits(self) -> tuple[float, ...]:
+        """Times from which on another setup is used, or reflectors are covered or uncovered [s]."""
+        return tuple(float(self.result.times[segment.first]) for segment in self.result.columns.segments[1:])
+
+    def _episodes(self) -> tuple[Stretch, ...]:
+        """All fail episodes of the drive."""
+        first_ns = int(self.result.inputs.log.stamps_ns[0])
+        return tuple(
+            ((episode.start_ns - first_ns) * 1e-9, (episode.end_ns - first_ns) * 1e-9)
+            for episode in self.result.episodes
+        )
+
+    def _has_begun(self, start: float) -> bool:
+        """Whether a cycle at a time is lived."""
+        return self.lived > 0 and start <= float(self.result.times[self.newest])

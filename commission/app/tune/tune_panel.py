@@ -91,7 +91,6 @@ class TunePanel(BasePanel):
     def __init__(self, gui: GuiApi, post: Post, state: AppState) -> None:
         self._widgets: dict[str, GuiInputHandle[Any]] = {}
         self._parameters = state.project.parameters
-        gui.add_html("<div class='c-note' style='padding:2px 4px'>Acts on the next scan; the filter goes on.</div>")
         for name, heading in GROUPS.items():
             with gui.add_folder(heading, expand_by_default=name != "odometry"):
                 self._add_group(gui, post, name)

@@ -11,8 +11,18 @@ from commission.app.base.state import AppState
 from commission.app.project.actions import ProjectSaved, RenameProject, Save
 from commission.app.project.effects import WriteProject
 from commission.app.project.state import FilesState
-from commission.app.run.actions import ChooseSource, Play, Restart, Seek, SetSpeed, StepScan, VirtualDrive
-from commission.app.run.effects import LoadSource, MoveTo, ProcessOneScan
+from commission.app.run.actions import (
+    ChooseSource,
+    Cover,
+    EditFromHereOn,
+    Play,
+    Restart,
+    Seek,
+    SetSpeed,
+    StepScan,
+    VirtualDrive,
+)
+from commission.app.run.effects import CoverFromHere, LoadSource, MoveByScans, PlayOn, RunAfresh
 from commission.app.run.state import RunState
 from commission.app.tune.actions import ParameterValue, ResetParameters, SetParameter
 from commission.app.tune.reducer import parameter
@@ -106,10 +116,30 @@ def test_a_virtual_drive_needs_a_route_of_the_project(state: AppState) -> None:
     assert after(state, ChooseSource(source)).effects == (LoadSource(source),)
 
 
-def test_a_step_pauses_and_processes_one_scan(state: AppState) -> None:
-    stepped = after(state, Play(playing=True), StepScan())
+@pytest.mark.parametrize(("back", "scans"), [(False, 1), (True, -1)])
+def test_a_step_pauses_and_goes_by_one_scan(state: AppState, back: bool, scans: int) -> None:
+    stepped = after(state, Play(playing=True), StepScan(back=back))
     assert not stepped.state.part(RunState).playing
-    assert stepped.effects == (ProcessOneScan(),)
+    assert stepped.effects == (MoveByScans(scans),)
+
+
+def test_play_runs_forward_or_backward_and_pauses_whatever_it_did(state: AppState) -> None:
+    backward = after(state, Play(playing=True, backward=True))
+    assert backward.state.part(RunState).playing
+    assert backward.state.part(RunState).backward
+    assert backward.effects == (PlayOn(backward=True),)
+    paused = after(backward.state, Play())
+    assert not paused.state.part(RunState).playing
+    assert paused.effects == ()
+    forward = after(paused.state, Play())
+    assert not forward.state.part(RunState).backward
+    assert forward.effects == (PlayOn(backward=False),)
+
+
+def test_a_cover_acts_from_the_cursor_on_and_edits_where_they_are_asked_to(state: AppState) -> None:
+    assert after(state, Cover(covered=True)).effects == (CoverFromHere(covered=True),)
+    assert not state.part(RunState).from_here_on
+    assert after(state, EditFromHereOn(from_here_on=True)).state.part(RunState).from_here_on
 
 
 @pytest.mark.parametrize(
@@ -129,7 +159,7 @@ def test_impossible_numbers_are_refused(state: AppState, wish: actions.Action) -
 
 
 def test_a_restart_goes_to_the_start_afresh(state: AppState) -> None:
-    assert after(state, Restart()).effects == (MoveTo(0.0, afresh=True),)
+    assert after(state, Restart()).effects == (RunAfresh(),)
 
 
 def test_a_hidden_layer_can_be_shown_again(state: AppState) -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from commission.app.base.view import LivedPath
 from commission.app.prediction.chart import chart
 from commission.app.prediction.driven import driven
 from commission.app.prediction.event_layer import events, place_at
@@ -12,8 +13,6 @@ from commission.app.prediction.load_colors import BOUNDS, load_classes, palette
 from commission.app.prediction.ribbon_layer import pieces
 from commission.app.prediction.tracks import round_up
 from commission.app.prediction.view import RouteView, route_view
-from commission.app.run.session import Drive, Session
-from commission.localization.setup import LocalizerSetup
 from commission.planning.route_prediction import RoutePrediction, plan_route, predict_route
 from commission.planning.true_error import predict_errors
 from commission.site.project import Project
@@ -21,6 +20,7 @@ from commission.site.reflectors import ReflectorMap
 from commission.site.stations import Station
 from commission.studies.prediction import PredictionInput
 from commission.studies.prediction import prediction as prediction_study
+from commission.studies.run import RunResult
 
 
 @pytest.fixture(scope="module")
@@ -29,12 +29,8 @@ def prediction(project: Project) -> RoutePrediction:
 
 
 @pytest.fixture
-def session(project: Project, drive: Drive) -> Session:
-    session = Session(drive, LocalizerSetup.of(project))
-    session.advance(1e-9)
-    while not session.at_end:
-        session.step()
-    return session
+def lived(result: RunResult) -> LivedPath:
+    return LivedPath(result.columns.means, result.two_sigma)
 
 
 def test_thinning_a_ribbon_keeps_its_worst_spot_and_both_ends() -> None:
@@ -55,18 +51,17 @@ def test_a_load_above_the_limit_has_a_color_outside_of_the_ramp() -> None:
 
 
 def test_a_run_there_and_back_is_laid_over_the_metres_it_was_driven(
-    session: Session, prediction: RoutePrediction
+    lived: LivedPath, prediction: RoutePrediction
 ) -> None:
-    found = driven(session.view().series, prediction)
+    found = driven(lived, prediction)
     assert found is not None
     assert np.all(np.diff(found.metres) >= 0.0)
     # The vehicle stops some centimetres short of the planned end or beyond.
     assert found.metres[-1] == pytest.approx(prediction.drive.length, abs=0.2)
 
 
-def test_a_run_elsewhere_is_not_laid_over_the_route(session: Session, prediction: RoutePrediction) -> None:
-    series = session.view().series
-    assert driven(replace(series, means=series.means + np.array([3.0, 3.0, 0.0])), prediction) is None
+def test_a_run_elsewhere_is_not_laid_over_the_route(lived: LivedPath, prediction: RoutePrediction) -> None:
+    assert driven(replace(lived, poses=lived.poses + np.array([3.0, 3.0, 0.0])), prediction) is None
 
 
 def strict(project: Project) -> Project:

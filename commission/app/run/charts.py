@@ -1,0 +1,132 @@
+"""What the plots show: their curves and thresholds, each as a function of the run. Nothing is drawn here."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from commission.app.base import theme
+from commission.geometry.arrays import FloatArray
+from commission.geometry.gaussian import chi_square_gate
+from commission.localization.estimate import Status
+from commission.site.parameters import Parameters
+from commission.studies.run import RunResult
+
+TURQUOISE, ORANGE = "#4dc4ff", "#ffb454"
+LIMIT = theme.css(theme.POSE)
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One curve of a plot."""
+
+    label: str
+    """Its name and unit."""
+    color: str
+    """CSS color: # and six digits."""
+    values: Callable[[RunResult], FloatArray]
+    """From a run to one value per cycle, in the plot's unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """A threshold of a plot, drawn dashed; it changes where another segment of the run begins."""
+
+    label: str
+    """Its name."""
+    value: Callable[[Parameters], float]
+    """From the parameters of a segment to the threshold, in the plot's unit."""
+    color: str = LIMIT
+    """CSS color."""
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """One plot."""
+
+    title: str
+    """Title with the unit."""
+    lines: tuple[Line, ...]
+    """Its curves."""
+    limits: tuple[Limit, ...] = ()
+    """Its thresholds."""
+    span: Callable[[Parameters], tuple[float, float]] | None = None
+    """Smallest and largest value shown, in the plot's unit; none: from 0 as far as the curves need."""
+    least: float = 1.0
+    """Where that is at least, so that a curve of zeros lies at the bottom."""
+    is_logarithmic: bool = False
+    """Whether the vertical axis is logarithmic: a good run lies far below its limits."""
+
+
+def _gate(parameters: Parameters) -> float:
+    return chi_square_gate(parameters.association.gate_probability, 2)
+
+
+def _decade_below(value: float) -> float:
+    """The power of ten below: where a logarithmic axis has a label anyway."""
+    return 10.0 ** math.floor(math.log10(value))
+
+
+def _heading_errors(run: RunResult) -> FloatArray:
+    """(K,) amount of the heading error [deg]; NaN where it is unknown."""
+    return np.degrees(np.abs(run.errors[:, 2]))
+
+
+CHARTS = (
+    Chart(
+        "2σ of x, y [mm]",
+        (
+            Line("x [mm]", TURQUOISE, lambda run: run.two_sigma[:, 0] * 1000.0),
+            Line("y [mm]", ORANGE, lambda run: run.two_sigma[:, 1] * 1000.0),
+        ),
+        (Limit("limit", lambda p: p.supervisor.position_limit * 1000.0),),
+        lambda p: (5.0 * p.supervisor.position_limit, 3000.0 * p.supervisor.position_limit),
+        is_logarithmic=True,
+    ),
+    Chart(
+        "2σ of heading [°]",
+        (Line("heading [°]", TURQUOISE, lambda run: np.degrees(run.two_sigma[:, 2])),),
+        (Limit("limit", lambda p: math.degrees(p.supervisor.heading_limit)),),
+        lambda p: (
+            _decade_below(0.005 * math.degrees(p.supervisor.heading_limit)),
+            3.0 * math.degrees(p.supervisor.heading_limit),
+        ),
+        is_logarithmic=True,
+    ),
+    Chart(
+        "NIS against gate",
+        (Line("largest NIS of a scan's inliers, 0: none", TURQUOISE, lambda run: np.nan_to_num(run.nis)),),
+        (Limit("gate", _gate),),
+        lambda p: (0.0, 1.4 * _gate(p)),
+    ),
+    Chart(
+        "Inliers, outliers per scan",
+        (
+            Line("inliers", theme.css(theme.INLIER), lambda run: run.counts[:, Status.INLIER].astype(float)),
+            Line(
+                "outliers",
+                theme.css(theme.OUTLIER_ASSOCIATION),
+                lambda run: run.counts[:, Status.OUTLIER_DETECTOR :].sum(axis=1).astype(float),
+            ),
+        ),
+        least=4.0,
+    ),
+    Chart(
+        "Position error [mm]",
+        (Line("error against reference [mm]", theme.css(theme.REFERENCE), lambda run: run.position_errors * 1000.0),),
+    ),
+    Chart(
+        "Heading error [°]",
+        (Line("error against reference [°]", theme.css(theme.REFERENCE), _heading_errors),),
+        least=0.01,
+    ),
+)
+
+
+def ceiling(value: float) -> float:
+    """Return the next of 1, 2, 5, 10, 20, ... : an axis that ends there stays while its curves change a little."""
+    decade = 10.0 ** math.floor(math.log10(value))
+    return next(step * decade for step in (1.0, 2.0, 5.0, 10.0) if step * decade >= value * (1.0 - 1e-12))

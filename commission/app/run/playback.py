@@ -1,0 +1,176 @@
+"""A cursor over a run that is there: play, step and seek, forward and back, cost nothing. Nothing is computed ahead.
+
+It is called by the owner thread alone and knows neither widgets, files nor jobs.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.app.run.view import Accumulated, RunView
+from commission.geometry import se2
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.localization.estimate import Belief, Estimate, Mode, Status
+from commission.localization.observation import project_detections, range_bearing
+from commission.localization.run_columns import RunColumns
+from commission.localization.setup import LocalizerSetup
+from commission.studies.run import RunResult
+
+GATE_POINTS = 40
+MOST_POINTS = 40_000
+"""Accumulated points of each kind that are drawn: of more, every second, third, ... one over the whole drive."""
+
+
+class Playback:
+    """A run, and where in it the page is.
+
+    Parameters
+    ----------
+    result : the whole drive, localized and judged: at least one cycle.
+    """
+
+    def __init__(self, result: RunResult) -> None:
+        stamps = result.inputs.log.stamps_ns
+        self.start_ns, self.end_ns = int(stamps[0]), int(stamps[-1])
+        self._at_ns = self.start_ns
+        self.replace(result)
+
+    @property
+    def result(self) -> RunResult:
+        """The whole drive."""
+        return self._result
+
+    @property
+    def time(self) -> float:
+        """The cursor: time after the start [s]."""
+        return (self._at_ns - self.start_ns) * 1e-9
+
+    @property
+    def lived(self) -> int:
+        """Number of cycles up to the cursor."""
+        return int(np.searchsorted(self._result.columns.stamps_ns, self._at_ns, side="right"))
+
+    @property
+    def at_start(self) -> bool:
+        """Whether the cursor is where the drive begins."""
+        return self._at_ns <= self.start_ns
+
+    @property
+    def at_end(self) -> bool:
+        """Whether the cursor is where the drive ends."""
+        return self._at_ns >= self.end_ns
+
+    def replace(self, result: RunResult) -> None:
+        """Show another run over the same drive; the cursor stays."""
+        self._result = result
+        self._inliers, self._outliers = (
+            _Cloud(result.columns, chosen)
+            for chosen in (result.columns.status == Status.INLIER, result.columns.status != Status.INLIER)
+        )
+
+    def seek(self, seconds: float) -> None:
+        """Go to a time after the start [s]; one before it or behind the end is the start or the end."""
+        # Compared before it is rounded: a slider may ask for more nanoseconds than there are numbers.
+        inside = min(max(seconds, 0.0), (self.end_ns - self.start_ns) * 1e-9)
+        self._at_ns = min(self.start_ns + round(inside * 1e9), self.end_ns)
+
+    def advance(self, seconds: float) -> None:
+        """Move the cursor by a time [s], which may be negative."""
+        self.seek(self.time + seconds)
+
+    def step(self, cycles: int) -> None:
+        """Go to the scan that lies some cycles ahead, or back where negative; beyond the first or last: there."""
+        stamps = self._result.columns.stamps_ns
+        wanted = self.lived - 1 + cycles
+        self._at_ns = self.start_ns if wanted < 0 else int(stamps[min(wanted, len(stamps) - 1)])
+
+    def view(self, *, covered: bool, whole: bool = True) -> RunView:
+        """Return the run as it is at the cursor.
+
+        Parameters
+        ----------
+        covered : whether every reflector is covered from the next cycle on, as asked for.
+        whole : with every detection so far, which takes longest to copy and draw.
+        """
+        columns, lived = self._result.columns, self.lived
+        estimate = columns.estimate(lived - 1) if lived else None
+        belief = columns.initial if estimate is None else estimate.posterior
+        segment = columns.segment(max(lived - 1, 0))
+        return RunView(
+            result=self._result,
+            lived=lived,
+            time=self.time,
+            pose=belief.mean,
+            covariance=belief.covariance,
+            mode=Mode.OPERATIONAL if estimate is None else estimate.mode,
+            estimate=estimate,
+            segment=segment,
+            covered=covered,
+            scan_map=self._scan_points(belief, segment.setup),
+            gates=_gates(estimate, segment.setup),
+            accumulated=self._accumulated(lived) if whole else None,
+        )
+
+    def _accumulated(self, lived: int) -> Accumulated:
+        """Return every detection's place so far."""
+        rows = int(self._result.columns.offsets[lived])
+        return Accumulated(self._inliers.before(rows), self._outliers.before(rows))
+
+    def _scan_points(self, belief: Belief, setup: LocalizerSetup) -> FloatArray:
+        """(B, 2) end points of the newest scan's beams [m], map frame."""
+        scans = self._result.inputs.log.scans
+        newest = -1 if scans is None else int(np.searchsorted(scans.stamps_ns, self._at_ns, side="right")) - 1
+        if scans is None or newest < 0:
+            return np.empty((0, 2))
+        scan = scans.scan(newest)
+        hit = np.isfinite(scan.ranges)
+        ranges, bearings = scan.ranges[hit].astype(np.float64), scan.bearings[hit]
+        points_scanner = ranges[:, np.newaxis] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+        T_map_scanner = se2.compose(belief.mean, setup.scanner.mounting)
+        return se2.transform_points(T_map_scanner, points_scanner)
+
+
+class _Cloud:
+    """Places of some detections of a whole run, at most MOST_POINTS of them; computed when they are first asked for."""
+
+    def __init__(self, columns: RunColumns, chosen: NDArray[np.bool_]) -> None:
+        self._columns, self._chosen = columns, chosen
+        self._rows: IntArray | None = None
+        self._points = np.empty((0, 2))
+
+    def before(self, row: int) -> FloatArray:
+        """(N, 2) places [m], map frame, of those before a row of the detections."""
+        if self._rows is None:
+            rows = np.flatnonzero(self._chosen)
+            self._rows = rows[:: max(1, -(-len(rows) // MOST_POINTS))]
+            self._points = _points_of(self._columns, self._rows)
+        return self._points[: int(np.searchsorted(self._rows, row))]
+
+
+def _points_of(columns: RunColumns, rows: IntArray) -> FloatArray:
+    """(N, 2) places [m], map frame, of some detections, seen from the posteriors of their cycles."""
+    cycles = np.searchsorted(columns.offsets, rows, side="right") - 1
+    points = np.empty((len(rows), 2))
+    ends = (*columns.firsts[1:].tolist(), len(columns))
+    for segment, end in zip(columns.segments, ends, strict=True):
+        here = slice(*np.searchsorted(cycles, (segment.first, end)).tolist())
+        alone = np.arange(len(rows[here]) + 1, dtype=np.int64)
+        points[here] = project_detections(
+            columns.means[cycles[here]], alone, columns.range_bearing[rows[here]], segment.setup.filter.observation
+        )
+    return points
+
+
+def _gates(estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
+    """(R, n, 2) validation areas of the reflectors that the scanner could see if nothing stood in between."""
+    if estimate is None or not len(setup.reflectors):
+        return np.empty((0, GATE_POINTS, 2))
+    scanner = setup.scanner
+    seen = range_bearing(estimate.prior.mean, scanner.mounting, setup.reflectors.centers)
+    first, last = (math.radians(limit) for limit in scanner.field_of_view_deg)
+    inside = np.mod(seen[:, 1] - first, 2.0 * math.pi) <= last - first
+    in_view = inside & (seen[:, 0] <= min(scanner.reflector_range, scanner.range[1]))
+    return setup.validation_outlines(estimate.prior, GATE_POINTS)[in_view]

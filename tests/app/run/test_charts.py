@@ -1,0 +1,162 @@
+"""Every curve of the plots equals the study that it comes from, in its unit; every limit its parameter."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import viser
+from scipy.stats import chi2
+
+from commission.app.base.server import start_server
+from commission.app.base.state import AppState
+from commission.app.base.view import view_of
+from commission.app.run.charts import CHARTS, ceiling
+from commission.app.run.curves import BINS
+from commission.app.run.drives import Drive
+from commission.app.run.playback import Playback
+from commission.app.run.plots import Plots
+from commission.app.tune.reducer import with_parameter
+from commission.localization.estimate import Status
+from commission.localization.setup import LocalizerSetup
+from commission.site.project import Project
+from commission.studies.run import RunInput, RunResult, judged_run
+
+LINES = {(chart.title, line.label): line for chart in CHARTS for line in chart.lines}
+DEGREES = 180.0 / math.pi
+
+
+def sigma(axis):
+    return lambda estimate, _truth: 2.0 * math.sqrt(estimate.posterior.covariance[axis, axis])
+
+
+def inliers(estimate, _truth):
+    return float((estimate.status == Status.INLIER).sum())
+
+
+EXPECTED = {
+    ("2σ of x, y [mm]", "x [mm]"): lambda e, t: 1000.0 * sigma(0)(e, t),
+    ("2σ of x, y [mm]", "y [mm]"): lambda e, t: 1000.0 * sigma(1)(e, t),
+    ("2σ of heading [°]", "heading [°]"): lambda e, t: DEGREES * sigma(2)(e, t),
+    ("NIS against gate", "largest NIS of a scan's inliers, 0: none"): lambda e, _t: max(
+        e.d2[e.status == 0], default=0.0
+    ),
+    ("Inliers, outliers per scan", "inliers"): inliers,
+    ("Inliers, outliers per scan", "outliers"): lambda e, t: len(e.status) - inliers(e, t),
+    ("Position error [mm]", "error against reference [mm]"): lambda e, t: (
+        1000.0 * math.hypot(e.posterior.mean[0] - t[0], e.posterior.mean[1] - t[1])
+    ),
+    ("Heading error [°]", "error against reference [°]"): lambda e, t: (
+        DEGREES * abs(math.remainder(e.posterior.mean[2] - t[2], 2.0 * math.pi))
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def strict(project: Project, drive: Drive) -> RunResult:
+    """A gate that rejects some detections, so that no curve is empty."""
+    narrow = replace(project, parameters=with_parameter(project.parameters, "association.gate_probability", 0.6))
+    return judged_run(RunInput.of(narrow, drive.log, drive.start))
+
+
+def test_every_curve_has_its_expectation() -> None:
+    assert set(EXPECTED) == set(LINES)
+
+
+@pytest.mark.parametrize("name", EXPECTED, ids=" ".join)
+def test_a_curve_is_its_quantity_in_its_unit_cycle_by_cycle(strict: RunResult, drive: Drive, name) -> None:
+    truth = dict(zip(drive.log.reference_stamps_ns.tolist(), drive.log.reference_poses, strict=True))
+    values = LINES[name].values(strict)
+    expected = [
+        EXPECTED[name](estimate, truth[estimate.stamp_ns])
+        for estimate in map(strict.columns.estimate, range(strict.cycles))
+    ]
+    np.testing.assert_allclose(values, expected, rtol=1e-9)
+    assert np.nanmax(values) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("title", "expected"),
+    [
+        ("2σ of x, y [mm]", 70.0),
+        ("2σ of heading [°]", 2.5),
+        ("NIS against gate", float(chi2.ppf(0.6, 2))),
+    ],
+)
+def test_a_limit_is_its_parameter_in_the_unit_of_its_plot(project: Project, title: str, expected: float) -> None:
+    parameters = project.parameters
+    for key, value in (
+        ("supervisor.position_limit", 0.07),
+        ("supervisor.heading_limit", 2.5 / DEGREES),
+        ("association.gate_probability", 0.6),
+    ):
+        parameters = with_parameter(parameters, key, value)
+    (chart,) = (chart for chart in CHARTS if chart.title == title)
+    assert chart.limits[0].value(parameters) == pytest.approx(expected, rel=1e-12)
+    low, high = chart.span(parameters)
+    assert low < expected < high
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [(1.0, 1.0), (1.01, 2.0), (2.0, 2.0), (37.0, 50.0), (0.011, 0.02), (600.0, 1000.0)],
+)
+def test_an_axis_ends_at_the_next_round_number(value: float, expected: float) -> None:
+    assert ceiling(value) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.fixture
+def server():
+    server = start_server("127.0.0.1", 0)
+    yield server
+    server.stop()
+
+
+def drawn(plots: Plots, project: Project, playback: Playback) -> list[np.ndarray]:
+    """What the first plot holds: axis, x and its pale part, y and its pale part, limit, marks."""
+    plots.draw_slowly(view_of(AppState(project, project), playback.view(covered=False)))
+    return [np.asarray(part) for part in plots._plots[0].data]
+
+
+def test_what_lies_behind_the_cursor_is_drawn_pale(
+    server: viser.ViserServer, project: Project, result: RunResult
+) -> None:
+    plots, playback = Plots(server.gui), Playback(result)
+    playback.seek(0.5 * result.duration)
+    axis, lived, coming = drawn(plots, project, playback)[:3]
+    half = BINS // 2
+    assert axis[-1] == pytest.approx(result.duration)
+    assert np.isfinite(lived[:half]).all()
+    assert np.isnan(lived[half + 1 :]).all()
+    assert np.isnan(coming[: half - 1]).all()
+    assert np.isfinite(coming[half + 1 :]).all()
+    playback.seek(1e9)
+    assert np.isfinite(drawn(plots, project, playback)[1]).all()
+
+
+def test_a_limit_changes_where_another_segment_begins(
+    server: viser.ViserServer, project: Project, result: RunResult
+) -> None:
+    wider = replace(project, parameters=with_parameter(project.parameters, "supervisor.position_limit", 0.2))
+    cycle = result.cycles // 2
+    later = judged_run(result.inputs.with_setup(LocalizerSetup.of(wider), cycle), earlier=result)
+    axis, *_, limit, _fail, _coming, _now, edits, _waking = drawn(Plots(server.gui), project, Playback(later))
+    assert set(limit.tolist()) == {100.0, 200.0}
+    step = axis[np.flatnonzero(np.diff(limit))[0]]
+    began = pytest.approx(float(result.times[cycle]), abs=result.duration / BINS)
+    assert step == began
+    assert axis[np.flatnonzero(edits)].tolist() == [began]
+
+
+def test_fail_episodes_are_areas_dark_where_they_are_lived(
+    server: viser.ViserServer, project: Project, drive: Drive
+) -> None:
+    tight = replace(project, parameters=with_parameter(project.parameters, "supervisor.position_limit", 0.03))
+    inputs = RunInput.of(tight, drive.log, drive.start).with_cover(15, covered=True).with_cover(75, covered=False)
+    playback = Playback(judged_run(inputs))
+    (start, end) = playback.view(covered=False).coming_episodes[0]
+    plots = Plots(server.gui)
+    playback.seek(0.5 * (start + end))
+    axis, *_, lived, coming, _now, _edits, _waking = drawn(plots, project, playback)
+    assert axis[lived > 0][[0, -1]] == pytest.approx((start, playback.time), abs=2.0 * axis[1])
+    assert axis[coming > 0][[0, -1]] == pytest.approx((playback.time, end), abs=2.0 * axis[1])

@@ -1,0 +1,307 @@
+"""The service behind the run: what an edit does to the run that is there, and that the newest one wins."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from commission.app.base.actions import PROGRAM, Action
+from commission.app.base.effects import Effect
+from commission.app.base.service import Context
+from commission.app.base.state import AppState
+from commission.app.base.view import Followed, LivedPath
+from commission.app.run import service as service_module
+from commission.app.run.actions import Play, VirtualDrive
+from commission.app.run.drives import Drive
+from commission.app.run.effects import CoverFromHere, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
+from commission.app.run.service import RunService
+from commission.app.run.state import RunState
+from commission.app.run.view import RunView
+from commission.app.tune.reducer import with_parameter
+from commission.localization.estimate import Mode
+from commission.localization.run_columns import Segment
+from commission.localization.setup import LocalizerSetup
+from commission.progress import Progress
+from commission.site.project import Project
+from commission.studies.run import RunInput, RunResult, judged_run
+from tests.app.owning import Owner
+
+GATE = "association.gate_probability"
+
+
+class Desk:
+    """A run service whose owner the test plays, and whose clock it moves."""
+
+    def __init__(self, project: Project, drive: Drive) -> None:
+        self.now = 0.0
+        self.drives = [drive]
+        self.state = AppState(project, project)
+        self.owner = Owner(self._make, self.state)
+
+    def _make(self, context: Context) -> RunService:
+        context = replace(context, clock=lambda: self.now)
+        return RunService(context, prepare=lambda *_: self.drives[-1], compile_all=lambda _progress: None)
+
+    @property
+    def service(self) -> RunService:
+        return self.owner.service
+
+    @property
+    def view(self) -> RunView:
+        view = self.service.view()
+        assert view is not None
+        return view
+
+    def do(self, *effects: Effect, settle: bool = True) -> None:
+        for effect in effects:
+            self.service.carry_out(effect, self.state, PROGRAM)
+        if settle:
+            self.owner.settle(self.state)
+
+    def ask(self, **changes: object) -> None:
+        self.state = self.state.with_part(replace(self.state.part(RunState), **changes))
+
+    def edit(self, change: Callable[[Project], Project], *, settle: bool = True) -> None:
+        before, self.state = self.state, replace(self.state, project=change(self.state.project))
+        self.service.project_changed(Action(), before, self.state)
+        if settle:
+            self.owner.settle(self.state)
+
+    def play(self, seconds: float) -> None:
+        """Play for a time, at 25 pictures a second."""
+        for _ in range(round(seconds / 0.04)):
+            self.now += 0.04
+            self.service.follow(self.state)
+
+
+@pytest.fixture
+def desk(project: Project, drive: Drive) -> Iterator[Desk]:
+    desk = Desk(project, drive)
+    desk.do(LoadSource(VirtualDrive("There and back")))
+    yield desk
+    desk.owner.close()
+
+
+def gate(probability: float) -> Callable[[Project], Project]:
+    return lambda project: replace(project, parameters=with_parameter(project.parameters, GATE, probability))
+
+
+def fresh(desk: Desk, *segments: tuple[int, Project, bool]) -> RunResult:
+    """The run that these segments make, computed on its own."""
+    drive = desk.drives[-1]
+    made = tuple(Segment(first, LocalizerSetup.of(project), covered) for first, project, covered in segments)
+    return judged_run(RunInput(log=drive.log, start=drive.start, segments=made))
+
+
+def assert_same(one: RunResult, other: RunResult) -> None:
+    assert one.inputs == other.inputs
+    for name in ("means", "covariances", "modes", "status", "d2"):
+        assert getattr(one.columns, name).tobytes() == getattr(other.columns, name).tobytes(), name
+    assert (one.statistics, one.episodes) == (other.statistics, other.episodes)
+
+
+def test_a_new_drive_is_there_whole_at_its_start_and_plays(desk: Desk, project: Project) -> None:
+    assert desk.owner.posted == [Play(playing=True)]
+    assert desk.view.time == 0.0
+    assert_same(desk.view.result, fresh(desk, (0, project, False)))
+
+
+def test_an_edit_runs_the_whole_drive_again_and_the_cursor_stays(desk: Desk, project: Project) -> None:
+    desk.do(MoveTo(5.0))
+    desk.edit(gate(0.6))
+    assert desk.view.time == pytest.approx(5.0)
+    assert_same(desk.view.result, fresh(desk, (0, gate(0.6)(project), False)))
+
+
+@pytest.mark.parametrize("part", ["reflectors", "scanner", "parameters"])
+def test_whatever_the_localizer_reads_runs_it_again(desk: Desk, part: str) -> None:
+    before = desk.view.result
+
+    def change(project: Project) -> Project:
+        match part:
+            case "reflectors":
+                one, *rest = project.reflectors.reflectors
+                return replace(project, reflectors=replace(project.reflectors, reflectors=(replace(one, y=2.1), *rest)))
+            case "scanner":
+                return replace(project, scanner=replace(project.scanner, mounting=[0.05, 0.0, 0.0]))
+            case _:
+                return gate(0.6)(project)
+
+    desk.edit(change)
+    assert desk.view.result.columns.means.tobytes() != before.columns.means.tobytes()
+    assert_same(desk.view.result, fresh(desk, (0, desk.state.project, False)))
+
+
+def test_an_edit_of_something_else_leaves_the_run(desk: Desk) -> None:
+    before = desk.view.result
+    desk.edit(lambda project: replace(project, name="Another"))
+    desk.edit(lambda project: replace(project, parameters=replace(project.parameters)))
+    assert desk.view.result is before
+
+
+def test_from_here_on_an_edit_leaves_what_was_lived(desk: Desk, project: Project) -> None:
+    desk.do(MoveTo(5.0))
+    cursor, before = desk.view.lived, desk.view.result
+    desk.ask(from_here_on=True)
+    desk.edit(gate(0.6))
+    after = desk.view
+    assert (after.lived, after.edits) == (cursor, (pytest.approx(5.1),))
+    assert_same(after.result, fresh(desk, (0, project, False), (cursor, gate(0.6)(project), False)))
+    assert after.result.columns.means[:cursor].tobytes() == before.columns.means[:cursor].tobytes()
+    desk.ask(from_here_on=False)
+    desk.edit(gate(0.7))
+    assert desk.view.edits == ()
+
+
+def test_covered_from_the_cursor_on_it_fails_and_uncovered_it_recovers(desk: Desk, project: Project) -> None:
+    desk.edit(lambda p: replace(p, parameters=with_parameter(p.parameters, "supervisor.position_limit", 0.03)))
+    desk.do(MoveTo(1.45), CoverFromHere(covered=True))
+    assert desk.view.covered
+    assert desk.view.mode is Mode.OPERATIONAL
+    desk.do(MoveTo(7.45))
+    assert desk.view.mode is Mode.FAIL
+    desk.do(CoverFromHere(covered=False))
+    assert not desk.view.covered
+    desk.do(MoveTo(9.0))
+    assert desk.view.mode is Mode.OPERATIONAL
+    assert len(desk.view.lived_episodes) == 1
+    tight = desk.state.project
+    assert_same(desk.view.result, fresh(desk, (0, tight, False), (15, tight, True), (75, tight, False)))
+    # Back in time the cover is on again, as it was lived.
+    desk.do(MoveTo(5.0))
+    assert desk.view.covered
+    # An edit from the start is made in the same world.
+    desk.edit(gate(0.6))
+    assert [segment.covered for segment in desk.view.result.inputs.segments] == [False, True, False]
+
+
+def test_afresh_the_drive_has_one_setup_and_nothing_covered(desk: Desk) -> None:
+    desk.ask(from_here_on=True)
+    desk.do(MoveTo(3.0), CoverFromHere(covered=True))
+    desk.edit(gate(0.6))
+    desk.do(RunAfresh())
+    assert desk.view.time == 0.0
+    assert not desk.view.covered
+    assert_same(desk.view.result, fresh(desk, (0, desk.state.project, False)))
+
+
+def test_at_the_end_nothing_is_left_to_act_on(desk: Desk) -> None:
+    desk.do(MoveTo(1e9))
+    before = desk.view.result
+    desk.do(CoverFromHere(covered=True))
+    assert "drive is over" in desk.owner.posted[-1].action.text
+    desk.ask(from_here_on=True)
+    desk.edit(gate(0.6))
+    assert desk.view.result is before
+
+
+def test_of_many_edits_the_newest_wins_and_the_old_run_stays_until_it_is_there(desk: Desk, project: Project) -> None:
+    before = desk.view.result
+    for probability in (0.5, 0.6, 0.7, 0.8):
+        desk.edit(gate(probability), settle=False)
+        assert desk.view.result is before
+    desk.owner.settle(desk.state)
+    assert_same(desk.view.result, fresh(desk, (0, gate(0.8)(project), False)))
+
+
+def test_an_edit_taken_back_while_it_is_computed_leaves_what_was_there(desk: Desk, project: Project) -> None:
+    desk.edit(gate(0.5), settle=False)
+    desk.edit(lambda p: replace(p, parameters=project.parameters))
+    assert_same(desk.view.result, fresh(desk, (0, project, False)))
+
+
+def test_an_edit_while_another_drive_is_localized_is_not_lost(desk: Desk, project: Project) -> None:
+    desk.do(MoveTo(5.0))
+    desk.ask(from_here_on=True)
+    old = desk.drives[-1]
+    desk.drives.append(replace(old, log=replace(old.log)))
+    desk.do(LoadSource(VirtualDrive("There and back")), settle=False)
+    while desk.service._wanted.log is old.log:
+        desk.owner.hear()
+    # The cursor is one of the drive before; of the new one nothing is lived.
+    desk.edit(gate(0.6))
+    assert desk.view.time == 0.0
+    assert_same(desk.view.result, fresh(desk, (0, gate(0.6)(project), False)))
+
+
+def test_a_run_that_fails_leaves_the_one_before_and_can_be_asked_for_again(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = desk.view.result
+
+    def failing(inputs: RunInput, progress: Progress, *, earlier: RunResult | None) -> RunResult:
+        raise ValueError("no such thing")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(service_module, "judged_run", failing)
+        desk.edit(gate(0.6))
+    assert "no such thing" in desk.owner.posted[-1].text
+    assert desk.view.result is before
+    desk.edit(lambda project: project)
+    desk.do(RunAfresh())
+    assert desk.view.result is not before
+    assert_same(desk.view.result, fresh(desk, (0, desk.state.project, False)))
+
+
+def test_playing_moves_the_cursor_at_its_speed_forward_and_back(desk: Desk) -> None:
+    desk.ask(playing=True, speed=2.0)
+    desk.play(1.0)
+    assert desk.view.time == pytest.approx(2.0)
+    desk.ask(backward=True, speed=0.5)
+    desk.play(1.0)
+    assert desk.view.time == pytest.approx(1.5)
+    desk.ask(playing=False)
+    desk.play(1.0)
+    assert desk.view.time == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize("backward", [False, True])
+def test_where_the_drive_is_over_it_stops_or_begins_again(desk: Desk, backward: bool) -> None:
+    end = desk.view.duration
+    near, beyond = (0.1, end) if backward else (end - 0.1, 0.0)
+    desk.do(MoveTo(near))
+    desk.ask(playing=True, backward=backward)
+    desk.owner.posted.clear()
+    desk.play(0.2)
+    desk.ask(playing=False)
+    desk.do(PlayOn(backward))
+    assert set(desk.owner.posted) == {Play(playing=False)}
+    assert desk.view.time == pytest.approx(beyond)
+    desk.do(MoveTo(near))
+    desk.ask(playing=True, repeat=True)
+    desk.play(0.2)
+    assert desk.view.time == pytest.approx(beyond, abs=0.2)
+
+
+def test_playing_on_in_the_middle_stays_there(desk: Desk) -> None:
+    desk.do(MoveTo(3.0), PlayOn(backward=False), PlayOn(backward=True))
+    assert desk.view.time == pytest.approx(3.0)
+
+
+def test_steps_reach_the_cursor(desk: Desk) -> None:
+    desk.do(MoveTo(3.0), MoveByScans(1))
+    assert desk.view.time == pytest.approx(3.1)
+    desk.do(MoveByScans(-1), MoveByScans(-1))
+    assert desk.view.time == pytest.approx(2.9)
+
+
+def test_others_are_given_where_the_vehicle_is_and_was(desk: Desk) -> None:
+    desk.do(MoveTo(3.0))
+    view, followed, lived = desk.service.parts(slowly=True)
+    assert isinstance(view, RunView)
+    assert followed == Followed((float(view.pose[0]), float(view.pose[1])))
+    assert isinstance(lived, LivedPath)
+    np.testing.assert_array_equal(lived.poses, view.result.columns.means[: view.lived])
+    np.testing.assert_array_equal(lived.two_sigma, view.result.two_sigma[: view.lived])
+
+
+def test_without_a_drive_nothing_moves_and_nothing_fails(project: Project, drive: Drive) -> None:
+    desk = Desk(project, drive)
+    desk.do(MoveTo(1.0), MoveByScans(1), CoverFromHere(covered=True), RunAfresh(), PlayOn(backward=False))
+    desk.edit(gate(0.6))
+    desk.ask(playing=True)
+    desk.play(0.2)
+    assert desk.service.view() is None
+    assert desk.service.parts(slowly=True) == ()
+    desk.owner.close()
