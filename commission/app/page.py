@@ -20,7 +20,7 @@ from commission.app.base.actions import Sender
 from commission.app.base.cameras import Cameras
 from commission.app.base.effects import Effect, FlyTo, PlaceCamera, SendFile, Tell
 from commission.app.base.extent import extent_of
-from commission.app.base.feature import Docked, Feature, Place, Side, Tab
+from commission.app.base.feature import Docked, Feature, PanelPlace, Side, Tab
 from commission.app.base.layer import Layer
 from commission.app.base.panel import Panel, Post
 from commission.app.base.pointer import floor_drag, take_clicks
@@ -113,7 +113,7 @@ class Page:
                 inside.enter_context(container)
             if panel.folder:
                 container = inside.enter_context(gui.add_folder(panel.folder, expand_by_default=panel.is_open))
-            return panel.make(Place(gui, scene, self._post, self._state, container, self._layers, client))
+            return panel.make(PanelPlace(gui, scene, self._post, self._state, container, self._layers, client))
 
     def show_site(self, state: AppState) -> None:
         """Draw what has changed of the project since it was last drawn."""

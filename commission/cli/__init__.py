@@ -35,7 +35,7 @@ COMMANDS: dict[str, type[Command]] = {
     "simulate": simulating.Simulate,
     "localize": localizing.Localize,
     "inspect": inspecting.Inspect,
-    "coverage": covering.Coverage,
+    "coverage": covering.CoverageCommand,
     "predict": predicting.Predict,
     "ambiguity": confusing.Ambiguity,
     "place": placing.Place,

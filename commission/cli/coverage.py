@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Coverage:
+class CoverageCommand:
     """Compute what the scanner sees over the floor; writes coverage.npz, .csv, .png and summary.json."""
 
     project: Positional[Path]

@@ -51,7 +51,7 @@ def kernel_digest(kernel: Any) -> str:
 def _own_state(kernel: Any) -> tuple[str, tuple[Any, ...]]:
     """Return name and digest of one kernel without those it calls, and these. Kernels live as long as the process."""
     function: FunctionType = getattr(kernel, "py_func", kernel)
-    reader = _Reader(function)
+    reader = _Describer(function)
     cells = tuple(reader.value(cell.cell_contents) for cell in function.__closure__ or ())
     content = (
         reader.code(function.__code__, function.__doc__),
@@ -64,7 +64,7 @@ def _own_state(kernel: Any) -> tuple[str, tuple[Any, ...]]:
     return f"{_name(function)} {hashlib.sha256(repr(content).encode()).hexdigest()}", tuple(reader.called)
 
 
-class _Reader:
+class _Describer:
     """Describes what one function reads, and collects the kernels among it.
 
     Descriptions are nested tuples of strings and bytes: equal exactly if what they describe is equal.

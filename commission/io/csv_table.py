@@ -160,7 +160,7 @@ def read_table(
         the file cannot be read, a column is missing, unknown or named twice, or a row has too few or too many cells.
     """
     check_size(path, size_limit)
-    layout: _Layout | None = None
+    layout: _Header | None = None
     try:
         with path.open("rb") as file:
             for first, text in _chunks(path, file, bytes_at_once, found):
@@ -237,7 +237,7 @@ def stated_delimiter(line: str) -> str | None:
 
 
 @dataclass(frozen=True, slots=True)
-class _Layout:
+class _Header:
     """What the header says."""
 
     names: list[str]
@@ -247,14 +247,14 @@ class _Layout:
     """Columns up to the last one that has a name; behind them Excel leaves empty ones."""
 
 
-def _layout(path: Path, number: int, header: str, wanted: tuple[Sequence[str], Sequence[str], bool]) -> _Layout:
+def _layout(path: Path, number: int, header: str, wanted: tuple[Sequence[str], Sequence[str], bool]) -> _Header:
     delimiter = ";" if ";" in header else ","
     names = [name.strip().lower() for name in _cells(path, number, header, delimiter)]
     named = names[: max((i for i, name in enumerate(names) if name), default=0) + 1]
-    return _Layout(names, _kept_columns(path, number, named, wanted), delimiter, len(named))
+    return _Header(names, _kept_columns(path, number, named, wanted), delimiter, len(named))
 
 
-def _block(path: Path, number: int, lines: list[str], layout: _Layout) -> Block | None:
+def _block(path: Path, number: int, lines: list[str], layout: _Header) -> Block | None:
     """Rows of some lines; None when there are none."""
     width, delimiter = len(layout.names), layout.delimiter
     numbers: Sequence[int] = range(number, number + len(lines))

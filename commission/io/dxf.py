@@ -21,7 +21,7 @@ from commission.errors import FileFormatError, UsageError
 from commission.geometry.arrays import FloatArray, read_only
 from commission.io.dxf_entities import Insert, insert_of, shapes_of
 from commission.io.dxf_shapes import Affine, Shape
-from commission.io.dxf_tags import Group, read_groups, text_of
+from commission.io.dxf_tags import DxfGroup, read_groups, text_of
 from commission.io.dxf_units import UNITS, doubts, judged_unit, stated_unit
 from commission.io.findings import Findings, shown
 from commission.io.outline import outline_map
@@ -160,7 +160,7 @@ class _Reader:
         self._left_out: Counter[str] = Counter()
         self._section = ""
         self._block: _Block | None = None
-        self._polyline: tuple[Group, list[Group]] | None = None
+        self._polyline: tuple[DxfGroup, list[DxfGroup]] | None = None
         self._coordinates = array("d")
         self._layers = array("i")
         self._names: dict[str, int] = {}
@@ -171,7 +171,7 @@ class _Reader:
         self._fraction = fraction
         self._progress(fraction, message)
 
-    def take(self, group: Group) -> None:
+    def take(self, group: DxfGroup) -> None:
         """Take the next group."""
         if self._polyline is not None and group.kind == b"VERTEX":
             self._polyline[1].append(group)
@@ -234,13 +234,13 @@ class _Reader:
     def _is_visible(self, layer: str) -> bool:
         return layer.upper() not in self._off | self._frozen
 
-    def _read_header(self, group: Group) -> None:
+    def _read_header(self, group: DxfGroup) -> None:
         """Unit of the drawing; a header is one group of names (code 9), each with its value behind it."""
         for (code, name), (_, value) in itertools.pairwise(group.tags):
             if code == 9 and name == b"$INSUNITS" and self._unit is None and value.isdigit():
                 self._unit = stated_unit(int(value[:6]))
 
-    def _read_layer(self, group: Group) -> None:
+    def _read_layer(self, group: DxfGroup) -> None:
         try:
             is_frozen, is_off = group.whole(70) & 1, group.whole(62, 7) < 0
         except ValueError:
@@ -251,7 +251,7 @@ class _Reader:
         if is_off:
             self._off.add(group.name(2).upper())
 
-    def _open_block(self, group: Group) -> None:
+    def _open_block(self, group: DxfGroup) -> None:
         try:
             base = (group.number(10), group.number(20))
         except ValueError:
@@ -259,7 +259,7 @@ class _Reader:
         self._block = _Block(base, [])
         self._blocks[group.name(2).upper()] = self._block
 
-    def _take_entity(self, group: Group) -> None:
+    def _take_entity(self, group: DxfGroup) -> None:
         """Draw an entity, or keep it in the block that is open."""
         if group.kind not in _DRAWN:
             self._left_out[text_of(group.kind)[:40]] += 1
@@ -268,7 +268,7 @@ class _Reader:
         else:
             self._add(group, ())
 
-    def _add(self, group: Group, vertices: Sequence[Group]) -> None:
+    def _add(self, group: DxfGroup, vertices: Sequence[DxfGroup]) -> None:
         try:
             # What lies on a sheet of paper (67) or is invisible (60) is no part of the hall.
             if group.whole(67) or group.whole(60):

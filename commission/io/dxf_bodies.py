@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from commission.io.dxf_shapes import Affine, Curve, Point, Polyline, Shape, bulged
-from commission.io.dxf_tags import Group
+from commission.io.dxf_shapes import Affine, BSpline, Point, Polyline, Shape, bulged
+from commission.io.dxf_tags import DxfGroup
 
 
 @dataclass(slots=True)
@@ -67,7 +67,7 @@ def _left(heading: float) -> Point:
     return -math.sin(heading), math.cos(heading)
 
 
-def faces(group: Group, flat: Affine) -> Iterator[Shape]:
+def faces(group: DxfGroup, flat: Affine) -> Iterator[Shape]:
     """Outline of a SOLID, TRACE or 3DFACE; the third and fourth corner of the first two are swapped in the file."""
     corners = [(group.number(10 + i), group.number(20 + i)) for i in range(3)]
     last = (group.number(13, corners[2][0]), group.number(23, corners[2][1]))
@@ -80,7 +80,7 @@ def faces(group: Group, flat: Affine) -> Iterator[Shape]:
             yield Polyline([plane.point(*start), plane.point(*end)])
 
 
-def multiline(group: Group) -> Iterator[Shape]:
+def multiline(group: DxfGroup) -> Iterator[Shape]:
     """Elements of an MLINE, how AutoCAD draws a wall, and a cap at each open end.
 
     Each vertex (codes 11, 21) has a miter (13, 23) on which each element lies at its first parameter (41 behind 74).
@@ -111,7 +111,7 @@ def multiline(group: Group) -> Iterator[Shape]:
             yield Polyline(row)
 
 
-def hatch(group: Group) -> Iterator[Shape]:
+def hatch(group: DxfGroup) -> Iterator[Shape]:
     """Boundaries of a hatch; ezdxf knows their many forms."""
     from ezdxf.entities.factory import load
     from ezdxf.lldxf.extendedtags import ExtendedTags
@@ -132,4 +132,4 @@ def hatch(group: Group) -> Iterator[Shape]:
             else:
                 degree = len(points) - 1
                 knots = np.repeat([0.0, 1.0], degree + 1)
-                yield Curve(degree, knots, np.array([(p.x, p.y, 1.0) for p in points]))
+                yield BSpline(degree, knots, np.array([(p.x, p.y, 1.0) for p in points]))

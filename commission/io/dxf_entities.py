@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.io.dxf_bodies import Corner, faces, hatch, multiline, polyline
-from commission.io.dxf_shapes import Affine, Arc, Curve, Point, Polyline, Shape, through
-from commission.io.dxf_tags import Group
+from commission.io.dxf_shapes import Affine, Arc, BSpline, Point, Polyline, Shape, through
+from commission.io.dxf_tags import DxfGroup
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +26,7 @@ class Insert:
     column_step: Point
 
 
-def shapes_of(group: Group, vertices: Sequence[Group]) -> Iterator[Shape]:
+def shapes_of(group: DxfGroup, vertices: Sequence[DxfGroup]) -> Iterator[Shape]:
     """Shapes of an entity; `vertices` are those of a POLYLINE. Raises ValueError or KeyError when it is unreadable."""
     if group.kind == b"LINE":
         values = dict(group.tags)
@@ -59,7 +59,7 @@ def shapes_of(group: Group, vertices: Sequence[Group]) -> Iterator[Shape]:
         yield from hatch(group)
 
 
-def insert_of(group: Group) -> Insert:
+def insert_of(group: DxfGroup) -> Insert:
     """Read an INSERT; raises ValueError when it is unreadable."""
     turn = math.radians(group.number(50))
     c, s = math.cos(turn), math.sin(turn)
@@ -78,7 +78,7 @@ def insert_of(group: Group) -> Insert:
     )
 
 
-def _plane(group: Group) -> Affine:
+def _plane(group: DxfGroup) -> Affine:
     """From an entity's own coordinates to the floor plan: mirrored when the entity was drawn from below."""
     extrusion = (group.number(210), group.number(220), group.number(230, 1.0))
     if extrusion[0] == extrusion[1] == 0.0 and extrusion[2] > 0.0:
@@ -90,7 +90,7 @@ def _plane(group: Group) -> Affine:
     return Affine(xx=x.x, xy=y.x, yx=x.y, yy=y.y, x0=up.x, y0=up.y)
 
 
-def _circle(group: Group) -> Arc:
+def _circle(group: DxfGroup) -> Arc:
     radius = group.number(40)
     if not radius > 0.0:
         raise ValueError("radius is not positive")
@@ -104,7 +104,7 @@ def _circle(group: Group) -> Arc:
     )
 
 
-def _ellipse(group: Group) -> Arc:
+def _ellipse(group: DxfGroup) -> Arc:
     """Center and major axis are given in the drawing's coordinates; the minor axis lies across them and the normal."""
     from ezdxf.math import Vec3
 
@@ -119,7 +119,7 @@ def _ellipse(group: Group) -> Arc:
     )
 
 
-def _light_corners(group: Group) -> list[Corner]:
+def _light_corners(group: DxfGroup) -> list[Corner]:
     """Vertices of an LWPOLYLINE: codes 10, 20 and, if any, 40, 41, 42 for each in turn; 43 is a width of all."""
     width = group.number(43)
     corners: list[Corner] = []
@@ -137,7 +137,7 @@ def _light_corners(group: Group) -> list[Corner]:
     return corners
 
 
-def _spline(group: Group) -> Curve:
+def _spline(group: DxfGroup) -> BSpline:
     values: dict[int, list[float]] = {code: [] for code in (10, 20, 11, 21, 40, 41)}
     for code, value in group.tags:
         if code in values:
@@ -157,4 +157,4 @@ def _spline(group: Group) -> Curve:
         raise ValueError("degree, knots and control points do not fit each other")
     if not t[degree] < t[len(points)] or not np.isfinite(t).all():
         raise ValueError("the knots span nothing")
-    return Curve(degree, t, np.column_stack((np.array(points) * w[:, np.newaxis], w)))
+    return BSpline(degree, t, np.column_stack((np.array(points) * w[:, np.newaxis], w)))

@@ -82,7 +82,7 @@ class Arc:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Curve:
+class BSpline:
     """A B-spline, rational where weights differ, over the part of its knots where it is defined."""
 
     degree: int
@@ -111,7 +111,7 @@ class Curve:
             breaks = np.sort(np.concatenate((breaks, u[1:-1:2][rough])))
 
 
-Shape = Polyline | Arc | Curve
+Shape = Polyline | Arc | BSpline
 
 
 def through(plane: Affine, arc: Arc) -> Arc:

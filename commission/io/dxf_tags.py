@@ -34,7 +34,7 @@ Tag = tuple[int, bytes]
 
 
 @dataclass(frozen=True, slots=True)
-class Group:
+class DxfGroup:
     """One entity, table entry or section mark."""
 
     kind: bytes
@@ -81,7 +81,7 @@ def text_of(value: bytes, encodings: tuple[str, ...] = MODERN) -> str:
     return text.strip()
 
 
-def encodings_of(header: Group) -> tuple[str, ...]:
+def encodings_of(header: DxfGroup) -> tuple[str, ...]:
     """Encodings of a drawing's texts by its header: UTF-8 since AutoCAD 2007 (AC1021), a code page before."""
     variables = {name: value for (code, name), (_, value) in itertools.pairwise(header.tags) if code == 9}
     version = text_of(variables.get(b"$ACADVER", b""))
@@ -96,7 +96,7 @@ def encodings_of(header: Group) -> tuple[str, ...]:
     return MODERN if encoding == "cp1252" else (encoding, *MODERN)
 
 
-def read_groups(path: Path, progress: Progress) -> Iterator[Group]:
+def read_groups(path: Path, progress: Progress) -> Iterator[DxfGroup]:
     """Read a drawing group by group.
 
     Parameters
@@ -120,8 +120,8 @@ def read_groups(path: Path, progress: Progress) -> Iterator[Group]:
         raise cannot_read(path, error) from error
 
 
-def _groups(path: Path, tags: Iterator[tuple[int, int, bytes]]) -> Iterator[Group]:
-    group: Group | None = None
+def _groups(path: Path, tags: Iterator[tuple[int, int, bytes]]) -> Iterator[DxfGroup]:
+    group: DxfGroup | None = None
     encodings = MODERN
     for line, code, value in tags:
         if code == 0:
@@ -129,7 +129,7 @@ def _groups(path: Path, tags: Iterator[tuple[int, int, bytes]]) -> Iterator[Grou
                 if group.kind == b"SECTION" and group.first(2).upper() == b"HEADER":
                     encodings = encodings_of(group)
                 yield group
-            group = Group(value.upper(), [], line, encodings)
+            group = DxfGroup(value.upper(), [], line, encodings)
             if group.kind == b"EOF":
                 yield group
                 return

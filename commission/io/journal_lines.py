@@ -23,7 +23,7 @@ _DECODER = json.JSONDecoder()
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class LinePlace:
     """Where an intact line stands in a file."""
 
     offset: int
@@ -40,7 +40,7 @@ class Place:
 class Lines:
     """What of a file is intact."""
 
-    places: tuple[Place, ...]
+    places: tuple[LinePlace, ...]
     """Intact lines, each number once, in the order of their numbers."""
     missing: tuple[int, ...]
     """Numbers of lines between the first and the last one that are not there."""
@@ -70,14 +70,14 @@ def entry_of(data: bytes) -> dict[str, Any] | None:
     return entry if isinstance(entry, dict) else None
 
 
-def intact_lines(file: IO[bytes]) -> Iterator[Place]:
+def intact_lines(file: IO[bytes]) -> Iterator[LinePlace]:
     """Find the intact lines of a file, in any order; what is between them is passed over."""
     offset = 0
     for position, data in enumerate(file, start=1):
         body = data.removesuffix(b"\n").removesuffix(b"\r")
         entry = entry_of(body)
         if entry is not None:
-            yield Place(offset, len(body), _number(entry, position), data == body + b"\n")
+            yield LinePlace(offset, len(body), _number(entry, position), data == body + b"\n")
         else:
             yield from _in_damage(data, offset)
         offset += len(data)
@@ -85,7 +85,7 @@ def intact_lines(file: IO[bytes]) -> Iterator[Place]:
 
 def read_lines(path: Path) -> Lines:
     """Find what of a journal is intact; raises OSError when it cannot be read."""
-    found: dict[int, Place] = {}
+    found: dict[int, LinePlace] = {}
     with path.open("rb") as file:
         for place in intact_lines(file):
             found.setdefault(place.number, place)
@@ -97,7 +97,7 @@ def read_lines(path: Path) -> Lines:
     return Lines(places, missing, is_whole)
 
 
-def _in_damage(data: bytes, offset: int) -> Iterator[Place]:
+def _in_damage(data: bytes, offset: int) -> Iterator[LinePlace]:
     """Intact lines in what is no line as a whole: what ends a line may be the one byte that was changed."""
     for match in _START.finditer(data):
         start, text = match.start(), match.start() + len(b"00000000 ")
@@ -108,7 +108,7 @@ def _in_damage(data: bytes, offset: int) -> Iterator[Place]:
         body = data[start : text + length]
         entry = entry_of(body)
         if entry is not None:
-            yield Place(offset + start, len(body), _number(entry, 0), is_line=False)
+            yield LinePlace(offset + start, len(body), _number(entry, 0), is_line=False)
 
 
 def _number(entry: dict[str, Any], position: int) -> int:

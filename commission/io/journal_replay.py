@@ -16,7 +16,7 @@ from typing import IO, Any
 
 from commission.errors import CommissionError, FileFormatError
 from commission.io.fingerprint import Fingerprint
-from commission.io.journal_lines import FORMAT, OLDEST_FORMAT, Lines, Place, entry_of, read_lines
+from commission.io.journal_lines import FORMAT, OLDEST_FORMAT, LinePlace, Lines, entry_of, read_lines
 from commission.io.journal_place import FILE_NAME, FileId, rescue_folder
 from commission.io.project_parts import apply
 from commission.io.reading import cannot_read, check_size
@@ -183,7 +183,7 @@ class _Replay:
     def _is_foreign_version(self) -> bool:
         return self._version is not None and self._version not in range(OLDEST_FORMAT, FORMAT + 1)
 
-    def _read(self, file: IO[bytes], place: Place) -> None:
+    def _read(self, file: IO[bytes], place: LinePlace) -> None:
         """Do what one line says."""
         file.seek(place.offset)
         entry = entry_of(file.read(place.length))

@@ -90,7 +90,7 @@ def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: in
     columns.d2[:detections] = earlier.d2[:detections]
 
 
-class Stretch(NamedTuple):
+class CycleStretch(NamedTuple):
     """Cycles to go over, and where they are written."""
 
     rows: tuple[int, int]
@@ -101,7 +101,7 @@ class Stretch(NamedTuple):
     """Rows of its cycles and detections."""
 
 
-def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch: Stretch) -> FilterState:
+def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch: CycleStretch) -> FilterState:
     """Go on from a state over a stretch, whose cycles are written; return the state after its last record.
 
     Parameters

@@ -21,7 +21,7 @@ from commission.localization.detection_log import (
 )
 from commission.localization.estimate import Belief
 from commission.localization.run_columns import Checkpoint, RunColumns, Segment, firsts_of
-from commission.localization.run_loop import Stretch, continued, cut, empty_columns, take_over
+from commission.localization.run_loop import CycleStretch, continued, cut, empty_columns, take_over
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, state_at_start
 from commission.progress import Progress, part, silent
@@ -120,7 +120,7 @@ def state_before(run: RunColumns, log: RecordLog, cycle: int) -> FilterState:
     state = checkpoint.state
     for segment, first, last in _chunks(run.segments, checkpoint.cycle, cycle):
         detected = run.detected.part(first, last)
-        stretch = Stretch(_odometry_rows(log, run.stamps_ns, first, last), detected, empty_columns(detected))
+        stretch = CycleStretch(_odometry_rows(log, run.stamps_ns, first, last), detected, empty_columns(detected))
         state = continued(log, segment.setup, state, stretch)
     return state
 
@@ -193,7 +193,7 @@ def _filtered(
     for segment, first, last in _chunks(segments, begin, cycles):
         progress((first - begin) / (cycles - begin), "localizing")
         rows = _odometry_rows(log, detected.stamps_ns, first, last)
-        stretch = Stretch(rows, detected.part(first, last), cut(columns, detected, first, last))
+        stretch = CycleStretch(rows, detected.part(first, last), cut(columns, detected, first, last))
         state = continued(log, segment.setup, state, stretch)
         checkpoints.append(Checkpoint(last, state))
     for column in columns:
@@ -220,7 +220,7 @@ def _final(
     """State after the last record: motion after the last scan is taken in, what is no cycle counts as a record."""
     begin, _ = _odometry_rows(log, stamps_ns, last.cycle, last.cycle)
     rows = (begin, len(log.odometry_stamps_ns))
-    final = continued(log, setup, last.state, Stretch(rows, nothing, empty_columns(nothing)))
+    final = continued(log, setup, last.state, CycleStretch(rows, nothing, empty_columns(nothing)))
     if len(log) == 0:
         return final
     own = final.sensor_detects or len(log.detection_stamps_ns) > 0

@@ -61,7 +61,7 @@ class DriveOptions:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class TrueMotion:
     """The true motion of base, a constant twist from one stamp to the next."""
 
     stamps_ns: IntArray
@@ -90,7 +90,7 @@ class Motion:
         return np.where(on_stamp, self.poses[before + 1], moved)
 
 
-def drive(route: Route, vehicle: Vehicle, rng: np.random.Generator, options: DriveOptions) -> Motion:
+def drive(route: Route, vehicle: Vehicle, rng: np.random.Generator, options: DriveOptions) -> TrueMotion:
     """Drive a route from rest to rest.
 
     Parameters
@@ -130,7 +130,9 @@ def drive(route: Route, vehicle: Vehicle, rng: np.random.Generator, options: Dri
         twists += [leg_twists[:count], standing]
     all_poses = np.concatenate(poses)
     stamps = np.arange(len(all_poses), dtype=np.int64) * options.period_ns
-    return Motion(stamps, frozen(all_poses, (None, 3), "poses"), frozen(np.concatenate(twists), (None, 3), "twists"))
+    return TrueMotion(
+        stamps, frozen(all_poses, (None, 3), "poses"), frozen(np.concatenate(twists), (None, 3), "twists")
+    )
 
 
 def _patience(leg: Leg, period: float) -> int:
@@ -140,7 +142,7 @@ def _patience(leg: Leg, period: float) -> int:
 
 
 def measure(
-    motion: Motion,
+    motion: TrueMotion,
     vehicle: Vehicle,
     noise: OdometryParameters,
     slips_per_100_m: float,
@@ -186,7 +188,7 @@ def measure(
     return displacements
 
 
-def _with_slips(motion: Motion, vehicle: Vehicle, per_100_m: float, rng: np.random.Generator) -> FloatArray:
+def _with_slips(motion: TrueMotion, vehicle: Vehicle, per_100_m: float, rng: np.random.Generator) -> FloatArray:
     """(M, 3) twists that the wheels report; where one slips it reports a motion that did not happen."""
     reported = np.array(motion.twists)
     period = 1e-9 * motion.period_ns

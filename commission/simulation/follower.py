@@ -60,7 +60,7 @@ class Drives(NamedTuple):
     """[rad/s]."""
 
 
-class Way(NamedTuple):
+class LegArrays(NamedTuple):
     """A leg as bare arrays."""
 
     points: FloatArray
@@ -105,13 +105,13 @@ def drives_of(vehicle: Vehicle, limits: MotionLimits, period: float) -> Drives:
     )
 
 
-def way_of(leg: Leg) -> Way:
+def way_of(leg: Leg) -> LegArrays:
     """Bare arrays of a leg."""
     sign = -1.0 if leg.reverse else 1.0
-    return Way(leg.points, leg.step, leg.travel_headings, leg.curvatures, leg.speeds, sign)
+    return LegArrays(leg.points, leg.step, leg.travel_headings, leg.curvatures, leg.speeds, sign)
 
 
-class Place(NamedTuple):
+class RoutePlace(NamedTuple):
     """Where the vehicle is relative to the way."""
 
     sample: int
@@ -142,7 +142,7 @@ class Actuators(NamedTuple):
 
 
 @compiled
-def follow_leg(drives: Drives, way: Way, start: FloatArray, poses: FloatArray, twists: FloatArray) -> int:
+def follow_leg(drives: Drives, way: LegArrays, start: FloatArray, poses: FloatArray, twists: FloatArray) -> int:
     """Drive one leg from rest to rest.
 
     Parameters
@@ -178,7 +178,7 @@ def follow_leg(drives: Drives, way: Way, start: FloatArray, poses: FloatArray, t
 
 
 @compiled
-def _control(drives: Drives, way: Way, place: Place, state: Actuators) -> tuple[Actuators, float, float]:
+def _control(drives: Drives, way: LegArrays, place: RoutePlace, state: Actuators) -> tuple[Actuators, float, float]:
     """One control step: actuators after it, and the velocity of base in its own frame [m/s]."""
     turning = state.turning and abs(place.turned) > TURNED
     speed = 0.0
@@ -214,7 +214,7 @@ def _slide(sign: float, speed: float, across: float, turned: float) -> tuple[flo
 
 
 @compiled
-def _place(way: Way, index: int, x: float, y: float, theta: float) -> Place:
+def _place(way: LegArrays, index: int, x: float, y: float, theta: float) -> RoutePlace:
     """Find the nearest sample from `index` on, and the errors there."""
     while index + 1 < len(way.points) and _squared(way, index + 1, x, y) <= _squared(way, index, x, y):
         index += 1
@@ -223,18 +223,18 @@ def _place(way: Way, index: int, x: float, y: float, theta: float) -> Place:
     dx, dy = x - way.points[index, 0], y - way.points[index, 1]
     facing = 0.0 if way.sign > 0.0 else math.pi
     turned = wrap_scalar(theta + facing - heading)
-    return Place(index, index * way.step + c * dx + s * dy, c * dy - s * dx, turned)
+    return RoutePlace(index, index * way.step + c * dx + s * dy, c * dy - s * dx, turned)
 
 
 @compiled
-def _squared(way: Way, index: int, x: float, y: float) -> float:
+def _squared(way: LegArrays, index: int, x: float, y: float) -> float:
     """Squared distance to a sample [m^2]."""
     dx, dy = x - way.points[index, 0], y - way.points[index, 1]
     return dx * dx + dy * dy
 
 
 @compiled
-def _speed_at(way: Way, s: float) -> float:
+def _speed_at(way: LegArrays, s: float) -> float:
     """Allowed speed at an arc length [m/s], interpolated in its square, which braking changes linearly."""
     place = min(max(s / way.step, 0.0), len(way.speeds) - 1.000001)
     index = int(place)
@@ -254,5 +254,5 @@ def warm_up() -> None:
     line = frozen([[0.0, 0.0], [0.01, 0.0], [0.02, 0.0]], (3, 2), "points")
     zeros, speeds = frozen(np.zeros(3), (3,), "headings"), frozen(np.full(3, 0.1), (3,), "speeds")
     drives = Drives(DIFFERENTIAL, 1.0, 1.0, 0.02, 0.4, 1.0, 3.0, 1.5)
-    way = Way(line, 0.01, zeros, zeros, speeds, 1.0)
+    way = LegArrays(line, 0.01, zeros, zeros, speeds, 1.0)
     follow_leg(drives, way, np.zeros(3), np.empty((4, 3)), np.empty((4, 3)))

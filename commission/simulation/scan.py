@@ -15,7 +15,7 @@ from commission.geometry.arrays import BoolArray, FloatArray
 from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
 from commission.geometry.se2 import compose
-from commission.simulation.scan_kernels import Beams, Hall, Moment, cast_scan
+from commission.simulation.scan_kernels import Hall, Moment, ScannerBeams, cast_scan
 from commission.site.disturbances import Disturbances
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -37,7 +37,7 @@ class VirtualScanner:
     """Glints and uneven floor."""
     hall: Hall
     """Walls, reflectors and shiny objects."""
-    beams: Beams
+    beams: ScannerBeams
     """The scanner's numbers."""
 
     @staticmethod
@@ -91,9 +91,9 @@ class VirtualScanner:
             flags[beams] |= ranges[beams] <= self.scanner.reflector_range
 
 
-def _beams(scanner: Scanner) -> Beams:
+def _beams(scanner: Scanner) -> ScannerBeams:
     """Numbers of the scanner for the kernel."""
-    return Beams(
+    return ScannerBeams(
         scanner.angle_min,
         scanner.angle_increment,
         0.5 * math.radians(scanner.beam_width_deg),

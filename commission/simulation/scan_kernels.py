@@ -26,7 +26,7 @@ NEIGHBORS = 2
 """Beams beside those that can meet a reflector which a detector also looks at, to see where a cluster ends."""
 
 
-class Beams(NamedTuple):
+class ScannerBeams(NamedTuple):
     """What the kernel has to know of the scanner."""
 
     angle_min: float
@@ -91,7 +91,7 @@ class Echoes(NamedTuple):
 
 
 @compiled
-def cast_scan(hall: Hall, beams: Beams, moment: Moment, ranges: NDArray[np.float32], flags: BoolArray) -> None:
+def cast_scan(hall: Hall, beams: ScannerBeams, moment: Moment, ranges: NDArray[np.float32], flags: BoolArray) -> None:
     """Take one scan.
 
     Parameters
@@ -136,7 +136,7 @@ def cast_scan(hall: Hall, beams: Beams, moment: Moment, ranges: NDArray[np.float
 
 
 @compiled
-def _first_beam(beams: Beams, bearing: float, count: int) -> tuple[int, int]:
+def _first_beam(beams: ScannerBeams, bearing: float, count: int) -> tuple[int, int]:
     """Index of the beam nearest to a bearing, and beams per full turn (both unclipped)."""
     offset = wrap_scalar(bearing - beams.angle_min - 0.5 * count * beams.increment) + 0.5 * count * beams.increment
     return round(offset / beams.increment), round(TURN / beams.increment)
@@ -144,7 +144,7 @@ def _first_beam(beams: Beams, bearing: float, count: int) -> tuple[int, int]:
 
 @compiled
 def _interval(
-    hall: Hall, beams: Beams, moment: Moment, index: int, count: int
+    hall: Hall, beams: ScannerBeams, moment: Moment, index: int, count: int
 ) -> tuple[int, int, int, float, float, float]:
     """Beams that can meet a reflective object: first, last and number per turn; its range, bearing and half its size.
 
@@ -162,7 +162,7 @@ def _interval(
 
 
 @compiled
-def _want(hall: Hall, beams: Beams, moment: Moment, index: int, wanted: BoolArray) -> None:
+def _want(hall: Hall, beams: ScannerBeams, moment: Moment, index: int, wanted: BoolArray) -> None:
     """Mark the beams that can meet a reflective object, and their neighbors."""
     first, last, turn, _, _, _ = _interval(hall, beams, moment, index, len(wanted))
     if last < first:
@@ -173,7 +173,7 @@ def _want(hall: Hall, beams: Beams, moment: Moment, index: int, wanted: BoolArra
 
 
 @compiled
-def _meet_circle(beams: Beams, moment: Moment, index: int, echoes: Echoes) -> None:
+def _meet_circle(beams: ScannerBeams, moment: Moment, index: int, echoes: Echoes) -> None:
     """Shorten every beam whose middle meets a dull circle."""
     radius = moment.circles[index, 2]
     dx, dy = moment.circles[index, 0] - moment.pose[0], moment.circles[index, 1] - moment.pose[1]
@@ -194,7 +194,7 @@ def _meet_circle(beams: Beams, moment: Moment, index: int, echoes: Echoes) -> No
 
 
 @compiled
-def _meet_reflective(hall: Hall, beams: Beams, moment: Moment, index: int, echoes: Echoes) -> None:
+def _meet_reflective(hall: Hall, beams: ScannerBeams, moment: Moment, index: int, echoes: Echoes) -> None:
     """Flag every beam of which a part meets a reflective object before its middle meets anything else.
 
     Retroreflecting tape outshines what the rest of the beam meets, so the echo is that of the lit part of the object:

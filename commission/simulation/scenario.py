@@ -14,7 +14,7 @@ import numpy as np
 from commission.geometry.arrays import FloatArray, IntArray, frozen
 from commission.progress import Progress, silent
 from commission.simulation import follower, scan
-from commission.simulation.drive import DriveOptions, Motion, drive, measure
+from commission.simulation.drive import DriveOptions, TrueMotion, drive, measure
 from commission.simulation.people import Crowd, WalkableFloor
 from commission.simulation.scan import VirtualScanner
 from commission.site.path import legs_of
@@ -29,7 +29,7 @@ DEFAULTS = DriveOptions()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Start:
+class DriveStart:
     """What is known of the vehicle before it moves: the localizer's initial belief."""
 
     pose: FloatArray
@@ -38,7 +38,7 @@ class Start:
     """(3,) 1-sigma of x [m], y [m] and heading [rad], map frame."""
 
 
-def start_of(project: Project, route_name: str, options: DriveOptions = DEFAULTS) -> Start:
+def start_of(project: Project, route_name: str, options: DriveOptions = DEFAULTS) -> DriveStart:
     """Return where a drive starts and how far the true start may lie from it.
 
     Parameters
@@ -54,7 +54,7 @@ def start_of(project: Project, route_name: str, options: DriveOptions = DEFAULTS
     """
     route = project.route(route_name)
     pose = legs_of(route, project.vehicle, options.limits)[0].start_pose
-    return Start(pose, frozen(options.start_sigma, (3,), "start sigmas"))
+    return DriveStart(pose, frozen(options.start_sigma, (3,), "start sigmas"))
 
 
 def records(
@@ -122,7 +122,7 @@ def virtual_drive(
     return RecordLog.collect(records(project, route_name, seed, options=options, progress=progress))
 
 
-def _odometry(motion: Motion, displacements: FloatArray, first: int, last: int) -> Iterator[Record]:
+def _odometry(motion: TrueMotion, displacements: FloatArray, first: int, last: int) -> Iterator[Record]:
     """Odometry records of rows `first` to before `last`."""
     for row in range(first, last):
         yield Odometry(int(motion.stamps_ns[row]), displacements[row])

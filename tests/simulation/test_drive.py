@@ -10,7 +10,7 @@ import pytest
 from commission.errors import ProjectError
 from commission.geometry.angles import difference
 from commission.geometry.se2 import exp, log, relative
-from commission.simulation.drive import DriveOptions, Motion, drive, measure
+from commission.simulation.drive import DriveOptions, TrueMotion, drive, measure
 from commission.site.parameters import OdometryParameters
 from commission.site.path import KINK, MotionLimits, legs_of
 from commission.site.routes import Direction, Route, Segment
@@ -30,11 +30,11 @@ NOISELESS = OdometryParameters(
 STRAIGHT = Route("Straight", (Segment(control_points=np.array([[0.0, 0.0], [10.0, 0.0]]), degree=1),), 1.0)
 
 
-def driven(vehicle: Vehicle, route: Route, options: DriveOptions = EXACT_START) -> Motion:
+def driven(vehicle: Vehicle, route: Route, options: DriveOptions = EXACT_START) -> TrueMotion:
     return drive(route, vehicle, np.random.default_rng(0), options)
 
 
-def distances_to(route: Route, vehicle: Vehicle, motion: Motion) -> np.ndarray:
+def distances_to(route: Route, vehicle: Vehicle, motion: TrueMotion) -> np.ndarray:
     way = np.concatenate([leg.points for leg in legs_of(route, vehicle, MotionLimits())])
     return np.array([np.min(np.hypot(*(way - pose[:2]).T)) for pose in motion.poses])
 

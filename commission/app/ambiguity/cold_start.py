@@ -21,7 +21,7 @@ CLASSES = EVERY + 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ambiguity:
+class AmbiguousFloor:
     """The ambiguous floor."""
 
     reflectors: ReflectorMap
@@ -43,10 +43,10 @@ class Ambiguity:
         return tuple(self.reflectors.reflectors[index].id for index in group)
 
 
-def look_alike(inputs: AmbiguityInput, progress: Progress) -> Ambiguity:
+def look_alike(inputs: AmbiguityInput, progress: Progress) -> AmbiguousFloor:
     """Ask for every free spot of the floor, heading by heading, whether another pose sees the same."""
     found = ambiguity(inputs, progress)
-    return Ambiguity(inputs.reflectors, found.lattice, _classes(found), both_ways(found.cold.pairs))
+    return AmbiguousFloor(inputs.reflectors, found.lattice, _classes(found), both_ways(found.cold.pairs))
 
 
 def _classes(found: AmbiguityResult) -> NDArray[np.uint8]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from commission.app.ambiguity.cold_start import Ambiguity, look_alike
+from commission.app.ambiguity.cold_start import AmbiguousFloor, look_alike
 from commission.app.ambiguity.settings import NAME, AmbiguitySettings
 from commission.app.ambiguity.view import ColdStartView, cold_start_view
 from commission.app.base.conditions import Conditions
@@ -24,7 +24,7 @@ class AmbiguityService(Service):
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
-        self._kept = Kept[AmbiguityInput, Ambiguity](COLD_START, context.jobs, Lane.PATIENT)
+        self._kept = Kept[AmbiguityInput, AmbiguousFloor](COLD_START, context.jobs, Lane.PATIENT)
         self._remembered = Remembered[ColdStartView]()
         self.view: ColdStartView | None = None
         """What there is now; the same value as long as nothing changes."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from commission.app.ambiguity.cold_start import Ambiguity
+from commission.app.ambiguity.cold_start import AmbiguousFloor
 from commission.geometry.arrays import FloatArray
 
 Pose: TypeAlias = tuple[float, float, float]
@@ -26,7 +26,7 @@ class TwinsView:
 class ColdStartView:
     """Where a vehicle could take its place for another one."""
 
-    ambiguity: Ambiguity
+    ambiguity: AmbiguousFloor
     """Map and pairs."""
     twins: TwinsView | None
     """The pair that is shown on the floor."""
@@ -36,7 +36,7 @@ class ColdStartView:
     """Whether the site or the tolerance has changed since."""
 
 
-def cold_start_view(ambiguity: Ambiguity, shown: int, *, is_drawn: bool, outdated: bool) -> ColdStartView:
+def cold_start_view(ambiguity: AmbiguousFloor, shown: int, *, is_drawn: bool, outdated: bool) -> ColdStartView:
     """Find the reflectors and poses of the pair that is shown.
 
     Parameters

@@ -19,7 +19,7 @@ from websockets.asyncio.server import ServerConnection
 from websockets.http11 import Request, Response
 
 from commission.app.base import viser_private
-from commission.app.base.gate import Gate, GateAnswer
+from commission.app.base.gate import AccessGate, GateAnswer
 from commission.app.base.seam import Seam
 
 log = logging.getLogger(__name__)
@@ -66,7 +66,7 @@ class Door:
     alive : answers the page's question whether the program is there and works, as JSON.
     """
 
-    def __init__(self, gate: Gate, alive: Callable[[], str]) -> None:
+    def __init__(self, gate: AccessGate, alive: Callable[[], str]) -> None:
         self.gate = gate
         self.is_used = False
         """Whether viser's server has been put behind it."""

@@ -67,7 +67,7 @@ ROUTE = Tab(Side.BOTTOM, "Route", 20)
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class PanelPlace:
     """What a panel is made with. Its constructor is called where its widgets belong: they need no container."""
 
     gui: GuiApi
@@ -97,7 +97,7 @@ class Place:
 class Docked:
     """A panel and where it goes."""
 
-    make: Callable[[Place], Panel]
+    make: Callable[[PanelPlace], Panel]
     """Makes it."""
     tab: Tab | None
     """The tab that it is in; none: the bar at the top, and of a browser's own panels those without a widget."""

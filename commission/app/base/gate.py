@@ -38,7 +38,7 @@ class GateAnswer(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Gate:
+class AccessGate:
     """Decides about each request."""
 
     token: str | None

@@ -23,7 +23,7 @@ import websockets.asyncio.server as websocket_server
 
 from commission.app.base import viser_private
 from commission.app.base.connection import LARGEST_MESSAGE, Door
-from commission.app.base.gate import Gate
+from commission.app.base.gate import AccessGate
 from commission.app.base.seam import Seam
 from commission.app.base.transfers import Transfers
 from commission.errors import ServerError
@@ -88,7 +88,7 @@ def start_server(
     listening = _bound(host, family, address)
     own_names = {"localhost", "127.0.0.1", "::1", host.lower(), address[0]}
     public_names = () if origin is None else (urlsplit(origin).hostname or "",)
-    gate = Gate(
+    gate = AccessGate(
         token=token,
         host_names=frozenset({*own_names, *public_names}) if is_local else None,
         cookie_name=f"commission_{listening.getsockname()[1]}",

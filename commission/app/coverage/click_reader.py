@@ -9,7 +9,7 @@ from commission.app.base.pointer import on_floor, reach_of
 from commission.app.coverage.actions import ReadFloor
 
 
-class ClickReader(BasePanel):
+class CoverageClicks(BasePanel):
     """Posts each click of any browser on the floor; a panel without widgets.
 
     Parameters

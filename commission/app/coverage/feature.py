@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from commission.app.base.feature import LEGEND, PLAN, Docked, Feature
 from commission.app.coverage import reducer
-from commission.app.coverage.click_reader import ClickReader
+from commission.app.coverage.click_reader import CoverageClicks
 from commission.app.coverage.ellipse_layer import FixEllipseLayer
 from commission.app.coverage.heat_layer import HeatLayer
 from commission.app.coverage.heat_legend import HeatLegend
@@ -19,6 +19,6 @@ FEATURE = Feature(
     panels=(
         Docked(lambda at: HeatmapPanel(at.gui, at.post), PLAN, 10, folder="Heatmap of the floor", is_open=True),
         Docked(lambda at: HeatLegend(at.gui), LEGEND, 10),
-        Docked(lambda at: ClickReader(at.scene, at.post), None, 90),
+        Docked(lambda at: CoverageClicks(at.scene, at.post), None, 90),
     ),
 )

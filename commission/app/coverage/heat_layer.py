@@ -10,7 +10,7 @@ from commission.app.base.layer import BaseLayer
 from commission.app.base.view import PageView
 from commission.app.coverage.scale import picture
 from commission.app.coverage.settings import CoverageSettings
-from commission.app.coverage.view import HeatView, Reading, coverage_of
+from commission.app.coverage.view import FloorReading, HeatView, coverage_of
 from commission.app.coverage.words import value_text
 from commission.planning.dilution import Measurement
 
@@ -27,7 +27,7 @@ class HeatLayer(BaseLayer):
         self._image: ImageHandle | None = None
         self._label: LabelHandle | None = None
         self._shown: tuple[HeatView | None, float] = (None, 0.0)
-        self._read: tuple[Reading | None, HeatView | None] = (None, None)
+        self._read: tuple[FloorReading | None, HeatView | None] = (None, None)
 
     def draw(self, view: PageView) -> None:
         """Draw the picture anew where it or its opacity has changed."""
@@ -65,7 +65,7 @@ class HeatLayer(BaseLayer):
         )
 
     def _write(
-        self, reading: Reading | None, heat: HeatView | None, measurement: Measurement, *, visible: bool
+        self, reading: FloorReading | None, heat: HeatView | None, measurement: Measurement, *, visible: bool
     ) -> None:
         """Write the value where the floor was clicked."""
         if self._label is not None:

@@ -16,7 +16,7 @@ from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.coverage.scale import NO_FIX_COLORS
 from commission.app.coverage.settings import CoverageSettings, Figure
-from commission.app.coverage.view import EllipseView, HeatView, Reading, coverage_of
+from commission.app.coverage.view import EllipseView, FloorReading, HeatView, coverage_of
 from commission.app.coverage.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES, value_text
 
 AMONG_PEOPLE = (Figure.EXPECTED_VISIBLE, Figure.TWO_OR_MORE, Figure.THREE_OR_MORE)
@@ -74,7 +74,7 @@ def ellipse_note(found: EllipseView) -> str:
     return f"<div class='c-note'>ellipses: 1σ of a fix, drawn {found.factor:g}x{note}</div>"
 
 
-def reading_table(reading: Reading, state: AppState) -> str:
+def reading_table(reading: FloorReading, state: AppState) -> str:
     """Return every figure at the place that was clicked; those among people only where there are some."""
     x, y = reading.place
     measurement, people = state.part(CoverageSettings).measurement, state.part(Conditions).blocked_per_m > 0.0

@@ -30,7 +30,7 @@ PERCENT = (50.0, 70.0, 80.0, 90.0, 95.0, 98.0, 99.0, 99.9)
 
 
 @dataclass(frozen=True, slots=True)
-class Quantity:
+class ShownFigure:
     """How a figure is shown."""
 
     label: str
@@ -45,15 +45,15 @@ class Quantity:
     """Whether a large number is good."""
 
 
-QUANTITIES: dict[Figure, Quantity] = {
-    Figure.VISIBLE: Quantity("Visible reflectors", "", 1.0, COUNTS, more_is_better=True),
-    Figure.POSITION_SIGMA: Quantity("Position error, 1σ [mm]", "mm", 1000.0),
-    Figure.HEADING_SIGMA: Quantity("Heading error, 1σ [°]", "°", math.degrees(1.0)),
-    Figure.POSITION_DOP: Quantity("Position dilution (DOP)", "", 1.0),
-    Figure.HEADING_DOP: Quantity("Heading dilution (DOP)", "", 1.0),
-    Figure.EXPECTED_VISIBLE: Quantity("Visible among people, mean", "", 1.0, (1.0, *COUNTS), more_is_better=True),
-    Figure.TWO_OR_MORE: Quantity("Chance of 2 or more [%]", "%", 100.0, PERCENT, more_is_better=True),
-    Figure.THREE_OR_MORE: Quantity("Chance of 3 or more [%]", "%", 100.0, PERCENT, more_is_better=True),
+QUANTITIES: dict[Figure, ShownFigure] = {
+    Figure.VISIBLE: ShownFigure("Visible reflectors", "", 1.0, COUNTS, more_is_better=True),
+    Figure.POSITION_SIGMA: ShownFigure("Position error, 1σ [mm]", "mm", 1000.0),
+    Figure.HEADING_SIGMA: ShownFigure("Heading error, 1σ [°]", "°", math.degrees(1.0)),
+    Figure.POSITION_DOP: ShownFigure("Position dilution (DOP)", "", 1.0),
+    Figure.HEADING_DOP: ShownFigure("Heading dilution (DOP)", "", 1.0),
+    Figure.EXPECTED_VISIBLE: ShownFigure("Visible among people, mean", "", 1.0, (1.0, *COUNTS), more_is_better=True),
+    Figure.TWO_OR_MORE: ShownFigure("Chance of 2 or more [%]", "%", 100.0, PERCENT, more_is_better=True),
+    Figure.THREE_OR_MORE: ShownFigure("Chance of 3 or more [%]", "%", 100.0, PERCENT, more_is_better=True),
 }
 
 
@@ -67,7 +67,7 @@ class Scale:
     """Where one class ends and the next begins, ascending, in the page's unit."""
 
     @property
-    def quantity(self) -> Quantity:
+    def quantity(self) -> ShownFigure:
         """How the figure is shown."""
         return QUANTITIES[self.figure]
 

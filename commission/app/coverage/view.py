@@ -16,7 +16,7 @@ from commission.planning.coverage import Lattice
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class FloorReading:
     """Values at one place of the floor."""
 
     place: tuple[float, float]
@@ -65,7 +65,7 @@ class CoverageView:
 
     heat: HeatView | None = None
     """The heatmap."""
-    reading: Reading | None = None
+    reading: FloorReading | None = None
     """Values at the place that was clicked."""
     ellipses: EllipseView | None = None
     """Ellipses on the heatmap."""
@@ -93,11 +93,11 @@ def heat_view(covered: Covered, scale: Scale, *, outdated: bool) -> HeatView:
     )
 
 
-def reading_of(covered: Covered, probe: tuple[float, float]) -> Reading | None:
+def reading_of(covered: Covered, probe: tuple[float, float]) -> FloorReading | None:
     """Read every figure at a place; none beside the lattice."""
     index = covered.live.coverage.lattice.index_near(*probe)
     if index is None:
         return None
     fixes = covered.live.coverage.fixes
     values = {figure: float(getattr(fixes, figure.value)[index]) for figure in QUANTITIES}
-    return Reading(probe, values, bool(covered.floor[index]))
+    return FloorReading(probe, values, bool(covered.floor[index]))

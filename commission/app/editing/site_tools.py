@@ -114,16 +114,16 @@ class MeasureTool(Tool):
         middle = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
         return ((f"{text}  (dx {found.dx:.3f} m, dy {found.dy:.3f} m)", middle),)
 
-    def measurement(self) -> Measurement | None:
+    def measurement(self) -> MeasuredLine | None:
         """Return what was measured; none before the second click."""
         if len(self.points) < 2:
             return None
         (x0, y0), (x1, y1) = self.points
-        return Measurement(x1 - x0, y1 - y0)
+        return MeasuredLine(x1 - x0, y1 - y0)
 
 
 @dataclass(frozen=True, slots=True)
-class Measurement:
+class MeasuredLine:
     """From one point to another."""
 
     dx: float
@@ -142,7 +142,7 @@ class Measurement:
         return math.atan2(self.dy, self.dx)
 
 
-def measurement(editor: Editor) -> Measurement | None:
+def measurement(editor: Editor) -> MeasuredLine | None:
     """Return what a browser has measured; none when that is nothing yet."""
     return editor.tool.measurement() if isinstance(editor.tool, MeasureTool) else None
 

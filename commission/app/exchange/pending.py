@@ -42,7 +42,7 @@ ImportSource: TypeAlias = Upload | ServerFile | Pasted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reading:
+class FileReading:
     """A file that is being read in the background."""
 
     source: ImportSource
@@ -89,7 +89,7 @@ class Exchange:
 
     number: int = 0
     """Counts what was asked for; an answer to an earlier question is too late."""
-    reading: Reading | None = None
+    reading: FileReading | None = None
     """What is being read."""
     pending: Pending | None = None
     """What waits for a yes or no."""

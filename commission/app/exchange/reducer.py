@@ -10,7 +10,7 @@ from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.exchange import actions
 from commission.app.exchange.effects import ExportProject, ReadFile, StopReading
-from commission.app.exchange.pending import Exchange, Pending, Reading, Sent
+from commission.app.exchange.pending import Exchange, FileReading, Pending, Sent
 from commission.errors import UsageError
 from commission.io.project_archive import ProjectImport
 
@@ -29,7 +29,7 @@ def _pending(state: AppState, sender: Sender) -> Pending:
 def read_import(action: actions.ReadImport, state: AppState, sender: Sender) -> Outcome:
     exchange = state.of_browser(sender.browser, Exchange)
     number = exchange.number + 1
-    reading = Exchange(number, Reading(action.source), exchange.pending)
+    reading = Exchange(number, FileReading(action.source), exchange.pending)
     return Outcome(
         state.with_browser(sender.browser, reading),
         (ReadFile(number, action.source, action.choice, state.project),),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from commission.app.base.feature import PLAN, Docked, Feature
 from commission.app.failures import reducer
-from commission.app.failures.click_reader import ClickReader
+from commission.app.failures.click_reader import FailureClicks
 from commission.app.failures.failure_layer import FailingLayer
 from commission.app.failures.failure_panel import FailurePanel
 from commission.app.failures.service import FailureService
@@ -16,6 +16,6 @@ FEATURE = Feature(
     layers=(FailingLayer,),
     panels=(
         Docked(lambda at: FailurePanel(at.gui, at.post), PLAN, 30, folder="What if one reflector fails"),
-        Docked(lambda at: ClickReader(at.scene, at.post), None, 91),
+        Docked(lambda at: FailureClicks(at.scene, at.post), None, 91),
     ),
 )

@@ -8,9 +8,9 @@ import numpy as np
 
 from commission.app.base import theme
 from commission.app.base.panel import escaped, table
-from commission.app.prediction.driven import Driven
+from commission.app.prediction.driven import DrivenMetres
 from commission.app.prediction.load_colors import load_classes, palette
-from commission.app.prediction.tracks import Axis, Limited, Plain, limited, plain, round_up
+from commission.app.prediction.tracks import Limited, Plain, TrackAxis, limited, plain, round_up
 from commission.app.prediction.view import RouteView
 from commission.planning.station_accuracy import StationAccuracy
 
@@ -18,7 +18,7 @@ MOST_BARS = 120
 MOST_STOPS = 6
 
 
-def chart(route: RouteView, run: Driven | None) -> str:
+def chart(route: RouteView, run: DrivenMetres | None) -> str:
     """Return what is expected along a route.
 
     Parameters
@@ -61,16 +61,16 @@ def chart(route: RouteView, run: Driven | None) -> str:
     )
 
 
-def _axis(route: RouteView, starts: np.ndarray) -> Axis:
+def _axis(route: RouteView, starts: np.ndarray) -> TrackAxis:
     """The bars begin at these metres; their color is that of the ribbon."""
     prediction = route.prediction
     shades = [theme.css(color) for color in palette()]
     fills = tuple(shades[index] for index in load_classes(np.maximum.reduceat(route.loads, starts)))
     metres = route.metres.metre[starts].astype(float)
-    return Axis(prediction.drive.length, metres, fills, prediction.trips(), prediction.recoveries())
+    return TrackAxis(prediction.drive.length, metres, fills, prediction.trips(), prediction.recoveries())
 
 
-def _note(route: RouteView, run: Driven | None) -> str:
+def _note(route: RouteView, run: DrivenMetres | None) -> str:
     if route.outdated:
         return "predicting anew …"
     lines = ["color: share of the limit", "violet: 2σ of the true error"]

@@ -19,7 +19,7 @@ BESIDE = 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Driven:
+class DrivenMetres:
     """A run over the metres of a route."""
 
     metres: FloatArray
@@ -28,7 +28,7 @@ class Driven:
     """(N, 3) 2-sigma of x [m], y [m] and heading [rad], the largest since the row before."""
 
 
-def driven(lived: LivedPath, prediction: RoutePrediction) -> Driven | None:
+def driven(lived: LivedPath, prediction: RoutePrediction) -> DrivenMetres | None:
     """Find the metre of the route for each cycle of a run.
 
     Parameters
@@ -58,4 +58,4 @@ def driven(lived: LivedPath, prediction: RoutePrediction) -> Driven | None:
             break
         reached += nearest
         metres[number] = drive.metres[reached]
-    return Driven(metres, two_sigma) if len(metres) > 1 else None
+    return DrivenMetres(metres, two_sigma) if len(metres) > 1 else None

@@ -25,7 +25,7 @@ LABELS_PX = 12
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Axis:
+class TrackAxis:
     """The horizontal axis: metres of the route, and what happens at some of them."""
 
     length: float
@@ -76,7 +76,7 @@ class Plain:
     """Levels that are written beside the axis; the largest ends it."""
 
 
-def limited(track: Limited, axis: Axis) -> str:
+def limited(track: Limited, axis: TrackAxis) -> str:
     """Draw bars up to a logarithmic level, the limit, the true error, and a run."""
     low, high = math.log10(track.limit / BELOW), math.log10(track.limit * ABOVE)
 
@@ -96,7 +96,7 @@ def limited(track: Limited, axis: Axis) -> str:
     return _svg(track.title, TALL, axis, parts)
 
 
-def plain(track: Plain, axis: Axis) -> str:
+def plain(track: Plain, axis: TrackAxis) -> str:
     """Draw bars from zero."""
     most = max(*track.ticks, 1e-9)
     parts = [part for tick in track.ticks for part in _tick(LOW * (1.0 - tick / most), number_text(tick))]
@@ -110,7 +110,7 @@ def round_up(value: float) -> float:
     return next(nice * power for nice in (1.0, 2.0, 5.0, 10.0) if nice * power >= value * (1.0 - 1e-9))
 
 
-def _svg(title: str, bottom: float, axis: Axis, parts: list[str]) -> str:
+def _svg(title: str, bottom: float, axis: TrackAxis, parts: list[str]) -> str:
     height = bottom + LABELS_PX
     content = "".join([*parts, *_events(axis, bottom), *_metre_labels(axis, height)])
     head = f"<div style='font-size:11px;opacity:.75;padding-top:5px'>{escaped(title)}</div>"
@@ -130,7 +130,7 @@ def _line(y: float, color: str, dash: str = "none") -> str:
     return f"<line x1='{LEFT}' x2='{WIDTH}' y1='{y:.1f}' y2='{y:.1f}' stroke='{color}' stroke-dasharray='{dash}'/>"
 
 
-def _bars(axis: Axis, tops: FloatArray, bottom: float) -> list[str]:
+def _bars(axis: TrackAxis, tops: FloatArray, bottom: float) -> list[str]:
     edges = axis.edges()
     return [
         f"<rect x='{left:.1f}' y='{min(top, bottom - 1.0):.1f}' width='{right - left + 0.3:.1f}' "
@@ -139,14 +139,14 @@ def _bars(axis: Axis, tops: FloatArray, bottom: float) -> list[str]:
     ]
 
 
-def _steps(axis: Axis, tops: FloatArray, color: str) -> str:
+def _steps(axis: TrackAxis, tops: FloatArray, color: str) -> str:
     """Draw a line that is level over each bar."""
     places = np.column_stack((np.repeat(axis.edges(), 2)[1:-1], np.repeat(tops, 2)))
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in places.tolist())
     return f"<polyline class='c-error' points='{points}' fill='none' stroke='{color}' stroke-width='1.2'/>"
 
 
-def _events(axis: Axis, bottom: float) -> list[str]:
+def _events(axis: TrackAxis, bottom: float) -> list[str]:
     """Draw an upright line where the supervisor stops the vehicle, and one where it lets it go on."""
     kinds = ((axis.stops, theme.OVER_LIMIT, "c-stop"), (axis.recoveries, theme.RECOVERY, "c-recovery"))
     return [
@@ -157,7 +157,7 @@ def _events(axis: Axis, bottom: float) -> list[str]:
     ]
 
 
-def _metre_labels(axis: Axis, height: float) -> list[str]:
+def _metre_labels(axis: TrackAxis, height: float) -> list[str]:
     """Write the metres at the ends and in the middle."""
     places = ((0.0, "start"), (0.5 * axis.length, "middle"), (axis.length, "end"))
     return [

@@ -40,7 +40,7 @@ WORDS = {
 
 
 @dataclass(frozen=True, slots=True)
-class Chart:
+class RouteChart:
     """One plot."""
 
     title: str
@@ -51,11 +51,11 @@ class Chart:
     """Whether the vertical axis begins at zero."""
 
 
-CURVATURE = Chart("Curvature [1/m] over metres, to the left positive", lambda profile: profile.curvatures)
+CURVATURE = RouteChart("Curvature [1/m] over metres, to the left positive", lambda profile: profile.curvatures)
 CHARTS = (
     CURVATURE,
-    Chart("Heading of the vehicle [°] over metres", lambda profile: np.degrees(profile.headings)),
-    Chart("Planned speed [m/s] over metres", lambda profile: profile.speeds, from_zero=True),
+    RouteChart("Heading of the vehicle [°] over metres", lambda profile: np.degrees(profile.headings)),
+    RouteChart("Planned speed [m/s] over metres", lambda profile: profile.speeds, from_zero=True),
 )
 
 
@@ -89,7 +89,7 @@ def flags(profile: RouteProfile, violations: Sequence[Violation]) -> FloatArray:
     return marked
 
 
-def span(chart: Chart, profile: RouteProfile) -> tuple[float, float]:
+def span(chart: RouteChart, profile: RouteProfile) -> tuple[float, float]:
     """Return smallest and largest value that a plot shows, in its unit."""
     values = chart.values(profile)
     low, high = float(values.min()), float(values.max())
@@ -167,7 +167,7 @@ class RoutePlots(BasePanel):
         self._spans = (profile.length, spans)
 
 
-def _plot(gui: GuiApi, chart: Chart) -> GuiUplotHandle:
+def _plot(gui: GuiApi, chart: RouteChart) -> GuiUplotHandle:
     empty = np.full(2, np.nan)
     return gui.add_uplot(
         (np.array([0.0, 1.0]), *(empty for _ in range(6))),
@@ -183,7 +183,7 @@ def _plot(gui: GuiApi, chart: Chart) -> GuiUplotHandle:
     )
 
 
-def _series(chart: Chart) -> tuple[uplot.Series, ...]:
+def _series(chart: RouteChart) -> tuple[uplot.Series, ...]:
     hidden: uplot.Series_Points = {"show": False}
     limits = [uplot.Series(label="limit", stroke=LIMIT, width=1, dash=(5, 4), points=hidden) for _ in range(2)]
     return (

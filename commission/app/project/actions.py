@@ -76,7 +76,7 @@ class Reloaded(Action):
 
 
 @dataclass(frozen=True, slots=True)
-class Restored(Action):
+class EditsRestored(Action):
     """The journal held edits that were not saved."""
 
     project: Project

@@ -16,20 +16,19 @@ from commission.app.base.state import AppState
 from commission.app.project.actions import (
     AskToReplace,
     ChangedOnDisk,
+    EditsRestored,
     HeldByOther,
     HeldByUs,
     ProjectSaved,
     Protected,
     Reloaded,
-    Restored,
 )
 from commission.app.project.effects import KeepProjectIn, ReadProject, TakeProjectOver, WriteProject
 from commission.app.project.state import FilesState
 from commission.app.project.writer import Writer
 from commission.errors import CommissionError, FileFormatError, ProjectError, UsageError
 from commission.io.journal import Journal, remove_leftovers
-from commission.io.journal_replay import Restored as FromJournal
-from commission.io.journal_replay import restore
+from commission.io.journal_replay import Restored, restore
 from commission.io.overwriting import project_in
 from commission.io.project_copy import save_copy
 from commission.io.project_file import load_project, open_project
@@ -55,7 +54,7 @@ class ProjectFolder(Service):
         self._folder = context.state.folder
         self._lock: ProjectLock | None = None
         self._journal: Journal | None = None
-        self._restored: FromJournal | None = None
+        self._restored: Restored | None = None
         if self._folder is not None:
             self._lock = ProjectLock(self._folder)
             if self._lock.look() is not Hold.THEIRS:
@@ -249,7 +248,7 @@ class ProjectFolder(Service):
         self.context.post(HeldByUs(project))
         self._tell_restored()
 
-    def _edit(self, folder: Path, project: Project) -> FromJournal | None:
+    def _edit(self, folder: Path, project: Project) -> Restored | None:
         """Begin a journal; return what the last one held."""
         remove_leftovers(folder)
         restored = restore(folder, project)
@@ -287,7 +286,7 @@ class ProjectFolder(Service):
         """Have the edits made again that a journal held, or say that it could not be read."""
         restored, self._restored = self._restored, None
         if restored is not None and restored.edits:
-            self.context.post(Restored(restored.project, restored.summary(), restored.foreign_changes))
+            self.context.post(EditsRestored(restored.project, restored.summary(), restored.foreign_changes))
         elif restored is not None:
             self.context.post(Report(restored.summary()))
 

@@ -77,7 +77,7 @@ def reloaded(action: actions.Reloaded, state: AppState, sender: Sender) -> Outco
 
 
 @reduce.register
-def restored(action: actions.Restored, state: AppState, sender: Sender) -> Outcome:
+def restored(action: actions.EditsRestored, state: AppState, sender: Sender) -> Outcome:
     """Take what the journal held: one undo step, told to each browser that comes."""
     files = replace(state.part(FilesState), foreign=action.foreign)
     greeted = replace(state, greeting=action.text).with_part(files)

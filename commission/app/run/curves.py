@@ -36,7 +36,7 @@ def binned(times: FloatArray, values: FloatArray, duration: float) -> FloatArray
     return np.where(latest >= 0, levels[latest], np.nan)
 
 
-class Curve:
+class PlotCurve:
     """One value per cycle of a whole run, ready to be cut at the cursor at no cost.
 
     Parameters

@@ -15,7 +15,7 @@ from viser import GuiApi, GuiUplotHandle, uplot
 from commission.app.base.panel import BasePanel
 from commission.app.base.view import PageView
 from commission.app.run.charts import CHARTS, LIMIT, TURQUOISE, Chart, ceiling
-from commission.app.run.curves import BINS, Curve
+from commission.app.run.curves import BINS, PlotCurve
 from commission.app.run.view import RunView, Stretch
 from commission.geometry.arrays import FloatArray
 from commission.site.parameters import Parameters
@@ -43,7 +43,7 @@ class Plots(BasePanel):
         self._spans: tuple[tuple[float, float], ...] = ()
         self._axis = np.linspace(0.0, 1.0, BINS)
         self._result: RunResult | None = None
-        self._curves: list[list[Curve]] = []
+        self._curves: list[list[PlotCurve]] = []
         self._limits: list[list[FloatArray]] = []
         for chart in CHARTS:
             series = _series(chart)
@@ -97,7 +97,7 @@ class Plots(BasePanel):
         segments = np.searchsorted(columns.firsts, cycles, side="right") - 1
         parameters = [segment.setup.parameters for segment in columns.segments]
         self._curves = [
-            [Curve(result.times, line.values(result), result.duration) for line in chart.lines] for chart in CHARTS
+            [PlotCurve(result.times, line.values(result), result.duration) for line in chart.lines] for chart in CHARTS
         ]
         self._limits = [
             [np.array([limit.value(each) for each in parameters])[segments] for limit in chart.limits]
@@ -119,7 +119,7 @@ class Plots(BasePanel):
         return lines
 
 
-def _span(chart: Chart, curves: Sequence[Curve], parameters: Parameters) -> tuple[float, float]:
+def _span(chart: Chart, curves: Sequence[PlotCurve], parameters: Parameters) -> tuple[float, float]:
     """Smallest and largest value shown."""
     if chart.span is not None:
         return chart.span(parameters)

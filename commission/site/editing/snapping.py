@@ -48,7 +48,7 @@ class WallPoint:
 
 
 @dataclass(frozen=True, slots=True)
-class Alignment:
+class LinedUp:
     """A point moved so that it lines up with reflectors."""
 
     x: float
@@ -135,9 +135,7 @@ def to_grid(points: ArrayLike, spacing: float) -> FloatArray:
     return np.round(np.asarray(points, dtype=np.float64) / spacing) * spacing
 
 
-def align(
-    reflectors: ReflectorMap, point: tuple[float, float], reach: float, ignored: Collection[str] = ()
-) -> Alignment:
+def align(reflectors: ReflectorMap, point: tuple[float, float], reach: float, ignored: Collection[str] = ()) -> LinedUp:
     """Move a point onto the row and the column of other reflectors.
 
     Parameters
@@ -160,7 +158,7 @@ def align(
         best = int(np.argmin(gaps)) if len(gaps) else -1
         is_near = best >= 0 and gaps[best] <= reach
         found.append((float(centers[best, axis]), names[best]) if is_near else (float(point[axis]), None))
-    return Alignment(found[0][0], found[1][0], found[0][1], found[1][1])
+    return LinedUp(found[0][0], found[1][0], found[0][1], found[1][1])
 
 
 def nearest_corner(grid: OccupancyGrid, point: tuple[float, float], reach: float) -> FloatArray | None:

@@ -8,7 +8,7 @@ import pytest
 
 from commission.app.ambiguity.ambiguity_layer import MAP_COLORS, ambiguity_picture
 from commission.app.ambiguity.ambiguity_legend import cold_start_scale
-from commission.app.ambiguity.cold_start import EVERY, NOTHING, SOME, TOO_FEW, UNIQUE, Ambiguity, look_alike
+from commission.app.ambiguity.cold_start import EVERY, NOTHING, SOME, TOO_FEW, UNIQUE, AmbiguousFloor, look_alike
 from commission.app.ambiguity.service import AmbiguityService
 from commission.app.ambiguity.settings import AmbiguitySettings, DropPlaces, FindPlaces, SetAmbiguity, ShowPair
 from commission.app.base.conditions import SetCondition
@@ -32,7 +32,7 @@ def symmetric_hall() -> Project:
     return Project(name="Symmetric hall", floor_map=FloorMap(cells, 0.1), reflectors=reflectors, scanner=scanner)
 
 
-def found_in(project: Project) -> Ambiguity:
+def found_in(project: Project) -> AmbiguousFloor:
     return look_alike(AmbiguityInput.of(project), silent)
 
 

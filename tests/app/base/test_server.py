@@ -156,7 +156,7 @@ def test_a_viser_that_takes_serve_from_elsewhere_ends_the_program(monkeypatch: p
 
 def test_a_gate_that_lets_strangers_in_ends_the_program(monkeypatch: pytest.MonkeyPatch) -> None:
     before = ports_of_ours()
-    monkeypatch.setattr("commission.app.base.gate.Gate.answer", lambda *_: None)
+    monkeypatch.setattr("commission.app.base.gate.AccessGate.answer", lambda *_: None)
     with pytest.raises(ServerError, match=r"a stranger is answered 200 by viser .*; expected to be refused"):
         start_server("127.0.0.1", 0, TOKEN)
     assert ports_of_ours() == before

@@ -14,7 +14,15 @@ from commission.app.base.effects import Effect, Tell
 from commission.app.base.state import NOTHING_SAVED, AppState
 from commission.app.editing import actions as editing
 from commission.app.editing.site_tools import PlaceTool
-from commission.app.project.actions import ChangedOnDisk, KeepOther, Reload, RenameProject, Restored, Save, TakeOver
+from commission.app.project.actions import (
+    ChangedOnDisk,
+    EditsRestored,
+    KeepOther,
+    Reload,
+    RenameProject,
+    Save,
+    TakeOver,
+)
 from commission.app.project.project_folder import ProjectFolder
 from commission.app.project.state import FilesState
 from commission.app.project.top_bar import standing
@@ -292,7 +300,7 @@ def test_the_journal_is_written_before_the_effects_of_an_edit(folder: Path, monk
 
     monkeypatch.setattr(Runtime, "_carry_out", look_at_journal)
     theirs = replace(kept.now, name="Restored")
-    kept.do(Restored(theirs, "told to each browser: an effect"))
+    kept.do(EditsRestored(theirs, "told to each browser: an effect"))
     assert seen == [theirs]
 
 

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from commission.app.run.curves import BINS, Curve, binned
+from commission.app.run.curves import BINS, PlotCurve, binned
 
 LEVELS = st.lists(st.floats(-1e6, 1e6), min_size=1, max_size=3000)
 
@@ -35,7 +35,7 @@ def test_what_is_drawn_as_lived_comes_from_lived_cycles_alone(values: list[float
     # What is not lived yet is larger than all: it would stand out at once.
     spoiled = np.array(values)
     spoiled[lived:] += 1e9
-    before, behind = Curve(times, spoiled, 100.0).cut(cursor, lived)
+    before, behind = PlotCurve(times, spoiled, 100.0).cut(cursor, lived)
     known = before[np.isfinite(before)]
     assert set(known.tolist()) <= set(values[:lived])
     if lived:
@@ -48,7 +48,7 @@ def test_what_is_drawn_as_lived_comes_from_lived_cycles_alone(values: list[float
 
 def test_a_curve_is_complete_from_the_first_moment() -> None:
     times = np.arange(0.0, 40.0, 0.1)
-    before, behind = Curve(times, times.copy(), 40.0).cut(0.0, 1)
+    before, behind = PlotCurve(times, times.copy(), 40.0).cut(0.0, 1)
     assert before[0] == 0.0
     assert np.isnan(before[1:]).all()
     assert behind[-1] == pytest.approx(39.9)

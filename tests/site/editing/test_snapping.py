@@ -111,7 +111,7 @@ def test_a_point_lines_up_with_the_nearest_row_and_column():
     )
     aligned = snapping.align(others, (1.05, 2.05), 0.1, ["own"])
     assert (aligned.x, aligned.x_of, aligned.y, aligned.y_of) == (1.0, "A", 2.0, "B")
-    assert snapping.align(ReflectorMap(), (1.0, 2.0), 0.1) == snapping.Alignment(1.0, 2.0, None, None)
+    assert snapping.align(ReflectorMap(), (1.0, 2.0), 0.1) == snapping.LinedUp(1.0, 2.0, None, None)
 
 
 def test_a_row_attracts_up_to_its_reach_and_not_beyond():
