@@ -95,4 +95,21 @@ STUDIES = (
         replace="0.0",
         tests=(TESTS + "test_start.py::test_a_route_that_starts_in_reverse_has_the_vehicle_face_backward",),
     ),
+    Mutant(
+        name="the keys of studies forget supervisor, gate and odometry",
+        file="commission/studies/inputs.py",
+        find="if field.compare]",
+        replace='if field.compare and field.name != "parameters"]',
+        tests=(
+            "tests/app/prediction/test_service.py::test_every_part_that_a_prediction_depends_on_predicts_anew",
+            "tests/studies/test_inputs.py::test_whatever_edit_changes_a_result_changes_the_input",
+        ),
+    ),
+    Mutant(
+        name="coverage without a map forgets its routes",
+        file="commission/studies/coverage.py",
+        find="routes=project.routes if project.floor_map is None else ()",
+        replace="routes=()",
+        tests=("tests/studies/test_inputs.py::test_whatever_edit_changes_a_result_changes_the_input",),
+    ),
 )
