@@ -46,6 +46,13 @@ def test_raw_map_holds_percent_and_everything_beyond_is_unknown(tmp_path: Path) 
     assert floor_map.cells.tolist() == [[FREE, FREE, UNKNOWN, OCCUPIED, OCCUPIED, UNKNOWN, UNKNOWN, UNKNOWN]]
 
 
+def test_cell_exactly_at_a_threshold_is_unknown(tmp_path: Path) -> None:
+    # Percent of 64, 65 and 66 about 0.65, of 19, 20 and 21 about 0.2.
+    pixels = np.array([[64, 65, 66, 19, 20, 21]], dtype=np.uint8)
+    floor_map = read_floor_map(write_map(tmp_path, pixels, mode="raw", occupied_thresh=0.65, free_thresh=0.2))
+    assert floor_map.cells.tolist() == [[UNKNOWN, UNKNOWN, OCCUPIED, FREE, UNKNOWN, UNKNOWN]]
+
+
 def test_scale_map_takes_transparent_pixels_for_unknown(tmp_path: Path) -> None:
     pixels = np.array([[[0, 255], [0, 254], [254, 255], [128, 255]]], dtype=np.uint8)
     floor_map = read_floor_map(write_map(tmp_path, pixels, mode="scale"))

@@ -191,6 +191,23 @@ def test_reported_motion_spreads_as_the_parameter_says(name: str, sigmas: tuple[
             assert spread[axis] == pytest.approx(expected, rel=0.18, abs=1e-9)
 
 
+@pytest.mark.parametrize(("name", "along"), [("forward_per_sqrt_m", True), ("lateral_per_sqrt_m", False)])
+def test_noise_of_a_motion_askew_lies_along_it_or_across_it(name: str, along: bool) -> None:
+    # 200 steps of 25 mm, 30 degrees to the left of the vehicle's axis.
+    askew = np.array([np.cos(np.radians(30.0)), np.sin(np.radians(30.0))])
+    twists = np.zeros((201, 3))
+    twists[1:, :2] = 1.25 * askew
+    poses = np.concatenate((np.zeros((1, 3)), np.cumsum(twists[1:], axis=0) * 0.02))
+    motion = TrueMotion(np.arange(201) * 20_000_000, poses, twists)
+    vehicle, noise = OmnidirectionalVehicle(), replace(NOISELESS, **{name: 0.02})
+    errors = measure(motion, vehicle, noise, 0.0, np.random.default_rng(1))[1:, :2] - 0.025 * askew
+    parts = errors @ askew, errors @ [-askew[1], askew[0]]
+    spread, nothing = parts if along else parts[::-1]
+    np.testing.assert_allclose(nothing, 0.0, atol=1e-12)
+    # 200 draws: 1-sigma of a standard deviation is 5 %; four of them.
+    assert np.std(spread) == pytest.approx(0.02 * np.sqrt(0.025), rel=0.2)
+
+
 def test_reported_heading_spreads_with_the_angle_turned() -> None:
     motion = driven(DifferentialVehicle(), out_and_back())
     turned = np.sum(np.abs(motion.twists[:, 2])) * 1e-9 * motion.period_ns

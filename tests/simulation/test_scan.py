@@ -147,7 +147,13 @@ def test_shiny_object_passes_for_a_reflector() -> None:
 def test_tilted_floor_cuts_every_beam_and_hides_reflectors() -> None:
     project = Project(
         floor_map=room(),
-        reflectors=ReflectorMap((Reflector(id="Near", x=4.0, y=4.0), Reflector(id="Far", x=8.0, y=4.0, radius=0.1))),
+        reflectors=ReflectorMap(
+            (
+                Reflector(id="Near", x=4.0, y=4.0),
+                Reflector(id="Far", x=8.0, y=4.0, radius=0.1),
+                Reflector(id="Aside", x=8.0, y=6.0, radius=0.1),  # in nobody's shadow
+            )
+        ),
         scanner=QUIET,
         disturbances=Disturbances(tilted_stretches=(TiltedStretch(2.0, 4.0, 1.0),)),
     )

@@ -1,0 +1,71 @@
+"""Faults of files: units, axes and columns swapped, what is upside down or inverted."""
+
+from tests.tools.mutants.mutant import Mutant
+
+FOLDER, TESTS = "commission/io/", "tests/io/"
+
+IO = (
+    Mutant(
+        name="map upside down",
+        file=FOLDER + "map_server.py",
+        find="FloorMap(np.flipud(cells), description",
+        replace="FloorMap(cells, description",
+        tests=(TESTS + "test_map_server.py::test_first_row_of_the_image_is_the_far_side_of_the_floor",),
+    ),
+    Mutant(
+        name="negated map read as a usual one",
+        file=FOLDER + "map_server.py",
+        find="brightness if description.negate else 1.0 - brightness",
+        replace="1.0 - brightness",
+        tests=(TESTS + "test_map_server.py::test_negated_map_takes_white_for_walls",),
+    ),
+    Mutant(
+        name="occupied at the threshold itself",
+        file=FOLDER + "map_server.py",
+        find="occupancy > description.occupied_thresh",
+        replace="occupancy >= description.occupied_thresh",
+        tests=(TESTS + "test_map_server.py::test_cell_exactly_at_a_threshold_is_unknown",),
+    ),
+    Mutant(
+        name="percent of a raw map taken for gray values",
+        file=FOLDER + "map_server.py",
+        find="occupancy = percent / 100.0",
+        replace="occupancy = percent / 255.0",
+        tests=(TESTS + "test_map_server.py::test_raw_map_holds_percent_and_everything_beyond_is_unknown",),
+    ),
+    Mutant(
+        name="diameter of an IMK layout taken for the radius",
+        file=FOLDER + "imk.py",
+        find="radius=size / 2000.0",
+        replace="radius=size / 1000.0",
+        tests=(TESTS + "test_imk.py::test_layout_of_a_real_sensor_is_read",),
+    ),
+    Mutant(
+        name="LIF layout driven the other way round",
+        file=FOLDER + "lif_writer.py",
+        find="math.pi if segment.direction is Direction.REVERSE else 0.0",
+        replace="0.0 if segment.direction is Direction.REVERSE else math.pi",
+        tests=(TESTS + "test_lif.py::test_routes_that_are_written_and_read_again_are_equal",),
+    ),
+    Mutant(
+        name="variance of y in the column of x and heading",
+        file=FOLDER + "results.py",
+        find="(0, 2), (1, 1)",
+        replace="(1, 1), (0, 2)",
+        tests=(TESTS + "test_results.py::test_every_cycle_is_a_row_that_reads_back_to_the_last_bit",),
+    ),
+    Mutant(
+        name="inliers in the column of outliers",
+        file=FOLDER + "results.py",
+        find="run.counts(Status.INLIER),\n        outliers",
+        replace="outliers,\n        run.counts(Status.INLIER)",
+        tests=(TESTS + "test_results.py::test_every_cycle_is_a_row_that_reads_back_to_the_last_bit",),
+    ),
+    Mutant(
+        name="heading of a coverage in radians called degrees",
+        file=FOLDER + "coverage_files.py",
+        find='"heading_sigma": "_rad"',
+        replace='"heading_sigma": "_deg"',
+        tests=(TESTS + "test_coverage_files.py::test_files_hold_the_figures_of_the_floor",),
+    ),
+)
