@@ -84,7 +84,7 @@ class Window(NamedTuple):
     last_column: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Coverage:
     """Figures of a fix at every point of a lattice."""
 
@@ -155,7 +155,7 @@ def coverage(
         sight[tile] = model.visible(scanner_points[tile])
         _fill(model, kernel_model, scanner_points[tile], sight[tile], counts[tile], figures[tile])
     progress(1.0, "coverage")
-    return Coverage(lattice, options, as_fixes(counts, figures), floor, sight)
+    return Coverage(lattice=lattice, options=options, fixes=as_fixes(counts, figures), floor=floor, sight=sight)
 
 
 def tiles(lattice: Lattice) -> list[slice]:

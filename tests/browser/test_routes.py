@@ -60,7 +60,7 @@ def test_a_station_is_placed_typed_dragged_and_seen_by_another_browser(
     assert other.errors == []
     # Without a graphics card two windows draw too slowly for the drag that follows.
     other.close()
-    page.press(None.value)
+    page.press("Select")
     page.fill("Name", "Dock <b>1</b>")
     site.until(lambda: site.state.project.stations[0].name == "Dock <b>1</b>")
     page.fill("Within [mm]", "12")

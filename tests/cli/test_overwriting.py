@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -127,8 +128,9 @@ def test_unsaved_edits_of_a_project_that_is_replaced_are_kept_and_not_made_over_
     refused, commission, project, tmp_path
 ):
     out = tmp_path / "placed"
+    out.mkdir()
     journal = Journal(out, load_project(project))
-    journal.append(load_project(project), "Nothing")
+    journal.append(dataclasses.replace(load_project(project), name="Another"), "rename")
     journal.close()
     written = journal.path.read_bytes()
     said = refused("place", project, "--out", out)
