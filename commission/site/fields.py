@@ -210,9 +210,13 @@ def with_field(value: Value, name: str, new: object, what: str = "field") -> Val
     """
     found = _found(value, name, what)
     last = found[-1]
+    here = getattr(last.holder, last.name)
+    if dataclasses.is_dataclass(here) and not dataclasses.is_dataclass(new):
+        inner = ", ".join(f"{name}.{each}" for each in fields_of(type(here)))
+        raise UsageError(f"no {what} is called {name!r}; expected one of: {inner}")
     changed: Any = _of_kind(new, last.info, name)
     if last.indices:
-        changed = _with_element(getattr(last.holder, last.name), last.indices, changed)
+        changed = _with_element(here, last.indices, changed)
     for step in reversed(found):
         changes: dict[str, Any] = {step.name: changed}
         changed = dataclasses.replace(typing.cast(Any, step.holder), **changes)

@@ -143,7 +143,7 @@ class Quantity:
     bounds: Bounds = Bounds()
     """Which numbers are allowed."""
     step: float = 0.001
-    """Step of its widget, in the page's unit; texts and widgets are rounded to its decimals."""
+    """Step of its widget, in the page's unit; texts have its decimals."""
     slider: tuple[float, float] | None = None
     """Ends of its slider in the page's unit, a value beyond moves them; none: it is typed."""
     entry: tuple[float, float] | None = None
@@ -167,20 +167,19 @@ class Quantity:
         return f"{self.label} [{self.shown_unit}]" if self.shown_unit else self.label
 
     def on_page(self, value: float) -> float:
-        """Return a value in the page's unit, rounded to the decimals of its step; a whole number stays whole."""
+        """Return a value in the page's unit, with the decimals of its step or six digits, whichever is closer."""
         if isinstance(value, int) and self.scale == 1.0:
             return value
-        return round(float(value) * self.scale, _decimals(self.step))
+        number = float(value) * self.scale
+        return min(round(number, _decimals(self.step)), float(f"{number:.6g}"), key=lambda near: abs(near - number))
 
     def of_page(self, number: float) -> float:
         """Return what a number on the page means."""
         return number / self.scale
 
     def text(self, value: float) -> str:
-        """Return a value as the page writes it: number and unit."""
-        number = self.on_page(value)
-        digits = 0 if isinstance(number, int) else _decimals(self.step)
-        return _joined(f"{number:.{digits}f}", self.shown_unit)
+        """Return a value as the page writes it: number, with the decimals of its step, and unit."""
+        return _joined(f"{value * self.scale:.{_decimals(self.step)}f}", self.shown_unit)
 
     def refusal(self, value: float) -> str:
         """Say in the page's unit why a value is not allowed; empty when it is."""

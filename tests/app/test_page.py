@@ -10,6 +10,7 @@ import pytest
 import viser
 
 from commission.app.base.actions import Action
+from commission.app.base.field_widget import held, meant
 from commission.app.base.jobs import Job
 from commission.app.base.panel import clock, escaped, posting
 from commission.app.base.server import start_server
@@ -25,9 +26,10 @@ from commission.app.run.playback import Playback
 from commission.app.run.run_panel import NO_ROUTE, RunPanel
 from commission.app.run.vehicle_layer import VehicleLayer
 from commission.app.run.view import RunView
-from commission.app.tune.reducer import parameter, with_parameter
-from commission.app.tune.tune_panel import KNOBS, SWITCHES, TunePanel, meant, shown
+from commission.app.tune.tune_panel import TunePanel
 from commission.localization.estimate import Mode, Status
+from commission.site.fields import field_info, get_field, walk_fields, with_field
+from commission.site.parameters import Parameters
 from commission.site.presets import SCANNERS, ScannerPreset
 from commission.site.project import Project
 from commission.studies.run import RunResult
@@ -83,23 +85,40 @@ def test_a_person_posts_and_the_server_itself_does_not() -> None:
     assert posted == [Seek(2.0)]
 
 
+def test_every_parameter_has_exactly_one_widget_with_its_label_its_unit_and_its_hint(
+    server: viser.ViserServer, project: Project
+) -> None:
+    added: list[Any] = []
+    for name in ("add_slider", "add_checkbox", "add_dropdown", "add_number", "add_text"):
+        real = getattr(server.gui, name)
+        setattr(server.gui, name, lambda *args, real=real, **keys: added.append(real(*args, **keys)) or added[-1])
+    panel = TunePanel(server.gui, lambda _action: None, AppState(project, project))
+    described = dict(walk_fields(Parameters))
+    assert sorted(panel._widgets) == sorted(described)
+    assert {id(widget) for widget in added} == {id(widget) for widget in panel._widgets.values()}
+    for key, info in described.items():
+        widget = panel._widgets[key]
+        assert widget.hint == f"{info.hint} ({key})"
+        assert widget.label == (info.quantity.title if info.quantity else info.label)
+
+
 def test_every_slider_posts_its_parameter_in_si(server: viser.ViserServer, project: Project) -> None:
     posted: list[Any] = []
     panel = TunePanel(server.gui, taking(posted), AppState(project, project))
     for key, widget in panel._widgets.items():
         change(widget, widget.value, client=SimpleNamespace(client_id=1))
         assert posted[-1].key == key
-        value = parameter(project.parameters, key)
+        value = get_field(project.parameters, key)
         # The page shows six digits.
         assert posted[-1].value == (pytest.approx(value, rel=1e-5) if isinstance(value, float) else value)
-        with_parameter(project.parameters, key, posted[-1].value)
-    assert len(posted) == len(panel._widgets) >= len(KNOBS) + len(SWITCHES)
+        with_field(project.parameters, key, posted[-1].value)
+    assert len(posted) == len(panel._widgets) == len(dict(walk_fields(Parameters)))
 
 
 def test_sliders_follow_undo_but_not_their_own_drag(server: viser.ViserServer, project: Project) -> None:
     key = "supervisor.position_limit"
     panel = TunePanel(server.gui, lambda _action: None, AppState(project, project))
-    edited = replace(project, parameters=with_parameter(project.parameters, key, 0.2))
+    edited = replace(project, parameters=with_field(project.parameters, key, 0.2))
     change(panel._widgets[key], 200.0, client=SimpleNamespace(client_id=1))
     panel.draw_slowly(view_of(AppState(edited, project, last_edit=LastEdit(key))))
     assert panel._widgets[key].value == 200.0
@@ -107,11 +126,10 @@ def test_sliders_follow_undo_but_not_their_own_drag(server: viser.ViserServer, p
     assert panel._widgets[key].value == 100.0
 
 
-@pytest.mark.parametrize("key", sorted(KNOBS))
+@pytest.mark.parametrize("key", sorted(name for name, info in walk_fields(Parameters) if info.quantity))
 def test_what_the_page_shows_means_the_same_parameter(project: Project, key: str) -> None:
-    value = parameter(project.parameters, key)
-    assert isinstance(value, int | float)
-    again = meant(KNOBS[key], shown(KNOBS[key], value), value)
+    info, value = field_info(project.parameters, key), get_field(project.parameters, key)
+    again = meant(info, held(info, value))
     assert type(again) is type(value)
     assert again == pytest.approx(value, rel=1e-5)
 

@@ -14,7 +14,7 @@ from commission.app.run.actions import Play, Restart, Seek, SetSpeed, VirtualDri
 from commission.app.run.state import RunState
 from commission.app.run.view import RunView
 from commission.app.tune.actions import ResetParameters
-from commission.app.tune.reducer import with_parameter
+from commission.site.fields import with_field
 from commission.site.project import Project
 from tests.app.sites import room
 from tests.browser.page import SMALL, OpenPage
@@ -41,7 +41,7 @@ class OpenRun(Served):
 def run() -> Iterator[OpenRun]:
     project = room()
     # Tight enough that half a minute without reflectors is too long.
-    opened = OpenRun(replace(project, parameters=with_parameter(project.parameters, "supervisor.position_limit", 0.03)))
+    opened = OpenRun(replace(project, parameters=with_field(project.parameters, "supervisor.position_limit", 0.03)))
     yield opened
     opened.close()
 

@@ -136,6 +136,15 @@ def test_a_name_that_there_is_not_is_answered_with_those_there_are(name, message
             ask()
 
 
+def test_a_whole_group_is_no_parameter():
+    with pytest.raises(
+        UsageError, match=r"no parameter is called 'association'; expected one of: association\.enabled"
+    ):
+        with_field(Parameters(), "association", 0.9, "parameter")
+    group = AssociationParameters(gate_probability=0.9)
+    assert get_field(with_field(Parameters(), "association", group), "association") == group
+
+
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [

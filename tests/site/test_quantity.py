@@ -67,12 +67,14 @@ def test_the_page_refuses_in_its_own_unit():
     assert heading.refusal(2.0 * math.pi) == "Faces is 360°; expected -180 to 180°"
 
 
-def test_numbers_are_shown_in_the_unit_of_the_page_with_the_decimals_of_their_step():
-    assert SIGMA.on_page(0.01234) == 12.3
+def test_numbers_are_shown_in_the_unit_of_the_page_and_written_with_the_decimals_of_their_step():
+    assert SIGMA.on_page(0.01234) == 12.34
+    assert SIGMA.on_page(0.012345678) == 12.3457
+    assert X.on_page(5_412_345.678_91) == 5_412_345.679
     assert SIGMA.text(0.02) == "20.0 mm"
     assert SIGMA.title == "Range 1σ [mm]"
     assert Quantity(label="Bearing", unit="rad", shown=DEGREES, step=0.01).text(math.radians(30.0)) == "30.00°"
-    assert Quantity(label="Resolution", unit="deg", shown=AS_DEGREES, step=0.0001).on_page(1.0 / 6.0) == 0.1667
+    assert Quantity(label="Resolution", unit="deg", shown=AS_DEGREES, step=0.0001).text(1.0 / 6.0) == "0.1667°"
     assert Quantity(label="Beams", step=1).text(3) == "3"
     assert Quantity(label="Spacing", unit="m", step=0.25).text(1.5) == "1.50 m"
     assert Quantity(label="Every", unit="m", step=20.0).text(41.2) == "41 m"

@@ -25,8 +25,8 @@ from commission.app.run.actions import (
 from commission.app.run.effects import CoverFromHere, LoadSource, MoveByScans, PlayOn, RunAfresh
 from commission.app.run.state import RunState
 from commission.app.tune.actions import ParameterValue, ResetParameters, SetParameter
-from commission.app.tune.reducer import parameter
 from commission.errors import UsageError
+from commission.site.fields import get_field
 from tests.app.asking import ME, after, by
 from tests.app.sites import room
 
@@ -40,7 +40,7 @@ def state() -> AppState:
 
 
 def gate(state: AppState) -> ParameterValue:
-    return parameter(state.project.parameters, GATE)
+    return get_field(state.project.parameters, GATE)
 
 
 def test_a_parameter_change_edits_the_project(state: AppState) -> None:

@@ -16,9 +16,9 @@ from commission.app.run.curves import BINS
 from commission.app.run.drives import Drive
 from commission.app.run.playback import Playback
 from commission.app.run.plots import Plots
-from commission.app.tune.reducer import with_parameter
 from commission.localization.estimate import Status
 from commission.localization.setup import LocalizerSetup
+from commission.site.fields import with_field
 from commission.site.project import Project
 from commission.studies.run import RunInput, RunResult, judged_run
 
@@ -55,7 +55,7 @@ EXPECTED = {
 @pytest.fixture(scope="module")
 def strict(project: Project, drive: Drive) -> RunResult:
     """A gate that rejects some detections, so that no curve is empty."""
-    narrow = replace(project, parameters=with_parameter(project.parameters, "association.gate_probability", 0.6))
+    narrow = replace(project, parameters=with_field(project.parameters, "association.gate_probability", 0.6))
     return judged_run(RunInput.of(narrow, drive.log, drive.start))
 
 
@@ -90,7 +90,7 @@ def test_a_limit_is_its_parameter_in_the_unit_of_its_plot(project: Project, titl
         ("supervisor.heading_limit", 2.5 / DEGREES),
         ("association.gate_probability", 0.6),
     ):
-        parameters = with_parameter(parameters, key, value)
+        parameters = with_field(parameters, key, value)
     (chart,) = (chart for chart in CHARTS if chart.title == title)
     assert chart.limits[0].value(parameters) == pytest.approx(expected, rel=1e-12)
     low, high = chart.span(parameters)
@@ -137,7 +137,7 @@ def test_what_lies_behind_the_cursor_is_drawn_pale(
 def test_a_limit_changes_where_another_segment_begins(
     server: viser.ViserServer, project: Project, result: RunResult
 ) -> None:
-    wider = replace(project, parameters=with_parameter(project.parameters, "supervisor.position_limit", 0.2))
+    wider = replace(project, parameters=with_field(project.parameters, "supervisor.position_limit", 0.2))
     cycle = result.cycles // 2
     later = judged_run(result.inputs.with_setup(LocalizerSetup.of(wider), cycle), earlier=result)
     axis, *_, limit, _fail, _coming, _now, edits, _waking = drawn(Plots(server.gui), project, Playback(later))
@@ -151,7 +151,7 @@ def test_a_limit_changes_where_another_segment_begins(
 def test_fail_episodes_are_areas_dark_where_they_are_lived(
     server: viser.ViserServer, project: Project, drive: Drive
 ) -> None:
-    tight = replace(project, parameters=with_parameter(project.parameters, "supervisor.position_limit", 0.03))
+    tight = replace(project, parameters=with_field(project.parameters, "supervisor.position_limit", 0.03))
     inputs = RunInput.of(tight, drive.log, drive.start).with_cover(15, covered=True).with_cover(75, covered=False)
     playback = Playback(judged_run(inputs))
     (start, end) = playback.view(covered=False).coming_episodes[0]

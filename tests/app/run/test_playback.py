@@ -8,10 +8,10 @@ from commission.app.run.drives import Drive
 from commission.app.run.playback import Playback
 from commission.app.run.time_line import strip
 from commission.app.run.view import RunView
-from commission.app.tune.reducer import with_parameter
 from commission.localization.estimate import Mode, Status
 from commission.localization.localizer import Localizer
 from commission.localization.setup import LocalizerSetup
+from commission.site.fields import with_field
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry
@@ -29,7 +29,7 @@ def playback(result: RunResult) -> Playback:
 @pytest.fixture(scope="module")
 def failing(project: Project, drive: Drive) -> RunResult:
     """A run that fails once while its reflectors are covered, and recovers when they are not."""
-    tight = replace(project, parameters=with_parameter(project.parameters, "supervisor.position_limit", 0.03))
+    tight = replace(project, parameters=with_field(project.parameters, "supervisor.position_limit", 0.03))
     inputs = RunInput.of(tight, drive.log, drive.start)
     return judged_run(inputs.with_cover(COVERED_FROM, covered=True).with_cover(COVERED_TO, covered=False))
 
@@ -101,7 +101,7 @@ def test_a_seek_beyond_the_end_ends_at_the_end(playback: Playback, seconds: floa
 
 def test_another_run_over_the_drive_leaves_the_cursor(playback: Playback, project: Project) -> None:
     before = at(playback, 2.0)
-    wider = with_parameter(project.parameters, "association.gate_probability", 0.9999)
+    wider = with_field(project.parameters, "association.gate_probability", 0.9999)
     setup = LocalizerSetup.of(replace(project, parameters=wider))
     playback.replace(judged_run(playback.result.inputs.with_setup(setup), earlier=playback.result))
     after = playback.view(covered=False)

@@ -18,11 +18,11 @@ from commission.app.run.effects import CoverFromHere, LoadSource, MoveByScans, M
 from commission.app.run.service import RunService
 from commission.app.run.state import RunState
 from commission.app.run.view import RunView
-from commission.app.tune.reducer import with_parameter
 from commission.localization.estimate import Mode
 from commission.localization.run_columns import Segment
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress
+from commission.site.fields import with_field
 from commission.site.project import Project
 from commission.studies.run import RunInput, RunResult, judged_run
 from tests.app.owning import Owner
@@ -84,7 +84,7 @@ def desk(project: Project, drive: Drive) -> Iterator[Desk]:
 
 
 def gate(probability: float) -> Callable[[Project], Project]:
-    return lambda project: replace(project, parameters=with_parameter(project.parameters, GATE, probability))
+    return lambda project: replace(project, parameters=with_field(project.parameters, GATE, probability))
 
 
 def fresh(desk: Desk, *segments: tuple[int, Project, bool]) -> RunResult:
@@ -155,7 +155,7 @@ def test_from_here_on_an_edit_leaves_what_was_lived(desk: Desk, project: Project
 
 
 def test_covered_from_the_cursor_on_it_fails_and_uncovered_it_recovers(desk: Desk, project: Project) -> None:
-    desk.edit(lambda p: replace(p, parameters=with_parameter(p.parameters, "supervisor.position_limit", 0.03)))
+    desk.edit(lambda p: replace(p, parameters=with_field(p.parameters, "supervisor.position_limit", 0.03)))
     desk.do(MoveTo(1.45), CoverFromHere(covered=True))
     assert desk.view.covered
     assert desk.view.mode is Mode.OPERATIONAL
