@@ -1,6 +1,7 @@
 """The deliberate faults, one module per room: each is a kind that tests have missed before, or might."""
 
 from tests.tools.mutants.app import APP
+from tests.tools.mutants.cli import CLI
 from tests.tools.mutants.geometry import GEOMETRY
 from tests.tools.mutants.io import IO
 from tests.tools.mutants.localization import LOCALIZATION
@@ -12,7 +13,7 @@ from tests.tools.mutants.studies import STUDIES
 
 MUTANTS: tuple[Mutant, ...] = (
     *(*GEOMETRY, *SITE, *LOCALIZATION, *PLANNING, *SIMULATION, *STUDIES),
-    *(*IO, *APP),
+    *(*IO, *APP, *CLI),
 )
 
 __all__ = ["MUTANTS", "Mutant"]
