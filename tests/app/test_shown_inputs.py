@@ -1,0 +1,155 @@
+"""Every number that can be typed on the page means what its label says, and is shown again as it was typed.
+
+The whole page on a real server, without a browser: each number is changed as by a person, the action that is posted is
+carried out, and the page is drawn from what came of it. Factors are those of the units in the labels, written here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import viser
+
+from commission.app.base.actions import Action
+from commission.app.base.server import start_server
+from commission.app.base.state import AppState
+from commission.app.base.view import view_of
+from commission.app.page import Page
+from commission.site.parameters import Parameters
+from commission.site.project import Project
+from tests.app.asking import FEATURES, after, taking
+
+DEGREES = 180.0 / math.pi
+UNITS = {
+    **{"mm": 1000.0, "mm/√m": 1000.0, "mm/√s": 1000.0, "m": 1.0},
+    **{"°": DEGREES, "°/√m": DEGREES, "°/√rad": DEGREES, "°/√s": DEGREES},
+    **{"%": 100.0, "%/m": 100.0, "": 1.0, "s": 1.0, "detections": 1.0},
+}
+"""Number on the page for one SI unit, by the unit that the label names."""
+IN_DEGREES = {"First bearing", "Last bearing", "Resolution", "Beam width", "Steering to"}
+"""Fields whose names end with `_deg`: the project holds them in degrees, too."""
+BEARING_OF_SCANNER = "Bearing 1σ"
+"""Shown twice: of the scanner, whose field is in degrees, and of the localizer, whose parameter is in radians."""
+
+PARAMETERS = {
+    "association.enabled": ("Association filter", None),
+    "association.gate_probability": ("Gate [%]", 100.0),
+    "detector.enabled": ("Detector filter", None),
+    "detector.intensity_threshold": ("Intensity from", 1.0),
+    "detector.min_model_error": ("Beams too few", 1.0),
+    "detector.max_model_error": ("Beams too many", 1.0),
+    "detector.range_jump": ("Range jump [mm]", 1000.0),
+    "detector.center": ("Center from", None),
+    "supervisor.enabled": ("Supervisor", None),
+    "supervisor.position_limit": ("2σ position [mm]", 1000.0),
+    "supervisor.heading_limit": ("2σ heading [°]", DEGREES),
+    "supervisor.recovery_ratio": ("Recovery ratio", 1.0),
+    "supervisor.rejection_enabled": ("Lost by rejections", None),
+    "supervisor.rejection_window": ("Window [s]", 1.0),
+    "supervisor.rejection_evidence": ("Evidence [detections]", 1.0),
+    "supervisor.rejection_reach": ("Near a reflector [m]", 1.0),
+    "supervisor.rejection_near_limit": ("Rejected near [%]", 100.0),
+    "supervisor.rejection_limit": ("Rejected at all [%]", 100.0),
+    "observation.range_sigma": ("Range 1σ [mm]", 1000.0),
+    "observation.bearing_sigma": ("Bearing 1σ [°]", DEGREES),
+    "observation.range_bias": ("Range bias [mm]", 1000.0),
+    "odometry.forward_per_sqrt_m": ("Along [mm/√m]", 1000.0),
+    "odometry.lateral_per_sqrt_m": ("Across [mm/√m]", 1000.0),
+    "odometry.heading_per_sqrt_m": ("Heading [°/√m]", DEGREES),
+    "odometry.heading_per_sqrt_rad": ("Heading, turning [°/√rad]", DEGREES),
+    "odometry.forward_per_sqrt_s": ("Along, in time [mm/√s]", 1000.0),
+    "odometry.heading_per_sqrt_s": ("Heading, in time [°/√s]", DEGREES),
+}
+"""Label and factor of each parameter's widget; None: not a number."""
+
+
+class Desk:
+    """The page of a project, and what its widgets post."""
+
+    def __init__(self, server: viser.ViserServer, project: Project) -> None:
+        self.server, self.posted, self.state = server, [], AppState(project, project)
+        self.page = Page(server, taking(self.posted), self.state, FEATURES)
+        self.page.show_site(self.state)
+        self.draw(self.state)
+
+    def draw(self, state: AppState) -> None:
+        """Draw a state in which nobody is just moving a slider."""
+        self.page.draw(view_of(replace(state, last_edit=None)), slowly=True)
+
+    @property
+    def widgets(self) -> list[Any]:
+        """Everything that can be set."""
+        return list(self.server.gui._gui_input_handle_from_uuid.values())
+
+    def change(self, widget: Any, value: Any) -> list[Action]:
+        """Let a person change a widget; return what that posts. The widget itself shows what it did before."""
+        self.posted.clear()
+        # As viser does with what a browser sends: to the type of what the widget held.
+        before = widget._impl.value
+        widget._impl.value = type(before)(value)
+        for callback in list(widget._impl.update_cb):
+            callback(SimpleNamespace(client=SimpleNamespace(client_id=1), client_id=1, target=widget))
+        widget._impl.value = before
+        return list(self.posted)
+
+
+@pytest.fixture
+def desk(project: Project) -> Iterator[Desk]:
+    server = start_server("127.0.0.1", 0)
+    # Less than a full turn, so that either end may move.
+    yield Desk(server, replace(project, scanner=replace(project.scanner, field_of_view_deg=(-170.0, 165.0))))
+    server.stop()
+
+
+def numbers_in(value: Any) -> list[float]:
+    """All numbers in an action."""
+    if isinstance(value, bool | str) or value is None:
+        return []
+    if isinstance(value, int | float):
+        return [float(value)]
+    if dataclasses.is_dataclass(value):
+        return [n for field in dataclasses.fields(value) for n in numbers_in(getattr(value, field.name))]
+    return [n for each in value for n in numbers_in(each)] if isinstance(value, tuple | list | np.ndarray) else []
+
+
+def is_number(widget: Any) -> bool:
+    """Whether a widget holds a number with a label; the time line's slider has none."""
+    return type(widget).__name__ in ("GuiNumberHandle", "GuiSliderHandle") and bool(widget.label)
+
+
+def unit_of(label: str) -> str:
+    """The unit between brackets at the end of a label; empty: none."""
+    found = re.search(r"\[(.+)\]$", label)
+    return found[1] if found else ""
+
+
+def factor_of(widget: Any, hint: str) -> float:
+    name = widget.label.partition(" [")[0]
+    in_degrees = name in IN_DEGREES or (name == BEARING_OF_SCANNER and "(observation." not in hint)
+    return 1.0 if in_degrees else UNITS[unit_of(widget.label)]
+
+
+def test_every_parameter_has_exactly_one_widget_that_shows_it_in_its_unit(desk: Desk) -> None:
+    parameters = Parameters()
+    keys = [
+        f"{group.name}.{field.name}"
+        for group in dataclasses.fields(Parameters)
+        for field in dataclasses.fields(getattr(parameters, group.name))
+    ]
+    assert sorted(keys) == sorted(PARAMETERS)
+    for key in keys:
+        (widget,) = [each for each in desk.widgets if f"({key})" in (getattr(each, "hint", None) or "")]
+        label, factor = PARAMETERS[key]
+        group, _, name = key.partition(".")
+        value = getattr(getattr(desk.state.project.parameters, group), name)
+        assert widget.label == label
+        # Six digits.
+        assert widget.value == (value if factor is None else pytest.approx(factor * value, rel=5.1e-6))
