@@ -137,6 +137,37 @@ def factor_of(widget: Any, hint: str) -> float:
     return 1.0 if in_degrees else UNITS[unit_of(widget.label)]
 
 
+def another(widget: Any) -> float:
+    """A number that the widget may hold and does not."""
+    low, high = getattr(widget, "min", None), getattr(widget, "max", None)
+    value = float(widget.value)
+    step = float(getattr(widget, "step", None) or 1.0)
+    # Downwards first: some pairs of numbers may be no farther apart than they are.
+    for tried in (value - step, value + step, value + 3.0 * step):
+        if (low is None or tried >= low) and (high is None or tried <= high) and tried != 0.0:
+            return int(tried) if isinstance(widget.value, int) and step.is_integer() else tried + 0.0
+    raise AssertionError(widget.label)
+
+
+def test_every_number_posts_what_its_label_says_and_is_shown_as_it_was_typed(desk: Desk) -> None:
+    seen = set()
+    for widget in filter(is_number, desk.widgets):
+        if not widget.visible or not widget._impl.update_cb:
+            continue
+        typed = another(widget)
+        posted = desk.change(widget, typed)
+        assert len(posted) == 1, (widget.label, posted)
+        meant = typed / factor_of(widget, widget.hint or "")
+        found = numbers_in(posted[0])
+        assert any(number == pytest.approx(meant, rel=1e-9) for number in found), (widget.label, typed, posted)
+        desk.draw(after(desk.state, posted[0]).state)
+        # Six digits.
+        assert widget.value == pytest.approx(typed, rel=2e-6), (widget.label, typed, posted)
+        desk.draw(desk.state)
+        seen.add(widget.label)
+    assert len(seen) >= 40
+
+
 def test_every_parameter_has_exactly_one_widget_that_shows_it_in_its_unit(desk: Desk) -> None:
     parameters = Parameters()
     keys = [

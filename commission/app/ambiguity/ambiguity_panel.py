@@ -29,7 +29,7 @@ class ColdStartPanel(BasePanel):
     def __init__(self, gui: GuiApi, post: Post, folder: GuiFolderHandle) -> None:
         self._inputs = Inputs(gui, post, SetAmbiguity, lambda state, name: getattr(state.part(AmbiguitySettings), name))
         hint = "Largest distance at which a reflector still counts as standing where its look-alike does."
-        tolerance = gui.add_number("Tolerance [mm]", 100, min=5, max=2000, step=5, hint=hint)
+        tolerance = gui.add_number("Tolerance [mm]", 100.0, min=5, max=2000, step=5, hint=hint)
         self._inputs.number("tolerance", 1000.0, tolerance)
         hint = "Look for places from which the reflectors look as they do from somewhere else."
         ask = gui.add_button("Find ambiguous places", hint=hint)

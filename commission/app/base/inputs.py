@@ -61,7 +61,15 @@ class Inputs:
         return widget
 
     def number(self, name: str, scale: float, widget: GuiInputHandle[Any]) -> GuiInputHandle[Any]:
-        """Connect a number that is shown in another unit: `scale` is the number on the page for one SI unit."""
+        """Connect a number that is shown in another unit: `scale` is the number on the page for one SI unit.
+
+        Raises
+        ------
+        TypeError
+            the widget began with a whole number: viser would cut the decimals off whatever is typed or shown later.
+        """
+        if not isinstance(widget.value, float):
+            raise TypeError(f"{widget.label} begins with {widget.value!r}; expected a float, so that decimals stay")
         self.connect(
             name,
             widget,

@@ -31,11 +31,11 @@ class HeatmapPanel(BasePanel):
         self._conditions = Inputs(gui, post, SetCondition, lambda state, name: getattr(state.part(Conditions), name))
         inputs.choice("figure", "Show", FIGURE_NAMES, "What the floor is colored by.")
         self._work = WorkBar(gui, post, COVERAGE, SetCoverage("figure", Figure.NONE.value))
-        self._floor.number("opacity", 100.0, gui.add_slider("Opacity [%]", 10, 100, 5, 80))
+        self._floor.number("opacity", 100.0, gui.add_slider("Opacity [%]", 10.0, 100.0, 5.0, 80.0))
         hint = "Heading of the vehicle, where the scanner does not see all around."
         inputs.choice("heading", "Heading", HEADING_NAMES, hint)
         hint = "Direction in which the vehicle looks; 0 is along x, counterclockwise."
-        given = gui.add_number("Given [°]", 0, min=-360, max=360, step=1, hint=hint)
+        given = gui.add_number("Given [°]", 0.0, min=-360, max=360, step=1, hint=hint)
         self._given = inputs.number("given_heading", math.degrees(1.0), given)
         hint = "What one scan measures: ranges and bearings, bearings only, or both together with odometry."
         inputs.choice("measurement", "Measured", MEASUREMENT_NAMES, hint)
@@ -43,7 +43,7 @@ class HeatmapPanel(BasePanel):
         odometry = gui.add_number("Odometry [m]", 1.0, min=0.1, max=100.0, step=0.1, hint=hint)
         self._odometry = inputs.number("on_odometry", 1.0, odometry)
         hint = "Chance that somebody stands in a metre of the way from scanner to reflector."
-        people = gui.add_number("People [%/m]", 0, min=0, max=50, step=0.1, hint=hint)
+        people = gui.add_number("People [%/m]", 0.0, min=0, max=50, step=0.1, hint=hint)
         self._conditions.number("blocked_per_m", 100.0, people)
         hint = "Beams that must hit a reflector for certain, so that it passes the detector filter (equation 3)."
         beams = gui.add_number("Beams at least", 1, min=1, max=20, step=1, hint=hint)

@@ -79,10 +79,10 @@ class LayoutPanel(BasePanel):
         hint = "Whether all demands must hold as well with any single reflector blocked."
         inputs.switch("demands.survive_failure", "One may fail", hint)
         hint = "Largest 2-sigma of x and of y on the routes; the supervisor's limit unless changed here."
-        limit = gui.add_number("2σ x, y [mm]", 100, min=1, max=10_000, step=1, hint=hint)
+        limit = gui.add_number("2σ x, y [mm]", 100.0, min=1, max=10_000, step=1, hint=hint)
         inputs.number(POSITION, MM, limit)
         hint = "Largest 2-sigma of the heading on the routes; the supervisor's limit unless changed here."
-        inputs.number(HEADING, DEG, gui.add_number("2σ heading [°]", 1, min=0.01, max=90, step=0.01, hint=hint))
+        inputs.number(HEADING, DEG, gui.add_number("2σ heading [°]", 1.0, min=0.01, max=90, step=0.01, hint=hint))
         hint = "Whether a vehicle that is switched on at the start of a route must see which place it is."
         inputs.switch("demands.unambiguous_starts", "Unique starts", hint)
         hint = "Whether a vehicle that is switched on at a station must see which place it is."
@@ -93,10 +93,10 @@ class LayoutPanel(BasePanel):
         hint = "Smallest distance between two reflectors."
         inputs.number("demands.spacing", 1.0, gui.add_number("Apart [m]", 0.5, min=0, max=100, step=0.05, hint=hint))
         hint = "Distance along the walls between the places that are tried: finer finds fewer and takes longer."
-        tried = gui.add_number("Try every [m]", 1, min=0.1, max=20, step=0.1, hint=hint)
+        tried = gui.add_number("Try every [m]", 1.0, min=0.1, max=20, step=0.1, hint=hint)
         inputs.number("candidates.spacing", 1.0, tried)
         hint = "Radius of the reflectors to be put up."
-        radius = gui.add_number("Radius [mm]", 40, min=5, max=500, step=1, hint=hint)
+        radius = gui.add_number("Radius [mm]", 40.0, min=5, max=500, step=1, hint=hint)
         inputs.number("candidates.radius", MM, radius)
         hint = "Height of their middle above the floor: the scanner's."
         inputs.number("candidates.height", 1.0, gui.add_number("Height [m]", 0.2, min=0, max=10, step=0.01, hint=hint))
