@@ -138,7 +138,7 @@ def judged(mutant: Mutant) -> Outcome:
     seconds = time.monotonic() - started
     if code not in (0, 1):
         return Outcome(Verdict.BROKEN, seconds, output[-2000:])
-    failed = set(re.findall(r"^FAILED (\S+?)(?:\[.*)?(?: - .*)?$", output, re.MULTILINE))
+    failed = set(re.findall(r"^(?:FAILED|ERROR) (\S+?)(?:\[.*)?(?: - .*)?$", output, re.MULTILINE))
     if passed := [test for test in mutant.tests if test not in failed]:
         return Outcome(Verdict.SURVIVED, seconds, "not seen by " + ", ".join(passed))
     return Outcome(Verdict.KILLED, seconds)

@@ -112,4 +112,34 @@ STUDIES = (
         replace="routes=()",
         tests=("tests/studies/test_inputs.py::test_whatever_edit_changes_a_result_changes_the_input",),
     ),
+    Mutant(
+        name="drives of every study are planned without the project's supervisor",
+        file=FOLDER + "drives.py",
+        find="            parameters=project.parameters,\n",
+        replace=(
+            "            parameters=__import__('dataclasses').replace(\n"
+            "                project.parameters, supervisor=type(project.parameters.supervisor)()),\n"
+        ),
+        tests=(TESTS + "test_inputs.py::test_whatever_edit_changes_a_result_changes_the_input",),
+    ),
+    Mutant(
+        name="drives of every study are planned without the project's gate",
+        file=FOLDER + "drives.py",
+        find="            parameters=project.parameters,\n",
+        replace=(
+            "            parameters=__import__('dataclasses').replace(\n"
+            "                project.parameters, association=type(project.parameters.association)()),\n"
+        ),
+        tests=(TESTS + "test_inputs.py::test_whatever_edit_changes_a_result_changes_the_input",),
+    ),
+    Mutant(
+        name="drives of every study are planned without the project's odometry",
+        file=FOLDER + "drives.py",
+        find="            parameters=project.parameters,\n",
+        replace=(
+            "            parameters=__import__('dataclasses').replace(\n"
+            "                project.parameters, odometry=type(project.parameters.odometry)()),\n"
+        ),
+        tests=(TESTS + "test_inputs.py::test_whatever_edit_changes_a_result_changes_the_input",),
+    ),
 )

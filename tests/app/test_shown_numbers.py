@@ -1,0 +1,448 @@
+"""Every number that the page writes equals the study that it comes from, in the unit that stands beside it.
+
+One table for badge, numbers of the newest cycle, time line, the numbers and tracks along a route, legend and readings
+of the heatmap, and the rankings. Numbers that are typed are in `test_shown_inputs`, the plots of a run in
+`run/test_charts`. What is expected is taken from beliefs, covariances and stamps, or written by hand; factors are
+written here.
+"""
+
+from __future__ import annotations
+
+import html
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from commission.app.base.conditions import Conditions
+from commission.app.base.server import start_server
+from commission.app.base.state import AppState
+from commission.app.base.view import view_of
+from commission.app.coverage.heat_legend import heat_scale, reading_table
+from commission.app.coverage.scale import FIRST, QUANTITIES, Scale
+from commission.app.coverage.settings import Figure
+from commission.app.coverage.view import FloorReading, HeatView
+from commission.app.coverage.words import value_text
+from commission.app.failures.failure_panel import ranking_table
+from commission.app.failures.view import FailureView
+from commission.app.prediction import chart as chart_module
+from commission.app.prediction.chart import chart
+from commission.app.prediction.route_panel import RoutePanel
+from commission.app.prediction.view import RiskView, RouteView, route_view
+from commission.app.run.badge import badge_text
+from commission.app.run.charts import CHARTS
+from commission.app.run.now_panel import rows as now_rows
+from commission.app.run.playback import Playback
+from commission.app.run.time_line import TimeLine, strip
+from commission.app.run.view import RunView
+from commission.app.tune.reducer import with_parameter
+from commission.localization.estimate import Mode
+from commission.planning.coverage import Lattice
+from commission.planning.dependence import Dependence, Failure, RouteDependence
+from commission.planning.dilution import Measurement
+from commission.planning.route_prediction import PerMetre
+from commission.site.project import Project
+from commission.site.stations import Station
+from commission.studies.prediction import PredictionInput
+from commission.studies.prediction import prediction as predicted
+from commission.studies.run import RunInput, RunResult, judged_run
+
+DEGREES = 180.0 / math.pi
+LIMITS = {"supervisor.position_limit": 0.087, "supervisor.heading_limit": 0.061}
+"""Limits that no other number is equal to: 87 mm, 3.5 degrees."""
+
+
+def numbers(text: str) -> list[str]:
+    """The numbers in a text, as they are written; names of sigmas are none."""
+    plain = html.unescape(re.sub(r"<[^>]*>", " ", text))
+    return re.findall(r"-?\d+(?:\.\d+)?", re.sub(r"[12]σ", "", plain))
+
+
+def assert_reads(text: str, *expected: float) -> None:
+    """The text has these numbers and no others, each with the decimals that it is written with."""
+    found = numbers(text)
+    assert len(found) == len(expected), (text, expected)
+    for written, number in zip(found, expected, strict=True):
+        decimals = len(written.partition(".")[2])
+        assert written == f"{round(number, decimals) + 0.0:.{decimals}f}", (text, expected)
+
+
+def with_limits(project: Project) -> Project:
+    parameters = project.parameters
+    for key, value in LIMITS.items():
+        parameters = with_parameter(parameters, key, value)
+    return replace(project, parameters=parameters)
+
+
+@dataclass(frozen=True)
+class At:
+    """The page at one cycle of a run, and what is known of that cycle."""
+
+    run: RunView
+    covariance: np.ndarray
+    mean: np.ndarray
+    truth: np.ndarray
+    d2: np.ndarray
+    status: np.ndarray
+
+
+@pytest.fixture(scope="module")
+def site(project: Project) -> Project:
+    """A gate that rejects some detections, limits that nothing else equals, and a station on the way."""
+    limited = with_limits(project)
+    parameters = with_parameter(limited.parameters, "association.gate_probability", 0.6)
+    dock = Station(name="Dock", x=2.3, y=2.0, required_accuracy=0.043)
+    return replace(limited, parameters=parameters, stations=(dock,))
+
+
+@pytest.fixture(scope="module")
+def judged(site: Project, drive: Any) -> RunResult:
+    return judged_run(RunInput.of(site, drive.log, drive.start))
+
+
+@pytest.fixture(scope="module")
+def at(judged: RunResult, drive: Any) -> At:
+    """The cycle, of the middle of the drive, at which most of its numbers differ from those of the cycle before."""
+    cycle = 40
+    playback = Playback(judged)
+    playback.seek(float(judged.times[cycle]) + 1e-6)
+    run = playback.view(covered=False)
+    assert run.newest == cycle
+    columns = judged.columns
+    rows = slice(int(columns.offsets[cycle]), int(columns.offsets[cycle + 1]))
+    references = dict(zip(drive.log.reference_stamps_ns.tolist(), drive.log.reference_poses, strict=True))
+    return At(
+        run=run,
+        covariance=columns.covariances[cycle],
+        mean=columns.means[cycle],
+        truth=references[int(columns.stamps_ns[cycle])],
+        d2=columns.d2[rows],
+        status=columns.status[rows],
+    )
+
+
+def two_sigma(at: At, axis: int) -> float:
+    return 2.0 * math.sqrt(at.covariance[axis, axis])
+
+
+def error(at: At) -> float:
+    return math.hypot(at.mean[0] - at.truth[0], at.mean[1] - at.truth[1])
+
+
+GATE = -2.0 * math.log(1.0 - 0.6)
+NOW: dict[str, Callable[[At], tuple[float, ...]]] = {
+    "Fail episodes so far": lambda at: (0.0,),
+    "Position x, y": lambda at: (at.mean[0], at.mean[1]),
+    "Heading": lambda at: (DEGREES * at.mean[2],),
+    "2σ x / limit": lambda at: (1000.0 * two_sigma(at, 0), 87.0),
+    "2σ y / limit": lambda at: (1000.0 * two_sigma(at, 1), 87.0),
+    "2σ heading / limit": lambda at: (DEGREES * two_sigma(at, 2), DEGREES * 0.061),
+    "Inliers": lambda at: (float(np.sum(at.status == 0)),),
+    "Outliers by beams, gate": lambda at: (float(np.sum(at.status == 1)), float(np.sum(at.status == 2))),
+    "Largest NIS / gate": lambda at: (max(at.d2[at.status == 0]), GATE),
+    "Cycle time": lambda at: (at.run.result.microseconds_per_cycle,),
+    "Position error": lambda at: (1000.0 * error(at),),
+}
+"""Numbers of each row of the newest cycle."""
+UNITS_NOW = {
+    **{"Position x, y": "m", "Heading": "°", "2σ x / limit": "mm", "2σ y / limit": "mm", "2σ heading / limit": "°"},
+    **{"Cycle time": "µs, mean of the drive", "Position error": "mm"},
+}
+
+
+def test_every_row_of_the_newest_cycle_is_expected(at: At) -> None:
+    assert {label for label, _ in now_rows(at.run)} == {*NOW, "Mode"}
+
+
+@pytest.mark.parametrize("label", NOW)
+def test_a_number_of_the_newest_cycle_is_that_of_its_study(at: At, label: str) -> None:
+    text = dict(now_rows(at.run))[label]
+    assert_reads(text, *NOW[label](at))
+    assert text.endswith(UNITS_NOW.get(label, ""))
+
+
+def test_outliers_are_those_of_the_detector_and_those_of_the_gate(at: At) -> None:
+    assert at.run.estimate is not None
+    # Two inliers, one cluster with too many beams, three outside of their gates.
+    status = np.array([2, 0, 1, 2, 0, 2], dtype=np.int8)
+    shown = dict(now_rows(replace(at.run, estimate=replace(at.run.estimate, status=status))))
+    assert_reads(shown["Inliers"], 2.0)
+    assert_reads(shown["Outliers by beams, gate"], 1.0, 3.0)
+    counted = replace(at.run.result, counts=np.array([[2, 1, 3], [5, 0, 4]]))
+    (inliers, outliers) = next(chart.lines for chart in CHARTS if chart.title == "Inliers, outliers per scan")
+    assert inliers.values(counted).tolist() == [2.0, 5.0]
+    assert outliers.values(counted).tolist() == [4.0, 4.0]
+
+
+def test_the_badge_shows_the_larger_sigma_and_both_limits(at: At, site: Project) -> None:
+    word, beside, _ = badge_text(view_of(AppState(site, site), at.run))
+    assert word == "OPERATIONAL"
+    position = 1000.0 * max(two_sigma(at, 0), two_sigma(at, 1))
+    assert_reads(beside.replace("&nbsp;", " "), position, 87.0, DEGREES * two_sigma(at, 2), DEGREES * 0.061)
+    assert re.search(r"/ 87 mm .* °$", beside)
+
+
+@pytest.fixture(scope="module")
+def failing(site: Project, drive: Any) -> RunResult:
+    """A run with covered reflectors and tight limits: it fails, and recovers."""
+    tight = replace(site, parameters=with_parameter(site.parameters, "supervisor.position_limit", 0.03))
+    inputs = RunInput.of(tight, drive.log, drive.start).with_cover(15, covered=True).with_cover(75, covered=False)
+    return judged_run(inputs)
+
+
+def test_the_badge_counts_the_seconds_since_the_vehicle_failed(failing: RunResult, site: Project) -> None:
+    modes, times = failing.columns.modes, failing.times
+    first = int(np.flatnonzero(modes != Mode.OPERATIONAL)[0])
+    later = int(np.searchsorted(times, times[first] + 2.6))
+    assert (modes[first : later + 1] != Mode.OPERATIONAL).all()
+    playback = Playback(failing)
+    playback.seek(float(times[later]))
+    word, _, _ = badge_text(view_of(AppState(site, site), playback.view(covered=False)))
+    assert re.sub(r"\d+", "", word) == f"{Mode(int(modes[later])).name}  s"
+    assert_reads(word, float(times[later] - times[first]))
+
+
+def test_the_time_line_draws_each_episode_where_it_lies(failing: RunResult) -> None:
+    modes, stamps = failing.columns.modes, failing.columns.stamps_ns
+    failed = np.flatnonzero(np.diff(np.concatenate(([False], modes != Mode.OPERATIONAL, [False]))))
+    first_ns = int(failing.inputs.log.stamps_ns[0])
+    playback = Playback(failing)
+    playback.seek(1e9)
+    run = playback.view(covered=False)
+    rects = re.findall(r"<rect x='([\d.]+)' y='0' width='([\d.]+)' height='8' fill='[^']+' opacity='1.0'/>", strip(run))
+    starts, ends = failed[::2], np.minimum(failed[1::2], len(stamps) - 1)
+    assert len(rects) == len(starts) > 0
+    duration_ns = int(failing.inputs.log.stamps_ns[-1]) - first_ns
+    for (x, width), start, end in zip(rects, starts, ends, strict=True):
+        assert float(x) == pytest.approx(100.0 * (stamps[start] - first_ns) / duration_ns, abs=0.006)
+        expected = max(0.3, 100.0 * (stamps[end] - stamps[start]) / duration_ns)
+        assert float(width) == pytest.approx(expected, abs=0.006)
+
+
+def test_the_clock_and_the_slider_show_the_cursor_and_the_length_of_the_drive(judged: RunResult, site: Project) -> None:
+    server = start_server("127.0.0.1", 0)
+    try:
+        line, playback = TimeLine(server.gui, lambda _action: None, 1.0), Playback(judged)
+        playback.seek(4.27)
+        line.draw_slowly(view_of(AppState(site, site), playback.view(covered=False)))
+        log = judged.inputs.log
+        duration = (int(log.stamps_ns[-1]) - int(log.stamps_ns[0])) / 1e9
+        assert line._slider.max == pytest.approx(duration)
+        assert line._slider.value == pytest.approx(4.27)
+        assert f"<b>00:04</b> / 00:{math.floor(duration):02d} " in line._clock.content
+    finally:
+        server.stop()
+
+
+@pytest.fixture(scope="module")
+def expected_route(site: Project) -> RouteView:
+    return route_view(predicted(PredictionInput.of(site, site.routes[0].name)), outdated=False)
+
+
+def worst_of(route: RouteView, values: np.ndarray) -> np.ndarray:
+    """The largest (or, of what is seen, handed over negative) of each metre."""
+    metre = np.floor(route.prediction.drive.metres).astype(int)
+    return np.array([values[metre == m].max() for m in range(metre[-1] + 1)])
+
+
+def sigma_along(route: RouteView, axes: slice) -> np.ndarray:
+    return 2.0 * np.sqrt(np.diagonal(route.prediction.covariances, axis1=1, axis2=2)[:, axes].max(axis=1))
+
+
+def error_along(site: Project, axes: slice) -> np.ndarray:
+    squares = predicted(PredictionInput.of(site, site.routes[0].name)).errors.squares
+    return 2.0 * np.sqrt(np.diagonal(squares, axis1=1, axis2=2)[:, axes].max(axis=1))
+
+
+XY, HEADING = slice(0, 2), slice(2, 3)
+
+
+def test_the_numbers_along_a_route_are_those_of_its_prediction(expected_route: RouteView, site: Project) -> None:
+    route, prediction = expected_route, expected_route.prediction
+    shown = dict(re.findall(r"<tr><td>(.*?)</td><td>(.*?)</td></tr>", chart(route, None)))
+    table = {
+        "Length": (prediction.drive.metres[-1],),
+        "Largest 2σ x, y / limit": (1000.0 * sigma_along(route, XY).max(), 87.0),
+        "Largest 2σ heading / limit": (DEGREES * sigma_along(route, HEADING).max(), DEGREES * 0.061),
+        "True error, 2σ x, y": (1000.0 * error_along(site, XY).max(),),
+        "True error, 2σ heading": (DEGREES * error_along(site, HEADING).max(),),
+        "Fewest reflectors seen": (float(prediction.seen.min()),),
+        "Longest on odometry": (prediction.on_odometry.max(),),
+        "Supervisor stops": (),
+    }
+    (dock,) = (label for label in shown if label.startswith("Dock"))
+    assert set(shown) == {*table, dock}
+    for label, expected in table.items():
+        assert_reads(shown[label], *expected)
+    there = np.hypot(*(prediction.drive.poses[:, :2] - (2.3, 2.0)).T) <= 0.2
+    both = np.maximum(sigma_along(route, XY), error_along(site, XY))
+    assert_reads(shown[dock], 1000.0 * both[there].max(), 43.0)
+    assert_reads(dock, prediction.drive.metres[np.flatnonzero(there)[0]])
+
+
+def test_the_tracks_along_a_route_are_those_of_its_prediction(
+    expected_route: RouteView, site: Project, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: dict[str, Any] = {}
+    for name in ("limited", "plain"):
+        monkeypatch.setattr(chart_module, name, lambda track, _axis: drawn.setdefault(track.title, track) and "")
+    route, prediction = expected_route, expected_route.prediction
+    chart(route, None)
+    position, heading = drawn["2σ of position [mm]"], drawn["2σ of heading [°]"]
+    np.testing.assert_allclose(position.levels, 1000.0 * worst_of(route, sigma_along(route, XY)))
+    np.testing.assert_allclose(heading.levels, DEGREES * worst_of(route, sigma_along(route, HEADING)))
+    np.testing.assert_allclose(position.errors, 1000.0 * worst_of(route, error_along(site, XY)))
+    np.testing.assert_allclose(heading.errors, DEGREES * worst_of(route, error_along(site, HEADING)))
+    assert (position.limit, heading.limit) == (pytest.approx(87.0), pytest.approx(DEGREES * 0.061))
+    seen = -worst_of(route, -prediction.seen.astype(float))
+    np.testing.assert_array_equal(drawn["Fewest reflectors seen"].levels, seen)
+    np.testing.assert_allclose(
+        drawn["On odometry alone [m]"].levels, worst_of(route, prediction.on_odometry), atol=1e-12
+    )
+    assert set(drawn) == {position.title, heading.title, "Fewest reflectors seen", "On odometry alone [m]"}
+
+
+def test_a_bar_of_several_metres_shows_the_worst_of_them(
+    expected_route: RouteView, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: dict[str, Any] = {}
+    for name in ("limited", "plain"):
+        monkeypatch.setattr(chart_module, name, lambda track, _axis: drawn.setdefault(track.title, track) and "")
+    # 300 metres in at most 120 bars: three to a bar.
+    rng = np.random.default_rng(3)
+    sigmas, errors, alone = rng.uniform(0.01, 0.1, (300, 3)), rng.uniform(0.01, 0.1, (300, 3)), rng.uniform(0, 9, 300)
+    seen = rng.integers(2, 9, 300)
+    metres = PerMetre(np.arange(300), np.arange(300), sigmas, np.zeros((300, 3)), seen, alone, np.zeros(300, bool))
+    chances = rng.uniform(0.0, 0.5, 300)
+    risk = RiskView(reflector="A", neighbor="B", chance=0.5, metres=(3,), points=np.zeros((1, 2)), worst=(1.0, 2.0))
+    chart(
+        replace(expected_route, metres=metres, errors=errors, loads=alone, risk=chances, risks=(risk,)),
+        None,
+    )
+    bars = {title: track.levels.tolist() for title, track in drawn.items()}
+    groups = [slice(first, first + 3) for first in range(0, 300, 3)]
+    assert bars == {
+        "2σ of position [mm]": pytest.approx([1000.0 * sigmas[g, :2].max() for g in groups]),
+        "2σ of heading [°]": pytest.approx([DEGREES * sigmas[g, 2].max() for g in groups]),
+        "Fewest reflectors seen": [seen[g].min() for g in groups],
+        "On odometry alone [m]": pytest.approx([alone[g].max() for g in groups]),
+        "Chance of a wrong association [%]": pytest.approx([100.0 * chances[g].max() for g in groups]),
+    }
+
+
+def test_a_wrong_association_is_told_in_percent_at_its_metres(expected_route: RouteView, site: Project) -> None:
+    risk = RiskView(
+        reflector="A", neighbor="B", chance=0.237, metres=(3, 4, 9), points=np.zeros((1, 2)), worst=(1.0, 2.0)
+    )
+    chances = np.linspace(0.0, 0.4, len(expected_route.metres.metre))
+    route = replace(expected_route, risks=(risk,), risk=chances)
+    server = start_server("127.0.0.1", 0)
+    drawn: dict[str, Any] = {}
+    try:
+        panel = RoutePanel(server.gui, lambda _action: None, server.gui.add_folder("Route"))
+        panel._rows.show = lambda lines: drawn.update(lines=lines)
+        panel.draw_slowly(view_of(AppState(site, site), route))
+    finally:
+        server.stop()
+    ((text, _color),) = drawn["lines"]
+    assert text == "A taken for B: 24 % at worst, 3 to 5 m, 9 to 10 m"
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(chart_module, "plain", lambda track, _axis: drawn.setdefault(track.title, track) and "")
+        chart(route, None)
+    np.testing.assert_allclose(drawn["Chance of a wrong association [%]"].levels, 100.0 * chances)
+
+
+FIGURES = {
+    Figure.VISIBLE: (3.0, "3"),
+    Figure.POSITION_SIGMA: (0.0123, "12.3 mm"),
+    Figure.HEADING_SIGMA: (0.0123, "0.705 °"),
+    Figure.POSITION_DOP: (1.23, "1.23"),
+    Figure.HEADING_DOP: (0.456, "0.456"),
+    Figure.EXPECTED_VISIBLE: (2.5, "2.5"),
+    Figure.TWO_OR_MORE: (0.99999, "99.9 %"),
+    Figure.THREE_OR_MORE: (0.5, "50.0 %"),
+}
+"""Of each figure of the heatmap a value of the study, and what is read."""
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_a_figure_of_the_floor_is_read_in_its_unit(figure: Figure, site: Project) -> None:
+    value, expected = FIGURES[figure]
+    assert value_text(figure, value, Measurement.RANGE_BEARING) == expected
+    state = AppState(site, site).with_part(Conditions(blocked_per_m=0.1))
+    table = reading_table(FloorReading((1.234, 5.678), {figure: value}, on_floor=True), state)
+    assert f"<td>{expected}</td>" in table
+    assert "1.23, 5.68 m" in table
+
+
+def test_every_figure_of_the_floor_is_expected() -> None:
+    assert set(FIGURES) == set(QUANTITIES)
+
+
+@pytest.mark.parametrize(
+    ("figure", "bounds", "values"),
+    [
+        # A class begins at its bound: 10 mm and 20 mm, half a degree and one, nine tenths and 99 %.
+        (Figure.POSITION_SIGMA, (10.0, 20.0), [0.00999, 0.01001, 0.01999, 0.02001]),
+        (Figure.HEADING_SIGMA, (0.5, 1.0), [0.49 / DEGREES, 0.51 / DEGREES, 0.99 / DEGREES, 1.01 / DEGREES]),
+        (Figure.TWO_OR_MORE, (90.0, 99.0), [0.8999, 0.9001, 0.9899, 0.9901]),
+        (Figure.POSITION_DOP, (1.0, 2.0), [0.99, 1.01, 1.99, 2.01]),
+    ],
+)
+def test_a_color_begins_at_the_bound_that_its_legend_names(
+    figure: Figure, bounds: tuple[float, float], values: list[float]
+) -> None:
+    classes = Scale(figure, bounds).classes(np.array(values), np.ones(4, dtype=np.bool_))
+    assert classes.tolist() == [FIRST, FIRST + 1, FIRST + 1, FIRST + 2]
+
+
+@pytest.mark.parametrize(
+    ("figure", "bounds", "limit"),
+    [
+        (Figure.POSITION_SIGMA, (10.0, 20.0), (87.0, 43.5)),
+        (Figure.HEADING_SIGMA, (0.5, 1.0), (DEGREES * 0.061, 0.5 * DEGREES * 0.061)),
+    ],
+)
+def test_the_legend_names_bounds_shares_and_the_limit_of_two_sigma_and_of_one(
+    site: Project, figure: Figure, bounds: tuple[float, float], limit: tuple[float, float]
+) -> None:
+    heat = HeatView(
+        lattice=Lattice(x=0.0, y=0.0, spacing=1.0, rows=1, columns=4),
+        scale=Scale(figure, bounds),
+        classes=np.full((1, 4), FIRST, np.uint8),
+        shares=np.array([0.123, 0.5, 0.25, 0.127]),
+        outdated=False,
+    )
+    shown = heat_scale(heat, AppState(site, site))
+    assert "no fix: 12.3 % of the floor" in shown
+    text = [each for each in re.split(r"<[^>]*>", shown) if each]
+    for number in (*(f"{bound:g}" for bound in bounds), "50", "25", "13"):
+        assert number in text
+    (note,) = (each for each in text if each.startswith("limit of 2σ"))
+    assert_reads(note.replace("2σ", " ").replace("1σ", " "), *limit)
+
+
+def test_a_ranking_tells_failing_metres_and_two_sigma_as_a_share_of_the_limit() -> None:
+    parts = (RouteDependence("Loop", np.array([3, 4, 9]), 1.237), RouteDependence("Dock", np.array([0]), 0.4))
+    first = Dependence(5, Failure.BLOCKED, parts)
+    second = Dependence(2, Failure.BLOCKED, (RouteDependence("Loop", np.empty(0, np.int64), 0.456),))
+    view = FailureView(
+        ranking=(first, second),
+        names=("R6", "R3"),
+        fallen=(),
+        fallen_places=np.empty((0, 2)),
+        failed="R6",
+        chosen=first,
+        place=(0.0, 0.0),
+        failing=(),
+        outdated=False,
+    )
+    shown = ranking_table(view)
+    rows = dict(re.findall(r"<tr><td>(R\d)</td><td>(.*?)</td></tr>", shown))
+    # The metres of both routes together; the load of the worse one.
+    assert rows == {"R6": "4 m; 124 %", "R3": "0 m; 46 %"}
+    assert "Loop: 3 to 5 m, 9 to 10 m<br>Dock: 0 to 1 m" in shown
