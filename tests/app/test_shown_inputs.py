@@ -22,10 +22,15 @@ from commission.app.base.actions import Action
 from commission.app.base.server import start_server
 from commission.app.base.state import AppState
 from commission.app.base.view import view_of
+from commission.app.editing.actions import SelectReflectors
+from commission.app.editing.selection_panel import SelectionPanel
+from commission.app.editing.station_actions import SelectStation
 from commission.app.page import Page
 from commission.site.parameters import Parameters
 from commission.site.project import Project
-from tests.app.asking import FEATURES, after, taking
+from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
+from commission.site.stations import Station
+from tests.app.asking import FEATURES, ME, after, joined, taking
 
 DEGREES = 180.0 / math.pi
 UNITS = {
@@ -184,3 +189,60 @@ def test_every_parameter_has_exactly_one_widget_that_shows_it_in_its_unit(desk: 
         assert widget.label == label
         # Six digits.
         assert widget.value == (value if factor is None else pytest.approx(factor * value, rel=5.1e-6))
+
+
+POST = Reflector(id="P", x=1.25, y=2.5, radius=0.0415, height=1.8, sigma=0.0035, kind=ReflectorKind.FLAT, heading=0.5)
+DOCK = Station(name="Dock", x=3.25, y=5.5, heading=-0.7, required_accuracy=0.043)
+SELECTED: dict[str, tuple[Action, dict[str, tuple[str, float]]]] = {
+    "reflector": (
+        SelectReflectors(("P",)),
+        {
+            "x [m]": ("x", 1.0),
+            "y [m]": ("y", 1.0),
+            "Radius [mm]": ("radius", 1000.0),
+            "Faces [°]": ("heading", DEGREES),
+            "Height [m]": ("height", 1.0),
+            "Survey 1σ [mm]": ("sigma", 1000.0),
+        },
+    ),
+    "station": (
+        SelectStation("Dock"),
+        {
+            "x [m]": ("x", 1.0),
+            "y [m]": ("y", 1.0),
+            "Heading [°]": ("heading", DEGREES),
+            "Within [mm]": ("required_accuracy", 1000.0),
+        },
+    ),
+}
+"""Of what can be selected: how, and each number's field and factor by its label."""
+
+
+@pytest.mark.parametrize("what", SELECTED)
+def test_numbers_of_what_is_selected_are_shown_and_set_in_the_units_of_their_labels(
+    project: Project, what: str
+) -> None:
+    select, fields = SELECTED[what]
+    site = replace(project, reflectors=ReflectorMap((POST,)), stations=(DOCK,))
+    state = after(joined(AppState(site, site)), select).state
+    posted: list[Any] = []
+    server = start_server("127.0.0.1", 0)
+    try:
+        panel = SelectionPanel(server.gui, taking(posted), ME)
+        panel.draw_slowly(view_of(state))
+        inside = panel._station._numbers.values() if what == "station" else panel._fields.values()
+        widgets = {each.label: each for each in inside if is_number(each)}
+        assert set(widgets) == set(fields)
+        for label, (field, factor) in fields.items():
+            widget, original = widgets[label], getattr(DOCK if what == "station" else POST, field)
+            # Half a step of the widget.
+            assert widget.value == pytest.approx(factor * original, abs=0.006)
+            before, widget._impl.value = widget._impl.value, 1.0625 * widget.value
+            for callback in list(widget._impl.update_cb):
+                callback(SimpleNamespace(client=SimpleNamespace(client_id=ME), client_id=ME, target=widget))
+            changed = after(state, posted[-1]).state.project
+            new = changed.stations[0] if what == "station" else changed.reflectors.reflectors[0]
+            assert getattr(new, field) == pytest.approx(1.0625 * before / factor, rel=1e-9)
+            widget._impl.value = before
+    finally:
+        server.stop()

@@ -282,4 +282,18 @@ PAGE = (
         replace="{each.load:.0f} %",
         tests=(NUMBERS + "test_a_ranking_tells_failing_metres_and_two_sigma_as_a_share_of_the_limit",),
     ),
+    Mutant(
+        name="survey of a reflector in metres",
+        file=FOLDER + "editing/selection_panel.py",
+        find='Field("Survey 1σ [mm]", 1000.0',
+        replace='Field("Survey 1σ [mm]", 1.0',
+        tests=(INPUTS + "test_numbers_of_what_is_selected_are_shown_and_set_in_the_units_of_their_labels",),
+    ),
+    Mutant(
+        name="heading of a station in radians",
+        file=FOLDER + "editing/station_fields.py",
+        find='"heading": DEG,',
+        replace='"heading": 1.0,',
+        tests=(INPUTS + "test_numbers_of_what_is_selected_are_shown_and_set_in_the_units_of_their_labels",),
+    ),
 )
