@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
@@ -61,19 +63,43 @@ LONGEST_FIRST = ("tests/browser", "tests/acceptance", "tests/planning")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Say which tests one of several workers runs one after the other: those of a file, which share what they prepare.
-
-    The tests in a browser share one worker with those that measure time: a browser without a graphics card takes the
-    cores that a measured test counts on.
-    """
-    for item in items:
-        file = item.path.relative_to(REPOSITORY).as_posix()
-        alone = file.startswith("tests/browser") or item.get_closest_marker("measures_time")
-        item.add_marker(pytest.mark.xdist_group("browser" if alone else file))
-        if config.getoption("acceptance"):
+    """Let the longest begin, and give tests with all their seeds the time they need."""
+    if config.getoption("acceptance"):
+        for item in items:
             item.add_marker(pytest.mark.timeout(LONGEST_WITH_ALL_SEEDS_S))
     if hasattr(config, "workerinput"):
         items.sort(key=lambda item: not item.path.relative_to(REPOSITORY).as_posix().startswith(LONGEST_FIRST))
+
+
+def run_together(nodeid: str) -> str:
+    """Name what one of several workers runs one after the other: the tests of a file, which share what they prepare.
+
+    The tests in a browser share one worker with the files in which time is measured: a browser without a graphics card
+    takes the cores that a measured test counts on.
+    """
+    file = nodeid.partition("::")[0]
+    return "browser" if file.startswith("tests/browser/") or _measures_time(file) else file
+
+
+@functools.cache
+def _measures_time(file: str) -> bool:
+    return "@pytest.mark.measures_time" in (REPOSITORY / file).read_text(encoding="utf-8")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Share the tests among workers by `run_together`.
+
+    The marks `xdist_group` would say it beside each test, but pytest-xdist 3.8 writes them into a part of the item that
+    pytest 9 does not read any more: then each test goes to any worker, and the preparations of a file are made twice.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Scheduling(LoadScopeScheduling):  # type: ignore[misc]
+        def _split_scope(self, nodeid: str) -> str:
+            return run_together(nodeid)
+
+    return Scheduling(config, log)
 
 
 @pytest.fixture(scope="session")
