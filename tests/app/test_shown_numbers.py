@@ -39,12 +39,12 @@ from commission.app.run.now_panel import rows as now_rows
 from commission.app.run.playback import Playback
 from commission.app.run.time_line import TimeLine, strip
 from commission.app.run.view import RunView
-from commission.app.tune.reducer import with_parameter
 from commission.localization.estimate import Mode
 from commission.planning.coverage import Lattice
 from commission.planning.dependence import Dependence, Failure, RouteDependence
 from commission.planning.dilution import Measurement
 from commission.planning.route_prediction import PerMetre
+from commission.site.fields import with_field
 from commission.site.project import Project
 from commission.site.stations import Station
 from commission.studies.prediction import PredictionInput
@@ -74,7 +74,7 @@ def assert_reads(text: str, *expected: float) -> None:
 def with_limits(project: Project) -> Project:
     parameters = project.parameters
     for key, value in LIMITS.items():
-        parameters = with_parameter(parameters, key, value)
+        parameters = with_field(parameters, key, value)
     return replace(project, parameters=parameters)
 
 
@@ -94,7 +94,7 @@ class At:
 def site(project: Project) -> Project:
     """A gate that rejects some detections, limits that nothing else equals, and a station on the way."""
     limited = with_limits(project)
-    parameters = with_parameter(limited.parameters, "association.gate_probability", 0.6)
+    parameters = with_field(limited.parameters, "association.gate_probability", 0.6)
     dock = Station(name="Dock", x=2.3, y=2.0, required_accuracy=0.043)
     return replace(limited, parameters=parameters, stations=(dock,))
 
@@ -189,7 +189,7 @@ def test_the_badge_shows_the_larger_sigma_and_both_limits(at: At, site: Project)
 @pytest.fixture(scope="module")
 def failing(site: Project, drive: Any) -> RunResult:
     """A run with covered reflectors and tight limits: it fails, and recovers."""
-    tight = replace(site, parameters=with_parameter(site.parameters, "supervisor.position_limit", 0.03))
+    tight = replace(site, parameters=with_field(site.parameters, "supervisor.position_limit", 0.03))
     inputs = RunInput.of(tight, drive.log, drive.start).with_cover(15, covered=True).with_cover(75, covered=False)
     return judged_run(inputs)
 

@@ -162,16 +162,16 @@ PAGE = (
     ),
     Mutant(
         name="slider posts what the page shows",
-        file=FOLDER + "tune/tune_panel.py",
-        find="else number / knob.scale",
-        replace="else number",
+        file=FOLDER + "base/field_widget.py",
+        find="number = info.quantity.of_page(content)",
+        replace="number = content",
         tests=(INPUTS + "test_every_number_posts_what_its_label_says_and_is_shown_as_it_was_typed",),
     ),
     Mutant(
         name="parameter without its widget",
         file=FOLDER + "tune/tune_panel.py",
-        find="if info.quantity is not None}",
-        replace='if info.quantity is not None and info.name != "rejection_limit"}',
+        find="        for info in infos:\n            key =",
+        replace='        for info in (i for i in infos if i.name != "rejection_limit"):\n            key =',
         tests=(INPUTS + "test_every_parameter_has_exactly_one_widget_that_shows_it_in_its_unit",),
     ),
     Mutant(
