@@ -153,6 +153,15 @@ def walk_fields(cls: type, prefix: str = "") -> Iterator[tuple[str, FieldInfo]]:
             yield prefix + name, info
 
 
+def names_of(cls: type) -> tuple[str, ...]:
+    """Names of all that the engineer edits in a value, in order; of what is described number by number each number."""
+    return tuple(
+        name if len(info.descriptions) == 1 else f"{name}[{index}]"
+        for name, info in fields_of(cls).items()
+        for index in range(len(info.descriptions))
+    )
+
+
 def field_info(value: object, name: str, what: str = "field") -> FieldInfo:
     """What is known about a field of a value.
 
@@ -215,10 +224,9 @@ def with_field(value: Value, name: str, new: object, what: str = "field") -> Val
         inner = ", ".join(f"{name}.{each}" for each in fields_of(type(here)))
         raise UsageError(f"no {what} is called {name!r}; expected one of: {inner}")
     changed: Any = _of_kind(new, last.info, name)
-    if last.indices:
-        changed = _with_element(here, last.indices, changed)
     for step in reversed(found):
-        changes: dict[str, Any] = {step.name: changed}
+        content = _with_element(getattr(step.holder, step.name), step.indices, changed) if step.indices else changed
+        changes: dict[str, Any] = {step.name: content}
         changed = dataclasses.replace(typing.cast(Any, step.holder), **changes)
     return typing.cast(Value, changed)
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import typing
+from collections.abc import Iterable
 from typing import Any
 
-from viser import GuiApi, GuiInputHandle
+import numpy as np
+from viser import GuiApi, GuiInputHandle, GuiNumberHandle, GuiSliderHandle
 
 from commission.site.fields import FieldInfo
 from commission.site.quantity import LARGEST, Choice, Quantity, Switch
@@ -36,20 +39,53 @@ def held(info: FieldInfo, value: Any) -> Any:
     """Return what the widget of a field holds while the field has this value."""
     if info.quantity is None:
         return str(value) if info.options else value
+    if isinstance(value, tuple | list | np.ndarray):
+        return tuple(float(info.quantity.on_page(float(each))) for each in typing.cast("Iterable[Any]", value))
     number = info.quantity.on_page(value)
     return round(number) if info.kind is int else float(number)
 
 
 def meant(info: FieldInfo, content: Any) -> Any:
-    """Return the value of a field that a person means by what the widget holds."""
+    """Return the value of a field that a person means by what the widget holds.
+
+    Raises
+    ------
+    ValueError
+        the field's bounds do not allow it; says so in the page's unit.
+    """
     if info.quantity is None:
         return info.kind(content)
-    number = info.quantity.of_page(content)
+    if isinstance(content, tuple | list):
+        return tuple(_allowed(info.quantity, float(each)) for each in typing.cast("Iterable[Any]", content))
+    number = _allowed(info.quantity, content)
     return round(number) if info.kind is int else float(number)
 
 
-def _number(gui: GuiApi, quantity: Quantity, number: float, hint: str) -> GuiInputHandle[Any]:
-    """A slider, or a number that is typed; what is beyond its ends moves them."""
+def write_held(widget: GuiInputHandle[Any], content: Any) -> None:
+    """Show in a widget what it holds for a field now; a number beyond the widget's ends moves them."""
+    bounded: Any = widget
+    if isinstance(widget, GuiNumberHandle | GuiSliderHandle):
+        if bounded.min is not None and content < bounded.min:
+            bounded.min = content
+        if bounded.max is not None and content > bounded.max:
+            bounded.max = content
+    if widget.value != content:
+        widget.value = content
+
+
+def _allowed(quantity: Quantity, content: float) -> float:
+    number = quantity.of_page(content)
+    refusal = quantity.refusal(number)
+    if refusal:
+        raise ValueError(refusal)
+    return number
+
+
+def _number(gui: GuiApi, quantity: Quantity, number: Any, hint: str) -> GuiInputHandle[Any]:
+    """A slider, a number that is typed, or two of them; what is beyond its ends moves them."""
+    if isinstance(number, tuple):
+        pair: Any = number
+        return gui.add_vector2(quantity.title, pair, step=quantity.step, hint=hint)
     kind = type(number)
     if quantity.slider is not None:
         low, high = quantity.slider

@@ -9,9 +9,11 @@ from typing import Any, TypeAlias, TypeVar
 from viser import GuiApi, GuiInputHandle
 
 from commission.app.base.actions import Action
+from commission.app.base.field_widget import add_widget, held, meant, write_held
 from commission.app.base.panel import Post, escaped, posting, write
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
+from commission.site.fields import field_info, get_field
 
 Choice = TypeVar("Choice", bound=StrEnum)
 Setting: TypeAlias = bool | int | float | str | None
@@ -38,7 +40,7 @@ class Inputs:
         self,
         name: str,
         widget: GuiInputHandle[Any],
-        meant: Callable[[Any], Setting],
+        meant: Callable[[Any], Any],
         shown: Callable[[AppState], Any],
     ) -> None:
         """Connect a widget.
@@ -48,10 +50,39 @@ class Inputs:
         name : of the setting.
         widget : shows it.
         meant : from what the widget shows to the setting's value, SI.
-        shown : from a state to what the widget shows.
+        shown : from a state to what the widget shows; None: it has nothing to show and stays as it is.
         """
-        widget.on_update(posting(self._post, lambda event: self._make(name, meant(event.target.value))))
+        index = len(self._widgets)
+
+        def asked(event: Any) -> Action:
+            try:
+                return self._make(name, meant(event.target.value))
+            except ValueError:
+                # What was refused does not stay in the widget.
+                self._followed.pop(index, None)
+                raise
+
+        widget.on_update(posting(self._post, asked))
         self._widgets.append((widget, shown))
+
+    def field(self, name: str, of: object, note: str = "") -> GuiInputHandle[Any]:
+        """Add the widget of a field, made from what is said beside it.
+
+        Parameters
+        ----------
+        name : the field's dotted name, as `of` has it and as `make` and `read` take it.
+        of : a value that has the field; the widget begins with what it has.
+        note : what stands behind the hint.
+        """
+        info = field_info(of, name)
+        widget = add_widget(self._gui, info, get_field(of, name), note)
+        self.connect(
+            name,
+            widget,
+            lambda content: meant(info, content),
+            lambda state: None if (value := self._read(state, name)) is None else held(info, value),
+        )
+        return widget
 
     def choice(self, name: str, label: str, names: Mapping[Choice, str], hint: str) -> GuiInputHandle[Any]:
         """Add a list of choices."""
@@ -93,9 +124,13 @@ class Inputs:
         """Set widgets to what the state says, each where that has changed: what is being typed is not yet in it."""
         for index, (widget, shown) in enumerate(self._widgets):
             value = shown(state)
-            if index not in self._followed or self._followed[index] != value:
+            if value is not None and (index not in self._followed or self._followed[index] != value):
                 self._followed[index] = value
-                write(widget, value)
+                write_held(widget, value)
+
+    def forget(self) -> None:
+        """Write every widget anew when it follows next, whatever stands in it: it is another thing's from now on."""
+        self._followed.clear()
 
 
 class WorkBar:

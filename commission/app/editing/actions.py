@@ -181,3 +181,13 @@ class SetScanner(Action):
 
     scanner: Scanner
     """The new one."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetEquipment(Action):
+    """Set one number, or list of them, of vehicle or scanner."""
+
+    name: str
+    """Its dotted name in the project: `vehicle.wheelbase`, `scanner.mounting[2]`."""
+    value: object
+    """New value, in the unit of code and files."""

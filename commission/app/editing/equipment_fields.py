@@ -2,76 +2,29 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import replace
 from typing import Any
 
 from viser import GuiApi, GuiEvent, GuiInputHandle
 
 from commission.app.base import actions as page_actions
+from commission.app.base.inputs import Inputs, show, write_html
 from commission.app.base.panel import BasePanel, Post, escaped, posting, write
+from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing import actions
-from commission.site.fields import field_hints
+from commission.site.fields import field_info, get_field, names_of
 from commission.site.presets import SCANNERS, Origin, ScannerPreset, with_preset
 from commission.site.project import Project
 from commission.site.scanner import Scanner
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
 
-DEG = math.degrees(1.0)
 KINDS: dict[str, type[Vehicle]] = {
     kind.kind: kind for kind in (DifferentialVehicle, TricycleVehicle, OmnidirectionalVehicle)
 }
 OWN = "as entered"
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """One number of the scanner."""
-
-    label: str
-    """Text beside it, with its unit."""
-    field: str
-    """Field of `Scanner`."""
-    index: int | None = None
-    """Which element of it; none: the field is one number."""
-    scale: float = 1.0
-    """Number on the page for one unit of the field."""
-    step: float = 0.01
-    """Step, in the page's unit."""
-
-    def read(self, scanner: Scanner) -> float:
-        """Return the number as the page shows it."""
-        value = getattr(scanner, self.field)
-        return round(float(value if self.index is None else value[self.index]) * self.scale, 4)
-
-    def write(self, scanner: Scanner, number: float) -> Scanner:
-        """Return the scanner with the number that a person set; raises ValueError when it is out of range."""
-        value: Any = number / self.scale
-        if self.index is not None:
-            elements = list(getattr(scanner, self.field))
-            elements[self.index] = value
-            value = tuple(elements)
-        changes: dict[str, Any] = {self.field: value}
-        return replace(scanner, **changes)
-
-
-SCANNER = (
-    Entry("Mounted at x [m]", "mounting", 0, step=0.001),
-    Entry("Mounted at y [m]", "mounting", 1, step=0.001),
-    Entry("Faces [°]", "mounting", 2, DEG),
-    Entry("First bearing [°]", "field_of_view_deg", 0, step=0.1),
-    Entry("Last bearing [°]", "field_of_view_deg", 1, step=0.1),
-    Entry("Resolution [°]", "resolution_deg", step=0.0001),
-    Entry("Scans per s", "rate", step=0.01),
-    Entry("Range from [m]", "range", 0),
-    Entry("Range to [m]", "range", 1),
-    Entry("Range 1σ [mm]", "range_sigma", scale=1000.0, step=0.1),
-    Entry("Bearing 1σ [°]", "bearing_sigma_deg", step=0.001),
-    Entry("Beam width [°]", "beam_width_deg", step=0.01),
-    Entry("Reflectors to [m]", "reflector_range", step=0.1),
-)
 FIGURES = {
     "field_of_view_deg": "field of view",
     "resolution_deg": "resolution",
@@ -88,16 +41,8 @@ ORIGINS = {
     Origin.QUOTED: "The maker's, as others quote it",
     Origin.ASSUMED: "Ours, without a source; measure it",
 }
-VEHICLE = {
-    "wheel_separation": "Wheels apart [m]",
-    "wheelbase": "Wheelbase [m]",
-    "max_steering_deg": "Steering to [°]",
-    "wheel_radius": "Wheel radius [m]",
-    "center_distance": "Wheels from base [m]",
-    "height": "Height [m]",
-}
-LISTS = {"outline": "Outline [m]", "wheel_angles_deg": "Wheel angles [°]"}
-"""Fields that are typed as text: numbers with blanks between, corners with commas between."""
+LIKE = {"outline": "corners like 0.5 0.3, -0.5 0.3, -0.5 -0.3", "wheel_angles_deg": "angles like 0 120 240"}
+"""How the lists of a vehicle are typed: numbers with blanks between, corners with commas between."""
 
 
 def list_text(value: tuple[Any, ...]) -> str:
@@ -117,8 +62,7 @@ def list_value(name: str, text: str) -> tuple[Any, ...]:
             raise ValueError(text)
         return tuple(corners)
     except ValueError as error:
-        like = "corners like 0.5 0.3, -0.5 0.3, -0.5 -0.3" if name == "outline" else "angles like 0 120 240"
-        raise ValueError(f"{LISTS[name]} is {text!r}; expected {like}") from error
+        raise ValueError(f"{name} is {text!r}; expected {LIKE[name]}") from error
 
 
 def of_kind(vehicle: Vehicle, kind: str) -> Vehicle:
@@ -148,62 +92,40 @@ class EquipmentFields(BasePanel):
     def __init__(self, gui: GuiApi, post: Post, project: Project) -> None:
         self._gui, self._post, self._project = gui, post, project
         self._shown: Project | None = None
+        self._inputs = Inputs(gui, post, actions.SetEquipment, value_of)
         with gui.add_folder("Vehicle", expand_by_default=False):
             self._kind = gui.add_dropdown("Kind", tuple(KINDS), initial_value=project.vehicle.kind)
             self._kind.on_update(
-                self._posting(lambda event: actions.SetVehicle(of_kind(self._now, event.target.value)))
+                posting(post, lambda event: actions.SetVehicle(of_kind(self._project.vehicle, event.target.value)))
             )
             self._parts = self._add_vehicle()
         with gui.add_folder("Scanner", expand_by_default=False):
             names = (OWN, *(preset.name for preset in SCANNERS))
             self._preset = gui.add_dropdown("Preset", names, hint="Figures of a common scanner; its mounting stays.")
-            self._preset.on_update(self._posting(self._from_preset))
+            self._preset.on_update(posting(post, self._from_preset))
             self._source = gui.add_html("")
-            self._numbers = {entry: self._add_number(entry) for entry in SCANNER}
-
-    @property
-    def _now(self) -> Vehicle:
-        return self._project.vehicle
-
-    def _posting(self, make: Callable[[GuiEvent[Any]], page_actions.Action]) -> Callable[[GuiEvent[Any]], None]:
-        """Return a callback that posts; what cannot be made of the input is reported instead."""
-
-        def action(event: GuiEvent[Any]) -> page_actions.Action:
-            try:
-                return make(event)
-            except ValueError as error:
-                return page_actions.Report(str(error))
-
-        return posting(self._post, action)
+            for name in names_of(Scanner):
+                self._inputs.field(f"scanner.{name}", project)
 
     def _add_vehicle(self) -> dict[str, GuiInputHandle[Any]]:
-        """Add an input for each field of every kind; those of other kinds are hidden."""
-        hints = {name: hint for kind in KINDS.values() for name, hint in field_hints(kind).items()}
+        """Add an input for each field of every kind, lists last; those of other kinds are hidden."""
+        kinds = {name: kind for kind in KINDS.values() for name in names_of(kind)}
         parts: dict[str, GuiInputHandle[Any]] = {}
-        for name, label in (VEHICLE | LISTS).items():
-            if name in LISTS:
-                widget: Any = self._gui.add_text(label, "", hint=hints[name], visible=False)
-            else:
-                widget = self._gui.add_number(label, 0.0, step=0.001, hint=hints[name], visible=False)
-
-            def changed(event: GuiEvent[Any], name: str = name) -> page_actions.Action:
-                typed = event.target.value
-                changes: dict[str, Any] = {name: list_value(name, typed) if name in LISTS else float(typed)}
-                return actions.SetVehicle(replace(self._now, **changes))
-
-            widget.on_update(self._posting(changed))
-            parts[name] = widget
+        for name in sorted(kinds, key=lambda name: name in LIKE):
+            project = replace(self._project, vehicle=kinds[name]())
+            parts[name] = (self._add_list if name in LIKE else self._inputs.field)(f"vehicle.{name}", project)
         return parts
 
-    def _add_number(self, entry: Entry) -> GuiInputHandle[Any]:
-        hint = field_hints(Scanner)[entry.field]
-        widget = self._gui.add_number(entry.label, entry.read(self._project.scanner), step=entry.step, hint=hint)
+    def _add_list(self, name: str, project: Project) -> GuiInputHandle[Any]:
+        """Add a line of text for several numbers."""
+        info = field_info(project, name)
+        widget = self._gui.add_text(info.quantity.title if info.quantity else info.label, "", hint=info.hint)
 
-        def changed(event: GuiEvent[Any]) -> page_actions.Action:
-            scanner = entry.write(self._project.scanner, float(event.target.value))
-            return actions.SetScanner(scanner)
+        def shown(state: AppState) -> str | None:
+            value = value_of(state, name)
+            return None if value is None else list_text(value)
 
-        widget.on_update(self._posting(changed))
+        self._inputs.connect(name, widget, lambda text: list_value(info.name, str(text)), shown)
         return widget
 
     def _from_preset(self, event: GuiEvent[Any]) -> page_actions.Action:
@@ -213,26 +135,22 @@ class EquipmentFields(BasePanel):
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow the project."""
-        if view.state.project is not self._shown:
-            self._shown = view.state.project
-            self.show(view.state.project)
-
-    def show(self, project: Project) -> None:
-        """Show vehicle and scanner of a project."""
-        self._project = project
-        vehicle, scanner = project.vehicle, project.scanner
-        write(self._kind, vehicle.kind)
-        own = {field.name for field in fields(vehicle)}
+        project = view.state.project
+        if project is self._shown:
+            return
+        self._shown = self._project = project
+        write(self._kind, project.vehicle.kind)
+        own = names_of(type(project.vehicle))
         for name, part in self._parts.items():
-            if part.visible is not (name in own):
-                part.visible = name in own
-            if name in own:
-                value = getattr(vehicle, name)
-                write(part, list_text(value) if name in LISTS else value)
-        for entry, number in self._numbers.items():
-            write(number, entry.read(scanner))
-        preset = next((p for p in SCANNERS if with_preset(scanner, p.name) == scanner), None)
+            show(part, visible=name in own)
+        self._inputs.follow(view.state)
+        preset = next((p for p in SCANNERS if with_preset(project.scanner, p.name) == project.scanner), None)
         write(self._preset, OWN if preset is None else preset.name)
-        source = source_html(preset)
-        if self._source.content != source:
-            self._source.content = source
+        write_html(self._source, source_html(preset))
+
+
+def value_of(state: AppState, name: str) -> Any:
+    """Return a value of the equipment by its dotted name in the project; None where another kind of vehicle has it."""
+    part, _, rest = name.partition(".")
+    is_there = part != "vehicle" or rest in names_of(type(state.project.vehicle))
+    return get_field(state.project, name) if is_there else None

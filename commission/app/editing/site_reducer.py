@@ -15,6 +15,7 @@ from commission.app.editing.editor import ControlPoint, Editor, Point, editor_of
 from commission.app.editing.route_gestures import route_of, segment_of
 from commission.errors import UsageError
 from commission.site.editing import routes as edits
+from commission.site.fields import get_field, with_field
 from commission.site.layout_brief import LayoutBrief
 from commission.site.routes import Route, Segment
 
@@ -142,3 +143,14 @@ def set_scanner(action: actions.SetScanner, state: AppState, sender: Sender) -> 
         return Outcome(state)
     edit = Edit("change the scanner", sender, "scanner")
     return Outcome(edited(state, replace(state.project, scanner=action.scanner), edit))
+
+
+@reduce.register
+def set_equipment(action: actions.SetEquipment, state: AppState, sender: Sender) -> Outcome:
+    part = action.name.partition(".")[0]
+    if part not in ("vehicle", "scanner"):
+        raise UsageError(f"no equipment is called {action.name!r}; expected one of vehicle or scanner")
+    project = with_field(state.project, action.name, action.value)
+    if get_field(project, part) == get_field(state.project, part):
+        return Outcome(state)
+    return Outcome(edited(state, project, Edit(f"change the {part}", sender, action.name)))

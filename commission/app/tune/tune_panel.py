@@ -9,7 +9,7 @@ from typing import Any
 
 from viser import GuiApi, GuiInputHandle
 
-from commission.app.base.field_widget import add_widget, held, meant
+from commission.app.base.field_widget import add_widget, held, meant, write_held
 from commission.app.base.panel import BasePanel, Post, posting
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
@@ -66,6 +66,4 @@ class TunePanel(BasePanel):
     def show(self, parameters: Parameters) -> None:
         """Set every widget."""
         for key, widget in self._widgets.items():
-            wanted = held(self._infos[key], get_field(parameters, key))
-            if widget.value != wanted:
-                widget.value = wanted
+            write_held(widget, held(self._infos[key], get_field(parameters, key)))

@@ -163,7 +163,7 @@ PAGE = (
     Mutant(
         name="slider posts what the page shows",
         file=FOLDER + "base/field_widget.py",
-        find="number = info.quantity.of_page(content)",
+        find="number = quantity.of_page(content)",
         replace="number = content",
         tests=(INPUTS + "test_every_number_posts_what_its_label_says_and_is_shown_as_it_was_typed",),
     ),
@@ -190,9 +190,9 @@ PAGE = (
     ),
     Mutant(
         name="noise of the scanner's range in metres",
-        file=FOLDER + "editing/equipment_fields.py",
-        find='"range_sigma", scale=1000.0',
-        replace='"range_sigma", scale=1.0',
+        file="commission/site/scanner.py",
+        find='label="Range 1σ", unit="m", shown=MILLIMETRES',
+        replace='label="Range 1σ [mm]", unit=""',
         tests=(INPUTS + "test_every_number_posts_what_its_label_says_and_is_shown_as_it_was_typed",),
     ),
     Mutant(
