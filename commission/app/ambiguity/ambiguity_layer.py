@@ -9,12 +9,11 @@ from viser import ImageHandle, LabelHandle, LineSegmentsHandle, SceneApi, SceneN
 from commission.app.ambiguity.cold_start import CLASSES, EVERY, SOME, TOO_FEW, UNIQUE
 from commission.app.ambiguity.view import ColdStartView, TwinsView
 from commission.app.base import theme
-from commission.app.base.drawing import NO_SEGMENTS, Points, outline_segments, stroke_segments
+from commission.app.base.drawing import NO_SEGMENTS, Points, heading_mark, outline_segments, stroke_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.floor_picture import FloorPicture
 from commission.app.base.layer import BaseLayer
 from commission.app.base.view import PageView
-from commission.app.run.vehicle_layer import heading_mark
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project

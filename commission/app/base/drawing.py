@@ -56,6 +56,13 @@ def crosses(places: FloatArray, size: float) -> FloatArray:
     return (places[:, np.newaxis, np.newaxis] + arm).reshape(-1, 2, 2)
 
 
+def heading_mark(outline: FloatArray) -> FloatArray:
+    """Return the (3, 2, 2) strokes of an arrow from base towards the front of an (n, 2) outline [m], base frame."""
+    tip = 0.85 * float(outline[:, 0].max())
+    wing = 0.3 * tip
+    return np.array([[(0, 0), (tip, 0)], [(tip, 0), (tip - wing, wing)], [(tip, 0), (tip - wing, -wing)]])
+
+
 def thinned(points: FloatArray, at_most: int) -> FloatArray:
     """Return about every k-th of (N, ...) points so that at most `at_most` remain; the last one always does."""
     if len(points) <= at_most:

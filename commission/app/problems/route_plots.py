@@ -15,11 +15,11 @@ from viser import GuiApi, GuiUplotHandle, uplot
 
 from commission.app.base import theme
 from commission.app.base.panel import BasePanel, clock, escaped
+from commission.app.base.plot_style import HIDDEN, LIMIT, TURQUOISE, plot_style, waking_series
 from commission.app.base.view import PageView
 from commission.app.editing.editor import Editor
 from commission.app.editing.route_gestures import route_of
 from commission.app.problems.view import inspection_of
-from commission.app.run.plots import HEIGHT_PX, LIMIT, ROOM_PX, TURQUOISE, axis_style
 from commission.geometry.arrays import FloatArray
 from commission.planning.route_profile import RouteProfile
 from commission.studies.violations import Violation, ViolationKind
@@ -174,26 +174,20 @@ def _plot(gui: GuiApi, chart: RouteChart) -> GuiUplotHandle:
         _series(chart),
         title=chart.title,
         scales=_scales(1.0, (0.0, 1.0)),
-        axes=(axis_style(20), axis_style(ROOM_PX)),
-        legend={"show": False},
-        cursor={"sync": {"key": "route"}, "drag": {"x": True, "y": False}},
-        height=HEIGHT_PX,
-        padding=(8, 8, 0, 0),
         visible=False,
+        **plot_style("route"),
     )
 
 
 def _series(chart: RouteChart) -> tuple[uplot.Series, ...]:
-    hidden: uplot.Series_Points = {"show": False}
-    limits = [uplot.Series(label="limit", stroke=LIMIT, width=1, dash=(5, 4), points=hidden) for _ in range(2)]
+    limits = [uplot.Series(label="limit", stroke=LIMIT, width=1, dash=(5, 4), points=HIDDEN) for _ in range(2)]
     return (
         uplot.Series(label="way [m]"),
-        uplot.Series(label=chart.title, stroke=TURQUOISE, width=1.5, points=hidden),
+        uplot.Series(label=chart.title, stroke=TURQUOISE, width=1.5, points=HIDDEN),
         *limits,
-        uplot.Series(label="cannot be driven", scale="flag", fill=FATAL_FILL, points=hidden),
-        uplot.Series(label="too little room", scale="flag", fill=LITTLE_FILL, points=hidden),
-        # uPlot lays out its axes only when a scale changes: this series is never seen, and changes its scale each time.
-        uplot.Series(label="", scale="waking", points=hidden),
+        uplot.Series(label="cannot be driven", scale="flag", fill=FATAL_FILL, points=HIDDEN),
+        uplot.Series(label="too little room", scale="flag", fill=LITTLE_FILL, points=HIDDEN),
+        waking_series(),
     )
 
 

@@ -9,14 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.app.base import theme
+from commission.app.base.plot_style import LIMIT, ORANGE, TURQUOISE
 from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
 from commission.localization.estimate import Status
 from commission.site.parameters import Parameters
 from commission.studies.run import RunResult
-
-TURQUOISE, ORANGE = "#4dc4ff", "#ffb454"
-LIMIT = theme.css(theme.POSE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,23 +13,19 @@ import numpy as np
 from viser import GuiApi, GuiUplotHandle, uplot
 
 from commission.app.base.panel import BasePanel
+from commission.app.base.plot_style import HIDDEN, plot_style, waking_series
 from commission.app.base.view import PageView
-from commission.app.run.charts import CHARTS, LIMIT, TURQUOISE, Chart, ceiling
+from commission.app.run.charts import CHARTS, Chart, ceiling
 from commission.app.run.curves import BINS, PlotCurve
 from commission.app.run.view import RunView, Stretch
 from commission.geometry.arrays import FloatArray
 from commission.site.parameters import Parameters
 from commission.studies.run import RunResult
 
-HEIGHT_PX = 150
-ROOM_PX = 44
-"""Room for the numbers beside a vertical axis: five figures and a comma."""
 EDIT = "#c08bff"
 """Where an edit acts from, or reflectors are covered."""
 PALE = "59"
 """Opacity of what lies behind the cursor, as the last two digits of a CSS color: a third."""
-HIDDEN: uplot.Series_Points = {"show": False}
-__all__ = ["EDIT", "HEIGHT_PX", "LIMIT", "ROOM_PX", "TURQUOISE", "Plots", "axis_style"]
 
 
 class Plots(BasePanel):
@@ -54,11 +50,7 @@ class Plots(BasePanel):
                     series,
                     title=chart.title,
                     scales=_scales(1.0, (0.1, 1.0), chart),
-                    axes=(axis_style(20), axis_style(ROOM_PX)),
-                    legend={"show": False},
-                    cursor={"sync": {"key": "run"}, "drag": {"x": True, "y": False}},
-                    height=HEIGHT_PX,
-                    padding=(8, 8, 0, 0),
+                    **plot_style("run"),
                 )
             )
 
@@ -145,9 +137,7 @@ def _series(chart: Chart) -> tuple[uplot.Series, ...]:
         uplot.Series(label="fail behind the cursor", scale="flag", fill="rgba(220,40,40,.10)", points=HIDDEN),
         uplot.Series(label="now", scale="flag", stroke="#e8eaee", width=1, points=HIDDEN),
         uplot.Series(label="edited from here on", scale="flag", stroke=EDIT, width=1, dash=(2, 2), points=HIDDEN),
-        # uPlot lays out its axes only when a scale changes: a chart that was made before the browser knew its width
-        # would stay without labels. This series is never seen, and changes its scale each time.
-        uplot.Series(label="", scale="waking", points=HIDDEN),
+        waking_series(),
     )
 
 
@@ -157,14 +147,3 @@ def _scales(duration: float, span: tuple[float, float], chart: Chart) -> dict[st
         value["distr"] = 3
     # The flags' scale starts above zero: their zero line stays outside of the plot.
     return {"x": {"time": False, "range": (0.0, duration)}, "y": value, "flag": {"range": (0.01, 1.0)}}
-
-
-def axis_style(size: int) -> uplot.Axis:
-    """Return how an axis is drawn; `size` is the room for its numbers [pixels]."""
-    return {
-        "size": size,
-        "font": "10px sans-serif",
-        "stroke": "#9aa0a8",
-        "grid": {"stroke": "#2f3237", "width": 1},
-        "ticks": {"stroke": "#3a3d43", "width": 1, "size": 4},
-    }

@@ -11,7 +11,7 @@ import numpy as np
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_SEGMENTS, lift, outline_segments, yaw_quaternion
+from commission.app.base.drawing import NO_SEGMENTS, heading_mark, outline_segments, stroke_segments, yaw_quaternion
 from commission.app.base.layer import BaseLayer
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
@@ -29,13 +29,6 @@ GROUND_CLEARANCE = 0.05
 NEAR_FAN = 2.0
 """Radius of the fan that shows the field of view beside the vehicle, in sizes of the vehicle."""
 ARC_STEP_DEG = 3.0
-
-
-def heading_mark(outline: np.ndarray) -> np.ndarray:
-    """Return the (3, 2, 2) strokes of an arrow from base towards the front [m], base frame."""
-    tip = 0.85 * float(outline[:, 0].max())
-    wing = 0.3 * tip
-    return np.array([[(0, 0), (tip, 0)], [(tip, 0), (tip - wing, wing)], [(tip, 0), (tip - wing, -wing)]])
 
 
 def reach_of(scanner: Scanner) -> float:
@@ -97,7 +90,7 @@ class VehicleLayer(BaseLayer):
         self._project = project
         outline = np.array(project.vehicle.outline)
         edges = outline_segments(outline[np.newaxis], theme.Height.VEHICLE)
-        arrow = lift(heading_mark(outline).reshape(-1, 2), theme.Height.VEHICLE).reshape(-1, 2, 3)
+        arrow = stroke_segments(heading_mark(outline), theme.Height.VEHICLE)
         self._lines.points = np.concatenate([edges, arrow])
         x, y, heading = (float(value) for value in project.scanner.mounting)
         self._scanner.position = (x, y, theme.Height.VEHICLE)
@@ -105,8 +98,7 @@ class VehicleLayer(BaseLayer):
         size = float(np.abs(outline).max())
         self._scanner.axes_length = 0.3 * size
         for node, radius in ((self._near, NEAR_FAN * size), (self._far, reach_of(project.scanner))):
-            strokes = fan(project.scanner, radius)
-            node.points = lift(strokes.reshape(-1, 2), theme.Height.GRID).reshape(-1, 2, 3)
+            node.points = stroke_segments(fan(project.scanner, radius), theme.Height.GRID)
         if not self._drives:
             self._wait(project)
 
