@@ -5,9 +5,6 @@ from collections import defaultdict
 
 from tests.conftest import REPOSITORY
 
-PENDING = {"Recording", "Segment"}
-"""Names that still stand for two things: those of the run."""
-
 
 def test_no_class_name_stands_for_two_things():
     modules = defaultdict[str, list[str]](list)
@@ -16,4 +13,4 @@ def test_no_class_name_stands_for_two_things():
             if isinstance(node, ast.ClassDef):
                 modules[node.name].append(str(path.relative_to(REPOSITORY)))
     twice = {name: where for name, where in modules.items() if len(where) > 1}
-    assert twice.keys() <= PENDING, twice
+    assert twice == {}

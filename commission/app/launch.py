@@ -33,7 +33,7 @@ from commission.app.problems import feature as problems
 from commission.app.project import feature as project
 from commission.app.run import feature as run
 from commission.app.run.accumulated_layer import AccumulatedLayer
-from commission.app.run.actions import Recording, Source, VirtualDrive
+from commission.app.run.actions import RecordedDrive, Source, VirtualDrive
 from commission.app.run.state import RunState
 from commission.app.runtime import BrowserCame, BrowserLeft, Runtime
 from commission.app.tune import feature as tune
@@ -154,7 +154,7 @@ def interruption() -> Generator[Callable[[], None]]:
 def first_source(project: Project, recording: Path | None, demo: bool) -> Source | None:
     """Return what drives when the page opens."""
     if recording is not None:
-        return Recording(recording)
+        return RecordedDrive(recording)
     return VirtualDrive(project.routes[0].name) if demo and project.routes else None
 
 

@@ -12,7 +12,7 @@ from commission.localization.detection_log import DetectionLog
 from commission.localization.detector import INLIER
 from commission.localization.estimate import Belief, Estimate, Status
 from commission.localization.localizer import Localizer
-from commission.localization.run_columns import Checkpoint, RunColumns, Segment
+from commission.localization.run_columns import Checkpoint, RunColumns, RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState
 from commission.localization.whole_run import CHECKPOINT_CYCLES
@@ -55,7 +55,7 @@ class GrowingRun:
 
     def __init__(self, setup: LocalizerSetup, start: Belief | FilterState) -> None:
         self._localizer = Localizer(setup, start)
-        self._segments = [Segment(0, setup)]
+        self._segments = [RunSegment(0, setup)]
         self._checkpoints = [Checkpoint(0, self._localizer.state)]
         self._count = 0
         n = FIRST_ROWS
@@ -96,7 +96,7 @@ class GrowingRun:
         self._localizer.replace_setup(setup)
         if self._segments[-1].first == self._count:
             self._segments.pop()
-        self._segments.append(Segment(self._count, setup))
+        self._segments.append(RunSegment(self._count, setup))
 
     def feed(self, record: Record) -> Estimate | None:
         """Take in one record; arguments, result and errors are those of `Localizer.feed`."""

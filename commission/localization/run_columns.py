@@ -21,7 +21,7 @@ from commission.localization.state import FilterState, belief_of, output_of
 
 
 @dataclass(frozen=True, slots=True)
-class Segment:
+class RunSegment:
     """A stretch of a run with one setup: from a cycle on, until the next segment begins."""
 
     first: int
@@ -36,7 +36,7 @@ class Segment:
             raise ValueError(f"a segment begins at cycle {self.first}; expected 0 or more")
 
 
-def firsts_of(segments: Sequence[Segment]) -> IntArray:
+def firsts_of(segments: Sequence[RunSegment]) -> IntArray:
     """(S,) first cycle of each segment; raises ValueError unless they begin at cycle 0 and follow each other."""
     firsts = np.array([segment.first for segment in segments], dtype=np.int64)
     if not len(firsts) or firsts[0] != 0 or (np.diff(firsts) <= 0).any():
@@ -55,7 +55,7 @@ class Checkpoint(NamedTuple):
 class RunColumns:
     """A run: K cycles (one per scan) with n detections in total. All arrays are read-only."""
 
-    segments: tuple[Segment, ...]
+    segments: tuple[RunSegment, ...]
     """What it was made with; the first one begins at cycle 0, each later one after the one before."""
     checkpoints: tuple[Checkpoint, ...]
     """States along the way, the one before the first record first: `whole_run.state_before` resumes from them."""
@@ -114,7 +114,7 @@ class RunColumns:
         """(n,) width of each cluster [beams]; 0 where the sensor itself detected."""
         return self.detected.beams
 
-    def segment(self, cycle: int) -> Segment:
+    def segment(self, cycle: int) -> RunSegment:
         """Return the segment of a cycle."""
         return self.segments[int(np.searchsorted(self.firsts, cycle, side="right")) - 1]
 

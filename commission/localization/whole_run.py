@@ -20,7 +20,7 @@ from commission.localization.detection_log import (
     nothing_detected,
 )
 from commission.localization.estimate import Belief
-from commission.localization.run_columns import Checkpoint, RunColumns, Segment, firsts_of
+from commission.localization.run_columns import Checkpoint, RunColumns, RunSegment, firsts_of
 from commission.localization.run_loop import CycleStretch, continued, cut, empty_columns, take_over
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, state_at_start
@@ -59,12 +59,12 @@ def run(
     state = state_at_start(start) if isinstance(start, Belief) else start
     if detected is None:
         detected = extract_detections(log, setup, sensor_detects=state.sensor_detects)
-    return _filtered(log, (Segment(0, setup),), detected, (Checkpoint(0, state),))
+    return _filtered(log, (RunSegment(0, setup),), detected, (Checkpoint(0, state),))
 
 
 def run_segments(
     log: RecordLog,
-    segments: Sequence[Segment],
+    segments: Sequence[RunSegment],
     start: Belief | FilterState,
     *,
     earlier: RunColumns | None = None,
@@ -125,12 +125,12 @@ def state_before(run: RunColumns, log: RecordLog, cycle: int) -> FilterState:
     return state
 
 
-def _segment(segments: Sequence[Segment], cycle: int) -> Segment:
+def _segment(segments: Sequence[RunSegment], cycle: int) -> RunSegment:
     """Return the segment of a cycle."""
     return next(segment for segment in reversed(segments) if segment.first <= cycle)
 
 
-def _first_difference(a: Sequence[Segment], b: Sequence[Segment], cycles: int) -> int:
+def _first_difference(a: Sequence[RunSegment], b: Sequence[RunSegment], cycles: int) -> int:
     """First cycle that two lists of segments treat differently; `cycles` when there is none."""
     for first in sorted({segment.first for segment in (*a, *b)}):
         one, other = _segment(a, first), _segment(b, first)
@@ -141,7 +141,7 @@ def _first_difference(a: Sequence[Segment], b: Sequence[Segment], cycles: int) -
 
 def _detected(
     log: RecordLog,
-    segments: Sequence[Segment],
+    segments: Sequence[RunSegment],
     stamps_ns: IntArray,
     earlier: RunColumns | None,
     *,
@@ -170,14 +170,14 @@ def _detected(
     return joined(parts) if parts else nothing_detected(stamps_ns)
 
 
-def _detects_like(segment: Segment, earlier: Segment) -> bool:
+def _detects_like(segment: RunSegment, earlier: RunSegment) -> bool:
     """Whether an earlier segment holds what is detected in this one, which is not covered."""
     return not earlier.covered and segment.setup.detects_like(earlier.setup)
 
 
 def _filtered(
     log: RecordLog,
-    segments: tuple[Segment, ...],
+    segments: tuple[RunSegment, ...],
     detected: DetectionLog,
     known: tuple[Checkpoint, ...],
     *,
@@ -227,7 +227,7 @@ def _final(
     return final._replace(newest_ns=int(log.stamps_ns[-1]), sensor_detects=own)
 
 
-def _chunks(segments: Sequence[Segment], begin: int, end: int) -> Iterator[tuple[Segment, int, int]]:
+def _chunks(segments: Sequence[RunSegment], begin: int, end: int) -> Iterator[tuple[RunSegment, int, int]]:
     """Stretches of cycles of one segment each, no longer than between two checkpoints."""
     lasts = (*(segment.first for segment in segments[1:]), end)
     for segment, last in zip(segments, lasts, strict=True):

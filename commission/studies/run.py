@@ -17,7 +17,7 @@ from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization import whole_run
 from commission.localization.detection_log import cycle_stamps
 from commission.localization.estimate import Mode, Status
-from commission.localization.run_columns import RunColumns, Segment
+from commission.localization.run_columns import RunColumns, RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.whole_run import run_segments
 from commission.progress import Progress, part, silent
@@ -47,7 +47,7 @@ class RunInput:
     """The drive; compared by identity."""
     start: Start
     """Belief before the first record, and who says so."""
-    segments: tuple[Segment, ...]
+    segments: tuple[RunSegment, ...]
     """Setups, from which cycle on, and whether reflectors are covered; the first one begins at cycle 0."""
 
     @staticmethod
@@ -60,7 +60,7 @@ class RunInput:
         log : all records of the drive.
         start : belief before the first record, and where it comes from.
         """
-        return RunInput(log=log, start=start, segments=(Segment(0, LocalizerSetup.of(project)),))
+        return RunInput(log=log, start=start, segments=(RunSegment(0, LocalizerSetup.of(project)),))
 
     def with_setup(self, setup: LocalizerSetup, first: int = 0) -> RunInput:
         """Return the input of the same run with another setup from a cycle on; what is covered stays covered.
@@ -82,11 +82,11 @@ class RunInput:
         """
         return self._changed(first, lambda segment: replace(segment, covered=covered))
 
-    def segment(self, cycle: int) -> Segment:
+    def segment(self, cycle: int) -> RunSegment:
         """Return the segment of a cycle."""
         return next(segment for segment in reversed(self.segments) if segment.first <= cycle)
 
-    def _changed(self, first: int, change: Callable[[Segment], Segment]) -> RunInput:
+    def _changed(self, first: int, change: Callable[[RunSegment], RunSegment]) -> RunInput:
         """Change all segments from a cycle on; where one no longer differs from the one before, they are one."""
         split = (*(s for s in self.segments if s.first < first), replace(self.segment(first), first=first))
         later = (segment for segment in self.segments if segment.first > first)

@@ -20,7 +20,7 @@ from commission.app.run.actions import (
     ChooseSource,
     Cover,
     Play,
-    Recording,
+    RecordedDrive,
     Repeat,
     Seek,
     SetSpeed,
@@ -117,7 +117,7 @@ class Bench:
         if self.slow is not None:
             return self.slow(_project, source, progress)
         progress(0.5, "")
-        if isinstance(source, Recording):
+        if isinstance(source, RecordedDrive):
             raise FileFormatError(source.path, "", "not a recording", "a folder with odometry.csv")
         return self.drive
 
@@ -170,7 +170,7 @@ def test_pictures_come_at_most_25_times_a_second(bench: Bench) -> None:
 
 
 def test_a_recording_that_cannot_be_read_is_told_and_listed_and_the_page_lives_on(bench: Bench) -> None:
-    bench.post(ChooseSource(Recording(Path("nothing"))))
+    bench.post(ChooseSource(RecordedDrive(Path("nothing"))))
     bench.until(lambda: bool(bench.page.told))
     assert "not a recording" in bench.page.told[0][0]
     assert bench.page.told[0][1]

@@ -22,7 +22,7 @@ from commission.app.floor_map.effects import ReadMapFile
 from commission.app.floor_map.work import MapService
 from commission.app.project.effects import WriteProject
 from commission.app.project.project_folder import ProjectFolder
-from commission.app.run.actions import Recording
+from commission.app.run.actions import RecordedDrive
 from commission.app.run.effects import LoadSource
 from commission.app.run.service import RunService
 from commission.errors import UsageError
@@ -37,7 +37,7 @@ Ask = Callable[[Path, Project], Effect]
 WAYS: dict[str, tuple[type[Service], Ask]] = {
     "import": (ExchangeService, lambda path, project: ReadFile(1, ServerFile(path), WHOLE, project)),
     "floor map": (MapService, lambda path, _project: ReadMapFile(MapFile(path))),
-    "recording": (RunService, lambda path, _project: LoadSource(Recording(path))),
+    "recording": (RunService, lambda path, _project: LoadSource(RecordedDrive(path))),
     "copy": (ProjectFolder, lambda path, project: WriteProject(project, path)),
 }
 
@@ -100,7 +100,7 @@ def test_why_a_recording_cannot_be_read_is_told_to_who_asked(
     (hall / "drive").mkdir()
     (hall / "drive" / "odometry.csv").write_text(SECRET)
     state = AppState(project=project, saved=project, reach=Reach.within([hall]))
-    owner.service.carry_out(LoadSource(Recording(hall / "drive")), state, sender)
+    owner.service.carry_out(LoadSource(RecordedDrive(hall / "drive")), state, sender)
     owner.settle(state)
     reports = [each for each in owner.posted if isinstance(each, Envelope) and isinstance(each.action, Report)]
     assert [each.sender for each in reports] == [sender]

@@ -16,7 +16,7 @@ import numpy as np
 from commission.app.run.charts import CHARTS
 from commission.app.run.curves import Curve
 from commission.app.run.playback import Playback
-from commission.localization.run_columns import Segment
+from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.site.parameters import AssociationParameters, Parameters
 from commission.studies.run import RunInput, RunResult, judged_run, warm_up
@@ -37,10 +37,10 @@ def main(cycles: int = CYCLES) -> None:
     setup = hall(20)
     log, initial = drive(setup, cycles)
     start = Start(initial, StartOrigin.GIVEN)
-    result = judged_run(RunInput(log=log, start=start, segments=(Segment(0, setup),)))
+    result = judged_run(RunInput(log=log, start=start, segments=(RunSegment(0, setup),)))
     poses = result.columns.means + np.array([0.003, -0.002, 0.001])
     log = replace(log, reference_stamps_ns=log.detection_stamps_ns, reference_poses=poses)
-    result = judged_run(RunInput(log=log, start=start, segments=(Segment(0, setup),)))
+    result = judged_run(RunInput(log=log, start=start, segments=(RunSegment(0, setup),)))
     playback, curves = Playback(result), curves_of(result)
     playback.view(covered=False)
     times = []

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from commission.errors import FileFormatError
 from commission.io.results import write_results
 from commission.localization.estimate import Belief, Mode, Status
-from commission.localization.run_columns import Segment
+from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.whole_run import run, run_segments
 from commission.site.parameters import Parameters, SupervisorParameters
@@ -53,7 +53,7 @@ def rows(path):
 def test_each_segment_names_the_reflectors_of_its_own_map(tmp_path):
     renamed = ReflectorMap(tuple(replace(r, id=f"new {i}") for i, r in enumerate(REFLECTORS.reflectors)))
     segments = tuple(
-        Segment(first, LocalizerSetup(reflectors, Scanner(), Parameters()))
+        RunSegment(first, LocalizerSetup(reflectors, Scanner(), Parameters()))
         for first, reflectors in enumerate((REFLECTORS, REFLECTORS, renamed))
     )
     start = Belief(0, np.zeros(3), 1e-4 * np.eye(3))

@@ -15,7 +15,7 @@ from commission.localization.detection_log import cycle_stamps, extract_detectio
 from commission.localization.estimate import Status
 from commission.localization.growing_run import GrowingRun
 from commission.localization.localizer import Localizer
-from commission.localization.run_columns import RunColumns, Segment
+from commission.localization.run_columns import RunColumns, RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import state_at_start
 from commission.localization.whole_run import run, run_segments, state_before
@@ -73,7 +73,7 @@ def assert_same(a: RunColumns, b: RunColumns, *, after: int = 0) -> None:
     assert a.final == b.final
 
 
-def fed(drive: Drive, segments: tuple[Segment, ...]) -> tuple[Localizer, RunColumns | list]:
+def fed(drive: Drive, segments: tuple[RunSegment, ...]) -> tuple[Localizer, RunColumns | list]:
     """The live localizer over a drive, its setup replaced and its reflectors covered as the segments say."""
     localizer = Localizer(segments[0].setup, drive.initial)
     estimates = []
@@ -86,7 +86,7 @@ def fed(drive: Drive, segments: tuple[Segment, ...]) -> tuple[Localizer, RunColu
     return localizer, estimates
 
 
-def assert_is_fed(columns: RunColumns, drive: Drive, segments: tuple[Segment, ...]) -> None:
+def assert_is_fed(columns: RunColumns, drive: Drive, segments: tuple[RunSegment, ...]) -> None:
     localizer, estimates = fed(drive, segments)
     assert len(estimates) == len(columns) > 0
     for cycle, live in enumerate(estimates):
@@ -137,12 +137,12 @@ def test_a_run_of_segments_is_the_live_localizer_whose_setup_is_replaced(drive: 
     kinds = st.sampled_from(sorted(SETUPS))
     firsts = sorted(data.draw(st.sets(st.integers(1, len(cycle_stamps(drive.log)) - 1), max_size=3)))
     segments = tuple(
-        Segment(first, SETUPS[data.draw(kinds)], covered=data.draw(st.booleans())) for first in (0, *firsts)
+        RunSegment(first, SETUPS[data.draw(kinds)], covered=data.draw(st.booleans())) for first in (0, *firsts)
     )
     columns = run_segments(drive.log, segments, drive.initial)
     assert_is_fed(columns, drive, segments)
     # Whatever another run of the same log was made with, what is taken over from it changes nothing.
-    others = tuple(Segment(s.first, SETUPS[data.draw(kinds)], covered=data.draw(st.booleans())) for s in segments)
+    others = tuple(RunSegment(s.first, SETUPS[data.draw(kinds)], covered=data.draw(st.booleans())) for s in segments)
     earlier = run_segments(drive.log, others, drive.initial)
     again = run_segments(drive.log, segments, drive.initial, earlier=earlier)
     assert_same(again, columns)
@@ -153,7 +153,7 @@ def test_from_here_on_goes_on_from_the_state_there_and_leaves_what_was_lived(dri
     setup, other = SETUPS["drive"], SETUPS["narrow gate"]
     before = run(drive.log, setup, drive.initial)
     cycle = 17
-    segments = (Segment(0, setup), Segment(cycle, other))
+    segments = (RunSegment(0, setup), RunSegment(cycle, other))
     after = run_segments(drive.log, segments, drive.initial, earlier=before)
     assert after.means[:cycle].tobytes() == before.means[:cycle].tobytes()
     assert after.means[cycle:].tobytes() != before.means[cycle:].tobytes()
@@ -164,7 +164,7 @@ def test_from_here_on_goes_on_from_the_state_there_and_leaves_what_was_lived(dri
 
 def test_covered_reflectors_are_not_detected_until_they_are_uncovered(drive: Drive) -> None:
     setup = SETUPS["drive"]
-    segments = (Segment(0, setup), Segment(5, setup, covered=True), Segment(20, setup))
+    segments = (RunSegment(0, setup), RunSegment(5, setup, covered=True), RunSegment(20, setup))
     columns = run_segments(drive.log, segments, drive.initial)
     seen = sum(columns.counts(status) for status in Status)
     assert seen[:5].sum() > 0
@@ -174,18 +174,18 @@ def test_covered_reflectors_are_not_detected_until_they_are_uncovered(drive: Dri
 
 def test_detections_are_kept_while_the_detector_stays_and_made_anew_when_it_does_not() -> None:
     drive = random_drive(SETUPS["drive"], np.random.default_rng(8), Plan(scans=30, beams=720))
-    first = run_segments(drive.log, (Segment(0, SETUPS["drive"]),), drive.initial)
-    moved_gate = run_segments(drive.log, (Segment(0, SETUPS["narrow gate"]),), drive.initial, earlier=first)
+    first = run_segments(drive.log, (RunSegment(0, SETUPS["drive"]),), drive.initial)
+    moved_gate = run_segments(drive.log, (RunSegment(0, SETUPS["narrow gate"]),), drive.initial, earlier=first)
     assert moved_gate.detected is first.detected
     other = SETUPS["another detector"]
-    stricter = run_segments(drive.log, (Segment(0, other),), drive.initial, earlier=first)
+    stricter = run_segments(drive.log, (RunSegment(0, other),), drive.initial, earlier=first)
     fresh = extract_detections(drive.log, other)
     assert stricter.detected.status.tolist() == fresh.status.tolist()
     assert first.detected.status.tolist() != fresh.status.tolist()
 
 
 def test_another_start_takes_no_cycle_from_an_earlier_run(drive: Drive) -> None:
-    segments = (Segment(0, SETUPS["drive"]),)
+    segments = (RunSegment(0, SETUPS["drive"]),)
     earlier = run_segments(drive.log, segments, drive.initial)
     start = dataclasses.replace(drive.initial, covariance=4.0 * drive.initial.covariance)
     fresh = run_segments(drive.log, segments, start)
@@ -196,19 +196,19 @@ def test_another_start_takes_no_cycle_from_an_earlier_run(drive: Drive) -> None:
 def test_a_segment_behind_the_last_cycle_is_left_out(drive: Drive) -> None:
     setup = SETUPS["drive"]
     count = len(run(drive.log, setup, drive.initial))
-    segments = tuple(Segment(first, setup) for first in (0, count - 1, count))
+    segments = tuple(RunSegment(first, setup) for first in (0, count - 1, count))
     assert run_segments(drive.log, segments, drive.initial).segments == segments[:2]
 
 
 @pytest.mark.parametrize("firsts", [(), (1,), (0, 3, 3), (0, 5, 2)])
 def test_segments_that_do_not_follow_each_other_are_refused(drive: Drive, firsts: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match="segments begin at cycles"):
-        run_segments(drive.log, tuple(Segment(first, SETUPS["drive"]) for first in firsts), drive.initial)
+        run_segments(drive.log, tuple(RunSegment(first, SETUPS["drive"]) for first in firsts), drive.initial)
 
 
 def test_a_run_says_how_far_it_is_and_stops_where_it_is_told_to(drive: Drive) -> None:
     told: list[tuple[float, str]] = []
-    segments = (Segment(0, SETUPS["drive"]),)
+    segments = (RunSegment(0, SETUPS["drive"]),)
     run_segments(drive.log, segments, drive.initial, progress=lambda share, text: told.append((share, text)))
     shares = [share for share, _ in told]
     assert shares == sorted(shares)
@@ -226,7 +226,7 @@ def test_a_run_says_how_far_it_is_and_stops_where_it_is_told_to(drive: Drive) ->
 def test_a_log_without_cycles_still_moves_the_state(drive: Drive) -> None:
     log = RecordLog.collect(record for record in drive.log.records() if not isinstance(record, Scan | Detections))
     setup = SETUPS["drive"]
-    columns = run_segments(log, (Segment(0, setup),), drive.initial)
+    columns = run_segments(log, (RunSegment(0, setup),), drive.initial)
     assert len(columns) == 0
     localizer = Localizer(setup, drive.initial)
     for record in log.records():
@@ -236,7 +236,11 @@ def test_a_log_without_cycles_still_moves_the_state(drive: Drive) -> None:
 
 def test_a_run_that_grows_while_it_is_driven_is_the_whole_run(drive: Drive, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(growing_run, "FIRST_ROWS", 3)
-    segments = (Segment(0, SETUPS["drive"]), Segment(12, SETUPS["narrow gate"]), Segment(13, SETUPS["another map"]))
+    segments = (
+        RunSegment(0, SETUPS["drive"]),
+        RunSegment(12, SETUPS["narrow gate"]),
+        RunSegment(13, SETUPS["another map"]),
+    )
     growing = GrowingRun(segments[0].setup, drive.initial)
     for record in drive.log.records():
         growing.feed(record)
@@ -269,4 +273,4 @@ def test_a_setup_that_is_replaced_before_a_cycle_comes_begins_no_segment_of_its_
     growing = GrowingRun(SETUPS["drive"], drive.initial)
     growing.begin_segment(SETUPS["another map"])
     growing.begin_segment(SETUPS["narrow gate"])
-    assert growing.columns().segments == (Segment(0, SETUPS["narrow gate"]),)
+    assert growing.columns().segments == (RunSegment(0, SETUPS["narrow gate"]),)

@@ -22,14 +22,14 @@ class VirtualDrive:
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class RecordedDrive:
     """A source: what a vehicle recorded."""
 
     path: Path
     """Folder or file of the recording."""
 
 
-Source: TypeAlias = VirtualDrive | Recording
+Source: TypeAlias = VirtualDrive | RecordedDrive
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from commission.app.run.actions import Recording, Source, VirtualDrive
+from commission.app.run.actions import RecordedDrive, Source, VirtualDrive
 from commission.errors import SourceError
 from commission.io.recordings.base import load_log
 from commission.progress import Progress
@@ -54,7 +54,7 @@ def _simulated(project: Project, source: VirtualDrive, progress: Progress) -> Dr
     return Drive(log, Start(belief_at(int(log.stamps_ns[0]), start.pose, start.sigmas.tolist()), StartOrigin.DRIVE))
 
 
-def _recorded(project: Project, source: Recording, progress: Progress) -> Drive:
+def _recorded(project: Project, source: RecordedDrive, progress: Progress) -> Drive:
     progress(0.0, "reading the recording")
     log = load_log(source.path)
     if log.scans is None and not len(log.detection_stamps_ns):

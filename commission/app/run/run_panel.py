@@ -9,7 +9,7 @@ from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.reach import typed_path
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.run.actions import ChooseSource, Cover, Recording, Repeat, Restart, VirtualDrive
+from commission.app.run.actions import ChooseSource, Cover, RecordedDrive, Repeat, Restart, VirtualDrive
 from commission.app.run.state import RunState
 from commission.app.run.view import RunView
 
@@ -67,7 +67,7 @@ class RunPanel(BasePanel):
 
     def _add_recording(self, post: Post, state: AppState) -> None:
         source = state.part(RunState).source
-        shown = str(source.path) if isinstance(source, Recording) else ""
+        shown = str(source.path) if isinstance(source, RecordedDrive) else ""
         with self._gui.add_folder("Recording"):
             path = self._gui.add_text(
                 "Folder", shown, hint="Path, on the computer that serves this page, of a recording."
@@ -77,7 +77,7 @@ class RunPanel(BasePanel):
             posting(
                 post,
                 lambda _event: (
-                    ChooseSource(Recording(typed_path(path.value)))
+                    ChooseSource(RecordedDrive(typed_path(path.value)))
                     if path.value.strip()
                     else actions.Report("no recording was named; expected the path of a folder")
                 ),
@@ -121,7 +121,7 @@ def _now(view: PageView) -> str:
     source = view.state.part(RunState).source
     if isinstance(source, VirtualDrive):
         what = f"Virtual drive, route <b>{escaped(source.route)}</b>, seed {source.seed}"
-    elif isinstance(source, Recording):
+    elif isinstance(source, RecordedDrive):
         what = f"Recording <b>{escaped(source.path.name)}</b>"
     else:
         what = "Nothing drives yet: choose a virtual drive or a recording."

@@ -13,14 +13,14 @@ from commission.app.base.service import IDLE_S, Context, Due, Service
 from commission.app.base.state import AppState
 from commission.app.base.view import Followed, LivedPath
 from commission.app.run import drives
-from commission.app.run.actions import ChooseSource, Play, Recording, Source
+from commission.app.run.actions import ChooseSource, Play, RecordedDrive, Source
 from commission.app.run.drives import Drive
 from commission.app.run.effects import CoverFromHere, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
 from commission.app.run.playback import Playback
 from commission.app.run.state import RunState
 from commission.app.run.view import RunView
 from commission.geometry import rasterize, se2, spline_kernels
-from commission.localization.run_columns import Segment
+from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress
 from commission.simulation import follower, scan
@@ -112,7 +112,9 @@ class RunService(Service):
             case RunAfresh() if playback is not None and self._wanted is not None:
                 playback.seek(0.0)
                 setup = LocalizerSetup.of(state.project)
-                self._localize(RunInput(log=self._wanted.log, start=self._wanted.start, segments=(Segment(0, setup),)))
+                self._localize(
+                    RunInput(log=self._wanted.log, start=self._wanted.start, segments=(RunSegment(0, setup),))
+                )
             case _:
                 pass
 
@@ -134,8 +136,8 @@ class RunService(Service):
 
     def _load(self, source: Source, state: AppState, sender: Sender) -> None:
         """Prepare a drive; why it cannot be is told to who asked."""
-        if isinstance(source, Recording):
-            source = Recording(state.reach.checked(source.path, sender))
+        if isinstance(source, RecordedDrive):
+            source = RecordedDrive(state.reach.checked(source.path, sender))
         project, prepare = state.project, self._prepare
         self._jobs.start(
             PREPARE,
@@ -157,7 +159,7 @@ class RunService(Service):
     def _begin(self, drive: Drive) -> None:
         """Localize a new drive; the run before stays on the page until that is done."""
         setup = LocalizerSetup.of(self._project)
-        self._localize(RunInput(log=drive.log, start=drive.start, segments=(Segment(0, setup),)))
+        self._localize(RunInput(log=drive.log, start=drive.start, segments=(RunSegment(0, setup),)))
 
     def _localize(self, wanted: RunInput) -> None:
         """Localize the whole drive in the background, unless that is what is there, or under way."""

@@ -7,7 +7,7 @@ from typing import TypeAlias
 
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Estimate, Mode
-from commission.localization.run_columns import Segment
+from commission.localization.run_columns import RunSegment
 from commission.studies.run import RunResult
 
 Stretch: TypeAlias = tuple[float, float]
@@ -42,7 +42,7 @@ class RunView:
     """State of the supervisor."""
     estimate: Estimate | None
     """The newest cycle; none before the first."""
-    segment: Segment
+    segment: RunSegment
     """What the newest cycle was made with."""
     covered: bool
     """Whether every reflector is covered from the next cycle on, as asked for."""

@@ -10,7 +10,7 @@ import pytest
 
 from commission.app.base.actions import PROGRAM
 from commission.app.base.state import AppState
-from commission.app.run.actions import Recording
+from commission.app.run.actions import RecordedDrive
 from commission.app.run.charts import CHARTS
 from commission.app.run.effects import LoadSource
 from commission.app.run.now_panel import rows
@@ -50,7 +50,7 @@ def shown(folders: tuple[Path, Path]) -> RunView:
     """The page at the end of the same recording."""
     project = load_project(folders[0])
     state = AppState(project, project)
-    source = Recording(folders[1])
+    source = RecordedDrive(folders[1])
     owner = Owner(lambda context: RunService(context, compile_all=lambda _progress: None), state)
     owner.service.carry_out(LoadSource(source), state, PROGRAM)
     owner.settle(state)

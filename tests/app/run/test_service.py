@@ -19,7 +19,7 @@ from commission.app.run.service import RunService
 from commission.app.run.state import RunState
 from commission.app.run.view import RunView
 from commission.localization.estimate import Mode
-from commission.localization.run_columns import Segment
+from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress
 from commission.site.fields import with_field
@@ -90,7 +90,7 @@ def gate(probability: float) -> Callable[[Project], Project]:
 def fresh(desk: Desk, *segments: tuple[int, Project, bool]) -> RunResult:
     """The run that these segments make, computed on its own."""
     drive = desk.drives[-1]
-    made = tuple(Segment(first, LocalizerSetup.of(project), covered) for first, project, covered in segments)
+    made = tuple(RunSegment(first, LocalizerSetup.of(project), covered) for first, project, covered in segments)
     return judged_run(RunInput(log=drive.log, start=drive.start, segments=made))
 
 
