@@ -7,6 +7,7 @@ field). It knows no particular file.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import re
 import types
 import typing
@@ -106,8 +107,9 @@ def _refuse_unknown_keys(document: YamlDocument, key_path: KeyPath, part: Any, k
             _refuse_unknown_keys(document, (*key_path, key), value, known[key])
 
 
+@functools.cache
 def keys_of(cls: type) -> dict[str, Any]:
-    """Keys that a dataclass takes, with their types."""
+    """Keys that a dataclass takes, with their types; found once per class, since a table asks in each of its rows."""
     hints = typing.get_type_hints(cls)
     return {field.name: hints[field.name] for field in dataclasses.fields(cls) if field.init}
 

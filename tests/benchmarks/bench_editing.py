@@ -20,6 +20,7 @@ from commission.geometry.occupancy import OccupancyGrid
 from commission.io.journal import Journal
 from commission.io.journal_replay import restore
 from commission.io.project_file import save_project
+from commission.planning.route_check import FloorDistances
 from commission.site.editing import reflectors as edits
 from commission.site.editing import routes as route_edits
 from commission.site.editing import snapping
@@ -73,8 +74,8 @@ def main() -> int:
     grid = project.floor_map.occupancy() if project.floor_map is not None else None
     assert project.floor_map is not None
     assert grid is not None
-    floor_alone = replace(project, routes=())
-    _, ready = timed("prepare the floor map, once", lambda: checked(floor_alone, None), None)
+    timed("prepare the floor map, once", lambda: FloorDistances(project.floor_map), None)
+    ready = checked(replace(project, routes=()), None)
     some = [r.id for r in project.reflectors.reflectors[:200]]
     checked(project, ready)
     results = [

@@ -109,7 +109,7 @@ def on_route(page: OpenPage, runtime: Runtime) -> None:
 
 def measured(page: OpenPage, runtime: Runtime) -> None:
     """A distance has been measured."""
-    page.press(MeasureTool().value)
+    page.press(MeasureTool.name)
     until(lambda: any(isinstance(editor.tool, MeasureTool) for editor in editors_of(runtime.state)))
     first, second = runtime.state.project.reflectors.reflectors[:2]
     for reflector in (first, second):
@@ -167,7 +167,7 @@ def files(page: OpenPage, _runtime: Runtime) -> None:
 
 def drawing(page: OpenPage, runtime: Runtime) -> None:
     """An obstacle is being drawn."""
-    page.press(ObstacleTool().value)
+    page.press(ObstacleTool.name)
     until(lambda: any(isinstance(editor.tool, ObstacleTool) for editor in editors_of(runtime.state)))
     for count, place in enumerate(((9.0, 4.0), (11.0, 4.0), (10.0, 5.5)), start=1):
         page.click_at(place)
@@ -198,7 +198,7 @@ def equipment(page: OpenPage, _runtime: Runtime) -> None:
 
 def at_station(page: OpenPage, runtime: Runtime) -> None:
     """A station has been placed, and is selected."""
-    page.press(StationTool().value)
+    page.press(StationTool.name)
     until(lambda: any(isinstance(editor.tool, StationTool) for editor in editors_of(runtime.state)))
     page.click_at((9.0, 6.5))
     until(lambda: len(runtime.state.project.stations) == 1)
