@@ -6,10 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from commission.site.checks import check_fields
-from commission.site.quantity import COORDINATE, NOT_NEGATIVE, PERCENT, SHARE, Bounds, Quantity
+from commission.site.quantity import NOT_NEGATIVE, PERCENT, SHARE, Bounds, Quantity, X, Y
 
-_X = Quantity(label="x", unit="m", bounds=COORDINATE, decimals=4)
-_Y = Quantity(label="y", unit="m", bounds=COORDINATE, decimals=4)
 _FREQUENCY = Bounds.between(0.0, 1000.0)
 
 
@@ -17,9 +15,9 @@ _FREQUENCY = Bounds.between(0.0, 1000.0)
 class ShinyObject:
     """A fixed object that the scanner takes for a reflector: an upright plate or post of a given width."""
 
-    x: Annotated[float, _X]
+    x: Annotated[float, X]
     """Center, x in the map frame."""
-    y: Annotated[float, _Y]
+    y: Annotated[float, Y]
     """Center, y in the map frame."""
     radius: Annotated[float, Quantity(label="Radius", unit="m", bounds=Bounds.between(0.001, 2.0), decimals=4)] = 0.1
     """Half its width."""
@@ -32,9 +30,9 @@ class ShinyObject:
 class TiltedStretch:
     """A circular patch of uneven floor on which the laser meets the ground early."""
 
-    x: Annotated[float, _X]
+    x: Annotated[float, X]
     """Center, x in the map frame."""
-    y: Annotated[float, _Y]
+    y: Annotated[float, Y]
     """Center, y in the map frame."""
     radius: Annotated[float, Quantity(label="Radius", unit="m", bounds=NOT_NEGATIVE, decimals=4)]
     """Radius of the patch."""

@@ -181,6 +181,10 @@ class Quantity:
         """Return a value as the page writes it: number, with the decimals of its step, and unit."""
         return _joined(f"{value * self.scale:.{_decimals(self.step)}f}", self.shown_unit)
 
+    def brief(self, value: float) -> str:
+        """Return a value as the page writes it where room is scarce: with no digit that says nothing."""
+        return _with_unit(self.on_page(value), self.shown_unit)
+
     def refusal(self, value: float) -> str:
         """Say in the page's unit why a value is not allowed; empty when it is."""
         if value in self.bounds:
@@ -195,6 +199,10 @@ class Quantity:
         # Adding zero turns -0.0 into 0.0.
         rounded = float(f"{value:.{SIGNIFICANT}g}") if self.decimals is None else round(float(value), self.decimals)
         return rounded + 0.0 if rounded in self.bounds else value
+
+
+X = Quantity(label="x", unit="m", bounds=COORDINATE, decimals=4)
+Y = Quantity(label="y", unit="m", bounds=COORDINATE, decimals=4)
 
 
 @dataclass(frozen=True, slots=True)

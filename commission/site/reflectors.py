@@ -12,7 +12,6 @@ from commission.errors import ProjectError
 from commission.geometry.arrays import FloatArray, frozen
 from commission.site.checks import check_fields
 from commission.site.quantity import (
-    COORDINATE,
     DEGREES,
     MILLIMETRES,
     NOT_NEGATIVE,
@@ -21,6 +20,8 @@ from commission.site.quantity import (
     Quantity,
     Switch,
     Words,
+    X,
+    Y,
 )
 
 _RADIUS = Bounds(0.0, 1.0, excludes_low=True)
@@ -39,9 +40,9 @@ class Reflector:
 
     id: Annotated[str, Words("Name")]
     """Name, unique within the map."""
-    x: Annotated[float, Quantity(label="x", unit="m", bounds=COORDINATE, decimals=4)]
+    x: Annotated[float, X]
     """Center, x in the map frame."""
-    y: Annotated[float, Quantity(label="y", unit="m", bounds=COORDINATE, decimals=4)]
+    y: Annotated[float, Y]
     """Center, y in the map frame."""
     radius: Annotated[
         float, Quantity(label="Radius", unit="m", shown=MILLIMETRES, bounds=_RADIUS, step=0.1, decimals=4)

@@ -9,12 +9,17 @@ import numpy as np
 
 from commission.geometry.arrays import FloatArray, frozen
 from commission.site.checks import check_fields
-from commission.site.quantity import COORDINATE, DEGREES, MILLIMETRES, Bounds, Quantity, Words
+from commission.site.quantity import DEGREES, MILLIMETRES, Bounds, Quantity, Words, X, Y
 
 DOCKING = 0.01
 """Accuracy that taking over a load usually needs [m]."""
 TRANSIT = 0.1
 """Accuracy that waiting and passing usually need [m]."""
+
+
+ACCURACY = Quantity(
+    label="Within", unit="m", shown=MILLIMETRES, bounds=Bounds.between(0.001, 10.0), step=0.1, decimals=4
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,23 +28,13 @@ class Station:
 
     name: Annotated[str, Words("Name")]
     """Name, unique within the project."""
-    x: Annotated[float, Quantity(label="x", unit="m", bounds=COORDINATE, decimals=4)]
+    x: Annotated[float, X]
     """Place of the vehicle's base, x in the map frame."""
-    y: Annotated[float, Quantity(label="y", unit="m", bounds=COORDINATE, decimals=4)]
+    y: Annotated[float, Y]
     """Place of the vehicle's base, y in the map frame."""
     heading: Annotated[float, Quantity(label="Heading", unit="rad", shown=DEGREES, step=0.01, decimals=6)] = 0.0
     """Heading of the vehicle, map frame."""
-    required_accuracy: Annotated[
-        float,
-        Quantity(
-            label="Within",
-            unit="m",
-            shown=MILLIMETRES,
-            bounds=Bounds.between(0.001, 10.0),
-            step=0.1,
-            decimals=4,
-        ),
-    ] = TRANSIT
+    required_accuracy: Annotated[float, ACCURACY] = TRANSIT
     """Largest allowed 2-sigma of the position there, each axis: 0.01 m to dock, 0.1 m to pass."""
 
     def __post_init__(self) -> None:

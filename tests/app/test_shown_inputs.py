@@ -230,7 +230,7 @@ def test_numbers_of_what_is_selected_are_shown_and_set_in_the_units_of_their_lab
     try:
         panel = SelectionPanel(server.gui, taking(posted), ME)
         panel.draw_slowly(view_of(state))
-        inside = panel._station._numbers.values() if what == "station" else panel._fields.values()
+        inside = (panel._station._fields if what == "station" else panel._fields).values()
         widgets = {each.label: each for each in inside if is_number(each)}
         assert set(widgets) == set(fields)
         for label, (field, factor) in fields.items():

@@ -51,7 +51,9 @@ def _reflectors(project: Project, rng: random.Random) -> Project:
             lambda: edits.delete(reflectors, chosen) if len(ids) > MOST else reflectors,
             lambda: edits.mirror(reflectors, chosen, edits.Axis(1.0, 1.0, rng.random())),
             lambda: edits.set_locked(reflectors, chosen, rng.random() < 0.3),
-            lambda: edits.set_values(reflectors, chosen, {"note": f"<{rng.random()}>; ä", "height": rng.random()}),
+            lambda: edits.set_value(
+                edits.set_value(reflectors, chosen, "note", f"<{rng.random()}>; ä"), chosen, "height", rng.random()
+            ),
         )
     )
     return replace(project, reflectors=changed())
@@ -64,9 +66,10 @@ def _routes(project: Project, rng: random.Random) -> Project:
         return replace(project, routes=(*project.routes[-MOST:], route))
     route = project.routes[-1]
     changed = routes.move_point(route, 0, 1, (rng.random(), rng.random()))
-    changed = routes.set_direction(changed, 0, rng.choice(list(Direction)))
+    changed = routes.set_value(changed, 0, "direction", rng.choice(list(Direction)))
     return replace(
-        project, routes=routes.put(project.routes, routes.set_speed(changed, 0, rng.random() + 0.1), route.name)
+        project,
+        routes=routes.put(project.routes, routes.set_value(changed, 0, "speed", rng.random() + 0.1), route.name),
     )
 
 

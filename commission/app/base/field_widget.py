@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from viser import GuiApi, GuiInputHandle, GuiNumberHandle, GuiSliderHandle
 
-from commission.site.fields import FieldInfo
+from commission.site.fields import FieldInfo, field_info, get_field
 from commission.site.quantity import LARGEST, Choice, Quantity, Switch
 
 
@@ -54,7 +54,7 @@ def meant(info: FieldInfo, content: Any) -> Any:
         the field's bounds do not allow it; says so in the page's unit.
     """
     if info.quantity is None:
-        return info.kind(content)
+        return content.strip() if info.kind is str else info.kind(content)
     if isinstance(content, tuple | list):
         return tuple(_allowed(info.quantity, float(each)) for each in typing.cast("Iterable[Any]", content))
     number = _allowed(info.quantity, content)
@@ -71,6 +71,25 @@ def write_held(widget: GuiInputHandle[Any], content: Any) -> None:
             bounded.max = content
     if widget.value != content:
         widget.value = content
+
+
+class Entry:
+    """A field's widget that posts nothing: what it holds is read when something is done with it.
+
+    Parameters
+    ----------
+    gui : where it is made.
+    name : the field's dotted name.
+    of : a value that has the field; the widget begins with what it has.
+    """
+
+    def __init__(self, gui: GuiApi, name: str, of: object) -> None:
+        self._info = field_info(of, name)
+        self._widget = add_widget(gui, self._info, get_field(of, name))
+
+    def read(self) -> Any:
+        """Return what it means, in the unit of code and files; raises ValueError when the bounds do not allow it."""
+        return meant(self._info, self._widget.value)
 
 
 def _allowed(quantity: Quantity, content: float) -> float:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from commission.app.base.actions import Action, Phase, Point
-from commission.app.editing.editor import ControlPoint, Snapping
+from commission.app.editing.editor import ControlPoint
 from commission.app.editing.tool import Tool
-from commission.site.routes import Direction
+from commission.site.editing.reflectors import MOST_COPIES
+from commission.site.quantity import COORDINATE, Bounds, Quantity, X, Y
 from commission.site.scanner import Scanner
 from commission.site.vehicle import Vehicle
 
@@ -21,11 +23,13 @@ class ChooseTool(Action):
 
 
 @dataclass(frozen=True, slots=True)
-class ChooseSnapping(Action):
-    """Change what attracts reflectors."""
+class SetSnapping(Action):
+    """Change one thing about what attracts reflectors."""
 
-    snapping: Snapping
-    """What attracts from now on."""
+    name: str
+    """Field of `Snapping`."""
+    value: object
+    """New value, SI."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +77,7 @@ class SetSelected(Action):
 
     name: str
     """Field of `Reflector`."""
-    value: float | str | bool
+    value: object
     """New value, SI and radians."""
 
 
@@ -81,8 +85,8 @@ class SetSelected(Action):
 class MirrorSelected(Action):
     """Mirror the selected reflectors about a line."""
 
-    through: Point
-    """A point of the line [m]."""
+    through: Annotated[Point, Quantity(label="Line at", unit="m", bounds=COORDINATE)]
+    """A point of the line."""
     angle: float
     """Its direction, map frame [rad]."""
     copy: bool = False
@@ -93,9 +97,13 @@ class MirrorSelected(Action):
 class RepeatSelected(Action):
     """Copy the selected reflectors several times along a line."""
 
-    step: Point
-    """From each copy to the next [m, m]."""
-    count: int
+    step: Annotated[
+        Point,
+        Quantity(label="Step x", unit="m", bounds=COORDINATE),
+        Quantity(label="Step y", unit="m", bounds=COORDINATE),
+    ]
+    """From each copy to the next, map frame."""
+    count: Annotated[int, Quantity(label="Copies", bounds=Bounds.between(1, MOST_COPIES), step=1, entry=(1, 1000))]
     """How many copies."""
 
 
@@ -138,20 +146,30 @@ class DeleteControlPoint(Action):
 class PlaceControlPoint(Action):
     """Put the selected control point somewhere."""
 
-    place: Point
-    """Where [m]."""
+    place: Annotated[Point, X, Y]
+    """Where, map frame."""
     dragged: bool = False
     """Whether a drag put it there: that is an undo step of its own."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetCoordinate(Action):
+    """Put the selected control point elsewhere along one axis."""
+
+    name: str
+    """Number of `PlaceControlPoint`: `place[0]` or `place[1]`."""
+    value: object
+    """New value [m]."""
 
 
 @dataclass(frozen=True, slots=True)
 class SetSegment(Action):
     """Set how the selected control point's segment is driven."""
 
-    direction: Direction
-    """`forward` or `reverse`."""
-    speed: float | None
-    """Speed [m/s]; none: the route's."""
+    name: str
+    """Field of `Segment`: `direction` or `speed`."""
+    value: object
+    """New value, SI."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import Annotated
 
 from commission.app.base.actions import Point, Sender
 from commission.app.base.state import AppState
 from commission.app.editing.tool import Tool
+from commission.site.checks import check_fields
+from commission.site.quantity import Bounds, Quantity, Switch
 
 
 class Grab(StrEnum):
@@ -56,16 +58,15 @@ class ControlPoint:
 class Snapping:
     """What attracts a reflector that is placed or dragged."""
 
-    walls: bool = True
-    """The nearest wall's surface."""
-    neighbors: bool = False
-    """Row and column of other reflectors."""
-    grid: float = 0.0
-    """Multiples of this spacing [m]; 0: no grid."""
+    walls: Annotated[bool, Switch("To walls")] = True
+    """Against the nearest wall, a flat plate facing away."""
+    neighbors: Annotated[bool, Switch("To neighbors")] = False
+    """Onto rows and columns of other reflectors."""
+    grid: Annotated[float, Quantity(label="Grid", unit="m", bounds=Bounds.between(0.0, 100.0), step=0.01)] = 0.0
+    """Onto multiples of this spacing; 0: no grid."""
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.grid) and 0.0 <= self.grid <= 100.0):
-            raise ValueError(f"spacing of the grid is {self.grid:g}; expected 0 (none) to 100 m")
+        check_fields(self, "snapping.")
 
 
 @dataclass(frozen=True, slots=True)

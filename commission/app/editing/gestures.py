@@ -131,7 +131,7 @@ def moved(project: Project, editor: Editor) -> ReflectorMap:
     target = snapped(project, replace(only, x=only.x + dx, y=only.y + dy), editor, (only.id,))
     placed = edits.place(project.reflectors, {only.id: (target.x, target.y)})
     if only.kind is ReflectorKind.FLAT and target.heading != only.heading:
-        return edits.set_values(placed, [only.id], {"heading": target.heading})
+        return edits.set_value(placed, [only.id], "heading", target.heading)
     return placed
 
 

@@ -26,6 +26,7 @@ from commission.app.editing.station_gestures import moved_station, station_at
 from commission.errors import UsageError
 from commission.site.editing import reflectors as edits
 from commission.site.editing.snapping import snap_to_wall
+from commission.site.fields import with_field
 from commission.site.reflectors import ReflectorMap
 
 
@@ -69,10 +70,10 @@ def choose_tool(action: actions.ChooseTool, state: AppState, sender: Sender) -> 
 
 
 @reduce.register
-def choose_snapping(action: actions.ChooseSnapping, state: AppState, sender: Sender) -> Outcome:
-    return Outcome(
-        state.with_browser(sender.browser, replace(editor_of(state, sender.browser), snapping=action.snapping))
-    )
+def set_snapping(action: actions.SetSnapping, state: AppState, sender: Sender) -> Outcome:
+    editor = editor_of(state, sender.browser)
+    snapping = with_field(editor.snapping, action.name, action.value, "attraction")
+    return Outcome(state.with_browser(sender.browser, replace(editor, snapping=snapping)))
 
 
 @reduce.register
@@ -241,7 +242,7 @@ def set_selected(action: actions.SetSelected, state: AppState, sender: Sender) -
         verb = "lock" if action.value else "unlock"
         changed = edits.set_locked(state.project.reflectors, ids, bool(action.value))
         return with_reflectors(state, changed, Edit(f"{verb} {what}", sender))
-    changed = edits.set_values(state.project.reflectors, ids, {action.name: action.value})
+    changed = edits.set_value(state.project.reflectors, ids, action.name, action.value)
     edit = Edit(f"set {action.name} of {what}", sender, f"{ids}:{action.name}")
     outcome = _telling_of_locked(state, ids, with_reflectors(state, changed, edit))
     if action.name != "id":

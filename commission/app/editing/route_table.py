@@ -17,7 +17,7 @@ from commission.app.editing.editor import ControlPoint, Editor
 from commission.app.editing.station_actions import SelectStation
 from commission.site.project import Project
 from commission.site.routes import Direction, Route
-from commission.site.stations import Station
+from commission.site.stations import ACCURACY, Station
 from commission.studies.problems import ProblemsResult
 
 MOST_ROWS = 60
@@ -49,8 +49,10 @@ def route_row(route: Route, violations: int) -> Row:
 
 def station_row(station: Station) -> Row:
     """Return a station on one line."""
-    accuracy = f"{1000.0 * station.required_accuracy:g} mm"
-    return Row(f"{station.name}   {accuracy}  {station.x:.2f}  {station.y:.2f} m", station=station.name)
+    return Row(
+        f"{station.name}   {ACCURACY.brief(station.required_accuracy)}  {station.x:.2f}  {station.y:.2f} m",
+        station=station.name,
+    )
 
 
 def rows(project: Project, violations: Counter[str], sought: str) -> list[Row]:

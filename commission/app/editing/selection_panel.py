@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
-from viser import GuiApi, GuiEvent, GuiInputHandle
+from viser import GuiApi, GuiEvent
 
 from commission.app.base import actions as page_actions
 from commission.app.base import theme
+from commission.app.base.field_widget import Entry
+from commission.app.base.inputs import Inputs, show
 from commission.app.base.panel import BasePanel, Post, escaped, posting, table
+from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing import actions
 from commission.app.editing.editor import Editor
@@ -19,41 +20,11 @@ from commission.app.editing.gestures import selected_of
 from commission.app.editing.route_fields import RouteFields
 from commission.app.editing.site_tools import measurement
 from commission.app.editing.station_fields import StationFields
-from commission.site.fields import field_hints
+from commission.site.fields import get_field, names_of
 from commission.site.reflectors import Reflector, ReflectorKind
 
-DEG = math.degrees(1.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Field:
-    """How a value of a reflector is shown."""
-
-    label: str
-    """Text beside it, with its unit."""
-    scale: float
-    """Number on the page for one SI unit."""
-    step: float
-    """Step of the number, in the page's unit; it is rounded to that."""
-
-
-NUMBERS = {
-    "x": Field("x [m]", 1.0, 0.001),
-    "y": Field("y [m]", 1.0, 0.001),
-    "radius": Field("Radius [mm]", 1000.0, 0.1),
-    "heading": Field("Faces [°]", DEG, 0.01),
-    "height": Field("Height [m]", 1.0, 0.001),
-    "sigma": Field("Survey 1σ [mm]", 1000.0, 0.1),
-}
-TEXTS = {"id": "Name", "layer": "Layer", "note": "Note"}
 ALONE = ("id", "x", "y")
 """Fields that several reflectors cannot share."""
-
-
-def in_page_units(name: str, value: float) -> float:
-    """Return a number as the page shows it."""
-    field = NUMBERS[name]
-    return round(value * field.scale, max(0, -math.floor(math.log10(field.step))))
 
 
 class SelectionPanel(BasePanel):
@@ -71,8 +42,9 @@ class SelectionPanel(BasePanel):
         self._reflectors: tuple[Reflector, ...] = ()
         self._drawn: tuple[object, ...] = ()
         self._head = gui.add_html("")
-        self._fields: dict[str, GuiInputHandle[Any]] = {}
-        self._add_fields()
+        self._inputs = Inputs(gui, post, actions.SetSelected, self._read)
+        example = Reflector(id="R1", x=0.0, y=0.0)
+        self._fields = {name: self._inputs.field(name, example) for name in names_of(Reflector)}
         gui.add_html(theme.WIDE)
         self._buttons = gui.add_button_group("", ("Duplicate", "Delete", "To wall"), visible=False)
         self._buttons.on_click(posting(post, self._pressed))
@@ -82,37 +54,6 @@ class SelectionPanel(BasePanel):
             self._add_repeat()
         self._route = RouteFields(gui, post, browser)
         self._station = StationFields(gui, post, browser)
-
-    def _add_fields(self) -> None:
-        """Add an input for each value of a reflector, in the order in which one thinks of them."""
-        hints = field_hints(Reflector)
-        gui = self._gui
-        for name in ("id", "x", "y", "radius", "kind", "heading", "height", "sigma", "layer", "note", "locked"):
-            hint = hints[name]
-            if name in NUMBERS:
-                field = NUMBERS[name]
-                widget: Any = gui.add_number(field.label, 0.0, step=field.step, hint=hint, visible=False)
-            elif name in TEXTS:
-                widget = gui.add_text(TEXTS[name], "", hint=hint, visible=False)
-            elif name == "kind":
-                widget = gui.add_dropdown("Kind", tuple(ReflectorKind), hint=hint, visible=False)
-            else:
-                widget = gui.add_checkbox("Locked", False, hint=hint, visible=False)
-            widget.on_update(posting(self._post, self._setting(name)))
-            self._fields[name] = widget
-
-    def _setting(self, name: str) -> Callable[[GuiEvent[Any]], page_actions.Action]:
-        """Return what makes the action of one field's widget."""
-
-        def action(event: GuiEvent[Any]) -> page_actions.Action:
-            value = event.target.value
-            if name in NUMBERS:
-                value = float(value) / NUMBERS[name].scale
-            elif name == "kind":
-                value = ReflectorKind(value)
-            return actions.SetSelected(name, value)
-
-        return action
 
     def _pressed(self, event: GuiEvent[Any]) -> page_actions.Action:
         """Return the action of one of the buttons."""
@@ -127,13 +68,13 @@ class SelectionPanel(BasePanel):
     def _add_mirror(self) -> None:
         gui = self._gui
         axis = gui.add_dropdown("About", ("x =", "y ="), hint="A line across x, or one across y.")
-        at = gui.add_number("Line at [m]", 0.0, step=0.001)
+        at = Entry(gui, "through[0]", actions.MirrorSelected((0.0, 0.0), 0.0))
         gui.add_html(theme.WIDE)
         mirror = gui.add_button_group("", ("Mirror", "Mirrored copy"))
 
         def mirrored(event: GuiEvent[Any]) -> page_actions.Action:
             upright = axis.value == "x ="
-            through = (float(at.value), 0.0) if upright else (0.0, float(at.value))
+            through = (at.read(), 0.0) if upright else (0.0, at.read())
             return actions.MirrorSelected(
                 through, 0.5 * math.pi if upright else 0.0, event.target.value == "Mirrored copy"
             )
@@ -142,14 +83,13 @@ class SelectionPanel(BasePanel):
 
     def _add_repeat(self) -> None:
         gui = self._gui
-        dx = gui.add_number("Step x [m]", 2.0, step=0.001)
-        dy = gui.add_number("Step y [m]", 0.0, step=0.001)
-        count = gui.add_number("Copies", 3, min=1, max=1000, step=1)
+        first = actions.RepeatSelected((2.0, 0.0), 3)
+        dx, dy, count = (Entry(gui, name, first) for name in names_of(actions.RepeatSelected))
         repeat = gui.add_button("Repeat", color="gray", hint="Copies along a line, each one step from the one before.")
         repeat.on_click(
             posting(
                 self._post,
-                lambda _event: actions.RepeatSelected((float(dx.value), float(dy.value)), int(count.value)),
+                lambda _event: actions.RepeatSelected((dx.read(), dy.read()), count.read()),
             )
         )
 
@@ -160,29 +100,24 @@ class SelectionPanel(BasePanel):
         if self._drawn and self._drawn[0] is drawn[0] and self._drawn[1:] == drawn[1:]:
             return
         self._drawn = drawn
-        self._reflectors = selected_of(view.state.project, editor)
+        selected = selected_of(view.state.project, editor)
+        if [r.id for r in selected] != [r.id for r in self._reflectors]:
+            self._inputs.forget()
+        self._reflectors = selected
+        self._inputs.follow(view.state)
         self._head.content = _company(self._browser, len(view.state.browsers)) + _head(editor, self._reflectors)
         self._buttons.visible = self._copies.visible = bool(self._reflectors)
         for name, widget in self._fields.items():
-            shown = bool(self._reflectors) and (len(self._reflectors) == 1 or name not in ALONE)
+            shown = bool(selected) and (len(self._reflectors) == 1 or name not in ALONE)
             if name == "heading":
                 shown = shown and any(r.kind is ReflectorKind.FLAT for r in self._reflectors)
-            if widget.visible is not shown:
-                widget.visible = shown
-            if shown:
-                self._show_value(name, widget)
-        self._route.show(view.state.project, editor)
-        self._station.show(view.state.project, editor)
+            show(widget, visible=shown)
+        self._route.show(view.state)
+        self._station.show(view.state)
 
-    def _show_value(self, name: str, widget: GuiInputHandle[Any]) -> None:
-        """Write a value into its widget, the first one's where several are selected."""
-        value: Any = getattr(self._reflectors[0], name)
-        if name in NUMBERS:
-            value = in_page_units(name, value)
-        elif name == "kind":
-            value = value.value
-        if widget.value != value:
-            widget.value = value
+    def _read(self, _state: AppState, name: str) -> Any:
+        """Return a value of the selection, the first one's where several are selected; None: of nothing."""
+        return get_field(self._reflectors[0], name) if self._reflectors else None
 
 
 def _company(browser: int, browsers: int) -> str:

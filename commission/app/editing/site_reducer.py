@@ -92,13 +92,19 @@ def place_control_point(action: actions.PlaceControlPoint, state: AppState, send
 
 
 @reduce.register
+def set_coordinate(action: actions.SetCoordinate, state: AppState, sender: Sender) -> Outcome:
+    _, _, segment, point = _selected(state, sender)
+    x, y = (float(value) for value in segment.control_points[point.index])
+    return reduce(with_field(actions.PlaceControlPoint((x, y)), action.name, action.value), state, sender)
+
+
+@reduce.register
 def set_segment(action: actions.SetSegment, state: AppState, sender: Sender) -> Outcome:
     _, route, segment, point = _selected(state, sender)
-    if (action.direction, action.speed) == (segment.direction, route.speed_of(segment)):
+    if action.value == (route.speed_of(segment) if action.name == "speed" else get_field(segment, action.name)):
         return Outcome(state)
-    changed = edits.set_direction(route, point.segment, action.direction)
-    changed = edits.set_speed(changed, point.segment, action.speed)
-    edit = Edit(f"set drive of {route.name}", sender, f"{route.name}:{point.segment}:drive")
+    changed = edits.set_value(route, point.segment, action.name, action.value)
+    edit = Edit(f"set {action.name} of {route.name}", sender, f"{route.name}:{point.segment}:{action.name}")
     return with_routes(state, edits.put(state.project.routes, changed, route.name), edit, point)
 
 

@@ -44,7 +44,7 @@ class SetStation(Action):
 
     field: str
     """Field of `Station`."""
-    value: float | str
+    value: object
     """New value, SI and radians."""
 
 

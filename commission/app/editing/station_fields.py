@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from typing import Any
 
 from viser import GuiApi, GuiEvent
 
 from commission.app.base import actions as page_actions
 from commission.app.base import theme
-from commission.app.base.panel import Post, posting, write
+from commission.app.base.inputs import Inputs, show
+from commission.app.base.panel import Post, posting
+from commission.app.base.state import AppState
 from commission.app.editing import station_actions as actions
-from commission.app.editing.editor import Editor
+from commission.app.editing.editor import editor_of
 from commission.app.editing.station_gestures import station_of
-from commission.site.fields import field_hints
-from commission.site.project import Project
-from commission.site.stations import DOCKING, TRANSIT, Station
+from commission.site.fields import get_field, names_of
+from commission.site.stations import ACCURACY, DOCKING, TRANSIT, Station
 
-DEG, MM = math.degrees(1.0), 1000.0
-SCALES = {"x": 1.0, "y": 1.0, "heading": DEG, "required_accuracy": MM}
-"""Number on the page for one SI unit."""
-DOCK, PASS = f"{DOCKING * MM:.0f} mm", f"{TRANSIT * MM:.0f} mm"
+DOCK, PASS = (ACCURACY.brief(accuracy) for accuracy in (DOCKING, TRANSIT))
 ALIGN, DELETE = "Onto route", "Delete"
 
 
@@ -29,29 +25,20 @@ class StationFields:
     """Name, pose, required accuracy, buttons."""
 
     def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
-        self._post, self._browser = post, browser
-        hints = field_hints(Station)
+        self._browser, self._shown = browser, ""
+        self._inputs = Inputs(gui, post, actions.SetStation, self._read)
         self._folder = gui.add_folder("Station", visible=False)
         with self._folder:
-            self._name = gui.add_text("Name", "", hint=hints["name"])
-            self._name.on_update(posting(post, self._setting("name", lambda typed: str(typed).strip())))
-            self._numbers: dict[str, Any] = {
-                "x": gui.add_number("x [m]", 0.0, step=0.001, hint=hints["x"]),
-                "y": gui.add_number("y [m]", 0.0, step=0.001, hint=hints["y"]),
-                "heading": gui.add_number("Heading [°]", 0.0, step=0.01, hint=hints["heading"]),
-                "required_accuracy": gui.add_number("Within [mm]", 100.0, step=0.1, hint=hints["required_accuracy"]),
-            }
-            for field, widget in self._numbers.items():
-                widget.on_update(posting(post, self._setting(field, lambda typed, f=field: float(typed) / SCALES[f])))
+            example = Station(name="S1", x=0.0, y=0.0)
+            self._fields = {name: self._inputs.field(name, example) for name in names_of(Station)}
             gui.add_html(theme.WIDE)
             buttons = gui.add_button_group("", (DOCK, PASS, ALIGN, DELETE))
             buttons.on_click(posting(post, self._pressed))
 
-    def _setting(
-        self, field: str, meant: Callable[[Any], float | str]
-    ) -> Callable[[GuiEvent[Any]], page_actions.Action]:
-        """Return what makes the action of one field's widget."""
-        return lambda event: actions.SetStation(field, meant(event.target.value))
+    def _read(self, state: AppState, name: str) -> Any:
+        """Return a value of the selected station; None without one."""
+        station = station_of(state.project, editor_of(state, self._browser))
+        return None if station is None else get_field(station, name)
 
     def _pressed(self, event: GuiEvent[Any]) -> page_actions.Action:
         match event.target.value:
@@ -63,13 +50,11 @@ class StationFields:
                 accuracy = DOCKING if label == DOCK else TRANSIT
                 return actions.SetStation("required_accuracy", accuracy)
 
-    def show(self, project: Project, editor: Editor) -> None:
+    def show(self, state: AppState) -> None:
         """Show the selected station."""
-        station = station_of(project, editor)
-        if self._folder.visible is not (station is not None):
-            self._folder.visible = station is not None
-        if station is None:
-            return
-        write(self._name, station.name)
-        for field, widget in self._numbers.items():
-            write(widget, round(float(getattr(station, field)) * SCALES[field], 3))
+        station = station_of(state.project, editor_of(state, self._browser))
+        show(self._folder, visible=station is not None)
+        if station is not None and station.name != self._shown:
+            self._inputs.forget()
+        self._shown = "" if station is None else station.name
+        self._inputs.follow(state)

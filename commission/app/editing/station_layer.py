@@ -13,7 +13,7 @@ from commission.app.base.view import PageView
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
-from commission.site.stations import Station
+from commission.site.stations import ACCURACY, Station
 
 MOST_LABELS = 60
 MARK = np.array([(1.6, 0.0), (0.6, 1.0), (-1.0, 1.0), (-1.0, -1.0), (0.6, -1.0)])
@@ -68,7 +68,7 @@ class StationLayer(BaseLayer):
     def _write(self, station: Station, below: float) -> None:
         """Write name and accuracy under a station."""
         position = (station.x, station.y - below, theme.Height.LABEL)
-        text = f"{station.name}  {1000.0 * station.required_accuracy:g} mm"
+        text = f"{station.name}  {ACCURACY.brief(station.required_accuracy)}"
         label = self._labels.get(station.name)
         if label is None:
             self._labels[station.name] = self.scene.add_label(

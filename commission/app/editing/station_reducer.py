@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
 
 from commission.app.base.actions import Sender
 from commission.app.base.effects import FlyTo
@@ -15,6 +14,7 @@ from commission.app.editing.editor import editor_of
 from commission.app.editing.station_gestures import station_of
 from commission.errors import UsageError
 from commission.site.editing import stations as edits
+from commission.site.fields import with_field
 from commission.site.stations import Station
 
 WORDS = {"x": "place", "y": "place", "heading": "heading", "required_accuracy": "accuracy"}
@@ -72,8 +72,7 @@ def move_station(action: actions.MoveStation, state: AppState, sender: Sender) -
 @reduce.register
 def set_station(action: actions.SetStation, state: AppState, sender: Sender) -> Outcome:
     station = _selected(state, sender)
-    changes: dict[str, Any] = {action.field: action.value}
-    changed = replace(station, **changes)
+    changed = with_field(station, action.field, action.value, "field of a station")
     what = f"rename {station.name}" if action.field == "name" else f"set {WORDS[action.field]} of {station.name}"
     key = "" if action.field == "name" else f"{station.name}:{action.field}"
     stations = edits.put(state.project.stations, changed, station.name)

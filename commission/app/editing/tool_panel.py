@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, TypeAlias
 
 from viser import GuiApi
 
 from commission.app.base import theme
 from commission.app.base.actions import Action
-from commission.app.base.inputs import show
+from commission.app.base.inputs import Inputs, show
 from commission.app.base.panel import BasePanel, Post, posting, write_label
 from commission.app.base.view import PageView
 from commission.app.editing.actions import (
     Cancel,
-    ChooseSnapping,
     ChooseTool,
     DeleteSelected,
     DuplicateSelected,
     Finish,
+    SetSnapping,
 )
 from commission.app.editing.editor import Snapping, editor_of
 from commission.app.editing.site_tools import SITE_TOOLS, MeasureTool, PlaceTool, RouteTool, StationTool
 from commission.app.editing.tool import Tool
+from commission.site.fields import get_field, names_of
 
 SELECT = "Select"
 """On the button that puts the tool away."""
@@ -77,19 +77,12 @@ class SnappingPanel(BasePanel):
     """What attracts a reflector that is placed or dragged."""
 
     def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
-        self._browser = browser
-        self._snapping = Snapping()
-        self._walls = gui.add_checkbox("To walls", True, hint="Against the nearest wall, a flat plate facing away.")
-        self._neighbors = gui.add_checkbox("To neighbors", False, hint="Onto rows and columns of other reflectors.")
-        self._grid = gui.add_number("Grid [m]", 0.0, min=0.0, max=100.0, step=0.01, hint="0: no grid.")
-        for widget in (self._walls, self._neighbors, self._grid):
-            widget.on_update(posting(post, lambda _event: self._chosen()))
-
-    def _chosen(self) -> ChooseSnapping:
-        """Return the action of the widgets together."""
-        walls, neighbors, grid = self._walls.value, self._neighbors.value, float(self._grid.value)
-        return ChooseSnapping(replace(self._snapping, walls=walls, neighbors=neighbors, grid=grid))
+        self._inputs = Inputs(
+            gui, post, SetSnapping, lambda state, name: get_field(editor_of(state, browser).snapping, name)
+        )
+        for name in names_of(Snapping):
+            self._inputs.field(name, Snapping())
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow the editor."""
-        self._snapping = editor_of(view.state, self._browser).snapping
+        self._inputs.follow(view.state)

@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,6 +17,7 @@ from commission.errors import UsageError
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray
 from commission.site.editing.names import fresh_names
+from commission.site.fields import with_field
 from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
 
 MOST_COPIES = 10_000
@@ -194,14 +194,15 @@ def row(start: tuple[float, float], end: tuple[float, float], spacing: float) ->
     return np.asarray(start) + share * (np.asarray(end, dtype=np.float64) - np.asarray(start))
 
 
-def set_values(reflectors: ReflectorMap, ids: Collection[str], values: Mapping[str, Any]) -> ReflectorMap:
-    """Set fields of the selection, as typed into a table.
+def set_value(reflectors: ReflectorMap, ids: Collection[str], name: str, value: object) -> ReflectorMap:
+    """Set one field of the selection, as typed into a table.
 
     Parameters
     ----------
     reflectors : those there are.
     ids : the selection; exactly one when `id` is set.
-    values : by the names of the fields of `Reflector`; `set_locked` is for `locked`.
+    name : of a field of `Reflector`; `set_locked` is for `locked`.
+    value : its new content, SI and radians.
 
     Raises
     ------
@@ -212,13 +213,11 @@ def set_values(reflectors: ReflectorMap, ids: Collection[str], values: Mapping[s
     ValueError
         a value is out of its range.
     """
-    allowed = [field.name for field in fields(Reflector) if field.name != "locked"]
-    for name in values:
-        if name not in allowed:
-            raise UsageError(f"a reflector has no field {name!r} to set; expected one of: {', '.join(allowed)}")
-    if "id" in values and len(ids) != 1:
-        raise UsageError(f"{len(ids)} reflectors would be called {values['id']!r}; expected one to be renamed")
-    return _change(reflectors, ids, lambda r: replace(r, **values))
+    if name == "locked":
+        raise UsageError("reflectors are locked together with those that are locked already; expected another field")
+    if name == "id" and len(ids) != 1:
+        raise UsageError(f"{len(ids)} reflectors would be called {value!r}; expected one to be renamed")
+    return _change(reflectors, ids, lambda r: with_field(r, name, value, "field of a reflector"))
 
 
 def set_locked(reflectors: ReflectorMap, ids: Collection[str], locked: bool) -> ReflectorMap:

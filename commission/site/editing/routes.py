@@ -19,6 +19,7 @@ from commission.geometry.arrays import FloatArray
 from commission.geometry.knot_insertion import insert_knot, multiplicity, split
 from commission.geometry.splines import Spline, catmull_rom
 from commission.site.editing.names import fresh_names
+from commission.site.fields import with_field
 from commission.site.routes import Direction, Route, Segment
 
 BEZIER = 3
@@ -222,28 +223,24 @@ def split_segment(route: Route, segment: int, near: tuple[float, float]) -> Rout
     return replace(route, segments=(*route.segments[:segment], before, after, *route.segments[segment + 1 :]))
 
 
-def set_direction(route: Route, segment: int, direction: Direction) -> Route:
-    """Drive a segment with the vehicle's front or its rear ahead.
+def set_value(route: Route, segment: int, name: str, value: object) -> Route:
+    """Return the route with one field of a segment changed.
 
     Parameters
     ----------
-    route : the route.
-    segment : index.
-    direction : which of the two.
+    route : the one there is.
+    segment : which of its segments.
+    name : of a field of `Segment`: `direction`, `speed`.
+    value : its new content; a speed in m/s, none: the route's.
+
+    Raises
+    ------
+    UsageError
+        there is no such segment or field.
+    ValueError
+        the value is out of its range.
     """
-    return _with_segment(route, segment, replace(_segment_at(route, segment), direction=direction))
-
-
-def set_speed(route: Route, segment: int, speed: float | None) -> Route:
-    """Set the speed of a segment.
-
-    Parameters
-    ----------
-    route : the route.
-    segment : index.
-    speed : [m/s]; None: that of the route.
-    """
-    return _with_segment(route, segment, replace(_segment_at(route, segment), speed=speed))
+    return _with_segment(route, segment, with_field(_segment_at(route, segment), name, value, "field of a segment"))
 
 
 def is_bezier(segment: Segment) -> bool:

@@ -10,7 +10,7 @@ from commission.app.base.actions import ClickFloor, DragFloor, Envelope, Leave
 from commission.app.base.effects import FlyTo, Tell
 from commission.app.base.state import AppState
 from commission.app.editing import actions
-from commission.app.editing.editor import ControlPoint, Editor, Snapping
+from commission.app.editing.editor import ControlPoint, Editor
 from commission.app.editing.site_tools import MeasureTool, PlaceTool, RouteTool, StationTool, measurement
 from commission.app.editing.tool import Tool
 from commission.errors import UsageError
@@ -63,16 +63,17 @@ def test_a_click_near_a_wall_places_a_reflector_that_touches_it(state: AppState)
 
 
 def test_without_snapping_a_reflector_stands_where_it_was_clicked(state: AppState) -> None:
-    freely = actions.ChooseSnapping(Snapping(walls=False))
+    freely = actions.SetSnapping("walls", False)
     new = reflector(after(state, freely, place(), click(4.0, 0.3)).state, "R5")
     assert (new.x, new.y) == (4.0, 0.3)
 
 
 def test_a_grid_and_the_rows_of_neighbors_attract_when_they_are_asked_to(state: AppState) -> None:
-    on_grid = actions.ChooseSnapping(Snapping(walls=False, grid=0.5))
-    assert reflector(after(state, on_grid, place(), click(4.1, 3.2)).state, "R5").x == 4.0
-    in_line = actions.ChooseSnapping(Snapping(walls=False, neighbors=True))
-    new = reflector(after(state, in_line, place(), click(4.1, 2.1)).state, "R5")
+    freely = after(state, actions.SetSnapping("walls", False)).state
+    on_grid = actions.SetSnapping("grid", 0.5)
+    assert reflector(after(freely, on_grid, place(), click(4.1, 3.2)).state, "R5").x == 4.0
+    in_line = actions.SetSnapping("neighbors", True)
+    new = reflector(after(freely, in_line, place(), click(4.1, 2.1)).state, "R5")
     assert (new.x, new.y) == (4.1, 2.0)
 
 
@@ -112,7 +113,7 @@ def test_a_single_dragged_reflector_snaps_and_several_keep_their_places_to_each_
 
 
 def test_the_handle_moves_the_selection_by_as_much_as_itself(state: AppState) -> None:
-    begin = after(state, click(0.25, 2.0), actions.ChooseSnapping(Snapping(walls=False)))
+    begin = after(state, click(0.25, 2.0), actions.SetSnapping("walls", False))
     now = (3.0, 3.0)
     moved = after(begin.state, actions.DragSelection("start", (0.25, 2.0)), actions.DragSelection("end", now))
     assert (reflector(moved.state, "R1").x, reflector(moved.state, "R1").y) == pytest.approx(now)
@@ -208,7 +209,12 @@ def test_a_segment_is_split_reversed_and_driven_slower(state: AppState) -> None:
     chosen = after(state, click(4.0, 2.1)).state
     point = editor(chosen).point
     assert point is not None
-    split = after(chosen, actions.SplitSegment(), actions.SetSegment(Direction.REVERSE, 0.2)).state
+    split = after(
+        chosen,
+        actions.SplitSegment(),
+        actions.SetSegment("direction", Direction.REVERSE),
+        actions.SetSegment("speed", 0.2),
+    ).state
     segments = split.project.routes[0].segments
     assert len(segments) == len(state.project.routes[0].segments) + 1
     assert [(s.direction, s.speed) for s in segments].count((Direction.REVERSE, 0.2)) == 1

@@ -72,7 +72,7 @@ def test_edits_leave_locked_reflectors_and_the_rest_of_the_map_alone(selection, 
         edits.turn(locked, ids, offset, angle),
         edits.mirror(locked, ids, edits.Axis(*offset, angle)),
         edits.delete(locked, ids),
-        edits.set_values(locked, ids, {"radius": 0.5}),
+        edits.set_value(locked, ids, "radius", 0.5),
         edits.place(locked, dict.fromkeys(ids, offset)),
     ]
     assert all(result == locked for result in edited)
@@ -143,10 +143,10 @@ def test_a_row_reaches_its_end_when_the_spacing_fits():
     ("edit", "kind", "message"),
     [
         (lambda m: edits.delete(m, ["Z"]), UsageError, "no reflector is called 'Z'"),
-        (lambda m: edits.set_values(m, ["A"], {"color": 1}), UsageError, "no field 'color' to set"),
-        (lambda m: edits.set_values(m, ["A", "B"], {"id": "C"}), UsageError, "2 reflectors would be called 'C'"),
-        (lambda m: edits.set_values(m, ["A"], {"id": "B"}), ProjectError, "'B' is used twice"),
-        (lambda m: edits.set_values(m, ["A"], {"radius": 0.0}), ValueError, "radius is 0"),
+        (lambda m: edits.set_value(m, ["A"], "color", 1), UsageError, "no field of a reflector is called 'color'"),
+        (lambda m: edits.set_value(m, ["A", "B"], "id", "C"), UsageError, "2 reflectors would be called 'C'"),
+        (lambda m: edits.set_value(m, ["A"], "id", "B"), ProjectError, "'B' is used twice"),
+        (lambda m: edits.set_value(m, ["A"], "radius", 0.0), ValueError, "radius is 0"),
         (lambda m: edits.repeat(m, ["A"], (1, 0), 10_001), UsageError, "expected 0 to 10000"),
         (lambda m: edits.row((0, 0), (1, 0), 0.0), UsageError, "expected more than 0 m"),
         (lambda m: edits.Axis.through((1, 1), (1, 1)), ValueError, "coincide"),

@@ -77,7 +77,7 @@ def test_an_end_that_two_segments_share_moves_in_both():
 
 def test_a_split_route_drives_the_same_way_and_takes_other_speeds():
     route = edits.split_segment(edits.new_route("r", WAY), 0, (5.0, 1.5))
-    route = edits.set_speed(edits.set_direction(route, 1, Direction.REVERSE), 1, 0.2)
+    route = edits.set_value(edits.set_value(route, 1, "direction", Direction.REVERSE), 1, "speed", 0.2)
     assert [(s.direction, s.speed) for s in route.segments] == [("forward", None), ("reverse", 0.2)]
     whole = edits.new_route("r", WAY).segments[0].spline().length
     assert sum(s.spline().length for s in route.segments) == pytest.approx(whole, rel=1e-9)

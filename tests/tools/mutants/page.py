@@ -284,16 +284,16 @@ PAGE = (
     ),
     Mutant(
         name="survey of a reflector in metres",
-        file=FOLDER + "editing/selection_panel.py",
-        find='Field("Survey 1σ [mm]", 1000.0',
-        replace='Field("Survey 1σ [mm]", 1.0',
+        file="commission/site/reflectors.py",
+        find='label="Survey 1σ", unit="m", shown=MILLIMETRES',
+        replace='label="Survey 1σ [mm]", unit=""',
         tests=(INPUTS + "test_numbers_of_what_is_selected_are_shown_and_set_in_the_units_of_their_labels",),
     ),
     Mutant(
         name="heading of a station in radians",
-        file=FOLDER + "editing/station_fields.py",
-        find='"heading": DEG,',
-        replace='"heading": 1.0,',
+        file="commission/site/stations.py",
+        find='label="Heading", unit="rad", shown=DEGREES',
+        replace='label="Heading [°]", unit=""',
         tests=(INPUTS + "test_numbers_of_what_is_selected_are_shown_and_set_in_the_units_of_their_labels",),
     ),
 )
