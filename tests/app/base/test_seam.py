@@ -62,10 +62,10 @@ BAD_VALUES: tuple[tuple[str, object, str], ...] = (
     ("button", False, "Press: found False; expected true"),
     ("group", "three", "Group: found 'three'; expected one of the choices shown"),
     ("dropdown", ["a"], "Choice: found ['a']; expected one of the choices shown"),
-    ("text", "x" * 1_001, "Name: found 1,001 letters; expected at most 1,000"),
+    ("text", "x" * 1_001, "Name: found more than 1,000 letters; expected at most as many"),
     ("text", "a\0b", "Name: found the control character '\\x00'; expected text"),
     ("text", 5, "Name: found 5; expected text"),
-    ("lines", "x" * 1_000_001, "Table: found 1,000,001 letters; expected at most 1,000,000"),
+    ("lines", "x" * 1_000_001, "Table: found more than 1,000,000 letters; expected at most as many"),
     ("progress", 50.0, "a field: found 50; expected nothing: it cannot be changed"),
     ("disabled", True, "Not now cannot be used at the moment; nothing was done"),
 )
