@@ -23,6 +23,14 @@ class CommissionError(Exception):
     """
 
 
+def fault_line(error: BaseException) -> str:
+    """Return what people are told of an error that is a mistake of ours.
+
+    Its own text is no answer to anybody (a bare key, a number), and may be a line of a file: it is for the log.
+    """
+    return f"a fault of the program ({type(error).__name__}); its log says where"
+
+
 class ProjectError(CommissionError):
     """The project's values contradict each other."""
 

@@ -24,7 +24,7 @@ from commission.app.base.jobs import Job, JobReport, Jobs
 from commission.app.base.service import IDLE_S, Context, Due, Service
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView, view_of
-from commission.errors import CommissionError
+from commission.errors import CommissionError, fault_line
 from commission.site.project import Project
 
 log = logging.getLogger(__name__)
@@ -213,7 +213,8 @@ class Runtime:
             case JobReport():
                 following = self._jobs.hear(message)
                 if isinstance(following, Action | Envelope):
-                    self.handle(following)
+                    # What one browser's file or wish leads to is refused to that browser, not to everybody.
+                    self._guarded(lambda: self.handle(following), _sender_of(following))
             case BrowserCame(number):
                 self._apply(Join(), Sender(number, self._clock()))
                 if page is not None:
@@ -287,14 +288,11 @@ def _reported(error: Exception, sender: Sender) -> Report:
     """Return what is told of an error; where a mistake of ours was is written to the log, too."""
     if isinstance(error, CommissionError):
         return Report(str(error))
-    is_value = isinstance(error, ValueError)
-    if is_value and sender.browser is not None:  # a handler refuses what a person asked for
+    if isinstance(error, ValueError) and sender.browser is not None:  # a handler refuses what a person asked for
         return Report(str(error))
     log.error("a fault on the page", exc_info=error)
-    kind = type(error).__name__
-    listed = f"a fault of the program ({kind}); its log says where"
-    text = str(error) if is_value else f"a fault of the program ({kind}: {error}); its log says where"
-    return Report(text, listed=listed)
+    text = fault_line(error)
+    return Report(text, listed=text)
 
 
 def _sender_of(message: Message) -> Sender:

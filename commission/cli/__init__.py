@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import os
 import sys
+import traceback
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NoReturn
 
 from commission.app.base.logs import SHOW_TRACEBACK, one_line_each
@@ -68,7 +70,9 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     except Exception as error:
         if os.environ.get(SHOW_TRACEBACK):
             raise
-        _fail(f"unexpected {type(error).__name__}: {error} (set {SHOW_TRACEBACK}=1 to see where)")
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        fault = f"{type(error).__name__}: {error}, {Path(place.filename).name} line {place.lineno}"
+        _fail(f"a fault of the program ({fault}); {SHOW_TRACEBACK}=1 shows more")
     sys.exit(0)
 
 

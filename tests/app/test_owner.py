@@ -161,9 +161,27 @@ def test_what_a_file_holds_is_quoted_to_who_asked_for_it_and_to_nobody_else(owne
         for in_effect in (False, True):
             owner.runtime.post(by(3, Fail(error, in_effect)))
     owner.until(lambda: len(owner.window.told) == 4)
+    fault = "a fault of the program (KeyError); its log says where"
+    assert owner.window.told == [(3, str(secret)), (3, str(secret)), (3, fault), (3, fault)]
+    assert set(owner.runtime.state.faults) == {fault}
+
+
+def test_what_a_job_of_one_browser_leads_to_is_refused_to_that_browser_alone(owner: Owner) -> None:
+    secret = "found 'root:x:0:0'; expected a number"
+    for error in (FileFormatError("passwd", "line 1", "found 'root:x:0:0'", "a number"), ValueError(secret)):
+        owner.runtime._jobs.start("Reading", lambda _: 1, then=lambda _, error=error: by(3, Fail(error)), key=id(error))
+    owner.until(lambda: len(owner.window.told) == 2)
     assert {browser for browser, _ in owner.window.told} == {3}
-    assert all("root:x" in text for _, text in owner.window.told)
-    assert set(owner.runtime.state.faults) == {"a fault of the program (KeyError); its log says where"}
+    assert owner.runtime.state.faults == ()
+
+
+@pytest.mark.parametrize("kind", [KeyError, ValueError, TypeError, RuntimeError])
+def test_the_bare_text_of_a_fault_is_for_the_log_and_no_browser(owner: Owner, kind: type[Exception]) -> None:
+    owner.runtime._jobs.start("Study", lambda _: (_ for _ in ()).throw(kind("5")))
+    owner.runtime._jobs.start("Another", lambda _: 1, then=lambda _: Fail(kind("5")))
+    owner.until(lambda: len(owner.window.told) == 2)
+    fault = f"a fault of the program ({kind.__name__}); its log says where"
+    assert sorted(owner.window.told, key=str) == [(None, f"Study: {fault}"), (None, fault)]
 
 
 def test_what_the_program_itself_meets_is_told_to_everybody_and_listed(owner: Owner) -> None:
@@ -211,7 +229,7 @@ def test_an_error_while_an_error_is_told_is_logged(owner: Owner, caplog: pytest.
 def test_what_fails_at_every_turn_is_told_once_in_five_seconds(owner: Owner, monkeypatch: pytest.MonkeyPatch) -> None:
     owner.broken.add("follow")
     time.sleep(0.5)
-    assert owner.window.told == [(None, "a fault of the program (RuntimeError: follow is broken); its log says where")]
+    assert owner.window.told == [(None, "a fault of the program (RuntimeError); its log says where")]
     monkeypatch.setattr(runtime_module, "SAME_FAULT_AFTER_S", 0.0)
     owner.until(lambda: len(owner.window.told) > 1)
 

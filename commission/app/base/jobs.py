@@ -19,7 +19,7 @@ from enum import StrEnum
 from queue import SimpleQueue
 from typing import Any, TypeVar
 
-from commission.errors import CommissionError, JobCancelled, JobError
+from commission.errors import CommissionError, JobCancelled, JobError, fault_line
 from commission.progress import Progress
 
 _log = logging.getLogger(__name__)
@@ -341,9 +341,6 @@ class Jobs:
 
 
 def _one_line(problem: Exception) -> str:
-    """What went wrong, for the user; the class's name helps where the text was not written by us."""
+    """What went wrong, for the user."""
     text = " ".join(str(problem).split())
-    if text and isinstance(problem, CommissionError):
-        return text
-    named = f"{type(problem).__name__}: {text}".rstrip(": ")
-    return f"a fault of the program ({named}); its log says where"
+    return text if text and isinstance(problem, CommissionError) else fault_line(problem)

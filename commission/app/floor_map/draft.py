@@ -187,7 +187,16 @@ class MapLoading:
     """A map whose image has not come yet."""
     image: MapFile | None = None
     """The image that came last: a YAML file that comes after it may mean it."""
-    trouble: str = ""
-    """Why the newest file could not be loaded, in one line; empty: nothing went wrong."""
     notes: tuple[str, ...] = ()
     """What was loaded, and what was left out or assumed on the way."""
+
+
+@dataclass(frozen=True, slots=True)
+class MapTrouble:
+    """Why what one browser asked for did not become a floor map: it may quote a file, which is nobody else's business.
+
+    A file that can be read is everybody's work (`MapLoading`), like the map that is made of it.
+    """
+
+    text: str = ""
+    """In one line; empty: nothing went wrong."""

@@ -7,12 +7,13 @@ from typing import Any
 from viser import GuiApi, GuiEvent
 
 from commission.app.base import actions as page_actions
+from commission.app.base.inputs import write_html
 from commission.app.base.panel import BasePanel, Post, escaped, from_browser, posting
 from commission.app.base.reach import typed_path
 from commission.app.base.uploads import Uploads
 from commission.app.base.view import PageView
 from commission.app.floor_map import actions
-from commission.app.floor_map.draft import ENDINGS, MapFile, MapLoading
+from commission.app.floor_map.draft import ENDINGS, MapFile, MapLoading, MapTrouble
 from commission.app.floor_map.draft_fields import MapDraftFields
 from commission.site.project import Project
 
@@ -83,11 +84,23 @@ class FloorMapPanel(BasePanel):
         self._fields.show(loading.draft)
 
 
+class MapTroublePanel(BasePanel):
+    """Says to one browser alone, above everything else of the tab, why its file did not become a floor map."""
+
+    def __init__(self, gui: GuiApi, browser: int) -> None:
+        self._browser = browser
+        self._said = gui.add_html("", order=-1.0, visible=False)
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Follow what the browser asks for."""
+        text = view.state.of_browser(self._browser, MapTrouble).text
+        style = "font-size:12px;padding:2px 8px;color:#ff8a80;overflow-wrap:anywhere"
+        write_html(self._said, text and f"<div style='{style}'>No floor map: {escaped(text)}</div>")
+
+
 def said(loading: MapLoading) -> str:
-    """Return what there is to say, as html: trouble first."""
+    """Return what there is to say to everybody, as html."""
     lines: list[str] = []
-    if loading.trouble:
-        lines.append(f"<div style='color:#ff8a80'>{escaped(loading.trouble)}</div>")
     if loading.waiting is not None:
         name, image = escaped(loading.waiting.file.name), escaped(loading.waiting.image)
         lines.append(f"<div><b>{name}</b> needs its image: upload <b>{image}</b>, too.</div>")

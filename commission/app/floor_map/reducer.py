@@ -22,6 +22,7 @@ from commission.app.floor_map.draft import (
     MapDraft,
     MapLoading,
     MapOptions,
+    MapTrouble,
     Stage,
     WaitingMap,
 )
@@ -35,7 +36,8 @@ from commission.site.project import Project
 
 @reduce.register
 def open_map(action: actions.OpenMap, state: AppState, sender: Sender) -> Outcome:
-    file, loading = action.file, replace(state.part(MapLoading), trouble="", notes=())
+    file, loading = action.file, replace(state.part(MapLoading), notes=())
+    state = state.with_browser(sender.browser, MapTrouble())
     if file.ending not in ENDINGS:
         known = ", ".join(f".{ending}" for ending in ENDINGS)
         return reduce(
@@ -67,9 +69,9 @@ def image_missing(action: actions.ImageMissing, state: AppState, _sender: Sender
 
 
 @reduce.register
-def map_failed(action: actions.MapFailed, state: AppState, _sender: Sender) -> Outcome:
+def map_failed(action: actions.MapFailed, state: AppState, sender: Sender) -> Outcome:
     text = " ".join(action.text.split())
-    return Outcome(state.with_part(replace(state.part(MapLoading), trouble=text)), (Tell(text, failed=True),))
+    return Outcome(state.with_browser(sender.browser, MapTrouble(text)), (Tell(text, failed=True),))
 
 
 @reduce.register
@@ -79,7 +81,7 @@ def map_opened(action: actions.MapOpened, state: AppState, sender: Sender) -> Ou
     draft = MapDraft(action.file, action.read, action.reading, options)
     if isinstance(action.read, Picture):
         draft = replace(draft, stage=_stage(action.read, state.project))
-    opened = state.with_part(replace(state.part(MapLoading), draft=draft, waiting=None, trouble=""))
+    opened = state.with_part(replace(state.part(MapLoading), draft=draft, waiting=None))
     return reduce(actions.ClickPicture(), opened, sender) if isinstance(action.read, Picture) else Outcome(opened)
 
 
@@ -134,8 +136,9 @@ def stop_map_job(_action: actions.StopMapJob, state: AppState, _sender: Sender) 
 
 
 @reduce.register
-def discard_map(_action: actions.DiscardMap, state: AppState, _sender: Sender) -> Outcome:
-    return Outcome(_without_calibration(state.with_part(MapLoading())), (StopMapWork(),))
+def discard_map(_action: actions.DiscardMap, state: AppState, sender: Sender) -> Outcome:
+    cleared = state.with_part(MapLoading()).with_browser(sender.browser, MapTrouble())
+    return Outcome(_without_calibration(cleared), (StopMapWork(),))
 
 
 @reduce.register

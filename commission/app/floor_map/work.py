@@ -45,7 +45,14 @@ class MapService(Service):
                 self.context.jobs.cancel(KEY)
 
     def _start(self, name: str, work: Callable[[Progress], Action], sender: Sender) -> None:
-        self.context.jobs.start(name, work, then=lambda action: Envelope(action, sender), key=KEY, lane=Lane.FILES)
+        self.context.jobs.start(
+            name,
+            work,
+            then=lambda action: Envelope(action, sender),
+            failed=lambda job: Envelope(MapFailed(f"{job.name}: {job.error}"), sender),
+            key=KEY,
+            lane=Lane.FILES,
+        )
 
 
 def _within(file: MapFile, reach: Reach, sender: Sender) -> MapFile:

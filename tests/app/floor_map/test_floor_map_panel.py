@@ -19,10 +19,10 @@ from commission.app.base.state import AppState
 from commission.app.base.view import view_of
 from commission.app.floor_map import actions
 from commission.app.floor_map.align_tool import AlignTool, NamedPoint
-from commission.app.floor_map.draft import MapDraft, MapFile, MapLoading, MapOptions, Stage, WaitingMap
+from commission.app.floor_map.draft import MapDraft, MapFile, MapLoading, MapOptions, MapTrouble, Stage, WaitingMap
 from commission.app.floor_map.draft_fields import MOST_LAYERS, MapDraftFields, facts, layers_by_size
 from commission.app.floor_map.draft_layer import INK, PAPER, MapDraftLayer, preview
-from commission.app.floor_map.floor_map_panel import FloorMapPanel, said
+from commission.app.floor_map.floor_map_panel import FloorMapPanel, MapTroublePanel, said
 from commission.app.floor_map.tool_fields import alignment_text
 from commission.io.dxf import Drawing, DrawingLayer
 from commission.io.image_map import Picture
@@ -145,12 +145,25 @@ def test_a_layer_among_hundreds_is_found_by_a_part_of_its_name(server: viser.Vis
 
 def test_names_of_files_are_shown_as_text() -> None:
     waiting = WaitingMap(MapFile(Path(f"{NASTY}.yaml")), NASTY)
-    text = said(MapLoading(waiting=waiting, trouble=NASTY, notes=(NASTY,)))
+    text = said(MapLoading(waiting=waiting, notes=(NASTY,)))
     assert "<img" not in text
-    assert text.count("&lt;img") == 4
+    assert text.count("&lt;img") == 3
     assert all("<img" not in value for _, value in facts(DRAFTS["drawing"]))
     named = AlignTool(known=(NamedPoint((0.0, 0.0), (0.0, 0.0), NASTY), NamedPoint((9.0, 0.0), (9.0, 0.0))))
     assert "<img" not in alignment_text(named)
+
+
+def test_why_a_file_is_no_floor_map_is_shown_as_text_and_to_the_browser_that_asked(server: viser.ViserServer) -> None:
+    mine, other = (MapTroublePanel(server.gui, number) for number in (1, 2))
+    state = AppState(Project(name="x"), Project(name="x")).joined(1).joined(2)
+    view = view_of(state.with_browser(1, MapTrouble(NASTY)), jobs=(), waiting=())
+    for panel in (mine, other):
+        panel.draw_slowly(view)
+    assert "<img" not in mine._said.content
+    assert "&lt;img" in mine._said.content
+    assert mine._said.visible
+    assert other._said.content == ""
+    assert not other._said.visible
 
 
 def test_facts_tell_how_large_a_file_makes_the_hall() -> None:

@@ -16,7 +16,7 @@ from commission.app.base.service import Context, Service
 from commission.app.base.state import AppState
 from commission.app.base.uploads import Upload
 from commission.app.floor_map import actions
-from commission.app.floor_map.draft import MapFile, MapLoading
+from commission.app.floor_map.draft import MapFile, MapLoading, MapTrouble
 from commission.app.project.project_folder import name_of_edit
 from commission.app.runtime import Runtime
 from commission.io.map_server import write_floor_map
@@ -102,8 +102,8 @@ def test_a_broken_file_is_told_and_the_map_stays(loading: Loading, hall: FloorMa
         (nowhere, nowhere),
     ):
         loading.open(source)
-        loading.until(lambda: bool(loading.state.part(MapLoading).trouble))
-        assert loading.state.part(MapLoading).trouble.startswith(f"{name}: ")
+        loading.until(lambda: bool(loading.state.of_browser(ME, MapTrouble).text))
+        assert loading.state.of_browser(ME, MapTrouble).text.startswith(f"{name}: ")
     assert loading.state.project is before
 
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from commission.app.base import actions as page
-from commission.app.base.actions import Camera, ClickFloor, DragFloor
+from commission.app.base.actions import Camera, ClickFloor, DragFloor, Sender
 from commission.app.base.effects import PlaceCamera, Tell
-from commission.app.base.reducer import Outcome
+from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import MAP_BYTES, AppState
 from commission.app.base.uploads import Upload
 from commission.app.editing import actions as editing
@@ -19,7 +20,7 @@ from commission.app.editing.editor import Editor
 from commission.app.editing.tool import Tool
 from commission.app.floor_map import actions
 from commission.app.floor_map.align_tool import AlignTool, NamedPoint
-from commission.app.floor_map.draft import MapDraft, MapFile, MapLoading, ReadOptions
+from commission.app.floor_map.draft import MapDraft, MapFile, MapLoading, MapTrouble, ReadOptions
 from commission.app.floor_map.effects import DrawMap, ReadMapFile, StopMapWork
 from commission.app.floor_map.pen import MapPen
 from commission.app.floor_map.tools import CalibrateTool, EraseTool, ObstacleTool, WallTool
@@ -63,6 +64,10 @@ def cells(state: AppState) -> np.ndarray:
     return state.project.floor_map.cells
 
 
+def trouble(state: AppState) -> str:
+    return state.of_browser(ME, MapTrouble).text
+
+
 def draft(state: AppState) -> MapDraft:
     assert state.part(MapLoading).draft is not None
     return state.part(MapLoading).draft
@@ -91,7 +96,7 @@ def test_a_map_and_its_image_are_read_together_in_whichever_order_they_come(stat
 def test_another_image_than_the_one_that_is_waited_for_is_named(state: AppState) -> None:
     waiting = after(state, actions.ImageMissing(YAML, "3.pgm")).state
     refused = after(waiting, actions.OpenMap(ANOTHER))
-    assert refused.state.part(MapLoading).trouble == "other.png: is not the image of 3.yaml; expected 3.pgm"
+    assert trouble(refused.state) == "other.png: is not the image of 3.yaml; expected 3.pgm"
     assert refused.state.part(MapLoading).waiting == waiting.part(MapLoading).waiting
     freed = after(refused.state, actions.DiscardMap(), actions.OpenMap(ANOTHER))
     assert freed.effects == (ReadMapFile(ANOTHER),)
@@ -100,13 +105,23 @@ def test_another_image_than_the_one_that_is_waited_for_is_named(state: AppState)
 def test_trouble_leaves_the_project_as_it_is_and_goes_with_the_next_file(state: AppState) -> None:
     failed = after(state, actions.MapFailed("hall.stl: is no readable STL;\n expected a complete model"))
     assert failed.state.project is state.project
-    assert failed.state.part(MapLoading).trouble == "hall.stl: is no readable STL; expected a complete model"
-    assert failed.effects == (Tell(failed.state.part(MapLoading).trouble, failed=True),)
-    assert after(failed.state, actions.OpenMap(PLAN)).state.part(MapLoading).trouble == ""
+    assert trouble(failed.state) == "hall.stl: is no readable STL; expected a complete model"
+    assert failed.effects == (Tell(trouble(failed.state), failed=True),)
+    assert trouble(after(failed.state, actions.OpenMap(PLAN)).state) == ""
+    assert trouble(after(failed.state, actions.DiscardMap()).state) == ""
     unknown = after(state, actions.OpenMap(MapFile(Path("map.pdf"))))
-    assert unknown.state.part(MapLoading).trouble.startswith(
-        "map.pdf: is no floor map; expected a file that ends in .yaml"
-    )
+    assert trouble(unknown.state).startswith("map.pdf: is no floor map; expected a file that ends in .yaml")
+
+
+def test_why_a_file_is_no_floor_map_is_known_to_the_browser_that_asked_and_to_no_other(state: AppState) -> None:
+    both = state.joined(ME + 1)
+    quoting = reduce(actions.MapFailed("passwd.dxf: line 1: found root:x:0:0"), both, Sender(ME)).state
+    assert trouble(quoting).endswith("root:x:0:0")
+    others = replace(quoting, browsers={ME + 1: quoting.browsers[ME + 1]})
+    assert "root:x" not in repr(others)
+    # What the other one asks for does not take the reason away.
+    later = reduce(actions.OpenMap(PLAN), quoting, Sender(ME + 1)).state
+    assert trouble(later) == trouble(quoting)
 
 
 def test_an_image_is_placed_by_two_clicks_a_distance_and_an_axis(state: AppState) -> None:
