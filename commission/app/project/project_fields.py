@@ -5,12 +5,10 @@ from __future__ import annotations
 from viser import GuiApi
 
 from commission.app.base import actions
-from commission.app.base.inputs import show, write_html
-from commission.app.base.panel import BasePanel, Post, escaped, posting, write
+from commission.app.base.panel import BasePanel, Post, posting, write
 from commission.app.base.reach import typed_path
 from commission.app.base.view import PageView
-from commission.app.project.actions import AskToReplace, KeepOther, RenameProject, Save
-from commission.app.project.state import FilesState
+from commission.app.project.actions import RenameProject, Save
 from commission.site.project import Project
 
 
@@ -36,27 +34,9 @@ class ProjectFields(BasePanel):
             )
         )
 
-        self._question = gui.add_html("", visible=False)
-        self._answers = (
-            gui.add_button("Replace it", color="red", hint="Write the copy over what lies there.", visible=False),
-            gui.add_button("Keep it", color="gray", hint="Write nothing.", visible=False),
-        )
-        self._asked: AskToReplace | None = None
-        replace, keep = self._answers
-        replace.on_click(posting(post, lambda _event: self._replace()))
-        keep.on_click(posting(post, lambda _event: KeepOther()))
-
-    def _replace(self) -> actions.Action:
-        return KeepOther() if self._asked is None else Save(self._asked.folder, overwrite=True)
-
     def draw_slowly(self, view: PageView) -> None:
         """Follow undo and other browsers, but not while a name is typed."""
         project = view.state.project
         if project is not self._shown:
             self._shown = project
             write(self._name, project.name)
-        self._asked = asked = view.state.part(FilesState).question
-        text = "" if asked is None else f"{escaped(asked.folder)} holds {escaped(asked.holds)}. Replace it?"
-        write_html(self._question, text and f"<div class='c-note' style='padding:2px 6px'>{text}</div>")
-        for answer in self._answers:
-            show(answer, visible=asked is not None)

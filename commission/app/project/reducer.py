@@ -10,7 +10,7 @@ from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited, refuse_read_only
 from commission.app.project import actions
 from commission.app.project.effects import KeepProjectIn, ReadProject, TakeProjectOver, WriteProject
-from commission.app.project.state import FilesState
+from commission.app.project.state import CopyQuestion, FilesState
 from commission.errors import UsageError
 
 
@@ -37,8 +37,9 @@ def save(action: actions.Save, state: AppState, _sender: Sender) -> Outcome:
 
 
 @reduce.register
-def project_saved(action: actions.ProjectSaved, state: AppState, _sender: Sender) -> Outcome:
+def project_saved(action: actions.ProjectSaved, state: AppState, sender: Sender) -> Outcome:
     """From now on the project is kept where it was written."""
+    state = state.with_browser(sender.browser, CopyQuestion())
     is_elsewhere = action.folder != state.folder
     saved = replace(state, saved=action.project, folder=action.folder, read_only="", last_edit=None, greeting="")
     keep: tuple[Effect, ...] = (KeepProjectIn(action.project, action.folder),) if is_elsewhere else ()
@@ -87,16 +88,16 @@ def restored(action: actions.EditsRestored, state: AppState, sender: Sender) -> 
 
 
 @reduce.register
-def ask_to_replace(action: actions.AskToReplace, state: AppState, _sender: Sender) -> Outcome:
+def ask_to_replace(action: actions.AskToReplace, state: AppState, sender: Sender) -> Outcome:
     """Ask before a copy replaces something."""
     text = f"{action.folder} holds {action.holds}; it stays unless you answer Replace it"
-    return Outcome(state.with_part(replace(state.part(FilesState), question=action)), (Tell(text, failed=True),))
+    return Outcome(state.with_browser(sender.browser, CopyQuestion(action)), (Tell(text, failed=True),))
 
 
 @reduce.register
-def keep_other(_action: actions.KeepOther, state: AppState, _sender: Sender) -> Outcome:
+def keep_other(_action: actions.KeepOther, state: AppState, sender: Sender) -> Outcome:
     """Replace nothing."""
-    return Outcome(state.with_part(replace(state.part(FilesState), question=None)))
+    return Outcome(state.with_browser(sender.browser, CopyQuestion()))
 
 
 @reduce.register

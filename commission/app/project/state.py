@@ -22,5 +22,11 @@ class FilesState:
     """Whether all unsaved edits are in the journal."""
     kept_in: Path | None = None
     """Where unsaved edits are while the project's folder is gone; none: it is there."""
-    question: AskToReplace | None = None
-    """A copy that waits for an answer: something lies where it is to be written."""
+
+
+@dataclass(frozen=True, slots=True)
+class CopyQuestion:
+    """What one browser is asked: it names what lies in a folder that this browser has named."""
+
+    asked: AskToReplace | None = None
+    """A copy that waits for an answer; none: there is no question."""

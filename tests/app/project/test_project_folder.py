@@ -15,6 +15,7 @@ from commission.app.base.state import NOTHING_SAVED, AppState
 from commission.app.editing import actions as editing
 from commission.app.editing.site_tools import PlaceTool
 from commission.app.project.actions import (
+    AskToReplace,
     ChangedOnDisk,
     EditsRestored,
     KeepOther,
@@ -24,7 +25,7 @@ from commission.app.project.actions import (
     TakeOver,
 )
 from commission.app.project.project_folder import ProjectFolder
-from commission.app.project.state import FilesState
+from commission.app.project.state import CopyQuestion, FilesState
 from commission.app.project.top_bar import standing
 from commission.app.runtime import Runtime
 from commission.errors import ProjectError, UsageError
@@ -104,6 +105,11 @@ class Kept:
     @property
     def kept(self) -> FilesState:
         return self.runtime.state.part(FilesState)
+
+    @property
+    def question(self) -> AskToReplace | None:
+        """What the browser is asked about a copy."""
+        return self.runtime.state.of_browser(ME, CopyQuestion).asked
 
     @property
     def now(self) -> Project:
@@ -354,15 +360,17 @@ def test_a_copy_onto_another_project_is_asked_about_first(
     kept = Kept(folder)
     kept.place(4.0, 3.0)
     kept.do(Save(other))
-    question = kept.kept.question
+    question = kept.question
     assert question is not None
+    # The other browsers do not learn what lies there.
+    assert kept.runtime.state.joined(ME + 1).of_browser(ME + 1, CopyQuestion).asked is None
     assert question.holds.startswith("the project 'Theirs' and unsaved edits of a session that crashed or still runs")
     kept.do(KeepOther())
-    assert kept.kept.question is None
+    assert kept.question is None
     assert load_project(other) == theirs
     kept.do(Save(other))
     kept.do(Save(other, overwrite=True))
-    assert kept.kept.question is None
+    assert kept.question is None
     assert load_project(other) == kept.now
     (aside,) = other.glob(".commission.journal.replaced-*")
     assert aside.read_bytes() == content
