@@ -14,17 +14,16 @@ from pathlib import Path
 from typing import NoReturn
 
 from commission.app.base.logs import SHOW_TRACEBACK, one_line_each
-from commission.cli import ambiguity as confusing
-from commission.cli import convert as converting
-from commission.cli import coverage as covering
-from commission.cli import inspect as inspecting
-from commission.cli import localize as localizing
-from commission.cli import parsing
-from commission.cli import place as placing
-from commission.cli import predict as predicting
-from commission.cli import serve as page
-from commission.cli import simulate as simulating
-from commission.cli.parsing import Command
+from commission.cli.ambiguity import Ambiguity
+from commission.cli.convert import Convert
+from commission.cli.coverage import CoverageCommand
+from commission.cli.inspect import Inspect
+from commission.cli.localize import Localize
+from commission.cli.parsing import Command, parse
+from commission.cli.place import Place
+from commission.cli.predict import Predict
+from commission.cli.serve import Demo, Serve
+from commission.cli.simulate import Simulate
 from commission.cli.versions import Version
 from commission.errors import CommissionError
 
@@ -32,16 +31,16 @@ EXIT_ERROR = 2
 EXIT_INTERRUPTED = 130
 
 COMMANDS: dict[str, type[Command]] = {
-    "demo": page.Demo,
-    "serve": page.Serve,
-    "simulate": simulating.Simulate,
-    "localize": localizing.Localize,
-    "inspect": inspecting.Inspect,
-    "coverage": covering.CoverageCommand,
-    "predict": predicting.Predict,
-    "ambiguity": confusing.Ambiguity,
-    "place": placing.Place,
-    "convert": converting.Convert,
+    "demo": Demo,
+    "serve": Serve,
+    "simulate": Simulate,
+    "localize": Localize,
+    "inspect": Inspect,
+    "coverage": CoverageCommand,
+    "predict": Predict,
+    "ambiguity": Ambiguity,
+    "place": Place,
+    "convert": Convert,
     "version": Version,
 }
 
@@ -54,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> NoReturn:
     arguments : command and its options; those of the process when None.
     """
     try:
-        command = parsing.parse(COMMANDS, arguments)
+        command = parse(COMMANDS, arguments)
         with one_line_each():
             command.run()
         sys.stdout.flush()

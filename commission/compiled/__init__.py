@@ -16,7 +16,7 @@ import llvmlite
 import numba
 
 from commission.compiled.digest import kernel_digest, named_fields
-from commission.compiled.store import KernelStore, usual_folders
+from commission.compiled.kernel_files import KernelFiles, usual_folders
 from commission.progress import Progress, silent
 
 _numba: Any = numba
@@ -66,7 +66,7 @@ class KernelCache:
     may each write the first and read the other's.
     """
 
-    store = KernelStore(usual_folders())
+    files = KernelFiles(usual_folders())
 
     def __init__(self, dispatcher: Any) -> None:
         self._dispatcher = dispatcher
@@ -75,12 +75,12 @@ class KernelCache:
     @property
     def cache_path(self) -> str:
         """Folder that is tried first."""
-        return str(self.store.folders[0])
+        return str(self.files.folders[0])
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Machine code for these types of arguments, or None."""
         target_context.refresh()
-        content = self.store.read(self._file_name(sig, target_context.codegen()))
+        content = self.files.read(self._file_name(sig, target_context.codegen()))
         if content is None:
             return None
         # The folder is the user's own, like the sources themselves.
@@ -93,7 +93,7 @@ class KernelCache:
             name = self._dispatcher.py_func.__qualname__
             warnings.warn(f"kernel {name} compiles at each start: it has lifted loops or large globals", stacklevel=2)
             return
-        self.store.write(self._file_name(sig, data.codegen), _numba.core.serialize.dumps(data._reduce()))
+        self.files.write(self._file_name(sig, data.codegen), _numba.core.serialize.dumps(data._reduce()))
 
     def flush(self) -> None:
         """Do nothing: a name stands for one content."""

@@ -243,7 +243,7 @@ def _from_routes(source: Path, target: Path, wanted: Kind, options: ConvertOptio
         return (*imported.warnings, *write_lif(_network(source, imported), target))
     project = _existing(target)
     routes = network_diff.difference(project.routes, imported.routes)
-    accurate = network_diff.keeping_accuracy(project.stations, imported.stations)
+    accurate = network_diff.with_required_accuracy(project.stations, imported.stations)
     stations = network_diff.difference(project.stations, accurate)
     changed = dataclasses.replace(
         project,

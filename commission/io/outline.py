@@ -60,8 +60,8 @@ def outline_map(segments: FloatArray, resolution: float, path: Path, progress: P
     # Cells that each segment costs, so that a few long segments report as often as many short ones.
     effort = np.cumsum(np.abs(flat[:, 2:] - flat[:, :2]).sum(axis=1) + 1.0)
     borders = np.searchsorted(effort, np.arange(_CELLS_AT_ONCE, effort[-1], _CELLS_AT_ONCE))
-    edges = [0, *borders.tolist(), len(flat)]
-    for start, end in itertools.pairwise(edges):
+    bounds = [0, *borders.tolist(), len(flat)]
+    for start, end in itertools.pairwise(bounds):
         progress(start / len(flat), "drawing the map")
         draw_segments(occupied, np.ascontiguousarray(flat[start:end]))
     progress(1.0, "drawing the map")

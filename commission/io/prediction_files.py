@@ -27,8 +27,8 @@ COLUMNS = (
     *("visible", "on_odometry", "over_limit", "mode"),
     *("error_two_sigma_x", "error_two_sigma_y", "error_two_sigma_theta"),
 )
-FAILURE_COLUMNS = ("blocked", "reflector_id", "route", "failing_metres", "load", "metres")
-DEPENDENT_COLUMNS = ("reflector_id", "failure", "route", "failing_metres", "load", "metres")
+FAILURE_COLUMNS = ("blocked", "reflector_id", "route", "failing_metres", "limit_share", "metres")
+DEPENDENT_COLUMNS = ("reflector_id", "failure", "route", "failing_metres", "limit_share", "metres")
 
 
 def write_prediction(
@@ -135,7 +135,7 @@ def write_dependents(folder: Path, ranked: Sequence[Dependence], reflectors: Ref
             each.failure,
             part.route,
             len(part.metres),
-            figure(part.load),
+            figure(part.limit_share),
             metres,
         )
         for each in ranked
@@ -169,4 +169,4 @@ def write_failures(folder: Path, failures: Sequence[Dependence], reflectors: Ref
 
 def _part(part: RouteDependence) -> tuple[str, int, str, str]:
     """Cells of what fails on one route."""
-    return part.route, len(part.metres), figure(part.load), " ".join(map(str, part.metres.tolist()))
+    return part.route, len(part.metres), figure(part.limit_share), " ".join(map(str, part.metres.tolist()))

@@ -165,8 +165,8 @@ def _run(  # noqa: PLR0917 - the columns of the log
             d2,
         )
         state = cycle.state
-        _store(cycle.prior, k, prior_means, prior_covariances)
-        _store(state.belief, k, means, covariances)
+        _write_belief(cycle.prior, k, prior_means, prior_covariances)
+        _write_belief(state.belief, k, means, covariances)
         modes[k] = state.mode
     while rows < len(odometry_stamps):
         dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
@@ -176,7 +176,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
 
 
 @compiled_inline
-def _store(belief: PoseGaussian, row: int, means: FloatArray, covariances: FloatArray) -> None:
+def _write_belief(belief: PoseGaussian, row: int, means: FloatArray, covariances: FloatArray) -> None:
     """Write a belief to its row."""
     means[row, 0], means[row, 1], means[row, 2] = belief.x, belief.y, belief.theta
     covariances[row, 0, 0], covariances[row, 0, 1], covariances[row, 0, 2] = belief.xx, belief.xy, belief.xt

@@ -149,12 +149,12 @@ def _detected(
     sensor_detects: bool,
 ) -> DetectionLog:
     """Detections of each segment, from an earlier run where its detector was no other."""
-    bounds = {segment.first for segment in (*segments, *(() if earlier is None else earlier.segments))}
-    edges = (*sorted(bound for bound in bounds if bound < len(stamps_ns)), len(stamps_ns))
+    starts = {segment.first for segment in (*segments, *(() if earlier is None else earlier.segments))}
+    bounds = (*sorted(start for start in starts if start < len(stamps_ns)), len(stamps_ns))
     # In pieces, so that it can be stopped; what the sensor has detected is only cut out of its columns.
     step = max(len(stamps_ns), 1) if log.scans is None else CHECKPOINT_CYCLES
     parts: list[DetectionLog] = []
-    for first, last in itertools.pairwise(edges):
+    for first, last in itertools.pairwise(bounds):
         segment = _segment(segments, first)
         if segment.covered:
             parts.append(nothing_detected(stamps_ns[first:last]))

@@ -37,7 +37,7 @@ class RouteDependence:
     """Name of the route."""
     metres: IntArray
     """Metres of the way that fail with it and do not fail without it."""
-    load: float
+    limit_share: float
     """Largest bias plus 2-sigma on the route with it, as a share of the supervisor's limit [1]; above 1 fails."""
 
 
@@ -58,9 +58,9 @@ class Dependence:
         return sum(len(route.metres) for route in self.routes)
 
     @property
-    def load(self) -> float:
-        """Largest load on any route."""
-        return max((route.load for route in self.routes), default=0.0)
+    def limit_share(self) -> float:
+        """Largest share of the limit on any route [1]."""
+        return max((route.limit_share for route in self.routes), default=0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ def dependences(
         parts = [_on_route(route, damages, fails) for route, fails in zip(routes, intact, strict=True)]
         found.append(Dependence(reflector, options.failure, tuple(parts)))
     progress(1.0, "failures")
-    return tuple(sorted(found, key=lambda each: (-each.failing_metres, -each.load, each.reflector)))
+    return tuple(sorted(found, key=lambda each: (-each.failing_metres, -each.limit_share, each.reflector)))
 
 
 def worst_failures(
@@ -158,5 +158,5 @@ def _on_route(route: PlannedRoute, damages: Sequence[Damage], intact: IntArray) 
     """Compare a route with each of the damages to the route as it is."""
     predictions = [predict_route(route, damage) for damage in damages]
     failing = np.unique(np.concatenate([prediction.failing_metres() for prediction in predictions]))
-    load = max(float(prediction.load.max()) for prediction in predictions)
-    return RouteDependence(route.name, np.setdiff1d(failing, intact), load)
+    share = max(float(prediction.limit_share.max()) for prediction in predictions)
+    return RouteDependence(route.name, np.setdiff1d(failing, intact), share)

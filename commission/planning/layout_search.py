@@ -116,7 +116,7 @@ class LayoutSearch:
         rng = np.random.default_rng(self._options.seed)
         taken, asked_more = self._fixed, False
         for number in range(ROUNDS):
-            self._report(COVERING * number / ROUNDS, "covering")
+            self._report(COVERING * number / ROUNDS, "choosing reflectors")
             taken = cover(self._problem(self._needs, self._apart), rng, self._options.exchanges, self._step(number))
             # Both, so that one round asks for all that is missing.
             if not any([self._raise_needs(self._over(taken), taken), self._tell_apart(taken)]):
@@ -292,7 +292,7 @@ class LayoutSearch:
         return bool(np.all(self._distinction.rivals(taken) <= state.rivals))
 
     def _step(self, number: int) -> Callable[[float], None]:
-        return lambda done: self._report(COVERING * (number + done) / ROUNDS, "covering")
+        return lambda done: self._report(COVERING * (number + done) / ROUNDS, "choosing reflectors")
 
     def _report(self, fraction: float | None, what: str) -> None:
         """Tell how far the search is; without a fraction only give the chance to cancel."""

@@ -84,7 +84,7 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
             dx, dy, dtheta = compose_scalars(back_x, back_y, back_theta, x, y, theta)
             seconds = 1e-9 * (stamps_ns[k] - stamps_ns[k - 1])
             belief = predict(belief, dx, dy, dtheta, seconds, model.odometry)
-        _store_covariance(belief, k, prior_covariances)
+        _write_covariance(belief, k, prior_covariances)
         prior = belief
         offset_x, offset_y = scanner_offset(theta, model.observation)
         found = 0
@@ -105,7 +105,7 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
         if found > 0:
             last_seen_at = metres[k]
         means[k, 0], means[k, 1], means[k, 2] = belief.x, belief.y, belief.theta
-        _store_covariance(belief, k, covariances)
+        _write_covariance(belief, k, covariances)
         modes[k], seen[k], on_odometry[k] = mode, found, metres[k] - last_seen_at
 
 
@@ -191,7 +191,7 @@ def mixed(before: PoseGaussian, after: PoseGaussian, probability: float) -> Pose
 
 
 @compiled_inline
-def _store_covariance(belief: PoseGaussian, row: int, covariances: FloatArray) -> None:
+def _write_covariance(belief: PoseGaussian, row: int, covariances: FloatArray) -> None:
     """Write a covariance to its row."""
     covariances[row, 0, 0], covariances[row, 0, 1], covariances[row, 0, 2] = belief.xx, belief.xy, belief.xt
     covariances[row, 1, 0], covariances[row, 1, 1], covariances[row, 1, 2] = belief.xy, belief.yy, belief.yt

@@ -167,14 +167,14 @@ class RoutePrediction:
         return deviations
 
     @property
-    def load(self) -> FloatArray:
+    def limit_share(self) -> FloatArray:
         """(K,) bias and 2-sigma together as a share of the supervisor's limit, of the axis where it is largest [1]."""
         limits = (self.limits.position_limit, self.limits.position_limit, self.limits.heading_limit)
         return ((np.abs(self.bias) + self.two_sigma) / limits).max(axis=1)
 
     def over_limit(self) -> BoolArray:
-        """(K,) whether the load is above 1, or the supervisor is in fail mode."""
-        return (self.load > 1.0) | (self.modes == Mode.FAIL)
+        """(K,) whether the share of the limit is above 1, or the supervisor is in fail mode."""
+        return (self.limit_share > 1.0) | (self.modes == Mode.FAIL)
 
     def trips(self) -> FloatArray:
         """Metres of the way at which the supervisor stops the vehicle [m]."""

@@ -85,7 +85,7 @@ def merged(before: tuple[T, ...], diff: NamedDiff[T], *, remove: bool) -> tuple[
     return (*kept, *diff.added)
 
 
-def keeping_accuracy(before: tuple[Station, ...], after: tuple[Station, ...]) -> tuple[Station, ...]:
+def with_required_accuracy(before: tuple[Station, ...], after: tuple[Station, ...]) -> tuple[Station, ...]:
     """Return the later stations with the required accuracy of earlier ones of their names: no format carries it."""
     accuracy = {station.name: station.required_accuracy for station in before}
     return tuple(replace(s, required_accuracy=accuracy.get(s.name, s.required_accuracy)) for s in after)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from commission.compiled import compiled
 from commission.geometry.angles import difference, wrap
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
+from commission.geometry.stretches import stretches_of
 from commission.localization.estimate import Mode
 
 LONGEST_GAP_NS = 1_000_000_000
@@ -264,10 +265,8 @@ def fail_episodes(stamps_ns: IntArray, modes: NDArray[np.integer]) -> tuple[Fail
     stamps_ns : (K,) stamp of each cycle [ns].
     modes : (K,) `Mode` after each cycle.
     """
-    failing = np.concatenate([[False], modes != Mode.OPERATIONAL, [False]])
-    edges = np.flatnonzero(failing[1:] != failing[:-1])
     count = len(stamps_ns)
     return tuple(
         FailEpisode(int(stamps_ns[first]), int(stamps_ns[min(after, count - 1)]), bool(after < count))
-        for first, after in edges.reshape(-1, 2)
+        for first, after in stretches_of(modes != Mode.OPERATIONAL)
     )

@@ -209,12 +209,12 @@ def _gaps(inputs: PlausibilityInput) -> Iterator[Finding]:
     if len(stamps) < 2 or not len(seen) or seen.max() < stamps[0] or seen.min() > stamps[-1]:
         return
     longest = max(LONGEST_GAP_S, 5.0 * _period_s(stamps))
-    edges = np.concatenate([[min(seen.min(), stamps[0])], stamps, [max(seen.max(), stamps[-1])]])
-    long = np.flatnonzero(np.diff(edges) * 1e-9 > longest)
+    times = np.concatenate([[min(seen.min(), stamps[0])], stamps, [max(seen.max(), stamps[-1])]])
+    long = np.flatnonzero(np.diff(times) * 1e-9 > longest)
     start = int(min(seen.min(), stamps[0]))
     for gap in long[:_TOLD_GAPS]:
-        begin, end = int(edges[gap]), int(edges[gap + 1])
-        is_end = gap == len(edges) - 2
+        begin, end = int(times[gap]), int(times[gap + 1])
+        is_end = gap == len(times) - 2
         yield Finding(
             found=f"the odometry {'ends at' if is_end else 'pauses from'} {(begin - start) * 1e-9:.1f} s"
             f"{'' if is_end else f' to {(end - start) * 1e-9:.1f} s'}, and scans go on"

@@ -11,9 +11,9 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray
+from commission.geometry.stretches import stretches_of
 from commission.planning.route_check import FloorDistances, Way, room_along, smallest_radius, way_of
 from commission.site.path import KINK
 from commission.site.routes import Route
@@ -119,9 +119,9 @@ def _curves(walk: _Walk, vehicle: Vehicle) -> Iterable[Violation]:
     """Curves tighter than the vehicle can drive."""
     radius, bends = smallest_radius(vehicle), np.abs(walk.way.curvatures)
     # A thousandth is the rounding of a circle that was drawn with just that radius.
-    for first, last in _runs(bends * radius > 1.001):
-        tightest = first + int(np.argmax(bends[first : last + 1]))
-        where = walk.stretch(first, last, tightest)
+    for first, end in stretches_of(bends * radius > 1.001).tolist():
+        tightest = first + int(np.argmax(bends[first:end]))
+        where = walk.stretch(first, end - 1, tightest)
         yield Violation(
             kind=ViolationKind.CURVE,
             route=walk.name,
@@ -155,20 +155,20 @@ def _corners(walk: _Walk, vehicle: Vehicle) -> Iterable[Violation]:
 
 def _room(walk: _Walk, room: FloatArray, clearance: float) -> Iterable[Violation]:
     """Walls in the way, and stretches with little room that meet none."""
-    for first, last in _runs(room <= 0.0):
-        where = walk.stretch(first, last, (first + last) // 2)
+    for first, end in stretches_of(room <= 0.0).tolist():
+        where = walk.stretch(first, end - 1, (first + end - 1) // 2)
         yield Violation(
             kind=ViolationKind.WALL,
             route=walk.name,
             where=where,
-            found=float(room[first : last + 1].min()),
+            found=float(room[first:end].min()),
             expected=clearance,
             is_fatal=True,
         )
-    for first, last in _runs(room < clearance):
-        least = first + int(np.argmin(room[first : last + 1]))
+    for first, end in stretches_of(room < clearance).tolist():
+        least = first + int(np.argmin(room[first:end]))
         if room[least] > 0.0:
-            where = walk.stretch(first, last, least)
+            where = walk.stretch(first, end - 1, least)
             yield Violation(
                 kind=ViolationKind.ROOM,
                 route=walk.name,
@@ -177,9 +177,3 @@ def _room(walk: _Walk, room: FloatArray, clearance: float) -> Iterable[Violation
                 expected=clearance,
                 is_fatal=False,
             )
-
-
-def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last index of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
-    return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]

@@ -76,7 +76,7 @@ PARAMETERS = {
 """Label and factor of each parameter's widget; None: not a number."""
 
 
-class Desk:
+class PageBench:
     """The page of a project, and what its widgets post."""
 
     def __init__(self, server: viser.ViserServer, project: Project) -> None:
@@ -107,10 +107,10 @@ class Desk:
 
 
 @pytest.fixture
-def desk(project: Project) -> Iterator[Desk]:
+def bench(project: Project) -> Iterator[PageBench]:
     server = start_server("127.0.0.1", 0)
     # Less than a full turn, so that either end may move.
-    yield Desk(server, replace(project, scanner=replace(project.scanner, field_of_view_deg=(-170.0, 165.0))))
+    yield PageBench(server, replace(project, scanner=replace(project.scanner, field_of_view_deg=(-170.0, 165.0))))
     server.stop()
 
 
@@ -154,26 +154,26 @@ def another(widget: Any) -> float:
     raise AssertionError(widget.label)
 
 
-def test_every_number_posts_what_its_label_says_and_is_shown_as_it_was_typed(desk: Desk) -> None:
+def test_every_number_posts_what_its_label_says_and_is_shown_as_it_was_typed(bench: PageBench) -> None:
     seen = set()
-    for widget in filter(is_number, desk.widgets):
+    for widget in filter(is_number, bench.widgets):
         if not widget.visible or not widget._impl.update_cb:
             continue
         typed = another(widget)
-        posted = desk.change(widget, typed)
+        posted = bench.change(widget, typed)
         assert len(posted) == 1, (widget.label, posted)
         meant = typed / factor_of(widget, widget.hint or "")
         found = numbers_in(posted[0])
         assert any(number == pytest.approx(meant, rel=1e-9) for number in found), (widget.label, typed, posted)
-        desk.draw(after(desk.state, posted[0]).state)
+        bench.draw(after(bench.state, posted[0]).state)
         # Six digits.
         assert widget.value == pytest.approx(typed, rel=2e-6), (widget.label, typed, posted)
-        desk.draw(desk.state)
+        bench.draw(bench.state)
         seen.add(widget.label)
     assert len(seen) >= 40
 
 
-def test_every_parameter_has_exactly_one_widget_that_shows_it_in_its_unit(desk: Desk) -> None:
+def test_every_parameter_has_exactly_one_widget_that_shows_it_in_its_unit(bench: PageBench) -> None:
     parameters = Parameters()
     keys = [
         f"{group.name}.{field.name}"
@@ -182,10 +182,10 @@ def test_every_parameter_has_exactly_one_widget_that_shows_it_in_its_unit(desk: 
     ]
     assert sorted(keys) == sorted(PARAMETERS)
     for key in keys:
-        (widget,) = [each for each in desk.widgets if f"({key})" in (getattr(each, "hint", None) or "")]
+        (widget,) = [each for each in bench.widgets if f"({key})" in (getattr(each, "hint", None) or "")]
         label, factor = PARAMETERS[key]
         group, _, name = key.partition(".")
-        value = getattr(getattr(desk.state.project.parameters, group), name)
+        value = getattr(getattr(bench.state.project.parameters, group), name)
         assert widget.label == label
         # Six digits.
         assert widget.value == (value if factor is None else pytest.approx(factor * value, rel=5.1e-6))

@@ -68,7 +68,7 @@ def test_a_click_arrives_at_the_point_that_was_meant(server: viser.ViserServer, 
     clicks: SimpleQueue[object] = SimpleQueue()
 
     @server.scene.on_click()
-    def _(event: viser.SceneClickEvent) -> None:
+    def keep_place(event: viser.SceneClickEvent) -> None:
         origin, direction = np.asarray(event.ray_origin), np.asarray(event.ray_direction)
         clicks.put(origin - direction * origin[2] / direction[2])
 

@@ -44,9 +44,9 @@ def test_a_reflector_that_no_route_sees_has_no_dependents():
 
 
 def test_dirt_never_harms_more_than_blocking(planned):
-    blocked = {each.reflector: each.load for each in dependences([planned])}
+    blocked = {each.reflector: each.limit_share for each in dependences([planned])}
     for each in dependences([planned], FailureOptions(Failure.DIRTY)):
-        assert each.load <= blocked[each.reflector] * (1.0 + 1e-9)
+        assert each.limit_share <= blocked[each.reflector] * (1.0 + 1e-9)
 
 
 def test_a_reflector_moved_within_its_gate_harms_where_few_others_are_seen(planned):
@@ -55,7 +55,7 @@ def test_a_reflector_moved_within_its_gate_harms_where_few_others_are_seen(plann
     crowd = open_field([(10.0, 1.0), *((float(x), -2.0) for x in range(1, 20, 2))], parameters=CARELESS)
     among = dependences([plan_route(crowd, "Line")], FailureOptions(Failure.MOVED, 0.04))
     of_first = next(each for each in among if each.reflector == 0)
-    assert ranked[0].load > 1.5 * of_first.load
+    assert ranked[0].limit_share > 1.5 * of_first.limit_share
 
 
 def test_the_next_failure_is_asked_for_beside_those_that_there_are(planned):

@@ -175,7 +175,7 @@ def by_hand(position_sigma: list[float], heading_sigma: list[float], bias: list[
 def test_load_is_bias_and_two_sigma_as_a_share_of_the_limit_of_the_worst_axis():
     found = by_hand([0.01, 0.049, 0.051, 0.03, 0.0], [0.0, 0.0, 0.0, 0.0, 0.02], [0.0, 0.0, 0.0, 0.045, 0.0], [0] * 5)
     # 20 mm, 98 mm, 102 mm, 60 + 45 mm of 100 mm; 40 mrad of 50 mrad.
-    np.testing.assert_allclose(found.load, [0.2, 0.98, 1.02, 1.05, 0.8])
+    np.testing.assert_allclose(found.limit_share, [0.2, 0.98, 1.02, 1.05, 0.8])
     np.testing.assert_allclose(found.two_sigma[:, 1], [0.02, 0.098, 0.102, 0.06, 0.0])
     np.testing.assert_allclose(found.bias[:, 1], [0.0, 0.0, 0.0, 0.045, 0.0])
     assert found.over_limit().tolist() == [False, False, True, True, False]

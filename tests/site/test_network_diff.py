@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from commission.site.network_diff import Change, NamedDiff, course_shift, difference, keeping_accuracy, merged
+from commission.site.network_diff import Change, NamedDiff, course_shift, difference, merged, with_required_accuracy
 from commission.site.routes import Route, Segment
 from commission.site.stations import Station
 
@@ -45,7 +45,7 @@ def test_applying_a_difference_gives_the_later_stations(
 def test_a_station_keeps_the_accuracy_that_no_layout_carries() -> None:
     known = Station(name="Dock", x=1.0, y=2.0, required_accuracy=0.01)
     read = (Station(name="Dock", x=1.5, y=2.0), Station(name="Wait", x=0.0, y=0.0))
-    assert [s.required_accuracy for s in keeping_accuracy((known,), read)] == [0.01, 0.1]
+    assert [s.required_accuracy for s in with_required_accuracy((known,), read)] == [0.01, 0.1]
 
 
 def test_shift_of_a_course_is_the_distance_that_it_moves() -> None:

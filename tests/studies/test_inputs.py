@@ -91,12 +91,12 @@ def _predicted(inputs: PredictionInput) -> object:
     found = prediction(inputs)
     said = found.prediction
     risks = [(risk.reflector, risk.neighbor, risk.probability.tobytes()) for risk in found.risks]
-    return (_all(said.covariances, said.modes, said.load, found.errors.squares), found.stations, risks)
+    return (_all(said.covariances, said.modes, said.limit_share, found.errors.squares), found.stations, risks)
 
 
 def _ranked(inputs: FailuresInput) -> object:
     found = failures(inputs).ranking
-    return [(each.reflector, each.load, [part.metres.tolist() for part in each.routes]) for each in found]
+    return [(each.reflector, each.limit_share, [part.metres.tolist() for part in each.routes]) for each in found]
 
 
 def _ambiguous(inputs: AmbiguityInput) -> object:

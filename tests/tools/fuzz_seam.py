@@ -19,7 +19,7 @@ from typing import Any
 
 import msgspec
 
-from tests.app.base.widgets import Desk
+from tests.app.base.widget_bench import WidgetBench
 from tests.app.raw_client import CAMERA
 
 BATCH = 200
@@ -53,7 +53,7 @@ BAD: dict[str, Callable[[Random], Any]] = {
     "progress": lambda r: r.choice((0.0, 50.0, 100, "x", None)),
     "disabled": lambda r: r.choice((True, False, 1, "x")),
 }
-"""A value that a person cannot give to the widget of that name; see `Desk.widgets`."""
+"""A value that a person cannot give to the widget of that name; see `WidgetBench.widgets`."""
 
 
 def _bad_tuple(random: Random, length: int, beyond: float) -> Any:
@@ -76,17 +76,17 @@ RAY = {"ray_origin": POINT, "ray_direction": [0.0, 0.0, -1.0]}
 NODE = {"name": "/box", "instance_index": None, "modifier": None, "owner": ""}
 
 
-def good_messages(desk: Desk) -> dict[str, dict[str, Any]]:
+def good_messages(bench: WidgetBench) -> dict[str, dict[str, Any]]:
     """One message of each type as a page sends it; none of them changes what a widget holds."""
-    name = {widget: desk.widgets[widget]._impl.uuid for widget in desk.widgets}
-    upload = {"source_component_uuid": desk.upload._impl.uuid, "transfer_uuid": "t"}
+    name = {widget: bench.widgets[widget]._impl.uuid for widget in bench.widgets}
+    upload = {"source_component_uuid": bench.upload._impl.uuid, "transfer_uuid": "t"}
     return {
         "ViewerCameraMessage": dict(CAMERA),
         "GuiUpdateMessage": {"uuid": name["count"], "updates": {"value": 7}},
         "GuiButtonHoldMessage": {"uuid": name["button"], "frequency": 10.0},
-        "GuiFormSubmitMessage": {"uuid": desk.form._impl.uuid},
-        "GuiFormDirtyMessage": {"uuid": desk.form._impl.uuid},
-        "CommandTriggerMessage": {"uuid": desk.command._impl.uuid},
+        "GuiFormSubmitMessage": {"uuid": bench.form._impl.uuid},
+        "GuiFormDirtyMessage": {"uuid": bench.form._impl.uuid},
+        "CommandTriggerMessage": {"uuid": bench.command._impl.uuid},
         "FileTransferStartUpload": {**upload, "filename": "f", "mime_type": "", "part_count": 1, "size_bytes": 1},
         "FileTransferPart": {**upload, "part_index": 0, "content": b"x"},
         "TransformControlsUpdateMessage": {"name": "/gizmo", "wxyz": QUATERNION, "position": POINT, "owner": ""},
@@ -114,16 +114,16 @@ FOREIGN_TYPES = (
 )  # fmt: skip
 
 
-def bad_message(desk: Desk, random: Random) -> bytes | str:
+def bad_message(bench: WidgetBench, random: Random) -> bytes | str:
     """Something that no page says."""
-    good = good_messages(desk)
+    good = good_messages(bench)
     match random.randrange(10):
         case 0 | 1 | 2 | 3 | 4:
             widget = random.choice(tuple(BAD))
-            uuid = desk.widgets[widget]._impl.uuid
+            uuid = bench.widgets[widget]._impl.uuid
             return _packed("GuiUpdateMessage", uuid=uuid, updates={"value": BAD[widget](random)})
         case 5:
-            widget = desk.widgets[random.choice(tuple(desk.widgets))]
+            widget = bench.widgets[random.choice(tuple(bench.widgets))]
             attribute = random.choice(("props", "label", "visible", "disabled", "min", "_impl", "uuid", "content", ""))
             updates = random.choice(({attribute: 5}, {"value": 7, attribute: 5}, {}, {attribute: [1] * 100}))
             return _packed("GuiUpdateMessage", uuid=widget._impl.uuid, updates=updates)
@@ -194,35 +194,35 @@ class Fuzzed:
     """Longest time until the innocent browser saw a picture [s]."""
 
 
-def fuzz(desk: Desk, count: int, seed: int) -> Fuzzed:
+def fuzz(bench: WidgetBench, count: int, seed: int) -> Fuzzed:
     """Send bad values; raises AssertionError where one of them has changed something or disturbs somebody."""
     random, started = Random(seed), time.monotonic()
-    values, kept, slowest = desk.values, desk.kept, 0.0
-    desk.guest.heard.clear()
+    values, kept, slowest = bench.values, bench.kept, 0.0
+    bench.guest.heard.clear()
     for begun in range(0, count, BATCH):
         for _ in range(min(BATCH, count - begun)):
-            desk.guest.send_raw(bad_message(desk, random))
+            bench.guest.send_raw(bad_message(bench, random))
         drawing = time.monotonic()
-        desk.draw()
+        bench.draw()
         slowest = max(slowest, time.monotonic() - drawing)
-        desk.innocent.heard.clear()
-        desk.guest.hear_all(0.001)
-        while desk.guest.refused < begun - AHEAD:
-            desk.guest.hear(30.0)
-    _hear_the_rest(desk, count)
-    assert desk.values == values, "a widget holds something else"
-    assert desk.changed == [], "a callback has heard of it"
-    assert desk.kept == kept, "something stays for browsers that come"
-    assert desk.server.transfers.open == ()
-    return Fuzzed(count, desk.guest.refused, -(-count // BATCH), time.monotonic() - started, slowest)
+        bench.innocent.heard.clear()
+        bench.guest.hear_all(0.001)
+        while bench.guest.refused < begun - AHEAD:
+            bench.guest.hear(30.0)
+    _hear_the_rest(bench, count)
+    assert bench.values == values, "a widget holds something else"
+    assert bench.changed == [], "a callback has heard of it"
+    assert bench.kept == kept, "something stays for browsers that come"
+    assert bench.server.transfers.open == ()
+    return Fuzzed(count, bench.guest.refused, -(-count // BATCH), time.monotonic() - started, slowest)
 
 
-def _hear_the_rest(desk: Desk, count: int) -> None:
+def _hear_the_rest(bench: WidgetBench, count: int) -> None:
     """Hear of refusals until all have been told, or nothing has come for some seconds."""
     before = -1
-    while before < desk.guest.refused < count:
-        before = desk.guest.refused
-        desk.guest.hear_all(4.0)
+    while before < bench.guest.refused < count:
+        before = bench.guest.refused
+        bench.guest.hear_all(4.0)
 
 
 def main() -> None:
@@ -231,11 +231,11 @@ def main() -> None:
     parser.add_argument("--values", type=int, default=100_000, help="bad values")
     parser.add_argument("--seed", type=int, default=1, help="of the random numbers")
     asked = parser.parse_args()
-    desk = Desk()
+    bench = WidgetBench()
     try:
-        found = fuzz(desk, asked.values, asked.seed)
+        found = fuzz(bench, asked.values, asked.seed)
     finally:
-        desk.close()
+        bench.close()
     sys.stdout.write(
         f"{found.sent} bad values in {found.seconds:.0f} s; told {found.told}; "
         f"{found.pictures} pictures seen, the slowest after {found.slowest_picture:.2f} s; nothing persists\n"

@@ -9,7 +9,7 @@ from commission.app.base.conditions import Conditions
 from commission.app.base.floor_picture import FloorPicture
 from commission.app.base.jobs import Lane
 from commission.app.base.kept import Kept
-from commission.app.base.remembered import Remembered
+from commission.app.base.memo import Memo
 from commission.app.base.service import Context, Due, Service
 from commission.app.base.state import AppState
 from commission.planning.ambiguity import AmbiguityOptions
@@ -25,7 +25,7 @@ class AmbiguityService(Service):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self._kept = Kept[AmbiguityInput, AmbiguousFloor](COLD_START, context.jobs, Lane.PATIENT)
-        self._remembered = Remembered[ColdStartView]()
+        self._memo = Memo[ColdStartView]()
         self.view: ColdStartView | None = None
         """What there is now; the same value as long as nothing changes."""
 
@@ -43,7 +43,7 @@ class AmbiguityService(Service):
         else:
             self._kept.drop()
         found, is_drawn = self._kept.result, state.part(FloorPicture).is_free_for(NAME)
-        self.view = self._remembered.of(
+        self.view = self._memo.of(
             (found, settings.pair, is_drawn, outdated),
             lambda: found and cold_start_view(found, settings.pair, is_drawn=is_drawn, outdated=outdated),
         )

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from commission.app.base.conditions import Conditions
 from commission.app.base.kept import Kept
-from commission.app.base.remembered import Remembered
+from commission.app.base.memo import Memo
 from commission.app.base.service import Context, Due, Service
 from commission.app.base.state import AppState
 from commission.app.coverage.ellipses import ellipses
@@ -33,9 +33,9 @@ class CoverageService(Service):
         self._scaled: Covered | None = None
         self._moves = 0
         self._drag: tuple[Project, tuple[Editor, ...], Project] | None = None
-        self._heat = Remembered[HeatView]()
-        self._ellipses = Remembered[EllipseView]()
-        self._remembered = Remembered[CoverageView]()
+        self._heat = Memo[HeatView]()
+        self._ellipses = Memo[EllipseView]()
+        self._memo = Memo[CoverageView]()
         self.view = CoverageView()
         """What there is now; the same value as long as nothing changes."""
 
@@ -55,7 +55,7 @@ class CoverageService(Service):
             outdated = False
         before, covered = self.view, self._kept.result
         key = (covered, self._moves, figure, outdated, settings)
-        self.view = self._remembered.of(key, lambda: self._look(figure, settings, outdated=outdated)) or before
+        self.view = self._memo.of(key, lambda: self._look(figure, settings, outdated=outdated)) or before
         return Due.NEVER if self.view is before else Due.SOON
 
     def _kept_up(self, inputs: CoverageInput) -> bool:

@@ -105,5 +105,5 @@ def _with_network(found: Preview, routes: tuple[Route, ...], stations: tuple[Sta
     found = replace(found, routes=network_diff.difference(found.project.routes, routes))
     if stations is None:
         return found
-    accurate = network_diff.keeping_accuracy(found.project.stations, stations)
+    accurate = network_diff.with_required_accuracy(found.project.stations, stations)
     return replace(found, stations=network_diff.difference(found.project.stations, accurate))

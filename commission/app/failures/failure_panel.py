@@ -85,7 +85,7 @@ def ranking_table(failures: FailureView) -> str:
     if failures.fallen:
         rows.insert(0, ("Failed before", ", ".join(escaped(name) for name in failures.fallen)))
     rows += [
-        (escaped(name), f"{each.failing_metres} m; {100 * each.load:.0f} %")
+        (escaped(name), f"{each.failing_metres} m; {100 * each.limit_share:.0f} %")
         for name, each in list(zip(failures.names, failures.ranking, strict=True))[:RANKED_SHOWN]
     ]
     chosen = failures.chosen

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from commission.app.base.conditions import Conditions
 from commission.app.base.kept import Kept
-from commission.app.base.remembered import Remembered
+from commission.app.base.memo import Memo
 from commission.app.base.service import Context, Due, Service
 from commission.app.base.state import AppState
 from commission.app.failures.settings import FailureSettings
@@ -21,7 +21,7 @@ class FailureService(Service):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self._kept = Kept[FailuresInput, FailuresResult](RANKING, context.jobs)
-        self._remembered = Remembered[FailureView]()
+        self._memo = Memo[FailureView]()
         self.view: FailureView | None = None
         """What there is now; the same value as long as nothing changes."""
 
@@ -40,7 +40,7 @@ class FailureService(Service):
         else:
             self._kept.drop()
         found = self._kept.result
-        self.view = self._remembered.of(
+        self.view = self._memo.of(
             (found, settings.failed, outdated),
             lambda: found and failure_view(found, settings.failed, outdated=outdated),
         )

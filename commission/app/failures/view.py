@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import BoolArray, FloatArray
+from commission.geometry.stretches import stretches_of
 from commission.planning.dependence import Dependence
 from commission.studies.failures import FailuresResult
 
@@ -68,5 +69,4 @@ def failure_view(ranked: FailuresResult, failed: str, *, outdated: bool) -> Fail
 
 def stretches(points: FloatArray, chosen: BoolArray) -> tuple[FloatArray, ...]:
     """Cut the chosen ones of (K, 2) points in a row into pieces without gaps."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], chosen, [False]]).astype(np.int8)))
-    return tuple(points[start:end] for start, end in zip(edges[::2], edges[1::2], strict=True))
+    return tuple(points[start:end] for start, end in stretches_of(chosen))

@@ -20,7 +20,7 @@ from commission.site.project import Project
 UPLOAD_LIMIT = 256_000_000
 """Bytes of one upload: it is held in memory until it is read."""
 JOBS = ("Reading ", "Loading ")
-"""How the names of the jobs of `mapping.effects` begin."""
+"""How the names of the jobs of `work` begin."""
 KINDS = (
     "<div class='c-note' style='padding:0 6px 4px'>ROS map (.yaml and its image), plain image, CAD drawing (.dxf), "
     "3D model (.stl .obj .glb .ply).</div>"

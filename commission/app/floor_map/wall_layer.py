@@ -11,6 +11,7 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base.drawing import yaw_quaternion
 from commission.app.base.layer import BaseLayer
 from commission.geometry.arrays import BoolArray
+from commission.geometry.stretches import stretches_of
 from commission.site.floor_map import OCCUPIED
 from commission.site.project import Project
 
@@ -37,8 +38,7 @@ def merged_boxes(occupied: BoolArray) -> NDArray[np.int64]:
     for row in range(len(occupied) + 1):
         runs: set[tuple[int, int]] = set()
         if row < len(occupied):
-            edges = np.flatnonzero(np.diff(np.concatenate([[0], occupied[row].astype(np.int8), [0]])))
-            runs = {(int(a), int(b)) for a, b in edges.reshape(-1, 2)}
+            runs = {(first, end) for first, end in stretches_of(occupied[row]).tolist()}
         for run in [run for run in open_runs if run not in runs]:
             boxes.append((open_runs.pop(run), row, *run))
         for run in runs:

@@ -51,7 +51,7 @@ def count_route(action: actions.CountRoute, state: AppState, sender: Sender) -> 
     return _asking(state, replace(brief, ignored_routes=ignored), edit)
 
 
-def _keeping_out(state: AppState, areas: tuple[Rectangle, ...], edit: Edit) -> Outcome:
+def _set_keep_out(state: AppState, areas: tuple[Rectangle, ...], edit: Edit) -> Outcome:
     return _asking(state, with_field(state.project.layout, "candidates.keep_out", areas), edit)
 
 
@@ -61,7 +61,7 @@ def keep_out(action: actions.KeepOut, state: AppState, sender: Sender) -> Outcom
     if min(high[0] - low[0], high[1] - low[1]) < SMALLEST_AREA:
         return Outcome(state)
     areas = (*state.project.layout.candidates.keep_out, (*low, *high))
-    return _keeping_out(state, areas, Edit("keep an area free of reflectors", sender))
+    return _set_keep_out(state, areas, Edit("keep an area free of reflectors", sender))
 
 
 @reduce.register
@@ -69,7 +69,7 @@ def free_areas(action: actions.FreeAreas, state: AppState, sender: Sender) -> Ou
     place = action.place
     areas = state.project.layout.candidates.keep_out
     left = () if place is None else tuple(area for area in areas if not _contains(area, place))
-    return _keeping_out(state, left, Edit("allow reflectors again", sender))
+    return _set_keep_out(state, left, Edit("allow reflectors again", sender))
 
 
 def _contains(area: Rectangle, place: tuple[float, float]) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from commission.app.base.jobs import Lane
 from commission.app.base.kept import Kept
-from commission.app.base.remembered import Remembered
+from commission.app.base.memo import Memo
 from commission.app.base.service import Context, Due, Service
 from commission.app.base.state import AppState
 from commission.app.placement.view import LayoutView, layout_view
@@ -22,7 +22,7 @@ class PlacementService(Service):
         super().__init__(context)
         self._kept = Kept[PlacementInput, PlacementResult](LAYOUT, context.jobs, Lane.PATIENT)
         self._asked = 0
-        self._remembered = Remembered[LayoutView]()
+        self._memo = Memo[LayoutView]()
         self.view: LayoutView | None = None
         """What there is now; the same value as long as nothing changes."""
 
@@ -40,5 +40,5 @@ class PlacementService(Service):
         if inputs is not None:
             self._kept.ask(wish.asked, inputs, lambda progress: placement(inputs, progress))
         found, project = self._kept.result, state.project
-        self.view = self._remembered.of((found, project, wish), lambda: found and layout_view(found, project, wish))
+        self.view = self._memo.of((found, project, wish), lambda: found and layout_view(found, project, wish))
         return Due.NEVER if self.view is before else Due.SOON

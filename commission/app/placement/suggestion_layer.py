@@ -1,4 +1,4 @@
-"""The suggested layout before it is accepted: new reflectors as ghosts, those that would go crossed out, keep-outs."""
+"""The suggested layout before it is accepted: new reflectors, those that would go crossed out, keep-outs."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ class SuggestionLayer(BaseLayer):
         self._mark = 0.1
         self._shown: LayoutView | None = None
         self._areas: tuple[Rectangle, ...] = ()
-        self._ghosts = scene.add_point_cloud(
-            "/plan/suggested/ghosts",
+        self._suggested = scene.add_point_cloud(
+            "/plan/suggested/reflectors",
             NO_POINTS,
             theme.SUGGESTED,
             point_size=0.1,
@@ -94,8 +94,8 @@ class SuggestionLayer(BaseLayer):
         nothing = np.empty((0, 2))
         suggestion = None if found is None else found.suggestion
         added, removed = (nothing, nothing) if suggestion is None else (suggestion.added, suggestion.removed)
-        self._ghosts.point_size = 1.2 * self._mark
-        self._ghosts.points = lift(added, theme.Height.LABEL)
+        self._suggested.point_size = 1.2 * self._mark
+        self._suggested.points = lift(added, theme.Height.LABEL)
         angles = np.linspace(0.0, 2.0 * np.pi, RING_POINTS, endpoint=False)
         circle = RING_MARKS * self._mark * np.stack([np.cos(angles), np.sin(angles)], axis=1)
         self._rings.points = outline_segments(added[:, np.newaxis] + circle, theme.Height.LABEL)
@@ -120,5 +120,5 @@ class SuggestionLayer(BaseLayer):
         return view.part(LayoutView) is not None or bool(view.state.project.layout.candidates.keep_out)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
-        """Return ghosts, marks and areas."""
-        return self._ghosts, self._rings, self._crosses, self._unmet, self._keep_outs
+        """Return reflectors, marks and areas."""
+        return self._suggested, self._rings, self._crosses, self._unmet, self._keep_outs

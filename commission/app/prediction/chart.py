@@ -9,7 +9,7 @@ import numpy as np
 from commission.app.base import theme
 from commission.app.base.panel import escaped, table
 from commission.app.prediction.driven import DrivenMetres
-from commission.app.prediction.load_colors import load_classes, palette
+from commission.app.prediction.limit_colors import limit_classes, palette
 from commission.app.prediction.tracks import Limited, Plain, TrackAxis, limited, plain, round_up
 from commission.app.prediction.view import RouteView
 from commission.planning.station_accuracy import StationAccuracy
@@ -65,7 +65,7 @@ def _axis(route: RouteView, starts: np.ndarray) -> TrackAxis:
     """The bars begin at these metres; their color is that of the ribbon."""
     prediction = route.prediction
     shades = [theme.css(color) for color in palette()]
-    fills = tuple(shades[index] for index in load_classes(np.maximum.reduceat(route.loads, starts)))
+    fills = tuple(shades[index] for index in limit_classes(np.maximum.reduceat(route.limit_shares, starts)))
     metres = route.metres.metre[starts].astype(float)
     return TrackAxis(prediction.drive.length, metres, fills, prediction.trips(), prediction.recoveries())
 

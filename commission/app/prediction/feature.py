@@ -5,7 +5,7 @@ from __future__ import annotations
 from commission.app.base.feature import LEGEND, PLAN, Docked, Feature
 from commission.app.prediction import reducer
 from commission.app.prediction.event_layer import EventLayer
-from commission.app.prediction.load_legend import LoadLegend
+from commission.app.prediction.limit_legend import LimitLegend
 from commission.app.prediction.ribbon_layer import RibbonLayer
 from commission.app.prediction.route_panel import RoutePanel
 from commission.app.prediction.service import PredictionService
@@ -17,6 +17,6 @@ FEATURE = Feature(
     layers=(RibbonLayer, EventLayer),
     panels=(
         Docked(lambda at: RoutePanel(at.gui, at.post, at.container), PLAN, 20, folder="Along a route"),
-        Docked(lambda at: LoadLegend(at.gui), LEGEND, 14),
+        Docked(lambda at: LimitLegend(at.gui), LEGEND, 14),
     ),
 )

@@ -1,4 +1,4 @@
-"""What is expected along a route: a ribbon in the colors of its load. What happens on it is in `events`."""
+"""What is expected along a route, as a ribbon in colors of the share of the limit. `event_layer` draws what happens."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, stroke_segments
 from commission.app.base.layer import BaseLayer
 from commission.app.base.view import PageView
-from commission.app.prediction.load_colors import load_classes, palette
+from commission.app.prediction.limit_colors import limit_classes, palette
 from commission.app.prediction.view import RouteView
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.planning.route_prediction import RoutePrediction
@@ -18,24 +18,24 @@ MOST_PIECES = 1500
 WIDTH, RIM = 6.0, 9.0
 
 
-def pieces(points: FloatArray, loads: FloatArray, at_most: int) -> tuple[FloatArray, IntArray]:
+def pieces(points: FloatArray, limit_shares: FloatArray, at_most: int) -> tuple[FloatArray, IntArray]:
     """Thin a colored line without losing its worst spots.
 
     Parameters
     ----------
     points : (K, 2) array [m].
-    loads : (K,) load at each point [1].
+    limit_shares : (K,) share of the supervisor's limit at each point [1].
     at_most : about how many pieces remain.
 
     Returns
     -------
     lines : (N, 2, 2) pieces [m], end to end.
-    classes : (N,) class of the largest load of each.
+    classes : (N,) class of the largest share of each.
     """
     step = max(1, -(-len(points) // at_most))
     starts = np.arange(0, len(points) - 1, step)
     ends = np.minimum(starts + step, len(points) - 1)
-    return np.stack([points[starts], points[ends]], axis=1), load_classes(np.maximum.reduceat(loads, starts))
+    return np.stack([points[starts], points[ends]], axis=1), limit_classes(np.maximum.reduceat(limit_shares, starts))
 
 
 class RibbonLayer(BaseLayer):
@@ -65,10 +65,12 @@ class RibbonLayer(BaseLayer):
         if prediction is self._shown:
             return
         self._shown = prediction
-        points, loads = (np.empty((0, 2)), np.empty(0))
+        points, limit_shares = (np.empty((0, 2)), np.empty(0))
         if prediction is not None:
-            points, loads = prediction.drive.poses[:, :2], prediction.load
-        lines, classes = pieces(points, loads, MOST_PIECES) if len(points) > 1 else (points.reshape(0, 2, 2), loads)
+            points, limit_shares = prediction.drive.poses[:, :2], prediction.limit_share
+        lines, classes = (
+            pieces(points, limit_shares, MOST_PIECES) if len(points) > 1 else (points.reshape(0, 2, 2), limit_shares)
+        )
         self._rim.points = stroke_segments(lines, theme.Height.ROUTE)
         for index, node in enumerate(self._ribbon):
             chosen = lines[classes == index]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from commission.app.base.conditions import Conditions
 from commission.app.base.kept import Kept
-from commission.app.base.remembered import Remembered
+from commission.app.base.memo import Memo
 from commission.app.base.service import Context, Due, Service
 from commission.app.base.state import AppState
 from commission.app.prediction.settings import PredictionSettings
@@ -21,7 +21,7 @@ class PredictionService(Service):
     def __init__(self, context: Context) -> None:
         super().__init__(context)
         self._kept = Kept[PredictionInput, PredictionResult](PREDICTION, context.jobs)
-        self._remembered = Remembered[RouteView]()
+        self._memo = Memo[RouteView]()
         self.view: RouteView | None = None
         """What there is now; the same value as long as nothing changes."""
 
@@ -38,7 +38,7 @@ class PredictionService(Service):
             self._kept.keep(inputs, lambda progress: prediction(inputs, progress))
         before, found = self.view, self._kept.result
         outdated = inputs is not None and not self._kept.is_of(inputs)
-        self.view = self._remembered.of((found, outdated), lambda: found and route_view(found, outdated=outdated))
+        self.view = self._memo.of((found, outdated), lambda: found and route_view(found, outdated=outdated))
         return Due.NEVER if self.view is before else Due.SOON
 
 

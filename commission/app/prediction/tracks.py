@@ -43,8 +43,8 @@ class TrackAxis:
         """Pixels from the left of the drawing."""
         return LEFT + (WIDTH - LEFT) * np.asarray(metre) / max(self.length, 1e-9)
 
-    def edges(self) -> FloatArray:
-        """(B + 1,) left edge of each bar, and the right one of the last."""
+    def bounds(self) -> FloatArray:
+        """(B + 1,) left bound of each bar, and the right one of the last."""
         return self.x(np.append(self.metres, self.length))
 
 
@@ -131,17 +131,17 @@ def _line(y: float, color: str, dash: str = "none") -> str:
 
 
 def _bars(axis: TrackAxis, tops: FloatArray, bottom: float) -> list[str]:
-    edges = axis.edges()
+    bounds = axis.bounds()
     return [
         f"<rect x='{left:.1f}' y='{min(top, bottom - 1.0):.1f}' width='{right - left + 0.3:.1f}' "
         f"height='{max(bottom - top, 1.0):.1f}' fill='{fill}'/>"
-        for left, right, top, fill in zip(edges[:-1], edges[1:], tops, axis.fills, strict=True)
+        for left, right, top, fill in zip(bounds[:-1], bounds[1:], tops, axis.fills, strict=True)
     ]
 
 
 def _steps(axis: TrackAxis, tops: FloatArray, color: str) -> str:
     """Draw a line that is level over each bar."""
-    places = np.column_stack((np.repeat(axis.edges(), 2)[1:-1], np.repeat(tops, 2)))
+    places = np.column_stack((np.repeat(axis.bounds(), 2)[1:-1], np.repeat(tops, 2)))
     points = " ".join(f"{x:.1f},{y:.1f}" for x, y in places.tolist())
     return f"<polyline class='c-error' points='{points}' fill='none' stroke='{color}' stroke-width='1.2'/>"
 

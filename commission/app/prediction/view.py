@@ -47,7 +47,7 @@ class RouteView:
     """The worst of each metre."""
     errors: FloatArray
     """(B, 3) largest 2-sigma of the true error of x [m], y [m] and heading [rad] in each metre."""
-    loads: FloatArray
+    limit_shares: FloatArray
     """(B,) largest share of the supervisor's limit in each metre [1]."""
     risk: FloatArray
     """(B,) largest chance of a wrong association in each metre [0..0.5]."""
@@ -77,7 +77,7 @@ def route_view(predicted: PredictionResult, *, outdated: bool) -> RouteView:
         prediction=prediction,
         metres=metres,
         errors=predicted.errors.per_metre(metres),
-        loads=np.maximum.reduceat(prediction.load, metres.first),
+        limit_shares=np.maximum.reduceat(prediction.limit_share, metres.first),
         risk=np.maximum.reduceat(chances, metres.first),
         risks=tuple(_risk_view(predicted, risk) for risk in predicted.risks),
         stations=predicted.stations,

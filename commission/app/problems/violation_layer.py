@@ -18,10 +18,10 @@ from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
 from commission.studies.violations import Stretch, Violation
 
-WIDTH, GHOST_WIDTH = 9.0, 1.2
+WIDTH, OUTLINE_WIDTH = 9.0, 1.2
 MOST_POINTS = 100
 """Points along one stretch: enough for any curve that a vehicle drives."""
-MOST_GHOSTS = 60
+MOST_OUTLINES = 60
 """Outlines that are drawn: more would hide the floor."""
 SHORTEST = 1.2
 """Length of the mark of a corner, which has none of its own, in sizes of a mark."""
@@ -45,7 +45,7 @@ class ViolationLayer(BaseLayer):
         self._shown: Sequence[Violation] | None = None
         self._fatal = self._lines("fatal", theme.OVER_LIMIT, WIDTH)
         self._little = self._lines("little", theme.TOO_LITTLE, WIDTH)
-        self._ghosts = self._lines("outlines", theme.OVER_LIMIT, GHOST_WIDTH)
+        self._worst_outlines = self._lines("outlines", theme.OVER_LIMIT, OUTLINE_WIDTH)
 
     def _lines(self, name: str, color: theme.Color, width: float) -> LineSegmentsHandle:
         return self.scene.add_line_segments(
@@ -66,10 +66,10 @@ class ViolationLayer(BaseLayer):
         self._shown = violations
         self._fatal.points = self._stretches(v for v in violations if v.is_fatal)
         self._little.points = self._stretches(v for v in violations if not v.is_fatal)
-        ghosts = [
-            se2.transform_points(violation.where.worst_pose, self._outline) for violation in violations[:MOST_GHOSTS]
+        outlines = [
+            se2.transform_points(violation.where.worst_pose, self._outline) for violation in violations[:MOST_OUTLINES]
         ]
-        self._ghosts.points = outline_segments(np.array(ghosts), theme.Height.ACCUMULATED)
+        self._worst_outlines.points = outline_segments(np.array(outlines), theme.Height.ACCUMULATED)
 
     def is_used(self, view: PageView) -> bool:  # noqa: ARG002 - the protocol's
         """Whether a route asks too much."""
@@ -91,4 +91,4 @@ class ViolationLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return stretches and outlines."""
-        return self._fatal, self._little, self._ghosts
+        return self._fatal, self._little, self._worst_outlines

@@ -89,9 +89,9 @@ class VehicleLayer(BaseLayer):
         """Draw the outline and the scanner's place on the vehicle."""
         self._project = project
         outline = np.array(project.vehicle.outline)
-        edges = outline_segments(outline[np.newaxis], theme.Height.VEHICLE)
+        sides = outline_segments(outline[np.newaxis], theme.Height.VEHICLE)
         arrow = stroke_segments(heading_mark(outline), theme.Height.VEHICLE)
-        self._lines.points = np.concatenate([edges, arrow])
+        self._lines.points = np.concatenate([sides, arrow])
         x, y, heading = (float(value) for value in project.scanner.mounting)
         self._scanner.position = (x, y, theme.Height.VEHICLE)
         self._scanner.wxyz = yaw_quaternion(heading)

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from commission.app.base import connection, seam, viser_private
-from tests.app.base.widgets import Desk
+from tests.app.base.widget_bench import WidgetBench
 from tests.app.raw_client import CAMERA, RawClient
 
 
@@ -22,24 +22,24 @@ def _quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def desk() -> Iterator[Desk]:
-    opened = Desk()
+def bench() -> Iterator[WidgetBench]:
+    opened = WidgetBench()
     yield opened
     opened.close()
 
 
 @pytest.fixture(scope="module")
-def one_desk() -> Iterator[Desk]:
-    opened = Desk()
+def one_bench() -> Iterator[WidgetBench]:
+    opened = WidgetBench()
     yield opened
     opened.close()
 
 
 @pytest.fixture
-def shared(one_desk: Desk) -> Desk:
-    """A desk that other tests have used, for tests that change nothing of it; its guest is new."""
-    one_desk.begin_anew()
-    return one_desk
+def shared(one_bench: WidgetBench) -> WidgetBench:
+    """A bench that other tests have used, for tests that change nothing of it; its guest is new."""
+    one_bench.begin_anew()
+    return one_bench
 
 
 BAD_VALUES: tuple[tuple[str, object, str], ...] = (
@@ -73,7 +73,7 @@ BAD_VALUES: tuple[tuple[str, object, str], ...] = (
 
 @pytest.mark.parametrize(("name", "value", "told"), BAD_VALUES)
 def test_a_value_that_no_person_can_give_changes_nothing_and_is_told_to_that_browser_alone(
-    shared: Desk, name: str, value: object, told: str
+    shared: WidgetBench, name: str, value: object, told: str
 ) -> None:
     values, kept = shared.values, shared.kept
     shared.guest.update(shared.widgets[name], value)
@@ -109,24 +109,24 @@ GOOD_VALUES: tuple[tuple[str, object, object], ...] = (
 
 @pytest.mark.parametrize(("name", "value", "expected"), GOOD_VALUES)
 def test_a_value_at_its_bound_is_taken_and_reaches_the_other_browser(
-    desk: Desk, name: str, value: object, expected: object
+    bench: WidgetBench, name: str, value: object, expected: object
 ) -> None:
-    desk.guest.update(desk.widgets[name], value)
-    desk.until(lambda: desk.changed == [(name, expected)])
+    bench.guest.update(bench.widgets[name], value)
+    bench.until(lambda: bench.changed == [(name, expected)])
     if name != "group":  # buttons are pressed, not set
-        desk.innocent.hear_until(lambda message: "value" in message.get("updates", {}))
-    assert desk.guest.refusals == []
+        bench.innocent.hear_until(lambda message: "value" in message.get("updates", {}))
+    assert bench.guest.refusals == []
 
 
-def test_a_pressed_button_is_heard(desk: Desk) -> None:
+def test_a_pressed_button_is_heard(bench: WidgetBench) -> None:
     pressed: list[int] = []
-    desk.widgets["button"].on_click(lambda event: pressed.append(event.client_id))
-    desk.guest.update(desk.widgets["button"], True)
-    desk.until(lambda: pressed == [0])
+    bench.widgets["button"].on_click(lambda event: pressed.append(event.client_id))
+    bench.guest.update(bench.widgets["button"], True)
+    bench.until(lambda: pressed == [0])
 
 
 @pytest.mark.parametrize("name", ["label", "disabled", "props", "min", "_impl", "uuid", "content"])
-def test_no_browser_can_change_anything_of_a_widget_but_its_value(shared: Desk, name: str) -> None:
+def test_no_browser_can_change_anything_of_a_widget_but_its_value(shared: WidgetBench, name: str) -> None:
     kept = shared.kept
     for widget in shared.widgets.values():
         shared.guest.update(widget, 5, name)
@@ -226,7 +226,7 @@ BAD_MESSAGES: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("name", BAD_MESSAGES)
 def test_a_message_that_no_page_sends_is_told_and_leaves_no_trace(
-    shared: Desk, name: str, caplog: pytest.LogCaptureFixture
+    shared: WidgetBench, name: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     kept = shared.kept
     shared.guest.send(**BAD_MESSAGES[name])
@@ -242,43 +242,43 @@ def test_a_message_that_no_page_sends_is_told_and_leaves_no_trace(
     "raw",
     [b"", b"\xc1", b"\xdd\xff\xff\xff\xff", b"\x91" * 100_000, b"\x81\xa4type\xa1\xff", b"\xc0", b"\x2a", "text", ""],
 )
-def test_bytes_that_are_no_message_are_told_and_the_connection_lives_on(desk: Desk, raw: bytes | str) -> None:
-    desk.guest.send_raw(raw)
-    desk.guest.hear_until(lambda message: message["type"] == "NotificationShowMessage")
-    desk.guest.update(desk.widgets["count"], 8)
-    desk.until(lambda: desk.changed == [("count", 8)])
+def test_bytes_that_are_no_message_are_told_and_the_connection_lives_on(bench: WidgetBench, raw: bytes | str) -> None:
+    bench.guest.send_raw(raw)
+    bench.guest.hear_until(lambda message: message["type"] == "NotificationShowMessage")
+    bench.guest.update(bench.widgets["count"], 8)
+    bench.until(lambda: bench.changed == [("count", 8)])
 
 
-def test_the_second_of_two_equal_keys_is_what_is_checked_and_what_viser_hears(desk: Desk) -> None:
+def test_the_second_of_two_equal_keys_is_what_is_checked_and_what_viser_hears(bench: WidgetBench) -> None:
     """Two readers of the same bytes could take different ones."""
-    uuid = desk.widgets["count"]._impl.uuid.encode()
+    uuid = bench.widgets["count"]._impl.uuid.encode()
 
     def text(content: bytes) -> bytes:
         return b"\xd9" + bytes([len(content)]) + content
 
     head = b"\x84" + text(b"type") + text(b"GuiUpdateMessage") + text(b"uuid") + text(uuid)
     good, bad = b"\x81" + text(b"value") + b"\x09", b"\x81" + text(b"props") + b"\x05"
-    desk.guest.send_raw(head + text(b"updates") + good + text(b"updates") + bad)
-    desk.guest.hear_until(lambda message: message["type"] == "NotificationShowMessage")
-    desk.guest.send_raw(head + text(b"updates") + bad + text(b"updates") + good)
-    desk.until(lambda: desk.changed == [("count", 9)])
-    assert "props" not in str(desk.kept)
+    bench.guest.send_raw(head + text(b"updates") + good + text(b"updates") + bad)
+    bench.guest.hear_until(lambda message: message["type"] == "NotificationShowMessage")
+    bench.guest.send_raw(head + text(b"updates") + bad + text(b"updates") + good)
+    bench.until(lambda: bench.changed == [("count", 9)])
+    assert "props" not in str(bench.kept)
 
 
-def test_what_a_page_says_of_gizmos_nodes_forms_and_commands_is_heard(desk: Desk) -> None:
+def test_what_a_page_says_of_gizmos_nodes_forms_and_commands_is_heard(bench: WidgetBench) -> None:
     heard: list[str] = []
-    desk.command.on_trigger(lambda _event: heard.append("command"))
-    desk.form.on_submit(lambda _event: heard.append("form"))
-    desk.box.on_click(lambda _event: heard.append("box"))
-    desk.box.on_drag("left")(lambda event: heard.append(event.phase))
-    desk.gizmo.on_update(lambda _event: heard.append("gizmo"))
-    desk.server.scene.on_click()(lambda _event: heard.append("floor"))
-    desk.server.scene.on_rect_select()(lambda _event: heard.append("rectangle"))
-    desk.widgets["button"].on_hold(callback_hz=10.0)(lambda _event: heard.append("hold"))
-    say = desk.guest.send
-    say(type="CommandTriggerMessage", uuid=desk.command._impl.uuid)
-    say(type="GuiFormDirtyMessage", uuid=desk.form._impl.uuid)
-    say(type="GuiFormSubmitMessage", uuid=desk.form._impl.uuid)
+    bench.command.on_trigger(lambda _event: heard.append("command"))
+    bench.form.on_submit(lambda _event: heard.append("form"))
+    bench.box.on_click(lambda _event: heard.append("box"))
+    bench.box.on_drag("left")(lambda event: heard.append(event.phase))
+    bench.gizmo.on_update(lambda _event: heard.append("gizmo"))
+    bench.server.scene.on_click()(lambda _event: heard.append("floor"))
+    bench.server.scene.on_rect_select()(lambda _event: heard.append("rectangle"))
+    bench.widgets["button"].on_hold(callback_hz=10.0)(lambda _event: heard.append("hold"))
+    say = bench.guest.send
+    say(type="CommandTriggerMessage", uuid=bench.command._impl.uuid)
+    say(type="GuiFormDirtyMessage", uuid=bench.form._impl.uuid)
+    say(type="GuiFormSubmitMessage", uuid=bench.form._impl.uuid)
     say(type="SceneNodeClickMessage", **{**NODE, "name": "/box", "owner": ""})
     say(type="SceneNodeDragMessage", **DRAG, owner="")
     say(type="SceneNodeDragMessage", **{**DRAG, "phase": "end"}, owner="")
@@ -287,97 +287,99 @@ def test_what_a_page_says_of_gizmos_nodes_forms_and_commands_is_heard(desk: Desk
     say(type="TransformControlsDragEndMessage", name="/gizmo", owner="")
     say(type="ScenePointerMessage", **CLICK)
     say(type="ScenePointerMessage", **{**CLICK, "event_type": "rect-select", "screen_pos": [[0, 0], [1, 1]]})
-    say(type="GuiButtonHoldMessage", uuid=desk.widgets["button"]._impl.uuid, frequency=10)
+    say(type="GuiButtonHoldMessage", uuid=bench.widgets["button"]._impl.uuid, frequency=10)
     expected = ["command", "form", "box", "start", "end", "gizmo", "gizmo", "gizmo", "floor", "rectangle", "hold"]
-    desk.until(lambda: len(heard) == len(expected))
+    bench.until(lambda: len(heard) == len(expected))
     assert heard == expected
-    assert tuple(desk.gizmo.position) == (1.0, 2.0, 3.0)
-    assert desk.guest.refusals == []
+    assert tuple(bench.gizmo.position) == (1.0, 2.0, 3.0)
+    assert bench.guest.refusals == []
 
 
-def test_a_connection_that_has_not_become_a_browser_changes_nothing(desk: Desk) -> None:
-    stranger = RawClient(desk.server, is_silent=True)
-    stranger.update(desk.widgets["count"], 8)
+def test_a_connection_that_has_not_become_a_browser_changes_nothing(bench: WidgetBench) -> None:
+    stranger = RawClient(bench.server, is_silent=True)
+    stranger.update(bench.widgets["count"], 8)
     stranger.hear_until(lambda message: message["type"] == "NotificationShowMessage")
     assert stranger.refusals == ["GuiUpdateMessage came before the page was ready; nothing was done"]
-    assert desk.widgets["count"].value == 7
+    assert bench.widgets["count"].value == 7
     stranger.close()
 
 
-def test_a_refused_value_is_shown_no_longer_than_a_moment_in_the_field_where_it_was_typed(desk: Desk) -> None:
-    desk.guest.update(desk.widgets["count"], 1e20)
-    back = desk.guest.hear_until(lambda message: message["type"] == "GuiUpdateMessage")
+def test_a_refused_value_is_shown_no_longer_than_a_moment_in_the_field_where_it_was_typed(bench: WidgetBench) -> None:
+    bench.guest.update(bench.widgets["count"], 1e20)
+    back = bench.guest.hear_until(lambda message: message["type"] == "GuiUpdateMessage")
     assert back["updates"] == {"value": 7}
-    assert back["uuid"] == desk.widgets["count"]._impl.uuid
-    desk.draw()
-    assert [message for message in desk.innocent.heard if message.get("updates") == {"value": 7}] == []
+    assert back["uuid"] == bench.widgets["count"]._impl.uuid
+    bench.draw()
+    assert [message for message in bench.innocent.heard if message.get("updates") == {"value": 7}] == []
 
 
-def test_a_number_that_is_half_typed_is_neither_told_nor_written_over(desk: Desk) -> None:
+def test_a_number_that_is_half_typed_is_neither_told_nor_written_over(bench: WidgetBench) -> None:
     """From 10 to 60: on the way to 50 one types 5."""
-    desk.guest.update(desk.widgets["bounded"], 5)
-    desk.guest.update(desk.widgets["bounded"], 50)
-    desk.until(lambda: desk.changed == [("bounded", 50)])
-    desk.guest.hear_all(0.5)
-    assert desk.guest.refusals == []
-    assert [message for message in desk.guest.heard if message["type"] == "GuiUpdateMessage"] == []
+    bench.guest.update(bench.widgets["bounded"], 5)
+    bench.guest.update(bench.widgets["bounded"], 50)
+    bench.until(lambda: bench.changed == [("bounded", 50)])
+    bench.guest.hear_all(0.5)
+    assert bench.guest.refusals == []
+    assert [message for message in bench.guest.heard if message["type"] == "GuiUpdateMessage"] == []
 
 
-def test_a_number_that_stays_beyond_its_bounds_is_told_once(desk: Desk) -> None:
-    desk.guest.update(desk.widgets["bounded"], 6)
-    desk.guest.update(desk.widgets["bounded"], 61)
-    desk.guest.hear_all(0.6)
-    assert desk.guest.refusals == ["Count: found 61; expected 10 to 60 (and 1 more)"]
-    assert desk.guest.refused == 2
-    assert desk.widgets["bounded"].value == 20
+def test_a_number_that_stays_beyond_its_bounds_is_told_once(bench: WidgetBench) -> None:
+    bench.guest.update(bench.widgets["bounded"], 6)
+    bench.guest.update(bench.widgets["bounded"], 61)
+    bench.guest.hear_all(0.6)
+    assert bench.guest.refusals == ["Count: found 61; expected 10 to 60 (and 1 more)"]
+    assert bench.guest.refused == 2
+    assert bench.widgets["bounded"].value == 20
 
 
-def test_a_flood_of_refusals_is_a_few_notes_that_count_them_all(desk: Desk) -> None:
+def test_a_flood_of_refusals_is_a_few_notes_that_count_them_all(bench: WidgetBench) -> None:
     for _ in range(300):
-        desk.guest.update(desk.widgets["checkbox"], "yes")
-    desk.guest.hear_all(1.0)
-    assert desk.guest.refused == 300
-    assert len(desk.guest.refusals) < 30
+        bench.guest.update(bench.widgets["checkbox"], "yes")
+    bench.guest.hear_all(1.0)
+    assert bench.guest.refused == 300
+    assert len(bench.guest.refusals) < 30
 
 
-def test_a_message_that_is_too_large_ends_only_its_own_connection(desk: Desk) -> None:
-    desk.guest.send_raw(b"x" * (connection.LARGEST_MESSAGE + 1))
-    desk.guest.hear_all(2.0)
-    assert "4194304" in desk.guest.close_reason or "limit" in desk.guest.close_reason
-    desk.draw()
+def test_a_message_that_is_too_large_ends_only_its_own_connection(bench: WidgetBench) -> None:
+    bench.guest.send_raw(b"x" * (connection.LARGEST_MESSAGE + 1))
+    bench.guest.hear_all(2.0)
+    assert "4194304" in bench.guest.close_reason or "limit" in bench.guest.close_reason
+    bench.draw()
 
 
-def test_forms_with_invented_names_fill_no_memory(desk: Desk) -> None:
-    kept = desk.kept
+def test_forms_with_invented_names_fill_no_memory(bench: WidgetBench) -> None:
+    kept = bench.kept
     for number in range(500):
-        desk.guest.send(type="GuiFormDirtyMessage", uuid=f"form{number}")
-    desk.guest.hear_all(1.0)
-    assert desk.guest.refused == 500
-    assert desk.kept == kept
+        bench.guest.send(type="GuiFormDirtyMessage", uuid=f"form{number}")
+    bench.guest.hear_all(1.0)
+    assert bench.guest.refused == 500
+    assert bench.kept == kept
 
 
 @pytest.mark.measures_time
-def test_a_flood_of_messages_waits_and_the_others_are_heard(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_flood_of_messages_waits_and_the_others_are_heard(
+    bench: WidgetBench, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(connection, "MESSAGES_PER_S", 100.0)
     for number in range(1_500):
-        desk.guest.update(desk.widgets["count"], number)
+        bench.guest.update(bench.widgets["count"], number)
     started = time.monotonic()
-    desk.innocent.update(desk.widgets["checkbox"], True)
-    desk.until(lambda: ("checkbox", True) in desk.changed)
+    bench.innocent.update(bench.widgets["checkbox"], True)
+    bench.until(lambda: ("checkbox", True) in bench.changed)
     assert time.monotonic() - started < 2.0
-    assert desk.widgets["count"].value < 1_400
+    assert bench.widgets["count"].value < 1_400
 
 
-def test_callbacks_run_in_the_order_in_which_a_person_did_things(desk: Desk) -> None:
+def test_callbacks_run_in_the_order_in_which_a_person_did_things(bench: WidgetBench) -> None:
     for number in range(200):
-        desk.guest.update(desk.widgets["count"], 1_000 + number)
-    desk.until(lambda: len(desk.changed) >= 200)
+        bench.guest.update(bench.widgets["count"], 1_000 + number)
+    bench.until(lambda: len(bench.changed) >= 200)
     # A callback reads what the widget holds when it runs, which may be newer.
-    assert [value for _, value in desk.changed] == sorted(value for _, value in desk.changed)
+    assert [value for _, value in bench.changed] == sorted(value for _, value in bench.changed)
 
 
 def test_a_callback_that_fails_is_one_line_in_the_log_and_the_next_one_runs(
-    desk: Desk, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
+    bench: WidgetBench, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
 ) -> None:
     def fail(_event: object) -> None:
         raise RuntimeError("a mistake of ours")
@@ -385,26 +387,26 @@ def test_a_callback_that_fails_is_one_line_in_the_log_and_the_next_one_runs(
     async def fail_later(_event: object) -> None:
         raise RuntimeError("another one")
 
-    desk.widgets["button"].on_click(fail)
-    desk.box.on_click(fail_later)
-    desk.guest.update(desk.widgets["button"], True)
-    desk.guest.send(type="SceneNodeClickMessage", **{**NODE, "name": "/box"})
-    desk.until(lambda: len(caplog.records) == 2)
+    bench.widgets["button"].on_click(fail)
+    bench.box.on_click(fail_later)
+    bench.guest.update(bench.widgets["button"], True)
+    bench.guest.send(type="SceneNodeClickMessage", **{**NODE, "name": "/box"})
+    bench.until(lambda: len(caplog.records) == 2)
     assert {str(record.exc_info[1]) for record in caplog.records if record.exc_info} == {
         "a mistake of ours",
         "another one",
     }
-    desk.guest.update(desk.widgets["count"], 8)
-    desk.until(lambda: ("count", 8) in desk.changed)
+    bench.guest.update(bench.widgets["count"], 8)
+    bench.until(lambda: ("count", 8) in bench.changed)
     assert capfd.readouterr().err == ""
 
 
-def test_writing_to_a_browser_that_has_gone_throws_nothing(desk: Desk) -> None:
-    gone = desk.server.get_clients()[0]
-    desk.guest.close()
-    desk.until(lambda: 0 not in desk.server.get_clients())
+def test_writing_to_a_browser_that_has_gone_throws_nothing(bench: WidgetBench) -> None:
+    gone = bench.server.get_clients()[0]
+    bench.guest.close()
+    bench.until(lambda: 0 not in bench.server.get_clients())
     gone.add_notification("Done", "nobody reads it")
     gone.gui.add_html("nor this")
     gone.camera.position = (0.0, 0.0, 1.0)
-    viser_private.notify(desk.server, 0, title="t", text="nor that", seconds=1.0)
-    desk.draw()
+    viser_private.notify(bench.server, 0, title="t", text="nor that", seconds=1.0)
+    bench.draw()

@@ -16,7 +16,7 @@ from tests.app.raw_client import RawClient
 LIMIT = 1_000_000
 
 
-class Desk:
+class UploadBench:
     """A server with one upload button, and a client that sends what it likes."""
 
     def __init__(self) -> None:
@@ -87,166 +87,166 @@ class Desk:
 
 
 @pytest.fixture
-def desk() -> Iterator[Desk]:
-    opened = Desk()
+def bench() -> Iterator[UploadBench]:
+    opened = UploadBench()
     yield opened
     opened.close()
 
 
-def test_file_arrives_in_parts_and_is_not_kept_afterwards(desk: Desk) -> None:
-    desk.begin(6, 2)
-    desk.part(0, b"abc")
-    desk.part(1, b"def")
-    desk.until(lambda: bool(desk.taken))
-    assert desk.taken == [("hall.csv", b"abcdef")]
-    assert desk.kept == 0
-    assert desk.button.value.content == b""
-    desk.begin(0, 0, transfer="empty")
-    desk.until(lambda: len(desk.taken) == 2)
-    assert desk.refused == []
+def test_file_arrives_in_parts_and_is_not_kept_afterwards(bench: UploadBench) -> None:
+    bench.begin(6, 2)
+    bench.part(0, b"abc")
+    bench.part(1, b"def")
+    bench.until(lambda: bool(bench.taken))
+    assert bench.taken == [("hall.csv", b"abcdef")]
+    assert bench.kept == 0
+    assert bench.button.value.content == b""
+    bench.begin(0, 0, transfer="empty")
+    bench.until(lambda: len(bench.taken) == 2)
+    assert bench.refused == []
 
 
-def test_file_over_the_limit_is_refused_by_its_announced_size_and_no_byte_of_it_is_kept(desk: Desk) -> None:
-    desk.begin(40_000_000, 80)
+def test_file_over_the_limit_is_refused_by_its_announced_size_and_no_byte_of_it_is_kept(bench: UploadBench) -> None:
+    bench.begin(40_000_000, 80)
     for index in range(80):
-        desk.part(index, b"x" * 500_000)
-    desk.until(lambda: bool(desk.refused))
-    assert desk.refused == ["the file has 40 MB (40,000,000 bytes); expected at most 1 MB"]
+        bench.part(index, b"x" * 500_000)
+    bench.until(lambda: bool(bench.refused))
+    assert bench.refused == ["the file has 40 MB (40,000,000 bytes); expected at most 1 MB"]
     # The next file is taken as if nothing had happened, after all parts of the first have been heard.
-    desk.begin(3, 1, transfer="next")
-    desk.part(0, b"abc", transfer="next")
-    desk.until(lambda: bool(desk.taken))
-    assert desk.taken == [("hall.csv", b"abc")]
-    assert desk.kept == 0
+    bench.begin(3, 1, transfer="next")
+    bench.part(0, b"abc", transfer="next")
+    bench.until(lambda: bool(bench.taken))
+    assert bench.taken == [("hall.csv", b"abc")]
+    assert bench.kept == 0
 
 
-def test_file_that_is_larger_than_announced_is_dropped(desk: Desk) -> None:
-    desk.begin(LIMIT, 1000)
-    desk.part(0, b"x" * 400_000)
-    desk.until(lambda: desk.kept == 400_000)
-    desk.part(1, b"x" * 900_000)
-    desk.until(lambda: bool(desk.refused))
-    assert desk.refused == ["the upload sends more than it announced; it was dropped"]
-    assert desk.kept == 0
-    assert desk.taken == []
+def test_file_that_is_larger_than_announced_is_dropped(bench: UploadBench) -> None:
+    bench.begin(LIMIT, 1000)
+    bench.part(0, b"x" * 400_000)
+    bench.until(lambda: bench.kept == 400_000)
+    bench.part(1, b"x" * 900_000)
+    bench.until(lambda: bool(bench.refused))
+    assert bench.refused == ["the upload sends more than it announced; it was dropped"]
+    assert bench.kept == 0
+    assert bench.taken == []
 
 
 @pytest.mark.parametrize(("size", "parts"), [(10, 0), (10, 11), (10, 10**9), (0, 1)])
-def test_parts_that_cannot_make_up_the_file_are_refused(desk: Desk, size: int, parts: int) -> None:
-    desk.begin(size, parts)
-    desk.until(lambda: bool(desk.refused))
-    assert desk.refused == [f"the upload announces {parts} parts of {size} bytes; expected a file"]
-    assert desk.server.transfers.open == ()
+def test_parts_that_cannot_make_up_the_file_are_refused(bench: UploadBench, size: int, parts: int) -> None:
+    bench.begin(size, parts)
+    bench.until(lambda: bool(bench.refused))
+    assert bench.refused == [f"the upload announces {parts} parts of {size} bytes; expected a file"]
+    assert bench.server.transfers.open == ()
 
 
 @pytest.mark.parametrize(("size", "parts"), [(-1, 1), (10, -1), (1e99, 1), (1.5, 1)])
-def test_sizes_that_are_none_are_refused(desk: Desk, size: float, parts: int) -> None:
-    desk.begin(size, parts)
-    desk.client.hear_until(lambda message: message["type"] == "NotificationShowMessage")
-    assert desk.client.refused == 1
-    assert desk.server.transfers.open == ()
+def test_sizes_that_are_none_are_refused(bench: UploadBench, size: float, parts: int) -> None:
+    bench.begin(size, parts)
+    bench.client.hear_until(lambda message: message["type"] == "NotificationShowMessage")
+    assert bench.client.refused == 1
+    assert bench.server.transfers.open == ()
 
 
-def test_files_of_browsers_that_have_left_are_not_kept(desk: Desk) -> None:
-    others = [RawClient(desk.server) for _ in range(4)]
-    desk.until(lambda: len(desk.server.get_clients()) == 5)
+def test_files_of_browsers_that_have_left_are_not_kept(bench: UploadBench) -> None:
+    others = [RawClient(bench.server) for _ in range(4)]
+    bench.until(lambda: len(bench.server.get_clients()) == 5)
     for number, other in enumerate(others):
-        desk.begin(LIMIT, 3, transfer=f"t{number}", client=other)
-        desk.part(0, b"x" * 300_000, transfer=f"t{number}", client=other)
-    desk.until(lambda: desk.kept == 1_200_000)
+        bench.begin(LIMIT, 3, transfer=f"t{number}", client=other)
+        bench.part(0, b"x" * 300_000, transfer=f"t{number}", client=other)
+    bench.until(lambda: bench.kept == 1_200_000)
     for other in others:
         other.close()
-    desk.until(lambda: desk.server.transfers.open == ())
+    bench.until(lambda: bench.server.transfers.open == ())
 
 
-def test_files_on_their_way_are_bounded_over_all_browsers(desk: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_on_their_way_are_bounded_over_all_browsers(bench: UploadBench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(uploads, "MOST_KEPT", 1_000_000)
-    other = RawClient(desk.server)
-    desk.until(lambda: len(desk.server.get_clients()) == 2)
-    desk.begin(LIMIT, 2, transfer="first", client=other)
-    desk.part(0, b"x" * 700_000, transfer="first", client=other)
-    desk.until(lambda: desk.kept == 700_000)
-    desk.begin(LIMIT, 2)
-    desk.part(0, b"x" * 299_000)
-    desk.until(lambda: desk.kept == 999_000)
-    desk.part(1, b"x" * 2_000)
-    desk.until(lambda: bool(desk.refused))
-    assert desk.refused == ["other files of 1 MB are on their way; expected to wait for them"]
-    assert desk.kept == 700_000
+    other = RawClient(bench.server)
+    bench.until(lambda: len(bench.server.get_clients()) == 2)
+    bench.begin(LIMIT, 2, transfer="first", client=other)
+    bench.part(0, b"x" * 700_000, transfer="first", client=other)
+    bench.until(lambda: bench.kept == 700_000)
+    bench.begin(LIMIT, 2)
+    bench.part(0, b"x" * 299_000)
+    bench.until(lambda: bench.kept == 999_000)
+    bench.part(1, b"x" * 2_000)
+    bench.until(lambda: bool(bench.refused))
+    assert bench.refused == ["other files of 1 MB are on their way; expected to wait for them"]
+    assert bench.kept == 700_000
     other.close()
 
 
 def test_a_file_of_which_nothing_comes_any_more_makes_room_for_the_next(
-    desk: Desk, monkeypatch: pytest.MonkeyPatch
+    bench: UploadBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(transfers, "STALE_AFTER_S", 0.0)
-    other = RawClient(desk.server)
-    desk.until(lambda: len(desk.server.get_clients()) == 2)
-    desk.begin(LIMIT, 2, transfer="stale", client=other)
-    desk.until(lambda: desk.server.transfers.get("stale") is not None)
-    desk.begin(LIMIT, 2, transfer="new")
-    desk.until(lambda: desk.server.transfers.get("new") is not None)
-    assert desk.server.transfers.get("stale") is None
+    other = RawClient(bench.server)
+    bench.until(lambda: len(bench.server.get_clients()) == 2)
+    bench.begin(LIMIT, 2, transfer="stale", client=other)
+    bench.until(lambda: bench.server.transfers.get("stale") is not None)
+    bench.begin(LIMIT, 2, transfer="new")
+    bench.until(lambda: bench.server.transfers.get("new") is not None)
+    assert bench.server.transfers.get("stale") is None
     other.close()
 
 
-def test_nobody_else_hears_of_an_upload_and_nothing_of_it_stays(desk: Desk) -> None:
-    other = RawClient(desk.server)
+def test_nobody_else_hears_of_an_upload_and_nothing_of_it_stays(bench: UploadBench) -> None:
+    other = RawClient(bench.server)
     other.hear_all(0.3)
-    kept = len(desk.server._websock_server.get_message_buffer().message_from_id)
-    desk.begin(6, 2)
-    desk.part(0, b"abc")
-    desk.part(1, b"def")
-    desk.begin(LIMIT + 1, 2, transfer="large")
-    desk.until(lambda: bool(desk.taken) and bool(desk.refused))
+    kept = len(bench.server._websock_server.get_message_buffer().message_from_id)
+    bench.begin(6, 2)
+    bench.part(0, b"abc")
+    bench.part(1, b"def")
+    bench.begin(LIMIT + 1, 2, transfer="large")
+    bench.until(lambda: bool(bench.taken) and bool(bench.refused))
     other.hear_all(1.0)
     assert [message["type"] for message in other.heard if message["type"].startswith(("FileT", "Notif"))] == []
-    assert len(desk.server._websock_server.get_message_buffer().message_from_id) == kept
-    desk.client.hear_all(0.3)
-    acks = [m["transferred_bytes"] for m in desk.client.heard if m["type"] == "FileTransferPartAck"]
+    assert len(bench.server._websock_server.get_message_buffer().message_from_id) == kept
+    bench.client.hear_all(0.3)
+    acks = [m["transferred_bytes"] for m in bench.client.heard if m["type"] == "FileTransferPartAck"]
     assert acks == [0, 3, 6, 1]
     other.close()
 
 
-def test_nobody_can_send_parts_of_the_file_of_another_browser(desk: Desk) -> None:
-    other = RawClient(desk.server)
-    desk.until(lambda: len(desk.server.get_clients()) == 2)
-    desk.begin(6, 2)
-    desk.until(lambda: desk.server.transfers.get("t") is not None)
-    desk.part(0, b"xyz", client=other)
-    desk.part(0, b"abc")
-    desk.part(0, b"123")
-    desk.part(1, b"def")
-    desk.until(lambda: bool(desk.taken))
-    assert desk.taken == [("hall.csv", b"abcdef")]
+def test_nobody_can_send_parts_of_the_file_of_another_browser(bench: UploadBench) -> None:
+    other = RawClient(bench.server)
+    bench.until(lambda: len(bench.server.get_clients()) == 2)
+    bench.begin(6, 2)
+    bench.until(lambda: bench.server.transfers.get("t") is not None)
+    bench.part(0, b"xyz", client=other)
+    bench.part(0, b"abc")
+    bench.part(0, b"123")
+    bench.part(1, b"def")
+    bench.until(lambda: bool(bench.taken))
+    assert bench.taken == [("hall.csv", b"abcdef")]
     other.close()
 
 
-def test_a_file_shorter_than_announced_is_dropped(desk: Desk) -> None:
-    desk.begin(6, 2)
-    desk.part(0, b"abc")
-    desk.part(1, b"de")
-    desk.until(lambda: bool(desk.refused))
-    assert desk.refused == ["the upload sends 5 bytes; expected 6, as it announced"]
-    assert desk.taken == []
+def test_a_file_shorter_than_announced_is_dropped(bench: UploadBench) -> None:
+    bench.begin(6, 2)
+    bench.part(0, b"abc")
+    bench.part(1, b"de")
+    bench.until(lambda: bool(bench.refused))
+    assert bench.refused == ["the upload sends 5 bytes; expected 6, as it announced"]
+    assert bench.taken == []
 
 
-def test_one_browser_sends_one_file_at_a_time(desk: Desk) -> None:
+def test_one_browser_sends_one_file_at_a_time(bench: UploadBench) -> None:
     for number in range(20):
-        desk.begin(LIMIT, 3, transfer=f"t{number}")
-        desk.part(0, b"x" * 300_000, transfer=f"t{number}")
-    desk.until(lambda: desk.server.transfers.get("t19") is not None)
-    desk.until(lambda: desk.kept == 300_000)
-    assert len(desk.server.transfers.open) == 1
+        bench.begin(LIMIT, 3, transfer=f"t{number}")
+        bench.part(0, b"x" * 300_000, transfer=f"t{number}")
+    bench.until(lambda: bench.server.transfers.get("t19") is not None)
+    bench.until(lambda: bench.kept == 300_000)
+    assert len(bench.server.transfers.open) == 1
 
 
-def test_files_come_in_through_upload_buttons_only(desk: Desk) -> None:
-    desk.begin(3, 1, widget=desk.slider)
-    desk.part(0, b"abc", widget=desk.slider)
-    desk.begin(3, 1, transfer="next")
-    desk.part(0, b"abc", transfer="next")
-    desk.until(lambda: bool(desk.taken))
-    assert desk.slider.value == 0
+def test_files_come_in_through_upload_buttons_only(bench: UploadBench) -> None:
+    bench.begin(3, 1, widget=bench.slider)
+    bench.part(0, b"abc", widget=bench.slider)
+    bench.begin(3, 1, transfer="next")
+    bench.part(0, b"abc", transfer="next")
+    bench.until(lambda: bool(bench.taken))
+    assert bench.slider.value == 0
 
 
 def test_sizes_are_written_as_people_read_them() -> None:
@@ -267,8 +267,8 @@ def test_an_odd_ending_is_not_kept(name: str) -> None:
         assert path.name == "upload"
 
 
-def test_a_name_arrives_without_folders(desk: Desk) -> None:
-    desk.begin(3, 1, name="..\\..\\etc/hall.csv")
-    desk.part(0, b"abc")
-    desk.until(lambda: bool(desk.taken))
-    assert desk.taken == [("hall.csv", b"abc")]
+def test_a_name_arrives_without_folders(bench: UploadBench) -> None:
+    bench.begin(3, 1, name="..\\..\\etc/hall.csv")
+    bench.part(0, b"abc")
+    bench.until(lambda: bool(bench.taken))
+    assert bench.taken == [("hall.csv", b"abc")]

@@ -16,7 +16,7 @@ import viser
 import commission
 from commission.app.base import viser_private
 from commission.app.base.viser_private import LoopEvent
-from tests.app.base.widgets import Desk
+from tests.app.base.widget_bench import WidgetBench
 
 PACKAGE = Path(commission.__file__).parent
 OTHERS_OWN = {"_exit", "_replace", "_asdict", "_fields"}
@@ -45,9 +45,9 @@ def test_only_one_module_uses_private_names_of_viser() -> None:
 
 def test_each_private_name_of_viser_is_there() -> None:
     """One that is missing says so here, and not in the middle of a drive."""
-    desk = Desk()
-    server, client = desk.server, desk.server.get_clients()[0]
-    socket, button = server._websock_server, desk.widgets["button"]
+    bench = WidgetBench()
+    server, client = bench.server, bench.server.get_clients()[0]
+    socket, button = server._websock_server, bench.widgets["button"]
     have: tuple[object, ...] = (
         viser,
         server,
@@ -59,7 +59,7 @@ def test_each_private_name_of_viser_is_there() -> None:
         socket._client_state_from_id[0],
         button,
         button._button_impl,
-        desk.gizmo,
+        bench.gizmo,
         viser._scene_api,
         viser._viser,
     )
@@ -68,7 +68,7 @@ def test_each_private_name_of_viser_is_there() -> None:
     assert {name for name in used if not any(name in dir(owner) for owner in have)} == set()
     for module in (viser._scene_api, viser._viser):
         assert hasattr(module, "print_awaited_callback_error")
-    desk.close()
+    bench.close()
 
 
 def test_what_a_browser_can_say_has_the_fields_that_viser_reads() -> None:
@@ -119,12 +119,12 @@ def test_who_waits_for_an_event_is_woken_by_the_loop_alone() -> None:
 
 
 def test_the_events_of_all_buffers_are_of_that_kind() -> None:
-    desk = Desk()
-    server = desk.server._websock_server
+    bench = WidgetBench()
+    server = bench.server._websock_server
     buffers = [server.get_message_buffer(), *(s.message_buffer for s in server._client_state_from_id.values())]
     assert len(buffers) == 3
     assert {type(buffer.message_event) for buffer in buffers} == {LoopEvent}
-    desk.close()
+    bench.close()
 
 
 def test_an_event_that_was_set_from_another_thread_wakes_who_waits_within_a_turn_of_the_loop() -> None:
@@ -141,11 +141,11 @@ def test_an_event_that_was_set_from_another_thread_wakes_who_waits_within_a_turn
 
 @pytest.mark.parametrize("name", ["notify", "show_value", "send"])
 def test_nothing_happens_when_a_connection_has_gone(name: str) -> None:
-    desk = Desk()
+    bench = WidgetBench()
     if name == "notify":
-        viser_private.notify(desk.server, 99, title="t", text="x", seconds=1.0)
+        viser_private.notify(bench.server, 99, title="t", text="x", seconds=1.0)
     elif name == "show_value":
-        viser_private.show_value(desk.server, 99, desk.widgets["count"])
+        viser_private.show_value(bench.server, 99, bench.widgets["count"])
     else:
-        viser_private.send(desk.server, 99, None)
-    desk.close()
+        viser_private.send(bench.server, 99, None)
+    bench.close()

@@ -9,7 +9,7 @@ from commission.app.base.view import LivedPath
 from commission.app.prediction.chart import chart
 from commission.app.prediction.driven import driven
 from commission.app.prediction.event_layer import events, place_at
-from commission.app.prediction.load_colors import BOUNDS, load_classes, palette
+from commission.app.prediction.limit_colors import BOUNDS, limit_classes, palette
 from commission.app.prediction.ribbon_layer import pieces
 from commission.app.prediction.tracks import round_up
 from commission.app.prediction.view import RouteView, route_view
@@ -35,9 +35,9 @@ def lived(result: RunResult) -> LivedPath:
 
 def test_thinning_a_ribbon_keeps_its_worst_spot_and_both_ends() -> None:
     points = np.stack([np.arange(1000.0), np.zeros(1000)], axis=1)
-    loads = np.zeros(1000)
-    loads[503] = 2.0
-    lines, classes = pieces(points, loads, 100)
+    shares = np.zeros(1000)
+    shares[503] = 2.0
+    lines, classes = pieces(points, shares, 100)
     assert len(lines) <= 100
     assert lines[0, 0].tolist() == [0.0, 0.0]
     assert lines[-1, 1].tolist() == [999.0, 0.0]
@@ -46,7 +46,7 @@ def test_thinning_a_ribbon_keeps_its_worst_spot_and_both_ends() -> None:
 
 
 def test_a_load_above_the_limit_has_a_color_outside_of_the_ramp() -> None:
-    below, above = load_classes(np.array([0.999 * BOUNDS[-1], 1.001 * BOUNDS[-1]])).tolist()
+    below, above = limit_classes(np.array([0.999 * BOUNDS[-1], 1.001 * BOUNDS[-1]])).tolist()
     assert (below, above) == (len(palette()) - 2, len(palette()) - 1)
 
 

@@ -40,7 +40,7 @@ def test_an_unknown_route_is_refused(bench: Bench[PredictionService]) -> None:
 def test_a_route_is_predicted_and_predicted_anew_after_an_edit(bench: Bench[PredictionService]) -> None:
     predicted(bench)
     first = bench.view
-    assert len(first.loads) == len(first.metres.metre)
+    assert len(first.limit_shares) == len(first.metres.metre)
     bench.move(0, 0.5)
     assert bench.view.outdated
     second = bench.found()

@@ -92,7 +92,7 @@ def test_every_violated_stretch_is_drawn_with_the_outline_where_it_is_worst(serv
         gaps = np.hypot(*(places - violation.where.worst_pose[:2]).T)
         assert gaps.min() < 0.2
     corners = len(ROOM.vehicle.outline)
-    assert len(layer._ghosts.points) == corners * len(VIOLATIONS)
+    assert len(layer._worst_outlines.points) == corners * len(VIOLATIONS)
     before = layer._fatal.points
     layer.draw(view(None))
     assert layer._fatal.points is before

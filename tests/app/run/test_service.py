@@ -30,7 +30,7 @@ from tests.app.owning import Owner
 GATE = "association.gate_probability"
 
 
-class Desk:
+class RunBench:
     """A run service whose owner the test plays, and whose clock it moves."""
 
     def __init__(self, project: Project, drive: Drive) -> None:
@@ -76,20 +76,20 @@ class Desk:
 
 
 @pytest.fixture
-def desk(project: Project, drive: Drive) -> Iterator[Desk]:
-    desk = Desk(project, drive)
-    desk.do(LoadSource(VirtualDrive("There and back")))
-    yield desk
-    desk.owner.close()
+def bench(project: Project, drive: Drive) -> Iterator[RunBench]:
+    bench = RunBench(project, drive)
+    bench.do(LoadSource(VirtualDrive("There and back")))
+    yield bench
+    bench.owner.close()
 
 
 def gate(probability: float) -> Callable[[Project], Project]:
     return lambda project: replace(project, parameters=with_field(project.parameters, GATE, probability))
 
 
-def fresh(desk: Desk, *segments: tuple[int, Project, bool]) -> RunResult:
+def fresh(bench: RunBench, *segments: tuple[int, Project, bool]) -> RunResult:
     """The run that these segments make, computed on its own."""
-    drive = desk.drives[-1]
+    drive = bench.drives[-1]
     made = tuple(RunSegment(first, LocalizerSetup.of(project), covered) for first, project, covered in segments)
     return judged_run(RunInput(log=drive.log, start=drive.start, segments=made))
 
@@ -101,22 +101,22 @@ def assert_same(one: RunResult, other: RunResult) -> None:
     assert (one.statistics, one.episodes) == (other.statistics, other.episodes)
 
 
-def test_a_new_drive_is_there_whole_at_its_start_and_plays(desk: Desk, project: Project) -> None:
-    assert desk.owner.posted == [Play(playing=True)]
-    assert desk.view.time == 0.0
-    assert_same(desk.view.result, fresh(desk, (0, project, False)))
+def test_a_new_drive_is_there_whole_at_its_start_and_plays(bench: RunBench, project: Project) -> None:
+    assert bench.owner.posted == [Play(playing=True)]
+    assert bench.view.time == 0.0
+    assert_same(bench.view.result, fresh(bench, (0, project, False)))
 
 
-def test_an_edit_runs_the_whole_drive_again_and_the_cursor_stays(desk: Desk, project: Project) -> None:
-    desk.do(MoveTo(5.0))
-    desk.edit(gate(0.6))
-    assert desk.view.time == pytest.approx(5.0)
-    assert_same(desk.view.result, fresh(desk, (0, gate(0.6)(project), False)))
+def test_an_edit_runs_the_whole_drive_again_and_the_cursor_stays(bench: RunBench, project: Project) -> None:
+    bench.do(MoveTo(5.0))
+    bench.edit(gate(0.6))
+    assert bench.view.time == pytest.approx(5.0)
+    assert_same(bench.view.result, fresh(bench, (0, gate(0.6)(project), False)))
 
 
 @pytest.mark.parametrize("part", ["reflectors", "scanner", "parameters"])
-def test_whatever_the_localizer_reads_runs_it_again(desk: Desk, part: str) -> None:
-    before = desk.view.result
+def test_whatever_the_localizer_reads_runs_it_again(bench: RunBench, part: str) -> None:
+    before = bench.view.result
 
     def change(project: Project) -> Project:
         match part:
@@ -128,167 +128,169 @@ def test_whatever_the_localizer_reads_runs_it_again(desk: Desk, part: str) -> No
             case _:
                 return gate(0.6)(project)
 
-    desk.edit(change)
-    assert desk.view.result.columns.means.tobytes() != before.columns.means.tobytes()
-    assert_same(desk.view.result, fresh(desk, (0, desk.state.project, False)))
+    bench.edit(change)
+    assert bench.view.result.columns.means.tobytes() != before.columns.means.tobytes()
+    assert_same(bench.view.result, fresh(bench, (0, bench.state.project, False)))
 
 
-def test_an_edit_of_something_else_leaves_the_run(desk: Desk) -> None:
-    before = desk.view.result
-    desk.edit(lambda project: replace(project, name="Another"))
-    desk.edit(lambda project: replace(project, parameters=replace(project.parameters)))
-    assert desk.view.result is before
+def test_an_edit_of_something_else_leaves_the_run(bench: RunBench) -> None:
+    before = bench.view.result
+    bench.edit(lambda project: replace(project, name="Another"))
+    bench.edit(lambda project: replace(project, parameters=replace(project.parameters)))
+    assert bench.view.result is before
 
 
-def test_from_here_on_an_edit_leaves_what_was_lived(desk: Desk, project: Project) -> None:
-    desk.do(MoveTo(5.0))
-    cursor, before = desk.view.lived, desk.view.result
-    desk.ask(from_here_on=True)
-    desk.edit(gate(0.6))
-    after = desk.view
+def test_from_here_on_an_edit_leaves_what_was_lived(bench: RunBench, project: Project) -> None:
+    bench.do(MoveTo(5.0))
+    cursor, before = bench.view.lived, bench.view.result
+    bench.ask(from_here_on=True)
+    bench.edit(gate(0.6))
+    after = bench.view
     assert (after.lived, after.edits) == (cursor, (pytest.approx(5.1),))
-    assert_same(after.result, fresh(desk, (0, project, False), (cursor, gate(0.6)(project), False)))
+    assert_same(after.result, fresh(bench, (0, project, False), (cursor, gate(0.6)(project), False)))
     assert after.result.columns.means[:cursor].tobytes() == before.columns.means[:cursor].tobytes()
-    desk.ask(from_here_on=False)
-    desk.edit(gate(0.7))
-    assert desk.view.edits == ()
+    bench.ask(from_here_on=False)
+    bench.edit(gate(0.7))
+    assert bench.view.edits == ()
 
 
-def test_covered_from_the_cursor_on_it_fails_and_uncovered_it_recovers(desk: Desk, project: Project) -> None:
-    desk.edit(lambda p: replace(p, parameters=with_field(p.parameters, "supervisor.position_limit", 0.03)))
-    desk.do(MoveTo(1.45), CoverFromHere(covered=True))
-    assert desk.view.covered
-    assert desk.view.mode is Mode.OPERATIONAL
-    desk.do(MoveTo(7.45))
-    assert desk.view.mode is Mode.FAIL
-    desk.do(CoverFromHere(covered=False))
-    assert not desk.view.covered
-    desk.do(MoveTo(9.0))
-    assert desk.view.mode is Mode.OPERATIONAL
-    assert len(desk.view.lived_episodes) == 1
-    tight = desk.state.project
-    assert_same(desk.view.result, fresh(desk, (0, tight, False), (15, tight, True), (75, tight, False)))
+def test_covered_from_the_cursor_on_it_fails_and_uncovered_it_recovers(bench: RunBench, project: Project) -> None:
+    bench.edit(lambda p: replace(p, parameters=with_field(p.parameters, "supervisor.position_limit", 0.03)))
+    bench.do(MoveTo(1.45), CoverFromHere(covered=True))
+    assert bench.view.covered
+    assert bench.view.mode is Mode.OPERATIONAL
+    bench.do(MoveTo(7.45))
+    assert bench.view.mode is Mode.FAIL
+    bench.do(CoverFromHere(covered=False))
+    assert not bench.view.covered
+    bench.do(MoveTo(9.0))
+    assert bench.view.mode is Mode.OPERATIONAL
+    assert len(bench.view.lived_episodes) == 1
+    tight = bench.state.project
+    assert_same(bench.view.result, fresh(bench, (0, tight, False), (15, tight, True), (75, tight, False)))
     # Back in time the cover is on again, as it was lived.
-    desk.do(MoveTo(5.0))
-    assert desk.view.covered
+    bench.do(MoveTo(5.0))
+    assert bench.view.covered
     # An edit from the start is made in the same world.
-    desk.edit(gate(0.6))
-    assert [segment.covered for segment in desk.view.result.inputs.segments] == [False, True, False]
+    bench.edit(gate(0.6))
+    assert [segment.covered for segment in bench.view.result.inputs.segments] == [False, True, False]
 
 
-def test_afresh_the_drive_has_one_setup_and_nothing_covered(desk: Desk) -> None:
-    desk.ask(from_here_on=True)
-    desk.do(MoveTo(3.0), CoverFromHere(covered=True))
-    desk.edit(gate(0.6))
-    desk.do(RunAfresh())
-    assert desk.view.time == 0.0
-    assert not desk.view.covered
-    assert_same(desk.view.result, fresh(desk, (0, desk.state.project, False)))
+def test_afresh_the_drive_has_one_setup_and_nothing_covered(bench: RunBench) -> None:
+    bench.ask(from_here_on=True)
+    bench.do(MoveTo(3.0), CoverFromHere(covered=True))
+    bench.edit(gate(0.6))
+    bench.do(RunAfresh())
+    assert bench.view.time == 0.0
+    assert not bench.view.covered
+    assert_same(bench.view.result, fresh(bench, (0, bench.state.project, False)))
 
 
-def test_at_the_end_nothing_is_left_to_act_on(desk: Desk) -> None:
-    desk.do(MoveTo(1e9))
-    before = desk.view.result
-    desk.do(CoverFromHere(covered=True))
-    assert "drive is over" in desk.owner.posted[-1].action.text
-    desk.ask(from_here_on=True)
-    desk.edit(gate(0.6))
-    assert desk.view.result is before
+def test_at_the_end_nothing_is_left_to_act_on(bench: RunBench) -> None:
+    bench.do(MoveTo(1e9))
+    before = bench.view.result
+    bench.do(CoverFromHere(covered=True))
+    assert "drive is over" in bench.owner.posted[-1].action.text
+    bench.ask(from_here_on=True)
+    bench.edit(gate(0.6))
+    assert bench.view.result is before
 
 
-def test_of_many_edits_the_newest_wins_and_the_old_run_stays_until_it_is_there(desk: Desk, project: Project) -> None:
-    before = desk.view.result
+def test_of_many_edits_the_newest_wins_and_the_old_run_stays_until_it_is_there(
+    bench: RunBench, project: Project
+) -> None:
+    before = bench.view.result
     for probability in (0.5, 0.6, 0.7, 0.8):
-        desk.edit(gate(probability), settle=False)
-        assert desk.view.result is before
-    desk.owner.settle(desk.state)
-    assert_same(desk.view.result, fresh(desk, (0, gate(0.8)(project), False)))
+        bench.edit(gate(probability), settle=False)
+        assert bench.view.result is before
+    bench.owner.settle(bench.state)
+    assert_same(bench.view.result, fresh(bench, (0, gate(0.8)(project), False)))
 
 
-def test_an_edit_taken_back_while_it_is_computed_leaves_what_was_there(desk: Desk, project: Project) -> None:
-    desk.edit(gate(0.5), settle=False)
-    desk.edit(lambda p: replace(p, parameters=project.parameters))
-    assert_same(desk.view.result, fresh(desk, (0, project, False)))
+def test_an_edit_taken_back_while_it_is_computed_leaves_what_was_there(bench: RunBench, project: Project) -> None:
+    bench.edit(gate(0.5), settle=False)
+    bench.edit(lambda p: replace(p, parameters=project.parameters))
+    assert_same(bench.view.result, fresh(bench, (0, project, False)))
 
 
-def test_an_edit_while_another_drive_is_localized_is_not_lost(desk: Desk, project: Project) -> None:
-    desk.do(MoveTo(5.0))
-    desk.ask(from_here_on=True)
-    old = desk.drives[-1]
-    desk.drives.append(replace(old, log=replace(old.log)))
-    desk.do(LoadSource(VirtualDrive("There and back")), settle=False)
-    while desk.service._wanted.log is old.log:
-        desk.owner.hear()
+def test_an_edit_while_another_drive_is_localized_is_not_lost(bench: RunBench, project: Project) -> None:
+    bench.do(MoveTo(5.0))
+    bench.ask(from_here_on=True)
+    old = bench.drives[-1]
+    bench.drives.append(replace(old, log=replace(old.log)))
+    bench.do(LoadSource(VirtualDrive("There and back")), settle=False)
+    while bench.service._wanted.log is old.log:
+        bench.owner.hear()
     # The cursor is one of the drive before; of the new one nothing is lived.
-    desk.edit(gate(0.6))
-    assert desk.view.time == 0.0
-    assert_same(desk.view.result, fresh(desk, (0, gate(0.6)(project), False)))
+    bench.edit(gate(0.6))
+    assert bench.view.time == 0.0
+    assert_same(bench.view.result, fresh(bench, (0, gate(0.6)(project), False)))
 
 
 def test_a_run_that_fails_leaves_the_one_before_and_can_be_asked_for_again(
-    desk: Desk, monkeypatch: pytest.MonkeyPatch
+    bench: RunBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    before = desk.view.result
+    before = bench.view.result
 
     def failing(inputs: RunInput, progress: Progress, *, earlier: RunResult | None) -> RunResult:
         raise ValueError("no such thing")
 
     with monkeypatch.context() as patch:
         patch.setattr(service_module, "judged_run", failing)
-        desk.edit(gate(0.6))
-    assert "no such thing" in desk.owner.posted[-1].text
-    assert desk.view.result is before
-    desk.edit(lambda project: project)
-    desk.do(RunAfresh())
-    assert desk.view.result is not before
-    assert_same(desk.view.result, fresh(desk, (0, desk.state.project, False)))
+        bench.edit(gate(0.6))
+    assert "no such thing" in bench.owner.posted[-1].text
+    assert bench.view.result is before
+    bench.edit(lambda project: project)
+    bench.do(RunAfresh())
+    assert bench.view.result is not before
+    assert_same(bench.view.result, fresh(bench, (0, bench.state.project, False)))
 
 
-def test_playing_moves_the_cursor_at_its_speed_forward_and_back(desk: Desk) -> None:
-    desk.ask(playing=True, speed=2.0)
-    desk.play(1.0)
-    assert desk.view.time == pytest.approx(2.0)
-    desk.ask(backward=True, speed=0.5)
-    desk.play(1.0)
-    assert desk.view.time == pytest.approx(1.5)
-    desk.ask(playing=False)
-    desk.play(1.0)
-    assert desk.view.time == pytest.approx(1.5)
+def test_playing_moves_the_cursor_at_its_speed_forward_and_back(bench: RunBench) -> None:
+    bench.ask(playing=True, speed=2.0)
+    bench.play(1.0)
+    assert bench.view.time == pytest.approx(2.0)
+    bench.ask(backward=True, speed=0.5)
+    bench.play(1.0)
+    assert bench.view.time == pytest.approx(1.5)
+    bench.ask(playing=False)
+    bench.play(1.0)
+    assert bench.view.time == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize("backward", [False, True])
-def test_where_the_drive_is_over_it_stops_or_begins_again(desk: Desk, backward: bool) -> None:
-    end = desk.view.duration
+def test_where_the_drive_is_over_it_stops_or_begins_again(bench: RunBench, backward: bool) -> None:
+    end = bench.view.duration
     near, beyond = (0.1, end) if backward else (end - 0.1, 0.0)
-    desk.do(MoveTo(near))
-    desk.ask(playing=True, backward=backward)
-    desk.owner.posted.clear()
-    desk.play(0.2)
-    desk.ask(playing=False)
-    desk.do(PlayOn(backward))
-    assert set(desk.owner.posted) == {Play(playing=False)}
-    assert desk.view.time == pytest.approx(beyond)
-    desk.do(MoveTo(near))
-    desk.ask(playing=True, repeat=True)
-    desk.play(0.2)
-    assert desk.view.time == pytest.approx(beyond, abs=0.2)
+    bench.do(MoveTo(near))
+    bench.ask(playing=True, backward=backward)
+    bench.owner.posted.clear()
+    bench.play(0.2)
+    bench.ask(playing=False)
+    bench.do(PlayOn(backward))
+    assert set(bench.owner.posted) == {Play(playing=False)}
+    assert bench.view.time == pytest.approx(beyond)
+    bench.do(MoveTo(near))
+    bench.ask(playing=True, repeat=True)
+    bench.play(0.2)
+    assert bench.view.time == pytest.approx(beyond, abs=0.2)
 
 
-def test_playing_on_in_the_middle_stays_there(desk: Desk) -> None:
-    desk.do(MoveTo(3.0), PlayOn(backward=False), PlayOn(backward=True))
-    assert desk.view.time == pytest.approx(3.0)
+def test_playing_on_in_the_middle_stays_there(bench: RunBench) -> None:
+    bench.do(MoveTo(3.0), PlayOn(backward=False), PlayOn(backward=True))
+    assert bench.view.time == pytest.approx(3.0)
 
 
-def test_steps_reach_the_cursor(desk: Desk) -> None:
-    desk.do(MoveTo(3.0), MoveByScans(1))
-    assert desk.view.time == pytest.approx(3.1)
-    desk.do(MoveByScans(-1), MoveByScans(-1))
-    assert desk.view.time == pytest.approx(2.9)
+def test_steps_reach_the_cursor(bench: RunBench) -> None:
+    bench.do(MoveTo(3.0), MoveByScans(1))
+    assert bench.view.time == pytest.approx(3.1)
+    bench.do(MoveByScans(-1), MoveByScans(-1))
+    assert bench.view.time == pytest.approx(2.9)
 
 
-def test_others_are_given_where_the_vehicle_is_and_was(desk: Desk) -> None:
-    desk.do(MoveTo(3.0))
-    view, followed, lived = desk.service.parts(slowly=True)
+def test_others_are_given_where_the_vehicle_is_and_was(bench: RunBench) -> None:
+    bench.do(MoveTo(3.0))
+    view, followed, lived = bench.service.parts(slowly=True)
     assert isinstance(view, RunView)
     assert followed == Followed((float(view.pose[0]), float(view.pose[1])))
     assert isinstance(lived, LivedPath)
@@ -297,11 +299,11 @@ def test_others_are_given_where_the_vehicle_is_and_was(desk: Desk) -> None:
 
 
 def test_without_a_drive_nothing_moves_and_nothing_fails(project: Project, drive: Drive) -> None:
-    desk = Desk(project, drive)
-    desk.do(MoveTo(1.0), MoveByScans(1), CoverFromHere(covered=True), RunAfresh(), PlayOn(backward=False))
-    desk.edit(gate(0.6))
-    desk.ask(playing=True)
-    desk.play(0.2)
-    assert desk.service.view() is None
-    assert desk.service.parts(slowly=True) == ()
-    desk.owner.close()
+    bench = RunBench(project, drive)
+    bench.do(MoveTo(1.0), MoveByScans(1), CoverFromHere(covered=True), RunAfresh(), PlayOn(backward=False))
+    bench.edit(gate(0.6))
+    bench.ask(playing=True)
+    bench.play(0.2)
+    assert bench.service.view() is None
+    assert bench.service.parts(slowly=True) == ()
+    bench.owner.close()

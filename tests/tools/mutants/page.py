@@ -276,10 +276,10 @@ PAGE = (
         tests=(NUMBERS + "test_a_figure_of_the_floor_is_read_in_its_unit",),
     ),
     Mutant(
-        name="load of a failure as a share called percent",
+        name="share of the limit after a failure told as if in percent",
         file=FOLDER + "failures/failure_panel.py",
-        find="{100 * each.load:.0f} %",
-        replace="{each.load:.0f} %",
+        find="{100 * each.limit_share:.0f} %",
+        replace="{each.limit_share:.0f} %",
         tests=(NUMBERS + "test_a_ranking_tells_failing_metres_and_two_sigma_as_a_share_of_the_limit",),
     ),
     Mutant(

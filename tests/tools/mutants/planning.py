@@ -15,7 +15,7 @@ PLANNING = (
         ),
     ),
     Mutant(
-        name="load without the bias",
+        name="share of the limit without the bias",
         file=FOLDER + "route_prediction.py",
         find="np.abs(self.bias) + self.two_sigma",
         replace="self.two_sigma",
@@ -25,7 +25,7 @@ PLANNING = (
         ),
     ),
     Mutant(
-        name="load of one sigma",
+        name="share of the limit of one sigma",
         file=FOLDER + "route_prediction.py",
         find="(np.abs(self.bias) + self.two_sigma) / limits",
         replace="(np.abs(self.bias) + 0.5 * self.two_sigma) / limits",
@@ -47,7 +47,7 @@ PLANNING = (
     Mutant(
         name="metre fails by the mode alone",
         file=FOLDER + "route_prediction.py",
-        find="(self.load > 1.0) | (self.modes == Mode.FAIL)",
+        find="(self.limit_share > 1.0) | (self.modes == Mode.FAIL)",
         replace="self.modes == Mode.FAIL",
         tests=(
             TESTS

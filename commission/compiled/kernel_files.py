@@ -51,7 +51,7 @@ def usual_folders() -> tuple[Path, ...]:
     return Path(base) / "commission" / "kernels", temporary
 
 
-class KernelStore:
+class KernelFiles:
     """Named contents in the first of several folders that can be written to; read from all.
 
     The last folder lies where anybody may create one: it is used only while it is this user's own.

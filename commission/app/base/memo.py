@@ -10,7 +10,7 @@ from commission.studies.inputs import is_same
 Value = TypeVar("Value")
 
 
-class Remembered(Generic[Value]):
+class Memo(Generic[Value]):
     """The newest value and what it was made from."""
 
     def __init__(self) -> None:

@@ -12,7 +12,7 @@ from commission.app.base.server import PageServer, start_server
 from tests.app.raw_client import RawClient
 
 
-class Desk:
+class WidgetBench:
     """The server, its widgets by name, a browser that may say anything, and an innocent one."""
 
     def __init__(self) -> None:

@@ -9,11 +9,11 @@ from commission.app.base.inputs import write_html
 from commission.app.base.panel import BasePanel, escaped
 from commission.app.base.ramp import ramp_html, scales_html
 from commission.app.base.view import PageView
-from commission.app.prediction.load_colors import BOUNDS, palette
+from commission.app.prediction.limit_colors import BOUNDS, palette
 from commission.app.prediction.view import RouteView
 
 
-class LoadLegend(BasePanel):
+class LimitLegend(BasePanel):
     """Scale of the ribbon; nothing while there is none."""
 
     def __init__(self, gui: GuiApi) -> None:
@@ -22,10 +22,10 @@ class LoadLegend(BasePanel):
     def draw_slowly(self, view: PageView) -> None:
         """Follow what is drawn."""
         route = view.part(RouteView)
-        write_html(self._html, scales_html("" if route is None else load_scale(route)))
+        write_html(self._html, scales_html("" if route is None else limit_scale(route)))
 
 
-def load_scale(route: RouteView) -> str:
+def limit_scale(route: RouteView) -> str:
     """Return the colors of the ribbon."""
     colors = [theme.css(color) for color in palette()]
     bounds = [f"{100 * bound:.0f}" for bound in BOUNDS]

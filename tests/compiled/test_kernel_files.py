@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from commission.compiled import store
-from commission.compiled.store import FOLDER, KernelStore, sweep, usual_folders
+from commission.compiled import kernel_files
+from commission.compiled.kernel_files import FOLDER, KernelFiles, sweep, usual_folders
 
 DAY = 86400.0
 
@@ -25,7 +25,7 @@ def file_of(folder: Path, name: str, size: int = 100, days: float = 0.0) -> Path
 
 
 def test_content_is_read_as_it_was_written(tmp_path: Path) -> None:
-    kept = KernelStore([tmp_path / "first", tmp_path / "last"])
+    kept = KernelFiles([tmp_path / "first", tmp_path / "last"])
     assert kept.read("a") is None
     kept.write("a", b"code")
     kept.write("a", b"code")
@@ -36,7 +36,7 @@ def test_content_is_read_as_it_was_written(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("damage", [lambda c: b"", lambda c: c[:-1], lambda c: c[:2], lambda c: c[:-1] + b"?"])
 def test_damaged_content_is_as_good_as_none(tmp_path: Path, damage) -> None:
-    kept = KernelStore([tmp_path, tmp_path / "last"])
+    kept = KernelFiles([tmp_path, tmp_path / "last"])
     kept.write("a", b"code")
     path = tmp_path / FOLDER / "a"
     path.write_bytes(damage(path.read_bytes()))
@@ -45,7 +45,7 @@ def test_damaged_content_is_as_good_as_none(tmp_path: Path, damage) -> None:
 
 def test_second_folder_serves_where_the_first_cannot_be_made(tmp_path: Path) -> None:
     (tmp_path / "first").write_text("a file stands where the folder should")
-    kept = KernelStore([tmp_path / "first", tmp_path / "last"])
+    kept = KernelFiles([tmp_path / "first", tmp_path / "last"])
     kept.write("a", b"code")
     assert kept.read("a") == b"code"
     assert (tmp_path / "last").stat().st_mode & 0o777 == 0o700
@@ -54,7 +54,7 @@ def test_second_folder_serves_where_the_first_cannot_be_made(tmp_path: Path) -> 
 @pytest.mark.skipif(not hasattr(os, "getuid"), reason="Windows gives each user a temporary folder")
 def test_folder_that_others_can_write_to_is_neither_read_nor_written(tmp_path: Path) -> None:
     (tmp_path / "first").write_text("a file stands where the folder should")
-    kept = KernelStore([tmp_path / "first", tmp_path / "last"])
+    kept = KernelFiles([tmp_path / "first", tmp_path / "last"])
     kept.write("a", b"code")
     (tmp_path / "last").chmod(0o777)
     assert kept.read("a") is None
@@ -64,7 +64,7 @@ def test_folder_that_others_can_write_to_is_neither_read_nor_written(tmp_path: P
 
 def test_nowhere_to_write_is_no_error(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    kept = KernelStore([tmp_path / "file" / "first", tmp_path / "file" / "last"])
+    kept = KernelFiles([tmp_path / "file" / "first", tmp_path / "file" / "last"])
     kept.write("a", b"code")
     assert kept.read("a") is None
 
@@ -78,7 +78,7 @@ def test_files_go_when_they_were_not_used_for_thirty_days(tmp_path: Path) -> Non
 
 
 def test_reading_a_file_keeps_it(tmp_path: Path) -> None:
-    kept = KernelStore([tmp_path, tmp_path / "last"])
+    kept = KernelFiles([tmp_path, tmp_path / "last"])
     kept.write("a", b"code")
     path = tmp_path / FOLDER / "a"
     for days, refreshed in ((0.9, False), (29.0, True)):
@@ -128,8 +128,8 @@ def test_files_of_other_programs_are_left_alone(tmp_path: Path) -> None:
 
 def test_writing_sweeps_at_once_and_then_now_and_then(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     swept: list[Path] = []
-    monkeypatch.setattr(store, "sweep", swept.append)
-    kept = KernelStore([tmp_path, tmp_path / "last"])
+    monkeypatch.setattr(kernel_files, "sweep", swept.append)
+    kept = KernelFiles([tmp_path, tmp_path / "last"])
     for i in range(200):
         kept.write(str(i), b"")
     assert swept == [tmp_path]

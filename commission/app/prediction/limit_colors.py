@@ -1,4 +1,4 @@
-"""Colors of a load: what the supervisor compares with its limits, as a share of them, on routes and in charts."""
+"""Colors of what the supervisor compares with its limits, as a share of them, on routes and in charts."""
 
 from __future__ import annotations
 
@@ -20,6 +20,6 @@ def palette() -> tuple[Color, ...]:
     return (*ramp, theme.OVER_LIMIT)
 
 
-def load_classes(loads: FloatArray) -> IntArray:
-    """(N,) index into the palette of each of N loads [1]."""
-    return np.digitize(loads, BOUNDS)
+def limit_classes(limit_shares: FloatArray) -> IntArray:
+    """(N,) index into the palette of each of N shares of the limit [1]."""
+    return np.digitize(limit_shares, BOUNDS)
