@@ -8,6 +8,7 @@ from typing import Annotated
 from commission.site.checks import check_fields
 from commission.site.quantity import NOT_NEGATIVE, PERCENT, SHARE, Bounds, Quantity, X, Y
 
+PEOPLE = Quantity(label="People", bounds=Bounds.between(0, 10_000), step=1, entry=(0, 500))
 _FREQUENCY = Bounds.between(0.0, 1000.0)
 
 
@@ -60,7 +61,7 @@ class CoveredPeriod:
 class Disturbances:
     """Everything that a virtual drive suffers beyond the noise of its sensors."""
 
-    people: Annotated[int, Quantity(label="People", bounds=Bounds.between(0, 10_000), step=1, entry=(0, 500))] = 0
+    people: Annotated[int, PEOPLE] = 0
     """People walking about on the free floor."""
     walking_speed: Annotated[float, Quantity(label="Walking speed", unit="m/s", bounds=Bounds.between(0.0, 10.0))] = 1.0
     """Mean speed of a person."""

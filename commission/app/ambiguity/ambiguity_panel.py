@@ -12,6 +12,7 @@ from commission.app.base.inputs import Inputs, Text, WorkBar
 from commission.app.base.panel import BasePanel, Post, posting
 from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
+from commission.site.fields import get_field
 
 MOST_PAIRS = 15
 MOST_NAMES = 6
@@ -27,10 +28,10 @@ class ColdStartPanel(BasePanel):
     """
 
     def __init__(self, gui: GuiApi, post: Post, folder: GuiFolderHandle) -> None:
-        self._inputs = Inputs(gui, post, SetAmbiguity, lambda state, name: getattr(state.part(AmbiguitySettings), name))
-        hint = "Largest distance at which a reflector still counts as standing where its look-alike does."
-        tolerance = gui.add_number("Tolerance [mm]", 100.0, min=5, max=2000, step=5, hint=hint)
-        self._inputs.number("tolerance", 1000.0, tolerance)
+        self._inputs = Inputs(
+            gui, post, SetAmbiguity, lambda state, name: get_field(state.part(AmbiguitySettings), name)
+        )
+        self._inputs.field("tolerance", AmbiguitySettings())
         hint = "Look for places from which the reflectors look as they do from somewhere else."
         ask = gui.add_button("Find ambiguous places", hint=hint)
         ask.on_click(posting(post, lambda _event: FindPlaces()))

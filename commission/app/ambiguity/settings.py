@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from commission.app.base.actions import Action
 from commission.app.base.inputs import Setting
-from commission.site.checks import above
+from commission.site.checks import check_fields
+from commission.site.quantity import MILLIMETRES, POSITIVE, Quantity
 
 NAME = "ambiguity"
 """Of the feature."""
@@ -18,13 +20,16 @@ class AmbiguitySettings:
 
     asked: int = 0
     """Number of times ambiguous places were asked for; 0: they are not wanted."""
-    tolerance: float = 0.1
-    """Distance up to which a reflector counts as standing where a look-alike of it does [m]."""
+    tolerance: Annotated[
+        float,
+        Quantity(label="Tolerance", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=5.0, entry=(5.0, 2000.0)),
+    ] = 0.1
+    """Largest distance at which a reflector still counts as standing where its look-alike does."""
     pair: int = -1
     """Which pair of look-alikes is shown, counted in the order of the list; -1: none."""
 
     def __post_init__(self) -> None:
-        above(self.tolerance, 0.0, "tolerance", "m")
+        check_fields(self)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,28 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from commission.app.base.actions import Action, Sender
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState
 from commission.planning.route_prediction import PredictionOptions
 from commission.planning.visibility import VisibilityOptions
-from commission.site.checks import between
+from commission.site.checks import check_fields
 from commission.site.fields import with_field
+from commission.site.quantity import BARE, SHARE, Bounds, Quantity, Shown
 
 
 @dataclass(frozen=True, slots=True)
 class Conditions:
     """Conditions under which coverage, prediction, failures and ambiguous places are computed."""
 
-    blocked_per_m: float = 0.0
-    """Probability per metre of ray that a person stands in it [1/m]."""
-    min_beams: int = 1
-    """Beams that a reflector must get for certain to count as visible [beams]."""
+    blocked_per_m: Annotated[
+        float,
+        Quantity(label="People", unit="1/m", shown=Shown("%/m", 100.0), bounds=SHARE, step=0.1, entry=(0.0, 50.0)),
+    ] = 0.0
+    """Chance that somebody stands in a metre of the way from scanner to reflector."""
+    min_beams: Annotated[
+        int, Quantity(label="Beams at least", unit="beams", shown=BARE, bounds=Bounds.between(1, 20), step=1)
+    ] = 1
+    """Beams that must hit a reflector for certain, so that it passes the detector filter (equation 3)."""
 
     def __post_init__(self) -> None:
-        between(self.blocked_per_m, (0.0, 1.0), "blocked", "per metre")
-        between(self.min_beams, (1, 20), "beams at least")
+        check_fields(self, "conditions.")
 
     @property
     def visibility(self) -> VisibilityOptions:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typing
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,11 @@ def add_widget(gui: GuiApi, info: FieldInfo, value: Any, note: str = "") -> GuiI
             return gui.add_dropdown(label, info.options, initial_value=str(value), hint=hint)
         case description:
             return gui.add_text(description.label, str(value), hint=hint)
+
+
+def labelled(info: FieldInfo, label: str) -> FieldInfo:
+    """Return a field that a widget calls otherwise: that of one of several things of a kind."""
+    return replace(info, descriptions=tuple(replace(each, label=label) for each in info.descriptions))
 
 
 def held(info: FieldInfo, value: Any) -> Any:
@@ -85,11 +91,11 @@ class Entry:
 
     def __init__(self, gui: GuiApi, name: str, of: object) -> None:
         self._info = field_info(of, name)
-        self._widget = add_widget(gui, self._info, get_field(of, name))
+        self.widget = add_widget(gui, self._info, get_field(of, name))
 
     def read(self) -> Any:
         """Return what it means, in the unit of code and files; raises ValueError when the bounds do not allow it."""
-        return meant(self._info, self._widget.value)
+        return meant(self._info, self.widget.value)
 
 
 def _allowed(quantity: Quantity, content: float) -> float:

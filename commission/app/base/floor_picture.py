@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 from commission.app.base.actions import Action, Sender
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState
-from commission.site.checks import between
+from commission.site.checks import check_fields
+from commission.site.quantity import PERCENT, SHARE, Quantity
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,11 +18,13 @@ class FloorPicture:
 
     owner: str = ""
     """Name of the feature whose picture it is; empty: of none that asks to be alone."""
-    opacity: float = 0.8
-    """Its opacity [0..1]."""
+    opacity: Annotated[
+        float, Quantity(label="Opacity", shown=PERCENT, bounds=SHARE, step=5.0, slider=(10.0, 100.0))
+    ] = 0.8
+    """How much of the floor map it hides."""
 
     def __post_init__(self) -> None:
-        between(self.opacity, (0.0, 1.0), "opacity")
+        check_fields(self)
 
     def is_free_for(self, feature: str) -> bool:
         """Whether no other feature has the floor."""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from enum import StrEnum
-from typing import Any, TypeAlias, TypeVar
+from typing import Any, TypeAlias
 
 from viser import GuiApi, GuiInputHandle
 
@@ -15,7 +14,6 @@ from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.site.fields import field_info, get_field
 
-Choice = TypeVar("Choice", bound=StrEnum)
 Setting: TypeAlias = bool | int | float | str | None
 Read: TypeAlias = Callable[[AppState, str], Any]
 Make: TypeAlias = Callable[[str, Setting], Action]
@@ -84,40 +82,19 @@ class Inputs:
         )
         return widget
 
-    def choice(self, name: str, label: str, names: Mapping[Choice, str], hint: str) -> GuiInputHandle[Any]:
-        """Add a list of choices."""
-        meant = {text: choice.value for choice, text in names.items()}
-        widget = self._gui.add_dropdown(label, tuple(meant), hint=hint)
-        self.connect(name, widget, lambda text: meant[text], lambda state: names[self._read(state, name)])
-        return widget
+    def choice(self, name: str, of: object, names: Mapping[Any, str]) -> GuiInputHandle[Any]:
+        """Add a list of what a field may be, each called by a name.
 
-    def number(self, name: str, scale: float, widget: GuiInputHandle[Any]) -> GuiInputHandle[Any]:
-        """Connect a number that is shown in another unit: `scale` is the number on the page for one SI unit.
-
-        Raises
-        ------
-        TypeError
-            the widget began with a whole number: viser would cut the decimals off whatever is typed or shown later.
+        Parameters
+        ----------
+        name : the field's dotted name, as `of` has it and as `make` and `read` take it.
+        of : a value that has the field; the list begins with what it has.
+        names : what each possible value is called, in the list's order.
         """
-        if not isinstance(widget.value, float):
-            raise TypeError(f"{widget.label} begins with {widget.value!r}; expected a float, so that decimals stay")
-        self.connect(
-            name,
-            widget,
-            lambda value: float(value) / scale,
-            lambda state: round(float(self._read(state, name)) * scale, 3),
-        )
-        return widget
-
-    def count(self, name: str, widget: GuiInputHandle[Any]) -> GuiInputHandle[Any]:
-        """Connect a whole number."""
-        self.connect(name, widget, int, lambda state: int(self._read(state, name)))
-        return widget
-
-    def switch(self, name: str, label: str, hint: str) -> GuiInputHandle[Any]:
-        """Add a check box."""
-        widget = self._gui.add_checkbox(label, False, hint=hint)
-        self.connect(name, widget, bool, lambda state: bool(self._read(state, name)))
+        info, first = field_info(of, name), get_field(of, name)
+        meant = {text: value for value, text in names.items()}
+        widget = self._gui.add_dropdown(info.label, tuple(meant), initial_value=names[first], hint=info.hint)
+        self.connect(name, widget, lambda text: meant[text], lambda state: names.get(self._read(state, name)))
         return widget
 
     def follow(self, state: AppState) -> None:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 from commission.app.base.conditions import Conditions
 from commission.app.base.floor_picture import FloorPicture
 from commission.app.base.state import AppState
 from commission.planning.dilution import Heading, Measurement
-from commission.site.checks import above, between
+from commission.site.checks import check_fields
+from commission.site.quantity import DEGREES, POSITIVE, Bounds, Choice, Quantity, Switch
 from commission.studies.coverage import CoverageOptions
 
 Place: TypeAlias = tuple[float, float]
@@ -38,30 +38,31 @@ class Figure(StrEnum):
 class CoverageSettings:
     """What is wanted of the heatmap; while it shows no figure, nothing is computed."""
 
-    figure: Figure = Figure.NONE
-    """What it shows; none: there is no heatmap."""
-    heading: Heading = Heading.ALL_ROUND
-    """Heading of the vehicle at each spot."""
-    given_heading: float = 0.0
-    """Heading of the vehicle where it is given [rad], map frame."""
-    measurement: Measurement = Measurement.RANGE_BEARING
-    """What one scan measures of each reflector."""
-    on_odometry: float = 1.0
-    """Way driven on odometry before the fix [m]; read with odometry as a prior only."""
+    figure: Annotated[Figure, Choice("Show")] = Figure.NONE
+    """What the floor is colored by; off: there is no heatmap."""
+    heading: Annotated[Heading, Choice("Heading")] = Heading.ALL_ROUND
+    """Heading of the vehicle, where the scanner does not see all around."""
+    given_heading: Annotated[
+        float, Quantity(label="Given", unit="rad", shown=DEGREES, step=1.0, entry=(-360.0, 360.0))
+    ] = 0.0
+    """Direction in which the vehicle looks, map frame; 0 is along x, counterclockwise."""
+    measurement: Annotated[Measurement, Choice("Measured")] = Measurement.RANGE_BEARING
+    """What one scan measures: ranges and bearings, bearings only, or both together with odometry."""
+    on_odometry: Annotated[
+        float, Quantity(label="Odometry", unit="m", bounds=POSITIVE, step=0.1, entry=(0.1, 100.0))
+    ] = 1.0
+    """Way driven on odometry since a pose that was known exactly."""
     probe: Place | None = None
     """Where the floor was clicked last [m]; its values are read out."""
     spots: tuple[Place, ...] = ()
     """Where ellipses of a fix were asked for [m]."""
-    ellipse_grid: bool = False
-    """Whether ellipses are drawn on a coarse grid, too."""
-    ellipse_factor: float = 100.0
-    """Factor at which ellipses of a fix are drawn [1..10000]."""
+    ellipse_grid: Annotated[bool, Switch("On a grid")] = False
+    """Whether ellipses are drawn all over the floor, too."""
+    ellipse_factor: Annotated[float, Quantity(label="Drawn", bounds=Bounds.between(1.0, 1e4))] = 100.0
+    """Factor at which ellipses of a fix are drawn; true to scale is 1x."""
 
     def __post_init__(self) -> None:
-        between(self.ellipse_factor, (1.0, 1e4), "magnification of ellipses")
-        above(self.on_odometry, 0.0, "way on odometry", "m")
-        if not math.isfinite(self.given_heading):
-            raise ValueError(f"heading is {self.given_heading}; expected finite radians")
+        check_fields(self, "heatmap: ")
 
     def options(self, conditions: Conditions) -> CoverageOptions:
         """What the study is asked for, as fine as the page shows it."""

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 from viser import GuiApi, GuiTabHandle
 
 from commission.app.base import theme
+from commission.app.base.field_widget import Entry
+from commission.app.base.inputs import show
 from commission.app.base.panel import BasePanel, Post
 from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
 from commission.app.editing import actions
 from commission.app.editing.editor import Editor
+from commission.site.quantity import Bounds, Quantity
 from commission.site.reflectors import Reflector
 
 ROWS = 40
@@ -25,6 +29,14 @@ ORDERS: dict[str, Callable[[Reflector], Any]] = {
     "kind": lambda r: (r.kind.value, r.id),
     "layer": lambda r: (r.layer, r.id),
 }
+
+
+@dataclass(frozen=True, slots=True)
+class TableView:
+    """Which part of the table is shown."""
+
+    page: Annotated[int, Quantity(label="Page", bounds=Bounds.at_least(1), step=1)] = 1
+    """Page of rows, counted from 1."""
 
 
 def row_text(reflector: Reflector) -> str:
@@ -41,7 +53,8 @@ class ReflectorTable(BasePanel):
         self._browser = browser
         self._order = gui.add_dropdown("Sort by", tuple(ORDERS))
         self._find = gui.add_text("Find", "", hint="Part of a name, layer or note.")
-        self._page = gui.add_number("Page", 1, min=1, step=1, visible=False)
+        self._page = Entry(gui, "page", TableView())
+        show(self._page.widget, visible=False)
         self._count = gui.add_html("")
         self._ids: tuple[str, ...] = ()
         self._rows = Rows(gui, tab, post, self._selecting)
@@ -51,7 +64,7 @@ class ReflectorTable(BasePanel):
         """Show the reflectors in their order."""
         reflectors = view.state.project.reflectors
         editor = view.state.of_browser(self._browser, Editor)
-        asked = (self._order.value, self._find.value, self._page.value, editor.selected)
+        asked = (self._order.value, self._find.value, self._page.widget.value, editor.selected)
         if self._drawn and self._drawn[0] is reflectors and self._drawn[1] == asked:
             return
         self._drawn = (reflectors, asked)
@@ -59,8 +72,8 @@ class ReflectorTable(BasePanel):
         found = [r for r in reflectors.reflectors if sought in f"{r.id} {r.layer} {r.note}".lower()]
         found.sort(key=ORDERS[self._order.value])
         pages = max(1, -(-len(found) // ROWS))
-        first = ROWS * (min(int(self._page.value), pages) - 1)
-        self._page.visible = pages > 1
+        first = ROWS * (min(self._page.read(), pages) - 1)
+        show(self._page.widget, visible=pages > 1)
         self._count.content = (
             f"<div class='c-note' style='padding:2px 6px'>{len(found)} of {len(reflectors)} reflectors"
             f"{f', page {first // ROWS + 1} of {pages}' if pages > 1 else ''}</div>"

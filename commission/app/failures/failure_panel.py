@@ -16,6 +16,7 @@ from commission.app.failures.service import RANKING
 from commission.app.failures.settings import FailureSettings
 from commission.app.failures.view import FailureView
 from commission.planning.dependence import Failure
+from commission.site.fields import get_field
 
 FAILURE_NAMES: dict[Failure, str] = {
     Failure.BLOCKED: "blocked",
@@ -30,8 +31,8 @@ class FailurePanel(BasePanel):
     """Widgets of the ranking."""
 
     def __init__(self, gui: GuiApi, post: Post) -> None:
-        self._inputs = Inputs(gui, post, _asked, lambda state, name: getattr(state.part(FailureSettings), name))
-        self._inputs.choice("failure", "Each is", FAILURE_NAMES, "What happens to each reflector in turn.")
+        self._inputs = Inputs(gui, post, _asked, lambda state, name: get_field(state.part(FailureSettings), name))
+        self._inputs.choice("failure", FailureSettings(), FAILURE_NAMES)
         rank = gui.add_button("Rank reflectors", hint="Let each fail on every route, and rank what depends on it.")
         rank.on_click(posting(post, lambda _event: RankReflectors()))
         hint = "Let the one that is shown, else the first of the list, fail for good, and rank the others."

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from commission.app.base.actions import Action, Point
 from commission.app.floor_map.draft import MapFile, Read, ReadOptions
-from commission.app.floor_map.pen import MapPen
 from commission.site.floor_map import FloorMap
-
-OptionValue: TypeAlias = float | bool | tuple[str, ...] | tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +31,7 @@ class SetMapOption(Action):
 
     name: str
     """Field of `MapOptions`."""
-    value: OptionValue
+    value: object
     """New value, SI and radians."""
 
 
@@ -63,8 +59,10 @@ class DiscardMap(Action):
 class SetPen(Action):
     """Change how the floor map's tools draw."""
 
-    pen: MapPen
-    """How they draw from now on."""
+    name: str
+    """Field of `MapPen`."""
+    value: object
+    """New value, SI."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from commission.app.editing.tool import Label, Tool
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
 from commission.site.editing.alignment import DOUBTFUL, Alignment, KnownPoint, align, aligned
+from commission.site.quantity import COORDINATE, Quantity, Words
 
 LETTERS = "AB"
 
@@ -27,10 +29,10 @@ class NamedPoint:
 
     at: Point
     """Where it was clicked [m]."""
-    plant: Point
-    """Where it lies in the plant's coordinate system [m, m]; where it was clicked until somebody says otherwise."""
-    name: str = ""
-    """What the engineer calls it."""
+    plant: Annotated[Point, Quantity(label="x, y", unit="m", bounds=COORDINATE)]
+    """Where it lies in the plant's coordinate system; where it was clicked until somebody says otherwise."""
+    name: Annotated[str, Words("is")] = ""
+    """What you call it, such as: column B4."""
 
 
 @dataclass(frozen=True, slots=True)

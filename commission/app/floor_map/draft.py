@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePath
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 from commission.app.base.actions import Point
 from commission.app.base.uploads import Upload
@@ -14,7 +14,18 @@ from commission.io.dxf_units import UNITS
 from commission.io.image_map import ImagePlacement, Picture
 from commission.io.mesh import KINDS as MODEL_KINDS
 from commission.io.mesh import Model
-from commission.site.checks import above, between
+from commission.site.checks import check_fields
+from commission.site.quantity import (
+    COORDINATE,
+    DEGREES,
+    MILLIMETRES,
+    PERCENT,
+    POSITIVE,
+    SHARE,
+    Bounds,
+    Quantity,
+    Switch,
+)
 
 MAP_ENDINGS = ("yaml", "yml")
 DRAWING_ENDINGS = ("dxf",)
@@ -66,33 +77,33 @@ class ReadOptions:
 class MapOptions:
     """What a file leaves open."""
 
-    resolution: float = 0.05
-    """Edge of a cell of the map [m]."""
+    resolution: Annotated[
+        float, Quantity(label="Cell", unit="m", shown=MILLIMETRES, bounds=Bounds.between(0.001, 1.0), step=1.0)
+    ] = 0.05
+    """Edge of a cell of the map."""
     layers: tuple[str, ...] | None = None
     """Layers of a drawing that hold walls; none: those that are visible."""
-    heights: tuple[float, ...] = (0.2,)
-    """Heights at which a model is cut [m]: those of scanner and reflectors."""
-    threshold: float = 0.5
-    """Brightness of a picture at which walls end [0..1]."""
-    light_walls: bool = False
+    heights: Annotated[
+        tuple[float, ...], Quantity(label="Cut at", unit="m", bounds=Bounds.between(-HIGHEST, HIGHEST))
+    ] = (0.2,)
+    """Heights at which a model is cut, those of scanner and reflectors: 0.2 1.8"""
+    threshold: Annotated[
+        float, Quantity(label="Walls from", shown=PERCENT, bounds=SHARE, step=1.0, slider=(0.0, 100.0))
+    ] = 0.5
+    """Brightness of a picture at which walls end."""
+    light_walls: Annotated[bool, Switch("Walls are")] = False
     """Whether walls are lighter than the floor."""
-    distance: float = 10.0
-    """Distance between the two points that were clicked [m]."""
-    direction: float = 0.0
-    """Direction from the first to the second point in the map frame [rad]; 0 is along x."""
-    first_in_map: Point = (0.0, 0.0)
-    """Where the first point lies in the map frame: x, y [m]."""
+    distance: Annotated[float, Quantity(label="A to B", unit="m", bounds=POSITIVE)] = 10.0
+    """Distance between the two points that were clicked."""
+    direction: Annotated[float, Quantity(label="Heading", unit="rad", shown=DEGREES, step=0.01)] = 0.0
+    """Direction from the first to the second point, map frame; 0 is along x."""
+    first_in_map: Annotated[Point, Quantity(label="A is at", unit="m", bounds=COORDINATE)] = (0.0, 0.0)
+    """Where the first point lies, x and y in the map frame."""
 
     def __post_init__(self) -> None:
-        between(self.resolution, (0.001, 1.0), "cell", "m")
+        check_fields(self)
         if not 0 < len(self.heights) <= 20:
             raise ValueError(f"{len(self.heights)} heights are given; expected 1 to 20")
-        for height in self.heights:
-            between(height, (-HIGHEST, HIGHEST), "height", "m")
-        between(self.threshold, (0.0, 1.0), "threshold")
-        above(self.distance, 0.0, "distance", "m")
-        if not all(math.isfinite(number) for number in (self.direction, *self.first_in_map)):
-            raise ValueError("direction or place of the first point is not finite; expected numbers")
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,9 @@ from viser import GuiApi, GuiEvent
 
 from commission.app.base import actions as page_actions
 from commission.app.base import theme
+from commission.app.base.field_widget import add_widget, held, meant, write_held
 from commission.app.base.inputs import write_html
-from commission.app.base.panel import Post, escaped, posting, table, write
+from commission.app.base.panel import Post, escaped, posting, table
 from commission.app.base.rows import Rows
 from commission.app.floor_map import actions
 from commission.app.floor_map.draft import MapDraft, MapOptions, Read, ReadOptions
@@ -21,9 +22,10 @@ from commission.io.dxf import Drawing, DrawingLayer
 from commission.io.dxf_units import UNITS
 from commission.io.image_map import Picture
 from commission.io.mesh import Model
-from commission.site.fields import field_hints
+from commission.site.fields import field_hints, field_info, get_field
 
-DEG = math.degrees(1.0)
+OPTIONS = MapOptions()
+"""What the widgets begin with."""
 AS_STATED = "as stated"
 DARK, LIGHT = "dark", "light"
 ALONG_X, ALONG_Y, TYPED = "x axis", "y axis", "a heading"
@@ -93,11 +95,10 @@ class MapDraftFields:
         self._gui, self._post = gui, post
         self._draft: MapDraft | None = None
         self._widgets: list[tuple[Any, tuple[type[Read], ...], Callable[[MapDraft], Any] | None]] = []
-        self._hints = field_hints(MapOptions)
         self._facts = gui.add_html("", visible=False)
         self._add_reading()
         self._add_layers()
-        self._number("resolution", "Cell [mm]", 1000.0, (Drawing, Model), step=1.0)
+        self._field("resolution", (Drawing, Model))
         self._add_picture()
         self._make = gui.add_button(
             "Load as the floor map", visible=False, hint="Replaces the floor map; can be undone."
@@ -123,14 +124,14 @@ class MapDraftFields:
         self._widgets.append((widget, kinds, shown))
         return widget
 
-    def _number(self, name: str, label: str, scale: float, kinds: tuple[type[Read], ...], step: float) -> Any:
-        """Add a number of `MapOptions` that is shown in another unit."""
-        digits = max(0, -math.floor(math.log10(step)))
-        widget = self._gui.add_number(label, 0.0, step=step, hint=self._hints[name])
+    def _field(self, name: str, kinds: tuple[type[Read], ...]) -> Any:
+        """Add a number, or a pair, of `MapOptions`."""
+        info = field_info(OPTIONS, name)
+        widget = add_widget(self._gui, info, get_field(OPTIONS, name))
         widget.on_update(
-            self._posting(lambda event, _draft: actions.SetMapOption(name, float(event.target.value) / scale))
+            self._posting(lambda event, _draft: actions.SetMapOption(name, meant(info, event.target.value)))
         )
-        return self._add(widget, kinds, lambda draft: round(getattr(draft.options, name) * scale, digits))
+        return self._add(widget, kinds, lambda draft: held(info, get_field(draft.options, name)))
 
     def _add_reading(self) -> None:
         gui = self._gui
@@ -146,7 +147,8 @@ class MapDraftFields:
         self._add(up, (Model,), lambda draft: draft.reading.up or AS_STATED)
         for widget in (unit, up):
             widget.on_update(self._posting(read_again))
-        heights = gui.add_text("Cut at [m]", "", hint="Heights of sections, as the scanner sees them: 0.2 1.8")
+        info = field_info(OPTIONS, "heights")
+        heights = gui.add_text(info.quantity.title if info.quantity else info.label, "", hint=info.hint)
         heights.on_update(
             self._posting(lambda event, _draft: actions.SetMapOption("heights", heights_of(event.target.value)))
         )
@@ -184,7 +186,7 @@ class MapDraftFields:
 
     def _add_picture(self) -> None:
         gui, picture = self._gui, (Picture,)
-        self._number("distance", "A to B [m]", 1.0, picture, step=0.001)
+        self._field("distance", picture)
         axis = gui.add_dropdown("A to B is", (ALONG_X, ALONG_Y, TYPED), hint="Direction of B as seen from A.")
 
         def turned(event: GuiEvent[Any], draft: MapDraft) -> page_actions.Action:
@@ -194,20 +196,11 @@ class MapDraftFields:
 
         axis.on_update(self._posting(turned))
         self._add(axis, picture, lambda draft: axis_of(draft.options.direction))
-        self._heading = self._number("direction", "Heading [°]", DEG, picture, step=0.01)
-        first = gui.add_vector2("A is at [m]", (0.0, 0.0), step=0.001, hint=self._hints["first_in_map"])
-        first.on_update(
-            self._posting(
-                lambda event, _draft: actions.SetMapOption("first_in_map", tuple(float(v) for v in event.target.value))
-            )
-        )
-        self._add(first, picture, lambda draft: draft.options.first_in_map)
-        threshold = gui.add_slider("Walls from [%]", 0, 100, 1, 50, hint=self._hints["threshold"])
-        threshold.on_update(
-            self._posting(lambda event, _draft: actions.SetMapOption("threshold", float(event.target.value) / 100.0))
-        )
-        self._add(threshold, picture, lambda draft: round(100.0 * draft.options.threshold))
-        walls = gui.add_dropdown("Walls are", (DARK, LIGHT), hint=self._hints["light_walls"])
+        self._heading = self._field("direction", picture)
+        self._field("first_in_map", picture)
+        self._field("threshold", picture)
+        info = field_info(OPTIONS, "light_walls")
+        walls = gui.add_dropdown(info.label, (DARK, LIGHT), hint=info.hint)
         walls.on_update(
             self._posting(lambda event, _draft: actions.SetMapOption("light_walls", event.target.value == LIGHT))
         )
@@ -224,7 +217,7 @@ class MapDraftFields:
             if widget.visible is not visible:
                 widget.visible = visible
             if visible and shown is not None and draft is not None:
-                write(widget, shown(draft))
+                write_held(widget, shown(draft))
         self._facts.visible = self._make.visible = draft is not None
         if draft is None:
             return

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
+
+from commission.site.checks import check_fields
+from commission.site.quantity import MILLIMETRES, Bounds, Quantity, Switch
 
 
 @dataclass(frozen=True, slots=True)
 class MapPen:
     """How the floor map's tools draw."""
 
-    thickness: float = 0.1
-    """Thickness of a wall [m]."""
-    to_unknown: bool = False
-    """Whether erased cells become unknown instead of free."""
+    thickness: Annotated[
+        float,
+        Quantity(label="Thickness", unit="m", shown=MILLIMETRES, bounds=Bounds.between(0.001, 10.0), step=1.0),
+    ] = 0.1
+    """Thickness of a wall: half of it on each side of the line."""
+    to_unknown: Annotated[bool, Switch("Becomes")] = False
+    """Whether erased cells are unknown then, and not free; both let the laser pass."""
 
     def __post_init__(self) -> None:
-        if not 0.001 <= self.thickness <= 10.0:
-            raise ValueError(f"thickness is {self.thickness:g} m; expected 0.001 to 10 m")
+        check_fields(self)

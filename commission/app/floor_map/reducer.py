@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import replace
-from typing import Any
 
 from commission.app.base.actions import Camera, Sender
 from commission.app.base.effects import PlaceCamera, Tell
@@ -27,10 +25,12 @@ from commission.app.floor_map.draft import (
     WaitingMap,
 )
 from commission.app.floor_map.effects import DrawMap, ReadMapFile, StopMapWork
+from commission.app.floor_map.pen import MapPen
 from commission.app.floor_map.tools import CalibrateTool
 from commission.errors import UsageError
 from commission.io.image_map import Picture
 from commission.io.mesh import Model
+from commission.site.fields import with_field
 from commission.site.project import Project
 
 
@@ -118,10 +118,7 @@ def set_reading(action: actions.SetReading, state: AppState, _sender: Sender) ->
 @reduce.register
 def set_map_option(action: actions.SetMapOption, state: AppState, _sender: Sender) -> Outcome:
     draft = _draft(state)
-    if action.name not in {field.name for field in dataclasses.fields(MapOptions)}:
-        raise UsageError(f"a floor map has no option {action.name!r}")
-    changes: dict[str, Any] = {action.name: action.value}
-    options = replace(draft.options, **changes)
+    options = with_field(draft.options, action.name, action.value, "option of a floor map")
     return Outcome(state.with_part(replace(state.part(MapLoading), draft=replace(draft, options=options))))
 
 
@@ -143,7 +140,8 @@ def discard_map(_action: actions.DiscardMap, state: AppState, sender: Sender) ->
 
 @reduce.register
 def set_pen(action: actions.SetPen, state: AppState, sender: Sender) -> Outcome:
-    return Outcome(state.with_browser(sender.browser, action.pen))
+    pen = with_field(state.of_browser(sender.browser, MapPen), action.name, action.value, "property of the pen")
+    return Outcome(state.with_browser(sender.browser, pen))
 
 
 @reduce.register

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any, Literal
 
 from viser import GuiApi, GuiEvent
 
 from commission.app.base import actions as page_actions
 from commission.app.base import theme
-from commission.app.base.inputs import show
+from commission.app.base.field_widget import add_widget, held, labelled, meant
+from commission.app.base.inputs import Inputs, show
 from commission.app.base.panel import BasePanel, Post, posting, table, write
+from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing.actions import ChooseTool
 from commission.app.editing.editor import editor_of
@@ -21,6 +22,7 @@ from commission.app.floor_map.align_tool import LETTERS, AlignTool, NamedPoint
 from commission.app.floor_map.pen import MapPen
 from commission.app.floor_map.tools import EraseTool, ObstacleTool, WallTool
 from commission.site.editing.alignment import DOUBTFUL, WRONG
+from commission.site.fields import field_info, get_field
 
 FREE, UNKNOWN = "free", "unknown"
 MAP_ONLY, EVERYTHING = "the map alone", "what is on it, too"
@@ -32,6 +34,8 @@ KEYS: tuple[tuple[str, Literal["X", "L", "O"], Tool], ...] = (
     ("Draw an obstacle", "O", ObstacleTool()),
 )
 """What a key does."""
+NOWHERE = NamedPoint((0.0, 0.0), (0.0, 0.0))
+PLANT, NAME = field_info(NOWHERE, "plant"), field_info(NOWHERE, "name")
 LONGEST_NAME = 40
 """Letters of a point's name that are kept."""
 
@@ -54,28 +58,15 @@ class MapToolFields(BasePanel):
 
     def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
         self._gui, self._post, self._browser = gui, post, browser
-        self._pen = MapPen()
         self._shown: tuple[MapPen, Tool | None] | None = None
-        self._thickness = gui.add_number(
-            "Thickness [mm]",
-            100.0,
-            min=1.0,
-            max=10_000.0,
-            step=1.0,
-            visible=False,
-            hint="Half on each side of the line.",
-        )
-        self._thickness.on_update(
-            posting(post, lambda event: self._with_pen(thickness=float(event.target.value) / 1000.0))
-        )
-        self._becomes = gui.add_dropdown(
-            "Becomes", (FREE, UNKNOWN), visible=False, hint="What erased cells are then; both let the laser pass."
-        )
-        self._becomes.on_update(posting(post, lambda event: self._with_pen(to_unknown=event.target.value == UNKNOWN)))
+        self._inputs = Inputs(gui, post, actions.SetPen, self._read)
+        self._thickness = self._inputs.field("thickness", MapPen())
+        self._becomes = self._inputs.choice("to_unknown", MapPen(), {False: FREE, True: UNKNOWN})
         self._add_alignment()
 
-    def _with_pen(self, **changes: Any) -> page_actions.Action:
-        return actions.SetPen(replace(self._pen, **changes))
+    def _read(self, state: AppState, name: str) -> Any:
+        """Return a property of the browser's pen."""
+        return get_field(state.of_browser(self._browser, MapPen), name)
 
     def _add_alignment(self) -> None:
         gui = self._gui
@@ -95,12 +86,11 @@ class MapToolFields(BasePanel):
     def _add_point(self, index: int) -> tuple[Any, Any]:
         """Add name and plant coordinates of a point."""
         gui, letter = self._gui, LETTERS[index]
-        name = gui.add_text(f"{letter} is", "", hint="What you call it, such as: column B4.")
-        plant = gui.add_vector2(f"{letter} x, y [m]", (0.0, 0.0), step=0.001, hint="Where it lies in the plant.")
+        name = add_widget(gui, labelled(NAME, f"{letter} {NAME.label}"), "")
+        plant = add_widget(gui, labelled(PLANT, f"{letter} {PLANT.label}"), NOWHERE.plant)
 
         def typed(_event: GuiEvent[Any]) -> page_actions.Action:
-            x, y = (float(value) for value in plant.value)
-            return actions.SetPlantPoint(index, (x, y), str(name.value).strip()[:LONGEST_NAME])
+            return actions.SetPlantPoint(index, meant(PLANT, plant.value), meant(NAME, name.value)[:LONGEST_NAME])
 
         for widget in (name, plant):
             widget.on_update(posting(self._post, typed))
@@ -111,21 +101,19 @@ class MapToolFields(BasePanel):
         pen, tool = view.state.of_browser(self._browser, MapPen), editor_of(view.state, self._browser).tool
         if self._shown == (pen, tool):
             return
-        self._shown, self._pen = (pen, tool), pen
+        self._shown = (pen, tool)
         show(self._thickness, visible=isinstance(tool, WallTool))
         show(self._becomes, visible=isinstance(tool, EraseTool))
         show(self._folder, visible=isinstance(tool, AlignTool))
-        write(self._thickness, round(1000.0 * pen.thickness, 3))
-        write(self._becomes, UNKNOWN if pen.to_unknown else FREE)
+        self._inputs.follow(view.state)
         if isinstance(tool, AlignTool):
             self._show_alignment(tool)
 
     def _show_alignment(self, tool: AlignTool) -> None:
         for index, widgets in enumerate(self._points):
             known = index < len(tool.known)
-            point = tool.known[index] if known else NamedPoint((0.0, 0.0), (0.0, 0.0))
-            plant = (round(point.plant[0], 4), round(point.plant[1], 4))
-            for widget, value in zip(widgets, (point.name, plant), strict=True):
+            point = tool.known[index] if known else NOWHERE
+            for widget, value in zip(widgets, (point.name, held(PLANT, point.plant)), strict=True):
                 write(widget, value)
                 if widget.disabled is known:
                     widget.disabled = not known

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from viser import GuiApi
@@ -20,10 +19,22 @@ from commission.app.placement.keep_out_tool import KeepOutTool
 from commission.app.placement.service import LAYOUT
 from commission.app.placement.view import LayoutView
 from commission.app.placement.wish import LayoutWish
+from commission.site.fields import get_field
+from commission.site.layout_brief import Demands, LayoutBrief
 from commission.studies.placement import PlacementResult
 
-DEG, MM = math.degrees(1.0), 1000.0
 POSITION, HEADING = "demands.position_limit", "demands.heading_limit"
+DEMANDS = (
+    *("visible", "survive_failure", "position_limit", "heading_limit"),
+    *("unambiguous_starts", "unambiguous_stations"),
+)
+CANDIDATES = (
+    "demands.spacing",
+    *(f"candidates.{name}" for name in ("spacing", "radius", "height", "clearance")),
+)
+"""Options of the suggested layout, in the order of their inputs; the rest stands in `project.yaml` alone."""
+FIRST = LayoutBrief(demands=Demands(position_limit=0.1, heading_limit=0.02))
+"""What the inputs begin with."""
 MOST_UNMET = 12
 REASONS = {"visible": "too few visible", "uncertainty": "2σ over its limit", "ambiguous": "place not told apart"}
 DRAW, CLEAR = "Draw area", "Clear areas"
@@ -31,10 +42,7 @@ DRAW, CLEAR = "Draw area", "Clear areas"
 
 def option_of(state: AppState, name: str) -> Any:
     """Return an option of the suggested layout by its name; a limit that is not set is the supervisor's."""
-    group, _, inner = name.rpartition(".")
-    value: Any = (
-        getattr(getattr(state.project.layout, group), inner) if group else getattr(state.part(LayoutWish), name)
-    )
+    value: Any = get_field(state.project.layout if "." in name else state.part(LayoutWish), name)
     limits = state.project.parameters.supervisor
     if value is None and name == POSITION:
         return limits.position_limit
@@ -71,38 +79,14 @@ class LayoutPanel(BasePanel):
             self._unmet = Rows(gui, self._not_met, post, self._showing)
 
     def _add_demands(self) -> None:
-        gui, inputs = self._gui, self._inputs
-        hint = "Whether the reflectors that are there stay; if not, only the locked ones do."
-        inputs.switch("extend", "Keep present", hint)
-        hint = "Reflectors that every scan on the routes must see."
-        inputs.count("demands.visible", gui.add_number("Visible, at least", 2, min=1, max=20, step=1, hint=hint))
-        hint = "Whether all demands must hold as well with any single reflector blocked."
-        inputs.switch("demands.survive_failure", "One may fail", hint)
-        hint = "Largest 2-sigma of x and of y on the routes; the supervisor's limit unless changed here."
-        limit = gui.add_number("2σ x, y [mm]", 100.0, min=1, max=10_000, step=1, hint=hint)
-        inputs.number(POSITION, MM, limit)
-        hint = "Largest 2-sigma of the heading on the routes; the supervisor's limit unless changed here."
-        inputs.number(HEADING, DEG, gui.add_number("2σ heading [°]", 1.0, min=0.01, max=90, step=0.01, hint=hint))
-        hint = "Whether a vehicle that is switched on at the start of a route must see which place it is."
-        inputs.switch("demands.unambiguous_starts", "Unique starts", hint)
-        hint = "Whether a vehicle that is switched on at a station must see which place it is."
-        inputs.switch("demands.unambiguous_stations", "Unique stations", hint)
+        self._inputs.field("extend", LayoutWish())
+        for name in DEMANDS:
+            self._inputs.field(f"demands.{name}", FIRST)
 
     def _add_candidates(self) -> None:
-        gui, inputs = self._gui, self._inputs
-        hint = "Smallest distance between two reflectors."
-        inputs.number("demands.spacing", 1.0, gui.add_number("Apart [m]", 0.5, min=0, max=100, step=0.05, hint=hint))
-        hint = "Distance along the walls between the places that are tried: finer finds fewer and takes longer."
-        tried = gui.add_number("Try every [m]", 1.0, min=0.1, max=20, step=0.1, hint=hint)
-        inputs.number("candidates.spacing", 1.0, tried)
-        hint = "Radius of the reflectors to be put up."
-        radius = gui.add_number("Radius [mm]", 40.0, min=5, max=500, step=1, hint=hint)
-        inputs.number("candidates.radius", MM, radius)
-        hint = "Height of their middle above the floor: the scanner's."
-        inputs.number("candidates.height", 1.0, gui.add_number("Height [m]", 0.2, min=0, max=10, step=0.01, hint=hint))
-        hint = "Distance left between a reflector and the vehicle on its routes."
-        clear = gui.add_number("Clear of routes [m]", 0.3, min=0, max=10, step=0.05, hint=hint)
-        inputs.number("candidates.clearance", 1.0, clear)
+        gui = self._gui
+        for name in CANDIDATES:
+            self._inputs.field(name, FIRST)
         self._areas = Text(gui)
         areas = gui.add_button_group("Keep out", (DRAW, CLEAR), hint="Areas of the floor without new reflectors.")
         areas.on_click(

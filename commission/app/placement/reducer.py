@@ -32,8 +32,8 @@ def _asking(state: AppState, brief: LayoutBrief, edit: Edit) -> Outcome:
 
 @reduce.register
 def set_layout(action: actions.SetLayout, state: AppState, sender: Sender) -> Outcome:
-    if action.name == "extend":
-        return _wishing(state, replace(state.part(LayoutWish), extend=bool(action.value)))
+    if "." not in action.name:
+        return _wishing(state, with_field(state.part(LayoutWish), action.name, action.value, "wish"))
     words = action.name.rpartition(".")[2].replace("_", " ")
     edit = Edit(f"set {words} of the layout", sender, f"layout.{action.name}")
     return _asking(

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
 from commission.errors import UsageError
 from commission.planning.placement import PlacementOptions
 from commission.site.project import Project
+from commission.site.quantity import Switch
 from commission.studies.placement import PlacementInput
 
 SMALLEST_AREA = 0.05
@@ -17,8 +19,8 @@ SMALLEST_AREA = 0.05
 class LayoutWish:
     """Whether a suggested layout is wanted, and from what it starts."""
 
-    extend: bool = True
-    """Whether the present reflectors stay; if not, only the locked ones do."""
+    extend: Annotated[bool, Switch("Keep present")] = True
+    """Whether the reflectors that are there stay; if not, only the locked ones do."""
     inputs: PlacementInput | None = None
     """The site as it was when a layout was asked for, and what was asked; none: no layout is looked for or shown."""
     asked: int = 0

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import Annotated, TypeAlias
 
 from commission.app.base.actions import Action
+from commission.site.disturbances import PEOPLE
+from commission.site.quantity import Bounds, Quantity
+
+LARGEST_SEED = 2**53
+"""Browsers count to here without a gap."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -15,9 +20,9 @@ class VirtualDrive:
 
     route: str
     """Name of the route."""
-    seed: int = 1
+    seed: Annotated[int, Quantity(label="Seed", bounds=Bounds.between(0, LARGEST_SEED), step=1)] = 1
     """Seed of everything random: the same seed gives the same drive, to the bit."""
-    people: int | None = None
+    people: Annotated[int | None, PEOPLE] = None
     """People walking about; none: as many as the project says."""
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from viser import GuiApi
 
 from commission.app.base import actions
+from commission.app.base.field_widget import Entry
 from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.reach import typed_path
 from commission.app.base.state import AppState
@@ -50,18 +53,16 @@ class RunPanel(BasePanel):
         drive = source if isinstance(source, VirtualDrive) else None
         with self._gui.add_folder("Virtual drive"):
             self._route = self._gui.add_dropdown("Route", names, initial_value=drive.route if drive else None)
-            seed = self._gui.add_number(
-                "Seed", drive.seed if drive else 1, min=0, step=1, hint="The same seed gives the same drive."
-            )
-            people = self._gui.add_number(
-                "People", state.project.disturbances.people, min=0, max=500, step=1, hint="People walking about."
-            )
+            first = drive or VirtualDrive("")
+            if first.people is None:
+                first = replace(first, people=state.project.disturbances.people)
+            seed, people = (Entry(self._gui, name, first) for name in ("seed", "people"))
             self._drive = self._gui.add_button("Drive", hint="Simulate the drive and run it.")
         self._follow_routes(state)
         self._drive.on_click(
             posting(
                 post,
-                lambda _event: ChooseSource(VirtualDrive(self._route.value, int(seed.value), int(people.value))),
+                lambda _event: ChooseSource(VirtualDrive(self._route.value, seed.read(), people.read())),
             )
         )
 

@@ -22,7 +22,6 @@ from commission.app.floor_map import actions
 from commission.app.floor_map.align_tool import AlignTool, NamedPoint
 from commission.app.floor_map.draft import MapDraft, MapFile, MapLoading, MapTrouble, ReadOptions
 from commission.app.floor_map.effects import DrawMap, ReadMapFile, StopMapWork
-from commission.app.floor_map.pen import MapPen
 from commission.app.floor_map.tools import CalibrateTool, EraseTool, ObstacleTool, WallTool
 from commission.errors import UsageError
 from commission.io.dxf import Drawing
@@ -163,7 +162,7 @@ def test_options_out_of_range_are_refused_and_keep_what_was(state: AppState) -> 
     for name, value in (("threshold", 1.5), ("distance", 0.0), ("resolution", 5.0), ("heights", ())):
         with pytest.raises(ValueError, match="expected"):
             after(opened, actions.SetMapOption(name, value))
-    with pytest.raises(UsageError, match="no option 'color'"):
+    with pytest.raises(UsageError, match="no option of a floor map is called 'color'"):
         after(opened, actions.SetMapOption("color", 1.0))
     with pytest.raises(UsageError, match="no file is open"):
         after(state, actions.MakeMap())
@@ -190,7 +189,7 @@ def test_stopping_and_discarding_end_the_work_and_change_nothing(state: AppState
 
 
 def test_a_wall_is_drawn_by_clicks_and_enter_in_one_undo_step(state: AppState) -> None:
-    thick = actions.SetPen(MapPen(thickness=0.2))
+    thick = actions.SetPen("thickness", 0.2)
     clicked = after(state, use(WallTool()), thick, click(3.0, 2.0), click(5.0, 2.0)).state
     assert clicked.project is state.project
     drawn = after(clicked, editing.Finish()).state
@@ -219,7 +218,7 @@ def test_clutter_is_erased_by_a_rectangle_and_a_polygon_becomes_an_obstacle(stat
     filled = after(erased, use(ObstacleTool()), *corners, editing.Finish()).state
     assert (cells(filled)[100:120, 40:60] == OCCUPIED).all()
     assert [step.name for step in filled.undo] == ["erase", "draw obstacle"]
-    unknown = actions.SetPen(MapPen(to_unknown=True))
+    unknown = actions.SetPen("to_unknown", True)
     forgotten = after(filled, use(EraseTool()), unknown, *rectangle((2.0, 5.0), (3.0, 6.0))).state
     assert (cells(forgotten)[100:120, 40:60] == UNKNOWN).all()
 

@@ -176,16 +176,16 @@ PAGE = (
     ),
     Mutant(
         name="number posted in the page's unit",
-        file=FOLDER + "base/inputs.py",
-        find="lambda value: float(value) / scale",
-        replace="lambda value: float(value) * scale",
+        file="commission/site/quantity.py",
+        find="return number / self.scale",
+        replace="return number * self.scale",
         tests=(INPUTS + "test_every_number_posts_what_its_label_says_and_is_shown_as_it_was_typed",),
     ),
     Mutant(
         name="fractions cut off a field of whole numbers",
-        file=FOLDER + "coverage/heatmap_panel.py",
-        find='"People [%/m]", 0.0, min',
-        replace='"People [%/m]", 0, min',
+        file=FOLDER + "base/field_widget.py",
+        find="on_page(value)\n    return round(number) if info.kind is int else float(number)",
+        replace="on_page(value)\n    return round(number)",
         tests=(INPUTS + "test_every_number_posts_what_its_label_says_and_is_shown_as_it_was_typed",),
     ),
     Mutant(
