@@ -24,11 +24,13 @@ class Inspect:
         from commission.io.project_file import load_project
         from commission.io.recordings.base import load_log
         from commission.site.project import Project
+        from commission.site.truth import truth_lines
         from commission.studies.plausibility import PlausibilityInput, plausibility
         from commission.studies.recording_overview import channels
 
         log = load_log(self.recording)
         project = Project() if self.project is None else load_project(self.project)
         lines = [f"{channel.name.capitalize():12} {channel.text}" for channel in channels(log)]
+        true = [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
         notes = [f"Note         {finding}" for finding in plausibility(PlausibilityInput.of(project, log))]
-        sys.stdout.write("\n".join([*lines, *notes]) + "\n")
+        sys.stdout.write("\n".join([*lines, *true, *notes]) + "\n")

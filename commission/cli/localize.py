@@ -48,6 +48,7 @@ class Localize:
         from commission.io.recordings.base import load_log
         from commission.io.results import DETECTIONS, ESTIMATES, SUMMARY, write_results
         from commission.localization import whole_run
+        from commission.site.truth import truth_lines
         from commission.studies.plausibility import PlausibilityInput, plausibility
         from commission.studies.run import RunInput, judged_run, summary
         from commission.studies.run_findings import run_findings
@@ -69,8 +70,9 @@ class Localize:
 
         with out.writing() as folder:
             write_results(folder, result.columns, summary(result) | {"findings": findings})
+        true = [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
         notes = [f"Note         {finding}" for finding in findings]
-        sys.stdout.write("\n".join([*_report(result), *notes, f"Written to   {self.out}"]) + "\n")
+        sys.stdout.write("\n".join([*_report(result), *true, *notes, f"Written to   {self.out}"]) + "\n")
 
 
 def _report(result: RunResult) -> list[str]:

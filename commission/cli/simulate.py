@@ -34,7 +34,9 @@ class Simulate:
     seed: int = 1
     """Seed of every random number, 0 or more: the same seed gives the same recording, bit by bit."""
     faults: bool = True
-    """Whether the project's disturbances act: people, shiny objects, glints, tilted floor, lost scans, wheel slips."""
+    """Whether the project's disturbances act: people, shiny objects, glints, tilted floor, lost scans, wheel slips, and
+    errors of survey, mounting, ranges, clock and wheels that are constant over a drive (drawn once for each seed, and
+    written into the recording's truth.json). The noise of the wheels, `disturbances.wheels`, always acts."""
     people: Annotated[int | None, arg(metavar="N")] = None
     """People walking about. None: as many as the project says."""
     cover: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="START,DURATION")] = ()
@@ -43,24 +45,28 @@ class Simulate:
     """Whether a recording that is in DIR already is replaced."""
 
     def run(self) -> None:
-        """Simulate, write, and tell in two lines what was written."""
+        """Simulate, write, and tell in a few lines what was written and what is true in it."""
         if self.seed < 0:
             raise UsageError(f"--seed is {self.seed}; expected 0 or more")
 
         from commission.io.overwriting import refuse_recording
         from commission.io.project_file import load_project
         from commission.io.recordings.csv_writer import write_recording
+        from commission.simulation.constants import draw_truth
         from commission.simulation.scenario import records
+        from commission.site.truth import truth_lines
 
         refuse_recording(self.out, force=self.force)
         project = load_project(self.project)
         route = self._route(project)
         project = dataclasses.replace(project, disturbances=self._disturbances(project))
         tally = _Tally()
-        write_recording(self.out, tally.count(records(project, route, self.seed)))
+        truth = draw_truth(project, route, self.seed)
+        write_recording(self.out, tally.count(records(project, route, self.seed)), truth)
 
         seconds = tally.last_ns * 1e-9
         sys.stdout.write(f"Drive        route {route!r}, {seconds:.1f} s, {tally.scans} scans, seed {self.seed}\n")
+        sys.stdout.writelines(f"True         {line}\n" for line in truth_lines(truth))
         sys.stdout.write(f"Written to   {self.out}\n")
 
     def _route(self, project: Project) -> str:
@@ -73,9 +79,7 @@ class Simulate:
 
     def _disturbances(self, project: Project) -> Disturbances:
         """Return what the drive suffers; raises UsageError for a number out of range."""
-        from commission.site.disturbances import Disturbances
-
-        disturbances = project.disturbances if self.faults else Disturbances()
+        disturbances = project.disturbances if self.faults else project.disturbances.undisturbed()
         covered = (*disturbances.covered, *(_covered_period(text) for text in self.cover))
         people = disturbances.people if self.people is None else self.people
         try:

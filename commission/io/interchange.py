@@ -281,7 +281,8 @@ def _from_model(source: Path, target: Path, wanted: Kind, options: ConvertOption
 
 
 def _from_recording(source: Path, target: Path, _: Kind, __: ConvertOptions) -> tuple[str, ...]:
-    write_recording(target, open_recording(source).records())
+    recording = open_recording(source)
+    write_recording(target, recording.records(), recording.truth())
     return ()
 
 

@@ -21,7 +21,7 @@ from commission.io.project_text import project_text
 from commission.io.reading import cannot_read, inside
 from commission.io.reflector_tables import read_reflectors, write_reflectors
 from commission.io.yaml_document import YamlDocument, read_yaml, scalar
-from commission.site.disturbances import Disturbances
+from commission.site.disturbances import Disturbances, WheelNoise
 from commission.site.fields import in_file, with_field
 from commission.site.floor_map import FloorMap
 from commission.site.layout_brief import LayoutBrief
@@ -142,7 +142,7 @@ def load_project(path: Path, found: Findings | None = None) -> Project:
             vehicle=_vehicle(document, keys.vehicle),
             scanner=keys.scanner,
             parameters=keys.parameters,
-            disturbances=keys.disturbances,
+            disturbances=_disturbances(document, keys),
             stations=keys.stations,
             layout=keys.layout,
         )
@@ -219,6 +219,14 @@ def _vehicle(document: YamlDocument, keys: dict[str, Any] | None) -> Vehicle:
     without_kind = {key: value for key, value in keys.items() if key != "kind"}
     rest = dataclasses.replace(document, value={**document.value, "vehicle": without_kind})
     return convert(rest, VEHICLES[kind], ("vehicle",))
+
+
+def _disturbances(document: YamlDocument, keys: ProjectDocument) -> Disturbances:
+    """What a virtual drive suffers; projects of old took the true noise of the wheels from the filter's parameters."""
+    if "wheels" in document.value.get("disturbances", {}):
+        return keys.disturbances
+    wheels = WheelNoise(**dataclasses.asdict(keys.parameters.odometry))
+    return dataclasses.replace(keys.disturbances, wheels=wheels)
 
 
 def _floor_map(document: YamlDocument, name: str | None, found: Findings | None) -> FloorMap | None:

@@ -21,7 +21,7 @@ from commission.io.conversion import convert
 from commission.io.map_server import CELL_LIMIT
 from commission.io.project_file import VEHICLES
 from commission.io.yaml_document import YamlDocument
-from commission.site.disturbances import Disturbances
+from commission.site.disturbances import Disturbances, WheelNoise
 from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
 from commission.site.layout_brief import LayoutBrief
 from commission.site.parameters import Parameters
@@ -112,6 +112,11 @@ def _apply(project: Project, values: dict[str, Any], path: Path) -> Project:
             plain[name] = part["all"] if "all" in part else [element for _, element in part["set"]]
     parts = convert(YamlDocument(path, plain), _Parts)
     new: dict[str, Any] = {name: getattr(parts, name) for name in _WHOLE if name in values}
+    if "disturbances" in values and "wheels" not in values["disturbances"]:
+        # Written before the wheels had noise of their own.
+        odometry = new["parameters"].odometry if "parameters" in new else None
+        wheels = project.disturbances.wheels if odometry is None else WheelNoise(**dataclasses.asdict(odometry))
+        new["disturbances"] = dataclasses.replace(parts.disturbances, wheels=wheels)
     if "vehicle" in values:
         keys = {key: value for key, value in values["vehicle"].items() if key != "kind"}
         kind = VEHICLES[values["vehicle"]["kind"]]

@@ -53,10 +53,12 @@ class YamlDocument:
     value: Any
     """Nested dict, list, str, int, float, bool or None."""
     lines: dict[KeyPath, int] = field(default_factory=dict)
-    """Line (from 1) of each key and list element."""
+    """Line (from 1) of each key and list element; empty: the lines are not known."""
 
     def place(self, key_path: KeyPath) -> str:
         """Where a key is, for messages: `line 7, scanner.rate`; a missing key is placed at its nearest parent."""
+        if not self.lines:
+            return dotted(key_path)
         known = key_path
         while known and known not in self.lines:
             known = known[:-1]

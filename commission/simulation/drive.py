@@ -7,7 +7,7 @@ localizer it makes no difference which of the two is called the error.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,10 +17,10 @@ from commission.geometry.arrays import FloatArray, IntArray, frozen
 from commission.geometry.se2 import compose, exp
 from commission.localization.kinematics import body_twist, wheel_speeds
 from commission.simulation.follower import drives_of, follow_leg, way_of
-from commission.site.parameters import OdometryParameters
 from commission.site.path import CREEP, Leg, MotionLimits, legs_of
 from commission.site.routes import Route
-from commission.site.vehicle import TricycleVehicle, Vehicle
+from commission.site.truth import TrueWheels
+from commission.site.vehicle import DifferentialVehicle, TricycleVehicle, Vehicle
 
 PAUSE_AT_STOP = 0.5
 """Rest between two legs [s]."""
@@ -144,19 +144,19 @@ def _patience(leg: Leg, period: float) -> int:
 def measure(
     motion: TrueMotion,
     vehicle: Vehicle,
-    noise: OdometryParameters,
+    wheels: TrueWheels,
     slips_per_100_m: float,
     rng: np.random.Generator,
 ) -> FloatArray:
-    """Displacements that the vehicle reports: the true ones with noise and slips.
+    """Displacements that the vehicle reports: the true ones by wheels of the wrong size, with noise and slips.
 
     Parameters
     ----------
     motion : true motion.
     vehicle : which wheels can slip.
-    noise : the filter's own model, drawn from in the base frame, so that a filter with these parameters is consistent:
-        along and across the motion with the square root of the distance, in heading with that of distance, turn and
-        time, along the vehicle's axis with that of time.
+    wheels : their noise, drawn from in the base frame by the filter's own model, so that a filter with the same figures
+        is consistent: along and across the motion with the square root of the distance, in heading with that of
+        distance, turn and time, along the vehicle's axis with that of time. And their scale.
     slips_per_100_m : mean number of slips, each of one wheel that turns too fast for a moment.
     rng : draws the noise, then the slips.
 
@@ -165,7 +165,11 @@ def measure(
     displacements : (M, 3) array [m, m, rad] in the base frame at the stamp before; the first row is zero.
     """
     period = 1e-9 * motion.period_ns
-    reported = _with_slips(motion, vehicle, slips_per_100_m, rng) * period
+    noise = wheels.noise
+    reported = _with_slips(
+        replace(motion, twists=scaled(motion.twists, vehicle, wheels)), vehicle, slips_per_100_m, rng
+    )
+    reported *= period
     moves = motion.twists * period
     distance = np.hypot(moves[:, 0], moves[:, 1])
     turn = np.abs(moves[:, 2])
@@ -188,6 +192,50 @@ def measure(
     return displacements
 
 
+def driven_wheels(vehicle: Vehicle) -> int:
+    """Number of wheels whose turning is measured; the steering angle of a tricycle is no wheel."""
+    return 1 if isinstance(vehicle, TricycleVehicle) else len(wheel_speeds(vehicle, np.zeros(3)))
+
+
+def scaled(twists: FloatArray, vehicle: Vehicle, wheels: TrueWheels) -> FloatArray:
+    """Twists that a vehicle believes to make whose wheels are smaller, or farther apart, than it knows.
+
+    Parameters
+    ----------
+    twists : (M, 3) true ones [m/s, m/s, rad/s], base frame.
+    vehicle : as it believes to be.
+    wheels : their scale.
+
+    Returns
+    -------
+    believed : (M, 3) the same array where nothing is wrong.
+
+    Notes
+    -----
+    For every kind of vehicle the way from true to believed twist is linear: true twist, speeds of the true wheels, what
+    they report, twist of the vehicle's own wheels.
+    """
+    each = np.array(wheels.wheel_scales) if wheels.wheel_scales else np.zeros(driven_wheels(vehicle))
+    if not (each.any() or wheels.forward_scale or wheels.separation_scale):
+        return twists
+    true_vehicle = _with_separation(vehicle, 1.0 + wheels.separation_scale)
+    columns = []
+    for axis in np.eye(3):
+        turning = np.array(wheel_speeds(true_vehicle, axis))
+        turning[: len(each)] *= (1.0 + wheels.forward_scale) * (1.0 + each)
+        columns.append(body_twist(vehicle, turning))
+    return twists @ np.array(columns)
+
+
+def _with_separation(vehicle: Vehicle, factor: float) -> Vehicle:
+    """Return a vehicle whose wheels are farther apart by a factor."""
+    if isinstance(vehicle, DifferentialVehicle):
+        return replace(vehicle, wheel_separation=factor * vehicle.wheel_separation)
+    if isinstance(vehicle, TricycleVehicle):
+        return replace(vehicle, wheelbase=factor * vehicle.wheelbase)
+    return replace(vehicle, center_distance=factor * vehicle.center_distance)
+
+
 def _with_slips(motion: TrueMotion, vehicle: Vehicle, per_100_m: float, rng: np.random.Generator) -> FloatArray:
     """(M, 3) twists that the wheels report; where one slips it reports a motion that did not happen."""
     reported = np.array(motion.twists)
@@ -201,8 +249,6 @@ def _with_slips(motion: TrueMotion, vehicle: Vehicle, per_100_m: float, rng: np.
         choice = rng.uniform()
         for row in range(first, min(first + steps, len(reported))):
             wheels = np.array(wheel_speeds(vehicle, motion.twists[row]))
-            # The second number of a tricycle is its steering angle, which does not slip.
-            driven = 1 if isinstance(vehicle, TricycleVehicle) else len(wheels)
-            wheels[int(choice * driven)] *= excess
+            wheels[int(choice * driven_wheels(vehicle))] *= excess
             reported[row] = body_twist(vehicle, wheels)
     return reported

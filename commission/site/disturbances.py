@@ -1,15 +1,132 @@
-"""What disturbs localization in this hall: people, shiny things, tilted floor, faults. Read by the simulation alone."""
+"""The truth of a virtual world: wheels, constant errors, people, shiny things, faults. Read by the simulation alone."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated
 
 from commission.site.checks import check_fields
-from commission.site.quantity import NOT_NEGATIVE, PERCENT, SHARE, Bounds, Quantity, X, Y
+from commission.site.odometry_growth import (
+    FORWARD_PER_SQRT_M,
+    FORWARD_PER_SQRT_S,
+    HEADING_PER_SQRT_M,
+    HEADING_PER_SQRT_RAD,
+    HEADING_PER_SQRT_S,
+    LATERAL_PER_SQRT_M,
+)
+from commission.site.quantity import (
+    DEGREES,
+    MILLIMETRES,
+    NOT_NEGATIVE,
+    PERCENT,
+    SHARE,
+    Bounds,
+    Group,
+    Quantity,
+    Shown,
+    Words,
+    X,
+    Y,
+)
 
 PEOPLE = Quantity(label="People", bounds=Bounds.between(0, 10_000), step=1, entry=(0, 500))
 _FREQUENCY = Bounds.between(0.0, 1000.0)
+_MILLISECONDS = Shown("ms", 1000.0)
+_SHORT = Bounds.between(0.0, 0.1)
+_EITHER_WAY = Bounds.between(-10.0, 10.0)
+_SCALE = Bounds.between(0.0, 0.1)
+
+
+def _sigma(label: str) -> Quantity:
+    """1-sigma of a length that is the same over a whole drive."""
+    return Quantity(label=label, unit="m", shown=MILLIMETRES, bounds=_SHORT, step=0.1, decimals=6)
+
+
+def _scale(label: str) -> Quantity:
+    """1-sigma of a factor of the wheels, less one."""
+    return Quantity(label=label, shown=PERCENT, bounds=_SCALE, step=0.01, decimals=6)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WheelNoise:
+    """True noise of the wheels of a virtual vehicle; what the filter believes of it is `parameters.odometry`."""
+
+    forward_per_sqrt_m: Annotated[float, FORWARD_PER_SQRT_M] = 0.01
+    """True 1-sigma error along the motion after one metre driven."""
+    lateral_per_sqrt_m: Annotated[float, LATERAL_PER_SQRT_M] = 0.003
+    """True 1-sigma error across the motion after one metre driven."""
+    heading_per_sqrt_m: Annotated[float, HEADING_PER_SQRT_M] = 0.006
+    """True 1-sigma heading error after one metre driven."""
+    heading_per_sqrt_rad: Annotated[float, HEADING_PER_SQRT_RAD] = 0.01
+    """True 1-sigma heading error after turning one radian."""
+    forward_per_sqrt_s: Annotated[float, FORWARD_PER_SQRT_S] = 0.0005
+    """True 1-sigma error along the vehicle's axis after one second, even at rest."""
+    heading_per_sqrt_s: Annotated[float, HEADING_PER_SQRT_S] = 0.0002
+    """True 1-sigma heading error after one second, even at rest."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, "wheels.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ScannerError:
+    """Errors of one scanner that are the same in every drive: what was mounted askew, or measures too far."""
+
+    scanner: Annotated[str, Words("Scanner")] = "scanner"
+    """Name of the scanner."""
+    mounting: Annotated[
+        tuple[float, float, float],
+        Quantity(label="Mounting x off by", unit="m", shown=MILLIMETRES, bounds=_EITHER_WAY, step=0.1, decimals=6),
+        Quantity(label="Mounting y off by", unit="m", shown=MILLIMETRES, bounds=_EITHER_WAY, step=0.1, decimals=6),
+        Quantity(label="Turned by", unit="rad", shown=DEGREES, bounds=_EITHER_WAY, step=0.01, decimals=6),
+    ] = (0.0, 0.0, 0.0)
+    """What the true mounting has more than the project's: x, y and heading in the base frame."""
+    range_bias: Annotated[
+        float,
+        Quantity(label="Range bias", unit="m", shown=MILLIMETRES, bounds=_EITHER_WAY, step=0.1, decimals=6),
+    ] = 0.0
+    """What the scanner adds to every range."""
+    clock_offset: Annotated[
+        float, Quantity(label="Clock late by", unit="s", shown=_MILLISECONDS, bounds=_EITHER_WAY, step=0.1, decimals=6)
+    ] = 0.0
+    """How much later than they were taken its scans are stamped."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, "constant error's ")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConstantErrors:
+    """What is wrong in the same way over a whole virtual drive: 1-sigma of what is drawn once for each seed."""
+
+    survey_factor: Annotated[float, Quantity(label="Survey", bounds=Bounds.between(0.0, 100.0), step=0.1)] = 0.0
+    """True survey error of each reflector in multiples of the `sigma` that the map gives it; 0: all stand as mapped."""
+    survey_sigma: Annotated[float, _sigma("Survey 1σ")] = 0.0
+    """1-sigma of the true survey error, along x and along y, of each reflector whose `sigma` is 0 in the map."""
+    mounting_sigma: Annotated[
+        tuple[float, float, float],
+        _sigma("Mounting x 1σ"),
+        _sigma("Mounting y 1σ"),
+        Quantity(label="Mounting heading 1σ", unit="rad", shown=DEGREES, bounds=_SHORT, step=0.01, decimals=6),
+    ] = (0.0, 0.0, 0.0)
+    """1-sigma of what the true mounting of each scanner has more than the project's: x, y and heading."""
+    range_bias_sigma: Annotated[float, _sigma("Range bias 1σ")] = 0.0
+    """1-sigma of what each scanner adds to all its ranges."""
+    clock_offset_sigma: Annotated[
+        float, Quantity(label="Clock 1σ", unit="s", shown=_MILLISECONDS, bounds=_SHORT, step=0.1, decimals=6)
+    ] = 0.0
+    """1-sigma of how much later than they were taken the scans of each scanner are stamped."""
+    forward_scale_sigma: Annotated[float, _scale("Wheels too small 1σ")] = 0.0
+    """1-sigma of the share by which all wheels together report too much way."""
+    wheel_scale_sigma: Annotated[float, _scale("Each wheel 1σ")] = 0.0
+    """1-sigma of the share by which each driven wheel alone reports too much way: left and right differ."""
+    separation_scale_sigma: Annotated[float, _scale("Wheels apart 1σ")] = 0.0
+    """1-sigma of the share by which the true distance between the wheels is larger than the vehicle's."""
+    scanners: tuple[ScannerError, ...] = ()
+    """Errors of single scanners that are no chance; what is drawn comes on top."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, "constants.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +194,14 @@ class Disturbances:
     """Mean number of wheel slips per 100 m driven."""
     covered: tuple[CoveredPeriod, ...] = ()
     """Times at which all reflectors are covered."""
+    wheels: Annotated[WheelNoise, Group("Noise of the wheels")] = field(default_factory=WheelNoise)
+    """True noise of the wheels."""
+    constants: Annotated[ConstantErrors, Group("Constant errors")] = field(default_factory=ConstantErrors)
+    """What is wrong in the same way over a whole drive."""
+
+    def undisturbed(self) -> Disturbances:
+        """Return the noise of the wheels alone: a hall without people, faults and constant errors."""
+        return Disturbances(wheels=self.wheels)
 
     def __post_init__(self) -> None:
         check_fields(self, "disturbances.")

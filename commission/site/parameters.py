@@ -6,6 +6,14 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 from commission.site.checks import check_fields
+from commission.site.odometry_growth import (
+    FORWARD_PER_SQRT_M,
+    FORWARD_PER_SQRT_S,
+    HEADING_PER_SQRT_M,
+    HEADING_PER_SQRT_RAD,
+    HEADING_PER_SQRT_S,
+    LATERAL_PER_SQRT_M,
+)
 from commission.site.quantity import (
     DEGREES,
     MILLIMETRES,
@@ -52,38 +60,21 @@ class ObservationParameters:
         check_fields(self, "observation.")
 
 
-def _growth(label: str, unit: str, shown: Shown, step: float, most: float) -> Quantity:
-    """Uncertainty that grows with the square root of way, turn or time."""
-    return Quantity(label=label, unit=unit, shown=shown, bounds=NOT_NEGATIVE, step=step, slider=(0.0, most))
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OdometryParameters:
     """Growth of the uncertainty while driving (Q of equation 1), independent of how finely odometry is sampled."""
 
-    forward_per_sqrt_m: Annotated[
-        float, _growth("Along", "m/sqrt(m)", Shown("mm/√m", MILLIMETRES.scale), 0.5, 100.0)
-    ] = 0.01
+    forward_per_sqrt_m: Annotated[float, FORWARD_PER_SQRT_M] = 0.01
     """1-sigma error along the motion after one metre driven."""
-    lateral_per_sqrt_m: Annotated[
-        float, _growth("Across", "m/sqrt(m)", Shown("mm/√m", MILLIMETRES.scale), 0.5, 100.0)
-    ] = 0.003
+    lateral_per_sqrt_m: Annotated[float, LATERAL_PER_SQRT_M] = 0.003
     """1-sigma error across the motion after one metre driven."""
-    heading_per_sqrt_m: Annotated[float, _growth("Heading", "rad/sqrt(m)", Shown("°/√m", DEGREES.scale), 0.01, 5.0)] = (
-        0.006
-    )
+    heading_per_sqrt_m: Annotated[float, HEADING_PER_SQRT_M] = 0.006
     """1-sigma heading error after one metre driven."""
-    heading_per_sqrt_rad: Annotated[
-        float, _growth("Heading, turning", "rad/sqrt(rad)", Shown("°/√rad", DEGREES.scale), 0.01, 5.0)
-    ] = 0.01
+    heading_per_sqrt_rad: Annotated[float, HEADING_PER_SQRT_RAD] = 0.01
     """1-sigma heading error after turning one radian."""
-    forward_per_sqrt_s: Annotated[
-        float, _growth("Along, in time", "m/sqrt(s)", Shown("mm/√s", MILLIMETRES.scale), 0.1, 50.0)
-    ] = 0.0005
+    forward_per_sqrt_s: Annotated[float, FORWARD_PER_SQRT_S] = 0.0005
     """1-sigma error along the vehicle's axis after one second, even at rest."""
-    heading_per_sqrt_s: Annotated[
-        float, _growth("Heading, in time", "rad/sqrt(s)", Shown("°/√s", DEGREES.scale), 0.01, 3.0)
-    ] = 0.0002
+    heading_per_sqrt_s: Annotated[float, HEADING_PER_SQRT_S] = 0.0002
     """1-sigma heading error after one second, even at rest."""
 
     def __post_init__(self) -> None:

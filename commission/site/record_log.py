@@ -17,6 +17,7 @@ from commission.site.records import (
     ReferencePose,
     Scan,
 )
+from commission.site.truth import Truth
 
 
 def _stamps(records: list[Record]) -> IntArray:
@@ -72,6 +73,8 @@ class RecordLog:
     """(R,) [ns]."""
     reference_poses: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
     """(R, 3) `T_map_base` [m, m, rad]."""
+    truth: Truth | None = None
+    """The constants that were drawn for a virtual drive; None of a real vehicle."""
     order: NDArray[np.int64] = field(init=False, repr=False)
     """(E, 2) every record in order of delivery: rank of its kind in ORDER_WITHIN_A_STAMP, index within its kind."""
     stamps_ns: IntArray = field(init=False, repr=False)

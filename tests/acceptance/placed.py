@@ -80,7 +80,7 @@ def blocked_drive(project: Project, route: str, seed: int, disturbances: Disturb
     hall = replace(
         project,
         reflectors=ReflectorMap(reflectors[:gone] + reflectors[gone + 1 :]),
-        disturbances=disturbances or Disturbances(),
+        disturbances=disturbances or project.disturbances.undisturbed(),
     )
     log = virtual_drive(hall, route, seed, options=DriveOptions(whole_scans=False))
     judged = judge(project, route, log)

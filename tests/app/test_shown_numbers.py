@@ -44,9 +44,11 @@ from commission.planning.coverage import Lattice
 from commission.planning.dependence import Dependence, Failure, RouteDependence
 from commission.planning.dilution import Measurement
 from commission.planning.route_prediction import PerMetre
+from commission.site.disturbances import ScannerError
 from commission.site.fields import with_field
 from commission.site.project import Project
 from commission.site.stations import Station
+from commission.site.truth import TruePlace, TrueWheels, Truth
 from commission.studies.prediction import PredictionInput
 from commission.studies.prediction import prediction as predicted
 from commission.studies.run import RunInput, RunResult, judged_run
@@ -154,8 +156,34 @@ UNITS_NOW = {
 }
 
 
+TRUE = {
+    "True wheels": "along 10.0 mm/√m, across 3.0 mm/√m, heading 0.34 °/√m, heading, turning 0.57 °/√rad, "
+    "along, in time 0.5 mm/√s, heading, in time 0.01 °/√s, all too small 0.250 %, alone too small -0.100 %, "
+    "alone too small 0.125 %, farther apart 2.000 %",
+    "True scanner": "mounting x off by 3.0 mm, turned by 1.00°, range bias -5.5 mm, clock late by 4.0 ms",
+    "True reflectors": "2 off, 3.5 mm RMS, 4.0 mm at most (B)",
+}
+"""What the page tells of the truth below."""
+WORLD = Truth(
+    wheels=TrueWheels(forward_scale=0.0025, wheel_scales=(-0.001, 0.00125), separation_scale=0.02),
+    scanners=(
+        ScannerError(scanner="scanner", mounting=(0.003, 0.0, 0.017453), range_bias=-0.0055, clock_offset=0.004),
+    ),
+    # 3 and 4 mm: together 5 / sqrt(2).
+    reflectors=(TruePlace(id="A", dx=0.003, dy=0.0), TruePlace(id="B", dx=0.0, dy=-0.004)),
+)
+
+
+def test_what_is_true_in_a_virtual_drive_is_told_in_the_units_of_its_fields(at: At) -> None:
+    inputs = at.run.result.inputs
+    of = replace(at.run, result=replace(at.run.result, inputs=replace(inputs, log=replace(inputs.log, truth=WORLD))))
+    assert {label: text for label, text in now_rows(of) if label in TRUE} == TRUE
+    recorded = replace(of, result=replace(of.result, inputs=replace(inputs, log=replace(inputs.log, truth=None))))
+    assert not TRUE.keys() & dict(now_rows(recorded)).keys()
+
+
 def test_every_row_of_the_newest_cycle_is_expected(at: At) -> None:
-    assert {label for label, _ in now_rows(at.run)} == {*NOW, "Mode"}
+    assert {label for label, _ in now_rows(at.run)} == {*NOW, "Mode", *TRUE}
 
 
 @pytest.mark.parametrize("label", NOW)

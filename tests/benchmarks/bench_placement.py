@@ -56,7 +56,10 @@ def compare(site: str, drives: int) -> None:
             f"unmet: {len(found.unmet)}",
             flush=True,
         )
-        for what, disturbances in (("nobody about", Disturbances()), ("disturbed", project.disturbances)):
+        for what, disturbances in (
+            ("nobody about", project.disturbances.undisturbed()),
+            ("disturbed", project.disturbances),
+        ):
             drive_all(placed, demands, drives, what, disturbances)
 
 

@@ -27,7 +27,9 @@ def test_the_same_seed_gives_the_same_files_and_another_seed_does_not(commission
     for name, seed in (("a", 5), ("b", 5), ("c", 6)):
         assert commission("simulate", project, "--out", tmp_path / name, "--seed", seed)[0] == 0
     names = sorted(path.name for path in (tmp_path / "a").iterdir())
-    assert names == ["odometry.csv", "reference.csv", "scans.npz"]
+    assert names == ["odometry.csv", "reference.csv", "scans.npz", "truth.json"]
+    truths = [(tmp_path / name / "truth.json").read_bytes() for name in "abc"]
+    assert truths[0] == truths[1] != truths[2]
     odometry = [(tmp_path / name / "odometry.csv").read_bytes() for name in "abc"]
     assert odometry[0] == odometry[1] != odometry[2]
     ranges = [np.load(tmp_path / name / "scans.npz")["ranges"] for name in "ab"]
@@ -47,6 +49,27 @@ def test_without_faults_the_disturbances_of_the_project_do_not_act(commission, p
         file.write("disturbances: {dropped_scans: 1.0}\n")
     assert "0 scans" in commission("simulate", project, "--out", tmp_path / "a")[1]
     assert " 0 scans" not in commission("simulate", project, "--out", tmp_path / "b", "--no-faults")[1]
+
+
+def test_what_is_true_is_told_and_written_and_told_again_by_those_who_read_the_recording(commission, project, tmp_path):
+    constants = "{scanners: [{scanner: scanner, mounting: [0.0, 0.003, 0.0], range_bias: 0.02}], survey_sigma: 0.01}"
+    with (project / "project.yaml").open("a", encoding="utf-8") as file:
+        file.write(f"disturbances: {{constants: {constants}}}\n")
+    told = commission("simulate", project, "--out", tmp_path / "rec")[1]
+    written = json.loads((tmp_path / "rec" / "truth.json").read_text(encoding="utf-8"))
+    assert (written["schema"], written["seed"], written["route"]) == (1, 1, "Straight")
+    assert written["scanners"][0]["range_bias"] == 0.02
+    assert len(written["reflectors"]) == 5
+    line = "True         scanner: mounting y off by 3.0 mm, range bias 20.0 mm\n"
+    localized = commission("localize", project, tmp_path / "rec", "--out", tmp_path / "out")[1]
+    inspected = commission("inspect", tmp_path / "rec")[1]
+    for text in (told, localized, inspected):
+        assert line in text
+        assert "True         reflectors: 5 off, " in text
+    commission("simulate", project, "--out", tmp_path / "right", "--no-faults")
+    right = json.loads((tmp_path / "right" / "truth.json").read_text(encoding="utf-8"))
+    assert (right["scanners"][0]["range_bias"], right["reflectors"]) == (0.0, [])
+    assert right["wheels"] == written["wheels"]
 
 
 def test_people_are_as_many_as_asked_for(commission, project, tmp_path):

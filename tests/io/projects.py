@@ -8,7 +8,15 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from commission.site.disturbances import CoveredPeriod, Disturbances, ShinyObject, TiltedStretch
+from commission.site.disturbances import (
+    ConstantErrors,
+    CoveredPeriod,
+    Disturbances,
+    ScannerError,
+    ShinyObject,
+    TiltedStretch,
+    WheelNoise,
+)
 from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
 from commission.site.layout_brief import AllowedHeights, CandidateOptions, Demands, LayoutBrief
 from commission.site.parameters import (
@@ -101,6 +109,7 @@ def parameters() -> st.SearchStrategy[Parameters]:
 
 
 def disturbances() -> st.SearchStrategy[Disturbances]:
+    small = st.floats(0.0, 0.1)
     return st.builds(
         Disturbances,
         people=st.integers(0, 99),
@@ -108,6 +117,13 @@ def disturbances() -> st.SearchStrategy[Disturbances]:
         tilted_stretches=st.lists(st.builds(TiltedStretch, x=METRES, y=METRES, radius=POSITIVE), max_size=2).map(tuple),
         covered=st.lists(st.builds(CoveredPeriod, start=POSITIVE, duration=POSITIVE), max_size=2).map(tuple),
         dropped_scans=st.floats(0.0, 1.0),
+        wheels=st.builds(WheelNoise, forward_per_sqrt_m=st.floats(0.0, 1.0), heading_per_sqrt_s=st.floats(0.0, 1.0)),
+        constants=st.builds(
+            ConstantErrors,
+            survey_factor=st.floats(0.0, 9.0),
+            mounting_sigma=st.tuples(small, small, small),
+            scanners=st.lists(st.builds(ScannerError, scanner=NAME, range_bias=small), max_size=2).map(tuple),
+        ),
     )
 
 

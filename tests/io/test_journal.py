@@ -22,6 +22,7 @@ from commission.io.journal import Journal, News, remove_leftovers
 from commission.io.journal_replay import Restored, restore
 from commission.io.project_file import load_project, save_project
 from commission.io.project_parts import apply, change
+from commission.site.disturbances import Disturbances, WheelNoise
 from commission.site.fields import in_file
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.project import Project
@@ -50,6 +51,15 @@ def test_a_change_made_again_gives_the_later_project(before, after):
     assert apply(before, change(before, after), path) == after
     assert apply(Project(), change(None, after), path) == after
     assert change(after, after) == {}
+
+
+def test_an_older_journal_that_knows_no_wheels_leaves_those_there_are():
+    project = Project(disturbances=Disturbances(wheels=WheelNoise(lateral_per_sqrt_m=0.05)))
+    assert apply(project, {"disturbances": {"people": 3}}, Path("journal")).disturbances == replace(
+        project.disturbances, people=3
+    )
+    whole = {"disturbances": {"people": 3}, "parameters": {"odometry": {"lateral_per_sqrt_m": 0.07}}}
+    assert apply(Project(), whole, Path("journal")).disturbances.wheels == WheelNoise(lateral_per_sqrt_m=0.07)
 
 
 def test_a_small_edit_is_a_small_change():

@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 
 from commission.errors import CommissionError, FileFormatError, UsageError
 from commission.io.project_file import OpenedProject, apply_settings, load_project, open_project, save_project
+from commission.site.disturbances import WheelNoise
 from commission.site.floor_map import FloorMap
 from commission.site.parameters import Parameters
 from commission.site.project import Project
@@ -370,3 +371,29 @@ def test_a_save_for_which_there_is_no_space_writes_no_file_at_all(tmp_path, monk
     with pytest.raises(FileFormatError, match="No space left on device"):
         save_project(changed, tmp_path / "copy" / "of it")
     assert not (tmp_path / "copy").exists()
+
+
+OLD = """schema: 1
+parameters:
+  odometry: {forward_per_sqrt_m: 0.05, lateral_per_sqrt_m: 0.04, heading_per_sqrt_m: 0.03, heading_per_sqrt_rad: 0.02,
+             forward_per_sqrt_s: 0.01, heading_per_sqrt_s: 0.005}
+"""
+"""A project of the time when the filter's parameters were the true noise of the wheels, too."""
+
+
+@pytest.mark.parametrize("disturbances", ["", "disturbances: {people: 3}\n"])
+def test_wheels_of_an_old_project_are_those_that_its_parameters_gave_and_stay_so(
+    tmp_path: Path, disturbances: str
+) -> None:
+    (tmp_path / "project.yaml").write_text(OLD + disturbances)
+    project = load_project(tmp_path)
+    assert dataclasses.astuple(project.disturbances.wheels) == (0.05, 0.04, 0.03, 0.02, 0.01, 0.005)
+    assert project.disturbances.people == (3 if "3" in disturbances else 0)
+    tuned = dataclasses.replace(project, parameters=Parameters())
+    save_project(tuned, tmp_path)
+    assert load_project(tmp_path) == tuned
+
+
+def test_wheels_that_a_project_states_are_not_those_of_its_parameters(tmp_path: Path) -> None:
+    (tmp_path / "project.yaml").write_text(OLD + "disturbances: {wheels: {lateral_per_sqrt_m: 0.001}}\n")
+    assert load_project(tmp_path).disturbances.wheels == WheelNoise(lateral_per_sqrt_m=0.001)

@@ -16,7 +16,6 @@ from commission.planning.route_prediction import PlannedRoute, PredictionOptions
 from commission.planning.true_error import predict_errors
 from commission.simulation.drive import DriveOptions
 from commission.simulation.scenario import start_of, virtual_drive
-from commission.site.disturbances import Disturbances
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.studies.metrics import pose_errors, reference_at
@@ -67,7 +66,8 @@ class Comparison:
 
 def undisturbed(site: str) -> Project:
     """A bundled site without people, glints and tilted floor."""
-    return replace(load_project(bundled_folder("maps") / site), disturbances=Disturbances())
+    project = load_project(bundled_folder("maps") / site)
+    return replace(project, disturbances=project.disturbances.undisturbed())
 
 
 def thinned(project: Project, keep: int) -> Project:

@@ -11,15 +11,16 @@ from commission.errors import ProjectError
 from commission.geometry.angles import difference
 from commission.geometry.se2 import exp, log, relative
 from commission.simulation.drive import DriveOptions, TrueMotion, drive, measure
-from commission.site.parameters import OdometryParameters
+from commission.site.disturbances import WheelNoise
 from commission.site.path import KINK, MotionLimits, legs_of
 from commission.site.routes import Direction, Route, Segment
+from commission.site.truth import TrueWheels
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
 from tests.simulation.halls import out_and_back
 
 VEHICLES = (DifferentialVehicle(), TricycleVehicle(), TricycleVehicle(wheelbase=-1.0), OmnidirectionalVehicle())
 EXACT_START = DriveOptions(start_sigma=(0.0, 0.0, 0.0))
-NOISELESS = OdometryParameters(
+NOISELESS = WheelNoise(
     forward_per_sqrt_m=0.0,
     lateral_per_sqrt_m=0.0,
     heading_per_sqrt_m=0.0,
@@ -157,7 +158,7 @@ def test_poses_between_stamps_follow_the_same_arcs() -> None:
 
 def test_odometry_without_noise_is_the_true_motion() -> None:
     motion = driven(OmnidirectionalVehicle(), out_and_back())
-    reported = measure(motion, OmnidirectionalVehicle(), NOISELESS, 0.0, np.random.default_rng(0))
+    reported = measure(motion, OmnidirectionalVehicle(), TrueWheels(noise=NOISELESS), 0.0, np.random.default_rng(0))
     assert not reported[0].any()
     # Poses carry the rounding of a few metres.
     assert reported[1:] == pytest.approx(relative(motion.poses[:-1], motion.poses[1:]), abs=1e-12)
@@ -180,8 +181,8 @@ def test_reported_motion_spreads_as_the_parameter_says(name: str, sigmas: tuple[
     noise = replace(NOISELESS, **{name: 0.02})
     errors = []
     for _ in range(400):
-        reported = measure(motion, DifferentialVehicle(), noise, 0.0, rng)
-        twists = log(reported) - log(measure(motion, DifferentialVehicle(), NOISELESS, 0.0, rng))
+        reported = measure(motion, DifferentialVehicle(), TrueWheels(noise=noise), 0.0, rng)
+        twists = log(reported) - log(measure(motion, DifferentialVehicle(), TrueWheels(noise=NOISELESS), 0.0, rng))
         errors.append(twists.sum(axis=0))
     spread = np.std(errors, axis=0)
     for axis, sigma in enumerate(sigmas):
@@ -200,7 +201,7 @@ def test_noise_of_a_motion_askew_lies_along_it_or_across_it(name: str, along: bo
     poses = np.concatenate((np.zeros((1, 3)), np.cumsum(twists[1:], axis=0) * 0.02))
     motion = TrueMotion(np.arange(201) * 20_000_000, poses, twists)
     vehicle, noise = OmnidirectionalVehicle(), replace(NOISELESS, **{name: 0.02})
-    errors = measure(motion, vehicle, noise, 0.0, np.random.default_rng(1))[1:, :2] - 0.025 * askew
+    errors = measure(motion, vehicle, TrueWheels(noise=noise), 0.0, np.random.default_rng(1))[1:, :2] - 0.025 * askew
     parts = errors @ askew, errors @ [-askew[1], askew[0]]
     spread, nothing = parts if along else parts[::-1]
     np.testing.assert_allclose(nothing, 0.0, atol=1e-12)
@@ -214,7 +215,12 @@ def test_reported_heading_spreads_with_the_angle_turned() -> None:
     noise = replace(NOISELESS, heading_per_sqrt_rad=0.02)
     rng = np.random.default_rng(1)
     errors = [
-        np.sum(difference(measure(motion, DifferentialVehicle(), noise, 0.0, rng)[1:, 2], np.diff(motion.poses[:, 2])))
+        np.sum(
+            difference(
+                measure(motion, DifferentialVehicle(), TrueWheels(noise=noise), 0.0, rng)[1:, 2],
+                np.diff(motion.poses[:, 2]),
+            )
+        )
         for _ in range(300)
     ]
     assert np.std(errors) == pytest.approx(0.02 * np.sqrt(turned), rel=0.2)
@@ -223,8 +229,8 @@ def test_reported_heading_spreads_with_the_angle_turned() -> None:
 @pytest.mark.parametrize("vehicle", VEHICLES, ids=lambda v: v.kind)
 def test_slips_report_motion_that_did_not_happen(vehicle: Vehicle) -> None:
     motion = driven(vehicle, out_and_back())
-    true = measure(motion, vehicle, NOISELESS, 0.0, np.random.default_rng(0))
-    reported = measure(motion, vehicle, NOISELESS, 40.0, np.random.default_rng(0))
+    true = measure(motion, vehicle, TrueWheels(noise=NOISELESS), 0.0, np.random.default_rng(0))
+    reported = measure(motion, vehicle, TrueWheels(noise=NOISELESS), 40.0, np.random.default_rng(0))
     slipping = np.abs(reported - true).max(axis=1) > 1e-9
     assert 0 < np.count_nonzero(slipping) < 0.3 * len(slipping)
     # A wheel spins: it never reports less than it should.

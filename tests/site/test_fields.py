@@ -10,7 +10,15 @@ import pytest
 
 from commission.errors import UsageError
 from commission.site.checks import check_fields
-from commission.site.disturbances import CoveredPeriod, Disturbances, ShinyObject, TiltedStretch
+from commission.site.disturbances import (
+    ConstantErrors,
+    CoveredPeriod,
+    Disturbances,
+    ScannerError,
+    ShinyObject,
+    TiltedStretch,
+    WheelNoise,
+)
 from commission.site.fields import (
     field_info,
     fields_of,
@@ -31,6 +39,7 @@ from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle,
 
 EDITED = (
     *(DifferentialVehicle, TricycleVehicle, OmnidirectionalVehicle, Scanner, Reflector, Station, Segment, Route),
+    *(WheelNoise, ConstantErrors, ScannerError),
     *(Disturbances, ShinyObject, TiltedStretch, CoveredPeriod, Demands, CandidateOptions, AllowedHeights),
 )
 NO_QUANTITY = {"Segment.degree"}

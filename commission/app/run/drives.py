@@ -32,7 +32,7 @@ def prepare(project: Project, source: Source, progress: Progress) -> Drive:
 
     Parameters
     ----------
-    project : site, vehicle and scanner; its parameters are the wheels' true noise of a virtual drive.
+    project : site, vehicle, scanner, and the disturbances of a virtual drive.
     source : what drives.
     progress : told how far it is; may raise to cancel.
 

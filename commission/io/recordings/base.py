@@ -11,6 +11,7 @@ from commission.io.reading import cannot_read
 from commission.io.recordings.csv_folder import CsvFolder
 from commission.site.record_log import RecordLog
 from commission.site.records import Record
+from commission.site.truth import Truth
 
 
 class Recording(Protocol):
@@ -26,6 +27,10 @@ class Recording(Protocol):
 
         Raises FileFormatError, on the way, at the first thing that is wrong.
         """
+        ...
+
+    def truth(self) -> Truth | None:
+        """Read the constants of a virtual drive; None of a real vehicle. Raises FileFormatError."""
         ...
 
     def load(self) -> RecordLog:

@@ -1,7 +1,7 @@
 """A recording as a folder of tables: what an engineer can make from any log. The reading side.
 
-`odometry.csv`, and where they exist `detections.csv`, `scans.npz` and `reference.csv`. A pause in any of them is no
-error: vehicles stand still and scanners are unplugged.
+`odometry.csv`, and where they exist `detections.csv`, `scans.npz`, `reference.csv` and `truth.json`. A pause in any of
+them is no error: vehicles stand still and scanners are unplugged.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from commission.errors import FileFormatError
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.io.csv_table import Block, read_table
 from commission.io.recordings.scan_archive import ScanArchive
+from commission.io.recordings.truth_file import TRUTH, read_truth
 from commission.site.record_log import RecordLog
 from commission.site.records import (
     ORDER_WITHIN_A_STAMP,
@@ -26,6 +27,7 @@ from commission.site.records import (
     ReferencePose,
     Scan,
 )
+from commission.site.truth import Truth
 
 ODOMETRY = "odometry.csv"
 DETECTIONS = "detections.csv"
@@ -92,7 +94,12 @@ class CsvFolder:
             range_bearing=detections.values[seen],
             reference_stamps_ns=reference.stamps_ns,
             reference_poses=reference.values,
+            truth=self.truth(),
         )
+
+    def truth(self) -> Truth | None:
+        """Read the constants of a virtual drive; None of a real vehicle. Raises FileFormatError."""
+        return read_truth(self.path / TRUTH) if (self.path / TRUTH).exists() else None
 
     def _odometry(self) -> Iterator[Record]:
         for rows in self._odometry_rows(_STREAMED):

@@ -26,16 +26,19 @@ from commission.io.recordings.csv_folder import (
     REFERENCE_COLUMNS,
     SCANS,
 )
+from commission.io.recordings.truth_file import TRUTH, write_truth
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+from commission.site.truth import Truth
 
 
-def write_recording(folder: Path, records: Iterable[Record]) -> None:
+def write_recording(folder: Path, records: Iterable[Record], truth: Truth | None = None) -> None:
     """Write a recording as a CSV folder.
 
     Parameters
     ----------
     folder : made when missing; the recording in it is replaced once the new one is complete.
     records : in the order of their stamps; a source's error passes through and leaves the folder as it was.
+    truth : the constants of a virtual drive, for its `truth.json`.
 
     Raises
     ------
@@ -45,10 +48,13 @@ def write_recording(folder: Path, records: Iterable[Record]) -> None:
     try:
         with staged(folder, last=ODOMETRY) as scratch:
             names = _write_all(scratch, records, folder)
+            if truth is not None:
+                write_truth(scratch / TRUTH, truth)
+                names.add(TRUTH)
             for path in scratch.iterdir():
                 if path.name not in names:
                     path.unlink()
-        for name in (DETECTIONS, SCANS, REFERENCE):
+        for name in (DETECTIONS, SCANS, REFERENCE, TRUTH):
             if name not in names:
                 (folder / name).unlink(missing_ok=True)
     except OSError as error:

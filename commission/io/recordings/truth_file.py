@@ -1,0 +1,73 @@
+"""The file `truth.json` of a virtual drive: the constants that were drawn for it. Read back as the frozen value.
+
+Numbers keep all their digits; the file says its version, so that later ones can hold more.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import msgspec
+
+from commission.errors import FileFormatError
+from commission.io.atomic import write_text
+from commission.io.conversion import convert
+from commission.io.reading import read_text
+from commission.io.yaml_document import YamlDocument
+from commission.site.disturbances import ScannerError
+from commission.site.truth import TruePlace, TrueWheels, Truth
+
+TRUTH = "truth.json"
+SCHEMA = 1
+"""Version of the file."""
+SIZE_LIMIT = 32_000_000
+"""Bytes of the file; 10,000 reflectors need 1,000,000."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TruthDocument:
+    """Keys of `truth.json`, in SI units and radians."""
+
+    schema: int
+    """Version of the file."""
+    seed: int
+    """Seed of the drive."""
+    route: str
+    """Route that was driven."""
+    wheels: TrueWheels = field(default_factory=TrueWheels)
+    """Noise and scale of the wheels."""
+    scanners: tuple[ScannerError, ...] = ()
+    """Errors of each scanner."""
+    reflectors: tuple[TruePlace, ...] = ()
+    """Reflectors that do not stand where the map says."""
+
+
+def write_truth(path: Path, truth: Truth) -> None:
+    """Write what is true in a virtual drive; raises FileFormatError when the file cannot be written."""
+    values = {"schema": SCHEMA, **msgspec.to_builtins(truth)}
+    write_text(path, json.dumps(values, indent=1, ensure_ascii=False) + "\n")
+
+
+def read_truth(path: Path) -> Truth:
+    """Read what is true in a virtual drive.
+
+    Raises
+    ------
+    FileFormatError
+        the file is damaged, of another version, or holds something that is not expected; names the key.
+    """
+    try:
+        values = msgspec.json.decode(read_text(path, SIZE_LIMIT))
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise FileFormatError(path, "", f"is no JSON ({error})", "what this program wrote") from error
+    document = YamlDocument(path, values)
+    if not isinstance(values, dict) or "schema" not in values:
+        raise document.error(("schema",), "is missing", f"an object that begins with schema {SCHEMA}")
+    if values["schema"] != SCHEMA or isinstance(values["schema"], bool):
+        raise document.error(("schema",), f"is {values['schema']!r}", f"{SCHEMA}, the version this program knows")
+    keys = convert(document, TruthDocument)
+    return Truth(
+        seed=keys.seed, route=keys.route, wheels=keys.wheels, scanners=keys.scanners, reflectors=keys.reflectors
+    )
