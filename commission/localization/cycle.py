@@ -15,7 +15,7 @@ from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.association import INLIER, NOBODY, associate
 from commission.localization.kalman import correct
-from commission.localization.odometry import OdometryNoise, advance, reach
+from commission.localization.odometry import NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.rejection import rejects_the_world, weigh
 from commission.localization.setup import FilterModel
@@ -70,6 +70,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     status: NDArray[np.int8],
     reflectors: IntArray,
     d2: FloatArray,
+    following: NextOdometry,
 ) -> Cycle:
     """Process the detections of a scan.
 
@@ -84,13 +85,14 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     status : (n,) in: INLIER or OUTLIER_DETECTOR; out: a `Status`.
     reflectors : (n,) out: index into the reflector map, or -1.
     d2 : (n,) out: squared Mahalanobis distance at the prior, NaN for none.
+    following : the odometry record at or after the scan, where it is known.
 
     Notes
     -----
     No formula: `reach`, `associate`, `correct` and `supervise` in turn: Sobreira et al. 2016, Algorithms 1, 3 and 4;
     then the rule by rejections, which overrules it.
     """
-    prior, motion = reach(state.belief, state.motion, stamp_ns, model.odometry)
+    prior, motion = reach(state.belief, state.motion, stamp_ns, following, model.odometry)
     associate(
         prior,
         first,

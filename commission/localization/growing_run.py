@@ -90,22 +90,45 @@ class GrowingRun:
     def begin_segment(self, setup: LocalizerSetup) -> None:
         """Use another setup from the next record on; the state stays, and the columns say where it began.
 
-        When the newest record was a scan, the columns are those of a whole run with this segment; odometry that has
-        come since is taken in as it was.
+        Before what was pushed after the newest cycle is pulled, the columns are those of a whole run with this segment;
+        odometry that has been taken in since was taken in as it was.
         """
         self._localizer.replace_setup(setup)
         if self._segments[-1].first == self._count:
             self._segments.pop()
         self._segments.append(RunSegment(self._count, setup))
 
-    def feed(self, record: Record) -> Estimate | None:
+    def feed(self, record: Record) -> tuple[Estimate, ...]:
         """Take in one record; arguments, result and errors are those of `Localizer.feed`."""
-        estimate = self._localizer.feed(record)
+        self._localizer.push(record)
+        return self._pulled()
+
+    def push(self, record: Record) -> None:
+        """Take in one record without processing it, see `Localizer.push`."""
+        self._localizer.push(record)
+
+    def pull(self) -> Estimate | None:
+        """Process records up to the next scan, see `Localizer.pull`, and append its cycle."""
+        estimate = self._localizer.pull()
         if estimate is not None:
             self._append(estimate)
             if self._count % CHECKPOINT_CYCLES == 0:
                 self._checkpoints.append(Checkpoint(self._count, self._localizer.state))
         return estimate
+
+    def flush(self) -> tuple[Estimate, ...]:
+        """Process everything that waits, since no more records come; returns the estimates of its scans."""
+        estimates = self._localizer.flush()
+        for estimate in estimates:
+            self._append(estimate)
+        return estimates
+
+    def _pulled(self) -> tuple[Estimate, ...]:
+        """Return every estimate that can be made now."""
+        estimates: list[Estimate] = []
+        while (estimate := self.pull()) is not None:
+            estimates.append(estimate)
+        return tuple(estimates)
 
     def columns(self) -> RunColumns:
         """Return the run so far: views of rows that never change again."""

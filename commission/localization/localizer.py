@@ -1,9 +1,12 @@
 """The localizer as a vehicle runs it: fed record by record, the only mutable class of this package.
 
-Every step is a kernel that the compiled whole run calls too; nothing is computed here.
+Every step is a kernel that the compiled whole run calls too; nothing is computed here. A scan that lies between two
+odometry records waits for the second one, for at most one interval of odometry: its motion is then interpolated.
 """
 
 from __future__ import annotations
+
+from collections import deque
 
 import numpy as np
 
@@ -13,6 +16,7 @@ from commission.localization.cycle import process_odometry, process_scan
 from commission.localization.detector import DetectedReflectors, detect
 from commission.localization.estimate import Belief, Estimate, Mode, Status
 from commission.localization.observation import project_detections
+from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import to_belief
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, belief_of, output_of, state_at_start
@@ -20,6 +24,9 @@ from commission.site.parameters import Parameters
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
+
+LAST_NS = 2**63 - 1
+"""No record is newer [ns]."""
 
 
 def warm_up() -> None:
@@ -40,6 +47,7 @@ def warm_up() -> None:
         )
     )
     localizer.feed(Detections(3, np.array([[2.0, 0.0]])))
+    localizer.flush()
 
 
 class Localizer:
@@ -54,6 +62,8 @@ class Localizer:
     def __init__(self, setup: LocalizerSetup, start: Belief | FilterState) -> None:
         self._setup = setup
         self._state = state_at_start(start) if isinstance(start, Belief) else start
+        self._newest_ns = self._state.newest_ns
+        self._waiting: deque[Record] = deque()
 
     @property
     def setup(self) -> LocalizerSetup:
@@ -62,12 +72,20 @@ class Localizer:
 
     @property
     def state(self) -> FilterState:
-        """All that is remembered of the records so far: a run goes on from it as if it had not been interrupted."""
+        """All that is remembered of the records so far: a run goes on from it as if it had not been interrupted.
+
+        Records that are `waiting` are not in it.
+        """
         return self._state
 
     @property
+    def waiting(self) -> tuple[Record, ...]:
+        """Records that have been taken in and not been processed: a scan that waits for odometry, and what follows."""
+        return tuple(self._waiting)
+
+    @property
     def belief(self) -> Belief:
-        """The filter's own belief after the newest record; it goes on in fail mode."""
+        """The filter's own belief after the newest record that does not wait; it goes on in fail mode."""
         return belief_of(self._state)
 
     @property
@@ -76,11 +94,11 @@ class Localizer:
         return Mode(self._state.mode)
 
     def replace_setup(self, setup: LocalizerSetup) -> None:
-        """Use other parameters (or another map) from the next record on; the state stays."""
+        """Use other parameters (or another map) for what is processed from now on; the state stays."""
         self._setup = setup
 
-    def feed(self, record: Record) -> Estimate | None:
-        """Take in one record.
+    def feed(self, record: Record) -> tuple[Estimate, ...]:
+        """Take in one record, and process what can be processed now: `push`, then every `pull`.
 
         Parameters
         ----------
@@ -88,20 +106,70 @@ class Localizer:
 
         Returns
         -------
-        estimate : for a scan, and for detections of the sensor itself. None for odometry, for a reference pose (which
-            is never used), and for a scan of a sensor that has ever sent detections of its own: those win.
+        estimates : one for each scan, and for each set of detections of the sensor itself, that has been processed; of
+            a sensor that has ever sent detections of its own, scans give none: its detections win. A reference pose is
+            never used.
 
         Raises
         ------
         SourceError
             when the record is older than one before it.
         """
-        newest_ns = self._state.newest_ns
-        if record.stamp_ns < newest_ns:
+        self.push(record)
+        return self._pulled()
+
+    def push(self, record: Record) -> None:
+        """Take in one record without processing it; raises SourceError when it is older than one before it."""
+        if record.stamp_ns < self._newest_ns:
             raise SourceError(
-                f"{type(record).__name__} has stamp {record.stamp_ns} ns, {newest_ns - record.stamp_ns} ns "
+                f"{type(record).__name__} has stamp {record.stamp_ns} ns, {self._newest_ns - record.stamp_ns} ns "
                 "before the record that came before it; expected ascending stamps"
             )
+        self._newest_ns = int(record.stamp_ns)
+        self._waiting.append(record)
+
+    def pull(self) -> Estimate | None:
+        """Process records up to the next scan and return its estimate; None when there is none, or it has to wait."""
+        while self._waiting:
+            record, following = self._waiting[0], NOT_YET
+            if isinstance(record, Scan | Detections):
+                found = self._following(record.stamp_ns)
+                if found is None:
+                    return None
+                following = found
+            self._waiting.popleft()
+            estimate = self._taken_in(record, following)
+            if estimate is not None:
+                return estimate
+        return None
+
+    def flush(self) -> tuple[Estimate, ...]:
+        """Process everything that waits, since no more records come; returns the estimates of its scans."""
+        self._newest_ns = LAST_NS
+        estimates = self._pulled()
+        self._newest_ns = self._state.newest_ns
+        return estimates
+
+    def _pulled(self) -> tuple[Estimate, ...]:
+        """Return every estimate that can be made now."""
+        estimates: list[Estimate] = []
+        while (estimate := self.pull()) is not None:
+            estimates.append(estimate)
+        return tuple(estimates)
+
+    def _following(self, stamp_ns: int) -> NextOdometry | None:
+        """Odometry that follows the first scan that waits; None while it may still come in time."""
+        until_ns = waits_until(self._state.motion, stamp_ns)
+        for record in self._waiting:
+            if isinstance(record, Odometry):
+                if record.stamp_ns > until_ns:
+                    return NOT_YET
+                dx, dy, dtheta = (float(value) for value in record.displacement)
+                return NextOdometry(True, int(record.stamp_ns), dx, dy, dtheta)
+        return NOT_YET if until_ns == stamp_ns or self._newest_ns > until_ns else None
+
+    def _taken_in(self, record: Record, following: NextOdometry) -> Estimate | None:
+        """Process one record."""
         self._state = self._state._replace(newest_ns=int(record.stamp_ns))
         match record:
             case Odometry():
@@ -114,12 +182,12 @@ class Localizer:
                 count = len(record.range_bearing)
                 status = np.full(count, Status.INLIER, dtype=np.int8)
                 seen = DetectedReflectors(record.range_bearing, np.zeros(count, dtype=np.int64), status)
-                return self._process(record.stamp_ns, seen)
+                return self._process(record.stamp_ns, seen, following)
             case Scan():
                 if self._state.sensor_detects:
                     return None
                 detected = detect(record, self._setup.detector, self._setup.parameters.detector)
-                return self._process(record.stamp_ns, detected)
+                return self._process(record.stamp_ns, detected, following)
 
     def _advance(self, record: Odometry) -> None:
         """Predict over the motion of an odometry record."""
@@ -127,7 +195,7 @@ class Localizer:
         noise = self._setup.filter.odometry
         self._state = process_odometry(self._state, record.stamp_ns, dx, dy, dtheta, noise)
 
-    def _process(self, stamp_ns: int, seen: DetectedReflectors) -> Estimate:
+    def _process(self, stamp_ns: int, seen: DetectedReflectors, following: NextOdometry) -> Estimate:
         """Predict to the scan's stamp, associate, correct, supervise."""
         model = self._setup.filter
         detections = read_only(seen.range_bearing)
@@ -147,6 +215,7 @@ class Localizer:
             status,
             reflector,
             d2,
+            following,
         )
         self._state = cycle.state
         posterior = belief_of(cycle.state)

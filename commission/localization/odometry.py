@@ -14,9 +14,16 @@ from commission.geometry.se2 import compose_scalars, exp_scalars, inverse_scalar
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.site.parameters import OdometryParameters
 
+FIRST_WAIT_NS = 500_000_000
+"""How long a scan waits for the second odometry record: before it, nothing says how often one comes."""
+GAP_INTERVALS = 3
+"""Odometry is missing where none came for as many of its intervals."""
+LEAST_GAP_NS = 200_000_000
+"""No shorter pause means that odometry is missing: drivers send it in bunches."""
+
 
 class OdometryNoise(NamedTuple):
-    """Variances per metre, radian and second: the squares of `OdometryParameters`."""
+    """Variances per metre, radian and second, and of what odometry has not told: from `OdometryParameters`."""
 
     forward_per_m: float
     lateral_per_m: float
@@ -24,6 +31,14 @@ class OdometryNoise(NamedTuple):
     heading_per_rad: float
     forward_per_s: float
     heading_per_s: float
+    forward_per_s4: float = 0.0
+    """Of half the unknown acceleration: 1-sigma^2 / 4."""
+    heading_per_s4: float = 0.0
+    """Of half the unknown turning acceleration."""
+    missing_per_s2: float = 0.0
+    """Of an unknown speed that is anything up to the limit: limit^2 / 3, along each axis."""
+    turning_per_s2: float = 0.0
+    """Of an unknown turn rate up to its limit."""
 
 
 class Motion(NamedTuple):
@@ -45,9 +60,24 @@ class Motion(NamedTuple):
     """Motion already applied beyond the last odometry record: base of the belief in base at that record."""
     ahead_y: float
     ahead_theta: float
+    usual_ns: int
+    """Longest interval between odometry records of late: how long a scan waits for the one that follows it."""
 
 
-AT_REST = Motion(False, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+class NextOdometry(NamedTuple):
+    """The odometry record that follows a scan, where it is known already."""
+
+    known: bool
+    """Whether it is: otherwise the rest says nothing."""
+    stamp_ns: int
+    """Its stamp; the displacement is from the record before [m, m, rad]."""
+    dx: float
+    dy: float
+    dtheta: float
+
+
+AT_REST = Motion(False, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+NOT_YET = NextOdometry(False, 0, 0.0, 0.0, 0.0)
 
 
 def odometry_noise(parameters: OdometryParameters) -> OdometryNoise:
@@ -59,7 +89,29 @@ def odometry_noise(parameters: OdometryParameters) -> OdometryNoise:
         parameters.heading_per_sqrt_rad**2,
         parameters.forward_per_sqrt_s**2,
         parameters.heading_per_sqrt_s**2,
+        0.25 * parameters.acceleration**2,
+        0.25 * parameters.turn_acceleration**2,
+        parameters.gap_speed**2 / 3.0,
+        parameters.gap_turn_rate**2 / 3.0,
     )
+
+
+@compiled_inline
+def waits_until(motion: Motion, stamp_ns: int) -> int:
+    """Stamp [ns] up to which a scan waits for the odometry that follows it: one interval of odometry.
+
+    Parameters
+    ----------
+    motion : before the scan.
+    stamp_ns : of the scan [ns].
+
+    Notes
+    -----
+    The scan's stamp itself where there is nothing to wait for: no odometry yet, or odometry of that very stamp.
+    """
+    if not motion.started or stamp_ns <= motion.odometry_ns:
+        return stamp_ns
+    return stamp_ns + (motion.usual_ns if motion.usual_ns > 0 else FIRST_WAIT_NS)
 
 
 @compiled_inline
@@ -146,6 +198,8 @@ def advance(  # noqa: PLR0917 - one odometry record, number by number
     """Take in an odometry record: the motion from the record before to its stamp.
 
     The first record only starts the clock. What `reach` has applied in advance, of motion and of time, is taken off.
+    After a gap nobody knows whether the record holds the motion since the one before it: the belief spreads by what the
+    vehicle may have driven.
 
     Parameters
     ----------
@@ -160,7 +214,7 @@ def advance(  # noqa: PLR0917 - one odometry record, number by number
     motion, by definition.
     """
     if not motion.started:
-        return belief, Motion(True, stamp_ns, stamp_ns, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return belief, Motion(True, stamp_ns, stamp_ns, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
     rest_x, rest_y, rest_theta = dx, dy, dtheta
     if motion.belief_ns != motion.odometry_ns:
         back_x, back_y, back_theta = inverse_scalars(motion.ahead_x, motion.ahead_y, motion.ahead_theta)
@@ -168,20 +222,105 @@ def advance(  # noqa: PLR0917 - one odometry record, number by number
     seconds = (stamp_ns - motion.belief_ns) * 1e-9
     moved = predict(belief, rest_x, rest_y, rest_theta, seconds, noise)
     period_ns = stamp_ns - motion.odometry_ns
-    return moved, Motion(True, stamp_ns, stamp_ns, period_ns, dx, dy, dtheta, 0.0, 0.0, 0.0)
+    usual_ns = motion.usual_ns
+    if usual_ns > 0 and period_ns > max(GAP_INTERVALS * usual_ns, LEAST_GAP_NS):
+        reached_ns = motion.belief_ns - motion.odometry_ns
+        moved = _spread(moved, _missed(noise, usual_ns, period_ns), _missed(noise, usual_ns, reached_ns))
+    else:
+        usual_ns = max(period_ns, usual_ns - usual_ns // 16)
+    return moved, Motion(True, stamp_ns, stamp_ns, period_ns, dx, dy, dtheta, 0.0, 0.0, 0.0, usual_ns)
+
+
+class Unmeasured(NamedTuple):
+    """Variances of a motion that odometry has not told: along the vehicle's axis, along both axes, of the heading."""
+
+    along: float
+    each: float
+    heading: float
 
 
 @compiled_inline
-def reach(belief: PoseGaussian, motion: Motion, stamp_ns: int, noise: OdometryNoise) -> tuple[PoseGaussian, Motion]:
-    """Extrapolate the belief to the stamp of a scan.
+def _missed(noise: OdometryNoise, usual_ns: int, passed_ns: int) -> Unmeasured:
+    """Return what a vehicle may have driven since its last odometry, beyond the interval in which one is due.
 
-    The last displacement is continued at its speed, for at most as long as it took; time goes on beyond that. Nothing
-    happens before the first odometry record or when the belief is about that stamp already.
+    Parameters
+    ----------
+    noise : variances of unknown speeds.
+    usual_ns : that interval [ns].
+    passed_ns : time since the last odometry [ns].
+
+    Notes
+    -----
+    (limit t)^2 / 3, the variance of a speed between -limit and limit, driven for t; derived.
+    """
+    seconds = max(passed_ns - usual_ns, 0) * 1e-9
+    return Unmeasured(0.0, noise.missing_per_s2 * seconds * seconds, noise.turning_per_s2 * seconds * seconds)
+
+
+@compiled_inline
+def _unmeasured(noise: OdometryNoise, usual_ns: int, passed_ns: int) -> Unmeasured:
+    """Return what may have happened since the last odometry to a vehicle that is taken to go on as it did.
+
+    Parameters
+    ----------
+    noise : variances of unknown accelerations and speeds.
+    usual_ns : interval in which odometry is due [ns].
+    passed_ns : time since the last odometry [ns].
+
+    Notes
+    -----
+    (a t^2 / 2)^2 up to the interval, then `_missed`; derived.
+    """
+    seconds = min(passed_ns, usual_ns) * 1e-9
+    t4 = seconds * seconds * seconds * seconds
+    missed = _missed(noise, usual_ns, passed_ns)
+    return Unmeasured(noise.forward_per_s4 * t4, missed.each, noise.heading_per_s4 * t4 + missed.heading)
+
+
+@compiled_inline
+def _spread(belief: PoseGaussian, now: Unmeasured, before: Unmeasured) -> PoseGaussian:
+    """Add to a belief what has been added to an unmeasured motion.
+
+    Parameters
+    ----------
+    belief : of the pose.
+    now, before : of the unmeasured motion; `before` is in the belief already.
+
+    Notes
+    -----
+    P + R(theta) diag(along + each, each) R(theta)^T and the heading's, by definition.
+    """
+    c, s = math.cos(belief.theta), math.sin(belief.theta)
+    along, each = max(now.along - before.along, 0.0), max(now.each - before.each, 0.0)
+    return PoseGaussian(
+        belief.x,
+        belief.y,
+        belief.theta,
+        belief.xx + along * c * c + each,
+        belief.xy + along * c * s,
+        belief.xt,
+        belief.yy + along * s * s + each,
+        belief.yt,
+        belief.tt + max(now.heading - before.heading, 0.0),
+    )
+
+
+@compiled_inline
+def reach(
+    belief: PoseGaussian, motion: Motion, stamp_ns: int, following: NextOdometry, noise: OdometryNoise
+) -> tuple[PoseGaussian, Motion]:
+    """Move the belief to the stamp of a scan, between two odometry records or beyond the last one.
+
+    Where the record that follows is known, its motion is interpolated. Otherwise the last displacement is continued at
+    its speed, for at most as long as it took, and the belief spreads by the acceleration that the vehicle may have had,
+    then by the speed; time goes on. Nothing happens before the first odometry record or when the belief is about that
+    stamp already.
 
     Parameters
     ----------
     belief, motion : before the scan.
     stamp_ns : of the scan [ns].
+    following : the odometry record at or after the scan.
     noise : variances per metre, radian and second.
 
     Notes
@@ -191,18 +330,29 @@ def reach(belief: PoseGaussian, motion: Motion, stamp_ns: int, noise: OdometryNo
     """
     if not motion.started or stamp_ns <= motion.belief_ns:
         return belief, motion
-    until = min(stamp_ns - motion.odometry_ns, motion.period_ns)
-    done = min(motion.belief_ns - motion.odometry_ns, motion.period_ns)
-    step_x, step_y, step_theta = 0.0, 0.0, 0.0
-    if until > done:
-        share = (until - done) / motion.period_ns
-        forward, left, turn = log_scalars(motion.dx, motion.dy, motion.dtheta)
-        step_x, step_y, step_theta = exp_scalars(share * forward, share * left, share * turn)
     seconds = (stamp_ns - motion.belief_ns) * 1e-9
-    moved = predict(belief, step_x, step_y, step_theta, seconds, noise)
-    ahead_x, ahead_y, ahead_theta = compose_scalars(
-        motion.ahead_x, motion.ahead_y, motion.ahead_theta, step_x, step_y, step_theta
-    )
+    passed_ns, reached_ns = stamp_ns - motion.odometry_ns, motion.belief_ns - motion.odometry_ns
+    ahead_x, ahead_y, ahead_theta = motion.ahead_x, motion.ahead_y, motion.ahead_theta
+    if following.known:
+        share = passed_ns / (following.stamp_ns - motion.odometry_ns)
+        forward, left, turn = log_scalars(following.dx, following.dy, following.dtheta)
+        x, y, theta = exp_scalars(share * forward, share * left, share * turn)
+        back_x, back_y, back_theta = inverse_scalars(ahead_x, ahead_y, ahead_theta)
+        step_x, step_y, step_theta = compose_scalars(back_x, back_y, back_theta, x, y, theta)
+        moved = predict(belief, step_x, step_y, step_theta, seconds, noise)
+        ahead_x, ahead_y, ahead_theta = x, y, theta
+    else:
+        until, done = min(passed_ns, motion.period_ns), min(reached_ns, motion.period_ns)
+        step_x, step_y, step_theta = 0.0, 0.0, 0.0
+        if until > done:
+            share = (until - done) / motion.period_ns
+            forward, left, turn = log_scalars(motion.dx, motion.dy, motion.dtheta)
+            step_x, step_y, step_theta = exp_scalars(share * forward, share * left, share * turn)
+        moved = predict(belief, step_x, step_y, step_theta, seconds, noise)
+        usual_ns = motion.usual_ns if motion.usual_ns > 0 else FIRST_WAIT_NS
+        now, before = _unmeasured(noise, usual_ns, passed_ns), _unmeasured(noise, usual_ns, reached_ns)
+        moved = _spread(moved, now, before)
+        ahead_x, ahead_y, ahead_theta = compose_scalars(ahead_x, ahead_y, ahead_theta, step_x, step_y, step_theta)
     return moved, Motion(
         True,
         motion.odometry_ns,
@@ -214,4 +364,5 @@ def reach(belief: PoseGaussian, motion: Motion, stamp_ns: int, noise: OdometryNo
         ahead_x,
         ahead_y,
         ahead_theta,
+        motion.usual_ns,
     )

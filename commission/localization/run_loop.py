@@ -14,6 +14,7 @@ from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.cycle import process_odometry, process_scan
 from commission.localization.detection_log import DetectionLog
+from commission.localization.odometry import NextOdometry, waits_until
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.run_columns import RunColumns
 from commission.localization.setup import FilterModel, LocalizerSetup
@@ -112,10 +113,13 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
     stretch : what to go over, and where its cycles are written.
     """
     own, detected = log.detection_stamps_ns, stretch.detected
-    rows = slice(*stretch.rows)
+    first, last = stretch.rows
+    # One row more than is delivered: the last scans may lie between it and the row before.
+    rows = slice(first, last + 1)
     state = _run(
         read_only(log.odometry_stamps_ns[rows]),
         read_only(log.displacements[rows]),
+        last - first,
         detected.stamps_ns,
         detected.offsets,
         detected.range_bearing,
@@ -134,6 +138,7 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
 def _run(  # noqa: PLR0917 - the columns of the log
     odometry_stamps: IntArray,
     displacements: FloatArray,
+    delivered: int,
     scan_stamps: IntArray,
     offsets: IntArray,
     detections: FloatArray,
@@ -143,14 +148,21 @@ def _run(  # noqa: PLR0917 - the columns of the log
     state: FilterState,
     columns: Columns,
 ) -> FilterState:
-    """Deliver odometry and scans in the order of their stamps, odometry first; return the state after the last."""
+    """Deliver odometry and scans in the order of their stamps, odometry first; return the state after the last.
+
+    Of the odometry the rows up to `delivered`; the one behind them only tells the motion of scans before it.
+    """
     prior_means, prior_covariances, means, covariances, modes, status, reflectors, d2 = columns
     rows = 0
     for k in range(len(scan_stamps)):
-        while rows < len(odometry_stamps) and odometry_stamps[rows] <= scan_stamps[k]:
+        while rows < delivered and odometry_stamps[rows] <= scan_stamps[k]:
             dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
             state = process_odometry(state, odometry_stamps[rows], dx, dy, dtheta, model.odometry)
             rows += 1
+        following = NextOdometry(False, 0, 0.0, 0.0, 0.0)
+        if rows < len(odometry_stamps) and odometry_stamps[rows] <= waits_until(state.motion, scan_stamps[k]):
+            dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
+            following = NextOdometry(True, odometry_stamps[rows], dx, dy, dtheta)
         cycle = process_scan(
             state,
             scan_stamps[k],
@@ -163,12 +175,13 @@ def _run(  # noqa: PLR0917 - the columns of the log
             status,
             reflectors,
             d2,
+            following,
         )
         state = cycle.state
         _write_belief(cycle.prior, k, prior_means, prior_covariances)
         _write_belief(state.belief, k, means, covariances)
         modes[k] = state.mode
-    while rows < len(odometry_stamps):
+    while rows < delivered:
         dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
         state = process_odometry(state, odometry_stamps[rows], dx, dy, dtheta, model.odometry)
         rows += 1

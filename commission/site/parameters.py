@@ -76,6 +76,38 @@ class OdometryParameters:
     """1-sigma error along the vehicle's axis after one second, even at rest."""
     heading_per_sqrt_s: Annotated[float, HEADING_PER_SQRT_S] = 0.0002
     """1-sigma heading error after one second, even at rest."""
+    acceleration: Annotated[
+        float, Quantity(label="Acceleration", unit="m/s^2", bounds=NOT_NEGATIVE, step=0.05, slider=(0.0, 5.0))
+    ] = 0.5
+    """1-sigma acceleration that a vehicle may have when a scan is not followed by odometry in time."""
+    turn_acceleration: Annotated[
+        float,
+        Quantity(
+            label="Turning",
+            unit="rad/s^2",
+            shown=Shown("°/s²", DEGREES.scale),
+            bounds=NOT_NEGATIVE,
+            step=1.0,
+            slider=(0.0, 500.0),
+        ),
+    ] = 1.0
+    """1-sigma turning acceleration that a vehicle may have when a scan is not followed by odometry in time."""
+    gap_speed: Annotated[
+        float, Quantity(label="Speed in a gap", unit="m/s", bounds=NOT_NEGATIVE, step=0.1, slider=(0.0, 5.0))
+    ] = 1.5
+    """Largest speed of the vehicle: what it may have driven where odometry is missing is unknown up to it."""
+    gap_turn_rate: Annotated[
+        float,
+        Quantity(
+            label="Turn in a gap",
+            unit="rad/s",
+            shown=Shown("°/s", DEGREES.scale),
+            bounds=NOT_NEGATIVE,
+            step=1.0,
+            slider=(0.0, 360.0),
+        ),
+    ] = 1.0
+    """Fastest turn of the vehicle: how far it may have turned where odometry is missing is unknown up to it."""
 
     def __post_init__(self) -> None:
         check_fields(self, "odometry.")

@@ -162,14 +162,14 @@ def test_record_older_than_the_one_before_is_refused() -> None:
 
 def test_first_odometry_record_only_starts_the_clock() -> None:
     localizer = Localizer(one_reflector(), INITIAL)
-    assert localizer.feed(Odometry(10, np.array([1.0, 0.0, 0.0]))) is None
+    assert localizer.feed(Odometry(10, np.array([1.0, 0.0, 0.0]))) == ()
     np.testing.assert_array_equal(localizer.belief.mean, INITIAL.mean)
     np.testing.assert_array_equal(localizer.belief.covariance, INITIAL.covariance)
 
 
 def test_reference_pose_is_never_used() -> None:
     localizer = Localizer(one_reflector(), INITIAL)
-    assert localizer.feed(ReferencePose(0, np.array([9.0, 9.0, 1.0]))) is None
+    assert localizer.feed(ReferencePose(0, np.array([9.0, 9.0, 1.0]))) == ()
     np.testing.assert_array_equal(localizer.belief.mean, INITIAL.mean)
 
 
@@ -183,9 +183,9 @@ def test_detections_of_the_sensor_win_over_its_scans() -> None:
         intensities=None,
         reflector=np.array([True, True, True]),
     )
-    assert localizer.feed(scan) is not None
-    assert localizer.feed(Detections(1, np.array([[2.0, 0.0]]))) is not None
-    assert localizer.feed(dataclasses.replace(scan, stamp_ns=2)) is None
+    assert len(localizer.feed(scan)) == 1
+    assert len(localizer.feed(Detections(1, np.array([[2.0, 0.0]])))) == 1
+    assert localizer.feed(dataclasses.replace(scan, stamp_ns=2)) == ()
 
 
 def test_output_is_withheld_in_fail_mode_while_the_filter_goes_on() -> None:
@@ -196,8 +196,7 @@ def test_output_is_withheld_in_fail_mode_while_the_filter_goes_on() -> None:
     for k in range(60):
         localizer.feed(Odometry(k * 100_000_000, np.zeros(3)))
         covered = 10 <= k < 40
-        estimate = localizer.feed(Detections(k * 100_000_000, seen[:0] if covered else seen))
-        assert estimate is not None
+        (estimate,) = localizer.feed(Detections(k * 100_000_000, seen[:0] if covered else seen))
         outputs.append(estimate.output)
         modes.append(estimate.mode)
         assert estimate.posterior.stamp_ns == k * 100_000_000
@@ -218,25 +217,78 @@ def test_changed_parameters_act_on_the_next_scan_and_keep_the_state() -> None:
     before = localizer.belief
     localizer.replace_setup(one_reflector(Parameters(association=AssociationParameters(gate_probability=0.5))))
     np.testing.assert_array_equal(localizer.belief.covariance, before.covariance)
-    estimate = localizer.feed(Detections(0, np.array([[2.0, 0.0]])))
-    assert estimate is not None
+    (estimate,) = localizer.feed(Detections(0, np.array([[2.0, 0.0]])))
     assert estimate.gate == pytest.approx(2.0 * math.log(2.0))
 
 
-def test_scan_between_odometry_is_met_where_the_vehicle_is_then() -> None:
-    localizer = Localizer(one_reflector(), INITIAL)
-    step = np.array([0.1, 0.0, 0.0])
+NOTHING = np.empty((0, 2))
+STEP = np.array([0.1, 0.0, 0.0])
+
+
+def driven(setup: LocalizerSetup | None = None) -> Localizer:
+    """A localizer of a vehicle that has driven 0.1 m in the 100 ns between its two odometry records."""
+    localizer = Localizer(setup or one_reflector(), INITIAL)
     localizer.feed(Odometry(0, np.zeros(3)))
-    localizer.feed(Odometry(100, step))
-    nothing = np.empty((0, 2))
-    halfway = localizer.feed(Detections(150, nothing))
-    late = localizer.feed(Detections(990, nothing))
-    assert halfway is not None
-    assert late is not None
-    assert halfway.prior.mean[0] == pytest.approx(0.15)
-    assert late.prior.mean[0] == pytest.approx(0.2), "extrapolated by one odometry period at most"
-    localizer.feed(Odometry(1000, 9.0 * step))
+    localizer.feed(Odometry(100, STEP))
+    return localizer
+
+
+def test_a_scan_waits_for_the_odometry_that_follows_it_and_is_met_on_the_way() -> None:
+    localizer = driven()
+    assert localizer.feed(Detections(150, NOTHING)) == ()
+    assert localizer.feed(Detections(175, NOTHING)) == ()
+    assert [record.stamp_ns for record in localizer.waiting] == [150, 175]
+    first, second = localizer.feed(Odometry(200, 3.0 * STEP))
+    assert first.prior.mean[0] == pytest.approx(0.1 + 0.15), "interpolated, not at the speed of the record before"
+    assert second.prior.mean[0] == pytest.approx(0.1 + 0.225)
+    assert localizer.belief.mean[0] == pytest.approx(0.4)
+    assert localizer.waiting == ()
+
+
+@pytest.mark.parametrize(("stamp", "waits"), [(250, True), (251, False)])
+def test_a_scan_waits_for_one_interval_of_odometry(stamp: int, waits: bool) -> None:
+    localizer = driven()
+    localizer.feed(Detections(150, NOTHING))
+    estimates = localizer.feed(ReferencePose(stamp, np.zeros(3)))
+    assert (estimates == ()) is waits
+    whole = estimates + localizer.flush()
+    assert [estimate.prior.mean[0] for estimate in whole] == [pytest.approx(0.15)], "it goes on at its speed"
+
+
+@pytest.mark.parametrize(("stamp", "met"), [(250, 0.25), (251, 0.3)])
+def test_odometry_too_late_for_a_live_scan_is_not_used_for_it_afterwards_either(stamp: int, met: float) -> None:
+    rest = STEP * (stamp - 100) / 100.0
+    records = [Odometry(0, np.zeros(3)), Odometry(100, 2.0 * STEP), Detections(150, NOTHING), Odometry(stamp, rest)]
+    columns = run(RecordLog.collect(records), one_reflector(), INITIAL)
+    assert columns.prior_means[0, 0] == pytest.approx(met), (
+        "0.1 m per 100 ns by the later record, 0.2 m by the one before"
+    )
+
+
+def test_a_scan_at_the_stamp_of_odometry_does_not_wait() -> None:
+    assert len(driven().feed(Detections(100, NOTHING))) == 1
+
+
+def test_a_scan_before_any_odometry_does_not_wait() -> None:
+    assert len(Localizer(one_reflector(), INITIAL).feed(Detections(100, NOTHING))) == 1
+
+
+def test_a_scan_without_odometry_in_time_goes_on_for_one_interval_at_most() -> None:
+    localizer = driven()
+    localizer.feed(Detections(990, NOTHING))
+    (late,) = localizer.flush()
+    assert late.prior.mean[0] == pytest.approx(0.2)
+    localizer.feed(Odometry(1000, 9.0 * STEP))
     assert localizer.belief.mean[0] == pytest.approx(1.0)
+
+
+def test_records_older_than_what_was_flushed_are_refused() -> None:
+    localizer = driven()
+    localizer.feed(Detections(150, NOTHING))
+    localizer.flush()
+    with pytest.raises(SourceError, match="1 ns before"):
+        localizer.feed(Odometry(149, STEP))
+    localizer.feed(Odometry(150, STEP))
 
 
 def test_map_without_reflectors_makes_every_detection_an_outlier() -> None:

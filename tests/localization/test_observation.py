@@ -138,8 +138,7 @@ def test_drawn_outline_of_the_gate_parts_what_the_localizer_takes_from_what_it_l
         for size, status in ((0.96, Status.INLIER), (1.04, Status.OUTLIER_ASSOCIATION)):
             for corner in outline[::4]:
                 seen = plain.observed(belief.mean, MOUNTING, center + size * (corner - center)[np.newaxis])
-                estimate = Localizer(setup, belief).feed(Detections(0, seen))
-                assert estimate is not None
+                (estimate,) = Localizer(setup, belief).feed(Detections(0, seen))
                 assert estimate.status.tolist() == [status], (reflector.id, size, estimate.d2)
 
 

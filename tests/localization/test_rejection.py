@@ -65,10 +65,16 @@ def lonely(**supervisor: float) -> Localizer:
     return localizer
 
 
+def see(localizer: Localizer, record: Detections | Scan) -> None:
+    """Process a scan of a vehicle that has not moved since the record before."""
+    localizer.feed(Odometry(record.stamp_ns, np.zeros(3)))
+    assert len(localizer.feed(record)) == 1
+
+
 @pytest.mark.parametrize(("aside", "near"), [(0.99, 1.0), (1.01, 0.0)])
 def test_rejected_detection_is_near_within_reach_of_a_reflector(aside: float, near: float) -> None:
     localizer = lonely(rejection_reach=1.0)
-    localizer.feed(Detections(SECOND, np.array([[math.hypot(5.0, aside), math.atan2(aside, 5.0)]])))
+    see(localizer, Detections(SECOND, np.array([[math.hypot(5.0, aside), math.atan2(aside, 5.0)]])))
     counted = localizer.state.evidence
     assert (counted.rejected, counted.near_rejected) == (1.0, near)
     assert (counted.accepted, counted.near_accepted) == (0.0, 0.0)
@@ -77,11 +83,11 @@ def test_rejected_detection_is_near_within_reach_of_a_reflector(aside: float, ne
 def test_evidence_is_forgotten_to_a_third_in_a_window_but_not_below_what_it_takes() -> None:
     localizer = lonely(rejection_window=2.0, rejection_evidence=4.0)
     far = np.tile([[9.0, 1.0]], (30, 1))
-    localizer.feed(Detections(SECOND, far))
+    see(localizer, Detections(SECOND, far))
     assert localizer.state.evidence.rejected == 30.0
-    localizer.feed(Detections(3 * SECOND, np.empty((0, 2))))
+    see(localizer, Detections(3 * SECOND, np.empty((0, 2))))
     assert localizer.state.evidence.rejected == pytest.approx(30.0 / math.e)
-    localizer.feed(Detections(60 * SECOND, np.empty((0, 2))))
+    see(localizer, Detections(60 * SECOND, np.empty((0, 2))))
     # However long ago they were, four are kept.
     assert localizer.state.evidence.rejected == pytest.approx(4.0)
 
@@ -95,8 +101,9 @@ def test_what_the_detector_filter_rejects_does_not_count() -> None:
     flags = np.zeros(720, dtype=np.bool_)
     flags[300:340] = True  # 20 degrees wide at 5 m: a wall
     ranges = np.full(720, 5.0, dtype=np.float32)
-    localizer.feed(
-        Scan(stamp_ns=SECOND, ranges=ranges, angle_min=-math.pi, angle_increment=math.pi / 360.0, reflector=flags)
+    see(
+        localizer,
+        Scan(stamp_ns=SECOND, ranges=ranges, angle_min=-math.pi, angle_increment=math.pi / 360.0, reflector=flags),
     )
     counted = localizer.state.evidence
     assert (counted.accepted, counted.rejected) == (0.0, 0.0)

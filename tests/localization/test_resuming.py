@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 from commission.errors import JobCancelled
 from commission.localization import growing_run, whole_run
 from commission.localization.detection_log import cycle_stamps, extract_detections
-from commission.localization.estimate import Status
+from commission.localization.estimate import Estimate, Status
 from commission.localization.growing_run import GrowingRun
 from commission.localization.localizer import Localizer
 from commission.localization.run_columns import RunColumns, RunSegment
@@ -22,7 +23,7 @@ from commission.localization.whole_run import run, run_segments, state_before
 from commission.simulation.faults import cover
 from commission.site.parameters import AssociationParameters, DetectorParameters, Parameters, SupervisorParameters
 from commission.site.record_log import RecordLog
-from commission.site.records import Detections, Scan
+from commission.site.records import Detections, Record, Scan
 from commission.site.scanner import Scanner
 from tests.localization.drives import Drive, Plan, random_drive, random_map
 
@@ -73,16 +74,35 @@ def assert_same(a: RunColumns, b: RunColumns, *, after: int = 0) -> None:
     assert a.final == b.final
 
 
-def fed(drive: Drive, segments: tuple[RunSegment, ...]) -> tuple[Localizer, RunColumns | list]:
+def cycles_of(records: Iterable[Record]) -> Iterator[bool]:
+    """Whether each record is a cycle: of a sensor that detects, its scans are none."""
+    detects = False
+    for record in records:
+        detects = detects or isinstance(record, Detections)
+        yield isinstance(record, Detections) or (isinstance(record, Scan) and not detects)
+
+
+def fed(drive: Drive, segments: tuple[RunSegment, ...]) -> tuple[Localizer, list[Estimate]]:
     """The live localizer over a drive, its setup replaced and its reflectors covered as the segments say."""
+
+    def segment(cycle: int) -> RunSegment:
+        return next(s for s in reversed(segments) if s.first <= cycle)
+
     localizer = Localizer(segments[0].setup, drive.initial)
-    estimates = []
-    for record in drive.log.records():
-        segment = next(s for s in reversed(segments) if s.first <= len(estimates))
-        localizer.replace_setup(segment.setup)
-        estimate = localizer.feed(cover(record) if segment.covered else record)
-        if estimate is not None:
+    estimates: list[Estimate] = []
+
+    def pull() -> None:
+        while (estimate := localizer.pull()) is not None:
             estimates.append(estimate)
+            localizer.replace_setup(segment(len(estimates)).setup)
+
+    records, came = list(drive.log.records()), 0
+    for record, is_cycle in zip(records, cycles_of(records), strict=True):
+        localizer.push(cover(record) if segment(came).covered else record)
+        came += is_cycle
+        pull()
+    for estimate in localizer.flush():
+        estimates.append(estimate)
     return localizer, estimates
 
 
@@ -109,13 +129,15 @@ def test_split_at_any_record_the_rest_goes_on_as_if_nothing_had_happened(drive: 
     records = list(drive.log.records())
     position = round(share * len(records))
     before = Localizer(setup, drive.initial)
-    cycles = sum(before.feed(record) is not None for record in records[:position])
+    cycles = sum(len(before.feed(record)) for record in records[:position])
     whole = run(drive.log, setup, drive.initial)
-    rest = run(RecordLog.collect(records[position:]), setup, before.state)
+    to_come = [*before.waiting, *records[position:]]
+    rest = run(RecordLog.collect(to_come), setup, before.state)
     assert_same(rest, whole, after=cycles)
     live = Localizer(setup, before.state)
-    for record in records[position:]:
+    for record in to_come:
         live.feed(record)
+    live.flush()
     assert live.state == whole.final
 
 
@@ -125,8 +147,11 @@ def test_the_state_before_any_cycle_is_that_of_the_live_localizer(drive: Drive) 
     localizer = Localizer(setup, drive.initial)
     states = [localizer.state]
     for record in drive.log.records():
-        if localizer.feed(record) is not None:
+        localizer.push(record)
+        while localizer.pull() is not None:
             states.append(localizer.state)
+    if localizer.flush():
+        states.append(localizer.state)
     assert [state_before(whole, drive.log, cycle) for cycle in range(len(whole) + 1)] == states
     assert whole.final == localizer.state
 
@@ -231,6 +256,7 @@ def test_a_log_without_cycles_still_moves_the_state(drive: Drive) -> None:
     localizer = Localizer(setup, drive.initial)
     for record in log.records():
         localizer.feed(record)
+    localizer.flush()
     assert columns.final == localizer.state != state_at_start(drive.initial)
 
 
@@ -243,10 +269,12 @@ def test_a_run_that_grows_while_it_is_driven_is_the_whole_run(drive: Drive, monk
     )
     growing = GrowingRun(segments[0].setup, drive.initial)
     for record in drive.log.records():
-        growing.feed(record)
-        for segment in segments[1:]:
-            if segment.first == len(growing) and growing.columns().segments[-1].first < segment.first:
-                growing.begin_segment(segment.setup)
+        growing.push(record)
+        while growing.pull() is not None:
+            for segment in segments[1:]:
+                if segment.first == len(growing):
+                    growing.begin_segment(segment.setup)
+    growing.flush()
     columns, whole = growing.columns(), run_segments(drive.log, segments, drive.initial)
     assert_same(columns, whole)
     assert columns.segments == segments

@@ -54,7 +54,8 @@ def test_whole_run_equals_live_localizer_to_the_last_bit(plan: Plan, filtered: b
     drive = random_drive(setup, rng, plan)
     arrays = run(drive.log, setup, drive.initial)
     localizer = Localizer(setup, drive.initial)
-    estimates = [estimate for estimate in map(localizer.feed, drive.log.records()) if estimate is not None]
+    estimates = [estimate for record in drive.log.records() for estimate in localizer.feed(record)]
+    estimates += localizer.flush()
     assert len(estimates) == len(arrays) > 0
     for cycle, estimate in enumerate(estimates):
         assert_same_estimate(estimate, arrays.estimate(cycle))
@@ -67,7 +68,8 @@ def test_withheld_output_of_a_whole_run_is_that_of_the_live_localizer() -> None:
     drive = random_drive(setup, rng, Plan(scans=600, reach=6.0))
     arrays = run(drive.log, setup, drive.initial)
     localizer = Localizer(setup, drive.initial)
-    estimates = [estimate for estimate in map(localizer.feed, drive.log.records()) if estimate is not None]
+    estimates = [estimate for record in drive.log.records() for estimate in localizer.feed(record)]
+    estimates += localizer.flush()
     # It fails at once, recovers, and fails again.
     assert (estimates[0].mode, np.count_nonzero(np.diff(arrays.modes))) == (Mode.FAIL, 3)
     given = drive.initial

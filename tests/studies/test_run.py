@@ -90,7 +90,8 @@ def test_the_result_is_that_of_the_live_localizer_cycle_by_cycle():
     start = start_of(project, log)
     result = judged_run(RunInput.of(project, log, start))
     localizer = Localizer(LocalizerSetup.of(project), start.belief)
-    estimates = [estimate for record in log.records() if (estimate := localizer.feed(record)) is not None]
+    estimates = [estimate for record in log.records() for estimate in localizer.feed(record)]
+    estimates += localizer.flush()
     assert [e.mode for e in estimates] == [Mode(int(mode)) for mode in result.columns.modes]
     assert np.array_equal([e.posterior.mean for e in estimates], result.columns.means)
     for status in Status:

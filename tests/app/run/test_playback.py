@@ -61,7 +61,8 @@ def test_what_stands_at_the_cursor_is_what_the_live_localizer_said_there(
     playback: Playback, project: Project, drive: Drive
 ) -> None:
     localizer = Localizer(LocalizerSetup.of(project), drive.start.belief)
-    estimates = [estimate for record in drive.log.records() if (estimate := localizer.feed(record)) is not None]
+    estimates = [estimate for record in drive.log.records() for estimate in localizer.feed(record)]
+    estimates += localizer.flush()
     # Not in order: the cursor costs nothing wherever it goes.
     for cycle in (40, 3, len(estimates) - 1, 0):
         playback.seek((estimates[cycle].stamp_ns - playback.start_ns) * 1e-9)
