@@ -37,6 +37,7 @@ from commission.app.run.actions import RecordedDrive, Source, VirtualDrive
 from commission.app.run.state import RunState
 from commission.app.runtime import BrowserCame, BrowserLeft, Runtime
 from commission.app.tune import feature as tune
+from commission.app.world import feature as world
 from commission.io.project_file import OpenedProject, load_project, open_project
 from commission.site.project import Project
 
@@ -56,6 +57,7 @@ FEATURES = (
     placement.FEATURE,
     run.FEATURE,
     tune.FEATURE,
+    world.FEATURE,
 )
 """What there is on the page: a new feature is a folder and a line here."""
 

@@ -34,7 +34,7 @@ from tests.app.asking import FEATURES, ME, after, joined, taking
 
 DEGREES = 180.0 / math.pi
 UNITS = {
-    **{"mm": 1000.0, "mm/√m": 1000.0, "mm/√s": 1000.0, "m": 1.0},
+    **{"mm": 1000.0, "mm/√m": 1000.0, "mm/√s": 1000.0, "ms": 1000.0, "m": 1.0, "m/s": 1.0},
     **{"°": DEGREES, "°/√m": DEGREES, "°/√rad": DEGREES, "°/√s": DEGREES},
     **{"%": 100.0, "%/m": 100.0, "": 1.0, "s": 1.0, "detections": 1.0},
 }

@@ -1,0 +1,1 @@
+"""The virtual world: what is true in it, which the filter does not know."""
