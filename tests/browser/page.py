@@ -53,6 +53,13 @@ _IS_SETTLED = """() => {
 }"""
 """Panels, styles and the camera's place arrive one by one, and the floor fades in: a click in between misses."""
 
+_COLLECT_NOTES = """window.__notes = [];
+new MutationObserver(() => {
+  for (const note of document.querySelectorAll('.mantine-Notification-description'))
+    if (!window.__notes.includes(note.textContent)) window.__notes.push(note.textContent);
+}).observe(document, {subtree: true, childList: true, characterData: true});"""
+"""Notes go by themselves after some seconds, and a busy machine looks later than that."""
+
 _FRAME = "window.__viserTestpoints?.rendererInfo?.render?.frame ?? -1"
 
 Button = Literal["left", "middle", "right"]
@@ -72,6 +79,7 @@ class OpenPage:
         self.server = server
         self._context: BrowserContext = browser.new_context(viewport={"width": size[0], "height": size[1]})
         self.page: Page = self._context.new_page()
+        self.page.add_init_script(_COLLECT_NOTES)
         self.page.set_default_timeout(60_000)  # without a graphics card, on a busy machine: 2 frames a second
         self.errors: list[str] = []
         """What the browser complained about."""
@@ -182,6 +190,10 @@ class OpenPage:
     def wait_for_text(self, text: str) -> None:
         """Wait until this can be read on the page."""
         self.page.get_by_text(text).first.wait_for(state="visible")
+
+    def wait_until_told(self, text: str) -> None:
+        """Wait until a note has said this, if only for some seconds; tests hide notes, which cover the floor."""
+        self.page.wait_for_function("text => window.__notes.some(note => note.includes(text))", arg=text)
 
     def screenshot(self, path: Path) -> None:
         """Keep a picture of the window."""

@@ -58,8 +58,7 @@ def test_a_text_that_is_too_long_is_refused_in_words_and_the_connection_lives_on
         }""",
         letters,
     )
-    told = "Paste a table: found more than 1,000,000 letters; expected at most as many"
-    page.page.get_by_text(told).first.wait_for(state="attached")  # notes are hidden in tests
+    page.wait_until_told("Paste a table: found more than 1,000,000 letters; expected at most as many")
     page.page.wait_for_function("field => field.value === ''", arg=pasted.element_handle())
     assert list(served.server.get_clients()) == [client.client_id]
     assert page.errors == []
