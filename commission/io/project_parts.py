@@ -115,7 +115,7 @@ def _apply(project: Project, values: dict[str, Any], path: Path) -> Project:
     if "disturbances" in values and "wheels" not in values["disturbances"]:
         # Written before the wheels had noise of their own.
         odometry = new["parameters"].odometry if "parameters" in new else None
-        wheels = project.disturbances.wheels if odometry is None else WheelNoise(**dataclasses.asdict(odometry))
+        wheels = project.disturbances.wheels if odometry is None else WheelNoise.believed(odometry)
         new["disturbances"] = dataclasses.replace(parts.disturbances, wheels=wheels)
     if "vehicle" in values:
         keys = {key: value for key, value in values["vehicle"].items() if key != "kind"}

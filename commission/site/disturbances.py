@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Annotated
 
 from commission.site.checks import check_fields
@@ -14,6 +14,7 @@ from commission.site.odometry_growth import (
     HEADING_PER_SQRT_S,
     LATERAL_PER_SQRT_M,
 )
+from commission.site.parameters import OdometryParameters
 from commission.site.quantity import (
     DEGREES,
     MILLIMETRES,
@@ -63,6 +64,11 @@ class WheelNoise:
     """True 1-sigma error along the vehicle's axis after one second, even at rest."""
     heading_per_sqrt_s: Annotated[float, HEADING_PER_SQRT_S] = 0.0002
     """True 1-sigma heading error after one second, even at rest."""
+
+    @staticmethod
+    def believed(odometry: OdometryParameters) -> WheelNoise:
+        """Return the wheels that a filter believes in: those of projects that do not say how noisy theirs are."""
+        return WheelNoise(**{each.name: getattr(odometry, each.name) for each in fields(WheelNoise)})
 
     def __post_init__(self) -> None:
         check_fields(self, "wheels.")
