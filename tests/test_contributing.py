@@ -49,7 +49,7 @@ def order(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 @pytest.fixture
 def state() -> AppState:
     project = room()
-    return AppState(project, project)
+    return AppState(project=project, saved=project)
 
 
 def test_its_action_changes_what_the_feature_keeps(order: Any, state: AppState) -> None:

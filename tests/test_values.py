@@ -10,8 +10,6 @@ import commission
 
 POSITIONAL = 4
 """Fields that a value may have and still be made by position: with more, nobody knows at the call which is which."""
-ROOMS_TO_COME = ("app",)
-"""Rooms whose values do not keep the rule yet."""
 
 
 def values() -> Iterator[type]:
@@ -33,7 +31,6 @@ def test_a_value_of_more_than_four_fields_is_made_by_keyword():
     found = []
     for value in values():
         given = [field for field in dataclasses.fields(value) if field.init]
-        room = value.__module__.split(".")[1]
-        if len(given) > POSITIONAL and not all(field.kw_only for field in given) and room not in ROOMS_TO_COME:
+        if len(given) > POSITIONAL and not all(field.kw_only for field in given):
             found.append(f"{value.__module__}.{value.__qualname__}: {len(given)} fields; expected kw_only=True")
     assert not found, "\n".join(found)

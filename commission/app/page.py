@@ -113,7 +113,17 @@ class Page:
                 inside.enter_context(container)
             if panel.folder:
                 container = inside.enter_context(gui.add_folder(panel.folder, expand_by_default=panel.is_open))
-            return panel.make(PanelPlace(gui, scene, self._post, self._state, container, self._layers, client))
+            return panel.make(
+                PanelPlace(
+                    gui=gui,
+                    scene=scene,
+                    post=self._post,
+                    state=self._state,
+                    container=container,
+                    layers=self._layers,
+                    client=client,
+                )
+            )
 
     def show_site(self, state: AppState) -> None:
         """Draw what has changed of the project since it was last drawn."""

@@ -21,7 +21,7 @@ class Bench(Owner[Studying]):
     """A service, the state that it follows, and the queue of its jobs."""
 
     def __init__(self, make: Callable[[Context], Studying], project: Project) -> None:
-        self.state = joined(AppState(project, project))
+        self.state = joined(AppState(project=project, saved=project))
         super().__init__(make, self.state)
 
     @property

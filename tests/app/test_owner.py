@@ -124,7 +124,9 @@ class Owner:
     def __init__(self, project: Project) -> None:
         self.window, self.asked, self.broken = Window(), list[str](), set[str]()
         probe = partial(Probe, asked=self.asked, broken=self.broken)
-        self.runtime = Runtime(AppState(project, project, folder=Path("hall")), [Feature("probe", services=(probe,))])
+        self.runtime = Runtime(
+            AppState(project=project, saved=project, folder=Path("hall")), [Feature(name="probe", services=(probe,))]
+        )
         self.runtime.start(self.window)
 
     def until(self, reached: Callable[[], bool]) -> None:

@@ -61,7 +61,7 @@ def change(widget: Any, value: Any, client: object | None) -> None:
 
 
 def test_the_whole_page_is_built_and_draws_a_run(server: viser.ViserServer, project: Project, run: RunView) -> None:
-    state = AppState(project, project)
+    state = AppState(project=project, saved=project)
     page = Page(server, lambda _action: None, state, FEATURES)
     page.show_site(state)
     page.draw(view_of(state, run), slowly=True)
@@ -70,7 +70,7 @@ def test_the_whole_page_is_built_and_draws_a_run(server: viser.ViserServer, proj
 
 
 def test_the_page_stands_before_any_run_exists(server: viser.ViserServer) -> None:
-    state = AppState(Project(), Project())
+    state = AppState(project=Project(), saved=Project())
     page = Page(server, lambda _action: None, state, FEATURES)
     page.show_site(state)
     page.draw(view_of(state), slowly=True)
@@ -92,7 +92,7 @@ def test_every_parameter_has_exactly_one_widget_with_its_label_its_unit_and_its_
     for name in ("add_slider", "add_checkbox", "add_dropdown", "add_number", "add_text"):
         real = getattr(server.gui, name)
         setattr(server.gui, name, lambda *args, real=real, **keys: added.append(real(*args, **keys)) or added[-1])
-    panel = TunePanel(server.gui, lambda _action: None, AppState(project, project))
+    panel = TunePanel(server.gui, lambda _action: None, AppState(project=project, saved=project))
     described = dict(walk_fields(Parameters))
     assert sorted(panel._widgets) == sorted(described)
     assert {id(widget) for widget in added} == {id(widget) for widget in panel._widgets.values()}
@@ -104,7 +104,7 @@ def test_every_parameter_has_exactly_one_widget_with_its_label_its_unit_and_its_
 
 def test_every_slider_posts_its_parameter_in_si(server: viser.ViserServer, project: Project) -> None:
     posted: list[Any] = []
-    panel = TunePanel(server.gui, taking(posted), AppState(project, project))
+    panel = TunePanel(server.gui, taking(posted), AppState(project=project, saved=project))
     for key, widget in panel._widgets.items():
         change(widget, widget.value, client=SimpleNamespace(client_id=1))
         assert posted[-1].key == key
@@ -117,12 +117,12 @@ def test_every_slider_posts_its_parameter_in_si(server: viser.ViserServer, proje
 
 def test_sliders_follow_undo_but_not_their_own_drag(server: viser.ViserServer, project: Project) -> None:
     key = "supervisor.position_limit"
-    panel = TunePanel(server.gui, lambda _action: None, AppState(project, project))
+    panel = TunePanel(server.gui, lambda _action: None, AppState(project=project, saved=project))
     edited = replace(project, parameters=with_field(project.parameters, key, 0.2))
     change(panel._widgets[key], 200.0, client=SimpleNamespace(client_id=1))
-    panel.draw_slowly(view_of(AppState(edited, project, last_edit=LastEdit(key))))
+    panel.draw_slowly(view_of(AppState(project=edited, saved=project, last_edit=LastEdit(key))))
     assert panel._widgets[key].value == 200.0
-    panel.draw_slowly(view_of(AppState(project, project)))
+    panel.draw_slowly(view_of(AppState(project=project, saved=project)))
     assert panel._widgets[key].value == 100.0
 
 
@@ -135,14 +135,14 @@ def test_what_the_page_shows_means_the_same_parameter(project: Project, key: str
 
 
 def test_names_from_files_are_never_read_as_html(project: Project) -> None:
-    state = AppState(replace(project, name=NASTY), project)
+    state = AppState(project=replace(project, name=NASTY), saved=project)
     assert "<script" not in title(state)
     assert "&lt;script" in title(state)
     assert "<script" not in escaped(NASTY)
 
 
 def test_the_badge_says_operational_fail_or_that_nothing_runs(run: RunView, project: Project) -> None:
-    state = AppState(project, project)
+    state = AppState(project=project, saved=project)
     assert badge_text(view_of(state))[0] == "NO RUN"
     assert badge_text(view_of(state, run))[0] == "OPERATIONAL"
     word, beside, _ = badge_text(view_of(state, replace(run, mode=Mode.FAIL)))
@@ -151,7 +151,10 @@ def test_the_badge_says_operational_fail_or_that_nothing_runs(run: RunView, proj
 
 
 def test_what_is_being_prepared_is_said_where_the_badge_is(project: Project) -> None:
-    view = view_of(AppState(project, project), jobs=(Job(1, "Compiling", fraction=0.4, message="<rays>"),))
+    view = view_of(
+        AppState(project=project, saved=project),
+        jobs=(Job(number=1, name="Compiling", fraction=0.4, message="<rays>"),),
+    )
     assert badge_text(view)[:2] == ("PREPARING", "Compiling: &lt;rays&gt; 40%")
 
 
@@ -187,11 +190,11 @@ def test_times_are_shown_as_minutes_and_hours() -> None:
 
 
 def test_a_route_that_was_drawn_can_be_driven(server: viser.ViserServer, project: Project) -> None:
-    bare = AppState(replace(project, routes=()), project)
+    bare = AppState(project=replace(project, routes=()), saved=project)
     panel = RunPanel(server.gui, lambda _action: None, bare)
     (offered,) = (w for w in server.gui._gui_input_handle_from_uuid.values() if getattr(w, "label", "") == "Route")
     assert (offered.options, offered.disabled) == (NO_ROUTE, True)
-    panel.draw_slowly(view_of(AppState(project, project)))
+    panel.draw_slowly(view_of(AppState(project=project, saved=project)))
     assert (offered.options, offered.disabled) == (("There and back",), False)
 
 

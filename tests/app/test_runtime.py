@@ -102,15 +102,15 @@ class Bench:
         self.saved: list[Path] = []
         self.drive = drive
         self.slow: Callable[..., Drive] | None = None
-        self.runtime = Runtime(AppState(project, project, folder=Path("hall")), self._features())
+        self.runtime = Runtime(AppState(project=project, saved=project, folder=Path("hall")), self._features())
 
     def _features(self) -> list[Feature]:
         run = partial(RunService, prepare=self._prepare, compile_all=lambda _progress: None)
         others = [feature for feature in FEATURES if feature.name not in ("run", "project")]
         return [
             *others,
-            Feature("run", services=(run,)),
-            Feature("project", services=(partial(Saving, saved=self.saved),)),
+            Feature(name="run", services=(run,)),
+            Feature(name="project", services=(partial(Saving, saved=self.saved),)),
         ]
 
     def _prepare(self, _project: Project, source: Source, progress: Progress) -> Drive:

@@ -80,7 +80,7 @@ class PageBench:
     """The page of a project, and what its widgets post."""
 
     def __init__(self, server: viser.ViserServer, project: Project) -> None:
-        self.server, self.posted, self.state = server, [], AppState(project, project)
+        self.server, self.posted, self.state = server, [], AppState(project=project, saved=project)
         self.page = Page(server, taking(self.posted), self.state, FEATURES)
         self.page.show_site(self.state)
         self.draw(self.state)
@@ -224,7 +224,7 @@ def test_numbers_of_what_is_selected_are_shown_and_set_in_the_units_of_their_lab
 ) -> None:
     select, fields = SELECTED[what]
     site = replace(project, reflectors=ReflectorMap((POST,)), stations=(DOCK,))
-    state = after(joined(AppState(site, site)), select).state
+    state = after(joined(AppState(project=site, saved=site)), select).state
     posted: list[Any] = []
     server = start_server("127.0.0.1", 0)
     try:

@@ -207,7 +207,7 @@ def test_outliers_are_those_of_the_detector_and_those_of_the_gate(at: At) -> Non
 
 
 def test_the_badge_shows_the_larger_sigma_and_both_limits(at: At, site: Project) -> None:
-    word, beside, _ = badge_text(view_of(AppState(site, site), at.run))
+    word, beside, _ = badge_text(view_of(AppState(project=site, saved=site), at.run))
     assert word == "OPERATIONAL"
     position = 1000.0 * max(two_sigma(at, 0), two_sigma(at, 1))
     assert_reads(beside.replace("&nbsp;", " "), position, 87.0, DEGREES * two_sigma(at, 2), DEGREES * 0.061)
@@ -229,7 +229,7 @@ def test_the_badge_counts_the_seconds_since_the_vehicle_failed(failing: RunResul
     assert (modes[first : later + 1] != Mode.OPERATIONAL).all()
     playback = Playback(failing)
     playback.seek(float(times[later]))
-    word, _, _ = badge_text(view_of(AppState(site, site), playback.view(covered=False)))
+    word, _, _ = badge_text(view_of(AppState(project=site, saved=site), playback.view(covered=False)))
     assert re.sub(r"\d+", "", word) == f"{Mode(int(modes[later])).name}  s"
     assert_reads(word, float(times[later] - times[first]))
 
@@ -256,7 +256,7 @@ def test_the_clock_and_the_slider_show_the_cursor_and_the_length_of_the_drive(ju
     try:
         line, playback = TimeLine(server.gui, lambda _action: None, 1.0), Playback(judged)
         playback.seek(4.27)
-        line.draw_slowly(view_of(AppState(site, site), playback.view(covered=False)))
+        line.draw_slowly(view_of(AppState(project=site, saved=site), playback.view(covered=False)))
         log = judged.inputs.log
         duration = (int(log.stamps_ns[-1]) - int(log.stamps_ns[0])) / 1e9
         assert line._slider.max == pytest.approx(duration)
@@ -373,7 +373,7 @@ def test_a_wrong_association_is_told_in_percent_at_its_metres(expected_route: Ro
     try:
         panel = RoutePanel(server.gui, lambda _action: None, server.gui.add_folder("Route"))
         panel._rows.show = lambda lines: drawn.update(lines=lines)
-        panel.draw_slowly(view_of(AppState(site, site), route))
+        panel.draw_slowly(view_of(AppState(project=site, saved=site), route))
     finally:
         server.stop()
     ((text, _color),) = drawn["lines"]
@@ -401,7 +401,7 @@ FIGURES = {
 def test_a_figure_of_the_floor_is_read_in_its_unit(figure: Figure, site: Project) -> None:
     value, expected = FIGURES[figure]
     assert value_text(figure, value, Measurement.RANGE_BEARING) == expected
-    state = AppState(site, site).with_part(Conditions(blocked_per_m=0.1))
+    state = AppState(project=site, saved=site).with_part(Conditions(blocked_per_m=0.1))
     table = reading_table(FloorReading((1.234, 5.678), {figure: value}, on_floor=True), state)
     assert f"<td>{expected}</td>" in table
     assert "1.23, 5.68 m" in table
@@ -445,7 +445,7 @@ def test_the_legend_names_bounds_shares_and_the_limit_of_two_sigma_and_of_one(
         shares=np.array([0.123, 0.5, 0.25, 0.127]),
         outdated=False,
     )
-    shown = heat_scale(heat, AppState(site, site))
+    shown = heat_scale(heat, AppState(project=site, saved=site))
     assert "no fix: 12.3 % of the floor" in shown
     text = [each for each in re.split(r"<[^>]*>", shown) if each]
     for number in (*(f"{bound:g}" for bound in bounds), "50", "25", "13"):

@@ -35,7 +35,7 @@ from tests.benchmarks.edited_page import EditedPage
 from tests.io.large_files import write_drawing, write_obj, write_stl
 
 REACH, ROUNDS, LIMIT_MS, STOP_S = 0.5, 12, 100.0, 1.0
-STATE = AppState(Project(), Project())
+STATE = AppState(project=Project(), saved=Project())
 ENTITIES, MODEL_BYTES = 200_000, 100_000_000
 
 
@@ -74,7 +74,9 @@ def edit() -> bool:
             done(editing.ChooseTool(EraseTool()))
             x, y = (float(value) for value in rng.uniform((5, 5), (170, 70)))
             area = ((x, y), (x + 25.0, y + 20.0))
-            return done(*(DragFloor(phase, *area, REACH) for phase in ("start", "end")))
+            return done(
+                *(DragFloor(phase=phase, start=area[0], now=area[1], reach=REACH) for phase in ("start", "end"))
+            )
 
         def undone() -> float:
             return done(actions.Undo())
@@ -134,7 +136,7 @@ def load(path: Path) -> bool:
     if not isinstance(opened, MapOpened):
         print(f"  {path.name}: {report.job.error or opened}")
         return False
-    _, drawing, _, _ = reading.run(DrawMap(MapDraft(file, opened.read)))
+    _, drawing, _, _ = reading.run(DrawMap(MapDraft(file=file, read=opened.read)))
     stops: list[float] = []
     for share in (0.05, 0.3, 0.6, 0.9):
         stopped, _, waited, _ = reading.run(ReadMapFile(file), stop_after_s=share * took)

@@ -68,7 +68,7 @@ def central(project: Project) -> Reflector:
 
 def measure_server(project: Project, settings: CoverageSettings) -> None:
     """Print how long the service takes from a place of a drag to the picture."""
-    state = AppState(project, project).joined(1).with_part(settings).with_part(FloorPicture(owner=NAME))
+    state = AppState(project=project, saved=project).joined(1).with_part(settings).with_part(FloorPicture(owner=NAME))
     owner = Owner(CoverageService, state)
     owner.settle(state)
     service = owner.service
@@ -137,7 +137,9 @@ def measure_runtime(project: Project) -> float:
     cpu = time.process_time()
     while time.monotonic() - start < SECONDS:
         now = (place[0] + 0.05 * (step % 40), place[1])
-        runtime.post(Envelope(DragFloor("update" if step else "start", place, now, 0.3), Sender(1)))
+        runtime.post(
+            Envelope(DragFloor(phase="update" if step else "start", start=place, now=now, reach=0.3), Sender(1))
+        )
         time.sleep(0.05)
         step += 1
         heat = runtime.service(CoverageService).view.heat

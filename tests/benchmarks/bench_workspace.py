@@ -49,7 +49,10 @@ def main() -> None:
         def drag() -> float:
             r = page.state.project.reflectors.reflectors[7]
             start, end = (r.x, r.y), (r.x + 1.0, r.y + 1.0)
-            return done(DragFloor("start", start, start, REACH), DragFloor("end", start, end, REACH))
+            return done(
+                DragFloor(phase="start", start=start, now=start, reach=REACH),
+                DragFloor(phase="end", start=start, now=end, reach=REACH),
+            )
 
         def place() -> float:
             done(editing.ChooseTool(PlaceTool()))

@@ -10,12 +10,14 @@ from commission.app.ambiguity.service import AmbiguityService
 from commission.app.base.feature import LEGEND, PLAN, Docked, Feature
 
 FEATURE = Feature(
-    "ambiguity",
+    name="ambiguity",
     reducers=(reducer,),
     services=(AmbiguityService,),
     layers=(AmbiguityLayer,),
     panels=(
-        Docked(lambda at: ColdStartPanel(at.gui, at.post, at.container), PLAN, 40, folder="Ambiguous places"),
-        Docked(lambda at: AmbiguityLegend(at.gui), LEGEND, 12),
+        Docked(
+            make=lambda at: ColdStartPanel(at.gui, at.post, at.container), tab=PLAN, rank=40, folder="Ambiguous places"
+        ),
+        Docked(make=lambda at: AmbiguityLegend(at.gui), tab=LEGEND, rank=12),
     ),
 )

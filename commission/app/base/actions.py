@@ -124,7 +124,7 @@ class ClickFloor(Action):
     """Whether to add to the selection."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class DragFloor(Action):
     """The pointer is dragged over the floor."""
 

@@ -35,7 +35,7 @@ OnDrag: TypeAlias = Callable[[Any], Coroutine[Any, Any, None]]
 """Takes viser's drag events of the floor; `async`, since only those keep their order."""
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class ClientView:
     """What one browser looks at."""
 
@@ -75,7 +75,7 @@ class Cameras:
 
     def connected(self, client: ClientHandle) -> None:
         """Begin with the plan of the whole site."""
-        self._views[client.client_id] = ClientView(client)
+        self._views[client.client_id] = ClientView(client=client)
         client.camera.on_update(self._watch)
         self._furnish(self._views[client.client_id])
         self.show(client.client_id, Camera.FIT)

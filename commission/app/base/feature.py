@@ -66,7 +66,7 @@ TIME = Tab(Side.BOTTOM, "Time", 10)
 ROUTE = Tab(Side.BOTTOM, "Route", 20)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PanelPlace:
     """What a panel is made with. Its constructor is called where its widgets belong: they need no container."""
 
@@ -93,7 +93,7 @@ class PanelPlace:
         return self.client.client_id
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Docked:
     """A panel and where it goes."""
 
@@ -115,7 +115,7 @@ MakeService: TypeAlias = Callable[[Context], Service]
 MakeLayer: TypeAlias = Callable[[SceneApi], Layer]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Feature:
     """One feature of the page."""
 

@@ -57,7 +57,7 @@ class JobState(StrEnum):
     CANCELLED = "cancelled"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
     """How one job stands at one moment."""
 
@@ -187,7 +187,7 @@ class Jobs:
                 raise JobError(f"{name} cannot start: the program is closing")
             key = name if key is None else key
             self.cancel(key)
-            job = Job(next(self._numbers), name, key, lane, is_shown)
+            job = Job(number=next(self._numbers), name=name, key=key, lane=lane, is_shown=is_shown)
             self._continuations[job.number] = _Continuation(key, then, failed or self._failed, stopped)
             self._record(job)
             self._lane(lane).put((job.number, work))

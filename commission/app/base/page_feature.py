@@ -43,13 +43,13 @@ class CameraButtons(BasePanel):
 
 
 FEATURE = Feature(
-    "base",
+    name="base",
     reducers=(page_reducer,),
     layers=(GridLayer,),
     panels=(
-        Docked(lambda at: JobButton(at.gui, at.post), None, 20),
-        Docked(lambda at: CameraButtons(at.gui, at.post), None, 40),
-        Docked(lambda at: LegendPanel(at.gui, at.post, at.layers, at.state), LEGEND, 20),
-        Docked(lambda at: LayersPanel(at.gui, at.post, at.layers, at.state), LAYERS),
+        Docked(make=lambda at: JobButton(at.gui, at.post), tab=None, rank=20),
+        Docked(make=lambda at: CameraButtons(at.gui, at.post), tab=None, rank=40),
+        Docked(make=lambda at: LegendPanel(at.gui, at.post, at.layers, at.state), tab=LEGEND, rank=20),
+        Docked(make=lambda at: LayersPanel(at.gui, at.post, at.layers, at.state), tab=LAYERS),
     ),
 )

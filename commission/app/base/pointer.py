@@ -53,6 +53,11 @@ def floor_drag(post: Post) -> OnDrag:
             (float(position[0]), float(position[1])) for position in (event.start_position, event.end_position)
         )
         add = event.modifier == "shift"
-        post(from_browser(DragFloor(event.phase, start, now, reach_of(event.client), add), event.client_id))
+        post(
+            from_browser(
+                DragFloor(phase=event.phase, start=start, now=now, reach=reach_of(event.client), add=add),
+                event.client_id,
+            )
+        )
 
     return dragged

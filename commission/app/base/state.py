@@ -59,7 +59,7 @@ class LastEdit:
     """Who, and when."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class AppState:
     """Everything that the page shows and that no background work computes."""
 

@@ -12,13 +12,19 @@ from commission.app.coverage.heatmap_panel import HeatmapPanel
 from commission.app.coverage.service import CoverageService
 
 FEATURE = Feature(
-    "coverage",
+    name="coverage",
     reducers=(reducer,),
     services=(CoverageService,),
     layers=(HeatLayer, FixEllipseLayer),
     panels=(
-        Docked(lambda at: HeatmapPanel(at.gui, at.post), PLAN, 10, folder="Heatmap of the floor", is_open=True),
-        Docked(lambda at: HeatLegend(at.gui), LEGEND, 10),
-        Docked(lambda at: CoverageClicks(at.scene, at.post), None, 90),
+        Docked(
+            make=lambda at: HeatmapPanel(at.gui, at.post),
+            tab=PLAN,
+            rank=10,
+            folder="Heatmap of the floor",
+            is_open=True,
+        ),
+        Docked(make=lambda at: HeatLegend(at.gui), tab=LEGEND, rank=10),
+        Docked(make=lambda at: CoverageClicks(at.scene, at.post), tab=None, rank=90),
     ),
 )

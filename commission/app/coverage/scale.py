@@ -29,7 +29,7 @@ COUNTS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
 PERCENT = (50.0, 70.0, 80.0, 90.0, 95.0, 98.0, 99.0, 99.9)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ShownFigure:
     """How a figure is shown."""
 
@@ -46,14 +46,20 @@ class ShownFigure:
 
 
 QUANTITIES: dict[Figure, ShownFigure] = {
-    Figure.VISIBLE: ShownFigure("Visible reflectors", "", 1.0, COUNTS, more_is_better=True),
-    Figure.POSITION_SIGMA: ShownFigure("Position error, 1σ [mm]", "mm", 1000.0),
-    Figure.HEADING_SIGMA: ShownFigure("Heading error, 1σ [°]", "°", math.degrees(1.0)),
-    Figure.POSITION_DOP: ShownFigure("Position dilution (DOP)", "", 1.0),
-    Figure.HEADING_DOP: ShownFigure("Heading dilution (DOP)", "", 1.0),
-    Figure.EXPECTED_VISIBLE: ShownFigure("Visible among people, mean", "", 1.0, (1.0, *COUNTS), more_is_better=True),
-    Figure.TWO_OR_MORE: ShownFigure("Chance of 2 or more [%]", "%", 100.0, PERCENT, more_is_better=True),
-    Figure.THREE_OR_MORE: ShownFigure("Chance of 3 or more [%]", "%", 100.0, PERCENT, more_is_better=True),
+    Figure.VISIBLE: ShownFigure(label="Visible reflectors", unit="", factor=1.0, bounds=COUNTS, more_is_better=True),
+    Figure.POSITION_SIGMA: ShownFigure(label="Position error, 1σ [mm]", unit="mm", factor=1000.0),
+    Figure.HEADING_SIGMA: ShownFigure(label="Heading error, 1σ [°]", unit="°", factor=math.degrees(1.0)),
+    Figure.POSITION_DOP: ShownFigure(label="Position dilution (DOP)", unit="", factor=1.0),
+    Figure.HEADING_DOP: ShownFigure(label="Heading dilution (DOP)", unit="", factor=1.0),
+    Figure.EXPECTED_VISIBLE: ShownFigure(
+        label="Visible among people, mean", unit="", factor=1.0, bounds=(1.0, *COUNTS), more_is_better=True
+    ),
+    Figure.TWO_OR_MORE: ShownFigure(
+        label="Chance of 2 or more [%]", unit="%", factor=100.0, bounds=PERCENT, more_is_better=True
+    ),
+    Figure.THREE_OR_MORE: ShownFigure(
+        label="Chance of 3 or more [%]", unit="%", factor=100.0, bounds=PERCENT, more_is_better=True
+    ),
 }
 
 

@@ -69,7 +69,7 @@ class Snapping:
         check_fields(self, "snapping.")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Editor:
     """How one browser edits."""
 

@@ -16,18 +16,24 @@ from commission.app.editing.tool_hint import ToolHint
 from commission.app.editing.tool_panel import FinishButton, SnappingPanel, ToolButtons
 
 FEATURE = Feature(
-    "editing",
+    name="editing",
     reducers=(reducer, site_reducer, station_reducer),
     layers=(RouteLayer, StationLayer, ReflectorLayer, ReflectorNameLayer),
     panels=(
-        Docked(lambda at: EquipmentFields(at.gui, at.post, at.state.project), SITE, 30),
-        Docked(lambda at: Overlay(at.scene, at.post, at.browser), None, 10, own=True),
-        Docked(lambda at: ToolButtons(at.gui, at.post), SELECTION, 10, own=True),
-        Docked(lambda at: FinishButton(at.gui, at.post, at.browser), SELECTION, 30, own=True),
-        Docked(lambda at: SelectionPanel(at.gui, at.post, at.browser), SELECTION, 50, own=True),
-        Docked(lambda at: SnappingPanel(at.gui, at.post, at.browser), SELECTION, 70, folder="Snapping", own=True),
-        Docked(lambda at: ToolHint(at.gui, at.browser), SELECTION, 90, own=True),
-        Docked(lambda at: ReflectorTable(at.gui, at.post, at.browser, at.container), REFLECTORS, own=True),
-        Docked(lambda at: RouteTable(at.gui, at.post, at.browser, at.container), ROUTES, own=True),
+        Docked(make=lambda at: EquipmentFields(at.gui, at.post, at.state.project), tab=SITE, rank=30),
+        Docked(make=lambda at: Overlay(at.scene, at.post, at.browser), tab=None, rank=10, own=True),
+        Docked(make=lambda at: ToolButtons(at.gui, at.post), tab=SELECTION, rank=10, own=True),
+        Docked(make=lambda at: FinishButton(at.gui, at.post, at.browser), tab=SELECTION, rank=30, own=True),
+        Docked(make=lambda at: SelectionPanel(at.gui, at.post, at.browser), tab=SELECTION, rank=50, own=True),
+        Docked(
+            make=lambda at: SnappingPanel(at.gui, at.post, at.browser),
+            tab=SELECTION,
+            rank=70,
+            folder="Snapping",
+            own=True,
+        ),
+        Docked(make=lambda at: ToolHint(at.gui, at.browser), tab=SELECTION, rank=90, own=True),
+        Docked(make=lambda at: ReflectorTable(at.gui, at.post, at.browser, at.container), tab=REFLECTORS, own=True),
+        Docked(make=lambda at: RouteTable(at.gui, at.post, at.browser, at.container), tab=ROUTES, own=True),
     ),
 )

@@ -9,11 +9,11 @@ from commission.app.exchange.import_overlay import ImportOverlay
 from commission.app.exchange.work import ExchangeService
 
 FEATURE = Feature(
-    "exchange",
+    name="exchange",
     reducers=(reducer,),
     services=(ExchangeService,),
     panels=(
-        Docked(lambda at: ExchangePanel(at.gui, at.post, at.browser), SITE, 50, own=True),
-        Docked(lambda at: ImportOverlay(at.scene, at.browser), None, 50, own=True),
+        Docked(make=lambda at: ExchangePanel(at.gui, at.post, at.browser), tab=SITE, rank=50, own=True),
+        Docked(make=lambda at: ImportOverlay(at.scene, at.browser), tab=None, rank=50, own=True),
     ),
 )

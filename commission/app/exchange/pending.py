@@ -53,7 +53,7 @@ class FileReading:
     """What is done now."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Pending:
     """What was read and waits for a yes or no; the project is as before."""
 
@@ -83,7 +83,7 @@ class Sent:
     """What its format cannot carry."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Exchange:
     """One browser's imports and exports; two are equal only when they are one, which is found out at once."""
 

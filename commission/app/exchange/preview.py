@@ -28,7 +28,7 @@ PARTS = {
 """Parts of a project that are replaced as a whole, in the words of the page."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Preview:
     """Differences, part by part; a part that the file does not speak of is None and stays."""
 
@@ -73,7 +73,7 @@ class Preview:
 
 def compare(project: Project, imported: Imported) -> Preview:
     """Compare what was read with a project."""
-    same = Preview(project, project)
+    same = Preview(project=project, base=project)
     match imported:
         case ReflectorImport(reflectors, _, fields):
             return _with_reflectors(same, reflectors, fields)

@@ -29,7 +29,7 @@ def _pending(state: AppState, sender: Sender) -> Pending:
 def read_import(action: actions.ReadImport, state: AppState, sender: Sender) -> Outcome:
     exchange = state.of_browser(sender.browser, Exchange)
     number = exchange.number + 1
-    reading = Exchange(number, FileReading(action.source), exchange.pending)
+    reading = Exchange(number=number, reading=FileReading(action.source), pending=exchange.pending)
     return Outcome(
         state.with_browser(sender.browser, reading),
         (ReadFile(number, action.source, action.choice, state.project),),
@@ -58,8 +58,10 @@ def import_read(action: actions.ImportRead, state: AppState, sender: Sender) -> 
         return Outcome(state)
     # A table is usually one of several, a project is usually wanted as it is.
     whole = isinstance(action.imported, ProjectImport)
-    pending = Pending(exchange.reading.source, action.choice, action.imported, action.found, remove=whole)
-    return Outcome(state.with_browser(sender.browser, Exchange(exchange.number, pending=pending)))
+    pending = Pending(
+        source=exchange.reading.source, choice=action.choice, imported=action.imported, found=action.found, remove=whole
+    )
+    return Outcome(state.with_browser(sender.browser, Exchange(number=exchange.number, pending=pending)))
 
 
 @reduce.register
@@ -74,7 +76,7 @@ def remove_absent(action: actions.RemoveAbsent, state: AppState, sender: Sender)
 def accept_import(_action: actions.AcceptImport, state: AppState, sender: Sender) -> Outcome:
     pending = _pending(state, sender)
     project = pending.preview(state.project).accepted(remove=pending.remove)
-    done = state.with_browser(sender.browser, Exchange(state.of_browser(sender.browser, Exchange).number))
+    done = state.with_browser(sender.browser, Exchange(number=state.of_browser(sender.browser, Exchange).number))
     title = pending.source.title
     if project is state.project:
         return Outcome(done, (Tell(f"{title} changes nothing", failed=False),))
@@ -84,7 +86,7 @@ def accept_import(_action: actions.AcceptImport, state: AppState, sender: Sender
 @reduce.register
 def drop_import(_action: actions.DropImport, state: AppState, sender: Sender) -> Outcome:
     # The next number makes an answer that is on its way too late.
-    dropped = Exchange(state.of_browser(sender.browser, Exchange).number + 1)
+    dropped = Exchange(number=state.of_browser(sender.browser, Exchange).number + 1)
     return Outcome(state.with_browser(sender.browser, dropped), (StopReading(),))
 
 

@@ -10,12 +10,12 @@ from commission.app.failures.failure_panel import FailurePanel
 from commission.app.failures.service import FailureService
 
 FEATURE = Feature(
-    "failures",
+    name="failures",
     reducers=(reducer,),
     services=(FailureService,),
     layers=(FailingLayer,),
     panels=(
-        Docked(lambda at: FailurePanel(at.gui, at.post), PLAN, 30, folder="What if one reflector fails"),
-        Docked(lambda at: FailureClicks(at.scene, at.post), None, 91),
+        Docked(make=lambda at: FailurePanel(at.gui, at.post), tab=PLAN, rank=30, folder="What if one reflector fails"),
+        Docked(make=lambda at: FailureClicks(at.scene, at.post), tab=None, rank=91),
     ),
 )

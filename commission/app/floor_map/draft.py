@@ -73,7 +73,7 @@ class ReadOptions:
             raise ValueError(f"axis is {self.up!r}; expected y or z")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class MapOptions:
     """What a file leaves open."""
 
@@ -126,7 +126,7 @@ class Stage:
         return self.left + pixel[0] * self.pixel, self.top - pixel[1] * self.pixel
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class MapDraft:
     """A file that was read and waits for what it leaves open."""
 

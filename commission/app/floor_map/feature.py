@@ -12,14 +12,14 @@ from commission.app.floor_map.wall_layer import WallLayer
 from commission.app.floor_map.work import MapService
 
 FEATURE = Feature(
-    "floor_map",
+    name="floor_map",
     reducers=(reducer,),
     services=(MapService,),
     layers=(FloorLayer, WallLayer, MapDraftLayer),
     panels=(
-        Docked(lambda at: FloorMapPanel(at.gui, at.post, at.state.project), SITE, 20),
-        Docked(lambda at: MapTroublePanel(at.gui, at.browser), SITE, 20, own=True),
-        Docked(lambda at: MapToolButtons(at.gui, at.post), SELECTION, 20, own=True),
-        Docked(lambda at: MapToolFields(at.gui, at.post, at.browser), SELECTION, 40, own=True),
+        Docked(make=lambda at: FloorMapPanel(at.gui, at.post, at.state.project), tab=SITE, rank=20),
+        Docked(make=lambda at: MapTroublePanel(at.gui, at.browser), tab=SITE, rank=20, own=True),
+        Docked(make=lambda at: MapToolButtons(at.gui, at.post), tab=SELECTION, rank=20, own=True),
+        Docked(make=lambda at: MapToolFields(at.gui, at.post, at.browser), tab=SELECTION, rank=40, own=True),
     ),
 )

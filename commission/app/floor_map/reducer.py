@@ -78,7 +78,7 @@ def map_failed(action: actions.MapFailed, state: AppState, sender: Sender) -> Ou
 def map_opened(action: actions.MapOpened, state: AppState, sender: Sender) -> Outcome:
     before = state.part(MapLoading).draft
     options = before.options if before is not None and before.file is action.file else _usual(action, state.project)
-    draft = MapDraft(action.file, action.read, action.reading, options)
+    draft = MapDraft(file=action.file, read=action.read, reading=action.reading, options=options)
     if isinstance(action.read, Picture):
         draft = replace(draft, stage=_stage(action.read, state.project))
     opened = state.with_part(replace(state.part(MapLoading), draft=draft, waiting=None))

@@ -9,9 +9,9 @@ from commission.app.placement.service import PlacementService
 from commission.app.placement.suggestion_layer import SuggestionLayer
 
 FEATURE = Feature(
-    "placement",
+    name="placement",
     reducers=(reducer,),
     services=(PlacementService,),
     layers=(SuggestionLayer,),
-    panels=(Docked(lambda at: LayoutPanel(at.gui, at.post), PLAN, 50, folder="Suggested layout"),),
+    panels=(Docked(make=lambda at: LayoutPanel(at.gui, at.post), tab=PLAN, rank=50, folder="Suggested layout"),),
 )

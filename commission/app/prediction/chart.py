@@ -31,18 +31,18 @@ def chart(route: RouteView, run: DrivenMetres | None) -> str:
     axis = _axis(route, starts)
     worst, errors = (np.maximum.reduceat(values, starts, axis=0) for values in (metres.two_sigma, route.errors))
     position = Limited(
-        "2σ of position [mm]",
-        1000.0 * worst[:, :2].max(axis=1),
-        1000.0 * limits.position_limit,
-        1000.0 * errors[:, :2].max(axis=1),
-        None if run is None else (run.metres, 1000.0 * run.two_sigma[:, :2].max(axis=1)),
+        title="2σ of position [mm]",
+        levels=1000.0 * worst[:, :2].max(axis=1),
+        limit=1000.0 * limits.position_limit,
+        errors=1000.0 * errors[:, :2].max(axis=1),
+        driven=None if run is None else (run.metres, 1000.0 * run.two_sigma[:, :2].max(axis=1)),
     )
     heading = Limited(
-        "2σ of heading [°]",
-        np.degrees(worst[:, 2]),
-        math.degrees(limits.heading_limit),
-        np.degrees(errors[:, 2]),
-        None if run is None else (run.metres, np.degrees(run.two_sigma[:, 2])),
+        title="2σ of heading [°]",
+        levels=np.degrees(worst[:, 2]),
+        limit=math.degrees(limits.heading_limit),
+        errors=np.degrees(errors[:, 2]),
+        driven=None if run is None else (run.metres, np.degrees(run.two_sigma[:, 2])),
     )
     seen = np.minimum.reduceat(metres.seen, starts)
     alone = np.maximum.reduceat(metres.on_odometry, starts)
@@ -67,7 +67,13 @@ def _axis(route: RouteView, starts: np.ndarray) -> TrackAxis:
     shades = [theme.css(color) for color in palette()]
     fills = tuple(shades[index] for index in limit_classes(np.maximum.reduceat(route.limit_shares, starts)))
     metres = route.metres.metre[starts].astype(float)
-    return TrackAxis(prediction.drive.length, metres, fills, prediction.trips(), prediction.recoveries())
+    return TrackAxis(
+        length=prediction.drive.length,
+        metres=metres,
+        fills=fills,
+        stops=prediction.trips(),
+        recoveries=prediction.recoveries(),
+    )
 
 
 def _note(route: RouteView, run: DrivenMetres | None) -> str:

@@ -11,12 +11,12 @@ from commission.app.prediction.route_panel import RoutePanel
 from commission.app.prediction.service import PredictionService
 
 FEATURE = Feature(
-    "prediction",
+    name="prediction",
     reducers=(reducer,),
     services=(PredictionService,),
     layers=(RibbonLayer, EventLayer),
     panels=(
-        Docked(lambda at: RoutePanel(at.gui, at.post, at.container), PLAN, 20, folder="Along a route"),
-        Docked(lambda at: LimitLegend(at.gui), LEGEND, 14),
+        Docked(make=lambda at: RoutePanel(at.gui, at.post, at.container), tab=PLAN, rank=20, folder="Along a route"),
+        Docked(make=lambda at: LimitLegend(at.gui), tab=LEGEND, rank=14),
     ),
 )

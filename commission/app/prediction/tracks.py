@@ -24,7 +24,7 @@ TALL, LOW = 60.0, 34.0
 LABELS_PX = 12
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class TrackAxis:
     """The horizontal axis: metres of the route, and what happens at some of them."""
 
@@ -48,7 +48,7 @@ class TrackAxis:
         return self.x(np.append(self.metres, self.length))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Limited:
     """A quantity with a limit, on a logarithmic axis."""
 

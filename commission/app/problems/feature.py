@@ -10,12 +10,12 @@ from commission.app.problems.route_plots import RoutePlots
 from commission.app.problems.violation_layer import ViolationLayer
 
 FEATURE = Feature(
-    "problems",
+    name="problems",
     reducers=(reducer,),
     services=(Inspection,),
     layers=(ViolationLayer,),
     panels=(
-        Docked(lambda at: ProblemsPanel(at.gui, at.post, at.container), PROBLEMS),
-        Docked(lambda at: RoutePlots(at.gui, at.browser), ROUTE, own=True),
+        Docked(make=lambda at: ProblemsPanel(at.gui, at.post, at.container), tab=PROBLEMS),
+        Docked(make=lambda at: RoutePlots(at.gui, at.browser), tab=ROUTE, own=True),
     ),
 )

@@ -11,14 +11,14 @@ from commission.app.project.site_panel import SitePanel
 from commission.app.project.top_bar import ProjectButtons, TitlePanel
 
 FEATURE = Feature(
-    "project",
+    name="project",
     reducers=(reducer,),
     services=(ProjectFolder,),
     panels=(
-        Docked(lambda at: TitlePanel(at.gui, at.state), None, 0),
-        Docked(lambda at: ProjectButtons(at.gui, at.post), None, 30),
-        Docked(lambda at: SitePanel(at.gui, at.state.project), SITE, 0),
-        Docked(lambda at: ProjectFields(at.gui, at.post, at.state.project), SITE, 10, folder="Project"),
-        Docked(lambda at: CopyQuestionPanel(at.gui, at.post, at.browser), SITE, 10, own=True),
+        Docked(make=lambda at: TitlePanel(at.gui, at.state), tab=None, rank=0),
+        Docked(make=lambda at: ProjectButtons(at.gui, at.post), tab=None, rank=30),
+        Docked(make=lambda at: SitePanel(at.gui, at.state.project), tab=SITE, rank=0),
+        Docked(make=lambda at: ProjectFields(at.gui, at.post, at.state.project), tab=SITE, rank=10, folder="Project"),
+        Docked(make=lambda at: CopyQuestionPanel(at.gui, at.post, at.browser), tab=SITE, rank=10, own=True),
     ),
 )

@@ -44,7 +44,7 @@ def project_saved(action: actions.ProjectSaved, state: AppState, sender: Sender)
     saved = replace(state, saved=action.project, folder=action.folder, read_only="", last_edit=None, greeting="")
     keep: tuple[Effect, ...] = (KeepProjectIn(action.project, action.folder),) if is_elsewhere else ()
     told = Tell(f"saved in {action.folder}", failed=False, everywhere=True)
-    return Outcome(saved.with_part(FilesState(action.time_of_day)), (*keep, told))
+    return Outcome(saved.with_part(FilesState(saved_at=action.time_of_day)), (*keep, told))
 
 
 @reduce.register

@@ -8,7 +8,7 @@ from pathlib import Path
 from commission.app.project.actions import AskToReplace
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FilesState:
     """Saved when, and changed by whom."""
 

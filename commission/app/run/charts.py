@@ -41,7 +41,7 @@ class Limit:
     """CSS color."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Chart:
     """One plot."""
 
@@ -75,34 +75,34 @@ def _heading_errors(run: RunResult) -> FloatArray:
 
 CHARTS = (
     Chart(
-        "2σ of x, y [mm]",
-        (
+        title="2σ of x, y [mm]",
+        lines=(
             Line("x [mm]", TURQUOISE, lambda run: run.two_sigma[:, 0] * 1000.0),
             Line("y [mm]", ORANGE, lambda run: run.two_sigma[:, 1] * 1000.0),
         ),
-        (Limit("limit", lambda p: p.supervisor.position_limit * 1000.0),),
-        lambda p: (5.0 * p.supervisor.position_limit, 3000.0 * p.supervisor.position_limit),
+        limits=(Limit("limit", lambda p: p.supervisor.position_limit * 1000.0),),
+        span=lambda p: (5.0 * p.supervisor.position_limit, 3000.0 * p.supervisor.position_limit),
         is_logarithmic=True,
     ),
     Chart(
-        "2σ of heading [°]",
-        (Line("heading [°]", TURQUOISE, lambda run: np.degrees(run.two_sigma[:, 2])),),
-        (Limit("limit", lambda p: math.degrees(p.supervisor.heading_limit)),),
-        lambda p: (
+        title="2σ of heading [°]",
+        lines=(Line("heading [°]", TURQUOISE, lambda run: np.degrees(run.two_sigma[:, 2])),),
+        limits=(Limit("limit", lambda p: math.degrees(p.supervisor.heading_limit)),),
+        span=lambda p: (
             _decade_below(0.005 * math.degrees(p.supervisor.heading_limit)),
             3.0 * math.degrees(p.supervisor.heading_limit),
         ),
         is_logarithmic=True,
     ),
     Chart(
-        "NIS against gate",
-        (Line("largest NIS of a scan's inliers, 0: none", TURQUOISE, lambda run: np.nan_to_num(run.nis)),),
-        (Limit("gate", _gate),),
-        lambda p: (0.0, 1.4 * _gate(p)),
+        title="NIS against gate",
+        lines=(Line("largest NIS of a scan's inliers, 0: none", TURQUOISE, lambda run: np.nan_to_num(run.nis)),),
+        limits=(Limit("gate", _gate),),
+        span=lambda p: (0.0, 1.4 * _gate(p)),
     ),
     Chart(
-        "Inliers, outliers per scan",
-        (
+        title="Inliers, outliers per scan",
+        lines=(
             Line("inliers", theme.css(theme.INLIER), lambda run: run.counts[:, Status.INLIER].astype(float)),
             Line(
                 "outliers",
@@ -113,12 +113,14 @@ CHARTS = (
         least=4.0,
     ),
     Chart(
-        "Position error [mm]",
-        (Line("error against reference [mm]", theme.css(theme.REFERENCE), lambda run: run.position_errors * 1000.0),),
+        title="Position error [mm]",
+        lines=(
+            Line("error against reference [mm]", theme.css(theme.REFERENCE), lambda run: run.position_errors * 1000.0),
+        ),
     ),
     Chart(
-        "Heading error [°]",
-        (Line("error against reference [°]", theme.css(theme.REFERENCE), _heading_errors),),
+        title="Heading error [°]",
+        lines=(Line("error against reference [°]", theme.css(theme.REFERENCE), _heading_errors),),
         least=0.01,
     ),
 )

@@ -21,7 +21,7 @@ from commission.app.run.uncertainty_layer import UncertaintyLayer
 from commission.app.run.vehicle_layer import VehicleLayer
 
 FEATURE = Feature(
-    "run",
+    name="run",
     reducers=(reducer,),
     services=(RunService,),
     layers=(
@@ -35,12 +35,12 @@ FEATURE = Feature(
         ReferenceLayer,
     ),
     panels=(
-        Docked(lambda at: Badge(at.gui), None, 10),
-        Docked(lambda at: NowPanel(at.gui, at.browser), SELECTION, 60, own=True),
-        Docked(lambda at: RunPanel(at.gui, at.post, at.state), RUN),
-        Docked(lambda at: EditsPanel(at.gui, at.post, at.state), RUN, 10),
-        Docked(lambda at: EditsPanel(at.gui, at.post, at.state), TUNE, -10),
-        Docked(lambda at: TimeLine(at.gui, at.post, at.state.part(RunState).speed), TIME, 10),
-        Docked(lambda at: Plots(at.gui), TIME, 20),
+        Docked(make=lambda at: Badge(at.gui), tab=None, rank=10),
+        Docked(make=lambda at: NowPanel(at.gui, at.browser), tab=SELECTION, rank=60, own=True),
+        Docked(make=lambda at: RunPanel(at.gui, at.post, at.state), tab=RUN),
+        Docked(make=lambda at: EditsPanel(at.gui, at.post, at.state), tab=RUN, rank=10),
+        Docked(make=lambda at: EditsPanel(at.gui, at.post, at.state), tab=TUNE, rank=-10),
+        Docked(make=lambda at: TimeLine(at.gui, at.post, at.state.part(RunState).speed), tab=TIME, rank=10),
+        Docked(make=lambda at: Plots(at.gui), tab=TIME, rank=20),
     ),
 )

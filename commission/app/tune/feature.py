@@ -7,7 +7,7 @@ from commission.app.tune import reducer
 from commission.app.tune.tune_panel import TunePanel
 
 FEATURE = Feature(
-    "tune",
+    name="tune",
     reducers=(reducer,),
-    panels=(Docked(lambda at: TunePanel(at.gui, at.post, at.state), TUNE),),
+    panels=(Docked(make=lambda at: TunePanel(at.gui, at.post, at.state), tab=TUNE),),
 )

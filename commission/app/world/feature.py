@@ -7,7 +7,7 @@ from commission.app.world import reducer
 from commission.app.world.world_panel import WorldPanel
 
 FEATURE = Feature(
-    "world",
+    name="world",
     reducers=(reducer,),
-    panels=(Docked(lambda at: WorldPanel(at.gui, at.post, at.state), RUN, 20, folder="Virtual world"),),
+    panels=(Docked(make=lambda at: WorldPanel(at.gui, at.post, at.state), tab=RUN, rank=20, folder="Virtual world"),),
 )

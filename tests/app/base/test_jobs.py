@@ -110,7 +110,7 @@ def test_progress_beyond_its_range_is_clipped(owner: Owner) -> None:
 
 def test_a_job_cannot_claim_a_part_outside_zero_to_one() -> None:
     with pytest.raises(ValueError, match="expected 0 to 1"):
-        Job(1, "Coverage", fraction=1.5)
+        Job(number=1, name="Coverage", fraction=1.5)
 
 
 def test_an_error_of_the_users_is_reported_as_it_is(owner: Owner, caplog: pytest.LogCaptureFixture) -> None:

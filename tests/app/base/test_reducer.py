@@ -36,7 +36,7 @@ GATE = "association.gate_probability"
 @pytest.fixture
 def state() -> AppState:
     project = room()
-    return AppState(project, project, folder=Path("hall"))
+    return AppState(project=project, saved=project, folder=Path("hall"))
 
 
 def gate(state: AppState) -> ParameterValue:
@@ -97,7 +97,7 @@ def test_saving_writes_into_the_projects_folder_and_is_remembered_when_done(stat
 
 
 def test_a_bundled_project_is_not_written_without_a_folder(state: AppState) -> None:
-    bundled = AppState(state.project, state.project, folder=None)
+    bundled = AppState(project=state.project, saved=state.project, folder=None)
     with pytest.raises(UsageError, match="bundled"):
         after(bundled, Save())
     assert after(bundled, Save(Path("copy"))).effects

@@ -44,7 +44,7 @@ def covered(project: Project, heading: Heading) -> Covered:
 
 
 def after(project: Project, *wishes: Action) -> CoverageSettings:
-    return outcome(joined(AppState(project, project)), *wishes).state.part(CoverageSettings)
+    return outcome(joined(AppState(project=project, saved=project)), *wishes).state.part(CoverageSettings)
 
 
 @pytest.mark.parametrize("heading", list(Heading))

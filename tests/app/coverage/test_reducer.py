@@ -21,7 +21,7 @@ VISIBLE = SetCoverage("figure", "visible")
 
 
 def after(project: Project, *wishes: Action) -> AppState:
-    return outcome(joined(AppState(project, project)), *wishes).state
+    return outcome(joined(AppState(project=project, saved=project)), *wishes).state
 
 
 def settings(project: Project, *wishes: Action) -> CoverageSettings:

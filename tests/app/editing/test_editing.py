@@ -27,7 +27,7 @@ RADIUS = 0.04
 @pytest.fixture
 def state() -> AppState:
     project = room()
-    return joined(AppState(project, project, folder=Path("hall")))
+    return joined(AppState(project=project, saved=project, folder=Path("hall")))
 
 
 def click(x: float, y: float, *, add: bool = False, browser: int = ME) -> Envelope:
@@ -37,7 +37,7 @@ def click(x: float, y: float, *, add: bool = False, browser: int = ME) -> Envelo
 def drag(start: tuple[float, float], end: tuple[float, float], *, add: bool = False) -> tuple[DragFloor, ...]:
     half = (0.5 * (start[0] + end[0]), 0.5 * (start[1] + end[1]))
     steps = (("start", start), ("update", half), ("end", end))
-    return tuple(DragFloor(phase, start, now, REACH, add) for phase, now in steps)
+    return tuple(DragFloor(phase=phase, start=start, now=now, reach=REACH, add=add) for phase, now in steps)
 
 
 def place(tool: Tool = PLACE, browser: int = ME) -> Envelope:

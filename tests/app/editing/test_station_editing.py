@@ -41,13 +41,17 @@ def click(x: float, y: float) -> ClickFloor:
 
 
 def drag(start: tuple[float, float], end: tuple[float, float]) -> tuple[DragFloor, ...]:
-    return DragFloor("start", start, start, REACH), DragFloor("end", start, end, REACH)
+    return DragFloor(phase="start", start=start, now=start, reach=REACH), DragFloor(
+        phase="end", start=start, now=end, reach=REACH
+    )
 
 
 @pytest.fixture
 def state() -> AppState:
     project = room()
-    return after(joined(AppState(project, project, folder=Path("hall"))), actions.ChooseTool(StationTool()))
+    return after(
+        joined(AppState(project=project, saved=project, folder=Path("hall"))), actions.ChooseTool(StationTool())
+    )
 
 
 @pytest.fixture
@@ -99,7 +103,7 @@ def test_the_tip_turns_a_station_and_leaves_its_place(placed: AppState) -> None:
 
 def test_while_it_is_dragged_the_page_says_where_it_would_stand(placed: AppState) -> None:
     begin, _ = drag((3.0, 5.0), (4.0, 6.0))
-    on = DragFloor("update", (3.0, 5.0), (4.0, 6.0), REACH)
+    on = DragFloor(phase="update", start=(3.0, 5.0), now=(4.0, 6.0), reach=REACH)
     dragging = after(placed, begin, on)
     assert hint(dragging, ME) == "Station 1 to x 4.000 m, y 6.000 m, heading 0.0°"
 

@@ -15,7 +15,7 @@ from tests.app.sites import room
 
 
 def pending(imported: Imported) -> Pending:
-    return Pending(Pasted(""), WHOLE, imported, compare(room(), imported))
+    return Pending(source=Pasted(""), choice=WHOLE, imported=imported, found=compare(room(), imported))
 
 
 def test_added_and_moved_reflectors_are_drawn_where_they_would_stand() -> None:

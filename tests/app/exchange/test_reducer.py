@@ -39,7 +39,7 @@ DETOUR = Route("Detour", (Segment(control_points=np.array([[2.0, 2.0], [4.0, 6.0
 @pytest.fixture
 def state() -> AppState:
     project = room()
-    return joined(AppState(project, project, folder=Path("hall")))
+    return joined(AppState(project=project, saved=project, folder=Path("hall")))
 
 
 def table(*reflectors: Reflector, fields: tuple[str, ...] = COLUMNS) -> ReflectorImport:

@@ -25,7 +25,7 @@ from tests.app.owning import Owner
 from tests.app.sites import room
 
 ASKING = Sender(3)
-STATE = joined(AppState(room(), room()), 3)
+STATE = joined(AppState(project=room(), saved=room()), 3)
 TABLE = b"id,x,y,radius\nA,1,2,0.04\n"
 
 

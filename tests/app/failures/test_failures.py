@@ -71,7 +71,7 @@ def test_ranking_anew_begins_with_nothing_failed(bench: Bench[FailureService]) -
 
 def test_an_unknown_reflector_cannot_fail(project: Project) -> None:
     with pytest.raises(UsageError, match="Nobody"):
-        after(AppState(project, project), AlsoFails("Nobody"))
+        after(AppState(project=project, saved=project), AlsoFails("Nobody"))
 
 
 def test_it_is_said_of_a_reflector_that_no_route_sees_it(bench: Bench[FailureService], project: Project) -> None:

@@ -38,9 +38,9 @@ DRAWING = Drawing(
 )
 WHITE = np.full((40, 60), 255, np.uint8)
 DRAFTS = {
-    "drawing": MapDraft(MapFile(Path(f"{NASTY}.dxf")), DRAWING),
-    "model": MapDraft(MapFile(Path("a.stl")), Model(Path("a.stl"), np.arange(9.0).reshape(1, 3, 3))),
-    "picture": MapDraft(MapFile(Path("a.png")), Picture(WHITE, WHITE), stage=Stage(0.1, 0.0, 4.0)),
+    "drawing": MapDraft(file=MapFile(Path(f"{NASTY}.dxf")), read=DRAWING),
+    "model": MapDraft(file=MapFile(Path("a.stl")), read=Model(Path("a.stl"), np.arange(9.0).reshape(1, 3, 3))),
+    "picture": MapDraft(file=MapFile(Path("a.png")), read=Picture(WHITE, WHITE), stage=Stage(0.1, 0.0, 4.0)),
 }
 
 
@@ -129,7 +129,7 @@ def test_a_layer_among_hundreds_is_found_by_a_part_of_its_name(server: viser.Vis
         layer_of=np.array([200, 200, 0], np.int32),
         warnings=(),
     )
-    fields.show(MapDraft(MapFile(Path("a.dxf")), drawing))
+    fields.show(MapDraft(file=MapFile(Path("a.dxf")), read=drawing))
     assert sum(line.visible for line in fields._rows._buttons) == MOST_LAYERS
     assert "of 201 layers" in fields._rest.content
     change(labelled(server, "Find"), "wall")
@@ -155,7 +155,7 @@ def test_names_of_files_are_shown_as_text() -> None:
 
 def test_why_a_file_is_no_floor_map_is_shown_as_text_and_to_the_browser_that_asked(server: viser.ViserServer) -> None:
     mine, other = (MapTroublePanel(server.gui, number) for number in (1, 2))
-    state = AppState(Project(name="x"), Project(name="x")).joined(1).joined(2)
+    state = AppState(project=Project(name="x"), saved=Project(name="x")).joined(1).joined(2)
     view = view_of(state.with_browser(1, MapTrouble(NASTY)), jobs=(), waiting=())
     for panel in (mine, other):
         panel.draw_slowly(view)
@@ -187,12 +187,17 @@ def test_the_difference_of_distances_is_told_in_millimetres_with_what_is_allowed
 def test_progress_and_cancel_appear_while_a_file_is_read(server: viser.ViserServer) -> None:
     posted: list[Action] = []
     panel = FloorMapPanel(server.gui, taking(posted), Project())
-    state = AppState(Project(), Project())
-    panel.draw(view_of(state, jobs=(Job(1, "Coverage", fraction=0.2), Job(2, "Reading hall.dxf", fraction=0.4))))
+    state = AppState(project=Project(), saved=Project())
+    panel.draw(
+        view_of(
+            state,
+            jobs=(Job(number=1, name="Coverage", fraction=0.2), Job(number=2, name="Reading hall.dxf", fraction=0.4)),
+        )
+    )
     assert (panel._bar.visible, panel._bar.value, panel._cancel.visible) == (True, 40.0, True)
     change(panel._cancel, True)
     assert posted == [actions.StopMapJob()]
-    panel.draw(view_of(state, jobs=(Job(1, "Coverage", fraction=0.2),)))
+    panel.draw(view_of(state, jobs=(Job(number=1, name="Coverage", fraction=0.2),)))
     assert (panel._bar.visible, panel._cancel.visible) == (False, False)
 
 
@@ -215,9 +220,9 @@ def test_an_image_is_shown_as_the_walls_that_it_would_become(server: viser.Viser
     assert (preview(picture, 0.3, light_walls=False)[-1] == PAPER).all()
     layer = MapDraftLayer(server.scene)
     draft = replace(DRAFTS["picture"], pixels=((30.0, 20.0),))
-    state = AppState(Project(), Project()).with_part(MapLoading(draft=draft))
+    state = AppState(project=Project(), saved=Project()).with_part(MapLoading(draft=draft))
     layer.draw(view_of(state))
     assert {node.name for node in layer.nodes()} == {"/draft/image", "/draft/points", "/draft/line", "/draft/A"}
     np.testing.assert_allclose(layer.nodes()[0].position[:2], (3.0, 2.0))
-    layer.draw(view_of(AppState(Project(), Project())))
+    layer.draw(view_of(AppState(project=Project(), saved=Project())))
     assert layer.nodes() == ()

@@ -44,8 +44,11 @@ class Loading:
     def __init__(self) -> None:
         self.edits: list[str] = []
         note = partial(Noting, self.edits)
-        features = (*(feature for feature in FEATURES if feature.name != "run"), Feature("noting", services=(note,)))
-        self.runtime = Runtime(AppState(Project(name="New"), Project(name="New")), features)
+        features = (
+            *(feature for feature in FEATURES if feature.name != "run"),
+            Feature(name="noting", services=(note,)),
+        )
+        self.runtime = Runtime(AppState(project=Project(name="New"), saved=Project(name="New")), features)
         self.runtime.handle(by(ME, Join()))
 
     @property

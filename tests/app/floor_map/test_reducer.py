@@ -41,7 +41,7 @@ PICTURE = Picture(np.full((100, 200), 255, np.uint8), np.full((100, 200), 255, n
 @pytest.fixture
 def state() -> AppState:
     project = room()
-    return joined(AppState(project, project, folder=Path("hall")))
+    return joined(AppState(project=project, saved=project, folder=Path("hall")))
 
 
 def click(x: float, y: float) -> ClickFloor:
@@ -203,7 +203,7 @@ def test_a_wall_is_drawn_by_clicks_and_enter_in_one_undo_step(state: AppState) -
 
 def rectangle(start: tuple[float, float], end: tuple[float, float]) -> tuple[DragFloor, ...]:
     steps = (("start", start), ("update", end), ("end", end))
-    return tuple(DragFloor(phase, start, now, REACH) for phase, now in steps)
+    return tuple(DragFloor(phase=phase, start=start, now=now, reach=REACH) for phase, now in steps)
 
 
 def test_clutter_is_erased_by_a_rectangle_and_a_polygon_becomes_an_obstacle(state: AppState) -> None:
@@ -238,7 +238,7 @@ def test_too_few_points_are_refused_and_kept(state: AppState) -> None:
 
 
 def test_walls_can_be_drawn_before_there_is_a_map() -> None:
-    empty = joined(AppState(Project(name="New"), Project(name="New")))
+    empty = joined(AppState(project=Project(name="New"), saved=Project(name="New")))
     drawn = after(empty, use(WallTool()), click(0.0, 0.0), click(10.0, 0.0), editing.Finish()).state
     assert drawn.project.floor_map is not None
     with pytest.raises(UsageError, match="no floor map to erase in"):
@@ -296,7 +296,7 @@ def test_maps_of_many_undo_steps_take_bounded_memory_and_all_come_back() -> None
     side = 4000
     first = FloorMap(np.zeros((side, side), np.int8), 0.05)
     project = Project(name="Large", floor_map=first)
-    state = after(joined(AppState(project, project)), use(ObstacleTool())).state
+    state = after(joined(AppState(project=project, saved=project)), use(ObstacleTool())).state
     steps = MAP_BYTES // side**2 + 3
     seen = [first]
     for number in range(steps):

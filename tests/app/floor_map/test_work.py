@@ -34,7 +34,7 @@ from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.project import Project
 from tests.io.large_files import write_drawing, write_stl
 
-STATE = AppState(Project(), Project())
+STATE = AppState(project=Project(), saved=Project())
 HALL = FloorMap(np.where(np.eye(30, 40, dtype=bool), np.int8(OCCUPIED), np.int8(FREE)), 0.05, np.array([1.0, 2.0, 0.0]))
 
 
@@ -55,7 +55,7 @@ def drawn(file: MapFile, options: MapOptions, reading: ReadOptions | None = None
     """The floor map that a file becomes."""
     opened = outcome(file, reading)
     assert isinstance(opened, MapOpened), opened
-    made = draw(DrawMap(replace(MapDraft(file, opened.read, options=options), **changes)), silent)
+    made = draw(DrawMap(replace(MapDraft(file=file, read=opened.read, options=options), **changes)), silent)
     assert isinstance(made, MapMade), made
     return made.floor_map
 
@@ -142,7 +142,7 @@ def test_an_image_becomes_walls_at_the_place_and_scale_of_its_two_points(tmp_pat
     assert not floor_map.occupancy().is_occupied([(2.8, 5.0), (3.2, 5.0)]).any()
     opened = outcome(uploaded(tmp_path / "plan.png"))
     assert isinstance(opened, MapOpened)
-    unplaced = draw(DrawMap(MapDraft(opened.file, opened.read)), silent)
+    unplaced = draw(DrawMap(MapDraft(file=opened.file, read=opened.read)), silent)
     assert isinstance(unplaced, MapFailed) and "expected two points" in unplaced.text
 
 
@@ -162,7 +162,7 @@ def test_broken_files_say_in_one_line_what_is_wrong_under_the_name_that_they_hav
     shutil.rmtree(tmp_path / "folder.png")
     opened = outcome(MapFile(plan(tmp_path, lambda document: None)))
     assert isinstance(opened, MapOpened)
-    empty = draw(DrawMap(MapDraft(opened.file, opened.read)), silent)
+    empty = draw(DrawMap(MapDraft(file=opened.file, read=opened.read)), silent)
     assert isinstance(empty, MapFailed) and "holds no lines to draw" in empty.text
 
 
@@ -220,11 +220,11 @@ def test_a_large_file_loads_as_a_job_with_progress_and_is_stopped_on_the_way(tmp
         assert isinstance(opened.read, Model)
         assert len(opened.read.triangles) == (100_000_000 - 84) // 50
     assert len({round(fraction, 1) for fraction in whole.fractions}) >= 4
-    made = Stopping(None).run(DrawMap(MapDraft(opened.file, opened.read))).result
+    made = Stopping(None).run(DrawMap(MapDraft(file=opened.file, read=opened.read))).result
     assert isinstance(made, MapMade)
     # The corners were drawn over 180 x 80 m, with 1 m of floor around.
     assert made.floor_map.size == pytest.approx((182.0, 82.0), rel=0.1)
-    for effect in (ReadMapFile(MapFile(path)), DrawMap(MapDraft(opened.file, opened.read))):
+    for effect in (ReadMapFile(MapFile(path)), DrawMap(MapDraft(file=opened.file, read=opened.read))):
         stopped = Stopping(2)
         assert stopped.run(effect).job.state is JobState.CANCELLED
         assert max(stopped.fractions) < 0.9

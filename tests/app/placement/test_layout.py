@@ -73,7 +73,7 @@ def bench(project: Project) -> Iterator[Bench[PlacementService]]:
 
 def test_demands_are_set_by_the_names_they_have_in_planning(project: Project) -> None:
     state = after(
-        AppState(project, project),
+        AppState(project=project, saved=project),
         SetLayout("demands.visible", 3),
         SetLayout("demands.position_limit", 0.05),
         SetLayout("candidates.spacing", 2.0),
@@ -92,12 +92,12 @@ def test_demands_are_set_by_the_names_they_have_in_planning(project: Project) ->
 
 def test_a_slide_over_many_values_is_one_undo_step(project: Project) -> None:
     slide = [by(ME, SetLayout("candidates.spacing", 0.1 * step), 10.0 + 0.1 * step) for step in range(1, 9)]
-    assert len(after(AppState(project, project), *slide).undo) == 1
+    assert len(after(AppState(project=project, saved=project), *slide).undo) == 1
 
 
 def test_a_route_that_does_not_count_keeps_to_it_under_another_name(project: Project) -> None:
     route = project.routes[0].name
-    state = after(joined(AppState(project, project)), CountRoute(route, counts=False))
+    state = after(joined(AppState(project=project, saved=project)), CountRoute(route, counts=False))
     assert state.project.layout.ignored_routes == (route,)
     state = after(state, SelectControlPoint(ControlPoint(route)), RenameRoute("Round"))
     assert state.project.layout.ignored_routes == ("Round",)
@@ -117,12 +117,12 @@ def test_a_route_that_does_not_count_keeps_to_it_under_another_name(project: Pro
 )
 def test_demands_that_do_not_exist_or_are_out_of_range_are_refused(project: Project, wish: Action) -> None:
     with pytest.raises((UsageError, ValueError)):
-        after(AppState(project, project), wish)
+        after(AppState(project=project, saved=project), wish)
 
 
 def test_an_area_is_drawn_by_a_drag_and_freed_by_a_click_in_it(project: Project) -> None:
-    drag = [DragFloor(phase, (4.0, 5.0), (2.0, 7.0), 0.1) for phase in ("start", "update", "end")]
-    state = after(joined(AppState(project, project)), ChooseTool(KeepOutTool()), *drag)
+    drag = [DragFloor(phase=phase, start=(4.0, 5.0), now=(2.0, 7.0), reach=0.1) for phase in ("start", "update", "end")]
+    state = after(joined(AppState(project=project, saved=project)), ChooseTool(KeepOutTool()), *drag)
     assert kept_out(state) == ((2.0, 5.0, 4.0, 7.0),)
     assert [step.name for step in state.undo] == ["keep an area free of reflectors"]
     assert state.of_browser(ME, Editor).selected == ()
@@ -131,7 +131,9 @@ def test_an_area_is_drawn_by_a_drag_and_freed_by_a_click_in_it(project: Project)
 
 
 def test_a_click_is_no_area_and_all_areas_are_freed_together(project: Project) -> None:
-    state = after(AppState(project, project), KeepOut((1.0, 1.0, 1.01, 3.0)), KeepOut((1.0, 1.0, 2.0, 3.0)))
+    state = after(
+        AppState(project=project, saved=project), KeepOut((1.0, 1.0, 1.01, 3.0)), KeepOut((1.0, 1.0, 2.0, 3.0))
+    )
     assert len(kept_out(state)) == 1
     assert kept_out(after(state, FreeAreas())) == ()
 
@@ -174,13 +176,13 @@ def test_without_a_route_or_a_wall_it_is_said_what_is_missing(project: Project) 
     with pytest.raises(UsageError, match="no floor map"):
         suggest(open_field)
     with pytest.raises(UsageError, match="no floor map"):
-        after(AppState(open_field, open_field), AskLayout())
+        after(AppState(project=open_field, saved=open_field), AskLayout())
 
 
 def test_accepting_is_one_undo_step_and_undo_brings_the_old_ones_back(
     project: Project, suggestion: PlacementResult
 ) -> None:
-    state = after(AppState(project, project), AskLayout())
+    state = after(AppState(project=project, saved=project), AskLayout())
     accepted = after(state, AcceptLayout(suggestion))
     assert [step.name for step in accepted.undo] == [ACCEPT]
     assert accepted.project.reflectors == suggestion.placement.reflectors
@@ -191,7 +193,7 @@ def test_accepting_is_one_undo_step_and_undo_brings_the_old_ones_back(
 def test_a_layout_for_other_reflectors_is_not_accepted(project: Project, suggestion: PlacementResult) -> None:
     other = replace(project, reflectors=replace(project.reflectors, reflectors=project.reflectors.reflectors[1:]))
     with pytest.raises(UsageError, match="suggest it again"):
-        after(AppState(other, other), AcceptLayout(suggestion))
+        after(AppState(project=other, saved=other), AcceptLayout(suggestion))
 
 
 def test_it_is_looked_for_in_the_background_shown_and_dropped(bench: Bench[PlacementService]) -> None:

@@ -24,7 +24,7 @@ class Watch(Owner[Inspection]):
 
     def __init__(self) -> None:
         project = room()
-        self.state = joined(AppState(project, project))
+        self.state = joined(AppState(project=project, saved=project))
         super().__init__(Inspection, self.state)
         self.do()
 

@@ -34,7 +34,7 @@ def server():
 
 def view(route: str | None, violations: tuple[Violation, ...] = VIOLATIONS) -> PageView:
     point = None if route is None else ControlPoint(route)
-    state = joined(AppState(ROOM, ROOM)).with_browser(ME, Editor(point=point))
+    state = joined(AppState(project=ROOM, saved=ROOM)).with_browser(ME, Editor(point=point))
     return view_of(state, InspectionView(violations=violations, profiles={ROUTE.name: PROFILE}))
 
 
@@ -103,7 +103,7 @@ def test_every_violated_stretch_is_drawn_with_the_outline_where_it_is_worst(serv
 def test_a_route_of_another_name_leaves_the_plots_of_this_one_empty(server) -> None:
     panel = RoutePlots(server.gui, ME)
     renamed = Route("Other", ROUTE.segments)
-    state = joined(AppState(replace(ROOM, routes=(ROUTE, renamed)), ROOM)).with_browser(
+    state = joined(AppState(project=replace(ROOM, routes=(ROUTE, renamed)), saved=ROOM)).with_browser(
         ME, Editor(point=ControlPoint("Other"))
     )
     panel.draw_slowly(view_of(state, InspectionView(profiles={ROUTE.name: PROFILE})))

@@ -114,7 +114,7 @@ def server():
 
 def drawn(plots: Plots, project: Project, playback: Playback) -> list[np.ndarray]:
     """What the first plot holds: axis, x and its pale part, y and its pale part, limit, marks."""
-    plots.draw_slowly(view_of(AppState(project, project), playback.view(covered=False)))
+    plots.draw_slowly(view_of(AppState(project=project, saved=project), playback.view(covered=False)))
     return [np.asarray(part) for part in plots._plots[0].data]
 
 

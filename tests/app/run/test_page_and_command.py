@@ -49,7 +49,7 @@ def written(folders: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory
 def shown(folders: tuple[Path, Path]) -> RunView:
     """The page at the end of the same recording."""
     project = load_project(folders[0])
-    state = AppState(project, project)
+    state = AppState(project=project, saved=project)
     source = RecordedDrive(folders[1])
     owner = Owner(lambda context: RunService(context, compile_all=lambda _progress: None), state)
     owner.service.carry_out(LoadSource(source), state, PROGRAM)

@@ -36,7 +36,7 @@ class RunBench:
     def __init__(self, project: Project, drive: Drive) -> None:
         self.now = 0.0
         self.drives = [drive]
-        self.state = AppState(project, project)
+        self.state = AppState(project=project, saved=project)
         self.owner = Owner(self._make, self.state)
 
     def _make(self, context: Context) -> RunService:

@@ -56,7 +56,7 @@ def test_every_number_of_the_virtual_world_has_one_widget_that_sets_it_in_its_un
     names |= {f"wheels.{field.name}" for field in dataclasses.fields(WheelNoise)}
     names |= {f"constants.{field.name}" for field in dataclasses.fields(ConstantErrors)} - IN_FILE
     assert {name.partition("[")[0] for name in FIELDS} == names
-    state, posted, server = joined(AppState(project, project)), [], start_server("127.0.0.1", 0)
+    state, posted, server = joined(AppState(project=project, saved=project)), [], start_server("127.0.0.1", 0)
     try:
         panel = WorldPanel(server.gui, taking(posted), state)
         widgets = [each for each in server.gui._gui_input_handle_from_uuid.values() if getattr(each, "label", "")]
@@ -82,7 +82,7 @@ def test_every_number_of_the_virtual_world_has_one_widget_that_sets_it_in_its_un
 
 
 def test_an_edit_of_the_virtual_world_is_one_step_that_is_undone_and_tunes_nothing(project: Project) -> None:
-    state = joined(AppState(project, project))
+    state = joined(AppState(project=project, saved=project))
     for name, value in (("wheels.lateral_per_sqrt_m", 0.05), ("constants.mounting_sigma[2]", 0.01)):
         changed = after(state, SetDisturbance(name, value)).state
         assert changed.project.disturbances != project.disturbances
@@ -92,7 +92,7 @@ def test_an_edit_of_the_virtual_world_is_one_step_that_is_undone_and_tunes_nothi
 
 
 def test_what_is_no_disturbance_or_out_of_bounds_is_refused(project: Project) -> None:
-    state: Any = joined(AppState(project, project))
+    state: Any = joined(AppState(project=project, saved=project))
     with pytest.raises(UsageError, match=r"no disturbance is called 'wheels.up'; expected one of: wheels.forward"):
         after(state, SetDisturbance("wheels.up", 1.0))
     with pytest.raises(ValueError, match=r"wheels.lateral_per_sqrt_m is -1; expected 0"):
@@ -100,7 +100,7 @@ def test_what_is_no_disturbance_or_out_of_bounds_is_refused(project: Project) ->
 
 
 def test_the_next_drive_is_that_of_the_world_as_it_is_now(project: Project) -> None:
-    state = joined(AppState(project, project))
+    state = joined(AppState(project=project, saved=project))
     noisy = after(state, SetDisturbance("wheels.lateral_per_sqrt_m", 0.05)).state.project
     source = VirtualDrive(project.routes[0].name, seed=1)
     one, other = (prepare(each, source, silent).log for each in (project, noisy))

@@ -247,8 +247,8 @@ PAGE = (
     Mutant(
         name="heatmap shows two sigma as one",
         file=FOLDER + "coverage/scale.py",
-        find='ShownFigure("Position error, 1σ [mm]", "mm", 1000.0)',
-        replace='ShownFigure("Position error, 1σ [mm]", "mm", 2000.0)',
+        find='label="Position error, 1σ [mm]", unit="mm", factor=1000.0',
+        replace='label="Position error, 1σ [mm]", unit="mm", factor=2000.0',
         tests=(
             NUMBERS + "test_a_figure_of_the_floor_is_read_in_its_unit",
             NUMBERS + "test_a_color_begins_at_the_bound_that_its_legend_names",
@@ -257,8 +257,8 @@ PAGE = (
     Mutant(
         name="heading of the heatmap in milliradians",
         file=FOLDER + "coverage/scale.py",
-        find='"°", math.degrees(1.0))',
-        replace='"°", 1000.0)',
+        find='unit="°", factor=math.degrees(1.0))',
+        replace='unit="°", factor=1000.0)',
         tests=(NUMBERS + "test_a_figure_of_the_floor_is_read_in_its_unit",),
     ),
     Mutant(
