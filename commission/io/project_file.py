@@ -33,8 +33,10 @@ from commission.site.scanner import Scanner
 from commission.site.stations import Station
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
 
-SCHEMA = 1
-"""Version of the format that this program writes and reads."""
+SCHEMA = 2
+"""Version of the format that this program writes."""
+SCHEMAS = (1, SCHEMA)
+"""Versions that it reads: 1 has one `scanner`, 2 has `scanners`."""
 FILE_NAME = "project.yaml"
 
 VEHICLES: dict[str, type[Vehicle]] = {
@@ -57,7 +59,9 @@ class ProjectDocument:
     vehicle: dict[str, Any] | None = None
     """Wheels and outline; `kind` says which vehicle."""
     scanner: Scanner = field(default_factory=Scanner)
-    """The laser scanner."""
+    """The only laser scanner, as files of schema 1 have it."""
+    scanners: tuple[Scanner, ...] = ()
+    """The laser scanners."""
     routes: tuple[Route, ...] = ()
     """Planned routes."""
     parameters: Parameters = field(default_factory=Parameters)
@@ -140,7 +144,7 @@ def load_project(path: Path, found: Findings | None = None) -> Project:
             reflectors=_reflectors(document, keys.reflectors, found),
             routes=keys.routes,
             vehicle=_vehicle(document, keys.vehicle),
-            scanner=keys.scanner,
+            scanners=_scanners(document, keys),
             parameters=keys.parameters,
             disturbances=_disturbances(document, keys),
             stations=keys.stations,
@@ -205,8 +209,9 @@ def _read_document(yaml_path: Path) -> tuple[YamlDocument, ProjectDocument]:
     value = document.value
     if not isinstance(value, dict) or "schema" not in value:
         raise document.error(("schema",), "is missing", f"a mapping that begins with `schema: {SCHEMA}`")
-    if value["schema"] != SCHEMA or isinstance(value["schema"], bool):
-        raise document.error(("schema",), f"is {value['schema']!r}", f"{SCHEMA}, the version this program knows")
+    if value["schema"] not in SCHEMAS or isinstance(value["schema"], bool):
+        known = " or ".join(map(str, SCHEMAS))
+        raise document.error(("schema",), f"is {value['schema']!r}", f"{known}, the versions this program knows")
     return document, convert(document, ProjectDocument)
 
 
@@ -227,6 +232,15 @@ def _disturbances(document: YamlDocument, keys: ProjectDocument) -> Disturbances
         return keys.disturbances
     wheels = WheelNoise.believed(keys.parameters.odometry)
     return dataclasses.replace(keys.disturbances, wheels=wheels)
+
+
+def _scanners(document: YamlDocument, keys: ProjectDocument) -> tuple[Scanner, ...]:
+    """The scanners; a file of schema 1 has one or none."""
+    if "scanners" not in document.value:
+        return (keys.scanner,)
+    if "scanner" in document.value:
+        raise document.error(("scanner",), "is given besides `scanners`", "all scanners in the list `scanners`")
+    return keys.scanners
 
 
 def _floor_map(document: YamlDocument, name: str | None, found: Findings | None) -> FloorMap | None:

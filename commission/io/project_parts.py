@@ -31,9 +31,9 @@ from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
 
-_LISTS = {"reflectors": "id", "routes": "name", "stations": "name"}
+_LISTS = {"reflectors": "id", "scanners": "name", "routes": "name", "stations": "name"}
 """Parts that are lists, and the field that tells their elements apart."""
-_WHOLE = ("name", "scanner", "parameters", "disturbances", "layout")
+_WHOLE = ("name", "parameters", "disturbances", "layout")
 """Parts that are written as they are."""
 
 
@@ -43,9 +43,11 @@ class _Parts:
 
     name: str = ""
     scanner: Scanner = field(default_factory=Scanner)
+    """The only one, in journals of old."""
     parameters: Parameters = field(default_factory=Parameters)
     disturbances: Disturbances = field(default_factory=Disturbances)
     layout: LayoutBrief = field(default_factory=LayoutBrief)
+    scanners: tuple[Scanner, ...] = ()
     reflectors: tuple[Reflector, ...] = ()
     routes: tuple[Route, ...] = ()
     stations: tuple[Station, ...] = ()
@@ -105,7 +107,7 @@ def apply(project: Project, values: dict[str, Any], path: Path) -> Project:
 
 
 def _apply(project: Project, values: dict[str, Any], path: Path) -> Project:
-    plain = {name: values[name] for name in _WHOLE if name in values}
+    plain = {name: values[name] for name in (*_WHOLE, "scanner") if name in values}
     for name in _LISTS:
         if name in values:
             part = values[name]
@@ -117,6 +119,8 @@ def _apply(project: Project, values: dict[str, Any], path: Path) -> Project:
         odometry = new["parameters"].odometry if "parameters" in new else None
         wheels = project.disturbances.wheels if odometry is None else WheelNoise.believed(odometry)
         new["disturbances"] = dataclasses.replace(parts.disturbances, wheels=wheels)
+    if "scanner" in values:
+        new["scanners"] = (parts.scanner,)
     if "vehicle" in values:
         keys = {key: value for key, value in values["vehicle"].items() if key != "kind"}
         kind = VEHICLES[values["vehicle"]["kind"]]

@@ -31,7 +31,7 @@ LAST_NS = 2**63 - 1
 
 def warm_up() -> None:
     """Compile every kernel that a live localizer needs, by feeding it one record of each kind."""
-    setup = LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), Scanner(), Parameters())
+    setup = LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), (Scanner(),), Parameters())
     localizer = Localizer(setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3)))
     localizer.feed(Odometry(0, np.zeros(3)))
     localizer.feed(Odometry(1, np.zeros(3)))

@@ -36,12 +36,12 @@ class FilterModel(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LocalizerSetup:
-    """Reflector map, scanner and parameters of a localizer; kernels read `filter` and `detector`."""
+    """Reflector map, scanners and parameters of a localizer; kernels read `filter` and `detector`."""
 
     reflectors: ReflectorMap
     """The reflector map M_B."""
-    scanner: Scanner
-    """Mounting and resolution of the scanner."""
+    scanners: tuple[Scanner, ...]
+    """Mounting and resolution of the scanners."""
     parameters: Parameters
     """Tunables of every stage."""
     filter: FilterModel = field(init=False, repr=False)
@@ -55,7 +55,7 @@ class LocalizerSetup:
         index = build_index(self.reflectors)
         model = FilterModel(
             odometry_noise(self.parameters.odometry),
-            observation_model(self.scanner, self.parameters.observation),
+            observation_model(self.scanners[0], self.parameters.observation),
             index.cells,
             gate_of(self.parameters.association),
             supervisor_limits(self.parameters.supervisor),
@@ -63,7 +63,7 @@ class LocalizerSetup:
         )
         object.__setattr__(self, "index", index)
         object.__setattr__(self, "filter", model)
-        detector = detector_model(self.reflectors, self.scanner, self.parameters.detector)
+        detector = detector_model(self.reflectors, self.scanners[0], self.parameters.detector)
         object.__setattr__(self, "detector", detector)
 
     def __eq__(self, other: object) -> bool:
@@ -72,7 +72,7 @@ class LocalizerSetup:
             return NotImplemented
         return (
             self.parameters == other.parameters
-            and self.scanner == other.scanner
+            and self.scanners == other.scanners
             and self.reflectors == other.reflectors
         )
 
@@ -85,7 +85,7 @@ class LocalizerSetup:
     @staticmethod
     def of(project: Project) -> LocalizerSetup:
         """Return the setup of a project."""
-        return LocalizerSetup(project.reflectors, project.scanner, project.parameters)
+        return LocalizerSetup(project.reflectors, project.scanners, project.parameters)
 
     def validation_ellipses(self, belief: Belief) -> FloatArray:
         """(N, 2, 2) 1-sigma region [m^2] on the floor in which each reflector is expected to be detected."""

@@ -247,7 +247,7 @@ def _odometry_rows(log: RecordLog, stamps_ns: IntArray, first: int, last: int) -
 
 def warm_up() -> None:
     """Compile the loop and the detection of whole logs (the serial one), by running over one scan."""
-    setup = LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), Scanner(), Parameters())
+    setup = LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), (Scanner(),), Parameters())
     ranges = np.full((1, 4), 1.96, dtype=np.float32)
     flags = np.array([[False, False, True, False]])
     scans = ScanLog(

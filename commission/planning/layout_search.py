@@ -106,7 +106,7 @@ class LayoutSearch:
         self._needs = [np.full(len(route.drive), self._base, dtype=np.int64) for route in planned]
         self._limits = [_limits(route, site, demands) for route in planned]
         self._conflicts = _conflicts(model.reflectors.centers, demands.spacing)
-        self._places = chosen_places(demands, planned, site.stations, site.scanner, options.ambiguity)
+        self._places = chosen_places(demands, planned, site.stations, site.scanners[0], options.ambiguity)
         self._distinction = Distinction(model, self._places, demands.survive_failure, options.ambiguity)
         self._apart: list[BoolArray] = []
         self._quality = quality_of(planned[0]) if planned else None

@@ -229,7 +229,7 @@ def plan_route(
     """
     options = options or PredictionOptions()
     model = model or visibility_model(site)
-    drive = nominal_drive(site.route(route_name), site.vehicle, site.scanner, options.plan)
+    drive = nominal_drive(site.route(route_name), site.vehicle, site.scanners[0], options.plan)
     surveyed = np.array([reflector.sigma**2 for reflector in model.reflectors.reflectors])
     places = np.column_stack((model.reflectors.centers, surveyed))
     return PlannedRoute(
@@ -239,7 +239,7 @@ def plan_route(
         places=read_only(places),
         farthest=read_only(model.targets.farthest),
         reflectors=model.reflectors,
-        scanner=site.scanner,
+        scanner=site.scanners[0],
         parameters=site.parameters,
         options=options,
     )

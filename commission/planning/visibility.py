@@ -182,7 +182,7 @@ def visibility_model(site: Sighted, options: VisibilityOptions | None = None) ->
     options : what counts as visible; the defaults when None.
     """
     caster = walls_of(site.floor_map)
-    return build_visibility(site.reflectors, site.scanner, caster, options or VisibilityOptions())
+    return build_visibility(site.reflectors, site.scanners[0], caster, options or VisibilityOptions())
 
 
 def walls_of(floor_map: FloorMap | None) -> RayCaster:

@@ -21,8 +21,6 @@ from commission.site.truth import TruePlace, TrueWheels, Truth
 STREAM = 5
 """Stream of random numbers of a seed, beside those of `scenario`; the next number says which kind of constant."""
 SURVEY, MOUNTING, RANGE_BIAS, CLOCK, WHEEL_SCALE = range(1, 6)
-SCANNER = "scanner"
-"""Name of the only scanner."""
 
 
 def draw_truth(project: Project, route: str, seed: int) -> Truth:
@@ -47,7 +45,7 @@ def draw_truth(project: Project, route: str, seed: int) -> Truth:
             wheel_scales=tuple(map(float, each)),
             separation_scale=float(errors.separation_scale_sigma * draws[1]),
         ),
-        scanners=(_scanner(SCANNER, errors, seed),),
+        scanners=tuple(_scanner(scanner.name, errors, seed) for scanner in project.scanners),
         reflectors=tuple(place for place in places if place is not None),
     )
 
@@ -63,8 +61,11 @@ def true_site(project: Project, truth: Truth) -> Project:
                 for each in reflectors.reflectors
             )
         )
-    mounting = project.scanner.mounting + np.array(error_of(truth, SCANNER).mounting)
-    return replace(project, reflectors=reflectors, scanner=replace(project.scanner, mounting=mounting))
+    scanners = tuple(
+        replace(each, mounting=each.mounting + np.array(error_of(truth, each.name).mounting))
+        for each in project.scanners
+    )
+    return replace(project, reflectors=reflectors, scanners=scanners)
 
 
 def error_of(truth: Truth, scanner: str) -> ScannerError:

@@ -41,13 +41,13 @@ class VirtualScanner:
     """The scanner's numbers."""
 
     @staticmethod
-    def of(project: Project) -> VirtualScanner:
-        """Prepare walls and reflectors; a project without a floor map is an open field."""
+    def of(project: Project, scanner: Scanner) -> VirtualScanner:
+        """Prepare walls and reflectors for a scanner; a project without a floor map is an open field."""
         floor = project.floor_map
         grid = OccupancyGrid(np.zeros((1, 1), np.bool_), 1.0, np.zeros(3)) if floor is None else floor.occupancy()
         wall_depth = 0.0 if floor is None else 0.5 * floor.resolution
         hall = _hall(RayCaster(grid), project.reflectors, project.disturbances, wall_depth)
-        return VirtualScanner(project.scanner, project.disturbances, hall, _beams(project.scanner))
+        return VirtualScanner(scanner, project.disturbances, hall, _beams(scanner))
 
     def scan(
         self, T_map_base: FloatArray, circles: FloatArray, rng: np.random.Generator, *, whole: bool = True
@@ -121,5 +121,5 @@ def _hall(caster: RayCaster, reflectors: ReflectorMap, disturbances: Disturbance
 def warm_up() -> None:
     """Compile the scan kernel on a scanner of three beams in an open field."""
     scanner = Scanner(field_of_view_deg=(-1.0, 1.0), resolution_deg=1.0)
-    virtual = VirtualScanner.of(Project(scanner=scanner))
+    virtual = VirtualScanner.of(Project(scanners=(scanner,)), scanner)
     virtual.scan(np.zeros(3), np.array([[1.0, 0.0, 0.1]]), np.random.default_rng(0))

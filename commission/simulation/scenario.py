@@ -15,7 +15,7 @@ import numpy as np
 from commission.geometry.arrays import FloatArray, IntArray, frozen
 from commission.progress import Progress, silent
 from commission.simulation import follower, scan
-from commission.simulation.constants import SCANNER, draw_truth, error_of, true_site
+from commission.simulation.constants import draw_truth, error_of, true_site
 from commission.simulation.drive import DriveOptions, TrueMotion, drive, measure
 from commission.simulation.people import Crowd, WalkableFloor
 from commission.simulation.scan import VirtualScanner
@@ -96,13 +96,13 @@ def records(
     motion = drive(route, project.vehicle, _rng(seed, START), options)
     slips = project.disturbances.slips_per_100_m
     displacements = measure(motion, project.vehicle, truth.wheels, slips, _rng(seed, WHEELS))
-    stamps = np.arange(0, motion.duration_ns + 1, project.scanner.period_ns, dtype=np.int64)
+    stamps = np.arange(0, motion.duration_ns + 1, project.scanners[0].period_ns, dtype=np.int64)
     poses = motion.poses_at(stamps)
     scans = _scans(project, site, seed, zip(stamps.tolist(), poses, strict=True), options.whole_scans)
     yield from heapq.merge(
         _odometry(motion, displacements),
         _reference(stamps, poses),
-        _told(_as_reported(scans, error_of(truth, SCANNER)), len(stamps), progress),
+        _told(_as_reported(scans, error_of(truth, project.scanners[0].name)), len(stamps), progress),
         key=lambda record: (record.stamp_ns, ORDER_WITHIN_A_STAMP[type(record)]),
     )
     progress(1.0, "driving")
@@ -138,13 +138,13 @@ def _scans(
 ) -> Iterator[Scan | None]:
     """One scan per moment, None where it is lost; people walk where the project has floor, beams meet the true site."""
     disturbances = project.disturbances
-    scanner = VirtualScanner.of(site)
+    scanner = VirtualScanner.of(site, site.scanners[0])
     beams, losses, walkers = _rng(seed, BEAMS), _rng(seed, LOSSES), _rng(seed, PEOPLE)
     crowd: Crowd | None = None
     if disturbances.people:
         crowd = Crowd(WalkableFloor.of(project), disturbances.people, disturbances.walking_speed, walkers)
     nobody = np.empty((0, 3))
-    seconds = 1e-9 * project.scanner.period_ns
+    seconds = 1e-9 * project.scanners[0].period_ns
     for stamp, pose in moments:
         if crowd is not None:
             crowd.step(seconds, pose)
@@ -154,8 +154,8 @@ def _scans(
         record = Scan(
             stamp_ns=stamp,
             ranges=ranges,
-            angle_min=project.scanner.angle_min,
-            angle_increment=project.scanner.angle_increment,
+            angle_min=project.scanners[0].angle_min,
+            angle_increment=project.scanners[0].angle_increment,
             intensities=None,
             reflector=flags,
         )

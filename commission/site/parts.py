@@ -43,12 +43,12 @@ class HasRoutes(Protocol):
         ...
 
 
-class HasScanner(Protocol):
-    """The laser scanner."""
+class HasScanners(Protocol):
+    """The laser scanners."""
 
     @property
-    def scanner(self) -> Scanner:
-        """The laser scanner."""
+    def scanners(self) -> tuple[Scanner, ...]:
+        """The laser scanners, one at least; names are unique."""
         ...
 
 
@@ -83,11 +83,11 @@ class Extended(HasFloorMap, HasReflectors, HasRoutes, Protocol):
     """What says how far a site reaches."""
 
 
-class Sighted(HasFloorMap, HasReflectors, HasScanner, Protocol):
+class Sighted(HasFloorMap, HasReflectors, HasScanners, Protocol):
     """What says which reflectors are seen from where."""
 
 
-class Told(HasParameters, HasScanner, Protocol):
+class Told(HasParameters, HasScanners, Protocol):
     """What says which reflectors are told apart."""
 
 

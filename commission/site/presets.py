@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from types import MappingProxyType
+from typing import Any
 
 from commission.errors import UsageError
 from commission.site.scanner import Scanner
@@ -47,11 +48,24 @@ class ScannerPreset:
         return Origin.QUOTED if field in self.quoted else Origin.ASSUMED
 
     def origins(self) -> Mapping[str, Origin]:
-        """Where each figure comes from, by the names of the scanner's fields but for the mounting."""
-        names = (field.name for field in fields(Scanner) if field.name != "mounting")
+        """Where each figure comes from, by the names of the scanner's fields that are its figures."""
+        names = (field.name for field in fields(Scanner) if field.name in FIGURES)
         return MappingProxyType({name: self.origin(name) for name in names})
 
 
+FIGURES = frozenset(
+    {
+        "field_of_view_deg",
+        "resolution_deg",
+        "rate",
+        "range",
+        "range_sigma",
+        "bearing_sigma_deg",
+        "beam_width_deg",
+        "reflector_range",
+    }
+)
+"""Fields of a scanner that a preset sets; the others say how it is built into the vehicle."""
 _GEOMETRY = frozenset({"field_of_view_deg", "resolution_deg", "rate", "range"})
 
 SCANNERS: tuple[ScannerPreset, ...] = (
@@ -176,9 +190,10 @@ SCANNERS: tuple[ScannerPreset, ...] = (
 
 
 def with_preset(scanner: Scanner, name: str) -> Scanner:
-    """Scanner of a preset, mounted where the given one is; raises UsageError that lists the presets there are."""
+    """Scanner with the figures of a preset, built in like the given one; raises UsageError that lists the presets."""
     for preset in SCANNERS:
         if preset.name == name:
-            return replace(preset.scanner, mounting=scanner.mounting)
+            figures: dict[str, Any] = {name: getattr(preset.scanner, name) for name in FIGURES}
+            return replace(scanner, **figures)
     known = ", ".join(preset.name for preset in SCANNERS)
     raise UsageError(f"no scanner preset is called {name!r}; expected one of: {known}")

@@ -30,8 +30,8 @@ class Project:
     """Planned routes; names are unique."""
     vehicle: Vehicle = field(default_factory=DifferentialVehicle)
     """Wheels and outline."""
-    scanner: Scanner = field(default_factory=Scanner)
-    """The laser scanner."""
+    scanners: tuple[Scanner, ...] = field(default_factory=lambda: (Scanner(),))
+    """The laser scanners, one at least; names are unique."""
     parameters: Parameters = field(default_factory=Parameters)
     """Tunables of the localizer."""
     disturbances: Disturbances = field(default_factory=Disturbances)
@@ -42,12 +42,16 @@ class Project:
     """What is asked of a suggested layout of reflectors."""
 
     def __post_init__(self) -> None:
-        for kind, named in (("route", self.routes), ("station", self.stations)):
+        if not self.scanners:
+            raise ProjectError("scanners is empty; expected at least one")
+        for kind, named in (("route", self.routes), ("station", self.stations), ("scanner", self.scanners)):
             seen: set[str] = set()
             for name in (value.name for value in named):
-                if name in seen:
+                # Scanners give files their names, and some file systems know no capitals.
+                key = name.casefold() if kind == "scanner" else name
+                if key in seen:
                     raise ProjectError(f"{kind} name {name!r} is used twice; expected unique names")
-                seen.add(name)
+                seen.add(key)
 
     def route(self, name: str) -> Route:
         """Return the route of that name; raises UsageError that lists the names there are."""

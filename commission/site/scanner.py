@@ -1,9 +1,11 @@
-"""The laser scanner: where it sits on the vehicle, what it sees, and how well. Not its telegrams, not its scans."""
+"""A laser scanner: where it sits on the vehicle, what it sees, and how well. Not its telegrams, not its scans."""
 
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, field
+from enum import StrEnum
 from typing import Annotated
 
 from commission.geometry.arrays import FloatArray, equal_fields, frozen
@@ -16,17 +18,35 @@ from commission.site.quantity import (
     NOT_NEGATIVE,
     POSITIVE,
     Bounds,
+    Choice,
     Quantity,
+    Switch,
+    Words,
 )
 
 LONGEST_RANGE = 10_000.0
 """No laser scanner measures farther [m]."""
+ONLY_NAME = "scanner"
+"""What the only scanner of a vehicle is called."""
+_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_ -]{0,38}[A-Za-z0-9_-]|[A-Za-z0-9_-]")
+_SLACK = 1e-6
+"""Share of a period by which a sweep may be longer: both are rounded in files."""
+
+
+class StampOf(StrEnum):
+    """Which beam of a sweep was measured at the stamp of its scan."""
+
+    FIRST = "first"
+    MIDDLE = "middle"
+    LAST = "last"
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Scanner:
     """A 2D laser scanner on the vehicle."""
 
+    name: Annotated[str, Words(label="Name")] = ONLY_NAME
+    """What it is called in files and results: letters, digits, blanks, - and _."""
     mounting: Annotated[
         FloatArray,
         Quantity(label="Mounted at x", unit="m", decimals=4),
@@ -34,12 +54,19 @@ class Scanner:
         Quantity(label="Faces", unit="rad", shown=DEGREES, step=0.01, decimals=6),
     ] = field(default_factory=lambda: frozen([0.0, 0.0, 0.0], (3,), "scanner.mounting"))
     """(3,) `T_base_scanner`: x, y and heading of the scanner in the base frame."""
+    upside_down: Annotated[bool, Switch(label="Upside down")] = False
+    """Whether it hangs upside down: its beams then go clockwise, seen from above."""
     field_of_view_deg: Annotated[
         tuple[float, float],
         Quantity(label="First bearing", unit="deg", shown=AS_DEGREES, step=0.1, decimals=6),
         Quantity(label="Last bearing", unit="deg", shown=AS_DEGREES, step=0.1, decimals=6),
     ] = (-135.0, 135.0)
     """First and last bearing, scanner frame, counter-clockwise; a full turn is -180 to 180."""
+    blind_sectors_deg: Annotated[
+        tuple[tuple[float, float], ...],
+        Quantity(label="Blind sectors", unit="deg", shown=AS_DEGREES, bounds=Bounds.between(-360.0, 360.0), decimals=6),
+    ] = ()
+    """First and last bearing of each sector in which the vehicle itself is in the way, scanner frame."""
     # The last of thousands of beams is at thousands of steps: one step in a file needs all its digits.
     resolution_deg: Annotated[
         float,
@@ -83,19 +110,53 @@ class Scanner:
         float, Quantity(label="Beam width", unit="deg", shown=AS_DEGREES, bounds=NOT_NEGATIVE, step=0.01)
     ] = 0.25
     """Divergence of a beam: a reflector is met when any part of the beam touches it."""
+    beam_aperture: Annotated[
+        float,
+        Quantity(label="Beam aperture", unit="m", shown=MILLIMETRES, bounds=Bounds.between(0.0, 1.0), step=0.1),
+    ] = 0.0
+    """Width of a beam where it leaves the scanner; its divergence comes on top."""
     reflector_range: Annotated[
         float, Quantity(label="Reflectors to", unit="m", bounds=POSITIVE, step=0.1, decimals=4)
     ] = 20.0
     """Range up to which the scanner tells reflectors from other things."""
+    sweep_duration: Annotated[
+        float, Quantity(label="Sweep takes", unit="s", bounds=NOT_NEGATIVE, step=0.001, decimals=9)
+    ] = 0.0
+    """Time from the first to the last beam of a scan; 0: all are measured at once."""
+    sweep_direction: Annotated[int, Quantity(label="Sweep direction", bounds=Bounds.between(-1, 1), step=1)] = 1
+    """Way in which the beam turns, scanner frame: 1 counter-clockwise, -1 clockwise."""
+    stamp_of: Annotated[StampOf, Choice(label="Stamp of the beam")] = StampOf.FIRST
+    """Which beam of the sweep was measured at the stamp of the scan: first, middle or last."""
+    clock_offset: Annotated[
+        float, Quantity(label="Clock offset", unit="s", bounds=Bounds.between(-10.0, 10.0), step=0.001, decimals=9)
+    ] = 0.0
+    """What the scanner's clock shows more than the vehicle's."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mounting", frozen(self.mounting, (3,), "scanner.mounting"))
         check_fields(self, "scanner.")
+        if not _NAME.fullmatch(self.name):
+            expected = "1 to 40 letters, digits, blanks (inside), - and _"
+            raise ValueError(f"scanner.name is {self.name!r}; expected {expected}")
+        self._check_angles()
+        if self.sweep_direction == 0:
+            raise ValueError("scanner.sweep_direction is 0; expected 1 (counter-clockwise) or -1 (clockwise)")
+        if self.sweep_duration * self.rate > 1.0 + _SLACK:
+            found = f"scanner.sweep_duration is {self.sweep_duration:g} s at {self.rate:g} scans/s"
+            raise ValueError(f"{found}; expected no more than from one scan to the next")
+        object.__setattr__(self, "stamp_of", StampOf(self.stamp_of))
+
+    def _check_angles(self) -> None:
+        """Check what two numbers say together: the ends of sectors and of the range."""
         first, last = self.field_of_view_deg
         if not 0.0 < last - first <= 360.0:
             raise ValueError(
                 f"scanner.field_of_view_deg is [{first:g}, {last:g}]; expected first < last, at most 360 deg apart"
             )
+        for low, high in self.blind_sectors_deg:
+            if not 0.0 < high - low <= 360.0:
+                found = f"scanner.blind_sectors_deg holds [{low:g}, {high:g}]"
+                raise ValueError(f"{found}; expected first < last, at most 360 deg apart")
         nearest, farthest = self.range
         if not nearest < farthest:
             raise ValueError(f"scanner.range is [{nearest:g}, {farthest:g}]; expected smallest < largest range [m]")

@@ -93,8 +93,8 @@ class AmbiguityInput(StudyInput):
     """The reflector map."""
     floor_map: FloorMap | None
     """Walls and free floor."""
-    scanner: Scanner
-    """The laser scanner."""
+    scanners: tuple[Scanner, ...]
+    """The laser scanners."""
     routes: tuple[Route, ...]
     """Planned routes, where there is no map: they say how far the floor reaches. Else none."""
     options: AmbiguityOptions
@@ -124,7 +124,7 @@ class AmbiguityInput(StudyInput):
         return AmbiguityInput(
             reflectors=project.reflectors,
             floor_map=project.floor_map,
-            scanner=project.scanner,
+            scanners=project.scanners,
             routes=project.routes if project.floor_map is None else (),
             options=options or AmbiguityOptions(),
             visibility=visibility or VisibilityOptions(),

@@ -94,8 +94,8 @@ class CoverageInput(StudyInput):
     """The reflector map."""
     floor_map: FloorMap | None
     """Walls and free floor."""
-    scanner: Scanner
-    """The laser scanner."""
+    scanners: tuple[Scanner, ...]
+    """The laser scanners."""
     routes: tuple[Route, ...]
     """Planned routes, where there is no map: they say how far the floor reaches. Else none."""
     fix: FixOptions
@@ -119,7 +119,7 @@ class CoverageInput(StudyInput):
         return CoverageInput(
             reflectors=project.reflectors,
             floor_map=project.floor_map,
-            scanner=project.scanner,
+            scanners=project.scanners,
             routes=project.routes if project.floor_map is None else (),
             fix=options.fix(project.parameters.observation, project.parameters.odometry, speed),
             visibility=options.visibility,

@@ -29,8 +29,8 @@ class DrivesInput(StudyInput):
     """The reflector map."""
     floor_map: FloorMap | None
     """Walls and free floor."""
-    scanner: Scanner
-    """The laser scanner."""
+    scanners: tuple[Scanner, ...]
+    """The laser scanners."""
     vehicle: Vehicle
     """Wheels and outline."""
     parameters: Parameters
@@ -66,7 +66,7 @@ class DrivesInput(StudyInput):
         return DrivesInput(
             reflectors=project.reflectors,
             floor_map=project.floor_map,
-            scanner=project.scanner,
+            scanners=project.scanners,
             vehicle=project.vehicle,
             parameters=project.parameters,
             routes=project.routes if names is None else tuple(map(project.route, names)),

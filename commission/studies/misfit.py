@@ -145,7 +145,7 @@ def _mounting(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iter
     best, name, meaning, cure, turn = max(fits, key=lambda fit: fit[0].accepted)
     if best.accepted < GOOD_SHARE or best.accepted < before.accepted + 0.2:
         return
-    heading = float(wrap(inputs.setup.scanner.mounting[2] + turn))
+    heading = float(wrap(inputs.setup.scanners[0].mounting[2] + turn))
     yield Finding(
         found=f"{100.0 * before.accepted:.0f} % of the detections fit the reflectors, "
         f"{100.0 * best.accepted:.0f} % once they are {name}",

@@ -39,8 +39,8 @@ class PlacementInput(StudyInput):
     """The reflectors that are there."""
     floor_map: FloorMap | None
     """Walls and free floor."""
-    scanner: Scanner
-    """The laser scanner."""
+    scanners: tuple[Scanner, ...]
+    """The laser scanners."""
     vehicle: Vehicle
     """Wheels and outline."""
     parameters: Parameters
@@ -76,7 +76,7 @@ class PlacementInput(StudyInput):
         return PlacementInput(
             reflectors=project.reflectors,
             floor_map=project.floor_map,
-            scanner=project.scanner,
+            scanners=project.scanners,
             vehicle=project.vehicle,
             parameters=project.parameters,
             routes=tuple(map(project.route, names)),
@@ -154,7 +154,7 @@ def _stretches(inputs: PlacementInput, unmet: tuple[Unmet, ...]) -> list[UnmetSt
     """Metres where demands do not hold, those in a row together, in the order of their routes."""
     found: list[UnmetStretch] = []
     for each in unmet:
-        drive = nominal_drive(inputs.route(each.route), inputs.vehicle, inputs.scanner)
+        drive = nominal_drive(inputs.route(each.route), inputs.vehicle, inputs.scanners[0])
         metres = np.array(each.metres)
         for stretch in np.split(metres, np.flatnonzero(np.diff(metres) > 1) + 1):
             first, last = int(stretch[0]), int(stretch[-1]) + 1

@@ -56,8 +56,8 @@ class PlausibilityInput:
 
     log: RecordLog
     """The recording."""
-    scanner: Scanner
-    """The project's scanner."""
+    scanners: tuple[Scanner, ...]
+    """The laser scanners."""
     intensity_threshold: float
     """Echo strength from which a beam counts as reflective [sensor's unit]."""
 
@@ -65,7 +65,7 @@ class PlausibilityInput:
     def of(project: Project, log: RecordLog) -> PlausibilityInput:
         """Pick what the study reads from a project."""
         threshold = project.parameters.detector.intensity_threshold
-        return PlausibilityInput(log=log, scanner=project.scanner, intensity_threshold=threshold)
+        return PlausibilityInput(log=log, scanners=project.scanners, intensity_threshold=threshold)
 
 
 def plausibility(inputs: PlausibilityInput, progress: Progress = silent) -> tuple[Finding, ...]:
@@ -240,7 +240,7 @@ def _detections(inputs: PlausibilityInput) -> Iterator[Finding]:
             probably="they are in degrees",
             remedy="expected radians, counter-clockwise",
         )
-    yield from _ranges("detections", ranges, inputs.scanner)
+    yield from _ranges("detections", ranges, inputs.scanners[0])
 
 
 def _ranges(name: str, ranges: FloatArray, scanner: Scanner) -> Iterator[Finding]:
@@ -260,7 +260,7 @@ def _ranges(name: str, ranges: FloatArray, scanner: Scanner) -> Iterator[Finding
 
 
 def _scans(inputs: PlausibilityInput) -> Iterator[Finding]:
-    scans, scanner = inputs.log.scans, inputs.scanner
+    scans, scanner = inputs.log.scans, inputs.scanners[0]
     if scans is None or not len(scans.stamps_ns):
         return
     # A few scans spread over the drive tell as much as all of them.

@@ -106,8 +106,8 @@ class ProblemsInput(StudyInput):
     """Where the vehicle has to stand accurately."""
     vehicle: Vehicle
     """Wheels and outline."""
-    scanner: Scanner
-    """The laser scanner."""
+    scanners: tuple[Scanner, ...]
+    """The laser scanners."""
     parameters: Parameters
     """Tunables of the localizer."""
     limits: CheckLimits = field(default_factory=CheckLimits)
@@ -122,7 +122,7 @@ class ProblemsInput(StudyInput):
             routes=project.routes,
             stations=project.stations,
             vehicle=project.vehicle,
-            scanner=project.scanner,
+            scanners=project.scanners,
             parameters=project.parameters,
             limits=limits or CheckLimits(),
         )
@@ -257,7 +257,7 @@ def _map_problems(site: ProblemsInput, floor: FloorDistances | None) -> Iterable
 
 def _scanner_problems(site: ProblemsInput) -> Iterable[Problem]:
     """Beams that meet the vehicle's own outline."""
-    scanner, outline = site.scanner, np.asarray(site.vehicle.outline, dtype=np.float64)
+    scanner, outline = site.scanners[0], np.asarray(site.vehicle.outline, dtype=np.float64)
     position = scanner.mounting[:2]
     depth = float(np.hypot(*(outline_points(outline, 0.01) - position).T).min())
     if depth > 0.01 and _inside(position, outline):
@@ -310,7 +310,7 @@ def separation_needed(site: Told) -> tuple[float, float]:
         supervisor is content: twice the gate's radius at the alarm limit, but for the reflectors' own uncertainty [m].
     gap : between their edges, so that the detector sees two clusters up to the scanner's range for reflectors [m].
     """
-    parameters, scanner = site.parameters, site.scanner
+    parameters, scanner = site.parameters, site.scanners[0]
     sigma = math.hypot(0.5 * parameters.supervisor.position_limit, parameters.observation.range_sigma)
     apart = 2.0 * math.sqrt(chi_square_gate(parameters.association.gate_probability, 2)) * sigma
     angle = BRIDGED_BEAMS * scanner.angle_increment + math.radians(scanner.beam_width_deg)

@@ -16,7 +16,7 @@ def recording_input(result: RunResult) -> PlausibilityInput:
     setup = result.inputs.segments[0].setup
     return PlausibilityInput(
         log=result.inputs.log,
-        scanner=setup.scanner,
+        scanners=setup.scanners,
         intensity_threshold=setup.parameters.detector.intensity_threshold,
     )
 

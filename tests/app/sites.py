@@ -26,5 +26,5 @@ def room(rate: float = 10.0, resolution_deg: float = 0.5) -> Project:
         reflectors=ReflectorMap(tuple(Reflector(id=f"R{i + 1}", x=x, y=y) for i, (x, y) in enumerate(places))),
         routes=(Route("There and back", (there, back), speed=0.6),),
         vehicle=DifferentialVehicle(),
-        scanner=Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=resolution_deg, rate=rate),
+        scanners=(Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=resolution_deg, rate=rate),),
     )

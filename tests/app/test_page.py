@@ -202,13 +202,15 @@ def test_before_a_run_the_vehicle_waits_at_the_start_of_the_first_route_with_its
     server: viser.ViserServer, project: Project
 ) -> None:
     layer = VehicleLayer(server.scene)
-    half = replace(project, scanner=replace(project.scanner, mounting=[0.4, 0.1, 0.0], field_of_view_deg=(-90.0, 90.0)))
+    half = replace(
+        project, scanners=(replace(project.scanners[0], mounting=[0.4, 0.1, 0.0], field_of_view_deg=(-90.0, 90.0)),)
+    )
     layer.show_site(half)
     assert layer._frame.visible
     assert tuple(layer._frame.position[:2]) == (2.0, 2.0)
     # The outer fan reaches as far as reflectors are told apart, from the scanner and not behind it.
     strokes = layer._far.points[:, :, :2] - np.array([0.4, 0.1])
-    assert np.hypot(*strokes.reshape(-1, 2).T).max() == pytest.approx(project.scanner.reflector_range, rel=1e-6)
+    assert np.hypot(*strokes.reshape(-1, 2).T).max() == pytest.approx(project.scanners[0].reflector_range, rel=1e-6)
     assert strokes[..., 0].min() == pytest.approx(0.0, abs=1e-5)
     layer.show_site(replace(half, routes=()))
     assert not layer._frame.visible

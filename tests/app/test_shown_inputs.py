@@ -110,7 +110,9 @@ class PageBench:
 def bench(project: Project) -> Iterator[PageBench]:
     server = start_server("127.0.0.1", 0)
     # Less than a full turn, so that either end may move.
-    yield PageBench(server, replace(project, scanner=replace(project.scanner, field_of_view_deg=(-170.0, 165.0))))
+    yield PageBench(
+        server, replace(project, scanners=(replace(project.scanners[0], field_of_view_deg=(-170.0, 165.0)),))
+    )
     server.stop()
 
 

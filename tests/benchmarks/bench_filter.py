@@ -40,7 +40,7 @@ def hall(count: int) -> LocalizerSetup:
     side = math.sqrt(count / DENSITY)
     places = rng.uniform(-0.5 * side, 0.5 * side, (count, 2))
     reflectors = tuple(Reflector(id=str(i), x=float(x), y=float(y)) for i, (x, y) in enumerate(places))
-    return LocalizerSetup(ReflectorMap(reflectors), Scanner(), Parameters())
+    return LocalizerSetup(ReflectorMap(reflectors), (Scanner(),), Parameters())
 
 
 def drive(setup: LocalizerSetup, cycles: int) -> tuple[RecordLog, Belief]:
@@ -80,7 +80,7 @@ def peer_seconds(log: RecordLog, setup: LocalizerSetup, initial: Belief, cycles:
         warnings.simplefilter("ignore")
         from filterpy.kalman import ExtendedKalmanFilter
     model, noise, gate = setup.filter.observation, odometry_noise(setup.parameters.odometry), setup.filter.gate.d2
-    centers, mounting = setup.reflectors.centers, setup.scanner.mounting
+    centers, mounting = setup.reflectors.centers, setup.scanners[0].mounting
     R = np.diag([model.range_variance, model.bearing_variance])
     ekf = ExtendedKalmanFilter(dim_x=3, dim_z=2)
     ekf.x, ekf.P, ekf.R = np.array(initial.mean), np.array(initial.covariance), R

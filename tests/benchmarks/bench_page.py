@@ -40,8 +40,10 @@ def take_in(port: int, seconds: float, received: multiprocessing.Queue[int]) -> 
 def main(seconds: float = 20.0) -> None:
     """Measure and print."""
     project = load_project(bundled_folder("maps") / "laboratory")
-    scanner = replace(project.scanner, field_of_view_deg=(-135.0, 135.0), resolution_deg=270.0 / (BEAMS - 1), rate=25.0)
-    project = replace(project, scanner=scanner)
+    scanner = replace(
+        project.scanners[0], field_of_view_deg=(-135.0, 135.0), resolution_deg=270.0 / (BEAMS - 1), rate=25.0
+    )
+    project = replace(project, scanners=(scanner,))
     server = start_server("127.0.0.1", 0)
     runtime = open_page(server, project, source=VirtualDrive(project.routes[0].name))
     runtime.post(Repeat(repeat=True))
@@ -61,7 +63,9 @@ def main(seconds: float = 20.0) -> None:
     assert after is not None
     # The drive repeats: the cursor may have begun again.
     cycles = (after.lived - before.lived) % after.result.cycles
-    print(f"{project.scanner.beam_count} beams, {cycles / wall:.1f} scans/s, {received.get() / wall / 1e6:.1f} MB/s")
+    print(
+        f"{project.scanners[0].beam_count} beams, {cycles / wall:.1f} scans/s, {received.get() / wall / 1e6:.1f} MB/s"
+    )
     print(f"page: {100 * cpu / wall:.1f} % of one core (required: less than {100 * REQUIRED:.0f} %)")
     client.join()
     runtime.stop()

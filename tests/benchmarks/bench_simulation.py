@@ -20,7 +20,7 @@ SCANNER = Scanner(field_of_view_deg=(-135.0, 135.0), resolution_deg=0.25)
 def main() -> None:
     scenario.warm_up()
     project = hall(scanner=SCANNER)
-    virtual, rng, nobody = VirtualScanner.of(project), np.random.default_rng(0), np.empty((0, 3))
+    virtual, rng, nobody = VirtualScanner.of(project, project.scanners[0]), np.random.default_rng(0), np.empty((0, 3))
     poses = np.column_stack([rng.uniform(2, 10, 2000), rng.uniform(2, 6, 2000), rng.uniform(-3, 3, 2000)])
     start = time.perf_counter()
     for pose in poses:

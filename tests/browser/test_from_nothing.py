@@ -87,7 +87,7 @@ def choose_the_equipment(site: NewSite, page: OpenPage) -> None:
     for folder in ("Scanner", "Vehicle"):
         page.fold(folder)
     page.choose("Preset", "SICK TiM781")
-    site.until(lambda: site.state.project.scanner.rate == 15.0)
+    site.until(lambda: site.state.project.scanners[0].rate == 15.0)
     page.choose("Kind", "tricycle")
     site.until(lambda: site.state.project.vehicle.kind == "tricycle")
 

@@ -114,7 +114,7 @@ def test_a_bad_option_is_refused_by_name(words, said, refused, project, recordin
     [
         ("hall/project.yaml", None, "project.yaml"),
         ("hall/project.yaml", "", "schema"),
-        ("hall/project.yaml", "schema: 2\n", "schema"),
+        ("hall/project.yaml", "schema: 3\n", "schema"),
         ("hall/project.yaml", "schema: 1\nscaner: {}\n", "scaner"),
         ("hall/project.yaml", "schema: 1\nreflectors: ../../etc/passwd\n", "reflectors"),
         ("hall/project.yaml", "schema: [1\n", "project.yaml"),

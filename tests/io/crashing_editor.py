@@ -91,7 +91,7 @@ def _stations(project: Project, rng: random.Random) -> Project:
 def _equipment(project: Project, rng: random.Random) -> Project:
     """Use another vehicle or another scanner."""
     if rng.random() < 0.5:
-        return replace(project, scanner=with_preset(project.scanner, rng.choice(SCANNERS).name))
+        return replace(project, scanners=(with_preset(project.scanners[0], rng.choice(SCANNERS).name),))
     kinds = (DifferentialVehicle, TricycleVehicle, OmnidirectionalVehicle)
     return replace(project, vehicle=rng.choice(kinds)(height=0.1 + rng.random()))
 

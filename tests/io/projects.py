@@ -30,7 +30,7 @@ from commission.site.parameters import (
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Direction, Route, Segment
-from commission.site.scanner import Scanner
+from commission.site.scanner import Scanner, StampOf
 from commission.site.stations import Station
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
 
@@ -64,6 +64,14 @@ def scanners() -> st.SearchStrategy[Scanner]:
         resolution_deg=st.floats(0.05, 2.0),
         rate=st.floats(1.0, 100.0),
         range_sigma=st.floats(0.0, 0.1),
+        name=st.sampled_from(["front left", "rear-right", "Front Left", "2"]),
+        upside_down=st.booleans(),
+        blind_sectors_deg=st.lists(st.tuples(st.floats(-180.0, -1.0), st.floats(1.0, 170.0)), max_size=2).map(tuple),
+        beam_aperture=st.floats(0.0, 0.1),
+        sweep_duration=st.floats(0.0, 0.009),
+        sweep_direction=st.sampled_from([1, -1]),
+        stamp_of=st.sampled_from(StampOf),
+        clock_offset=st.floats(-1.0, 1.0),
     )
 
 
@@ -168,7 +176,7 @@ def projects() -> st.SearchStrategy[Project]:
         ),
         routes=st.lists(route, max_size=3, unique_by=lambda r: r.name).map(tuple),
         vehicle=vehicles(),
-        scanner=scanners(),
+        scanners=st.lists(scanners(), min_size=1, max_size=2, unique_by=lambda s: s.name.casefold()).map(tuple),
         parameters=parameters(),
         disturbances=disturbances(),
         stations=st.lists(stations(), max_size=2, unique_by=lambda s: s.name).map(tuple),

@@ -52,7 +52,7 @@ def poses_along(route: Route, step: float) -> np.ndarray:
 def visible_counts(name: str, poses: np.ndarray) -> np.ndarray:
     """Reflectors in range, in the field of view and in line of sight from each pose."""
     project = site(name)
-    scanner, centers = project.scanner, project.reflectors.centers
+    scanner, centers = project.scanners[0], project.reflectors.centers
     counts = []
     for pose in poses:
         T_map_scanner = compose(pose, scanner.mounting)
@@ -72,7 +72,7 @@ ROUTES = [(name, route.name) for name, draw in SITES.items() for route in draw()
 @pytest.mark.parametrize("name", SITES)
 def test_bundled_site_is_what_its_script_draws(name: str) -> None:
     drawn, bundled = SITES[name](), site(name)
-    for field in ("name", "floor_map", "reflectors", "routes", "vehicle", "scanner"):
+    for field in ("name", "floor_map", "reflectors", "routes", "vehicle", "scanners"):
         assert getattr(drawn, field) == getattr(bundled, field), field
 
 

@@ -23,7 +23,7 @@ LATTICE = Lattice(x=-2.0, y=-1.0, spacing=1.0, rows=3, columns=40)
 def found() -> Coverage:
     """A strip of 40 m; its far end is out of reach of the two reflectors at its start."""
     reflectors = ReflectorMap((Reflector(id="a", x=0.0, y=2.0), Reflector(id="b", x=4.0, y=2.0)))
-    project = Project(reflectors=reflectors, scanner=Scanner(resolution_deg=0.1))
+    project = Project(reflectors=reflectors, scanners=(Scanner(resolution_deg=0.1),))
     return coverage(visibility_model(project), LATTICE, FixOptions())
 
 

@@ -76,7 +76,7 @@ def test_project_lies_at_the_top_or_in_a_folder_and_other_files_do_not_matter(tm
             },
             "map.yaml, line 1, image: '../../x.png' leads out of the folder",
         ),
-        ({"project.yaml": "schema: 2\n"}, "hall.zip: project.yaml, line 1, schema: is 2; expected 1"),
+        ({"project.yaml": "schema: 3\n"}, "hall.zip: project.yaml, line 1, schema: is 3; expected 1"),
     ],
 )
 def test_what_is_no_project_or_leads_elsewhere_is_refused_in_one_line(

@@ -54,10 +54,65 @@ def write_project(folder: Path, text: str) -> Path:
 def test_minimal_project_has_its_values_and_defaults_elsewhere(tmp_path: Path) -> None:
     project = load_project(write_project(tmp_path, MINIMAL))
     assert project.name == "Lost in the woods"
-    assert project.scanner.mounting.tolist() == [0.219, 0.0, 0.0]
+    assert project.scanners[0].mounting.tolist() == [0.219, 0.0, 0.0]
     assert project.route("Loop").segments[0].control_points.tolist() == [[0, 0], [2, 0], [4, 1], [6, 1]]
     assert project.parameters == Parameters()
     assert project.floor_map is None
+
+
+TWO = """\
+schema: 2
+scanners:
+  - {name: front left, mounting: [0.4, 0.3, 0.8], stamp_of: last, sweep_direction: -1, sweep_duration: 0.03}
+  - name: rear right
+    upside_down: true
+    blind_sectors_deg: [[-90, -60], [60, 90]]
+"""
+
+
+def test_a_project_of_several_scanners_has_each_with_its_values(tmp_path: Path) -> None:
+    front, rear = load_project(write_project(tmp_path, TWO)).scanners
+    assert (front.name, front.stamp_of, front.sweep_direction, front.sweep_duration) == ("front left", "last", -1, 0.03)
+    assert front.mounting.tolist() == [0.4, 0.3, 0.8]
+    assert (rear.name, rear.upside_down) == ("rear right", True)
+    assert rear.blind_sectors_deg == ((-90.0, -60.0), (60.0, 90.0))
+
+
+def test_the_only_scanner_of_an_older_project_is_a_list_of_one(tmp_path: Path) -> None:
+    (scanner,) = load_project(write_project(tmp_path, MINIMAL)).scanners
+    assert (scanner.name, scanner.rate, scanner.sweep_duration) == ("scanner", 10.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("schema: 2\nscanners: []\n", "scanners is empty; expected at least one"),
+        ("schema: 3\n", "line 1, schema: is 3; expected 1 or 2, the versions this program knows"),
+        (
+            "schema: 2\nscanner: {rate: 5}\nscanners: [{rate: 5}]\n",
+            "line 2, scanner: is given besides `scanners`; expected all scanners in the list `scanners`",
+        ),
+        (
+            "schema: 2\nscanners: [{name: a}, {name: A}]\n",
+            "scanner name 'A' is used twice; expected unique names",
+        ),
+        (
+            "schema: 2\nscanners:\n  - name: a\n  - name: b/c\n",
+            "line 4, scanners[1].name: is 'b/c'; expected 1 to 40 letters, digits, blanks (inside), - and _",
+        ),
+        ("schema: 2\nscanners:\n  - stamp_of: end\n", "stamp_of"),
+        ("schema: 2\nscanners:\n  - sweep_direction: 0\n", "expected 1 (counter-clockwise) or -1 (clockwise)"),
+        (
+            "schema: 2\nscanners:\n  - {rate: 25, sweep_duration: 0.041}\n",
+            "scanners[0].sweep_duration: is 0.041 s at 25 scans/s; expected no more than from one scan to the next",
+        ),
+        ("schema: 2\nscanners:\n  - blind_sectors_deg: [[10, 5]]\n", "scanner.blind_sectors_deg holds [10, 5]"),
+    ],
+)
+def test_scanners_that_cannot_be_are_refused(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(FileFormatError) as refused:
+        load_project(write_project(tmp_path, text))
+    assert message in str(refused.value)
 
 
 def test_schema_alone_is_a_project(tmp_path: Path) -> None:
@@ -173,7 +228,7 @@ def test_saving_keeps_the_names_of_the_files_that_are_there(tmp_path: Path) -> N
     [
         ("rate: 10.0", "rate: fast", "line 9, scanner.rate: is 'fast'; expected a number (Scans per second [scans/s])"),
         ("rate: 10.0", "rate: 0", "line 9, scanner.rate: is 0; expected 0.1 to 1000 scans/s"),
-        ("rate: 10.0", "rte: 10", "line 9, scanner.rte: is no known key; expected one of: mounting, field_of_view_deg"),
+        ("rate: 10.0", "rte: 10", "line 9, scanner.rte: is no known key; expected one of: name, mounting, upside_down"),
         ("rate: 10.0", "rate: .inf", "line 9, scanner.rate: is .inf; expected a finite number"),
         ("rate: 10.0", "resolution_deg: 1", "line 9, scanner.resolution_deg: is given a second time"),
         (
@@ -280,7 +335,9 @@ def test_mutated_project_is_one_line_or_a_project(
 
 
 @given(tree=st.recursive(st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5), st.lists))
-@pytest.mark.parametrize("key", ["name", "floor_map", "reflectors", "vehicle", "scanner", "routes", "parameters"])
+@pytest.mark.parametrize(
+    "key", ["name", "floor_map", "reflectors", "vehicle", "scanner", "scanners", "routes", "parameters"]
+)
 def test_any_value_under_any_key_is_one_line_or_a_project(
     tmp_path_factory: pytest.TempPathFactory, key: str, tree: object
 ) -> None:

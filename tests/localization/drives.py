@@ -121,7 +121,7 @@ def _scan(
 
 def detections(pose: FloatArray, setup: LocalizerSetup, rng: np.random.Generator, plan: Plan) -> FloatArray:
     model = setup.filter.observation
-    expected = range_bearing(pose, setup.scanner.mounting, setup.reflectors.centers)
+    expected = range_bearing(pose, setup.scanners[0].mounting, setup.reflectors.centers)
     seen = expected[expected[:, 0] < plan.reach]
     sigma = [math.sqrt(model.range_variance), math.sqrt(model.bearing_variance)]
     seen = seen + rng.normal(size=seen.shape) * sigma + [model.range_bias, 0.0]
@@ -136,7 +136,7 @@ def scan(stamp: int, pose: FloatArray, setup: LocalizerSetup, rng: np.random.Gen
     ranges = np.full(plan.beams, 18.0)
     flags = np.zeros(plan.beams, dtype=bool)
     for (distance, bearing), radius in zip(
-        range_bearing(pose, setup.scanner.mounting, setup.reflectors.centers), setup.reflectors.radii, strict=True
+        range_bearing(pose, setup.scanners[0].mounting, setup.reflectors.centers), setup.reflectors.radii, strict=True
     ):
         if not radius < distance < plan.reach:
             continue

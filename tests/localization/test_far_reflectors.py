@@ -25,8 +25,10 @@ SCANNER = replace(Scanner(), resolution_deg=STEP_DEG, field_of_view_deg=(-10.5 *
 @pytest.mark.parametrize("distance", [21.0, 23.0, 24.5])
 def test_reflector_between_two_wide_beams_is_not_drawn_nearer_by_its_radius(distance: float) -> None:
     scanner = replace(SCANNER, reflector_range=30.0, bearing_sigma_deg=0.0, range_sigma=0.001)
-    project = Project(reflectors=ReflectorMap((Reflector(id="Far", x=distance, y=0.0, radius=0.05),)), scanner=scanner)
-    virtual, setup = VirtualScanner.of(project), LocalizerSetup.of(project)
+    project = Project(
+        reflectors=ReflectorMap((Reflector(id="Far", x=distance, y=0.0, radius=0.05),)), scanners=(scanner,)
+    )
+    virtual, setup = VirtualScanner.of(project, project.scanners[0]), LocalizerSetup.of(project)
     ranges, flags = virtual.scan(np.zeros(3), np.empty((0, 3)), np.random.default_rng(0))
     scan = Scan(
         stamp_ns=0,
@@ -51,9 +53,9 @@ def errors_of(distance: float, radius: float, hidden: float, scans: int = 600) -
     `hidden` is the share of its width, from the left, behind a post at two thirds of the way.
     """
     project = Project(
-        reflectors=ReflectorMap((Reflector(id="R", x=distance, y=0.0, radius=radius),)), scanner=SHOP_SCANNER
+        reflectors=ReflectorMap((Reflector(id="R", x=distance, y=0.0, radius=radius),)), scanners=(SHOP_SCANNER,)
     )
-    virtual, setup = VirtualScanner.of(project), LocalizerSetup.of(project)
+    virtual, setup = VirtualScanner.of(project, project.scanners[0]), LocalizerSetup.of(project)
     rng, post = np.random.default_rng(0), 0.1
     # The post's right edge on the line to the point at which the hidden part ends.
     edge = radius * (1.0 - 2.0 * hidden) * 2.0 / 3.0

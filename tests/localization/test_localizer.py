@@ -35,7 +35,7 @@ INITIAL = Belief(0, np.array([0.0, 0.0, 0.0]), np.diag([1e-4, 1e-4, 1e-4]))
 
 
 def one_reflector(parameters: Parameters | None = None) -> LocalizerSetup:
-    return LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), Scanner(), parameters or Parameters())
+    return LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), (Scanner(),), parameters or Parameters())
 
 
 def with_close_neighbors(rng: np.random.Generator, reflectors: ReflectorMap) -> ReflectorMap:
@@ -67,10 +67,10 @@ def with_close_neighbors(rng: np.random.Generator, reflectors: ReflectorMap) -> 
 )
 def test_localizer_agrees_with_the_plain_one(plan: Plan, parameters: Parameters) -> None:
     rng = np.random.default_rng(11)
-    setup = LocalizerSetup(with_close_neighbors(rng, random_map(rng, 12)), Scanner(mounting=MOUNTING), parameters)
+    setup = LocalizerSetup(with_close_neighbors(rng, random_map(rng, 12)), (Scanner(mounting=MOUNTING),), parameters)
     drive = random_drive(setup, rng, plan)
     arrays = run(drive.log, setup, drive.initial)
-    plain = PlainLocalizer(setup.reflectors, setup.scanner, parameters, drive.initial).run(drive.log)
+    plain = PlainLocalizer(setup.reflectors, setup.scanners[0], parameters, drive.initial).run(drive.log)
     assert len(plain) == len(arrays)
     # The plain one differentiates numerically: 1e-10 of relative error, which the gain passes on.
     assert_close(arrays.means, np.array([cycle["mean"] for cycle in plain]), 1e-8)
@@ -104,7 +104,7 @@ def test_pose_errors_and_innovations_are_as_large_as_the_filter_says(plan: Plan)
     drives = 40
     for seed in range(drives):
         rng = np.random.default_rng(seed)
-        setup = LocalizerSetup(random_map(rng, 5), Scanner(mounting=MOUNTING), parameters)
+        setup = LocalizerSetup(random_map(rng, 5), (Scanner(mounting=MOUNTING),), parameters)
         drive = random_drive(setup, rng, plan)
         arrays = run(drive.log, setup, drive.initial)
         error = arrays.means[-1] - drive.truth[-1]
@@ -129,7 +129,7 @@ def moved(drive: Drive, setup: LocalizerSetup, T: np.ndarray) -> tuple[Localizer
     )
     G = block(T)
     initial = Belief(0, se2.compose(T, drive.initial.mean), G @ drive.initial.covariance @ G.T)
-    return LocalizerSetup(reflectors, setup.scanner, setup.parameters), initial
+    return LocalizerSetup(reflectors, setup.scanners, setup.parameters), initial
 
 
 def block(T: np.ndarray) -> np.ndarray:
@@ -140,7 +140,7 @@ def block(T: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("T", [(100.0, -50.0, 0.0), (0.0, 0.0, 2.5), (-30.0, 7.0, -3.1)])
 def test_nothing_changes_when_the_whole_hall_is_moved_or_turned(T: tuple[float, float, float]) -> None:
     rng = np.random.default_rng(21)
-    setup = LocalizerSetup(random_map(rng, 12), Scanner(mounting=MOUNTING), Parameters())
+    setup = LocalizerSetup(random_map(rng, 12), (Scanner(mounting=MOUNTING),), Parameters())
     drive = random_drive(setup, rng, Plan(clutter=1.0))
     here = run(drive.log, setup, drive.initial)
     pose = np.array(T)
@@ -292,7 +292,7 @@ def test_records_older_than_what_was_flushed_are_refused() -> None:
 
 
 def test_map_without_reflectors_makes_every_detection_an_outlier() -> None:
-    setup = LocalizerSetup(ReflectorMap(), Scanner(), Parameters())
+    setup = LocalizerSetup(ReflectorMap(), (Scanner(),), Parameters())
     log = RecordLog.collect([Odometry(0, np.zeros(3)), Detections(0, np.array([[2.0, 0.0]]))])
     arrays = run(log, setup, INITIAL)
     assert arrays.status.tolist() == [Status.OUTLIER_ASSOCIATION]

@@ -128,7 +128,7 @@ def test_innovation_covariances_are_those_of_plain_matrices(seed: int) -> None:
 def test_drawn_outline_of_the_gate_parts_what_the_localizer_takes_from_what_it_leaves(probability: float) -> None:
     reflectors = ReflectorMap((Reflector(id="near", x=4.0, y=1.0, sigma=0.02), Reflector(id="far", x=-3.0, y=11.0)))
     parameters = Parameters(association=AssociationParameters(gate_probability=probability))
-    setup = LocalizerSetup(reflectors, Scanner(mounting=MOUNTING), parameters)
+    setup = LocalizerSetup(reflectors, (Scanner(mounting=MOUNTING),), parameters)
     covariance = np.array([[4e-4, 1e-4, 1e-5], [1e-4, 9e-4, -2e-5], [1e-5, -2e-5, 1e-5]])
     belief = Belief(0, np.array([0.5, -0.5, 0.3]), covariance)
     outlines = setup.validation_outlines(belief)

@@ -42,7 +42,7 @@ TIGHT = SupervisorParameters(position_limit=0.01)
 def setup_of(seed: int = 3, **groups: object) -> LocalizerSetup:
     scanner = Scanner(mounting=np.array([0.3, 0.1, 0.2]))
     parameters = Parameters(**{"supervisor": TIGHT, **groups})  # type: ignore[arg-type]
-    return LocalizerSetup(random_map(np.random.default_rng(seed), 12), scanner, parameters)
+    return LocalizerSetup(random_map(np.random.default_rng(seed), 12), (scanner,), parameters)
 
 
 SETUPS = {

@@ -31,7 +31,7 @@ PLANS = {
 
 def setup_of(rng: np.random.Generator, parameters: Parameters | None = None) -> LocalizerSetup:
     scanner = Scanner(mounting=np.array([0.3, 0.1, 0.2]))
-    return LocalizerSetup(random_map(rng, 12), scanner, parameters or Parameters())
+    return LocalizerSetup(random_map(rng, 12), (scanner,), parameters or Parameters())
 
 
 def bits(value: object) -> bytes | list[bytes]:

@@ -31,7 +31,8 @@ def straight(length: float = 20.0, speed: float = 1.0) -> Route:
     return Route("Line", (Segment(control_points=np.array([[0.0, 0.0], [length, 0.0]]), degree=1),), speed)
 
 
-def open_field(places, length: float = 20.0, **changes) -> Project:
+def open_field(places, length: float = 20.0, *, scanner: Scanner | None = None, **changes) -> Project:
     """Reflectors on an open field around a straight route, and a scanner that sees all around."""
-    given = {"scanner": Scanner(field_of_view_deg=(-180.0, 180.0)), "routes": (straight(length),), **changes}
+    scanners = (scanner or Scanner(field_of_view_deg=(-180.0, 180.0)),)
+    given = {"scanners": scanners, "routes": (straight(length),), **changes}
     return Project(reflectors=reflectors_at(places), **given)

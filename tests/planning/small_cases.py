@@ -115,7 +115,7 @@ def small_case(seed: int) -> SmallCase:
         floor_map=room(18.0, 8.0),
         # Five scans a second keep the enumeration of all layouts short; sight all around and from the middle of the
         # vehicle makes one heading stand for all.
-        scanner=Scanner(field_of_view_deg=(-180.0, 180.0), reflector_range=8.0, rate=5.0),
+        scanners=(Scanner(field_of_view_deg=(-180.0, 180.0), reflector_range=8.0, rate=5.0),),
         routes=(route,),
         # So poor odometry that two distant reflectors do not hold the pose.
         parameters=Parameters(odometry=OdometryParameters(heading_per_sqrt_m=0.03, forward_per_sqrt_m=0.03)),

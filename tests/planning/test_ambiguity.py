@@ -21,7 +21,7 @@ CORNERS = ((0.2, 0.2), (11.8, 0.2), (11.8, 7.8), (0.2, 7.8))
 
 
 def hall(places, scanner=ALL_AROUND) -> Project:
-    return Project(floor_map=room(12.0, 8.0), reflectors=reflectors_at(places), scanner=scanner)
+    return Project(floor_map=room(12.0, 8.0), reflectors=reflectors_at(places), scanners=(scanner,))
 
 
 def start_in(project):
@@ -78,10 +78,10 @@ def test_a_further_reflector_in_sight_tells_two_places_apart():
     shifted = triangle + np.array([40.0, 0.0])
     scanner = replace(ALL_AROUND, reflector_range=6.0)
     spot = [[0.5, 0.5, 0.0]]
-    alike = Project(reflectors=reflectors_at([*triangle, *shifted]), scanner=scanner)
+    alike = Project(reflectors=reflectors_at([*triangle, *shifted]), scanners=(scanner,))
     found = ambiguous_poses(visibility_model(alike), spot)
     np.testing.assert_allclose(found.partners, [[40.5, 0.5, 0.0]], atol=1e-9)
-    accompanied = Project(reflectors=reflectors_at([*triangle, *shifted, (43.0, 2.0)]), scanner=scanner)
+    accompanied = Project(reflectors=reflectors_at([*triangle, *shifted, (43.0, 2.0)]), scanners=(scanner,))
     assert not ambiguous_poses(visibility_model(accompanied), spot).ambiguous.any()
 
 

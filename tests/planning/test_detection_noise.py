@@ -22,8 +22,10 @@ SCANS = 1500
 
 def simulated(distance: float, scanner: Scanner, radius: float) -> np.ndarray:
     """Errors of range [m] and bearing [rad] of a reflector at any bearing between two beams."""
-    project = Project(reflectors=ReflectorMap((Reflector(id="R", x=distance, y=0.0, radius=radius),)), scanner=scanner)
-    virtual, setup = VirtualScanner.of(project), LocalizerSetup.of(project)
+    project = Project(
+        reflectors=ReflectorMap((Reflector(id="R", x=distance, y=0.0, radius=radius),)), scanners=(scanner,)
+    )
+    virtual, setup = VirtualScanner.of(project, project.scanners[0]), LocalizerSetup.of(project)
     rng, found = np.random.default_rng(5), []
     for heading in rng.uniform(-0.5, 0.5, SCANS) * scanner.angle_increment:
         ranges, flags = virtual.scan(np.array([0.0, 0.0, heading]), np.empty((0, 3)), rng)

@@ -32,7 +32,7 @@ FULL_TURN = Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=0.02, rang
 def open_field(centers: np.ndarray, scanner: Scanner = FULL_TURN, sigma: float = 0.0) -> VisibilityModel:
     """Reflectors without walls."""
     reflectors = tuple(Reflector(id=str(i), x=float(x), y=float(y), sigma=sigma) for i, (x, y) in enumerate(centers))
-    return visibility_model(Project(reflectors=ReflectorMap(reflectors), scanner=scanner))
+    return visibility_model(Project(reflectors=ReflectorMap(reflectors), scanners=(scanner,)))
 
 
 def on_circle(n: int, radius: float) -> np.ndarray:

@@ -26,7 +26,7 @@ SCANNER = Scanner(field_of_view_deg=(-180.0, 180.0), reflector_range=8.0, rate=5
 
 def hall(**changes) -> Project:
     route = Route("Through", (Segment(control_points=np.array([[2.0, 4.0], [16.0, 4.0]]), degree=1),), 1.0)
-    return Project(floor_map=room(18.0, 8.0), scanner=SCANNER, routes=(route,), **changes)
+    return Project(floor_map=room(18.0, 8.0), scanners=(SCANNER,), routes=(route,), **changes)
 
 
 def holds(project: Project, reflectors: ReflectorMap, demands: Demands) -> bool:
@@ -119,7 +119,7 @@ def test_extending_keeps_what_there_is_and_adds_fewer():
 
 
 def test_what_cannot_be_met_is_named_by_route_and_metre():
-    far = Project(floor_map=room(18.0, 8.0), scanner=replace(SCANNER, reflector_range=2.0), routes=hall().routes)
+    far = Project(floor_map=room(18.0, 8.0), scanners=(replace(SCANNER, reflector_range=2.0),), routes=hall().routes)
     found = place(far, options=PlacementOptions(demands=Demands(visible=2)))
     assert {(unmet.route, unmet.reason) for unmet in found.unmet} >= {("Through", "visible")}
     # In the middle of the hall no wall is within two metres.
@@ -160,9 +160,13 @@ CORNERS = ((0.2, 0.2), (11.8, 0.2), (11.8, 7.8), (0.2, 7.8))
 """A hall of 12 x 8 m looks the same after half a turn."""
 
 
-def symmetric_hall(**changes) -> Project:
+def symmetric_hall(scanner=None, **changes) -> Project:
     route = Route("Across", (Segment(control_points=np.array([[3.0, 2.5], [9.0, 2.5]]), degree=1),), 1.0)
-    given = {"reflectors": reflectors_at(CORNERS), "scanner": replace(SCANNER, reflector_range=20.0), **changes}
+    given = {
+        "reflectors": reflectors_at(CORNERS),
+        "scanners": (scanner or replace(SCANNER, reflector_range=20.0),),
+        **changes,
+    }
     return Project(floor_map=room(12.0, 8.0), routes=(route,), **given)
 
 

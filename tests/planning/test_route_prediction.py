@@ -33,7 +33,7 @@ NO_GATE = Parameters(association=AssociationParameters(enabled=False))
 
 def exact_records(project, planned) -> RecordLog:
     """The planned drive as a recording without any noise."""
-    drive, mounting = planned.drive, project.scanner.mounting
+    drive, mounting = planned.drive, project.scanners[0].mounting
     records = []
     for k, stamp in enumerate(drive.stamps_ns.tolist()):
         before, now = drive.poses[max(k - 1, 0)], drive.poses[k]
@@ -63,7 +63,7 @@ def test_prediction_equals_the_localizer_on_exact_records():
 
 def test_nominal_drive_rests_and_keeps_to_the_speed_of_the_route():
     project = open_field(LINE)
-    drive = nominal_drive(project.routes[0], project.vehicle, project.scanner, DrivePlan(rest=2.0))
+    drive = nominal_drive(project.routes[0], project.vehicle, project.scanners[0], DrivePlan(rest=2.0))
     seconds = drive.stamps_ns * 1e-9
     assert drive.length == pytest.approx(20.0)
     assert np.all(drive.metres[seconds <= 2.0] == 0.0)
@@ -94,7 +94,7 @@ def test_straight_odometry_grows_as_its_parameters_say():
 
 
 def test_a_vehicle_recovers_where_reflectors_come_in_sight_again():
-    scanner_range = replace(open_field(LINE).scanner, reflector_range=5.0)
+    scanner_range = replace(open_field(LINE).scanners[0], reflector_range=5.0)
     parameters = Parameters(odometry=OdometryParameters(heading_per_sqrt_m=0.03))
     project = open_field([(1.0, 2.0), (2.0, -2.0), (18.0, 2.0), (19.0, -2.0)], scanner=scanner_range)
     predicted = predict_route(plan_route(replace(project, parameters=parameters), "Line"))

@@ -88,7 +88,7 @@ def test_line_of_sight_is_that_of_cell_by_cell_traversal_for_every_pair(seed, on
 
 def open_field(*reflectors: Reflector, scanner: Scanner = SHARP, **options: float) -> VisibilityModel:
     """Reflectors without a map."""
-    project = Project(reflectors=ReflectorMap(reflectors), scanner=scanner)
+    project = Project(reflectors=ReflectorMap(reflectors), scanners=(scanner,))
     return visibility_model(project, VisibilityOptions(**options))
 
 

@@ -51,5 +51,5 @@ def hall(vehicle: Vehicle | None = None, scanner: Scanner | None = None) -> Proj
         reflectors=corner_reflectors(),
         routes=(out_and_back(),),
         vehicle=vehicle or DifferentialVehicle(),
-        scanner=scanner or Scanner(),
+        scanners=(scanner or Scanner(),),
     )

@@ -20,7 +20,7 @@ FULL_TURN = replace(QUIET, field_of_view_deg=(-180.0, 180.0))
 
 
 def scan(project: Project, pose: tuple[float, float, float], circles: np.ndarray = NOBODY, seed: int = 0):
-    return VirtualScanner.of(project).scan(np.array(pose), circles, np.random.default_rng(seed))
+    return VirtualScanner.of(project, project.scanners[0]).scan(np.array(pose), circles, np.random.default_rng(seed))
 
 
 def bearings(scanner: Scanner) -> np.ndarray:
@@ -32,7 +32,7 @@ def equation_3(distance: float, radius: float, scanner: Scanner) -> int:
 
 
 def test_ranges_in_a_square_room_are_those_to_its_four_walls() -> None:
-    project = Project(floor_map=room(10.0, 10.0), scanner=FULL_TURN)
+    project = Project(floor_map=room(10.0, 10.0), scanners=(FULL_TURN,))
     ranges, flags = scan(project, (4.0, 3.0, 0.3))
     angles = bearings(FULL_TURN) + 0.3
     with np.errstate(divide="ignore"):
@@ -45,20 +45,20 @@ def test_ranges_in_a_square_room_are_those_to_its_four_walls() -> None:
 
 def test_mounting_moves_and_turns_the_scanner() -> None:
     mounted = replace(QUIET, mounting=np.array([1.0, 0.5, math.pi / 2]))
-    ranges, _ = scan(Project(floor_map=room(10.0, 10.0), scanner=mounted), (4.0, 3.0, 0.0))
+    ranges, _ = scan(Project(floor_map=room(10.0, 10.0), scanners=(mounted,)), (4.0, 3.0, 0.0))
     ahead = np.argmin(np.abs(bearings(mounted)))
     assert ranges[ahead] == pytest.approx(9.95 - 3.5, abs=2e-6)
 
 
 def test_open_field_returns_nothing() -> None:
-    ranges, flags = scan(Project(scanner=QUIET), (0.0, 0.0, 0.0))
+    ranges, flags = scan(Project(scanners=(QUIET,)), (0.0, 0.0, 0.0))
     assert np.isnan(ranges).all()
     assert not flags.any()
 
 
 def test_cylinder_is_met_at_its_nearest_point_and_flagged() -> None:
     reflectors = ReflectorMap((Reflector(id="A", x=5.0, y=0.0, radius=0.1),))
-    ranges, flags = scan(Project(reflectors=reflectors, scanner=QUIET), (0.0, 0.0, 0.0))
+    ranges, flags = scan(Project(reflectors=reflectors, scanners=(QUIET,)), (0.0, 0.0, 0.0))
     assert np.nanmin(ranges) == pytest.approx(4.9, abs=1e-3)
     assert np.array_equal(flags, np.isfinite(ranges))
     middle = bearings(QUIET)[flags].mean()
@@ -76,7 +76,7 @@ def test_beams_on_a_reflector_follow_equation_3_within_the_detectors_window(
         turn = 0.37 * seed
         place = Reflector(id="A", x=distance * math.cos(turn), y=distance * math.sin(turn))
         project = Project(
-            reflectors=ReflectorMap((place,)), scanner=replace(scanner, field_of_view_deg=(-180.0, 180.0))
+            reflectors=ReflectorMap((place,)), scanners=(replace(scanner, field_of_view_deg=(-180.0, 180.0)),)
         )
         counts.append(int(scan(project, (0.0, 0.0, 0.0), seed=seed)[1].sum()))
     errors = np.array(counts) - equation_3(distance, 0.04, scanner)
@@ -88,7 +88,7 @@ def test_beams_on_a_reflector_follow_equation_3_within_the_detectors_window(
 
 def test_reflector_behind_a_full_turn_scanner_is_not_cut_at_the_seam() -> None:
     reflectors = ReflectorMap((Reflector(id="A", x=-2.0, y=0.0),))
-    _, flags = scan(Project(reflectors=reflectors, scanner=FULL_TURN), (0.0, 0.0, 0.0))
+    _, flags = scan(Project(reflectors=reflectors, scanners=(FULL_TURN,)), (0.0, 0.0, 0.0))
     assert flags[:2].all()
     assert flags[-2:].all()
     assert 0 <= flags.sum() - equation_3(2.0, 0.04, FULL_TURN) <= 2
@@ -96,20 +96,20 @@ def test_reflector_behind_a_full_turn_scanner_is_not_cut_at_the_seam() -> None:
 
 def test_reflector_outside_the_field_of_view_is_not_seen() -> None:
     reflectors = ReflectorMap((Reflector(id="A", x=-2.0, y=0.0),))
-    _, flags = scan(Project(reflectors=reflectors, scanner=QUIET), (0.0, 0.0, 0.0))
+    _, flags = scan(Project(reflectors=reflectors, scanners=(QUIET,)), (0.0, 0.0, 0.0))
     assert not flags.any()
 
 
 def test_reflector_beyond_its_detection_range_is_a_wall() -> None:
     reflectors = ReflectorMap((Reflector(id="A", x=11.0, y=4.0, radius=0.1),))
     near_sighted = replace(QUIET, reflector_range=5.0)
-    ranges, flags = scan(Project(floor_map=room(), reflectors=reflectors, scanner=near_sighted), (1.0, 4.0, 0.0))
+    ranges, flags = scan(Project(floor_map=room(), reflectors=reflectors, scanners=(near_sighted,)), (1.0, 4.0, 0.0))
     assert not flags.any()
     assert np.isfinite(ranges).all()
 
 
 def test_person_hides_the_reflector_behind() -> None:
-    project = Project(reflectors=ReflectorMap((Reflector(id="A", x=5.0, y=0.0),)), scanner=QUIET)
+    project = Project(reflectors=ReflectorMap((Reflector(id="A", x=5.0, y=0.0),)), scanners=(QUIET,))
     person = np.array([[2.5, 0.0, 0.2]])
     ranges, flags = scan(project, (0.0, 0.0, 0.0), person)
     assert not flags.any()
@@ -119,7 +119,7 @@ def test_person_hides_the_reflector_behind() -> None:
 
 
 def test_wall_hides_the_reflector_behind() -> None:
-    project = Project(floor_map=room(), reflectors=ReflectorMap((Reflector(id="A", x=13.0, y=4.0),)), scanner=QUIET)
+    project = Project(floor_map=room(), reflectors=ReflectorMap((Reflector(id="A", x=13.0, y=4.0),)), scanners=(QUIET,))
     _, flags = scan(project, (6.0, 4.0, 0.0))
     assert not flags.any()
 
@@ -127,7 +127,7 @@ def test_wall_hides_the_reflector_behind() -> None:
 @pytest.mark.parametrize(("facing_deg", "seen"), [(180.0, True), (150.0, True), (100.0, False), (0.0, False)])
 def test_flat_plate_is_flagged_only_where_it_faces_the_scanner(facing_deg: float, seen: bool) -> None:
     plate = Reflector(id="P", x=4.0, y=0.0, radius=0.15, kind=ReflectorKind.FLAT, heading=math.radians(facing_deg))
-    ranges, flags = scan(Project(reflectors=ReflectorMap((plate,)), scanner=QUIET), (0.0, 0.0, 0.0))
+    ranges, flags = scan(Project(reflectors=ReflectorMap((plate,)), scanners=(QUIET,)), (0.0, 0.0, 0.0))
     assert flags.any() == seen
     if seen:
         lit = ranges[flags] * np.exp(1j * bearings(QUIET)[flags])
@@ -139,7 +139,7 @@ def test_flat_plate_is_flagged_only_where_it_faces_the_scanner(facing_deg: float
 
 
 def test_shiny_object_passes_for_a_reflector() -> None:
-    project = Project(scanner=QUIET, disturbances=Disturbances(shiny_objects=(ShinyObject(3.0, 1.0),)))
+    project = Project(scanners=(QUIET,), disturbances=Disturbances(shiny_objects=(ShinyObject(3.0, 1.0),)))
     _, flags = scan(project, (0.0, 0.0, 0.0))
     assert flags.any()
 
@@ -154,7 +154,7 @@ def test_tilted_floor_cuts_every_beam_and_hides_reflectors() -> None:
                 Reflector(id="Aside", x=8.0, y=6.0, radius=0.1),  # in nobody's shadow
             )
         ),
-        scanner=QUIET,
+        scanners=(QUIET,),
         disturbances=Disturbances(tilted_stretches=(TiltedStretch(2.0, 4.0, 1.0),)),
     )
     ranges, flags = scan(project, (2.0, 4.0, 0.0))
@@ -168,8 +168,10 @@ def test_tilted_floor_cuts_every_beam_and_hides_reflectors() -> None:
 
 def test_range_noise_has_the_scanners_sigma() -> None:
     scanner = replace(QUIET, range_sigma=0.02)
-    clean, _ = scan(Project(floor_map=room(), scanner=QUIET), (5.0, 4.0, 0.0))
-    noisy = np.stack([scan(Project(floor_map=room(), scanner=scanner), (5.0, 4.0, 0.0), seed=k)[0] for k in range(20)])
+    clean, _ = scan(Project(floor_map=room(), scanners=(QUIET,)), (5.0, 4.0, 0.0))
+    noisy = np.stack(
+        [scan(Project(floor_map=room(), scanners=(scanner,)), (5.0, 4.0, 0.0), seed=k)[0] for k in range(20)]
+    )
     errors = noisy - clean
     # 10,800 draws: 1-sigma of the standard deviation is 0.7 %, of the mean 0.2 mm.
     assert np.std(errors) == pytest.approx(0.02, rel=0.035)
@@ -177,8 +179,8 @@ def test_range_noise_has_the_scanners_sigma() -> None:
 
 
 def test_glints_come_at_their_rate_in_short_runs_of_beams() -> None:
-    project = Project(floor_map=room(), scanner=QUIET, disturbances=Disturbances(glints_per_scan=0.5))
-    scanner, rng = VirtualScanner.of(project), np.random.default_rng(0)
+    project = Project(floor_map=room(), scanners=(QUIET,), disturbances=Disturbances(glints_per_scan=0.5))
+    scanner, rng = VirtualScanner.of(project, project.scanners[0]), np.random.default_rng(0)
     starts = longest = 0
     for _ in range(400):
         _, flags = scanner.scan(np.array([5.0, 4.0, 0.0]), NOBODY, rng)
@@ -192,6 +194,6 @@ def test_glints_come_at_their_rate_in_short_runs_of_beams() -> None:
 
 def test_echoes_nearer_than_the_scanner_measures_are_missing() -> None:
     blind = replace(QUIET, range=(1.0, 30.0))
-    ranges, _ = scan(Project(floor_map=room(), scanner=blind), (0.5, 4.0, math.pi))
+    ranges, _ = scan(Project(floor_map=room(), scanners=(blind,)), (0.5, 4.0, math.pi))
     assert np.isnan(ranges[np.argmin(np.abs(bearings(blind)))])
     assert np.nanmin(ranges) >= 1.0

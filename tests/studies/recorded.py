@@ -21,7 +21,7 @@ RANGE_SIGMA, BEARING_SIGMA = 0.01, 0.002
 
 PROJECT = Project(
     reflectors=ReflectorMap(tuple(Reflector(id=f"R{i}", x=x, y=y, radius=0.04) for i, (x, y) in enumerate(PLACES))),
-    scanner=Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=0.5, rate=10.0, range=(0.05, 30.0)),
+    scanners=(Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=0.5, rate=10.0, range=(0.05, 30.0)),),
     parameters=dataclasses.replace(
         Parameters(), observation=ObservationParameters(range_sigma=RANGE_SIGMA, bearing_sigma=BEARING_SIGMA)
     ),

@@ -27,7 +27,7 @@ CORNERS = ((0.2, 0.2), (11.8, 0.2), (11.8, 7.8), (0.2, 7.8))
 
 
 def hall(scanner=ALL_AROUND) -> Project:
-    return Project(floor_map=room(12.0, 8.0), reflectors=reflectors_at(CORNERS), scanner=scanner)
+    return Project(floor_map=room(12.0, 8.0), reflectors=reflectors_at(CORNERS), scanners=(scanner,))
 
 
 def over_floor(

@@ -30,7 +30,7 @@ def hall() -> Project:
     cells = np.full((60, 100), FREE, dtype=np.int8)
     cells[:, :20] = UNKNOWN
     cells[:, 60] = OCCUPIED
-    return Project(floor_map=FloorMap(cells, 0.1), reflectors=CORNERS, scanner=Scanner(resolution_deg=0.1))
+    return Project(floor_map=FloorMap(cells, 0.1), reflectors=CORNERS, scanners=(Scanner(resolution_deg=0.1),))
 
 
 def covered(project: Project, spacing: float, blocked_per_m: float = 0.0) -> CoverageResult:

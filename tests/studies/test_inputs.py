@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from commission.errors import UsageError
+from commission.errors import ProjectError, UsageError
 from commission.planning.ambiguity import AmbiguityOptions
 from commission.planning.dependence import Failure
 from commission.planning.dilution import Heading, Measurement
@@ -53,7 +53,7 @@ PLACES = ((0.3, 3.1), (3.0, 5.6), (3.07, 5.6), (7.2, 5.6), (9.6, 2.0), (5.5, 0.4
 SITE = Project(
     floor_map=hall(),
     reflectors=ReflectorMap(tuple(Reflector(id=f"R{i}", x=x, y=y) for i, (x, y) in enumerate(PLACES))),
-    scanner=Scanner(field_of_view_deg=(-150.0, 150.0), reflector_range=20.0),
+    scanners=(Scanner(field_of_view_deg=(-150.0, 150.0), reflector_range=20.0),),
     routes=(line(2.0),),
     stations=(Station(name="Dock", x=7.5, y=2.0),),
 )
@@ -171,7 +171,9 @@ def _with_other_fields(value: Any) -> Iterator[tuple[str, Any]]:
     for field in dataclasses.fields(value):
         if field.init:
             for path, other in others(getattr(value, field.name)):
-                with contextlib.suppress(ValueError, TypeError, LookupError):  # out of range, or of another shape
+                with contextlib.suppress(
+                    ProjectError, ValueError, TypeError, LookupError
+                ):  # out of range, or of another shape
                     yield f".{field.name}{path}", replace(value, **{field.name: other})
 
 
@@ -205,7 +207,7 @@ SEEN = {
     "coverage": (
         ".floor_map",
         ".parameters.observation.range_sigma",
-        ".scanner.mounting",
+        ".scanners[0].mounting",
         ".reflectors.reflectors[fewer]",
         ".parameters.odometry.forward_per_sqrt_m",
     ),
@@ -216,7 +218,7 @@ SEEN = {
         ".parameters.odometry.heading_per_sqrt_m",
         ".stations[fewer]",
         ".floor_map",
-        ".scanner.range_sigma",
+        ".scanners[0].range_sigma",
     ),
     "failures": (".parameters.supervisor.position_limit", ".parameters.odometry.heading_per_sqrt_m"),
     "problems": (".parameters.supervisor.position_limit", ".stations[0].x", ".vehicle.outline[fewer]"),

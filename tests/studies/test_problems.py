@@ -41,7 +41,7 @@ REFLECTORS = ReflectorMap(
     tuple(Reflector(id=n, x=x, y=y) for n, x, y in (("A", 1, 7.6), ("B", 4, 7.6), ("C", 11, 7.6)))
 )
 EDGE = Scanner(mounting=[0.5, 0.0, 0.0], field_of_view_deg=(-90.0, 90.0))
-SITE = Project(floor_map=FLOOR.floor_map, reflectors=REFLECTORS, vehicle=BOX, scanner=EDGE)
+SITE = Project(floor_map=FLOOR.floor_map, reflectors=REFLECTORS, vehicle=BOX, scanners=(EDGE,))
 
 
 def line(*points: tuple[float, float], name: str = "r", direction: Direction = Direction.FORWARD) -> Route:
@@ -104,7 +104,7 @@ def test_a_curve_tighter_than_the_vehicle_can_drive_is_an_error_with_both_radii(
     quarter = Segment(control_points=np.array(corner), degree=2, weights=np.array([1.0, weight, 1.0]))
     route = Route("bend", (quarter,))
     small = TricycleVehicle(1.2, 45.0, outline=((0.1, 0.1), (-0.1, 0.1), (0.0, -0.1)))
-    site = replace(SITE, routes=(route,), vehicle=small, scanner=Scanner(mounting=[0.0, 0.0, 0.0]))
+    site = replace(SITE, routes=(route,), vehicle=small, scanners=(Scanner(mounting=[0.0, 0.0, 0.0]),))
     (text,) = [t for t in texts(site) if "Route" in t]
     assert "a curve of 1.00 m radius over 1.5" in text
     assert "expected 1.20 m or more" in text
@@ -119,7 +119,7 @@ def test_a_corner_is_an_error_a_warning_or_fine_depending_on_the_vehicle():
     omni, scanner = OmnidirectionalVehicle(outline=small), Scanner(mounting=[0.1, 0, 0], field_of_view_deg=(-90, 90))
 
     def found(vehicle, route):
-        site = replace(SITE, vehicle=vehicle, routes=(route,), scanner=scanner)
+        site = replace(SITE, vehicle=vehicle, routes=(route,), scanners=(scanner,))
         return [(p.severity, "90 deg on the spot" in p.text) for p in checked(site).problems]
 
     assert found(tricycle, corner) == found(tricycle, two) == [(Severity.ERROR, True)]
@@ -189,11 +189,11 @@ def test_a_station_that_no_route_passes_is_told_since_nobody_would_check_its_acc
 
 
 def test_beams_into_the_vehicle_are_counted_with_their_bearings():
-    wide = replace(SITE, scanner=Scanner(mounting=[0.5, 0.0, 0.0], field_of_view_deg=(-135.0, 135.0)))
+    wide = replace(SITE, scanners=(Scanner(mounting=[0.5, 0.0, 0.0], field_of_view_deg=(-135.0, 135.0)),))
     (text,) = texts(wide)
     # From the middle of the front edge everything behind +-90 deg is vehicle: 45 deg on both sides.
     assert "blocks 180 of 541 beams, between -135.0 and 135.0 deg" in text
-    (note,) = checked(replace(SITE, scanner=Scanner())).problems
+    (note,) = checked(replace(SITE, scanners=(Scanner(),))).problems
     assert (note.severity, note.subject) == (Severity.NOTE, Subject.SCANNER)
     assert note.text.startswith("The scanner is 300 mm inside the vehicle's outline")
 

@@ -42,7 +42,7 @@ def hall(**groups):
     reflectors = tuple(Reflector(id=f"R{index}", x=x, y=y) for index, (x, y) in enumerate(CENTERS))
     return Project(
         reflectors=ReflectorMap(reflectors),
-        scanner=Scanner(mounting=[0.0, 0.0, 0.0], field_of_view_deg=(-180.0, 180.0)),
+        scanners=(Scanner(mounting=[0.0, 0.0, 0.0], field_of_view_deg=(-180.0, 180.0)),),
         parameters=Parameters(**groups),
     )
 

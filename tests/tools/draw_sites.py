@@ -108,12 +108,14 @@ def laboratory() -> Project:
         reflectors=reflector_map([(0.07, 3.1), (3.4, 7.93), (11.93, 6.4), (7.6, 0.07)], 0.05, "L"),
         routes=(Route("P0-P1-P2-P3-P0", segments, 0.4),),
         vehicle=DifferentialVehicle(0.4, ((0.35, 0.28), (-0.35, 0.28), (-0.35, -0.28), (0.35, -0.28)), 0.4),
-        scanner=Scanner(
-            mounting=np.array([0.15, 0.0, 0.0]),
-            field_of_view_deg=(-180.0, 180.0),
-            resolution_deg=0.36,
-            range=(0.05, 30.0),
-            reflector_range=20.0,
+        scanners=(
+            Scanner(
+                mounting=np.array([0.15, 0.0, 0.0]),
+                field_of_view_deg=(-180.0, 180.0),
+                resolution_deg=0.36,
+                range=(0.05, 30.0),
+                reflector_range=20.0,
+            ),
         ),
         parameters=Parameters(observation=ObservationParameters(range_sigma=0.0075, bearing_sigma=0.0015)),
     )
@@ -173,7 +175,7 @@ def shop_floor() -> Project:
             Route("Around", (Segment(control_points=around),), 0.5),
         ),
         vehicle=DifferentialVehicle(0.45, ((0.5, 0.3), (-0.4, 0.3), (-0.4, -0.3), (0.5, -0.3)), 0.35),
-        scanner=Scanner(mounting=np.array([0.42, 0.0, 0.0]), resolution_deg=0.25, reflector_range=15.0),
+        scanners=(Scanner(mounting=np.array([0.42, 0.0, 0.0]), resolution_deg=0.25, reflector_range=15.0),),
         parameters=Parameters(observation=ObservationParameters(range_sigma=0.008, bearing_sigma=0.0016)),
         disturbances=Disturbances(
             people=50,
@@ -281,12 +283,14 @@ def warehouse() -> Project:
             Route("Through aisles 6 and 4", (Segment(control_points=through),), 1.2),
         ),
         vehicle=TricycleVehicle(),
-        scanner=Scanner(
-            mounting=np.array([1.4, 0.0, 0.0]),
-            field_of_view_deg=(-137.5, 137.5),
-            resolution_deg=0.275,
-            range=(0.05, 40.0),
-            reflector_range=25.0,
+        scanners=(
+            Scanner(
+                mounting=np.array([1.4, 0.0, 0.0]),
+                field_of_view_deg=(-137.5, 137.5),
+                resolution_deg=0.275,
+                range=(0.05, 40.0),
+                reflector_range=25.0,
+            ),
         ),
         parameters=Parameters(observation=ObservationParameters(range_sigma=0.01, bearing_sigma=0.0016)),
         disturbances=Disturbances(people=12, glints_per_scan=0.1),

@@ -36,15 +36,17 @@ def project(data: dict[str, np.ndarray]) -> Project:
         name="Lost in the woods",
         reflectors=ReflectorMap(tubes),
         vehicle=DifferentialVehicle(0.4, ((0.35, 0.25), (-0.25, 0.25), (-0.25, -0.25), (0.35, -0.25))),
-        scanner=Scanner(
-            mounting=np.array([data["d"].item(), 0.0, 0.0]),
-            # The bearings in the file reach from -119.3 to 120.1 deg, its ranges to 5.64 m.
-            field_of_view_deg=(-121.0, 121.0),
-            resolution_deg=0.5,
-            rate=10.0,
-            range=(0.05, 6.0),
-            range_sigma=0.03,
-            reflector_range=5.7,
+        scanners=(
+            Scanner(
+                mounting=np.array([data["d"].item(), 0.0, 0.0]),
+                # The bearings in the file reach from -119.3 to 120.1 deg, its ranges to 5.64 m.
+                field_of_view_deg=(-121.0, 121.0),
+                resolution_deg=0.5,
+                rate=10.0,
+                range=(0.05, 6.0),
+                range_sigma=0.03,
+                reflector_range=5.7,
+            ),
         ),
     )
 

@@ -51,7 +51,7 @@ class BaseLayer:
     name = ""
     rank = 0
     legend: tuple[Legend, ...] = ()
-    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes", "vehicle", "scanner")
+    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes", "vehicle", "scanners")
 
     def __init__(self, scene: SceneApi) -> None:
         self.scene = scene

@@ -206,6 +206,6 @@ class SetEquipment(Action):
     """Set one number, or list of them, of vehicle or scanner."""
 
     name: str
-    """Its dotted name in the project: `vehicle.wheelbase`, `scanner.mounting[2]`."""
+    """Its dotted name in the project: `vehicle.wheelbase`, `scanners[0].mounting[2]`."""
     value: object
     """New value, in the unit of code and files."""

@@ -23,6 +23,19 @@ KINDS: dict[str, type[Vehicle]] = {
     kind.kind: kind for kind in (DifferentialVehicle, TricycleVehicle, OmnidirectionalVehicle)
 }
 OWN = "as entered"
+UNSEEN = frozenset(
+    {
+        "name",
+        "upside_down",
+        "blind_sectors_deg",
+        "beam_aperture",
+        "sweep_duration",
+        "sweep_direction",
+        "stamp_of",
+        "clock_offset",
+    }
+)
+"""Fields of a scanner that nothing acts upon yet."""
 
 
 FIGURES = {
@@ -105,7 +118,8 @@ class EquipmentFields(BasePanel):
             self._preset.on_update(posting(post, self._from_preset))
             self._source = gui.add_html("")
             for name in names_of(Scanner):
-                self._inputs.field(f"scanner.{name}", project)
+                if name not in UNSEEN:
+                    self._inputs.field(f"scanners[0].{name}", project)
 
     def _add_vehicle(self) -> dict[str, GuiInputHandle[Any]]:
         """Add an input for each field of every kind, lists last; those of other kinds are hidden."""
@@ -130,8 +144,8 @@ class EquipmentFields(BasePanel):
 
     def _from_preset(self, event: GuiEvent[Any]) -> page_actions.Action:
         if event.target.value == OWN:
-            return actions.SetScanner(self._project.scanner)
-        return actions.SetScanner(with_preset(self._project.scanner, event.target.value))
+            return actions.SetScanner(self._project.scanners[0])
+        return actions.SetScanner(with_preset(self._project.scanners[0], event.target.value))
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow the project."""
@@ -144,7 +158,7 @@ class EquipmentFields(BasePanel):
         for name, part in self._parts.items():
             show(part, visible=name in own)
         self._inputs.follow(view.state)
-        preset = next((p for p in SCANNERS if with_preset(project.scanner, p.name) == project.scanner), None)
+        preset = next((p for p in SCANNERS if with_preset(project.scanners[0], p.name) == project.scanners[0]), None)
         write(self._preset, OWN if preset is None else preset.name)
         write_html(self._source, source_html(preset))
 

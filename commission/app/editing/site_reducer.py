@@ -19,6 +19,9 @@ from commission.site.fields import get_field, with_field
 from commission.site.layout_brief import LayoutBrief
 from commission.site.routes import Route, Segment
 
+EQUIPMENT = {"vehicle": "vehicle", "scanners": "scanner"}
+"""Parts of a project that are equipment, and what each is called."""
+
 
 def with_routes(
     state: AppState,
@@ -145,18 +148,19 @@ def set_vehicle(action: actions.SetVehicle, state: AppState, sender: Sender) -> 
 
 @reduce.register
 def set_scanner(action: actions.SetScanner, state: AppState, sender: Sender) -> Outcome:
-    if action.scanner == state.project.scanner:
+    if action.scanner == state.project.scanners[0]:
         return Outcome(state)
     edit = Edit("change the scanner", sender, "scanner")
-    return Outcome(edited(state, replace(state.project, scanner=action.scanner), edit))
+    return Outcome(edited(state, replace(state.project, scanners=(action.scanner, *state.project.scanners[1:])), edit))
 
 
 @reduce.register
 def set_equipment(action: actions.SetEquipment, state: AppState, sender: Sender) -> Outcome:
     part = action.name.partition(".")[0]
-    if part not in ("vehicle", "scanner"):
-        raise UsageError(f"no equipment is called {action.name!r}; expected one of vehicle or scanner")
+    kind = EQUIPMENT.get(part.partition("[")[0])
+    if kind is None:
+        raise UsageError(f"no equipment is called {action.name!r}; expected one of {' or '.join(EQUIPMENT)}")
     project = with_field(state.project, action.name, action.value)
     if get_field(project, part) == get_field(state.project, part):
         return Outcome(state)
-    return Outcome(edited(state, project, Edit(f"change the {part}", sender, action.name)))
+    return Outcome(edited(state, project, Edit(f"change the {kind}", sender, action.name)))

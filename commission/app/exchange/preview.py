@@ -20,7 +20,7 @@ PARTS = {
     "name": "name of the project",
     "floor_map": "floor map",
     "vehicle": "vehicle",
-    "scanner": "scanner",
+    "scanners": "scanners",
     "parameters": "parameters of the localizer",
     "disturbances": "disturbances of virtual drives",
     "layout": "demands on a suggested layout",

@@ -10,7 +10,7 @@ from commission.site.project import Project
 from commission.studies.inputs import is_same
 from commission.studies.placement import PlacementInput, PlacementResult
 
-SITE = ("reflectors", "floor_map", "scanner", "vehicle", "parameters", "stations")
+SITE = ("reflectors", "floor_map", "scanners", "vehicle", "parameters", "stations")
 """Parts of the input that are the site's, besides its routes."""
 
 

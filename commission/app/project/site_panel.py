@@ -11,7 +11,7 @@ from commission.site.project import Project
 
 def rows(project: Project) -> list[tuple[str, str]]:
     """Return what the panel shows, line by line."""
-    floor_map, scanner = project.floor_map, project.scanner
+    floor_map, scanner = project.floor_map, project.scanners[0]
     first, last = scanner.field_of_view_deg
     shown = [("Project", escaped(project.name))]
     if floor_map is None:

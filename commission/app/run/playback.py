@@ -129,7 +129,7 @@ class Playback:
         hit = np.isfinite(scan.ranges)
         ranges, bearings = scan.ranges[hit].astype(np.float64), scan.bearings[hit]
         points_scanner = ranges[:, np.newaxis] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
-        T_map_scanner = se2.compose(belief.mean, setup.scanner.mounting)
+        T_map_scanner = se2.compose(belief.mean, setup.scanners[0].mounting)
         return se2.transform_points(T_map_scanner, points_scanner)
 
 
@@ -168,7 +168,7 @@ def _gates(estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
     """(R, n, 2) validation areas of the reflectors that the scanner could see if nothing stood in between."""
     if estimate is None or not len(setup.reflectors):
         return np.empty((0, GATE_POINTS, 2))
-    scanner = setup.scanner
+    scanner = setup.scanners[0]
     seen = range_bearing(estimate.prior.mean, scanner.mounting, setup.reflectors.centers)
     first, last = (math.radians(limit) for limit in scanner.field_of_view_deg)
     inside = np.mod(seen[:, 1] - first, 2.0 * math.pi) <= last - first

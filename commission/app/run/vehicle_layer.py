@@ -63,7 +63,7 @@ class VehicleLayer(BaseLayer):
 
     name = "Vehicle"
     rank = 190
-    reads: tuple[str, ...] = ("vehicle", "scanner", "routes")
+    reads: tuple[str, ...] = ("vehicle", "scanners", "routes")
     legend = (
         theme.Legend("vehicle; before a run at the start", theme.VEHICLE, theme.Mark.LINE),
         theme.Legend("field of view, reach for reflectors", theme.FIELD, theme.Mark.LINE),
@@ -92,13 +92,13 @@ class VehicleLayer(BaseLayer):
         sides = outline_segments(outline[np.newaxis], theme.Height.VEHICLE)
         arrow = stroke_segments(heading_mark(outline), theme.Height.VEHICLE)
         self._lines.points = np.concatenate([sides, arrow])
-        x, y, heading = (float(value) for value in project.scanner.mounting)
+        x, y, heading = (float(value) for value in project.scanners[0].mounting)
         self._scanner.position = (x, y, theme.Height.VEHICLE)
         self._scanner.wxyz = yaw_quaternion(heading)
         size = float(np.abs(outline).max())
         self._scanner.axes_length = 0.3 * size
-        for node, radius in ((self._near, NEAR_FAN * size), (self._far, reach_of(project.scanner))):
-            node.points = stroke_segments(fan(project.scanner, radius), theme.Height.GRID)
+        for node, radius in ((self._near, NEAR_FAN * size), (self._far, reach_of(project.scanners[0]))):
+            node.points = stroke_segments(fan(project.scanners[0], radius), theme.Height.GRID)
         if not self._drives:
             self._wait(project)
 

@@ -29,7 +29,7 @@ def symmetric_hall() -> Project:
     places = ((1.0, 0.5), (6.0, 0.5), (9.0, 5.5), (4.0, 5.5))
     reflectors = ReflectorMap(tuple(Reflector(id=f"R{i + 1}", x=x, y=y) for i, (x, y) in enumerate(places)))
     scanner = Scanner(field_of_view_deg=(-180.0, 180.0), mounting=np.zeros(3))
-    return Project(name="Symmetric hall", floor_map=FloorMap(cells, 0.1), reflectors=reflectors, scanner=scanner)
+    return Project(name="Symmetric hall", floor_map=FloorMap(cells, 0.1), reflectors=reflectors, scanners=(scanner,))
 
 
 def found_in(project: Project) -> AmbiguousFloor:
@@ -68,7 +68,7 @@ def test_a_pair_is_listed_once_whichever_is_taken_for_the_other() -> None:
     places = ((1.0, 0.5), (3.0, 0.5), (7.0, 5.5), (9.0, 5.5))
     near = Scanner(field_of_view_deg=(-180.0, 180.0), mounting=np.zeros(3), range=(0.05, 4.0))
     reflectors = ReflectorMap(tuple(Reflector(id=f"R{i + 1}", x=x, y=y) for i, (x, y) in enumerate(places)))
-    found = found_in(replace(symmetric_hall(), reflectors=reflectors, scanner=near))
+    found = found_in(replace(symmetric_hall(), reflectors=reflectors, scanners=(near,)))
     groups = [{pair.constellation, tuple(sorted(pair.image))} for pair in found.pairs]
     assert {(0, 1), (2, 3)} in groups
     assert len(groups) == len({frozenset(group) for group in groups})

@@ -50,7 +50,7 @@ def after(project: Project, *wishes: Action) -> CoverageSettings:
 @pytest.mark.parametrize("heading", list(Heading))
 def test_an_ellipse_is_as_long_as_the_heatmap_says(project: Project, heading: Heading) -> None:
     narrow = Scanner(field_of_view_deg=(-120.0, 120.0), mounting=np.array([0.4, 0.1, 0.3]))
-    found = covered(replace(project, scanner=narrow), heading)
+    found = covered(replace(project, scanners=(narrow,)), heading)
     drawn = ellipses(found, SPOTS, 1.0, grid=True)
     lattice, sigma = found.live.coverage.lattice, found.live.coverage.fixes.position_sigma
     assert len(drawn.centers) > 20

@@ -159,7 +159,7 @@ def test_edits_that_it_reads_are_computed_anew(bench: Bench[CoverageService]) ->
     observation = replace(project.parameters.observation, range_sigma=0.05)
     for edited in (
         replace(project, parameters=replace(project.parameters, observation=observation)),
-        replace(project, scanner=replace(project.scanner, range=(0.05, 5.0))),
+        replace(project, scanners=(replace(project.scanners[0], range=(0.05, 5.0)),)),
         replace(project, floor_map=None),
         replace(project, reflectors=ReflectorMap(project.reflectors.reflectors[:-1])),
     ):

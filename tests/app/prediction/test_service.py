@@ -63,7 +63,7 @@ def test_every_part_that_a_prediction_depends_on_predicts_anew(bench: Bench[Pred
     }
     changes = {
         "vehicle": {"vehicle": replace(project.vehicle, height=1.0)},
-        "scanner": {"scanner": replace(project.scanner, range=(0.05, 6.0))},
+        "scanner": {"scanners": (replace(project.scanners[0], range=(0.05, 6.0)),)},
         "stations": {"stations": (Station(name="Dock", x=2.0, y=2.0),)},
         "route": {"routes": (replace(route, speed=0.3), *project.routes[1:])},
         "map": {"floor_map": None},

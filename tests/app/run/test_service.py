@@ -114,7 +114,7 @@ def test_an_edit_runs_the_whole_drive_again_and_the_cursor_stays(bench: RunBench
     assert_same(bench.view.result, fresh(bench, (0, gate(0.6)(project), False)))
 
 
-@pytest.mark.parametrize("part", ["reflectors", "scanner", "parameters"])
+@pytest.mark.parametrize("part", ["reflectors", "scanners", "parameters"])
 def test_whatever_the_localizer_reads_runs_it_again(bench: RunBench, part: str) -> None:
     before = bench.view.result
 
@@ -123,8 +123,8 @@ def test_whatever_the_localizer_reads_runs_it_again(bench: RunBench, part: str) 
             case "reflectors":
                 one, *rest = project.reflectors.reflectors
                 return replace(project, reflectors=replace(project.reflectors, reflectors=(replace(one, y=2.1), *rest)))
-            case "scanner":
-                return replace(project, scanner=replace(project.scanner, mounting=[0.05, 0.0, 0.0]))
+            case "scanners":
+                return replace(project, scanners=(replace(project.scanners[0], mounting=[0.05, 0.0, 0.0]),))
             case _:
                 return gate(0.6)(project)
 
