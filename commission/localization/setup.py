@@ -34,9 +34,12 @@ class FilterModel(NamedTuple):
     rejection: RejectionRule
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class LocalizerSetup:
-    """Reflector map, scanners and parameters of a localizer; kernels read `filter` and `detector`."""
+    """Reflector map, scanners and parameters of a localizer; kernels read `filter` and `detector`.
+
+    Where they are equal, every record is processed alike.
+    """
 
     reflectors: ReflectorMap
     """The reflector map M_B."""
@@ -44,11 +47,11 @@ class LocalizerSetup:
     """Mounting and resolution of the scanners."""
     parameters: Parameters
     """Tunables of every stage."""
-    filter: FilterModel = field(init=False, repr=False)
+    filter: FilterModel = field(init=False, repr=False, compare=False)
     """Scalars of the filter."""
-    index: ReflectorIndex = field(init=False, repr=False)
+    index: ReflectorIndex = field(init=False, repr=False, compare=False)
     """The reflector map for the filter."""
-    detector: DetectorModel = field(init=False, repr=False)
+    detector: DetectorModel = field(init=False, repr=False, compare=False)
     """Scalars and tables of the detector."""
 
     def __post_init__(self) -> None:
@@ -65,16 +68,6 @@ class LocalizerSetup:
         object.__setattr__(self, "filter", model)
         detector = detector_model(self.reflectors, self.scanners[0], self.parameters.detector)
         object.__setattr__(self, "detector", detector)
-
-    def __eq__(self, other: object) -> bool:
-        """Whether every record is processed alike."""
-        if not isinstance(other, LocalizerSetup):
-            return NotImplemented
-        return (
-            self.parameters == other.parameters
-            and self.scanners == other.scanners
-            and self.reflectors == other.reflectors
-        )
 
     def detects_like(self, other: LocalizerSetup) -> bool:
         """Whether the same is detected in every scan: what the filter does with it afterwards may differ."""

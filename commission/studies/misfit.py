@@ -21,6 +21,7 @@ from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress, silent
 from commission.site.record_log import RecordLog
+from commission.studies.inputs import StudyInput
 from commission.studies.plausibility import Finding
 
 JUDGED_CYCLES = 6000
@@ -53,7 +54,7 @@ _VALLEY = 1.06
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class MisfitInput:
+class MisfitInput(StudyInput):
     """All that the study reads."""
 
     log: RecordLog

@@ -17,6 +17,7 @@ from commission.progress import Progress, silent
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.scanner import Scanner
+from commission.studies.inputs import StudyInput
 
 FASTEST = 15.0
 """Speed beyond which no vehicle of this kind drives [m/s]."""
@@ -51,7 +52,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class PlausibilityInput:
+class PlausibilityInput(StudyInput):
     """All that the study reads."""
 
     log: RecordLog

@@ -23,6 +23,7 @@ from commission.localization.whole_run import run_segments
 from commission.progress import Progress, part, silent
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
+from commission.studies.inputs import StudyInput
 from commission.studies.metrics import (
     ErrorStatistics,
     FailEpisode,
@@ -39,12 +40,12 @@ JUDGING_SHARE = 0.1
 """Share of the progress that the figures take."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunInput:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RunInput(StudyInput):
     """All that a run depends on."""
 
     log: RecordLog
-    """The drive; compared by identity."""
+    """The drive."""
     start: Start
     """Belief before the first record, and who says so."""
     segments: tuple[RunSegment, ...]

@@ -20,6 +20,7 @@ from commission.planning.placement import PlacementOptions
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.layout_brief import CandidateOptions, Demands
 from commission.site.project import Project
+from commission.site.record_log import RecordLog
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
 from commission.site.scanner import Scanner
@@ -30,9 +31,13 @@ from commission.studies.drives import DrivesInput
 from commission.studies.failures import FailuresInput, failures
 from commission.studies.inputs import StudyInput, is_same
 from commission.studies.placement import PlacementInput, placement
+from commission.studies.plausibility import PlausibilityInput, plausibility
 from commission.studies.prediction import PredictionInput, prediction
 from commission.studies.problems import ProblemsInput, problems
 from commission.studies.profiles import ProfilesInput, profiles
+from commission.studies.run import RunInput, judged_run
+from commission.studies.start import start_of
+from tests.studies.recorded import scan_log
 
 ROUTE = "Line"
 
@@ -59,6 +64,29 @@ SITE = Project(
 )
 OPEN = replace(SITE, floor_map=None)
 """Without a map the routes say how far the floor reaches."""
+
+
+def drive() -> RecordLog:
+    """Two metres along the route, with three reflectors in sight; of one the range is wrong by more and more."""
+    poses = np.column_stack([np.linspace(2.0, 4.0, 21), np.full(21, 2.0), np.zeros(21)])
+    stamps = np.arange(21) * 100_000_000
+    offsets = np.array(PLACES[1:4])[None] - poses[1:, None, :2]
+    seen = np.stack([np.hypot(offsets[..., 0], offsets[..., 1]), np.arctan2(offsets[..., 1], offsets[..., 0])], axis=2)
+    seen[:, 2, 0] += np.linspace(0.0, 0.3, 20)
+    return RecordLog(
+        odometry_stamps_ns=stamps,
+        displacements=np.concatenate([np.zeros((1, 3)), np.diff(poses, axis=0)]),
+        detection_stamps_ns=stamps[1:],
+        detection_offsets=3 * np.arange(21),
+        range_bearing=seen.reshape(-1, 2),
+        reference_stamps_ns=stamps,
+        reference_poses=poses,
+    )
+
+
+DRIVE = drive()
+SCANNED = replace(DRIVE, scans=scan_log(np.full((20, 601), 5000.0)))
+START = start_of(SITE, DRIVE, (2.0, 2.0, 0.0))
 GIVEN = CoverageOptions(heading=Heading.GIVEN, measurement=Measurement.RANGE_BEARING_PRIOR, spacing=0.5)
 FEW = PlacementOptions(
     demands=Demands(visible=2, survive_failure=False), candidates=CandidateOptions(spacing=2.0), checks=5, exchanges=5
@@ -121,6 +149,16 @@ def _looked_along(inputs: ProfilesInput) -> object:
     return [_all(*_arrays(profile)) for profile in profiles(inputs).profiles]
 
 
+def _run(inputs: RunInput) -> object:
+    found = judged_run(inputs)
+    figures = _all(found.columns.means, found.columns.covariances, found.columns.modes, found.columns.status, found.nis)
+    return figures, found.statistics, found.episodes
+
+
+def _implausible(inputs: PlausibilityInput) -> object:
+    return [str(finding) for finding in plausibility(inputs)]
+
+
 def _arrays(value: Any) -> list[Any]:
     names = value._fields if hasattr(value, "_fields") else [field.name for field in dataclasses.fields(value)]
     return [getattr(value, name) for name in names if isinstance(getattr(value, name), float | np.ndarray)]
@@ -136,6 +174,8 @@ STUDIES = (
     Study("neighbors", lambda site: DrivesInput.of(site, (ROUTE,)), _misled),
     Study("placement", lambda site: PlacementInput.of(site, FEW), _placed),
     Study("problems", ProblemsInput.of, _checked),
+    Study("run", lambda site: RunInput.of(site, DRIVE, START), _run),
+    Study("plausibility", lambda site: PlausibilityInput.of(site, SCANNED), _implausible),
     Study("profiles", lambda site: ProfilesInput.of(site, (ROUTE,)), _looked_along),
 )
 
@@ -219,6 +259,14 @@ SEEN = {
         ".stations[fewer]",
         ".floor_map",
         ".scanners[0].range_sigma",
+    ),
+    "run": (
+        ".parameters.observation.range_sigma",
+        ".parameters.odometry.heading_per_sqrt_m",
+        ".parameters.association.gate_probability",
+        ".scanner.mounting",
+        ".reflectors.reflectors[0].x",
+        ".reflectors.reflectors[fewer]",
     ),
     "failures": (".parameters.supervisor.position_limit", ".parameters.odometry.heading_per_sqrt_m"),
     "problems": (".parameters.supervisor.position_limit", ".stations[0].x", ".vehicle.outline[fewer]"),
