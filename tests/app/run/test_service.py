@@ -18,6 +18,7 @@ from commission.app.run.effects import CoverFromHere, LoadSource, MoveByScans, M
 from commission.app.run.service import RunService
 from commission.app.run.state import RunState
 from commission.app.run.view import RunView
+from commission.errors import UsageError
 from commission.localization.estimate import Mode
 from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup
@@ -233,7 +234,7 @@ def test_a_run_that_fails_leaves_the_one_before_and_can_be_asked_for_again(
     before = bench.view.result
 
     def failing(inputs: RunInput, progress: Progress, *, earlier: RunResult | None) -> RunResult:
-        raise ValueError("no such thing")
+        raise UsageError("no such thing")
 
     with monkeypatch.context() as patch:
         patch.setattr(service_module, "judged_run", failing)
