@@ -70,7 +70,7 @@ def drive() -> RecordLog:
     """Two metres along the route, with three reflectors in sight; of one the range is wrong by more and more."""
     poses = np.column_stack([np.linspace(2.0, 4.0, 21), np.full(21, 2.0), np.zeros(21)])
     stamps = np.arange(21) * 100_000_000
-    offsets = np.array(PLACES[1:4])[None] - poses[1:, None, :2]
+    offsets = np.array(PLACES[3:6])[None] - poses[1:, None, :2]
     seen = np.stack([np.hypot(offsets[..., 0], offsets[..., 1]), np.arctan2(offsets[..., 1], offsets[..., 0])], axis=2)
     seen[:, 2, 0] += np.linspace(0.0, 0.3, 20)
     return RecordLog(
@@ -264,8 +264,8 @@ SEEN = {
         ".parameters.observation.range_sigma",
         ".parameters.odometry.heading_per_sqrt_m",
         ".parameters.association.gate_probability",
-        ".scanner.mounting",
-        ".reflectors.reflectors[0].x",
+        ".scanners[0].mounting",
+        ".reflectors.reflectors[4].x",
         ".reflectors.reflectors[fewer]",
     ),
     "failures": (".parameters.supervisor.position_limit", ".parameters.odometry.heading_per_sqrt_m"),
