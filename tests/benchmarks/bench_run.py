@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from commission.app.run.charts import CHARTS
-from commission.app.run.curves import Curve
+from commission.app.run.curves import PlotCurve
 from commission.app.run.playback import Playback
 from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup
@@ -26,9 +26,9 @@ from tests.benchmarks.bench_filter import CYCLES, drive, hall
 SEEKS = 200
 
 
-def curves_of(result: RunResult) -> list[Curve]:
+def curves_of(result: RunResult) -> list[PlotCurve]:
     """What the plots prepare of another run."""
-    return [Curve(result.times, line.values(result), result.duration) for chart in CHARTS for line in chart.lines]
+    return [PlotCurve(result.times, line.values(result), result.duration) for chart in CHARTS for line in chart.lines]
 
 
 def main(cycles: int = CYCLES) -> None:
