@@ -26,7 +26,9 @@ class Line:
     color: str
     """CSS color: # and six digits."""
     values: Callable[[RunResult], FloatArray]
-    """From a run to one value per cycle, in the plot's unit."""
+    """From a run to one value per cycle, in the plot's unit; NaN where it is unknown."""
+    has_gaps: bool = False
+    """Whether it may be unknown in between: then it is drawn as dots, for a line would go on across the gap."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +98,7 @@ CHARTS = (
     ),
     Chart(
         title="NIS against gate",
-        lines=(Line("largest NIS of a scan's inliers, 0: none", TURQUOISE, lambda run: np.nan_to_num(run.nis)),),
+        lines=(Line("largest NIS of a scan's inliers", TURQUOISE, lambda run: run.nis, has_gaps=True),),
         limits=(Limit("gate", _gate),),
         span=lambda p: (0.0, 1.4 * _gate(p)),
     ),
@@ -115,12 +117,17 @@ CHARTS = (
     Chart(
         title="Position error [mm]",
         lines=(
-            Line("error against reference [mm]", theme.css(theme.REFERENCE), lambda run: run.position_errors * 1000.0),
+            Line(
+                "error against reference [mm]",
+                theme.css(theme.REFERENCE),
+                lambda run: run.position_errors * 1000.0,
+                has_gaps=True,
+            ),
         ),
     ),
     Chart(
         title="Heading error [°]",
-        lines=(Line("error against reference [°]", theme.css(theme.REFERENCE), _heading_errors),),
+        lines=(Line("error against reference [°]", theme.css(theme.REFERENCE), _heading_errors, has_gaps=True),),
         least=0.01,
     ),
 )

@@ -67,11 +67,10 @@ class PlotCurve:
         here = int(bins_of(np.array([time]), self._duration)[0])
         before, behind = self._levels.copy(), self._levels.copy()
         newest = self._values[self._firsts[here] : lived]
-        newest = newest[np.isfinite(newest)]
         before[here:] = np.nan
         behind[:here] = np.nan
         if len(newest):
-            before[here] = newest.max()
+            before[here] = np.fmax.reduce(newest)
         elif here:
             before[here] = before[here - 1]
         return before, behind

@@ -121,9 +121,10 @@ def _span(chart: Chart, curves: Sequence[PlotCurve], parameters: Parameters) -> 
 def _series(chart: Chart) -> tuple[uplot.Series, ...]:
     lines: list[uplot.Series] = []
     for line in chart.lines:
+        draw = _dots if line.has_gaps else _line
         lines += [
-            uplot.Series(label=line.label, stroke=line.color, width=1.5, points=HIDDEN),
-            uplot.Series(label=f"{line.label}, behind the cursor", stroke=line.color + PALE, width=1, points=HIDDEN),
+            draw(line.label, line.color, 1.5),
+            draw(f"{line.label}, behind the cursor", line.color + PALE, 1.0),
         ]
     limits = [
         uplot.Series(label=limit.label, stroke=limit.color, width=1, points=HIDDEN, dash=(5, 4))
@@ -139,6 +140,15 @@ def _series(chart: Chart) -> tuple[uplot.Series, ...]:
         uplot.Series(label="edited from here on", scale="flag", stroke=EDIT, width=1, dash=(2, 2), points=HIDDEN),
         waking_series(),
     )
+
+
+def _line(label: str, color: str, width: float) -> uplot.Series:
+    return uplot.Series(label=label, stroke=color, width=width, points=HIDDEN)
+
+
+def _dots(label: str, color: str, width: float) -> uplot.Series:
+    """One dot per known value: uPlot takes NaN for a point, so that its line would go straight across a gap."""
+    return uplot.Series(label=label, width=0, points={"show": True, "size": 2.0 * width, "width": 0, "fill": color})
 
 
 def _scales(duration: float, span: tuple[float, float], chart: Chart) -> dict[str, uplot.Scale]:

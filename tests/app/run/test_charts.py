@@ -38,9 +38,7 @@ EXPECTED = {
     ("2σ of x, y [mm]", "x [mm]"): lambda e, t: 1000.0 * sigma(0)(e, t),
     ("2σ of x, y [mm]", "y [mm]"): lambda e, t: 1000.0 * sigma(1)(e, t),
     ("2σ of heading [°]", "heading [°]"): lambda e, t: DEGREES * sigma(2)(e, t),
-    ("NIS against gate", "largest NIS of a scan's inliers, 0: none"): lambda e, _t: max(
-        e.d2[e.status == 0], default=0.0
-    ),
+    ("NIS against gate", "largest NIS of a scan's inliers"): lambda e, _t: max(e.d2[e.status == 0], default=math.nan),
     ("Inliers, outliers per scan", "inliers"): inliers,
     ("Inliers, outliers per scan", "outliers"): lambda e, t: len(e.status) - inliers(e, t),
     ("Position error [mm]", "error against reference [mm]"): lambda e, t: (
@@ -132,6 +130,32 @@ def test_what_lies_behind_the_cursor_is_drawn_pale(
     assert np.isfinite(coming[half + 1 :]).all()
     playback.seek(1e9)
     assert np.isfinite(drawn(plots, project, playback)[1]).all()
+
+
+@pytest.mark.parametrize("title", ["NIS against gate", "Position error [mm]", "Heading error [°]"])
+def test_what_is_unknown_for_a_while_is_a_gap_of_dots_and_not_0(
+    server: viser.ViserServer, project: Project, result: RunResult, title: str
+) -> None:
+    # From a half to three quarters of the drive no detection is accepted and no reference is there.
+    unknown = (result.times > 0.5 * result.duration) & (result.times < 0.75 * result.duration)
+    nis, errors = result.nis.copy(), result.errors.copy()
+    nis[unknown], errors[unknown] = math.nan, math.nan
+    gapped = replace(result, nis=nis, errors=errors, position_errors=np.hypot(errors[:, 0], errors[:, 1]))
+    plots, playback = Plots(server.gui), Playback(gapped)
+    number = [chart.title for chart in CHARTS].index(title)
+    for share in (0.7, 1.0):
+        playback.seek(share * result.duration)
+        plots.draw_slowly(view_of(AppState(project=project, saved=project), playback.view(covered=False)))
+        _, lived, coming = (np.asarray(part) for part in plots._plots[number].data[:3])
+        gap = slice(BINS // 2 + 1, int(0.7 * BINS) + 1)
+        assert np.isnan(lived[gap]).all()
+        assert np.isnan(coming[gap]).all()
+        assert np.isfinite(lived[: BINS // 2 - 1]).all()
+        assert (lived[: BINS // 2 - 1] > 0.0).any()
+    for series in plots._plots[number].series[1:3]:
+        # uPlot draws a line on across NaN, as a real browser shows; a dot it leaves out.
+        assert series["width"] == 0
+        assert series["points"]["show"]
 
 
 def test_a_limit_changes_where_another_segment_begins(

@@ -130,6 +130,20 @@ PAGE = (
         tests=(CHARTS + "test_a_curve_is_its_quantity_in_its_unit_cycle_by_cycle",),
     ),
     Mutant(
+        name="a scan without an accepted detection has a NIS of 0",
+        file=FOLDER + "run/charts.py",
+        find="lambda run: run.nis, has_gaps",
+        replace="lambda run: np.nan_to_num(run.nis), has_gaps",
+        tests=(CHARTS + "test_what_is_unknown_for_a_while_is_a_gap_of_dots_and_not_0",),
+    ),
+    Mutant(
+        name="line across what is unknown",
+        file=FOLDER + "run/plots.py",
+        find="_dots if line.has_gaps else _line",
+        replace="_line",
+        tests=(CHARTS + "test_what_is_unknown_for_a_while_is_a_gap_of_dots_and_not_0",),
+    ),
+    Mutant(
         name="outliers leave out those of the detector",
         file=FOLDER + "run/charts.py",
         find="run.counts[:, Status.OUTLIER_DETECTOR :].sum",
