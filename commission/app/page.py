@@ -215,7 +215,7 @@ class Page:
             if browser not in (None, number):
                 continue
             client.add_notification(
-                "Problem" if failed else "Done",
+                "Problem" if failed else "Note",
                 text,
                 color="red" if failed else "green",
                 auto_close_seconds=TOLD_FOR_S,

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from commission.app.base.theme import TOP_BAR_PX
 from commission.io.project_file import load_project, save_project
 from tests.app.sites import room
-from tests.browser.page import OpenPage
+from tests.browser.page import SMALL, OpenPage
 from tests.browser.serving import Served
 
 JOURNAL = ".commission.journal"
@@ -33,7 +34,7 @@ def open_hall(folder: Path, window: Callable[..., OpenPage]) -> Iterator[Open]:
 
     def opened() -> tuple[Served, OpenPage]:
         running.append(Served(load_project(folder), folder))
-        page = window(running[-1].server)
+        page = window(running[-1].server, SMALL)
         page.open()
         return running[-1], page
 
@@ -48,6 +49,19 @@ def rename(served: Served, page: OpenPage, name: str) -> None:
     served.until(lambda: served.state.project.name == name, 20.0)
 
 
+def assert_bar_is_whole(page: OpenPage, *names: str) -> None:
+    """The buttons of the bar stand beside each other, in it, however long the words before them are."""
+    right = 0.0
+    for name in names:
+        box = page.page.get_by_role("button", name=name, exact=True).bounding_box()
+        assert box is not None, name
+        assert box["x"] >= right, name
+        assert box["y"] >= 0.0, name
+        assert box["y"] + box["height"] <= TOP_BAR_PX, name
+        right = box["x"] + box["width"]
+    assert right < SMALL[0] - 120.0, "they cover the sign of the connection"
+
+
 def test_a_project_that_is_edited_elsewhere_is_shown_read_only_and_taken_over_by_a_button(open_hall: Open) -> None:
     first, here = open_hall()
     here.fold("Project")
@@ -60,6 +74,8 @@ def test_a_project_that_is_edited_elsewhere_is_shown_read_only_and_taken_over_by
     there.wait_until_told("this page shows the project read-only: it is edited by process")
     assert second.state.project.name != "Mine"
     assert here.page.get_by_role("button", name="Take over").count() == 0
+
+    assert_bar_is_whole(there, "Take over", "Plan", "3D", "Fit", "Follow")
 
     there.press("Take over")
     second.until(lambda: second.state.read_only == "" and second.state.project.name == "Edited", 30.0)
@@ -125,6 +141,7 @@ def test_what_became_of_the_journal_is_told_on_the_page(open_hall: Open, folder:
     page.wait_until_told(f"the project's folder {folder} was deleted or moved; all edits are kept in")
     page.wait_for_text("its folder is gone; edits are kept in")
     rename(served, page, "Two")
+    assert_bar_is_whole(page, "Overwrite", "Read again", "Plan", "3D", "Fit", "Follow")
     page.press("Overwrite")
     page.wait_for_text("saved ")
     assert load_project(folder).name == "Two"

@@ -145,7 +145,7 @@ STYLE = f"""<style>
 [data-dock-region-handle],[data-dock-leaf] [data-dock-griphandle]{{display:none!important}}
 div:has(>div>.c-top){{display:flex;align-items:center;height:var(--c-top);padding:0 152px 0 0!important;gap:6px}}
 div:has(>div>.c-top)>div{{padding:0!important;margin:0!important}}
-div:has(>div>.c-top)>:first-child{{flex:1}}
+div:has(>div>.c-top)>:first-child{{flex:1;min-width:0}}
 div:has(>div>.c-top) button{{height:26px!important;padding:0 10px!important;font-size:12px!important}}
 div:has(>div>.c-bottom){{display:grid;grid-template-columns:repeat(24,minmax(0,1fr));align-items:center;
  padding-top:2px!important}}

@@ -31,12 +31,14 @@ BUTTONS: tuple[Button, ...] = (
 
 
 def title(state: AppState) -> str:
-    """Return the left end of the bar."""
+    """Return the left end of the bar; what does not fit between name and buttons is cut, and shown by the pointer."""
+    stands = escaped(standing(state))
     return (
         "<div class='c-top' style='display:flex;align-items:center;padding:0 14px;gap:14px;font-size:13px;"
         "white-space:nowrap;overflow:hidden'>"
         f"<b>Commission</b><span style='opacity:.85'>{escaped(state.project.name)}</span>"
-        f"<span style='opacity:.55'>{escaped(standing(state))}</span></div>"
+        f"<span style='opacity:.55;min-width:0;overflow:hidden;text-overflow:ellipsis' title='{stands}'>"
+        f"{stands}</span></div>"
     )
 
 

@@ -405,7 +405,7 @@ def test_writing_to_a_browser_that_has_gone_throws_nothing(bench: WidgetBench) -
     gone = bench.server.get_clients()[0]
     bench.guest.close()
     bench.until(lambda: 0 not in bench.server.get_clients())
-    gone.add_notification("Done", "nobody reads it")
+    gone.add_notification("Note", "nobody reads it")
     gone.gui.add_html("nor this")
     gone.camera.position = (0.0, 0.0, 1.0)
     viser_private.notify(bench.server, 0, title="t", text="nor that", seconds=1.0)
