@@ -107,8 +107,8 @@ def waits_until(motion: Motion, stamp_ns: int) -> int:
 
     Notes
     -----
-    stamp + interval, by definition, of the usual interval, or `FIRST_WAIT_NS` while none is known. The scan's stamp
-    itself where there is nothing to wait for: no odometry yet, or odometry of that very stamp.
+    end = stamp + interval, by definition, with the usual interval, or `FIRST_WAIT_NS` while none is known. The scan's
+    stamp itself where there is nothing to wait for: no odometry yet, or odometry of that very stamp.
     """
     if not motion.started or stamp_ns <= motion.odometry_ns:
         return stamp_ns
