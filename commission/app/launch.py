@@ -38,6 +38,7 @@ from commission.app.run.state import RunState
 from commission.app.runtime import BrowserCame, BrowserLeft, Runtime
 from commission.app.tune import feature as tune
 from commission.app.world import feature as world
+from commission.io.findings import Findings
 from commission.io.project_file import OpenedProject, load_project, open_project
 from commission.site.project import Project
 
@@ -90,7 +91,7 @@ def serve(
     CommissionError
         the project cannot be read, or the page cannot be served as asked.
     """
-    opened = OpenedProject(load_project(project), project, False) if demo else open_project(project)
+    opened = bundled(project) if demo else open_project(project)
     loaded, folder = opened.project, None if demo else opened.folder
     with ExitStack() as open_things:
         # Ctrl-C may come at any moment from here on, and what is running would keep the program alive.
@@ -99,7 +100,9 @@ def serve(
         open_things.callback(server.stop)
         source = first_source(loaded, recording, demo)
         reach = Reach.within((folder, *access.files)) if access.lets_others_in else EVERYWHERE
-        runtime = open_page(server, loaded, folder=folder, source=source, is_new=opened.is_new, reach=reach)
+        runtime = open_page(
+            server, loaded, folder=folder, source=source, is_new=opened.is_new, reach=reach, notes=opened.notes
+        )
         open_things.callback(runtime.stop)
         wait_for_interruption = open_things.enter_context(interruption())
         log.info("page at %s", announced(access, server.get_port()))
@@ -153,6 +156,12 @@ def interruption() -> Generator[Callable[[], None]]:
         os.close(reader)
 
 
+def bundled(folder: Path) -> OpenedProject:
+    """Read a project that comes with the program, and is never written to."""
+    found = Findings()
+    return OpenedProject(load_project(folder, found), folder, False, found.lines())
+
+
 def first_source(project: Project, recording: Path | None, demo: bool) -> Source | None:
     """Return what drives when the page opens."""
     if recording is not None:
@@ -168,6 +177,7 @@ def open_page(
     source: Source | None = None,
     is_new: bool = False,
     reach: Reach = EVERYWHERE,
+    notes: tuple[str, ...] = (),
 ) -> Runtime:
     """Fill a server with the page of a project and start its owner thread; returns at once.
 
@@ -180,6 +190,7 @@ def open_page(
     source : what drives at once; none: nothing yet.
     is_new : whether nothing of the project is on disk yet.
     reach : where browsers may read and write.
+    notes : what was doubted while the project was read, one line each; listed among the problems.
     """
     greeting = f"A new project in {folder}: it is empty until you load a map or place something" if is_new else ""
     state = AppState(
@@ -190,6 +201,7 @@ def open_page(
         hidden=frozenset({AccumulatedLayer.name}),
         magnify=seen_magnification(project),
         greeting=greeting,
+        faults=notes,
     ).with_part(RunState(source=source, repeat=folder is None))
     runtime = Runtime(state, FEATURES)
     page = Page(server, runtime.post, state, FEATURES)

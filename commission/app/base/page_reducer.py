@@ -10,8 +10,6 @@ from commission.app.base.effects import CancelJob, FlyTo, PlaceCamera, Tell
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Step, refuse_read_only, with_maps_packed
 
-FAULTS_KEPT = 20
-
 
 @reduce.register
 def join(_action: actions.Join, state: AppState, sender: Sender) -> Outcome:
@@ -108,7 +106,7 @@ def report(action: actions.Report, state: AppState, sender: Sender) -> Outcome:
     listed = text if sender.browser is None else action.listed
     if not action.failed or not listed:
         return Outcome(state, told)
-    return Outcome(replace(state, faults=(*state.faults, listed)[-FAULTS_KEPT:]), told)
+    return Outcome(state.with_faults(listed), told)
 
 
 @reduce.register

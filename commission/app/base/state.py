@@ -25,6 +25,8 @@ NOTHING_SAVED = Project(name="")
 
 UNDO_STEPS = 10_000
 """Undo steps that are kept: nobody goes back farther, and memory stays bounded. Projects share what did not change."""
+FAULTS_KEPT = 20
+"""Lines of what went wrong that are listed."""
 MAP_BYTES = 200_000_000
 """Bytes of cells that the undo steps hold as they are, and as many the redo steps; older maps are packed."""
 MERGE_WITHIN_S = 1.0
@@ -104,6 +106,10 @@ class AppState:
     def with_part(self, part: object) -> AppState:
         """Return the state with one part exchanged."""
         return replace(self, parts={**self.parts, type(part): part})
+
+    def with_faults(self, *texts: str) -> AppState:
+        """Return the state with more lines in the list of what went wrong; the oldest fall out of a long one."""
+        return replace(self, faults=(*self.faults, *texts)[-FAULTS_KEPT:])
 
     def of_browser(self, browser: int | None, kind: type[Part]) -> Part:
         """Return what a feature keeps for a browser; its default where that is nothing, or the browser is not there."""

@@ -18,6 +18,7 @@ from commission.app.floor_map.draft import DRAWING_ENDINGS, ENDINGS, MAP_ENDINGS
 from commission.app.floor_map.effects import DrawMap, ReadMapFile, StopMapWork
 from commission.errors import CommissionError, FileFormatError, JobError
 from commission.io.dxf import Drawing, read_drawing
+from commission.io.findings import Findings
 from commission.io.image_map import Picture, read_picture
 from commission.io.map_server import image_name, read_floor_map
 from commission.io.mesh import Model, read_model
@@ -128,15 +129,15 @@ def _read(effect: ReadMapFile, path: Path, progress: Progress) -> Read:
 
 def _read_map(effect: ReadMapFile, path: Path, reach: Reach, sender: Sender) -> Action:
     """Read a `map_server` map: its image lies beside it, or was sent, too."""
-    file, image = effect.file, effect.image
+    file, image, found = effect.file, effect.image, Findings()
     if isinstance(file.source, Path):
         reach.checked(path.parent / image_name(path), sender)
-        return MapMade(file, read_floor_map(path))
+        return MapMade(file, read_floor_map(path, found=found), found.lines())
     name = image_name(path)
     if image is None or image.name != name:
         return ImageMissing(file, name)
     with _path_of(image) as image_path:
-        return MapMade(file, read_floor_map(path, image=image_path))
+        return MapMade(file, read_floor_map(path, image=image_path, found=found), found.lines())
 
 
 @contextmanager

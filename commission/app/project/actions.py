@@ -73,6 +73,8 @@ class Reloaded(Action):
 
     project: Project
     """As its files are."""
+    notes: tuple[str, ...] = ()
+    """What was doubted while it was read, one line each."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,7 @@ from commission.app.project.effects import KeepProjectIn, ReadProject, TakeProje
 from commission.app.project.state import FilesState
 from commission.app.project.writer import Writer
 from commission.errors import CommissionError, FileFormatError, ProjectError, UsageError
+from commission.io.findings import Findings
 from commission.io.journal import Journal, remove_leftovers
 from commission.io.journal_replay import Restored, restore
 from commission.io.overwriting import project_in
@@ -89,7 +90,7 @@ class ProjectFolder(Service):
             case KeepProjectIn(project, folder):
                 self._keep_in(folder, project, state.project)
             case ReadProject(folder):
-                self.context.post(Envelope(Reloaded(self.load(folder)), sender))
+                self.context.post(Envelope(self.load(folder), sender))
             case TakeProjectOver() if self._lock is not None:
                 self._lock.take_over()
                 self._look(state)
@@ -158,8 +159,12 @@ class ProjectFolder(Service):
         """Wait until all is written that was asked for, at most so long [s]."""
         self._writer.wait(seconds)
 
-    def load(self, folder: Path) -> Project:
+    def load(self, folder: Path) -> Reloaded:
         """Read the project from its files again; the journal of what was edited until now ends.
+
+        Returns
+        -------
+        reloaded : the project, and what was doubted while it was read.
 
         Raises
         ------
@@ -167,13 +172,14 @@ class ProjectFolder(Service):
             a file cannot be read.
         """
         self.wait()
-        project = load_project(folder)
+        found = Findings()
+        project = load_project(folder, found)
         if self._journal is not None:
             self._journal.discard()
             self._journal.close()
             self._journal = Journal(folder, project)
         self._listing = _listing(folder)
-        return project
+        return Reloaded(project, found.lines())
 
     def foreign_changes(self) -> tuple[str, ...] | None:
         """Return the files that somebody else has changed; none when nothing has happened since the last call."""
@@ -231,12 +237,12 @@ class ProjectFolder(Service):
         if listing == self._listing:
             return
         try:
-            project = load_project(self._folder)
+            project = load_project(self._folder, found := Findings())
         except CommissionError:
             return  # perhaps in the middle of a save: again at the next look
         self._listing = listing
         if project != state.project:
-            self.context.post(Reloaded(project))
+            self.context.post(Reloaded(project, found.lines()))
 
     def _begin_to_edit(self) -> None:
         """Go on where the one who edited the project has left off, saved or not."""

@@ -71,10 +71,12 @@ def reload_project(_action: actions.Reload, state: AppState, _sender: Sender) ->
 @reduce.register
 def reloaded(action: actions.Reloaded, state: AppState, sender: Sender) -> Outcome:
     """Take what the files hold: one undo step, unless somebody else edits them and this page only follows."""
-    read = replace(state, saved=action.project).with_part(replace(state.part(FilesState), foreign=()))
+    listed = state.with_faults(*(note for note in action.notes if note not in state.faults))
+    read = replace(listed, saved=action.project).with_part(replace(state.part(FilesState), foreign=()))
     if state.read_only:
         return Outcome(replace(read, project=action.project, undo=(), redo=(), last_edit=None))
-    return Outcome(edited(read, action.project, Edit("read again from disk", sender)))
+    told = (Tell("; ".join(action.notes[:3]), failed=False),) if action.notes else ()
+    return Outcome(edited(read, action.project, Edit("read again from disk", sender)), told)
 
 
 @reduce.register

@@ -5,9 +5,8 @@ import pytest
 from commission.app.base import actions
 from commission.app.base.actions import ClearFaults
 from commission.app.base.effects import Tell
-from commission.app.base.page_reducer import FAULTS_KEPT
 from commission.app.base.reducer import Outcome
-from commission.app.base.state import AppState
+from commission.app.base.state import FAULTS_KEPT, AppState
 from commission.app.project.actions import ProjectSaved, RenameProject, Save
 from commission.app.project.effects import WriteProject
 from commission.app.project.state import FilesState

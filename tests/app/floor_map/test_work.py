@@ -23,7 +23,7 @@ from commission.app.base.service import Context
 from commission.app.base.state import AppState
 from commission.app.base.uploads import Upload
 from commission.app.floor_map.actions import ImageMissing, MapFailed, MapMade, MapOpened
-from commission.app.floor_map.draft import MapDraft, MapFile, MapOptions, ReadOptions
+from commission.app.floor_map.draft import MapDraft, MapFile, MapLoading, MapOptions, ReadOptions
 from commission.app.floor_map.effects import DrawMap, ReadMapFile, StopMapWork
 from commission.app.floor_map.work import MapService, draw, read
 from commission.io.dxf import Drawing
@@ -32,6 +32,7 @@ from commission.io.map_server import write_floor_map
 from commission.io.mesh import Model
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.project import Project
+from tests.app.asking import after
 from tests.io.large_files import write_drawing, write_stl
 
 STATE = AppState(project=Project(), saved=Project())
@@ -74,6 +75,16 @@ def test_a_ros_map_is_read_from_a_path_and_from_two_uploads(tmp_path: Path) -> N
     yaml, image = uploaded(tmp_path / "hall.yaml"), uploaded(tmp_path / "hall.png")
     assert outcome(yaml) == ImageMissing(yaml, "hall.png")
     assert outcome(yaml, image=image) == MapMade(yaml, HALL)
+
+
+def test_what_is_doubted_in_a_ros_map_is_said_beside_it(tmp_path: Path) -> None:
+    write_floor_map(HALL, tmp_path / "hall.yaml")
+    text = (tmp_path / "hall.yaml").read_text().replace("hall.png", "/home/robot/maps/hall.png")
+    (tmp_path / "hall.yaml").write_text(text)
+    made = outcome(MapFile(tmp_path / "hall.yaml"))
+    note = "the image '/home/robot/maps/hall.png' is not read; hall.png beside hall.yaml is taken"
+    assert made == MapMade(MapFile(tmp_path / "hall.yaml"), HALL, (note,))
+    assert note in after(STATE, made).state.part(MapLoading).notes
 
 
 @pytest.mark.parametrize("reference", ["/home/robot/maps/hall.png", "../../maps/hall.png", "maps\\hall.png"])

@@ -11,9 +11,14 @@ import pytest
 from commission.app.base import actions
 from commission.app.base.actions import ClickFloor, Join, Sender
 from commission.app.base.effects import Effect, Tell
+from commission.app.base.panel import escaped
+from commission.app.base.server import start_server
 from commission.app.base.state import NOTHING_SAVED, AppState
+from commission.app.base.view import view_of
 from commission.app.editing import actions as editing
 from commission.app.editing.site_tools import PlaceTool
+from commission.app.launch import bundled, open_page
+from commission.app.problems.problems_panel import ProblemsPanel
 from commission.app.project.actions import (
     AskToReplace,
     ChangedOnDisk,
@@ -31,10 +36,10 @@ from commission.app.runtime import Runtime
 from commission.errors import ProjectError, UsageError
 from commission.io.journal import Journal
 from commission.io.journal_replay import restore
-from commission.io.project_file import load_project, save_project
+from commission.io.project_file import load_project, open_project, save_project
 from commission.io.project_lock import Hold, ProjectLock
 from commission.site.project import Project
-from tests.app.asking import FEATURES, ME, by
+from tests.app.asking import FEATURES, ME, by, taking
 from tests.app.owning import Owner
 from tests.app.project.killed_page import NoPage
 from tests.app.sites import room
@@ -171,6 +176,43 @@ def test_reading_again_takes_theirs_and_undo_brings_ones_own_back(folder: Path) 
     assert restore(folder, load_project(folder)) is None
     kept.do(actions.Undo())
     assert kept.now == mine
+
+
+def doubtful(folder: Path) -> str:
+    """Let the map name its image by a path on another computer; what is said about it."""
+    (described,) = (path for path in folder.glob("*.yaml") if path.name != "project.yaml")
+    (image,) = folder.glob("*.png")
+    described.write_text(described.read_text().replace(image.name, f"/home/robot/maps/{image.name}"))
+    return f"the image '/home/robot/maps/{image.name}' is not read; {image.name} beside {described.name} is taken"
+
+
+def test_what_is_doubted_when_a_project_is_opened_stands_in_the_problems_of_its_page(folder: Path) -> None:
+    note = doubtful(folder)
+    opened = open_project(folder)
+    assert opened.notes == (note,)
+    assert bundled(folder).notes == (note,)
+    server = start_server("127.0.0.1", 0)
+    runtime = open_page(server, opened.project, folder=folder, notes=opened.notes)
+    try:
+        assert runtime.state.faults == (note,)
+        panel = ProblemsPanel(server.gui, taking([]), server.gui.add_tab_group().add_tab("Problems"))
+        panel.draw_slowly(view_of(runtime.state))
+        assert escaped(note) in panel._html.content
+    finally:
+        runtime.stop()
+        server.stop()
+
+
+def test_what_is_doubted_when_a_project_is_read_again_is_listed_once_and_told(folder: Path) -> None:
+    kept = Kept(folder)
+    note = doubtful(folder)
+    page = Told()
+    kept.runtime._page = page
+    kept.do(Reload(), Reload())
+    kept.runtime._page = None
+    assert kept.runtime.state.faults == (note,)
+    assert [tell.text for tell, _ in page.told] == [note, note]
+    assert not page.told[0][0].failed
 
 
 def test_a_copy_saved_elsewhere_is_the_project_from_then_on(
