@@ -62,7 +62,8 @@ class Simulate:
         project = dataclasses.replace(project, disturbances=self._disturbances(project))
         tally = _Tally()
         truth = draw_truth(project, route, self.seed)
-        write_recording(self.out, tally.count(records(project, route, self.seed)), truth)
+        names = tuple(scanner.name for scanner in project.scanners)
+        write_recording(self.out, tally.count(records(project, route, self.seed)), truth, scanners=names)
 
         seconds = tally.last_ns * 1e-9
         sys.stdout.write(f"Drive        route {route!r}, {seconds:.1f} s, {tally.scans} scans, seed {self.seed}\n")

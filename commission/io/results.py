@@ -24,7 +24,7 @@ ESTIMATE_COLUMNS = (
     *("stamp_ns", "x", "y", "theta", "var_x", "cov_xy", "cov_xtheta", "var_y", "cov_ytheta", "var_theta"),
     *("mode", "inliers", "outliers"),
 )
-DETECTION_COLUMNS = ("stamp_ns", "range", "bearing", "x", "y", "status", "reflector_id", "d2")
+DETECTION_COLUMNS = ("stamp_ns", "range", "bearing", "x", "y", "status", "reflector_id", "d2", "scanner")
 
 UPPER_TRIANGLE = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 ROWS_AT_ONCE = 50_000
@@ -76,8 +76,19 @@ def _detection_rows(run: RunColumns) -> Iterator[Iterable[Any]]:
         np.array([status.name.lower() for status in Status])[run.status],
         _reflector_ids(run),
         distances,
+        _scanner_names(run),
     ]
     return _blocks(columns)
+
+
+def _scanner_names(run: RunColumns) -> NDArray[Any]:
+    """(n,) name of the scanner of each detection."""
+    ends = (*run.firsts[1:].tolist(), len(run))
+    names = np.empty(len(run), dtype=object)
+    for segment, end in zip(run.segments, ends, strict=True):
+        known = np.array([scanner.name for scanner in segment.setup.scanners], dtype=object)
+        names[segment.first : end] = known[run.detected.scanners[segment.first : end]]
+    return np.repeat(names, np.diff(run.offsets))
 
 
 def _reflector_ids(run: RunColumns) -> NDArray[Any]:

@@ -15,6 +15,7 @@ from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.association import INLIER, NOBODY, associate
 from commission.localization.kalman import correct
+from commission.localization.observation import ObservationModel
 from commission.localization.odometry import NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.rejection import rejects_the_world, weigh
@@ -65,6 +66,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     last: int,
     detections: FloatArray,
     model: FilterModel,
+    observation: ObservationModel,
     places: FloatArray,
     cell_offsets: IntArray,
     status: NDArray[np.int8],
@@ -81,6 +83,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     first, last : rows of the scan's detections, the last one excluded.
     detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
     model : of the whole filter.
+    observation : mounting and noise of the scan's scanner.
     places, cell_offsets : the map, see `ReflectorIndex`.
     status : (n,) in: INLIER or OUTLIER_DETECTOR; out: a `Status`.
     reflectors : (n,) out: index into the reflector map, or -1.
@@ -98,7 +101,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         first,
         last,
         detections,
-        model.observation,
+        observation,
         model.gate,
         model.cells,
         places,
@@ -115,12 +118,12 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         if status[i] == INLIER:
             posterior = correct(
                 posterior,
-                detections[i, 0] - model.observation.range_bias,
+                detections[i, 0] - observation.range_bias,
                 detections[i, 1],
                 places[entry, 0],
                 places[entry, 1],
                 places[entry, 2],
-                model.observation,
+                observation,
             )
         reflectors[i] = int(places[entry, 3])
     evidence = weigh(
@@ -130,7 +133,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         first,
         last,
         detections,
-        model.observation,
+        observation,
         model.cells,
         places,
         cell_offsets,

@@ -29,6 +29,8 @@ class DetectionLog:
 
     stamps_ns: IntArray
     """(K,) time of each scan [ns], ascending."""
+    scanners: IntArray
+    """(K,) scanner of each scan, index in the setup."""
     offsets: IntArray
     """(K + 1,) rows of scan k: offsets[k] to offsets[k + 1]."""
     range_bearing: FloatArray
@@ -49,6 +51,7 @@ class DetectionLog:
         rows = slice(int(self.offsets[first]), int(self.offsets[last]))
         return _log(
             self.stamps_ns[first:last],
+            self.scanners[first:last],
             self.offsets[first : last + 1] - self.offsets[first],
             self.range_bearing[rows],
             self.beams[rows],
@@ -66,9 +69,9 @@ def cycle_stamps(log: RecordLog, *, sensor_detects: bool = False) -> IntArray:
     sensor_detects : whether it has done so before this log begins.
     """
     scans = _scans_used(log, sensor_detects)
-    if scans == 0 or log.scans is None:
+    if scans == 0:
         return log.detection_stamps_ns
-    return np.concatenate((log.scans.stamps_ns[:scans], log.detection_stamps_ns))
+    return np.concatenate((log.scan_stamps_ns[:scans], log.detection_stamps_ns))
 
 
 def extract_detections(
@@ -91,14 +94,19 @@ def extract_detections(
     first, last : cycles from `first` to before `last` only; None: to the end.
     sensor_detects : whether the sensor has detected by itself before this log begins.
     parallel : whether to use all cores; the result is the same.
+
+    Raises
+    ------
+    UsageError
+        the log names a scanner that the setup does not have.
     """
     scans = _scans_used(log, sensor_detects)
     end = scans + len(log.detection_stamps_ns) if last is None else last
     parts: list[DetectionLog] = []
-    if log.scans is not None and first < scans:
-        parts.append(detect_log(_scans_between(log.scans, first, min(end, scans)), setup, parallel=parallel))
+    if first < scans:
+        parts.append(_in_scans(log, setup, (first, min(end, scans)), parallel=parallel))
     if end > scans or not parts:
-        parts.append(_sensor_detections(log).part(max(first - scans, 0), max(end - scans, 0)))
+        parts.append(_sensor_detections(log, setup).part(max(first - scans, 0), max(end - scans, 0)))
     return joined(parts)
 
 
@@ -106,61 +114,91 @@ def nothing_detected(stamps_ns: IntArray) -> DetectionLog:
     """Return what is detected at these stamps while all reflectors are covered."""
     offsets = np.zeros(len(stamps_ns) + 1, dtype=np.int64)
     nothing = np.empty(0, dtype=np.int64)
-    return _log(stamps_ns, offsets, np.empty((0, 2)), nothing, np.empty(0, dtype=np.int8))
+    scanners = np.zeros(len(stamps_ns), dtype=np.int64)
+    return _log(stamps_ns, scanners, offsets, np.empty((0, 2)), nothing, np.empty(0, dtype=np.int8))
 
 
-def detect_log(scans: ScanLog, setup: LocalizerSetup, *, parallel: bool = False) -> DetectionLog:
-    """Detect the reflectors in every scan of a log: the same as `detector.detect`, scan by scan.
+def detect_log(scans: ScanLog, setup: LocalizerSetup, *, scanner: int = 0, parallel: bool = False) -> DetectionLog:
+    """Detect the reflectors in every scan of one scanner: the same as `detector.detect`, scan by scan.
 
     Parameters
     ----------
     scans : with reflector flags, else intensities.
-    setup : reflector map, scanner and parameters.
+    setup : reflector map, scanners and parameters.
+    scanner : which of the setup's.
     parallel : whether to use all cores; the result is the same.
     """
+    model = setup.detectors[scanner]
     ranges = read_only(np.asarray(scans.ranges, dtype=np.float32))
     threshold = setup.parameters.detector.intensity_threshold
     flags = reflective_beams(ranges, scans.intensities, scans.reflector, threshold)
     beams = beams_of(ranges.shape[1], scans.angle_min, scans.angle_increment)
     count, fill = (_count_parallel, _fill_parallel) if parallel else (_count, _fill)
-    offsets = np.concatenate(([0], np.cumsum(count(ranges, flags, beams, setup.detector))))
+    offsets = np.concatenate(([0], np.cumsum(count(ranges, flags, beams, model))))
     total = int(offsets[-1])
     range_bearing = np.empty((total, 2))
     widths = np.empty(total, dtype=np.int64)
     status = np.empty(total, dtype=np.int8)
-    fill(ranges, flags, beams, setup.detector, offsets, range_bearing, widths, status)
-    return _log(np.asarray(scans.stamps_ns), offsets, range_bearing, widths, status)
+    fill(ranges, flags, beams, model, offsets, range_bearing, widths, status)
+    scanners = np.full(len(scans), scanner, dtype=np.int64)
+    return _log(np.asarray(scans.stamps_ns), scanners, offsets, range_bearing, widths, status)
 
 
-def _sensor_detections(log: RecordLog) -> DetectionLog:
+def _in_scans(log: RecordLog, setup: LocalizerSetup, cycles: tuple[int, int], *, parallel: bool) -> DetectionLog:
+    """Detect in the scans from one to before another, counted in order of delivery over all scanners."""
+    numbers = log.scan_order[slice(*cycles)]
+    indices = setup.indices_of(log.scanners)
+    parts: list[DetectionLog] = []
+    places: list[IntArray] = []
+    start = 0
+    for scans in log.scans:
+        where = np.flatnonzero((numbers >= start) & (numbers < start + len(scans)))
+        if len(where):
+            # Of one scanner, scans are delivered in the order in which they stand.
+            first, last = int(numbers[where[0]]) - start, int(numbers[where[-1]]) - start + 1
+            scanner = int(indices[scans.scanner])
+            parts.append(detect_log(scans.between(first, last), setup, scanner=scanner, parallel=parallel))
+            places.append(where)
+        start += len(scans)
+    return _interleaved(parts, places)
+
+
+def _interleaved(parts: Sequence[DetectionLog], places: Sequence[IntArray]) -> DetectionLog:
+    """Return the logs of several scanners as one; `places` says which cycle of it each scan is."""
+    if len(parts) == 1:
+        return parts[0]
+    cycles = sum(map(len, parts))
+    counts, stamps, scanners = (np.empty(cycles, dtype=np.int64) for _ in range(3))
+    for part, where in zip(parts, places, strict=True):
+        counts[where], stamps[where], scanners[where] = np.diff(part.offsets), part.stamps_ns, part.scanners
+    offsets = np.concatenate(([0], np.cumsum(counts)))
+    total = int(offsets[-1])
+    range_bearing, beams = np.empty((total, 2)), np.empty(total, dtype=np.int64)
+    status = np.empty(total, dtype=np.int8)
+    for part, where in zip(parts, places, strict=True):
+        shift = np.repeat(offsets[where] - part.offsets[:-1], np.diff(part.offsets))
+        rows = np.arange(len(part.range_bearing)) + shift
+        range_bearing[rows], beams[rows], status[rows] = part.range_bearing, part.beams, part.status
+    return _log(stamps, scanners, offsets, range_bearing, beams, status)
+
+
+def _sensor_detections(log: RecordLog, setup: LocalizerSetup) -> DetectionLog:
     """Return the detections that the sensor itself reported."""
     count = len(log.range_bearing)
     status = np.full(count, INLIER, dtype=np.int8)
     beams = np.zeros(count, dtype=np.int64)
-    return _log(log.detection_stamps_ns, log.detection_offsets, log.range_bearing, beams, status)
+    scanners = setup.indices_of(log.scanners)[log.detection_scanners]
+    return _log(log.detection_stamps_ns, scanners, log.detection_offsets, log.range_bearing, beams, status)
 
 
 def _scans_used(log: RecordLog, sensor_detects: bool) -> int:
     """Number of scans to detect in: those before the sensor's own detections begin."""
-    if log.scans is None or sensor_detects:
+    if sensor_detects:
         return 0
     if not len(log.detection_stamps_ns):
-        return len(log.scans.stamps_ns)
+        return len(log.scan_stamps_ns)
     # Of equal stamps the sensor's own detections are delivered first.
-    return int(np.searchsorted(log.scans.stamps_ns, log.detection_stamps_ns[0], side="left"))
-
-
-def _scans_between(scans: ScanLog, first: int, last: int) -> ScanLog:
-    """Return the scans from `first` to before `last` (views, no copies)."""
-    part = slice(first, last)
-    return ScanLog(
-        stamps_ns=scans.stamps_ns[part],
-        ranges=scans.ranges[part],
-        angle_min=scans.angle_min,
-        angle_increment=scans.angle_increment,
-        intensities=None if scans.intensities is None else scans.intensities[part],
-        reflector=None if scans.reflector is None else scans.reflector[part],
-    )
+    return int(np.searchsorted(log.scan_stamps_ns, log.detection_stamps_ns[0], side="left"))
 
 
 def joined(logs: Sequence[DetectionLog]) -> DetectionLog:
@@ -170,6 +208,7 @@ def joined(logs: Sequence[DetectionLog]) -> DetectionLog:
     starts = np.cumsum([0, *(int(log.offsets[-1]) for log in logs)])
     return _log(
         np.concatenate([log.stamps_ns for log in logs]),
+        np.concatenate([log.scanners for log in logs]),
         np.concatenate(([0], *(log.offsets[1:] + start for log, start in zip(logs, starts, strict=False)))),
         np.concatenate([log.range_bearing for log in logs]),
         np.concatenate([log.beams for log in logs]),
@@ -177,12 +216,18 @@ def joined(logs: Sequence[DetectionLog]) -> DetectionLog:
     )
 
 
-def _log(
-    stamps_ns: IntArray, offsets: IntArray, range_bearing: FloatArray, beams: IntArray, status: NDArray[np.int8]
+def _log(  # noqa: PLR0917 - the columns of the log
+    stamps_ns: IntArray,
+    scanners: IntArray,
+    offsets: IntArray,
+    range_bearing: FloatArray,
+    beams: IntArray,
+    status: NDArray[np.int8],
 ) -> DetectionLog:
     """Return a log of read-only arrays."""
     return DetectionLog(
         stamps_ns=read_only(np.asarray(stamps_ns, dtype=np.int64)),
+        scanners=read_only(np.asarray(scanners, dtype=np.int64)),
         offsets=read_only(np.asarray(offsets, dtype=np.int64)),
         range_bearing=read_only(np.asarray(range_bearing, dtype=np.float64)),
         beams=read_only(beams),

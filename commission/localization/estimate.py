@@ -70,6 +70,8 @@ class Estimate:
     """(N,) squared Mahalanobis distance to that reflector (NIS, 2 degrees of freedom); NaN: none."""
     gate: float
     """Largest squared Mahalanobis distance of an inlier (chi-square, 2 degrees of freedom)."""
+    scanner: int = 0
+    """Index of the scanner that saw them, in the setup."""
 
     def count(self, status: Status) -> int:
         """Return the number of detections of one status."""

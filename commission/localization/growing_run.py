@@ -26,6 +26,7 @@ class Cycles(NamedTuple):
     """A row per cycle."""
 
     stamps_ns: IntArray
+    scanners: IntArray
     prior_means: FloatArray
     prior_covariances: FloatArray
     means: FloatArray
@@ -61,6 +62,7 @@ class GrowingRun:
         n = FIRST_ROWS
         covariances = (np.empty((n, 3, 3)), np.empty((n, 3, 3)))
         self._cycles = Cycles(
+            np.empty(n, np.int64),
             np.empty(n, np.int64),
             np.empty((n, 3)),
             covariances[0],
@@ -138,6 +140,7 @@ class GrowingRun:
         rows = DetectionRows._make(read_only(column[: int(offsets[-1])]) for column in self._detections)
         detected = DetectionLog(
             stamps_ns=cycles.stamps_ns,
+            scanners=cycles.scanners,
             offsets=offsets,
             range_bearing=rows.range_bearing,
             beams=rows.beams,
@@ -168,7 +171,7 @@ class GrowingRun:
         if last > len(self._detections.d2):
             self._detections = DetectionRows._make(_longer(column, last) for column in self._detections)
         cycles, found = self._cycles, self._detections
-        cycles.stamps_ns[row] = estimate.stamp_ns
+        cycles.stamps_ns[row], cycles.scanners[row] = estimate.stamp_ns, estimate.scanner
         cycles.prior_means[row], cycles.prior_covariances[row] = estimate.prior.mean, estimate.prior.covariance
         cycles.means[row], cycles.covariances[row] = estimate.posterior.mean, estimate.posterior.covariance
         cycles.modes[row] = estimate.mode

@@ -182,12 +182,13 @@ class Localizer:
                 count = len(record.range_bearing)
                 status = np.full(count, Status.INLIER, dtype=np.int8)
                 seen = DetectedReflectors(record.range_bearing, np.zeros(count, dtype=np.int64), status)
-                return self._process(record.stamp_ns, seen, following)
+                return self._process(record, seen, following)
             case Scan():
                 if self._state.sensor_detects:
                     return None
-                detected = detect(record, self._setup.detector, self._setup.parameters.detector)
-                return self._process(record.stamp_ns, detected, following)
+                model = self._setup.detectors[record.scanner]
+                detected = detect(record, model, self._setup.parameters.detector)
+                return self._process(record, detected, following)
 
     def _advance(self, record: Odometry) -> None:
         """Predict over the motion of an odometry record."""
@@ -195,9 +196,9 @@ class Localizer:
         noise = self._setup.filter.odometry
         self._state = process_odometry(self._state, record.stamp_ns, dx, dy, dtheta, noise)
 
-    def _process(self, stamp_ns: int, seen: DetectedReflectors, following: NextOdometry) -> Estimate:
+    def _process(self, scan: Scan | Detections, seen: DetectedReflectors, following: NextOdometry) -> Estimate:
         """Predict to the scan's stamp, associate, correct, supervise."""
-        model = self._setup.filter
+        model, stamp_ns = self._setup.filter, scan.stamp_ns
         detections = read_only(seen.range_bearing)
         count = len(detections)
         status = seen.status.copy()
@@ -210,6 +211,7 @@ class Localizer:
             count,
             detections,
             model,
+            self._setup.observations[scan.scanner],
             self._setup.index.places,
             self._setup.index.offsets,
             status,
@@ -220,7 +222,10 @@ class Localizer:
         self._state = cycle.state
         posterior = belief_of(cycle.state)
         offsets = np.array((0, count), dtype=np.int64)
-        points = project_detections(posterior.mean[np.newaxis], offsets, detections, model.observation)
+        scanners = np.array((scan.scanner,), dtype=np.int64)
+        points = project_detections(
+            posterior.mean[np.newaxis], offsets, detections, self._setup.observation_rows, scanners=scanners
+        )
         return Estimate(
             stamp_ns=stamp_ns,
             prior=to_belief(cycle.prior, stamp_ns),
@@ -234,4 +239,5 @@ class Localizer:
             reflector=reflector,
             d2=d2,
             gate=model.gate.d2,
+            scanner=scan.scanner,
         )

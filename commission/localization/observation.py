@@ -6,6 +6,7 @@ Ranges and bearings are those of reflector centers in the scanner frame. No asso
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +53,24 @@ def observation_model(scanner: Scanner, parameters: ObservationParameters) -> Ob
     x, y, theta = (float(value) for value in scanner.mounting)
     return ObservationModel(
         x, y, theta, parameters.range_sigma**2, parameters.bearing_sigma**2, float(parameters.range_bias)
+    )
+
+
+def observation_rows(models: Sequence[ObservationModel]) -> FloatArray:
+    """(S, 6) the models of several scanners, for kernels; see `observation_at`."""
+    return read_only(np.array(models, dtype=np.float64).reshape(-1, 6))
+
+
+@compiled_inline
+def observation_at(rows: FloatArray, scanner: int) -> ObservationModel:
+    """Model of one scanner out of `observation_rows`."""
+    return ObservationModel(
+        rows[scanner, 0],
+        rows[scanner, 1],
+        rows[scanner, 2],
+        rows[scanner, 3],
+        rows[scanner, 4],
+        rows[scanner, 5],
     )
 
 
@@ -195,7 +214,7 @@ def validation_ellipses(
 
 
 def project_detections(
-    means: FloatArray, offsets: IntArray, detections: FloatArray, model: ObservationModel
+    means: FloatArray, offsets: IntArray, detections: FloatArray, models: FloatArray, *, scanners: IntArray
 ) -> FloatArray:
     """Detections of many scans seen from the poses of base.
 
@@ -204,23 +223,32 @@ def project_detections(
     means : (K, 3) poses of base in map [m, m, rad].
     offsets : (K + 1,) rows of `detections` that belong to each.
     detections : (n, 2) range [m] and bearing [rad], scanner frame, as measured; the range bias is taken off.
-    model : mounting of the scanner and range bias.
+    models : (S, 6) `observation_rows` of the scanners: mounting and range bias.
+    scanners : (K,) scanner of each scan.
 
     Returns
     -------
     points_map : (n, 2) array [m], map frame.
     """
     points = np.empty((len(detections), 2))
-    _project(read_only(means), read_only(offsets), read_only(detections), model, points)
+    _project(
+        read_only(means), read_only(offsets), read_only(detections), read_only(models), read_only(scanners), points
+    )
     return points
 
 
 @compiled
-def _project(
-    means: FloatArray, offsets: IntArray, detections: FloatArray, model: ObservationModel, points: FloatArray
+def _project(  # noqa: PLR0917 - the columns of the log
+    means: FloatArray,
+    offsets: IntArray,
+    detections: FloatArray,
+    models: FloatArray,
+    scanners: IntArray,
+    points: FloatArray,
 ) -> None:
     """`project_detections` into `points`."""
     for k in range(len(means)):
+        model = observation_at(models, scanners[k])
         x, y, theta = means[k, 0], means[k, 1], means[k, 2]
         offset_x, offset_y = scanner_offset(theta, model)
         for i in range(offsets[k], offsets[k + 1]):

@@ -131,7 +131,8 @@ class RunColumns:
                 self.means[segment.first : end],
                 self.offsets[segment.first : end + 1] - self.offsets[segment.first],
                 self.range_bearing[self.offsets[segment.first] : self.offsets[end]],
-                segment.setup.filter.observation,
+                segment.setup.observation_rows,
+                scanners=self.detected.scanners[segment.first : end],
             )
             for segment, end in zip(self.segments, ends, strict=True)
         ]
@@ -139,12 +140,18 @@ class RunColumns:
 
     def estimate(self, cycle: int) -> Estimate:
         """Return one cycle as `Localizer.feed` gives it, to the last bit."""
-        model = self.segment(cycle).setup.filter
+        setup = self.segment(cycle).setup
         stamp_ns = int(self.stamps_ns[cycle])
         rows = slice(int(self.offsets[cycle]), int(self.offsets[cycle + 1]))
         detections = self.range_bearing[rows]
         offsets = np.array((0, len(detections)), dtype=np.int64)
-        points = project_detections(self.means[cycle : cycle + 1], offsets, detections, model.observation)
+        points = project_detections(
+            self.means[cycle : cycle + 1],
+            offsets,
+            detections,
+            setup.observation_rows,
+            scanners=self.detected.scanners[cycle : cycle + 1],
+        )
         return Estimate(
             stamp_ns=stamp_ns,
             prior=Belief(stamp_ns, self.prior_means[cycle], self.prior_covariances[cycle]),
@@ -157,7 +164,8 @@ class RunColumns:
             status=self.status[rows],
             reflector=self.reflector[rows],
             d2=self.d2[rows],
-            gate=model.gate.d2,
+            gate=setup.filter.gate.d2,
+            scanner=int(self.detected.scanners[cycle]),
         )
 
     def _posterior(self, cycle: int) -> Belief:

@@ -14,6 +14,7 @@ from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.cycle import process_odometry, process_scan
 from commission.localization.detection_log import DetectionLog
+from commission.localization.observation import observation_at
 from commission.localization.odometry import NextOdometry, waits_until
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.run_columns import RunColumns
@@ -123,7 +124,9 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
         detected.stamps_ns,
         detected.offsets,
         detected.range_bearing,
+        detected.scanners,
         setup.filter,
+        setup.observation_rows,
         setup.index.places,
         setup.index.offsets,
         state,
@@ -142,7 +145,9 @@ def _run(  # noqa: PLR0917 - the columns of the log
     scan_stamps: IntArray,
     offsets: IntArray,
     detections: FloatArray,
+    scanners: IntArray,
     model: FilterModel,
+    observations: FloatArray,
     places: FloatArray,
     cell_offsets: IntArray,
     state: FilterState,
@@ -170,6 +175,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
             offsets[k + 1],
             detections,
             model,
+            observation_at(observations, scanners[k]),
             places,
             cell_offsets,
             status,

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from commission.geometry.arrays import FloatArray
+from commission.errors import UsageError
+from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.gaussian import ellipse_points
 from commission.localization.association import Gate, gate_of
 from commission.localization.detector import DetectorModel, detector_model
 from commission.localization.estimate import Belief
-from commission.localization.observation import ObservationModel, observation_model, validation_ellipses
+from commission.localization.observation import (
+    ObservationModel,
+    observation_model,
+    observation_rows,
+    validation_ellipses,
+)
 from commission.localization.odometry import OdometryNoise, odometry_noise
 from commission.localization.reflector_index import Cells, ReflectorIndex, build_index
 from commission.localization.rejection import RejectionRule, rejection_rule
@@ -27,7 +34,6 @@ class FilterModel(NamedTuple):
     """What the steps of the filter read, besides the arrays of the map."""
 
     odometry: OdometryNoise
-    observation: ObservationModel
     cells: Cells
     gate: Gate
     limits: SupervisorLimits
@@ -51,14 +57,17 @@ class LocalizerSetup:
     """Scalars of the filter."""
     index: ReflectorIndex = field(init=False, repr=False, compare=False)
     """The reflector map for the filter."""
-    detector: DetectorModel = field(init=False, repr=False, compare=False)
-    """Scalars and tables of the detector."""
+    observations: tuple[ObservationModel, ...] = field(init=False, repr=False, compare=False)
+    """Mounting and noise of each scanner."""
+    observation_rows: FloatArray = field(init=False, repr=False, compare=False)
+    """(S, 6) the same, for kernels."""
+    detectors: tuple[DetectorModel, ...] = field(init=False, repr=False, compare=False)
+    """Scalars and tables of the detector, for each scanner."""
 
     def __post_init__(self) -> None:
         index = build_index(self.reflectors)
         model = FilterModel(
             odometry_noise(self.parameters.odometry),
-            observation_model(self.scanners[0], self.parameters.observation),
             index.cells,
             gate_of(self.parameters.association),
             supervisor_limits(self.parameters.supervisor),
@@ -66,26 +75,57 @@ class LocalizerSetup:
         )
         object.__setattr__(self, "index", index)
         object.__setattr__(self, "filter", model)
-        detector = detector_model(self.reflectors, self.scanners[0], self.parameters.detector)
-        object.__setattr__(self, "detector", detector)
+        observations = tuple(observation_model(each, self.parameters.observation) for each in self.scanners)
+        object.__setattr__(self, "observations", observations)
+        object.__setattr__(self, "observation_rows", observation_rows(observations))
+        detectors = tuple(detector_model(self.reflectors, each, self.parameters.detector) for each in self.scanners)
+        object.__setattr__(self, "detectors", detectors)
 
     def detects_like(self, other: LocalizerSetup) -> bool:
         """Whether the same is detected in every scan: what the filter does with it afterwards may differ."""
         if self.parameters.detector.intensity_threshold != other.parameters.detector.intensity_threshold:
             return False
-        return all(np.array_equal(a, b) for a, b in zip(self.detector, other.detector, strict=True))
+        if [each.name for each in self.scanners] != [each.name for each in other.scanners]:
+            return False
+        pairs = zip(self.detectors, other.detectors, strict=True)
+        return all(np.array_equal(a, b) for pair in pairs for a, b in zip(*pair, strict=True))
+
+    def indices_of(self, names: Sequence[str]) -> IntArray:
+        """Indices of the scanners that a log names.
+
+        Parameters
+        ----------
+        names : of a log. Where both have one scanner it is the same one, whatever it is called: logs of old know none.
+
+        Returns
+        -------
+        indices : (len(names),) array into `scanners`.
+
+        Raises
+        ------
+        UsageError
+            a name is none of the setup's; says which there are.
+        """
+        own = [scanner.name for scanner in self.scanners]
+        if len(own) == len(names) == 1:
+            return np.zeros(1, dtype=np.int64)
+        for name in names:
+            if name not in own:
+                known = ", ".join(own)
+                raise UsageError(f"the recording's scanner {name!r} is none of the project's; expected {known}")
+        return np.array([own.index(name) for name in names], dtype=np.int64)
 
     @staticmethod
     def of(project: Project) -> LocalizerSetup:
         """Return the setup of a project."""
         return LocalizerSetup(project.reflectors, project.scanners, project.parameters)
 
-    def validation_ellipses(self, belief: Belief) -> FloatArray:
-        """(N, 2, 2) 1-sigma region [m^2] on the floor in which each reflector is expected to be detected."""
+    def validation_ellipses(self, belief: Belief, scanner: int = 0) -> FloatArray:
+        """(N, 2, 2) 1-sigma region [m^2] on the floor in which a scanner is expected to detect each reflector."""
         sigmas = [reflector.sigma for reflector in self.reflectors.reflectors]
-        return validation_ellipses(belief, self.filter.observation, self.reflectors.centers, sigmas)
+        return validation_ellipses(belief, self.observations[scanner], self.reflectors.centers, sigmas)
 
-    def validation_outlines(self, belief: Belief, n: int = 48) -> FloatArray:
+    def validation_outlines(self, belief: Belief, n: int = 48, *, scanner: int = 0) -> FloatArray:
         """(N, n, 2) outline [m] of the validation gate around each reflector, map frame (the paper's Fig. 12)."""
         scale = self.filter.gate.d2**0.5
-        return ellipse_points(self.reflectors.centers, self.validation_ellipses(belief), scale, n)
+        return ellipse_points(self.reflectors.centers, self.validation_ellipses(belief, scanner), scale, n)

@@ -152,7 +152,7 @@ def _detected(
     starts = {segment.first for segment in (*segments, *(() if earlier is None else earlier.segments))}
     bounds = (*sorted(start for start in starts if start < len(stamps_ns)), len(stamps_ns))
     # In pieces, so that it can be stopped; what the sensor has detected is only cut out of its columns.
-    step = max(len(stamps_ns), 1) if log.scans is None else CHECKPOINT_CYCLES
+    step = max(len(stamps_ns), 1) if not log.scans else CHECKPOINT_CYCLES
     parts: list[DetectionLog] = []
     for first, last in itertools.pairwise(bounds):
         segment = _segment(segments, first)
@@ -258,5 +258,5 @@ def warm_up() -> None:
         intensities=None,
         reflector=flags,
     )
-    log = RecordLog(odometry_stamps_ns=np.array([0, 1]), displacements=np.zeros((2, 3)), scans=scans)
+    log = RecordLog(odometry_stamps_ns=np.array([0, 1]), displacements=np.zeros((2, 3)), scans=(scans,))
     run(log, setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3))).points_map()

@@ -7,8 +7,10 @@ off leaves the others' draws as they were. What is constant over a drive is draw
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Iterator
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +26,7 @@ from commission.site.path import legs_of
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.records import ORDER_WITHIN_A_STAMP, Odometry, Record, ReferencePose, Scan
+from commission.site.scanner import Scanner
 
 START, WHEELS, BEAMS, PEOPLE, LOSSES = range(5)
 """Streams of random numbers of one seed."""
@@ -96,13 +99,18 @@ def records(
     motion = drive(route, project.vehicle, _rng(seed, START), options)
     slips = project.disturbances.slips_per_100_m
     displacements = measure(motion, project.vehicle, truth.wheels, slips, _rng(seed, WHEELS))
-    stamps = np.arange(0, motion.duration_ns + 1, project.scanners[0].period_ns, dtype=np.int64)
+    stamps, scanners = scan_moments(project.scanners, motion.duration_ns)
     poses = motion.poses_at(stamps)
-    scans = _scans(project, site, seed, zip(stamps.tolist(), poses, strict=True), options.whole_scans)
+    moments = list(itertools.starmap(_Moment, zip(stamps.tolist(), scanners.tolist(), poses, strict=True)))
+    scans = _scans(project, site, seed, _told(moments, progress), options.whole_scans)
+    shown, first = np.unique(stamps, return_index=True)
     yield from heapq.merge(
         _odometry(motion, displacements),
-        _reference(stamps, poses),
-        _told(_as_reported(scans, error_of(truth, project.scanners[0].name)), len(stamps), progress),
+        _reference(shown, poses[first]),
+        *(
+            _reported(_of_scanner(all_scans, index), error_of(truth, project.scanners[index].name))
+            for index, all_scans in enumerate(itertools.tee(scans, len(project.scanners)))
+        ),
         key=lambda record: (record.stamp_ns, ORDER_WITHIN_A_STAMP[type(record)]),
     )
     progress(1.0, "driving")
@@ -117,8 +125,32 @@ def virtual_drive(
     progress: Progress = silent,
 ) -> RecordLog:
     """Gather the records of a whole drive, and what is true in it; parameters and errors as in `records`."""
-    log = RecordLog.collect(records(project, route_name, seed, options=options, progress=progress))
+    names = tuple(scanner.name for scanner in project.scanners)
+    log = RecordLog.collect(records(project, route_name, seed, options=options, progress=progress), names)
     return replace(log, truth=draw_truth(project, route_name, seed))
+
+
+def scan_moments(scanners: Sequence[Scanner], duration_ns: int) -> tuple[IntArray, IntArray]:
+    """Stamps at which scanners scan, and which one does.
+
+    Parameters
+    ----------
+    scanners : the first begins at once, the others each a share of their period later: those of one rate take turns.
+    duration_ns : of the drive [ns].
+
+    Returns
+    -------
+    stamps_ns, scanners : (K,) arrays in order of time; of equal stamps the first scanner comes first.
+    """
+    begins = [round(index * scanner.period_ns / len(scanners)) for index, scanner in enumerate(scanners)]
+    stamps = [
+        np.arange(begin, duration_ns + 1, scanner.period_ns, dtype=np.int64)
+        for begin, scanner in zip(begins, scanners, strict=True)
+    ]
+    indices = np.repeat(np.arange(len(scanners)), [len(each) for each in stamps])
+    together = np.concatenate(stamps)
+    order = np.argsort(together, kind="stable")
+    return together[order], indices[order]
 
 
 def _odometry(motion: TrueMotion, displacements: FloatArray) -> Iterator[Record]:
@@ -133,58 +165,77 @@ def _reference(stamps: IntArray, poses: FloatArray) -> Iterator[Record]:
         yield ReferencePose(stamp, pose)
 
 
+class _Moment(NamedTuple):
+    """When a scanner scans: stamp [ns], index of the scanner, and the true pose of base."""
+
+    stamp_ns: int
+    scanner: int
+    pose: FloatArray
+
+
 def _scans(
-    project: Project, site: Project, seed: int, moments: Iterable[tuple[int, FloatArray]], whole: bool
-) -> Iterator[Scan | None]:
-    """One scan per moment, None where it is lost; people walk where the project has floor, beams meet the true site."""
-    disturbances = project.disturbances
-    scanner = VirtualScanner.of(site, site.scanners[0])
-    beams, losses, walkers = _rng(seed, BEAMS), _rng(seed, LOSSES), _rng(seed, PEOPLE)
+    project: Project, site: Project, seed: int, moments: Iterable[_Moment], whole: bool
+) -> Iterator[tuple[int, Scan | None]]:
+    """Scanner and scan of each moment, None where it is lost; people walk where the project has floor."""
+    disturbances, scanners = project.disturbances, project.scanners
+    virtual = [VirtualScanner.of(site, scanner) for scanner in site.scanners]
+    beams, losses = ([_rng(seed, kind, index) for index in range(len(scanners))] for kind in (BEAMS, LOSSES))
+    walkers = _rng(seed, PEOPLE)
     crowd: Crowd | None = None
     if disturbances.people:
         crowd = Crowd(WalkableFloor.of(project), disturbances.people, disturbances.walking_speed, walkers)
     nobody = np.empty((0, 3))
-    seconds = 1e-9 * project.scanners[0].period_ns
-    for stamp, pose in moments:
+    before = -scanners[0].period_ns
+    for stamp, index, pose in moments:
         if crowd is not None:
-            crowd.step(seconds, pose)
-        ranges, flags = scanner.scan(pose, nobody if crowd is None else crowd.legs(), beams, whole=whole)
+            crowd.step(1e-9 * (stamp - before), pose)
+        before = stamp
+        legs = nobody if crowd is None else crowd.legs()
+        ranges, flags = virtual[index].scan(pose, legs, beams[index], whole=whole)
         if any(0.0 <= 1e-9 * stamp - period.start < period.duration for period in disturbances.covered):
             flags[:] = False
         record = Scan(
             stamp_ns=stamp,
             ranges=ranges,
-            angle_min=project.scanners[0].angle_min,
-            angle_increment=project.scanners[0].angle_increment,
+            angle_min=scanners[index].angle_min,
+            angle_increment=scanners[index].angle_increment,
             intensities=None,
             reflector=flags,
+            scanner=index,
         )
-        yield None if losses.uniform() < disturbances.dropped_scans else record
+        yield index, None if losses[index].uniform() < disturbances.dropped_scans else record
 
 
-def _as_reported(scans: Iterator[Scan | None], error: ScannerError) -> Iterator[Scan | None]:
-    """Scans as a scanner reports them whose ranges and clock are off; what it stamps before the drive is lost."""
+def _of_scanner(scans: Iterable[tuple[int, Scan | None]], scanner: int) -> Iterator[Scan | None]:
+    """Scans of one scanner."""
+    return (record for index, record in scans if index == scanner)
+
+
+def _reported(scans: Iterable[Scan | None], error: ScannerError) -> Iterator[Scan]:
+    """Scans that a scanner reports whose ranges and clock are off; what it stamps before the drive is lost."""
     late_ns = round(1e9 * error.clock_offset)
     for record in scans:
-        if record is None or (error.range_bias == 0.0 and late_ns == 0):
+        if record is None:
+            continue
+        if error.range_bias == 0.0 and late_ns == 0:
             yield record
             continue
         stamp = record.stamp_ns + late_ns
         ranges = np.maximum(record.ranges + np.float32(error.range_bias), np.float32(0.0))
-        yield None if stamp < 0 else replace(record, stamp_ns=stamp, ranges=ranges)
+        if stamp >= 0:
+            yield replace(record, stamp_ns=stamp, ranges=ranges)
 
 
-def _told(scans: Iterator[Scan | None], count: int, progress: Progress) -> Iterator[Record]:
-    """Tell of each scan, and pass on those that are not lost."""
-    for index, record in enumerate(scans):
-        progress(index / count, "driving")
-        if record is not None:
-            yield record
+def _told(moments: Sequence[_Moment], progress: Progress) -> Iterator[_Moment]:
+    """Tell of each moment."""
+    for index, moment in enumerate(moments):
+        progress(index / len(moments), "driving")
+        yield moment
 
 
-def _rng(seed: int, stream: int) -> np.random.Generator:
-    """Generator of one stream of a seed."""
-    return np.random.default_rng((seed, stream))
+def _rng(seed: int, stream: int, scanner: int = 0) -> np.random.Generator:
+    """Generator of one stream of a seed; what the first scanner draws does not depend on how many there are."""
+    return np.random.default_rng((seed, stream, scanner) if scanner else (seed, stream))
 
 
 def warm_up() -> None:

@@ -33,7 +33,7 @@ class Odometry:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scan:
-    """One turn of the laser scanner."""
+    """One turn of a laser scanner."""
 
     stamp_ns: int
     """Time of the scan [ns]."""
@@ -47,6 +47,8 @@ class Scan:
     """(B,) strength of each echo [sensor's own unit], or None."""
     reflector: NDArray[np.bool_] | None = None
     """(B,) whether the sensor says that the beam met a reflector, or None."""
+    scanner: int = 0
+    """Which of the vehicle's scanners: index into the names that log or setup have."""
 
     @property
     def bearings(self) -> FloatArray:
@@ -62,6 +64,8 @@ class Detections:
     """Time of the scan [ns]."""
     range_bearing: FloatArray
     """(N, 2) range [m] and bearing [rad] of each reflector's center, scanner frame."""
+    scanner: int = 0
+    """Which of the vehicle's scanners: index into the names that log or setup have."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "range_bearing", frozen(self.range_bearing, (None, 2), "detections"))

@@ -33,6 +33,11 @@ _SLACK = 1e-6
 """Share of a period by which a sweep may be longer: both are rounded in files."""
 
 
+def is_name(text: str) -> bool:
+    """Whether a scanner may be called so."""
+    return _NAME.fullmatch(text) is not None
+
+
 class StampOf(StrEnum):
     """Which beam of a sweep was measured at the stamp of its scan."""
 
@@ -135,7 +140,7 @@ class Scanner:
     def __post_init__(self) -> None:
         object.__setattr__(self, "mounting", frozen(self.mounting, (3,), "scanner.mounting"))
         check_fields(self, "scanner.")
-        if not _NAME.fullmatch(self.name):
+        if not is_name(self.name):
             expected = "1 to 40 letters, digits, blanks (inside), - and _"
             raise ValueError(f"scanner.name is {self.name!r}; expected {expected}")
         self._check_angles()

@@ -15,7 +15,7 @@ from commission.geometry.angles import wrap
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.progress import Progress, silent
 from commission.site.project import Project
-from commission.site.record_log import RecordLog
+from commission.site.record_log import RecordLog, ScanLog
 from commission.site.scanner import Scanner
 from commission.studies.inputs import StudyInput
 
@@ -89,6 +89,7 @@ def plausibility(inputs: PlausibilityInput, progress: Progress = silent) -> tupl
         ("detections", _detections),
         ("scans", _scans),
         ("reference", _reference),
+        ("names of scanners", _unknown_scanners),
     )
     findings: list[Finding] = []
     for done, (name, check) in enumerate(checks):
@@ -100,14 +101,42 @@ def plausibility(inputs: PlausibilityInput, progress: Progress = silent) -> tupl
 
 def _kinds(log: RecordLog) -> tuple[tuple[str, IntArray], ...]:
     """Name and stamps [ns] of each kind of record that the recording has."""
-    scans = np.empty(0, np.int64) if log.scans is None else log.scans.stamps_ns
     kinds = (
         ("odometry", log.odometry_stamps_ns),
-        ("detections", log.detection_stamps_ns),
-        ("scans", scans),
+        *_by_scanner(log, "detections", log.detection_stamps_ns, log.detection_scanners),
+        *((scans_name(log, scans), scans.stamps_ns) for scans in log.scans),
         ("reference poses", log.reference_stamps_ns),
     )
     return tuple((name, stamps) for name, stamps in kinds if len(stamps))
+
+
+def scans_name(log: RecordLog, scans: ScanLog) -> str:
+    """What the scans of one scanner are called: `scans`, of several `scans of front left`."""
+    return "scans" if len(log.scanners) == 1 else f"scans of {log.scanners[scans.scanner]}"
+
+
+def _by_scanner(log: RecordLog, name: str, stamps: IntArray, scanners: IntArray) -> Iterator[tuple[str, IntArray]]:
+    """Records of each scanner."""
+    for index, scanner in enumerate(log.scanners):
+        called = name if len(log.scanners) == 1 else f"{name} of {scanner}"
+        yield called, stamps[scanners == index]
+
+
+def _scanner_of(inputs: PlausibilityInput, name: str) -> Scanner | None:
+    """The project's scanner of a name in the log; None where there is none of that name."""
+    if len(inputs.scanners) == len(inputs.log.scanners) == 1:
+        return inputs.scanners[0]
+    return next((each for each in inputs.scanners if each.name == name), None)
+
+
+def _unknown_scanners(inputs: PlausibilityInput) -> Iterator[Finding]:
+    for name in inputs.log.scanners:
+        if _scanner_of(inputs, name) is None:
+            yield Finding(
+                found=f"the recording's scanner {name!r} is none of the project's",
+                probably="it is called otherwise there",
+                remedy=f"expected one of: {', '.join(each.name for each in inputs.scanners)}",
+            )
 
 
 def _time_units(inputs: PlausibilityInput) -> Iterator[Finding]:
@@ -241,7 +270,13 @@ def _detections(inputs: PlausibilityInput) -> Iterator[Finding]:
             probably="they are in degrees",
             remedy="expected radians, counter-clockwise",
         )
-    yield from _ranges("detections", ranges, inputs.scanners[0])
+    log = inputs.log
+    scanners = np.repeat(log.detection_scanners, np.diff(log.detection_offsets))
+    for index, name in enumerate(log.scanners):
+        scanner = _scanner_of(inputs, name)
+        if scanner is not None:
+            called = "detections" if len(log.scanners) == 1 else f"detections of {name}"
+            yield from _ranges(called, ranges[scanners == index], scanner)
 
 
 def _ranges(name: str, ranges: FloatArray, scanner: Scanner) -> Iterator[Finding]:
@@ -261,14 +296,20 @@ def _ranges(name: str, ranges: FloatArray, scanner: Scanner) -> Iterator[Finding
 
 
 def _scans(inputs: PlausibilityInput) -> Iterator[Finding]:
-    scans, scanner = inputs.log.scans, inputs.scanners[0]
-    if scans is None or not len(scans.stamps_ns):
-        return
+    for scans in inputs.log.scans:
+        scanner = _scanner_of(inputs, inputs.log.scanners[scans.scanner])
+        if scanner is not None and len(scans):
+            yield from _scans_of(inputs, scans, scanner)
+
+
+def _scans_of(inputs: PlausibilityInput, scans: ScanLog, scanner: Scanner) -> Iterator[Finding]:
+    """Scans of one scanner that are not what the project says of it."""
+    called = scans_name(inputs.log, scans)
     # A few scans spread over the drive tell as much as all of them.
     chosen = np.unique(np.linspace(0, len(scans.stamps_ns) - 1, 200).astype(int))
     ranges = np.asarray(scans.ranges[chosen], dtype=np.float64)
     returned = np.isfinite(ranges)
-    yield from _ranges("scans", ranges[returned], scanner)
+    yield from _ranges(called, ranges[returned], scanner)
     if scans.intensities is not None and scans.reflector is None and returned.any():
         yield from _intensities(
             np.asarray(scans.intensities[chosen], dtype=np.float64)[returned], inputs.intensity_threshold
@@ -276,14 +317,14 @@ def _scans(inputs: PlausibilityInput) -> Iterator[Finding]:
     step, expected = abs(scans.angle_increment), scanner.angle_increment
     if not expected / RATE_RATIO <= step <= expected * RATE_RATIO:
         yield Finding(
-            found=f"the scans have {ranges.shape[1]} beams {math.degrees(step):.3g} deg apart",
+            found=f"the {called} have {ranges.shape[1]} beams {math.degrees(step):.3g} deg apart",
             probably=f"another scanner was recorded than the project's ({scanner.resolution_deg:g} deg)",
             remedy="correct the project's scanner (resolution_deg), by which the detector counts beams",
         )
     period = _period_s(scans.stamps_ns)
     if not math.isnan(period) and not scanner.rate / THINNED <= 1.0 / period <= scanner.rate * RATE_RATIO:
         yield Finding(
-            found=f"the scans come {1.0 / period:.3g} times a second",
+            found=f"the {called} come {1.0 / period:.3g} times a second",
             probably=f"the project's scanner ({scanner.rate:g} per second) is another one, or scans are lost",
             remedy="correct the project's scanner (rate) for virtual drives and predictions",
         )

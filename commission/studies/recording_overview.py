@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.site.record_log import RecordLog
+from commission.site.record_log import RecordLog, ScanLog
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,17 +41,28 @@ def channels(log: RecordLog) -> tuple[Channel, ...]:
     found: list[Channel] = []
     if len(log.odometry_stamps_ns):
         found.append(_channel(log, "odometry", log.odometry_stamps_ns, _odometry_values(log)))
-    if len(log.detection_stamps_ns):
-        values = f"{len(log.range_bearing)} reflectors"
-        if len(log.range_bearing):
-            values += f", {_spans(log.range_bearing, ('range', 'bearing'), ('m', 'rad'))}"
-        found.append(_channel(log, "detections", log.detection_stamps_ns, values))
-    if log.scans is not None and len(log.scans.stamps_ns):
-        found.append(_channel(log, "scans", log.scans.stamps_ns, _scan_values(log)))
+    of_row = np.repeat(log.detection_scanners, np.diff(log.detection_offsets))
+    for index, name in enumerate(log.scanners):
+        stamps = log.detection_stamps_ns[log.detection_scanners == index]
+        if len(stamps):
+            seen = log.range_bearing[of_row == index]
+            values = f"{len(seen)} reflectors"
+            if len(seen):
+                values += f", {_spans(seen, ('range', 'bearing'), ('m', 'rad'))}"
+            found.append(_channel(log, _called(log, "detections", name), stamps, values))
+    for scans in log.scans:
+        if len(scans):
+            called = _called(log, "scans", log.scanners[scans.scanner])
+            found.append(_channel(log, called, scans.stamps_ns, _scan_values(scans)))
     if len(log.reference_stamps_ns):
         values = _spans(log.reference_poses, ("x", "y", "theta"), ("m", "m", "rad"))
         found.append(_channel(log, "reference", log.reference_stamps_ns, values))
     return tuple(found)
+
+
+def _called(log: RecordLog, kind: str, scanner: str) -> str:
+    """What records of one scanner are called; its name matters where there are several."""
+    return kind if len(log.scanners) == 1 else f"{kind} of {scanner}"
 
 
 def _channel(log: RecordLog, name: str, stamps_ns: IntArray, values: str) -> Channel:
@@ -81,10 +92,7 @@ def _odometry_values(log: RecordLog) -> str:
     return f"{way:.1f} m driven, speed up to {speeds.max():.3g} m/s, turning up to {turns.max():.3g} rad/s"
 
 
-def _scan_values(log: RecordLog) -> str:
-    scans = log.scans
-    if scans is None:
-        return ""
+def _scan_values(scans: ScanLog) -> str:
     chosen = np.unique(np.linspace(0, len(scans.stamps_ns) - 1, 200).astype(int))
     ranges = np.asarray(scans.ranges[chosen], dtype=np.float64)
     hit = np.isfinite(ranges)

@@ -66,7 +66,6 @@ def drive(setup: LocalizerSetup, cycles: int) -> tuple[RecordLog, Belief]:
     log = RecordLog(
         odometry_stamps_ns=stamps,
         displacements=displacements,
-        scans=None,
         detection_stamps_ns=stamps,
         detection_offsets=offsets,
         range_bearing=detections.reshape(-1, 2),
@@ -79,7 +78,7 @@ def peer_seconds(log: RecordLog, setup: LocalizerSetup, initial: Belief, cycles:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         from filterpy.kalman import ExtendedKalmanFilter
-    model, noise, gate = setup.filter.observation, odometry_noise(setup.parameters.odometry), setup.filter.gate.d2
+    model, noise, gate = setup.observations[0], odometry_noise(setup.parameters.odometry), setup.filter.gate.d2
     centers, mounting = setup.reflectors.centers, setup.scanners[0].mounting
     R = np.diag([model.range_variance, model.bearing_variance])
     ekf = ExtendedKalmanFilter(dim_x=3, dim_z=2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -25,9 +26,11 @@ class Drive:
     initial: Belief
     truth: FloatArray
 
+    scanners: tuple[str, ...] = ("scanner",)
+
     @property
     def log(self) -> RecordLog:
-        return RecordLog.collect(self.records)
+        return RecordLog.collect(self.records, self.scanners)
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,7 @@ def odometry_error(
 
 
 def random_drive(setup: LocalizerSetup, rng: np.random.Generator, plan: Plan) -> Drive:
-    """A drive on a circle of 4 m radius in the middle of a 20 m hall."""
+    """A drive on a circle of 4 m radius in the middle of a 20 m hall; several scanners take turns."""
     start = np.array([10.0, 6.0, 0.0])
     covariance = np.diag([0.02, 0.02, 0.005]) ** 2
     pose = se2.compose(start, rng.multivariate_normal(np.zeros(3), covariance))
@@ -98,7 +101,8 @@ def random_drive(setup: LocalizerSetup, rng: np.random.Generator, plan: Plan) ->
         records.append(Odometry(stamp, moved + np.array([0.0, 0.0, plan.slip]) if slips else moved))
         while pending and pending[0] == stamp:
             _scan(records, truth, pending.pop(0), pose, setup, rng, plan)
-    return Drive(records, Belief(0, start, covariance), np.array(truth))
+    names = tuple(scanner.name for scanner in setup.scanners)
+    return Drive(records, Belief(0, start, covariance), np.array(truth), names)
 
 
 def _scan(
@@ -113,14 +117,16 @@ def _scan(
     records.append(ReferencePose(stamp, pose))
     index = len(truth)
     truth.append(pose)
+    alone = dataclasses.replace(setup, scanners=(setup.scanners[index % len(setup.scanners)],))
+    scanner = index % len(setup.scanners)
     if plan.beams == 0 or 0 <= plan.both_after <= index:
-        records.append(Detections(stamp, detections(pose, setup, rng, plan)))
+        records.append(Detections(stamp, detections(pose, alone, rng, plan), scanner))
     if plan.beams:
-        records.append(scan(stamp, pose, setup, rng, plan))
+        records.append(dataclasses.replace(scan(stamp, pose, alone, rng, plan), scanner=scanner))
 
 
 def detections(pose: FloatArray, setup: LocalizerSetup, rng: np.random.Generator, plan: Plan) -> FloatArray:
-    model = setup.filter.observation
+    model = setup.observations[0]
     expected = range_bearing(pose, setup.scanners[0].mounting, setup.reflectors.centers)
     seen = expected[expected[:, 0] < plan.reach]
     sigma = [math.sqrt(model.range_variance), math.sqrt(model.bearing_variance)]

@@ -38,7 +38,7 @@ def test_reflector_between_two_wide_beams_is_not_drawn_nearer_by_its_radius(dist
         intensities=None,
         reflector=flags,
     )
-    seen = detect(scan, setup.detector, setup.parameters.detector)
+    seen = detect(scan, setup.detectors[0], setup.parameters.detector)
     assert seen.beams.tolist() == [2]
     # Two beams of 1 mm noise, and no bias of the lit parts.
     assert seen.range_bearing[0] == pytest.approx([distance, 0.0], abs=0.003)
@@ -72,7 +72,7 @@ def errors_of(distance: float, radius: float, hidden: float, scans: int = 600) -
             intensities=None,
             reflector=flags,
         )
-        seen = detect(scan, setup.detector, setup.parameters.detector)
+        seen = detect(scan, setup.detectors[0], setup.parameters.detector)
         passed = seen.range_bearing[seen.status == Status.INLIER]
         found += list(passed + np.array([-distance, heading]))
     return np.array(found)

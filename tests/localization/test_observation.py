@@ -19,6 +19,7 @@ from commission.localization.observation import (
     innovation_covariances,
     jacobians,
     observation_model,
+    observation_rows,
     project_detections,
     range_bearing,
     scanner_offset,
@@ -32,6 +33,7 @@ from commission.site.scanner import Scanner
 from tests.localization import plain_observation as plain
 
 MODEL = ObservationModel(0.3, -0.1, 0.4, 4e-4, 1.6e-5, 0.05)
+ROWS = observation_rows([MODEL])
 MOUNTING = np.array([MODEL.mount_x, MODEL.mount_y, MODEL.mount_theta])
 POSES = st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(-3.1, 3.1)).map(np.array)
 PLACES = st.tuples(st.floats(0.5, 30), st.floats(-math.pi, math.pi))
@@ -71,7 +73,7 @@ def test_point_is_observed_where_it_lies_in_the_scanner_frame(pose: np.ndarray, 
     np.testing.assert_allclose([seen[0] - polar[0], difference(seen[1], polar[1])], 0.0, atol=1e-11)
     # And back, the bias of the range taken off.
     measured = np.array([[polar[0] + MODEL.range_bias, polar[1]]])
-    point = project_detections(pose[np.newaxis], np.array([0, 1]), measured, MODEL)
+    point = project_detections(pose[np.newaxis], np.array([0, 1]), measured, ROWS, scanners=np.zeros(1, np.int64))
     np.testing.assert_allclose(point, place_of(pose, polar), atol=1e-11)
 
 
@@ -91,7 +93,12 @@ def test_validation_ellipse_holds_the_detections_that_the_gate_holds() -> None:
     for j, place in enumerate(places):
         v = rng.multivariate_normal(np.zeros(2), S[j], 4000)
         measured = range_bearing(belief.mean, MOUNTING, places)[j] + v + [MODEL.range_bias, 0.0]
-        offset = project_detections(belief.mean[np.newaxis], np.array([0, len(v)]), measured, MODEL) - place
+        offset = (
+            project_detections(
+                belief.mean[np.newaxis], np.array([0, len(v)]), measured, ROWS, scanners=np.zeros(1, np.int64)
+            )
+            - place
+        )
         in_gate = np.einsum("ni,ni->n", v, np.linalg.solve(S[j], v.T).T) <= 5.991
         in_ellipse = np.einsum("ni,ni->n", offset, np.linalg.solve(ellipses[j], offset.T).T) <= 5.991
         # Only those on the edge differ, by the curvature of polar coordinates.

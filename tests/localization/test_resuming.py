@@ -39,10 +39,11 @@ TIGHT = SupervisorParameters(position_limit=0.01)
 """A limit that a drive among twelve reflectors passes now and then, so that the output is withheld."""
 
 
-def setup_of(seed: int = 3, **groups: object) -> LocalizerSetup:
-    scanner = Scanner(mounting=np.array([0.3, 0.1, 0.2]))
+def setup_of(seed: int = 3, count: int = 2, **groups: object) -> LocalizerSetup:
+    front = Scanner(mounting=np.array([0.3, 0.1, 0.2]))
+    scanners = (front, Scanner(name="rear", mounting=np.array([-0.4, -0.2, 2.8])))[:count]
     parameters = Parameters(**{"supervisor": TIGHT, **groups})  # type: ignore[arg-type]
-    return LocalizerSetup(random_map(np.random.default_rng(seed), 12), (scanner,), parameters)
+    return LocalizerSetup(random_map(np.random.default_rng(seed), 12), scanners, parameters)
 
 
 SETUPS = {
@@ -132,7 +133,7 @@ def test_split_at_any_record_the_rest_goes_on_as_if_nothing_had_happened(drive: 
     cycles = sum(len(before.feed(record)) for record in records[:position])
     whole = run(drive.log, setup, drive.initial)
     to_come = [*before.waiting, *records[position:]]
-    rest = run(RecordLog.collect(to_come), setup, before.state)
+    rest = run(RecordLog.collect(to_come, drive.scanners), setup, before.state)
     assert_same(rest, whole, after=cycles)
     live = Localizer(setup, before.state)
     for record in to_come:

@@ -7,6 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
+from commission.errors import UsageError
 from commission.localization.detection_log import extract_detections
 from commission.localization.estimate import Belief, Estimate, Mode, Status
 from commission.localization.localizer import Localizer
@@ -29,9 +30,12 @@ PLANS = {
 }
 
 
-def setup_of(rng: np.random.Generator, parameters: Parameters | None = None) -> LocalizerSetup:
-    scanner = Scanner(mounting=np.array([0.3, 0.1, 0.2]))
-    return LocalizerSetup(random_map(rng, 12), (scanner,), parameters or Parameters())
+def setup_of(rng: np.random.Generator, parameters: Parameters | None = None, scanners: int = 1) -> LocalizerSetup:
+    both = (
+        Scanner(mounting=np.array([0.3, 0.1, 0.2])),
+        Scanner(name="rear", mounting=np.array([-0.4, -0.2, 2.8]), resolution_deg=0.25, beam_width_deg=0.1),
+    )
+    return LocalizerSetup(random_map(rng, 12), both[:scanners], parameters or Parameters())
 
 
 def bits(value: object) -> bytes | list[bytes]:
@@ -47,10 +51,12 @@ def assert_same_estimate(a: Estimate, b: Estimate) -> None:
 
 
 @pytest.mark.parametrize("plan", PLANS.values(), ids=PLANS.keys())
-@pytest.mark.parametrize("filtered", [True, False], ids=["filtered", "unfiltered"])
-def test_whole_run_equals_live_localizer_to_the_last_bit(plan: Plan, filtered: bool) -> None:
+@pytest.mark.parametrize(
+    ("filtered", "scanners"), [(True, 1), (False, 1), (True, 2)], ids=["filtered", "unfiltered", "two scanners"]
+)
+def test_whole_run_equals_live_localizer_to_the_last_bit(plan: Plan, filtered: bool, scanners: int) -> None:
     rng = np.random.default_rng(3)
-    setup = setup_of(rng, Parameters(association=AssociationParameters(enabled=filtered)))
+    setup = setup_of(rng, Parameters(association=AssociationParameters(enabled=filtered)), scanners)
     drive = random_drive(setup, rng, plan)
     arrays = run(drive.log, setup, drive.initial)
     localizer = Localizer(setup, drive.initial)
@@ -91,9 +97,49 @@ def test_moved_gate_replays_the_filter_over_kept_detections() -> None:
     assert kept.counts(Status.INLIER).sum() < before.counts(Status.INLIER).sum()
 
 
+def test_scans_of_two_scanners_are_localized_with_their_own_mounting() -> None:
+    rng = np.random.default_rng(3)
+    setup = setup_of(rng, scanners=2)
+    drive = random_drive(setup, rng, Plan(scans=60, beams=1440, clutter=0.0))
+    columns = run(drive.log, setup, drive.initial)
+    assert columns.detected.scanners.tolist() == [0, 1] * 30
+    judged = columns.counts(Status.INLIER) + columns.counts(Status.OUTLIER_ASSOCIATION)
+    assert columns.counts(Status.INLIER).sum() > 0.9 * judged.sum()
+    swapped = dataclasses.replace(
+        setup,
+        scanners=tuple(
+            dataclasses.replace(scanner, mounting=other.mounting)
+            for scanner, other in zip(setup.scanners, reversed(setup.scanners), strict=True)
+        ),
+    )
+    wrong = run(drive.log, swapped, drive.initial)
+    assert wrong.counts(Status.INLIER).sum() < 0.3 * judged.sum()
+
+
+def test_the_order_of_scanners_in_log_and_setup_does_not_matter() -> None:
+    rng = np.random.default_rng(3)
+    setup = setup_of(rng, scanners=2)
+    drive = random_drive(setup, rng, Plan(scans=20, beams=720))
+    turned = dataclasses.replace(setup, scanners=tuple(reversed(setup.scanners)))
+    one, other = (run(drive.log, each, drive.initial) for each in (setup, turned))
+    assert bits(one.means) == bits(other.means)
+    assert one.detected.scanners.tolist() == [1 - index for index in other.detected.scanners.tolist()]
+
+
+def test_a_scanner_that_the_setup_does_not_have_is_refused_by_name() -> None:
+    rng = np.random.default_rng(3)
+    setup = setup_of(rng, scanners=2)
+    drive = random_drive(setup, rng, Plan(scans=4))
+    other = dataclasses.replace(
+        setup, scanners=(setup.scanners[0], dataclasses.replace(setup.scanners[1], name="left"))
+    )
+    with pytest.raises(UsageError, match="scanner 'rear' is none of the project's; expected scanner, left"):
+        run(drive.log, other, drive.initial)
+
+
 def test_extraction_on_all_cores_gives_the_same_detections() -> None:
     rng = np.random.default_rng(5)
-    setup = setup_of(rng)
+    setup = setup_of(rng, scanners=2)
     log = random_drive(setup, rng, Plan(scans=30, beams=1440, clutter=3.0)).log
     serial, parallel = extract_detections(log, setup), extract_detections(log, setup, parallel=True)
     for field in dataclasses.fields(serial):

@@ -37,7 +37,7 @@ def simulated(distance: float, scanner: Scanner, radius: float) -> np.ndarray:
             intensities=None,
             reflector=flags,
         )
-        seen = detect(scan, setup.detector, setup.parameters.detector)
+        seen = detect(scan, setup.detectors[0], setup.parameters.detector)
         found += [(r - distance, b + heading) for r, b in seen.range_bearing[seen.status == Status.INLIER]]
     return np.array(found)
 

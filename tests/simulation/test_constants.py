@@ -66,8 +66,8 @@ def same(one: RecordLog, other: RecordLog) -> bool:
         and np.array_equal(one.stamps_ns, other.stamps_ns)
         and np.array_equal(one.displacements, other.displacements)
         and np.array_equal(one.reference_poses, other.reference_poses)
-        and np.array_equal(one.scans.ranges, other.scans.ranges, equal_nan=True)
-        and np.array_equal(one.scans.reflector, other.scans.reflector)
+        and np.array_equal(one.scans[0].ranges, other.scans[0].ranges, equal_nan=True)
+        and np.array_equal(one.scans[0].reflector, other.scans[0].reflector)
     )
 
 
@@ -112,7 +112,7 @@ def test_each_noise_of_the_true_wheels_changes_the_reported_motion_alone(name: s
     one, changed = (virtual_drive(each, ROUTE, 3, options=QUICK) for each in (site, other))
     assert not np.array_equal(one.displacements, changed.displacements)
     assert np.array_equal(one.reference_poses, changed.reference_poses)
-    assert np.array_equal(one.scans.ranges, changed.scans.ranges, equal_nan=True)
+    assert np.array_equal(one.scans[0].ranges, changed.scans[0].ranges, equal_nan=True)
     assert changed.truth.wheels.noise == wheels
 
 
@@ -142,8 +142,8 @@ def test_turning_a_constant_on_changes_neither_the_others_nor_the_noise_of_the_d
     assert np.array_equal(before.reference_poses, after.reference_poses)
     is_wheel = "scale" in name
     assert np.array_equal(before.displacements, after.displacements) is not is_wheel
-    seen = before.scans.ranges.shape == after.scans.ranges.shape and np.array_equal(
-        before.scans.ranges, after.scans.ranges, equal_nan=True
+    seen = before.scans[0].ranges.shape == after.scans[0].ranges.shape and np.array_equal(
+        before.scans[0].ranges, after.scans[0].ranges, equal_nan=True
     )
     # A clock that is late stamps the same scans; one that is early loses the first.
     assert seen is (is_wheel or (name == "clock_offset_sigma" and after.truth.scanners[0].clock_offset >= 0.0))
@@ -172,7 +172,7 @@ def test_a_scanner_turned_by_a_degree_sees_everything_a_degree_to_the_right() ->
     still = DriveOptions(start_sigma=(0.0, 0.0, 0.0))
     site = hall(scanner=replace(QUIET, resolution_deg=0.5, beam_width_deg=0.0))
     turned = with_errors(site, scanners=(ScannerError(scanner="scanner", mounting=(0.0, 0.0, math.radians(1.0))),))
-    one, other = (virtual_drive(each, ROUTE, 1, options=still).scans for each in (site, turned))
+    one, other = (virtual_drive(each, ROUTE, 1, options=still).scans[0] for each in (site, turned))
     # One degree is two beams: what beam i met is met by beam i - 2. Reflectors are flagged by the same geometry.
     assert np.array_equal(one.reflector[:10, 2:], other.reflector[:10, :-2])
     assert one.ranges[:10, 2:] == pytest.approx(other.ranges[:10, :-2], abs=1e-5, nan_ok=True)
@@ -187,7 +187,7 @@ def test_an_error_of_a_scanner_of_another_name_does_nothing() -> None:
 def test_a_range_bias_is_added_to_each_range() -> None:
     site = hall(scanner=Scanner(resolution_deg=1.0))
     biased = with_errors(site, scanners=(ScannerError(scanner="scanner", range_bias=0.25),))
-    one, other = (virtual_drive(each, ROUTE, 3).scans for each in (site, biased))
+    one, other = (virtual_drive(each, ROUTE, 3).scans[0] for each in (site, biased))
     # Ranges are float32.
     np.testing.assert_allclose(other.ranges, one.ranges + 0.25, atol=1e-6)
 
@@ -198,8 +198,8 @@ def test_a_clock_that_is_off_stamps_the_same_scans_at_other_times(late_ns: int) 
     off = with_errors(site, scanners=(ScannerError(scanner="scanner", clock_offset=late_ns * 1e-9),))
     one, other = (virtual_drive(each, ROUTE, 3) for each in (site, off))
     lost = 1 if late_ns < 0 else 0
-    assert np.array_equal(other.scans.stamps_ns, one.scans.stamps_ns[lost:] + late_ns)
-    assert np.array_equal(other.scans.ranges, one.scans.ranges[lost:])
+    assert np.array_equal(other.scans[0].stamps_ns, one.scans[0].stamps_ns[lost:] + late_ns)
+    assert np.array_equal(other.scans[0].ranges, one.scans[0].ranges[lost:])
     assert np.array_equal(other.reference_stamps_ns, one.reference_stamps_ns)
     assert (np.diff(other.stamps_ns) >= 0).all()
     assert other.stamps_ns[0] == 0

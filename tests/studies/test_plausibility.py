@@ -27,7 +27,7 @@ def with_scans(**scans: object) -> RecordLog:
     log = drive(20.0)
     return dataclasses.replace(
         log,
-        scans=scan_log(**scans),
+        scans=(scan_log(**scans),),
         detection_stamps_ns=log.detection_stamps_ns[:0],
         detection_offsets=np.zeros(1, np.int64),
         range_bearing=np.empty((0, 2)),

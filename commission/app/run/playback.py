@@ -17,6 +17,7 @@ from commission.localization.estimate import Belief, Estimate, Mode, Status
 from commission.localization.observation import project_detections, range_bearing
 from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
+from commission.site.records import Scan
 from commission.studies.run import RunResult
 
 GATE_POINTS = 40
@@ -120,17 +121,23 @@ class Playback:
         return Accumulated(self._inliers.before(rows), self._outliers.before(rows))
 
     def _scan_points(self, belief: Belief, setup: LocalizerSetup) -> FloatArray:
-        """(B, 2) end points of the newest scan's beams [m], map frame."""
-        scans = self._result.inputs.log.scans
-        newest = -1 if scans is None else int(np.searchsorted(scans.stamps_ns, self._at_ns, side="right")) - 1
-        if scans is None or newest < 0:
-            return np.empty((0, 2))
-        scan = scans.scan(newest)
-        hit = np.isfinite(scan.ranges)
-        ranges, bearings = scan.ranges[hit].astype(np.float64), scan.bearings[hit]
-        points_scanner = ranges[:, np.newaxis] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
-        T_map_scanner = se2.compose(belief.mean, setup.scanners[0].mounting)
-        return se2.transform_points(T_map_scanner, points_scanner)
+        """(B, 2) end points of the beams of each scanner's newest scan [m], map frame."""
+        log = self._result.inputs.log
+        indices = setup.indices_of(log.scanners)
+        points = [np.empty((0, 2))]
+        for scans in log.scans:
+            newest = int(np.searchsorted(scans.stamps_ns, self._at_ns, side="right")) - 1
+            if newest >= 0:
+                T_map_scanner = se2.compose(belief.mean, setup.scanners[int(indices[scans.scanner])].mounting)
+                points.append(se2.transform_points(T_map_scanner, _end_points(scans.scan(newest))))
+        return np.concatenate(points)
+
+
+def _end_points(scan: Scan) -> FloatArray:
+    """(B, 2) end points of the beams of a scan that came back [m], scanner frame."""
+    hit = np.isfinite(scan.ranges)
+    ranges, bearings = scan.ranges[hit].astype(np.float64), scan.bearings[hit]
+    return ranges[:, np.newaxis] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
 
 
 class _Cloud:
@@ -159,18 +166,22 @@ def _points_of(columns: RunColumns, rows: IntArray) -> FloatArray:
         here = slice(*np.searchsorted(cycles, (segment.first, end)).tolist())
         alone = np.arange(len(rows[here]) + 1, dtype=np.int64)
         points[here] = project_detections(
-            columns.means[cycles[here]], alone, columns.range_bearing[rows[here]], segment.setup.filter.observation
+            columns.means[cycles[here]],
+            alone,
+            columns.range_bearing[rows[here]],
+            segment.setup.observation_rows,
+            scanners=columns.detected.scanners[cycles[here]],
         )
     return points
 
 
 def _gates(estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
-    """(R, n, 2) validation areas of the reflectors that the scanner could see if nothing stood in between."""
+    """(R, n, 2) validation areas of the reflectors that the scan's scanner could see if nothing stood in between."""
     if estimate is None or not len(setup.reflectors):
         return np.empty((0, GATE_POINTS, 2))
-    scanner = setup.scanners[0]
+    scanner = setup.scanners[estimate.scanner]
     seen = range_bearing(estimate.prior.mean, scanner.mounting, setup.reflectors.centers)
     first, last = (math.radians(limit) for limit in scanner.field_of_view_deg)
     inside = np.mod(seen[:, 1] - first, 2.0 * math.pi) <= last - first
     in_view = inside & (seen[:, 0] <= min(scanner.reflector_range, scanner.range[1]))
-    return setup.validation_outlines(estimate.prior, GATE_POINTS)[in_view]
+    return setup.validation_outlines(estimate.prior, GATE_POINTS, scanner=estimate.scanner)[in_view]

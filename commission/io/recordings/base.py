@@ -22,6 +22,11 @@ class Recording(Protocol):
         """Where it is."""
         ...
 
+    @property
+    def scanners(self) -> tuple[str, ...]:
+        """Names of the scanners; records have indices into them."""
+        ...
+
     def records(self) -> Iterator[Record]:
         """Deliver every record in order of stamps, in memory that does not grow with the recording's length.
 

@@ -6,7 +6,7 @@ import math
 import os
 import shutil
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any
@@ -20,18 +20,28 @@ from commission.io.atomic import cannot_write, staged
 from commission.io.recordings.csv_folder import (
     DETECTION_COLUMNS,
     DETECTIONS,
+    NAMED_SCANS,
     ODOMETRY,
     ODOMETRY_COLUMNS,
     REFERENCE,
     REFERENCE_COLUMNS,
+    SCANNER_COLUMN,
     SCANS,
+    scans_file,
 )
 from commission.io.recordings.truth_file import TRUTH, write_truth
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+from commission.site.scanner import ONLY_NAME
 from commission.site.truth import Truth
 
 
-def write_recording(folder: Path, records: Iterable[Record], truth: Truth | None = None) -> None:
+def write_recording(
+    folder: Path,
+    records: Iterable[Record],
+    truth: Truth | None = None,
+    *,
+    scanners: tuple[str, ...] = (ONLY_NAME,),
+) -> None:
     """Write a recording as a CSV folder.
 
     Parameters
@@ -39,6 +49,7 @@ def write_recording(folder: Path, records: Iterable[Record], truth: Truth | None
     folder : made when missing; the recording in it is replaced once the new one is complete.
     records : in the order of their stamps; a source's error passes through and leaves the folder as it was.
     truth : the constants of a virtual drive, for its `truth.json`.
+    scanners : names of the scanners that records have indices of; of a single one the files do not say the name.
 
     Raises
     ------
@@ -47,21 +58,21 @@ def write_recording(folder: Path, records: Iterable[Record], truth: Truth | None
     """
     try:
         with staged(folder, last=ODOMETRY) as scratch:
-            names = _write_all(scratch, records, folder)
+            names = _write_all(scratch, records, folder, scanners)
             if truth is not None:
                 write_truth(scratch / TRUTH, truth)
                 names.add(TRUTH)
             for path in scratch.iterdir():
                 if path.name not in names:
                     path.unlink()
-        for name in (DETECTIONS, SCANS, REFERENCE, TRUTH):
+        for name in (DETECTIONS, SCANS, REFERENCE, TRUTH, *(path.name for path in folder.glob(NAMED_SCANS))):
             if name not in names:
                 (folder / name).unlink(missing_ok=True)
     except OSError as error:
         raise cannot_write(folder, error) from error
 
 
-def _write_all(scratch: Path, records: Iterable[Record], folder: Path) -> set[str]:
+def _write_all(scratch: Path, records: Iterable[Record], folder: Path, scanners: tuple[str, ...]) -> set[str]:
     """Write all files into a scratch folder; returns the names of those that hold something."""
     with ExitStack() as stack:
         tables = {
@@ -70,32 +81,36 @@ def _write_all(scratch: Path, records: Iterable[Record], folder: Path) -> set[st
         }
         for kind, columns in (
             (Odometry, ODOMETRY_COLUMNS),
-            (Detections, DETECTION_COLUMNS),
+            (Detections, DETECTION_COLUMNS if len(scanners) == 1 else (*DETECTION_COLUMNS, SCANNER_COLUMN)),
             (ReferencePose, REFERENCE_COLUMNS),
         ):
             tables[kind].write(",".join(columns) + "\n")
-        scans = _ScanWriter(scratch, folder, stack)
+        files = [scans_file(scanners, index) for index in range(len(scanners))]
+        writers = [_ScanWriter(scratch, folder / file, stack) for file in files]
+        cells = [""] if len(scanners) == 1 else [f",{name}" for name in scanners]
         names = {ODOMETRY}
         for record in records:
             if isinstance(record, Scan):
-                scans.add(record)
-                names.add(SCANS)
+                writers[record.scanner].add(record)
+                names.add(files[record.scanner])
             else:
-                tables[type(record)].write(_rows(record))
+                tables[type(record)].write(_rows(record, cells))
                 names.add({Odometry: ODOMETRY, Detections: DETECTIONS, ReferencePose: REFERENCE}[type(record)])
         for table in tables.values():
             table.flush()
             os.fsync(table.fileno())
-        scans.finish()
+        for writer in writers:
+            writer.finish()
     return names
 
 
-def _rows(record: Odometry | Detections | ReferencePose) -> str:
-    """Lines of a record; `repr` of a number reads back as the same number."""
+def _rows(record: Odometry | Detections | ReferencePose, scanners: Sequence[str]) -> str:
+    """Lines of a record, detections with the cell of their scanner; `repr` of a number reads back as the same."""
     if isinstance(record, Detections):
+        end = f"{scanners[record.scanner]}\n"
         if len(record.range_bearing) == 0:
-            return f"{record.stamp_ns},,\n"
-        return "".join(f"{record.stamp_ns},{r!r},{b!r}\n" for r, b in record.range_bearing.tolist())
+            return f"{record.stamp_ns},,{end}"
+        return "".join(f"{record.stamp_ns},{r!r},{b!r}{end}" for r, b in record.range_bearing.tolist())
     values = record.displacement if isinstance(record, Odometry) else record.pose
     return ",".join([str(record.stamp_ns), *("" if math.isnan(v) else repr(v) for v in values.tolist())]) + "\n"
 
@@ -103,9 +118,9 @@ def _rows(record: Odometry | Detections | ReferencePose) -> str:
 class _ScanWriter:
     """Collect the rows of each array in a plain file; pack them when their number, which comes first, is known."""
 
-    def __init__(self, scratch: Path, folder: Path, stack: ExitStack) -> None:
+    def __init__(self, scratch: Path, target: Path, stack: ExitStack) -> None:
         self.scratch = scratch
-        self.folder = folder
+        self.target = target
         self.stack = stack
         self.files: dict[str, IO[bytes]] = {}
         self.first: Scan | None = None
@@ -123,7 +138,9 @@ class _ScanWriter:
         if self.first is None:
             self.first = scan
             for name in present:
-                self.files[name] = self.stack.enter_context((self.scratch / f"{name}.raw").open("w+b"))
+                self.files[name] = self.stack.enter_context(
+                    (self.scratch / f"{self.target.stem}.{name}.raw").open("w+b")
+                )
         self._check(scan, present)
         for name, row in present.items():
             self.files[name].write(row.tobytes())
@@ -140,7 +157,7 @@ class _ScanWriter:
         )
         if not same:
             found = f"scan {self.count + 1} has other beams or arrays than the first"
-            raise FileFormatError(self.folder / SCANS, "", found, "one scanner per recording")
+            raise FileFormatError(self.target, "", found, "the same beams in all scans of one scanner")
 
     def finish(self) -> None:
         """Pack what was added into `scans.npz`."""
@@ -148,7 +165,7 @@ class _ScanWriter:
             return
         shapes = {name: (self.count, len(self.first.ranges)) for name in self.files} | {"stamp_ns": (self.count,)}
         types = {"stamp_ns": "<i8", "ranges": "<f4", "intensities": "<f4", "reflector": "|b1"}
-        with (self.scratch / SCANS).open("wb") as target:
+        with (self.scratch / self.target.name).open("wb") as target:
             with zipfile.ZipFile(target, "w", allowZip64=True) as archive:
                 for name, value in (
                     ("angle_min", self.first.angle_min),

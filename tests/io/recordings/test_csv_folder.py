@@ -52,6 +52,8 @@ def equal(first: object, second: object) -> bool:
     if isinstance(first, np.ndarray) and isinstance(second, np.ndarray):
         same_bits = np.array_equal(first, second, equal_nan=first.dtype.kind == "f")
         return first.dtype == second.dtype and same_bits
+    if isinstance(first, tuple) and isinstance(second, tuple):
+        return len(first) == len(second) and all(map(equal, first, second))
     return first == second
 
 
@@ -250,13 +252,13 @@ def test_the_first_and_the_last_stamp_that_is_taken_keep_their_order(tmp_path: P
     (folder / "odometry.csv").write_text(f"stamp_ns,dx,dy,dtheta\n{first},0,0,0\n{last},0,0,0\n")
     log = load_log(folder)
     assert log.odometry_stamps_ns.tolist() == [first, last]
-    assert log.scans is not None
-    assert log.scans.stamps_ns.tolist() == [first, last]
+    (scans,) = log.scans
+    assert scans.stamps_ns.tolist() == [first, last]
     assert np.diff(log.odometry_stamps_ns).tolist() == [last - first]
 
 
 def test_infinite_range_means_that_nothing_came_back(tmp_path: Path) -> None:
-    scans = load_log(write_scans(tmp_path, ranges=np.full((2, 3), np.inf, dtype=np.float64))).scans
+    scans = load_log(write_scans(tmp_path, ranges=np.full((2, 3), np.inf, dtype=np.float64))).scans[0]
     assert scans is not None
     assert scans.ranges.dtype == np.float32
     assert np.isnan(scans.ranges).all()
@@ -342,3 +344,84 @@ def test_damaged_recording_is_one_line_or_records(
             read(folder)
         except CommissionError as error:
             assert "\n" not in str(error)
+
+
+BOTH = ("front left", "rear right")
+
+
+def of_two(count: int) -> Iterator[Record]:
+    """Scans and detections of two scanners with different beams; at every third stamp both have detected."""
+    for k in range(count):
+        stamp = 10 * k
+        yield Odometry(stamp, np.array([0.01, 0.0, 0.001]))
+        for scanner in (0, 1) if k % 3 == 0 else (k % 2,):
+            yield Detections(stamp, np.array([[1.0 + k, 0.1 * scanner]] * (k % 4)).reshape(-1, 2), scanner)
+        for scanner in (0, 1):
+            beams = 5 + scanner
+            yield Scan(
+                stamp_ns=stamp,
+                ranges=np.full(beams, 1.0 + k, dtype=np.float32),
+                angle_min=-1.0 - scanner,
+                angle_increment=0.01,
+                reflector=np.zeros(beams, dtype=np.bool_),
+                scanner=scanner,
+            )
+
+
+def test_recording_of_two_scanners_names_them_and_reads_back_to_the_bit(tmp_path: Path) -> None:
+    records = list(of_two(40))
+    write_recording(tmp_path / "drive", records, scanners=BOTH)
+    names = sorted(path.name for path in (tmp_path / "drive").iterdir())
+    assert names == ["detections.csv", "odometry.csv", "scans_front left.npz", "scans_rear right.npz"]
+    recording = open_recording(tmp_path / "drive")
+    assert recording.scanners == BOTH
+    read = list(recording.records())
+    assert len(read) == len(records)
+    assert all(equal(a, b) for a, b in zip(records, read, strict=True))
+    assert equal(recording.load(), RecordLog.collect(records, BOTH))
+
+
+def test_recording_of_one_scanner_replaces_that_of_two(tmp_path: Path) -> None:
+    write_recording(tmp_path, of_two(3), scanners=BOTH)
+    write_recording(tmp_path, drive(3))
+    assert [path.name for path in sorted(tmp_path.glob("scans*"))] == ["scans.npz"]
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ("0,1,0,a\n0,2,0,b\n0,3,0,a\n", "line 4, column scanner: is a again after rows of another scanner"),
+        ("0,1,0,a\n0,,,a\n", "an empty row and another row have one stamp"),
+        ("0,1,0,\n", "line 2, column scanner: is ''"),
+        ("0,1,0,a/b\n", "line 2, column scanner: is 'a/b'; expected the name of a scanner"),
+    ],
+)
+def test_rows_of_scanners_that_cannot_be_are_refused(tmp_path: Path, rows: str, message: str) -> None:
+    write(tmp_path, detections=f"stamp_ns,range,bearing,scanner\n{rows}")
+    for read in (load_log, lambda path: list(open_recording(path).records())):
+        with pytest.raises(FileFormatError) as refused:
+            read(tmp_path)
+        assert message in str(refused.value)
+
+
+def test_an_empty_row_of_one_scanner_may_stand_beside_rows_of_another(tmp_path: Path) -> None:
+    write(tmp_path, detections="stamp_ns,range,bearing,scanner\n0,,,b\n0,2,0,a\n5,1,0,b\n")
+    log = load_log(tmp_path)
+    assert (log.scanners, log.detection_scanners.tolist()) == (("b", "a"), [0, 1, 0])
+    assert log.detection_offsets.tolist() == [0, 0, 1, 2]
+
+
+def test_scans_without_a_name_beside_detections_of_two_scanners_are_refused(tmp_path: Path) -> None:
+    write_scans(tmp_path)
+    write(tmp_path, detections="stamp_ns,range,bearing,scanner\n0,1,0,a\n5,1,0,b\n")
+    with pytest.raises(FileFormatError, match=r"is of one scanner, detections\.csv of a, b"):
+        load_log(tmp_path)
+
+
+def test_scans_with_and_without_a_name_are_refused(tmp_path: Path) -> None:
+    write_scans(tmp_path)
+    (tmp_path / "scans.npz").rename(tmp_path / "scans_a.npz")
+    assert load_log(tmp_path).scanners == ("a",)
+    write_scans(tmp_path)
+    with pytest.raises(FileFormatError, match=r"is there besides scans_a\.npz"):
+        load_log(tmp_path)
