@@ -230,7 +230,8 @@ def _disturbances(document: YamlDocument, keys: ProjectDocument) -> Disturbances
     """What a virtual drive suffers; projects of old took the true noise of the wheels from the filter's parameters."""
     if "wheels" in document.value.get("disturbances", {}):
         return keys.disturbances
-    wheels = WheelNoise.believed(keys.parameters.odometry)
+    stated = document.value.get("parameters", {}).get("odometry", {})
+    wheels = WheelNoise.believed(keys.parameters.odometry, stated)
     return dataclasses.replace(keys.disturbances, wheels=wheels)
 
 

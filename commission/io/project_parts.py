@@ -117,7 +117,8 @@ def _apply(project: Project, values: dict[str, Any], path: Path) -> Project:
     if "disturbances" in values and "wheels" not in values["disturbances"]:
         # Written before the wheels had noise of their own.
         odometry = new["parameters"].odometry if "parameters" in new else None
-        wheels = project.disturbances.wheels if odometry is None else WheelNoise.believed(odometry)
+        stated = values.get("parameters", {}).get("odometry", {})
+        wheels = project.disturbances.wheels if odometry is None else WheelNoise.believed(odometry, stated)
         new["disturbances"] = dataclasses.replace(parts.disturbances, wheels=wheels)
     if "scanner" in values:
         new["scanners"] = (parts.scanner,)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import dataclass, field, fields
 from typing import Annotated
 
@@ -66,9 +67,16 @@ class WheelNoise:
     """True 1-sigma heading error after one second, even at rest."""
 
     @staticmethod
-    def believed(odometry: OdometryParameters) -> WheelNoise:
-        """Return the wheels that a filter believes in: those of projects that do not say how noisy theirs are."""
-        return WheelNoise(**{each.name: getattr(odometry, each.name) for each in fields(WheelNoise)})
+    def believed(odometry: OdometryParameters, stated: Container[str]) -> WheelNoise:
+        """Return the wheels that a filter believes in: those of projects that do not say how noisy theirs are.
+
+        Parameters
+        ----------
+        odometry : what the filter believes.
+        stated : names of what the project says of it; the defaults of a filter are no statement about wheels.
+        """
+        names = (each.name for each in fields(WheelNoise) if each.name in stated)
+        return WheelNoise(**{name: getattr(odometry, name) for name in names})
 
     def __post_init__(self) -> None:
         check_fields(self, "wheels.")

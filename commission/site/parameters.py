@@ -64,18 +64,18 @@ class ObservationParameters:
 class OdometryParameters:
     """Growth of the uncertainty while driving (Q of equation 1), independent of how finely odometry is sampled."""
 
-    forward_per_sqrt_m: Annotated[float, FORWARD_PER_SQRT_M] = 0.01
-    """1-sigma error along the motion after one metre driven."""
-    lateral_per_sqrt_m: Annotated[float, LATERAL_PER_SQRT_M] = 0.003
-    """1-sigma error across the motion after one metre driven."""
-    heading_per_sqrt_m: Annotated[float, HEADING_PER_SQRT_M] = 0.006
-    """1-sigma heading error after one metre driven."""
-    heading_per_sqrt_rad: Annotated[float, HEADING_PER_SQRT_RAD] = 0.01
-    """1-sigma heading error after turning one radian."""
+    forward_per_sqrt_m: Annotated[float, FORWARD_PER_SQRT_M] = 0.05
+    """1-sigma error along the motion after one metre driven: wheels of a slightly other diameter, slip, worn tires."""
+    lateral_per_sqrt_m: Annotated[float, LATERAL_PER_SQRT_M] = 0.03
+    """1-sigma error across the motion after one metre driven: wheels that are not quite parallel, slip in curves."""
+    heading_per_sqrt_m: Annotated[float, HEADING_PER_SQRT_M] = 0.02
+    """1-sigma heading error after one metre driven: wheels of unequal diameter, steering that is not quite straight."""
+    heading_per_sqrt_rad: Annotated[float, HEADING_PER_SQRT_RAD] = 0.02
+    """1-sigma heading error after turning one radian: a wheel separation or gyroscope slightly off."""
     forward_per_sqrt_s: Annotated[float, FORWARD_PER_SQRT_S] = 0.0005
-    """1-sigma error along the vehicle's axis after one second, even at rest."""
+    """1-sigma error along the vehicle's axis after one second, even at rest: the resolution of encoders, vibration."""
     heading_per_sqrt_s: Annotated[float, HEADING_PER_SQRT_S] = 0.0002
-    """1-sigma heading error after one second, even at rest."""
+    """1-sigma heading error after one second, even at rest: noise of a gyroscope, vibration."""
     acceleration: Annotated[
         float, Quantity(label="Acceleration", unit="m/s^2", bounds=NOT_NEGATIVE, step=0.05, slider=(0.0, 5.0))
     ] = 0.5

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -16,10 +16,11 @@ from commission.geometry.angles import wrap
 from commission.geometry.arrays import FloatArray, read_only
 from commission.localization import whole_run
 from commission.localization.detection_log import DetectionLog
-from commission.localization.estimate import Belief, Status
+from commission.localization.estimate import Belief, Mode, Status
 from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress, silent
+from commission.site.disturbances import WheelNoise
 from commission.site.record_log import RecordLog
 from commission.studies.inputs import StudyInput
 from commission.studies.plausibility import Finding
@@ -34,6 +35,8 @@ BETTER = 0.94
 """A suspicion must lower the misfit to this share of what it was."""
 SURE = 40.0
 """It must lower the sum of the squared Mahalanobis distances by this much: 6 sigma of one parameter (chi-square)."""
+LOST_FOR_S = 1.0
+"""Shortest time of being lost that is told: no shorter one stops a drive for long."""
 LOST_WINDOW_S = 5.0
 LOST_SHARE = 0.4
 """Accepted share over a window of 5 s below which the vehicle is probably lost [0..1]."""
@@ -110,7 +113,7 @@ def misfit(inputs: MisfitInput, progress: Progress = silent) -> tuple[Finding, .
     progress(0.3, "range bias")
     biases = tuple(_range_bias(inputs, detected, before))
     progress(0.5, "clock offset")
-    lags = tuple(_lag(inputs, detected, before))
+    lags = tuple(_lag(replace(inputs, setup=trusting(inputs.setup)), detected))
     progress(1.0, "")
     return (*lost, *biases, *lags)
 
@@ -128,12 +131,29 @@ def _lost(run: RunColumns) -> Iterator[Finding]:
     fits = np.flatnonzero((all_ == 0) | (good >= LOST_SHARE * all_))
     since = int(fits[-1]) + 1 if len(fits) else 0
     if since == len(run):
+        yield from _lost_and_found(run, times)
         return
     rejected = 1.0 - accepted[since:].sum() / max(1, judged[since:].sum())
     yield Finding(
         found=f"{100.0 * rejected:.0f} % of the detections are rejected from {times[since]:.1f} s on",
         probably="the vehicle is lost there, whatever its covariance says, or most of what it detects is no reflector",
         remedy="look at what happens just before, and at the other notes",
+    )
+
+
+def _lost_and_found(run: RunColumns, times: FloatArray) -> Iterator[Finding]:
+    """Say for how long the supervisor called the vehicle lost, where it was found again and it was no moment."""
+    lost = np.concatenate(([False], run.modes == Mode.LOST, [False]))
+    begins, ends = np.flatnonzero(lost[1:] & ~lost[:-1]), np.flatnonzero(~lost[1:] & lost[:-1]) - 1
+    lengths = times[ends] - times[begins]
+    if not len(lengths) or lengths.max() < LOST_FOR_S:
+        return
+    longest = int(np.argmax(lengths))
+    yield Finding(
+        found=f"the vehicle is lost for {lengths.sum():.1f} s in all, the longest time "
+        f"from {times[begins[longest]]:.1f} to {times[ends[longest]]:.1f} s",
+        probably="it takes one reflector for another there, or much of what it detects is no reflector",
+        remedy="look at what happens just before; odometry or detections may be noisier than the parameters say",
     )
 
 
@@ -174,7 +194,20 @@ def _range_bias(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> It
     )
 
 
-def _lag(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iterator[Finding]:
+def trusting(setup: LocalizerSetup) -> LocalizerSetup:
+    """Return the setup with odometry that is believed at least as much as that of a good vehicle.
+
+    A filter that gives way to every scan hides that scans and odometry are of different times.
+    """
+    own, good = setup.parameters.odometry, WheelNoise()
+    names = (each.name for each in fields(WheelNoise))
+    sharp = replace(own, **{name: min(getattr(own, name), getattr(good, name)) for name in names})
+    return replace(setup, parameters=replace(setup.parameters, odometry=sharp))
+
+
+def _lag(inputs: MisfitInput, detected: DetectionLog) -> Iterator[Finding]:
+    before = _fit(inputs, detected)
+
     def fit_of(lag: float) -> _Fit:
         return _fit(inputs, replace(detected, stamps_ns=read_only(detected.stamps_ns - round(lag * 1e9))))
 
