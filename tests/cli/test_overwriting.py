@@ -105,9 +105,10 @@ def test_a_recording_is_replaced_by_a_simulation_only_when_asked(refused, commis
     assert "expected another folder, or --force to overwrite" in said
     assert contents(recording) == before
     assert commission("simulate", project, "--out", recording, "--force")[0] == 0
-    assert sorted(contents(recording)) == ["odometry.csv", "reference.csv", "scans.npz"]
+    assert sorted(contents(recording)) == ["odometry.csv", "reference.csv", "scans.npz", "truth.json"]
     (recording / "odometry.csv").unlink()
     (recording / "reference.csv").unlink()
+    (recording / "truth.json").unlink()
     (recording / "scans.npz").rename(recording / "scans_left.npz")
     assert "scans_left.npz" in refused("simulate", project, "--out", recording)
 

@@ -18,6 +18,7 @@ from commission.site.parameters import AssociationParameters, Parameters, Superv
 from commission.site.record_log import RecordLog
 from commission.site.scanner import Scanner
 from tests.localization.drives import Plan, random_drive, random_map
+from tests.odometry_of import PRECISE
 
 PLANS = {
     "equal stamps": Plan(),
@@ -70,7 +71,7 @@ def test_whole_run_equals_live_localizer_to_the_last_bit(plan: Plan, filtered: b
 
 def test_withheld_output_of_a_whole_run_is_that_of_the_live_localizer() -> None:
     rng = np.random.default_rng(9)
-    setup = setup_of(rng, Parameters(supervisor=SupervisorParameters(position_limit=0.02)))
+    setup = setup_of(rng, Parameters(supervisor=SupervisorParameters(position_limit=0.02), odometry=PRECISE))
     drive = random_drive(setup, rng, Plan(scans=600, reach=6.0))
     arrays = run(drive.log, setup, drive.initial)
     localizer = Localizer(setup, drive.initial)

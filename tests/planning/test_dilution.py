@@ -254,7 +254,9 @@ def test_options_take_the_noise_of_the_localizer():
 
 
 def test_prior_of_odometry_matches_a_fine_random_walk():
-    parameters = OdometryParameters(heading_per_sqrt_m=0.02, forward_per_sqrt_m=0.001, heading_per_sqrt_s=0.0)
+    parameters = OdometryParameters(
+        heading_per_sqrt_m=0.02, forward_per_sqrt_m=0.001, lateral_per_sqrt_m=0.003, heading_per_sqrt_s=0.0
+    )
     position, heading = odometry_prior(parameters, 4.0, 1.0)
     rng = np.random.default_rng(0)
     turns = np.cumsum(rng.normal(0.0, 0.02 * math.sqrt(0.01), (20000, 400)), axis=1)

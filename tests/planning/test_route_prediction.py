@@ -83,7 +83,13 @@ def test_without_reflectors_the_uncertainty_only_grows_until_the_supervisor_stop
 
 
 def test_straight_odometry_grows_as_its_parameters_say():
-    odometry = OdometryParameters(forward_per_sqrt_s=0.0, heading_per_sqrt_s=0.0)
+    odometry = OdometryParameters(
+        forward_per_sqrt_m=0.01,
+        lateral_per_sqrt_m=0.003,
+        heading_per_sqrt_m=0.006,
+        forward_per_sqrt_s=0.0,
+        heading_per_sqrt_s=0.0,
+    )
     project = open_field((), parameters=Parameters(odometry=odometry))
     predicted = predict_route(plan_route(project, "Line", PredictionOptions(start_sigmas=(1e-6, 1e-6, 1e-6))))
     xx, yy, tt = np.diagonal(predicted.covariances[-1])

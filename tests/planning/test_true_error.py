@@ -17,6 +17,7 @@ from commission.simulation.scenario import start_of, virtual_drive
 from commission.site.parameters import AssociationParameters, ObservationParameters, Parameters
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.studies.metrics import pose_errors, reference_at
+from tests.odometry_of import PRECISE
 from tests.planning.driven import QUICK
 from tests.planning.sites import open_field
 
@@ -110,9 +111,8 @@ def test_errors_of_the_survey_stay_and_are_those_of_drives_among_displaced_refle
 def test_a_gate_that_rejects_more_leaves_larger_errors(gate: float):
     def sigmas(probability: float) -> np.ndarray:
         association = AssociationParameters(gate_probability=probability)
-        planned = plan_route(
-            open_field(LINE, parameters=Parameters(observation=FITTING, association=association)), "Line"
-        )
+        parameters = Parameters(observation=FITTING, association=association, odometry=PRECISE)
+        planned = plan_route(open_field(LINE, parameters=parameters), "Line")
         return predict_errors(planned, predict_route(planned)).sigmas[50:].mean(axis=0)
 
     assert np.all(sigmas(gate) > 0.95 * sigmas(0.9999))

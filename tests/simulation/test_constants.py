@@ -30,6 +30,7 @@ from commission.site.scanner import Scanner
 from commission.site.truth import TrueWheels, truth_told
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle
 from commission.studies.metrics import pose_errors, reference_at
+from tests.odometry_of import PRECISE
 from tests.simulation.halls import QUIET, hall
 
 ROUTE = "Out and back"
@@ -235,9 +236,7 @@ def test_wheels_as_the_vehicle_says_report_the_motion_to_the_last_bit() -> None:
 
 def anees(project: Project, *, believed: float = 1.0, true: float = 1.0) -> float:
     """Average NEES per degree of freedom over drives, wheels and what the filter thinks of them times a factor."""
-    odometry = OdometryParameters(
-        **{f.name: believed * getattr(OdometryParameters(), f.name) for f in fields(WheelNoise)}
-    )
+    odometry = OdometryParameters(**{f.name: believed * getattr(PRECISE, f.name) for f in fields(WheelNoise)})
     wheels = WheelNoise(**{f.name: true * getattr(WheelNoise(), f.name) for f in fields(WheelNoise)})
     site = replace(project, disturbances=Disturbances(wheels=wheels))
     setup = LocalizerSetup.of(replace(site, parameters=replace(site.parameters, odometry=odometry)))
