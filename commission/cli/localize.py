@@ -52,6 +52,7 @@ class Localize:
         from commission.studies.plausibility import PlausibilityInput, plausibility
         from commission.studies.run import RunInput, judged_run, summary
         from commission.studies.run_findings import run_findings
+        from commission.studies.scanner_figures import figures_entries
         from commission.studies.start import start_of
 
         names, sources = (ESTIMATES, DETECTIONS, SUMMARY), (self.recording, self.project)
@@ -68,8 +69,9 @@ class Localize:
         result = judged_run(RunInput.of(project, log, start))
         findings = [str(finding) for finding in run_findings(result)]
 
+        more = {"scanners": figures_entries(result.scanners), "findings": findings}
         with out.writing() as folder:
-            write_results(folder, result.columns, summary(result) | {"findings": findings})
+            write_results(folder, result.columns, summary(result) | more)
         true = [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
         notes = [f"Note         {finding}" for finding in findings]
         sys.stdout.write("\n".join([*_report(result), *true, *notes, f"Written to   {self.out}"]) + "\n")
@@ -92,6 +94,7 @@ def _report(result: RunResult) -> list[str]:
         f"{result.nis_before_gate_mean:.2f} of all near a reflector; {100.0 * result.rejected_fraction:.1f} % rejected",
         f"Unseen       {100.0 * result.unseen_fraction:.1f} % of the cycles without an accepted detection, "
         f"{result.longest_unseen:.1f} s at most",
+        *_by_scanner(result),
         f"Supervisor   operational {100.0 * result.operational_fraction:.1f} %, lost "
         f"{100.0 * result.lost_fraction:.1f} %; fail episodes: {len(result.episodes)}" + "".join(_longest(result)),
     ]
@@ -108,6 +111,15 @@ def _report(result: RunResult) -> list[str]:
         f"Danger       {errors.wrong_while_operational} of {errors.compared} cycles operational with an error "
         f"beyond {limit * 1e3:.0f} mm",
     ]
+
+
+def _by_scanner(result: RunResult) -> list[str]:
+    """A line for each scanner of a vehicle with several."""
+    from commission.studies.scanner_figures import told
+
+    if len(result.scanners) == 1:
+        return []
+    return [f"Scanner      {each.name}: {told(each)}" for each in result.scanners]
 
 
 def _longest(result: RunResult) -> list[str]:

@@ -30,7 +30,7 @@ UPPER_TRIANGLE = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 ROWS_AT_ONCE = 50_000
 
 
-def write_results(folder: Path, run: RunColumns, summary: Mapping[str, int | float | list[str] | None]) -> None:
+def write_results(folder: Path, run: RunColumns, summary: Mapping[str, Any]) -> None:
     """Write `estimates.csv`, `detections.csv` and `summary.json`; each is replaced whole or not at all.
 
     Parameters

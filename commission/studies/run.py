@@ -33,6 +33,7 @@ from commission.studies.metrics import (
     pose_errors,
     reference_at,
 )
+from commission.studies.scanner_figures import ScannerFigures, scanner_figures
 from commission.studies.start import Start
 
 Number = int | float | None
@@ -127,6 +128,8 @@ class RunResult:
     """Errors in numbers; None without a reference."""
     episodes: tuple[FailEpisode, ...]
     """Stretches in fail mode."""
+    scanners: tuple[ScannerFigures, ...]
+    """What each scanner contributed."""
     microseconds_per_cycle: float
     """Time that the localizer took per cycle, detection in scans included where it was done [us]."""
 
@@ -266,6 +269,7 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
         nis=read_only(largest_nis(columns)),
         statistics=statistics,
         episodes=fail_episodes(columns.stamps_ns, columns.modes),
+        scanners=scanner_figures(columns, references),
         microseconds_per_cycle=microseconds_per_cycle,
     )
 

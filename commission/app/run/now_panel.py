@@ -13,6 +13,7 @@ from commission.app.editing.editor import editor_of
 from commission.app.run.view import RunView
 from commission.localization.estimate import Mode, Status
 from commission.site.truth import truth_told
+from commission.studies.scanner_figures import told
 
 MODES = {
     Mode.OPERATIONAL: "operational",
@@ -53,6 +54,8 @@ def rows(run: RunView) -> list[tuple[str, str]]:
         ("Cycle time", f"{result.microseconds_per_cycle:.1f} µs, mean of the drive"),
         ("Position error", f"{error * 1000:.1f} mm" if math.isfinite(error) else "no reference"),
     ]
+    if len(result.scanners) > 1:
+        shown += [(f"Scanner {each.name}, drive", told(each)) for each in result.scanners]
     truth = result.inputs.log.truth
     return shown if truth is None else [*shown, *((f"True {what}", text) for what, text in truth_told(truth))]
 
