@@ -37,7 +37,6 @@ from commission.app.run.actions import RecordedDrive, Source, VirtualDrive
 from commission.app.run.state import RunState
 from commission.app.runtime import BrowserCame, BrowserLeft, Runtime
 from commission.app.tune import feature as tune
-from commission.app.world import feature as world
 from commission.io.findings import Findings
 from commission.io.project_file import OpenedProject, load_project, open_project
 from commission.site.project import Project
@@ -58,7 +57,6 @@ FEATURES = (
     placement.FEATURE,
     run.FEATURE,
     tune.FEATURE,
-    world.FEATURE,
 )
 """What there is on the page: a new feature is a folder and a line here."""
 

@@ -23,7 +23,7 @@ ORDER: Order = (
     ("launch",),
     ("page", "runtime"),
     (
-        *("run", "tune", "world", "floor_map", "exchange", "project", "problems"),
+        *("run", "tune", "floor_map", "exchange", "project", "problems"),
         *("coverage", "prediction", "failures", "ambiguity", "placement"),
     ),
     ("editing",),

@@ -110,3 +110,13 @@ class Cover(Action):
 
     covered: bool
     """Whether no reflector can be seen."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetDisturbance(Action):
+    """Change one number of what a virtual drive suffers."""
+
+    name: str
+    """Its dotted name in the disturbances: `wheels.forward_per_sqrt_m`, `constants.mounting_sigma[2]`."""
+    value: object
+    """New value, in the unit of code and files."""

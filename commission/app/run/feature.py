@@ -19,6 +19,7 @@ from commission.app.run.time_line import TimeLine
 from commission.app.run.trail_layers import ReferenceLayer, TrailLayer
 from commission.app.run.uncertainty_layer import UncertaintyLayer
 from commission.app.run.vehicle_layer import VehicleLayer
+from commission.app.run.world_panel import WorldPanel
 
 FEATURE = Feature(
     name="run",
@@ -39,6 +40,7 @@ FEATURE = Feature(
         Docked(make=lambda at: NowPanel(at.gui, at.browser), tab=SELECTION, rank=60, own=True),
         Docked(make=lambda at: RunPanel(at.gui, at.post, at.state), tab=RUN),
         Docked(make=lambda at: EditsPanel(at.gui, at.post, at.state), tab=RUN, rank=10),
+        Docked(make=lambda at: WorldPanel(at.gui, at.post, at.state), tab=RUN, rank=20, folder="Virtual world"),
         Docked(make=lambda at: EditsPanel(at.gui, at.post, at.state), tab=TUNE, rank=-10),
         Docked(make=lambda at: TimeLine(at.gui, at.post, at.state.part(RunState).speed), tab=TIME, rank=10),
         Docked(make=lambda at: Plots(at.gui), tab=TIME, rank=20),

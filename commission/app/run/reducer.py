@@ -7,10 +7,11 @@ from typing import Any
 
 from commission.app.base.actions import Sender
 from commission.app.base.reducer import Outcome, reduce
-from commission.app.base.state import AppState
+from commission.app.base.state import AppState, Edit, edited
 from commission.app.run import actions
 from commission.app.run.effects import CoverFromHere, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
 from commission.app.run.state import SPEEDS, RunState
+from commission.site.fields import with_field
 
 
 def _with(state: AppState, **changes: Any) -> AppState:
@@ -79,3 +80,13 @@ def cover(action: actions.Cover, state: AppState, _sender: Sender) -> Outcome:
 def edit_from_here_on(action: actions.EditFromHereOn, state: AppState, _sender: Sender) -> Outcome:
     """Choose what edits act on."""
     return Outcome(_with(state, from_here_on=action.from_here_on))
+
+
+@reduce.register
+def set_disturbance(action: actions.SetDisturbance, state: AppState, sender: Sender) -> Outcome:
+    """Change one number of the virtual world: one undo step for a moved slider."""
+    disturbances = with_field(state.project.disturbances, action.name, action.value, "disturbance")
+    if disturbances == state.project.disturbances:
+        return Outcome(state)
+    edit = Edit("change the virtual world", sender, f"disturbances.{action.name}")
+    return Outcome(edited(state, replace(state.project, disturbances=disturbances), edit))

@@ -13,10 +13,9 @@ from commission.app.base.actions import Undo
 from commission.app.base.server import start_server
 from commission.app.base.state import AppState
 from commission.app.base.view import view_of
-from commission.app.run.actions import VirtualDrive
+from commission.app.run.actions import SetDisturbance, VirtualDrive
 from commission.app.run.drives import prepare
-from commission.app.world.actions import SetDisturbance
-from commission.app.world.world_panel import WorldPanel
+from commission.app.run.world_panel import WorldPanel
 from commission.errors import UsageError
 from commission.progress import silent
 from commission.site.disturbances import ConstantErrors, Disturbances, WheelNoise

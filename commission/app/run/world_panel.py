@@ -14,7 +14,7 @@ from commission.app.base.inputs import Inputs
 from commission.app.base.panel import BasePanel, Post
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.world.actions import SetDisturbance
+from commission.app.run.actions import SetDisturbance
 from commission.site.disturbances import Disturbances
 from commission.site.fields import fields_of, get_field, names_of
 from commission.site.quantity import Group

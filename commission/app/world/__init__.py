@@ -1,1 +1,0 @@
-"""The virtual world: what is true in it, which the filter does not know."""
