@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
+from commission.site.parameters import Parameters
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Direction, Route, Segment
 from commission.site.scanner import Scanner
 from commission.site.vehicle import DifferentialVehicle
+from tests.odometry_of import PRECISE
 
 
 def room(rate: float = 10.0, resolution_deg: float = 0.5) -> Project:
@@ -27,4 +29,5 @@ def room(rate: float = 10.0, resolution_deg: float = 0.5) -> Project:
         routes=(Route("There and back", (there, back), speed=0.6),),
         vehicle=DifferentialVehicle(),
         scanners=(Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=resolution_deg, rate=rate),),
+        parameters=Parameters(odometry=PRECISE),
     )

@@ -85,7 +85,7 @@ def drive() -> RecordLog:
 
 
 DRIVE = drive()
-SCANNED = replace(DRIVE, scans=scan_log(np.full((20, 601), 5000.0)))
+SCANNED = replace(DRIVE, scans=(scan_log(np.full((20, 601), 5000.0)),))
 START = start_of(SITE, DRIVE, (2.0, 2.0, 0.0))
 GIVEN = CoverageOptions(heading=Heading.GIVEN, measurement=Measurement.RANGE_BEARING_PRIOR, spacing=0.5)
 FEW = PlacementOptions(
