@@ -161,7 +161,14 @@ def bundled(folder: Path) -> OpenedProject:
 
 
 def first_source(project: Project, recording: Path | None, demo: bool) -> Source | None:
-    """Return what drives when the page opens."""
+    """Return what drives when the page opens.
+
+    Parameters
+    ----------
+    project : its first route is what the demonstration drives.
+    recording : folder or file to play; none: not asked for.
+    demo : whether a virtual AGV is to drive.
+    """
     if recording is not None:
         return RecordedDrive(recording)
     return VirtualDrive(project.routes[0].name) if demo and project.routes else None

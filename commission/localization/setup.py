@@ -126,6 +126,13 @@ class LocalizerSetup:
         return validation_ellipses(belief, self.observations[scanner], self.reflectors.centers, sigmas)
 
     def validation_outlines(self, belief: Belief, n: int = 48, *, scanner: int = 0) -> FloatArray:
-        """(N, n, 2) outline [m] of the validation gate around each reflector, map frame (the paper's Fig. 12)."""
+        """(N, n, 2) outline [m] of the validation gate around each reflector, map frame (the paper's Fig. 12).
+
+        Parameters
+        ----------
+        belief : the pose and its covariance.
+        n : points of each outline.
+        scanner : index of the scanner that measures.
+        """
         scale = self.filter.gate.d2**0.5
         return ellipse_points(self.reflectors.centers, self.validation_ellipses(belief, scanner), scale, n)

@@ -127,7 +127,14 @@ class Cameras:
                 node.visible = visible
 
     def refurnish(self, changed: frozenset[str], extent: Extent, hidden: frozenset[str]) -> None:
-        """Make the browsers' own nodes of these layers anew, after the project changed."""
+        """Make the browsers' own nodes of these layers anew, after the project changed.
+
+        Parameters
+        ----------
+        changed : names of the layers whose parts of the project have changed.
+        extent : of the site as it is now.
+        hidden : names of the layers that are switched off.
+        """
         self._extent = extent
         for own in self._views.values():
             self._furnish_layers(own, changed)

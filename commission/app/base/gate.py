@@ -57,7 +57,14 @@ class AccessGate:
     """`https://name` of a proxy in front of us; None when there is none."""
 
     def answer(self, method: str, path: str, headers: Headers) -> GateAnswer | None:
-        """Answer of the gate itself; None lets the request through to viser."""
+        """Answer of the gate itself; None lets the request through to viser.
+
+        Parameters
+        ----------
+        method : of the request, in capitals.
+        path : asked for, with its query.
+        headers : of the request; the origin and the cookie are looked at.
+        """
         own = _malformed(path) or self._refused_sender(headers) or self._asked_for_token(path, headers)
         if own is not None or method in ("GET", "HEAD"):
             return own

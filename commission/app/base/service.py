@@ -58,10 +58,23 @@ class Service:
         """Begin; called once, when the page is there."""
 
     def project_changed(self, action: Action, before: AppState, after: AppState) -> None:
-        """Take note of another project, before the effects of the action are carried out."""
+        """Take note of another project, before the effects of the action are carried out.
+
+        Parameters
+        ----------
+        action : what changed it.
+        before, after : the state before the action and the one that follows.
+        """
 
     def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:
-        """Do one thing that a handler asks for, in the state that follows, on behalf of who sent the action."""
+        """Do one thing that a handler asks for, in the state that follows, on behalf of who sent the action.
+
+        Parameters
+        ----------
+        effect : one of the types in `effects`.
+        state : the state that follows from the action.
+        sender : who sent the action.
+        """
 
     def follow(self, state: AppState) -> Due:  # noqa: ARG002 - a default
         """Do what is due in this state, at most some milliseconds of it; return when its parts have to be drawn."""

@@ -146,6 +146,12 @@ class Edit:
 def edited(state: AppState, project: Project, edit: Edit) -> AppState:
     """Return the state after an edit: one more undo step, unless it belongs to the newest one.
 
+    Parameters
+    ----------
+    state : before the edit.
+    project : as edited.
+    edit : its name, who made it, and what it goes on with.
+
     Raises
     ------
     UsageError

@@ -145,20 +145,42 @@ def client_of(server: ViserServer, number: int) -> ClientHandle | None:
 
 
 def send(server: ViserServer, number: int, message: Any) -> None:
-    """Queue a message for one connection; nothing happens when it has gone."""
+    """Queue a message for one connection; nothing happens when it has gone.
+
+    Parameters
+    ----------
+    server : of the page.
+    number : of the connection.
+    message : one of viser's.
+    """
     state = server._websock_server._client_state_from_id.get(number)
     if state is not None:
         state.message_buffer.push(message)
 
 
 def notify(server: ViserServer, number: int, *, title: str, text: str, seconds: float) -> None:
-    """Show a red note in one browser."""
+    """Show a red note in one browser.
+
+    Parameters
+    ----------
+    server : of the page.
+    number : of the connection.
+    title, text : of the note; plain text.
+    seconds : until it goes [s].
+    """
     props = _messages.NotificationProps(title, text, False, True, seconds, "red")
     send(server, number, _messages.NotificationShowMessage(uuid.uuid4().hex, props))
 
 
 def show_value(server: ViserServer, number: int, widget: Any) -> None:
-    """Let one browser show the value that a widget has here."""
+    """Let one browser show the value that a widget has here.
+
+    Parameters
+    ----------
+    server : of the page.
+    number : of the connection.
+    widget : a handle that has a value.
+    """
     send(server, number, _messages.GuiUpdateMessage(identifier(widget), {"value": widget.value}))
 
 
@@ -195,12 +217,26 @@ def is_held(button: GuiButtonHandle, frequency: float) -> bool:
 
 
 def is_gizmo(scene: SceneApi, number: int, name: str) -> bool:
-    """Whether a gizmo has this name, or had it when the browser took hold of it."""
+    """Whether a gizmo has this name, or had it when the browser took hold of it.
+
+    Parameters
+    ----------
+    scene : of the page, or of one browser.
+    number : of the connection.
+    name : of the node, as the browser says it.
+    """
     return name in scene._handle_from_transform_controls_name or (number, name) in scene._active_transform_drag_handles
 
 
 def is_node(scene: SceneApi, number: int, name: str) -> bool:
-    """Whether something in the scene has this name, or had it when the browser began to drag it."""
+    """Whether something in the scene has this name, or had it when the browser began to drag it.
+
+    Parameters
+    ----------
+    scene : of the page, or of one browser.
+    number : of the connection.
+    name : of the node, as the browser says it.
+    """
     return name in scene._handle_from_node_name or (number, name) in scene._active_drag_handles
 
 
@@ -221,7 +257,14 @@ def on_leave(server: ViserServer, callback: Callable[[int], None]) -> None:
 
 
 def take_uploads(gui: GuiApi, begin: Callable[[int, Any], None], part: Callable[[int, Any], None]) -> None:
-    """Put two functions in the place of viser's own, which collects whatever comes and tells it to all browsers."""
+    """Put two functions in the place of viser's own, which collects whatever comes and tells it to all browsers.
+
+    Parameters
+    ----------
+    gui : of the page.
+    begin : takes the number of the connection and the message that announces a file.
+    part : takes the number of the connection and the message with a part of one.
+    """
     socket = gui._websock_interface
     socket.unregister_handler(_messages.FileTransferStartUpload, gui._handle_file_transfer_start)
     socket.unregister_handler(_messages.FileTransferPart, gui._handle_file_transfer_part)
@@ -230,12 +273,28 @@ def take_uploads(gui: GuiApi, begin: Callable[[int, Any], None], part: Callable[
 
 
 def acknowledge(server: ViserServer, number: int, message: Any, done: int, whole: int) -> None:
-    """Tell a browser how much of its file has come."""
+    """Tell a browser how much of its file has come.
+
+    Parameters
+    ----------
+    server : of the page.
+    number : of the connection.
+    message : with the part that came last.
+    done, whole : bytes that have come, and bytes of the file.
+    """
     ack = _messages.FileTransferPartAck(message.source_component_uuid, message.transfer_uuid, done, whole)
     send(server, number, ack)
 
 
 def replace_upload_note(server: ViserServer, number: int, transfer: str, text: str) -> None:
-    """Write over what a browser itself says of its upload."""
+    """Write over what a browser itself says of its upload.
+
+    Parameters
+    ----------
+    server : of the page.
+    number : of the connection.
+    transfer : identifier of the upload.
+    text : why the file is not taken; plain text.
+    """
     props = _messages.NotificationProps("Not taken", text, False, True, 10.0, "red")
     send(server, number, _messages.NotificationUpdateMessage(f"upload-{transfer}", props))

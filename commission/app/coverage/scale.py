@@ -132,7 +132,14 @@ def round_bounds(low: float, high: float) -> tuple[float, ...]:
 
 
 def picture(classes: NDArray[np.uint8], scale: Scale, opacity: float) -> NDArray[np.uint8]:
-    """Return the (rows, columns, 4) picture of classes given as (rows, columns)."""
+    """Return the (rows, columns, 4) picture of classes given as (rows, columns).
+
+    Parameters
+    ----------
+    classes : (rows, columns) class of each spot, as `Scale.classes` gives them.
+    scale : has the color of each class.
+    opacity : on the floor [0..1]; what is beside it is transparent.
+    """
     palette = np.zeros((256, 4), np.uint8)
     ramp = scale.colors()
     palette[FIRST : FIRST + len(ramp), :3] = ramp

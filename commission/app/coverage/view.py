@@ -80,7 +80,14 @@ def coverage_of(view: PageView) -> CoverageView:
 
 
 def heat_view(covered: Covered, scale: Scale, *, outdated: bool) -> HeatView:
-    """Sort the figure into the classes of its scale."""
+    """Sort the figure into the classes of its scale.
+
+    Parameters
+    ----------
+    covered : the figures of each spot, and where a vehicle could stand.
+    scale : the figure, and the bounds of its classes.
+    outdated : whether the project has changed since.
+    """
     lattice = covered.live.coverage.lattice
     classes = scale.classes(getattr(covered.live.coverage.fixes, scale.figure.value), covered.floor)
     counts = np.bincount(classes, minlength=FIRST + len(scale.bounds) + 1)[NO_FIX:]

@@ -24,7 +24,14 @@ MEASUREMENT_NAMES: dict[Measurement, str] = {
 
 
 def value_text(figure: Figure, value: float, measurement: Measurement) -> str:
-    """Return a value of a figure (SI) in the page's unit, which may depend on what is measured."""
+    """Return a value of a figure (SI) in the page's unit, which may depend on what is measured.
+
+    Parameters
+    ----------
+    figure : what it is a value of.
+    value : in SI units; 0 reflectors, or a figure that is not finite, is no fix.
+    measurement : what is measured of each reflector.
+    """
     if not is_fix(figure, value):
         return "none visible" if figure is Figure.VISIBLE else "no fix"
     quantity = QUANTITIES[figure]

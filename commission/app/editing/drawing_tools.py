@@ -28,7 +28,14 @@ class DrawingTool(Tool):
         return self.made(state, self.points, sender)
 
     def made(self, state: AppState, points: tuple[Point, ...], sender: Sender) -> Outcome:  # noqa: ARG002 - a default
-        """Return what follows from these points."""
+        """Return what follows from these points.
+
+        Parameters
+        ----------
+        state : in which they were clicked.
+        points : those clicked, in order [m], map frame.
+        sender : who clicked them.
+        """
         return Outcome(state)
 
     def so_far(self) -> str:
@@ -39,7 +46,14 @@ class DrawingTool(Tool):
 
 
 def area_dragged(state: AppState, drag: DragFloor, sender: Sender) -> tuple[AppState, bool]:
-    """Let a rectangle grow with a drag; return whether it is drawn to its end, and then has a width and a height."""
+    """Let a rectangle grow with a drag; return whether it is drawn to its end, and then has a width and a height.
+
+    Parameters
+    ----------
+    state : before.
+    drag : from its start to where it is now [m], map frame.
+    sender : who drags.
+    """
     editor = editor_of(state, sender.browser)
     if drag.phase != "end":
         whole = Drag(Grab.RECTANGLE, drag.start, drag.now)

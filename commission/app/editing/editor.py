@@ -93,7 +93,14 @@ class Editor:
     def selecting(
         self, reflectors: tuple[str, ...] = (), *, point: ControlPoint | None = None, station: str = ""
     ) -> Editor:
-        """Return the editor with this selected and nothing else."""
+        """Return the editor with this selected and nothing else.
+
+        Parameters
+        ----------
+        reflectors : ids.
+        point : control point of a route.
+        station : name; empty: none.
+        """
         return replace(self, selected=reflectors, point=point, station=station)
 
     @property
@@ -113,7 +120,14 @@ def editor_of(state: AppState, browser: int | None) -> Editor:
 
 
 def with_tool(state: AppState, sender: Sender, tool: Tool | None) -> AppState:
-    """Return the state in which a browser uses another tool, or the same one farther on."""
+    """Return the state in which a browser uses another tool, or the same one farther on.
+
+    Parameters
+    ----------
+    state : before.
+    sender : whose browser it is.
+    tool : with its points so far; none: a click selects.
+    """
     return state.with_browser(sender.browser, replace(editor_of(state, sender.browser), tool=tool))
 
 

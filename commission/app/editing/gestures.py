@@ -24,7 +24,14 @@ WALL_REACH = (0.05, 1.0)
 
 
 def reflector_at(reflectors: ReflectorMap, place: Point, reach: float) -> str | None:
-    """Return the id of the nearest reflector whose edge is within reach [m] of a place; none when there is none."""
+    """Return the id of the nearest reflector whose edge is within reach [m] of a place; none when there is none.
+
+    Parameters
+    ----------
+    reflectors : all of them.
+    place : (2,) point [m], map frame.
+    reach : largest distance to its edge [m].
+    """
     if not len(reflectors):
         return None
     gaps = np.hypot(*(reflectors.centers - place).T) - reflectors.radii
@@ -33,14 +40,27 @@ def reflector_at(reflectors: ReflectorMap, place: Point, reach: float) -> str | 
 
 
 def reflectors_in(reflectors: ReflectorMap, corner: Point, opposite: Point) -> tuple[str, ...]:
-    """Return the ids of the reflectors whose centers lie in an upright rectangle [m]."""
+    """Return the ids of the reflectors whose centers lie in an upright rectangle [m].
+
+    Parameters
+    ----------
+    reflectors : all of them.
+    corner, opposite : two corners [m], map frame.
+    """
     low, high = np.minimum(corner, opposite), np.maximum(corner, opposite)
     inside = np.all((reflectors.centers >= low) & (reflectors.centers <= high), axis=1)
     return tuple(r.id for r, chosen in zip(reflectors.reflectors, inside, strict=True) if chosen)
 
 
 def walls_near(floor_map: FloorMap, place: Point, reach: float) -> OccupancyGrid | None:
-    """Return the part of the walls around a place that snapping looks at; none when the place is far outside."""
+    """Return the part of the walls around a place that snapping looks at; none when the place is far outside.
+
+    Parameters
+    ----------
+    floor_map : the whole map.
+    place : point [m], map frame.
+    reach : how far from it snapping looks [m].
+    """
     column, row = (
         int(value)
         for value in np.floor(
@@ -63,14 +83,28 @@ def walls_near(floor_map: FloorMap, place: Point, reach: float) -> OccupancyGrid
 
 
 def corner_at(project: Project, place: Point, reach: float) -> Point | None:
-    """Return the nearest corner of a wall within reach [m] of a place; none when there is none."""
+    """Return the nearest corner of a wall within reach [m] of a place; none when there is none.
+
+    Parameters
+    ----------
+    project : has the floor map.
+    place : point [m], map frame.
+    reach : largest distance [m].
+    """
     grid = None if project.floor_map is None else walls_near(project.floor_map, place, reach)
     corner = None if grid is None else nearest_corner(grid, place, reach)
     return None if corner is None else (float(corner[0]), float(corner[1]))
 
 
 def marked_place(project: Project, place: Point, reach: float) -> Point:
-    """Return the point that a click means: the center of a reflector, a station, a wall's corner, else the place."""
+    """Return the point that a click means: the center of a reflector, a station, a wall's corner, else the place.
+
+    Parameters
+    ----------
+    project : what there is to click on.
+    place : that was clicked [m], map frame.
+    reach : largest distance of what it means [m].
+    """
     found = reflector_at(project.reflectors, place, reach)
     if found is not None:
         hit = next(r for r in project.reflectors.reflectors if r.id == found)
@@ -83,7 +117,15 @@ def marked_place(project: Project, place: Point, reach: float) -> Point:
 
 
 def snapped(project: Project, reflector: Reflector, editor: Editor, ignored: tuple[str, ...] = ()) -> Reflector:
-    """Put a reflector where it is attracted to: a wall first, then its neighbors' rows and columns, then the grid."""
+    """Put a reflector where it is attracted to: a wall first, then its neighbors' rows and columns, then the grid.
+
+    Parameters
+    ----------
+    project : has the walls and the neighbors.
+    reflector : as it was put.
+    editor : what snaps, and how far a click reaches.
+    ignored : ids of reflectors that move along, and attract nothing.
+    """
     place = (reflector.x, reflector.y)
     snapping = editor.snapping
     if snapping.walls and project.floor_map is not None:
@@ -103,7 +145,14 @@ def snapped(project: Project, reflector: Reflector, editor: Editor, ignored: tup
 
 
 def to_place(project: Project, place: Point, editor: Editor) -> Reflector:
-    """Return the reflector that a click places; its id is still that of the one it is like."""
+    """Return the reflector that a click places; its id is still that of the one it is like.
+
+    Parameters
+    ----------
+    project : its last reflector is the one that the new one is like.
+    place : that was clicked [m], map frame.
+    editor : what snaps.
+    """
     last = project.reflectors.reflectors[-1] if len(project.reflectors) else FIRST
     like = replace(last, x=place[0], y=place[1], note="", sigma=0.0, locked=False)
     return snapped(project, like, editor)
@@ -136,7 +185,14 @@ def moved(project: Project, editor: Editor) -> ReflectorMap:
 
 
 def grabbed(project: Project, editor: Editor, drag: Drag) -> Editor:
-    """Return the editor with a drag begun: on something selected, a reflector, a station, or the floor."""
+    """Return the editor with a drag begun: on something selected, a reflector, a station, or the floor.
+
+    Parameters
+    ----------
+    project : what there is to take hold of.
+    editor : what is selected, and how far a click reaches.
+    drag : from its start to where it is now [m], map frame.
+    """
     reach = editor.reach
     of_station = grabbed_of_station(project, editor, drag.start)
     if of_station is not None:

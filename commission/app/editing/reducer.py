@@ -37,7 +37,14 @@ def counted(state: AppState, editor: Editor) -> str:
 
 
 def with_reflectors(state: AppState, reflectors: ReflectorMap, edit: Edit) -> Outcome:
-    """Return what follows from another reflector map: one undo step."""
+    """Return what follows from another reflector map: one undo step.
+
+    Parameters
+    ----------
+    state : before.
+    reflectors : the other map.
+    edit : what the step is called, and who made it.
+    """
     if reflectors == state.project.reflectors:
         return Outcome(state)
     project = replace(state.project, reflectors=reflectors)

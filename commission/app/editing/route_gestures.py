@@ -13,7 +13,15 @@ CURVE_POINTS = 120
 
 
 def control_point_at(project: Project, route: str, place: Point, reach: float) -> ControlPoint | None:
-    """Return the nearest control point of a route within reach [m]; none when there is none."""
+    """Return the nearest control point of a route within reach [m]; none when there is none.
+
+    Parameters
+    ----------
+    project : has the routes.
+    route : name of the route.
+    place : point [m], map frame.
+    reach : largest distance [m].
+    """
     best: tuple[float, ControlPoint] | None = None
     for chosen in (r for r in project.routes if r.name == route):
         for number, segment in enumerate(chosen.segments):
@@ -31,7 +39,14 @@ def curve(segment: Segment) -> np.ndarray:
 
 
 def route_at(project: Project, place: Point, reach: float) -> ControlPoint | None:
-    """Return the control point nearest to where a click hit a route's curve within reach [m]; none when it hit none."""
+    """Return the control point nearest to where a click hit a route's curve within reach [m]; none when it hit none.
+
+    Parameters
+    ----------
+    project : has the routes.
+    place : that was clicked [m], map frame.
+    reach : largest distance to the curve [m].
+    """
     best: tuple[float, ControlPoint] | None = None
     for route in project.routes:
         for number, segment in enumerate(route.segments):

@@ -56,7 +56,14 @@ def station_row(station: Station) -> Row:
 
 
 def rows(project: Project, violations: Counter[str], sought: str) -> list[Row]:
-    """Return the table's lines: routes, then stations, whose names contain what is sought."""
+    """Return the table's lines: routes, then stations, whose names contain what is sought.
+
+    Parameters
+    ----------
+    project : has routes and stations.
+    violations : number of each route, by its name.
+    sought : in lower case; empty: all.
+    """
     routes = [route_row(route, violations[route.name]) for route in project.routes if sought in route.name.lower()]
     return routes + [station_row(station) for station in project.stations if sought in station.name.lower()]
 

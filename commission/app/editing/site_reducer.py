@@ -30,7 +30,16 @@ def with_routes(
     point: ControlPoint | None,
     layout: LayoutBrief | None = None,
 ) -> Outcome:
-    """Return what follows from other routes: one undo step, and `point` is selected."""
+    """Return what follows from other routes: one undo step, and `point` is selected.
+
+    Parameters
+    ----------
+    state : before.
+    routes : all of them, as edited.
+    edit : what the step is called, and who made it.
+    point : control point to select; none: nothing is selected.
+    layout : wishes for a suggested layout that go with the routes; none: they stay.
+    """
     project = replace(state.project, routes=routes, layout=layout or state.project.layout)
     after = edited(state, project, edit)
     browser = edit.sender.browser

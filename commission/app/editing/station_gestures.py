@@ -18,7 +18,14 @@ TIP_MARKS = 9.0
 
 
 def station_at(project: Project, place: Point, reach: float) -> str | None:
-    """Return the name of the nearest station within reach [m] of a place; none when there is none."""
+    """Return the name of the nearest station within reach [m] of a place; none when there is none.
+
+    Parameters
+    ----------
+    project : has the stations.
+    place : point [m], map frame.
+    reach : largest distance [m].
+    """
     if not project.stations:
         return None
     gaps = [math.dist(place, (station.x, station.y)) for station in project.stations]
@@ -38,7 +45,14 @@ def heading_tip(project: Project, station: Station) -> Point:
 
 
 def grabbed_of_station(project: Project, editor: Editor, start: Point) -> Grab | None:
-    """Return what a drag takes hold of at the selected station: the station or its tip; none when neither."""
+    """Return what a drag takes hold of at the selected station: the station or its tip; none when neither.
+
+    Parameters
+    ----------
+    project : has the stations.
+    editor : which one is selected, and how far a click reaches.
+    start : where the drag begins [m], map frame.
+    """
     station = station_of(project, editor)
     if station is None:
         return None

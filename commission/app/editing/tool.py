@@ -39,11 +39,25 @@ class Tool:
         return self != type(self)()
 
     def clicked(self, state: AppState, click: ClickFloor, sender: Sender) -> Outcome:  # noqa: ARG002 - a default
-        """Return what follows from a click; the editor in the state has its place and its reach already."""
+        """Return what follows from a click; the editor in the state has its place and its reach already.
+
+        Parameters
+        ----------
+        state : before the click.
+        click : the place [m], map frame, and how far a click reaches.
+        sender : who clicked.
+        """
         return Outcome(state)
 
     def dragged(self, state: AppState, drag: DragFloor, sender: Sender) -> Outcome:  # noqa: ARG002 - a default
-        """Return what follows from a drag."""
+        """Return what follows from a drag.
+
+        Parameters
+        ----------
+        state : before this part of the drag.
+        drag : from its start to where it is now [m], map frame.
+        sender : who drags.
+        """
         return Outcome(state)
 
     def finished(self, state: AppState, sender: Sender) -> Outcome:  # noqa: ARG002 - a default

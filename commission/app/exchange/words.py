@@ -142,7 +142,15 @@ def notes(warnings: Sequence[str], title: str = "Notes") -> str:
 
 
 def as_list(title: str, values: Sequence[T], line: Callable[[T], str], limit: int = LIST_LIMIT) -> str:
-    """Return a list with its title as html, empty for no values: the first lines, and how many more there are."""
+    """Return a list with its title as html, empty for no values: the first lines, and how many more there are.
+
+    Parameters
+    ----------
+    title : plain text above it.
+    values : of any kind.
+    line : plain text of a value.
+    limit : most values that are told.
+    """
     if not values:
         return ""
     shown = [escaped(shortened(line(value))) for value in values[:limit]]

@@ -100,7 +100,14 @@ def _answer(asked: ReadFile, source: ImportSource, progress: Progress) -> Action
 
 
 def read(source: ImportSource, choice: LayoutChoice, progress: Progress) -> Imported:
-    """Read a source; raises CommissionError as the readers do."""
+    """Read a source; raises CommissionError as the readers do.
+
+    Parameters
+    ----------
+    source : an upload, a file of the server, or pasted text.
+    choice : which layout and vehicle type of a file that holds several.
+    progress : told how far it is; may raise to cancel.
+    """
     match source:
         case Upload(name=name, content=content):
             return read_import(name, content, choice, progress=progress)

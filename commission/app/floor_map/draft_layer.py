@@ -20,7 +20,14 @@ INK: theme.Color = (214, 219, 227)
 
 
 def preview(picture: Picture, threshold: float, *, light_walls: bool) -> NDArray[np.uint8]:
-    """Return the (H, W, 3) picture of what would become walls, lowest row first as viser draws it."""
+    """Return the (H, W, 3) picture of what would become walls, lowest row first as viser draws it.
+
+    Parameters
+    ----------
+    picture : the image that was opened.
+    threshold : brightness that parts walls from floor [0..1].
+    light_walls : whether walls are light on dark.
+    """
     walls = picture.walls(threshold, light_walls=light_walls)
     step = -(-max(walls.shape) // LONGEST_SIDE)
     walls = walls[::step, ::step][::-1]

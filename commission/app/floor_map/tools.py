@@ -40,7 +40,14 @@ class ShapeTool(DrawingTool):
         return Outcome(edited(resting, replace(state.project, floor_map=after), Edit(self.does, sender)))
 
     def changed(self, floor_map: FloorMap | None, corners: FloatArray, pen: MapPen) -> FloorMap:
-        """Return the map with the shape whose (N, 2) corners [m] these are."""
+        """Return the map with the shape whose (N, 2) corners [m] these are.
+
+        Parameters
+        ----------
+        floor_map : before; none: there is none yet.
+        corners : (N, 2) array [m], map frame.
+        pen : thickness of a wall, and what erased cells become.
+        """
         raise NotImplementedError
 
 

@@ -60,7 +60,14 @@ CHARTS = (
 
 
 def summary(name: str, profile: RouteProfile, violations: Sequence[Violation]) -> str:
-    """Return the route in one line of html."""
+    """Return the route in one line of html.
+
+    Parameters
+    ----------
+    name : of the route, as typed.
+    profile : curvature, heading and speed along it.
+    violations : of this route.
+    """
     tightest = float(np.abs(profile.curvatures).max())
     parts = [
         f"{profile.length:.1f} m",

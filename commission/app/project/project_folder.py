@@ -131,6 +131,13 @@ class ProjectFolder(Service):
     def save(self, project: Project, folder: Path, *, overwrite: bool, sender: Sender) -> None:
         """Write a project in the background: edits are journaled meanwhile. What came of it is posted.
 
+        Parameters
+        ----------
+        project : what is written.
+        folder : of this project, or another one for a copy.
+        overwrite : whether files that have changed meanwhile, or another project, are replaced.
+        sender : who is told what came of it.
+
         Raises
         ------
         ProjectError
@@ -324,7 +331,13 @@ def _listing(folder: Path | None) -> frozenset[tuple[str, int, int]]:
 
 
 def name_of_edit(action: Action, before: AppState, after: AppState) -> str:
-    """Return what the journal calls an edit: the undo step's name, or which one was taken back or made again."""
+    """Return what the journal calls an edit: the undo step's name, or which one was taken back or made again.
+
+    Parameters
+    ----------
+    action : that made the edit.
+    before, after : the state before it and the one that follows.
+    """
     match action:
         case actions.Undo() if before.undo:
             return f"undo {before.undo[-1].name}"
