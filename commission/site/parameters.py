@@ -77,7 +77,15 @@ class OdometryParameters:
     heading_per_sqrt_s: Annotated[float, HEADING_PER_SQRT_S] = 0.0002
     """1-sigma heading error after one second, even at rest: noise of a gyroscope, vibration."""
     acceleration: Annotated[
-        float, Quantity(label="Acceleration", unit="m/s^2", bounds=NOT_NEGATIVE, step=0.05, slider=(0.0, 5.0))
+        float,
+        Quantity(
+            label="Acceleration",
+            unit="m/s^2",
+            shown=Shown("m/s²", 1.0),
+            bounds=NOT_NEGATIVE,
+            step=0.05,
+            slider=(0.0, 5.0),
+        ),
     ] = 0.5
     """1-sigma acceleration that a vehicle may have when a scan is not followed by odometry in time."""
     turn_acceleration: Annotated[

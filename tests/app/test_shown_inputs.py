@@ -34,7 +34,7 @@ from tests.app.asking import FEATURES, ME, after, joined, taking
 
 DEGREES = 180.0 / math.pi
 UNITS = {
-    **{"mm": 1000.0, "mm/√m": 1000.0, "mm/√s": 1000.0, "ms": 1000.0, "m": 1.0, "m/s": 1.0, "m/s^2": 1.0},
+    **{"mm": 1000.0, "mm/√m": 1000.0, "mm/√s": 1000.0, "ms": 1000.0, "m": 1.0, "m/s": 1.0, "m/s²": 1.0},
     **{"°": DEGREES, "°/√m": DEGREES, "°/√rad": DEGREES, "°/√s": DEGREES, "°/s": DEGREES, "°/s²": DEGREES},
     **{"%": 100.0, "%/m": 100.0, "": 1.0, "s": 1.0, "detections": 1.0},
 }
@@ -72,7 +72,7 @@ PARAMETERS = {
     "odometry.heading_per_sqrt_rad": ("Heading, turning [°/√rad]", DEGREES),
     "odometry.forward_per_sqrt_s": ("Along, in time [mm/√s]", 1000.0),
     "odometry.heading_per_sqrt_s": ("Heading, in time [°/√s]", DEGREES),
-    "odometry.acceleration": ("Acceleration [m/s^2]", 1.0),
+    "odometry.acceleration": ("Acceleration [m/s²]", 1.0),
     "odometry.turn_acceleration": ("Turning [°/s²]", DEGREES),
     "odometry.gap_speed": ("Speed in a gap [m/s]", 1.0),
     "odometry.gap_turn_rate": ("Turn in a gap [°/s]", DEGREES),

@@ -53,12 +53,16 @@ def _number_problem(value: object, like: object) -> str | None:
 
 def _bounds_problem(value: float, low: float | None, high: float | None) -> str | None:
     """Say which bound a number exceeds."""
-    slack = ROUNDING * max(abs(bound) for bound in (low or 0.0, high or 0.0, 1.0))
-    if (low is None or value >= low - slack) and (high is None or value <= high + slack):
+    # Of each bound its own: a large one at one end would let too much pass the other.
+    if (low is None or value >= low - _slack(low)) and (high is None or value <= high + _slack(high)):
         return None
     if high is None:
         return f"found {shown(value)}; expected at least {low:g}"
     return f"found {shown(value)}; expected {'at most' if low is None else f'{low:g} to'} {high:g}"
+
+
+def _slack(bound: float) -> float:
+    return ROUNDING * max(abs(bound), 1.0)
 
 
 def _check_number(widget: Any, value: Any) -> str | None:

@@ -8,6 +8,7 @@ NUMBERS, INPUTS, CHARTS = (
     TESTS + "test_shown_inputs.py::",
     TESTS + "run/test_charts.py::",
 )
+EVERY = "tests/app/test_every_input.py::"
 
 PAGE = (
     Mutant(
@@ -309,5 +310,75 @@ PAGE = (
         find='label="Heading", unit="rad", shown=DEGREES',
         replace='label="Heading [°]", unit=""',
         tests=(INPUTS + "test_numbers_of_what_is_selected_are_shown_and_set_in_the_units_of_their_labels",),
+    ),
+    Mutant(
+        name="noise of a range shown as two sigma",
+        file="commission/site/scanner.py",
+        find='label="Range 1σ", unit="m", shown=MILLIMETRES',
+        replace='label="Range 1σ", unit="m", shown=type(MILLIMETRES)("mm", 2000.0)',
+        tests=(EVERY + "test_a_number_is_shown_taken_and_bounded_as_its_row_says",),
+    ),
+    Mutant(
+        name="survey of a reflector shown as two sigma",
+        file="commission/site/reflectors.py",
+        find='label="Survey 1σ", unit="m", shown=MILLIMETRES',
+        replace='label="Survey 1σ", unit="m", shown=type(MILLIMETRES)("mm", 2000.0)',
+        tests=(EVERY + "test_a_number_of_ones_own_is_shown_taken_and_bounded_as_its_row_says",),
+    ),
+    Mutant(
+        name="people of the heatmap in permille",
+        file=FOLDER + "base/conditions.py",
+        find='Shown("%/m", 100.0)',
+        replace='Shown("%/m", 1000.0)',
+        tests=(EVERY + "test_a_number_is_shown_taken_and_bounded_as_its_row_says",),
+    ),
+    Mutant(
+        name="scanner that tells reflectors up to 0 m",
+        file="commission/site/scanner.py",
+        find='label="Reflectors to", unit="m", bounds=POSITIVE',
+        replace='label="Reflectors to", unit="m", bounds=NOT_NEGATIVE',
+        tests=(EVERY + "test_a_number_is_shown_taken_and_bounded_as_its_row_says",),
+    ),
+    Mutant(
+        name="station that need not be reached within 10 m",
+        file="commission/site/stations.py",
+        find="Bounds.between(0.001, 10.0)",
+        replace="Bounds.between(0.001, 100.0)",
+        tests=(EVERY + "test_a_number_of_ones_own_is_shown_taken_and_bounded_as_its_row_says",),
+    ),
+    Mutant(
+        name="vehicle that steers beyond a right angle",
+        file="commission/site/vehicle.py",
+        find="Bounds.between(1.0, 90.0)",
+        replace="Bounds.between(1.0, 900.0)",
+        tests=(EVERY + "test_a_number_of_a_vehicle_is_shown_taken_and_bounded_as_its_row_says",),
+    ),
+    Mutant(
+        name="radius of suggested reflectors without an end",
+        file="commission/site/layout_brief.py",
+        find="entry=(5.0, 500.0)",
+        replace="entry=(5.0, 5000.0)",
+        tests=(EVERY + "test_a_number_is_shown_taken_and_bounded_as_its_row_says",),
+    ),
+    Mutant(
+        name="pen whose walls may be as thin as nothing",
+        file=FOLDER + "floor_map/pen.py",
+        find="Bounds.between(0.001, 10.0)",
+        replace="Bounds.between(0.0, 10.0)",
+        tests=(EVERY + "test_a_number_of_ones_own_is_shown_taken_and_bounded_as_its_row_says",),
+    ),
+    Mutant(
+        name="option of the suggested layout without its widget",
+        file=FOLDER + "placement/placement_panel.py",
+        find='"radius", "height", "clearance")',
+        replace='"radius", "height")',
+        tests=(EVERY + "test_no_field_is_without_its_widget_and_no_widget_without_a_field",),
+    ),
+    Mutant(
+        name="large bound lets too much pass the small one",
+        file=FOLDER + "base/widget_values.py",
+        find="value >= low - _slack(low)",
+        replace="value >= low - _slack(high or low)",
+        tests=(EVERY + "test_seed_and_people_of_a_drive_are_those_that_were_typed",),
     ),
 )
