@@ -13,6 +13,7 @@ from commission.app.base.drawing import NO_SEGMENTS, Points, heading_mark, outli
 from commission.app.base.extent import extent_of
 from commission.app.base.floor_picture import FloorPicture
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_floor_picture, add_lines
 from commission.app.base.view import PageView
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
@@ -62,8 +63,7 @@ class AmbiguityLayer(BaseLayer):
         self._shown: tuple[ColdStartView | None, float] = (None, 0.0)
         self._twins: TwinsView | None = None
         self._groups: tuple[LineSegmentsHandle, ...] = tuple(
-            scene.add_line_segments(f"/plan/twins/{index}", NO_SEGMENTS, color, thickness=2.5, thickness_units="screen")
-            for index, color in enumerate(GROUP_COLORS)
+            add_lines(scene, f"/plan/twins/{index}", color, 2.5) for index, color in enumerate(GROUP_COLORS)
         )
 
     def show_site(self, project: Project) -> None:
@@ -96,16 +96,8 @@ class AmbiguityLayer(BaseLayer):
         if found is None or not found.is_drawn:
             return
         lattice = found.ambiguity.lattice
-        self._image = self.scene.add_image(
-            "/plan/ambiguity",
-            ambiguity_picture(found.ambiguity.classes, opacity),
-            render_width=lattice.columns * lattice.spacing,
-            render_height=lattice.rows * lattice.spacing,
-            format="png",
-            position=(*lattice.middle, theme.Height.HEAT),
-            cast_shadow=False,
-            receive_shadow=False,
-            visible=visible,
+        self._image = add_floor_picture(
+            self.scene, "/plan/ambiguity", ambiguity_picture(found.ambiguity.classes, opacity), lattice, visible=visible
         )
 
     def _group(self, twins: TwinsView, index: int) -> Points:

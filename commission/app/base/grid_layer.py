@@ -9,6 +9,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import lift
 from commission.app.base.extent import Extent, extent_of
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_lines
 from commission.site.project import Project
 
 STEPS = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
@@ -70,7 +71,7 @@ class GridLayer(BaseLayer):
 
     def _segments(self, name: str, lines: np.ndarray, color: theme.Color, thickness: float) -> SceneNodeHandle:
         points = lift(lines.reshape(-1, 2), theme.Height.GRID).reshape(-1, 2, 3)
-        return self.scene.add_line_segments(name, points, color, thickness=thickness, thickness_units="screen")
+        return add_lines(self.scene, name, color, thickness, lines=points)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return grid and scale bar."""

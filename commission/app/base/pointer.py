@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from viser import ClientHandle, SceneClickEvent, SceneNodeDragEvent
+from viser import ClientHandle, SceneApi, SceneClickEvent, SceneNodeDragEvent
 
-from commission.app.base.actions import ClickFloor, DragFloor, Point
+from commission.app.base.actions import Action, ClickFloor, DragFloor, Point
 from commission.app.base.cameras import OnDrag
-from commission.app.base.panel import Post, from_browser
+from commission.app.base.panel import BasePanel, Post, from_browser
 
 REACH_SHARE = 0.016
 """How near to something a click has to be, as a share of the visible height: about 10 pixels."""
@@ -40,6 +41,25 @@ def take_clicks(client: ClientHandle, post: Post) -> None:
 
     client.scene.on_click()(lambda event: clicked(event, add=False))
     client.scene.on_click(modifier="shift")(lambda event: clicked(event, add=True))
+
+
+class FloorClicks(BasePanel):
+    """Posts an action for each click of any browser on the floor; a panel without widgets.
+
+    Parameters
+    ----------
+    scene : everybody's.
+    post : takes the actions.
+    action : makes one of the place [m], map frame, and of how near to something counts as on it [m].
+    """
+
+    def __init__(self, scene: SceneApi, post: Post, action: Callable[[Point, float], Action]) -> None:
+        def clicked(event: SceneClickEvent) -> None:
+            place = on_floor(event.ray_origin, event.ray_direction)
+            if place is not None:
+                post(from_browser(action(place, reach_of(event.client)), event.client_id))
+
+        scene.on_click()(clicked)
 
 
 def floor_drag(post: Post) -> OnDrag:

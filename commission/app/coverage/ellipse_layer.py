@@ -7,6 +7,7 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, outline_segments
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.coverage.view import EllipseView, coverage_of
 from commission.geometry.gaussian import ellipse_points
@@ -25,9 +26,7 @@ class FixEllipseLayer(BaseLayer):
         super().__init__(scene)
         # A dark rim, since the heatmap has every lightness.
         self._rim, self._lines = (
-            scene.add_line_segments(
-                f"/plan/ellipses/{name}", NO_SEGMENTS, color, thickness=width, thickness_units="screen"
-            )
+            add_lines(scene, f"/plan/ellipses/{name}", color, width)
             for name, color, width in (("rim", (0, 0, 0), 4.0), ("line", theme.VEHICLE, 1.8))
         )
         self._shown: EllipseView | None = None

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from commission.app.base.feature import LEGEND, PLAN, Docked, Feature
+from commission.app.base.pointer import FloorClicks
 from commission.app.coverage import reducer
-from commission.app.coverage.click_reader import CoverageClicks
+from commission.app.coverage.actions import ReadFloor
 from commission.app.coverage.ellipse_layer import FixEllipseLayer
 from commission.app.coverage.heat_layer import HeatLayer
 from commission.app.coverage.heat_legend import HeatLegend
@@ -25,6 +26,6 @@ FEATURE = Feature(
             is_open=True,
         ),
         Docked(make=lambda at: HeatLegend(at.gui), tab=LEGEND, rank=10),
-        Docked(make=lambda at: CoverageClicks(at.scene, at.post), tab=None, rank=90),
+        Docked(make=lambda at: FloorClicks(at.scene, at.post, ReadFloor), tab=None, rank=90),
     ),
 )

@@ -7,6 +7,7 @@ from viser import ImageHandle, LabelHandle, SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.floor_picture import FloorPicture
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_floor_picture
 from commission.app.base.view import PageView
 from commission.app.coverage.scale import picture
 from commission.app.coverage.settings import CoverageSettings
@@ -52,17 +53,7 @@ class HeatLayer(BaseLayer):
             self._image.image = image
             return
         lattice = heat.lattice
-        self._image = self.scene.add_image(
-            "/plan/heat",
-            image,
-            render_width=lattice.columns * lattice.spacing,
-            render_height=lattice.rows * lattice.spacing,
-            format="png",
-            position=(*lattice.middle, theme.Height.HEAT),
-            cast_shadow=False,
-            receive_shadow=False,
-            visible=visible,
-        )
+        self._image = add_floor_picture(self.scene, "/plan/heat", image, lattice, visible=visible)
 
     def _write(
         self, reading: FloorReading | None, heat: HeatView | None, measurement: Measurement, *, visible: bool

@@ -12,8 +12,9 @@ import numpy as np
 from viser import LabelHandle, SceneApi, TransformControlsEvent
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_POINTS, NO_SEGMENTS, lift, outline_segments, polyline_segments, rings
+from commission.app.base.drawing import NO_SEGMENTS, lift, outline_segments, polyline_segments, rings
 from commission.app.base.extent import extent_of
+from commission.app.base.marks import add_lines, add_points
 from commission.app.base.panel import BasePanel, Post, from_browser
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
@@ -44,21 +45,9 @@ class Overlay(BasePanel):
 
     def __init__(self, scene: SceneApi, post: Post, browser: int) -> None:
         self._scene, self._browser = scene, browser
-        self._selected = scene.add_line_segments(
-            "/editing/selected", NO_SEGMENTS, theme.SELECTED, thickness=2.0, thickness_units="screen"
-        )
-        self._preview = scene.add_line_segments(
-            "/editing/preview", NO_SEGMENTS, theme.VEHICLE, thickness=1.5, thickness_units="screen"
-        )
-        self._points = scene.add_point_cloud(
-            "/editing/points",
-            NO_POINTS,
-            theme.SELECTED,
-            point_size=0.1,
-            point_shape="circle",
-            point_shading="flat",
-            precision="float32",
-        )
+        self._selected = add_lines(scene, "/editing/selected", theme.SELECTED, 2.0)
+        self._preview = add_lines(scene, "/editing/preview", theme.VEHICLE, 1.5)
+        self._points = add_points(scene, "/editing/points", theme.SELECTED, 0.1)
         self._labels: list[LabelHandle] = []
         self._handle = scene.add_transform_controls(
             "/editing/handle",

@@ -6,9 +6,10 @@ import numpy as np
 from viser import LabelHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_POINTS, lift
+from commission.app.base.drawing import lift
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_points
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorKind
 
@@ -28,15 +29,7 @@ class ReflectorLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._project = Project()
-        self._marks = scene.add_point_cloud(
-            "/reflectors/marks",
-            NO_POINTS,
-            theme.REFLECTOR,
-            point_size=0.1,
-            point_shape="circle",
-            point_shading="flat",
-            precision="float32",
-        )
+        self._marks = add_points(scene, "/reflectors/marks", theme.REFLECTOR, 0.1)
 
     def show_site(self, project: Project) -> None:
         """Draw a mark at each reflector's center."""

@@ -9,6 +9,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, lift
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_lines
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
 from commission.site.routes import Direction, Segment
@@ -47,9 +48,7 @@ class RouteLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._lines = scene.add_line_segments(
-            "/routes", NO_SEGMENTS, theme.ROUTE, thickness=1.5, thickness_units="screen"
-        )
+        self._lines = add_lines(scene, "/routes", theme.ROUTE, 1.5)
 
     def show_site(self, project: Project) -> None:
         """Draw every segment of every route in one set of lines."""

@@ -6,9 +6,10 @@ import numpy as np
 from viser import LabelHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_SEGMENTS, outline_segments
+from commission.app.base.drawing import outline_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
@@ -45,9 +46,7 @@ class StationLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._marks, self._outlines = (
-            scene.add_line_segments(
-                f"/stations/{name}", NO_SEGMENTS, theme.STATION, thickness=width, thickness_units="screen"
-            )
+            add_lines(scene, f"/stations/{name}", theme.STATION, width)
             for name, width in (("marks", 2.0), ("outlines", 1.0))
         )
         self._labels: dict[str, LabelHandle] = {}

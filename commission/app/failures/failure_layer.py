@@ -9,6 +9,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, crosses, outline_segments, polyline_segments, stroke_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.failures.view import FailureView
 from commission.site.project import Project
@@ -31,9 +32,7 @@ class FailingLayer(BaseLayer):
         self._mark = 0.1
         self._shown: FailureView | None = None
         self._metres, self._ring, self._fallen = (
-            scene.add_line_segments(
-                f"/plan/failing/{name}", NO_SEGMENTS, theme.DEPENDENT, thickness=width, thickness_units="screen"
-            )
+            add_lines(scene, f"/plan/failing/{name}", theme.DEPENDENT, width)
             for name, width in (("metres", 8.0), ("ring", 3.0), ("fallen", 2.5))
         )
 

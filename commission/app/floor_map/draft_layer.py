@@ -9,6 +9,7 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import lift, polyline_segments
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_lines, add_points
 from commission.app.base.view import PageView
 from commission.app.floor_map.draft import MapDraft, MapLoading
 from commission.io.image_map import Picture
@@ -97,22 +98,8 @@ class MapDraftLayer(BaseLayer):
         height = theme.Height.EDITING
         size = 0.008 * max(draft.read.size) * draft.stage.pixel if isinstance(draft.read, Picture) else 0.1
         self._marked = (
-            self.scene.add_point_cloud(
-                "/draft/points",
-                lift(places, height),
-                theme.SELECTED,
-                point_size=size,
-                point_shape="circle",
-                point_shading="flat",
-                precision="float32",
-            ),
-            self.scene.add_line_segments(
-                "/draft/line",
-                polyline_segments(places, height),
-                theme.SELECTED,
-                thickness=2.0,
-                thickness_units="screen",
-            ),
+            add_points(self.scene, "/draft/points", theme.SELECTED, size, points=lift(places, height)),
+            add_lines(self.scene, "/draft/line", theme.SELECTED, 2.0, lines=polyline_segments(places, height)),
             *(
                 self.scene.add_label(f"/draft/{name}", name, position=(float(x), float(y), height))
                 for name, (x, y) in zip("AB", places, strict=False)

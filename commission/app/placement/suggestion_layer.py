@@ -7,7 +7,6 @@ from viser import LineSegmentsHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import (
-    NO_POINTS,
     NO_SEGMENTS,
     Points,
     crosses,
@@ -18,6 +17,7 @@ from commission.app.base.drawing import (
 )
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_lines, add_points
 from commission.app.base.view import PageView
 from commission.app.placement.view import LayoutView
 from commission.geometry.arrays import FloatArray
@@ -58,24 +58,14 @@ class SuggestionLayer(BaseLayer):
         self._mark = 0.1
         self._shown: LayoutView | None = None
         self._areas: tuple[Rectangle, ...] = ()
-        self._suggested = scene.add_point_cloud(
-            "/plan/suggested/reflectors",
-            NO_POINTS,
-            theme.SUGGESTED,
-            point_size=0.1,
-            point_shape="circle",
-            point_shading="flat",
-            precision="float32",
-        )
+        self._suggested = add_points(scene, "/plan/suggested/reflectors", theme.SUGGESTED, 0.1)
         self._rings = self._lines("rings", theme.SUGGESTED, 2.0)
         self._crosses = self._lines("taken_down", theme.TAKEN_DOWN, 2.0)
         self._unmet = self._lines("unmet", theme.OVER_LIMIT, 8.0)
         self._keep_outs = self._lines("keep_out", theme.KEEP_OUT, 1.5)
 
     def _lines(self, name: str, color: theme.Color, width: float) -> LineSegmentsHandle:
-        return self.scene.add_line_segments(
-            f"/plan/suggested/{name}", NO_SEGMENTS, color, thickness=width, thickness_units="screen"
-        )
+        return add_lines(self.scene, f"/plan/suggested/{name}", color, width)
 
     def show_site(self, project: Project) -> None:
         """Adapt the size of the marks to the site's."""

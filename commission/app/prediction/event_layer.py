@@ -8,9 +8,10 @@ import numpy as np
 from viser import LabelHandle, PointCloudHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_POINTS, lift, thinned
+from commission.app.base.drawing import lift, thinned
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_points
 from commission.app.base.view import PageView
 from commission.app.prediction.view import RouteView
 from commission.geometry.arrays import FloatArray
@@ -75,15 +76,7 @@ class EventLayer(BaseLayer):
         self._shown: RouteView | None = None
         self._labels: tuple[LabelHandle, ...] = ()
         self._clouds: dict[theme.Color, PointCloudHandle] = {
-            color: scene.add_point_cloud(
-                f"/plan/events/{name}",
-                NO_POINTS,
-                color,
-                point_size=0.1,
-                point_shape="circle",
-                point_shading="flat",
-                precision="float32",
-            )
+            color: add_points(scene, f"/plan/events/{name}", color, 0.1)
             for name, color in (("risks", theme.RISK), ("going_on", theme.RECOVERY), ("stops", theme.OVER_LIMIT))
         }
 

@@ -6,8 +6,9 @@ import numpy as np
 from viser import LineSegmentsHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_SEGMENTS, stroke_segments
+from commission.app.base.drawing import stroke_segments
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.prediction.limit_colors import limit_classes, palette
 from commission.app.prediction.view import RouteView
@@ -54,9 +55,7 @@ class RibbonLayer(BaseLayer):
         self._shown: RoutePrediction | None = None
 
     def _lines(self, name: str, color: theme.Color, width: float) -> LineSegmentsHandle:
-        return self.scene.add_line_segments(
-            f"/plan/{name}", NO_SEGMENTS, color, thickness=width, thickness_units="screen"
-        )
+        return add_lines(self.scene, f"/plan/{name}", color, width)
 
     def draw(self, view: PageView) -> None:
         """Draw the ribbon anew where the prediction has changed."""

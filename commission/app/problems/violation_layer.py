@@ -11,6 +11,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, Points, outline_segments, polyline_segments, thinned
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.problems.view import inspection_of
 from commission.geometry import se2
@@ -48,9 +49,7 @@ class ViolationLayer(BaseLayer):
         self._worst_outlines = self._lines("outlines", theme.OVER_LIMIT, OUTLINE_WIDTH)
 
     def _lines(self, name: str, color: theme.Color, width: float) -> LineSegmentsHandle:
-        return self.scene.add_line_segments(
-            f"/violations/{name}", NO_SEGMENTS, color, thickness=width, thickness_units="screen"
-        )
+        return add_lines(self.scene, f"/violations/{name}", color, width)
 
     def show_site(self, project: Project) -> None:
         """Adapt the outline to the vehicle and the marks to the site."""

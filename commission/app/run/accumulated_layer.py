@@ -5,9 +5,10 @@ from __future__ import annotations
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_POINTS, lift
+from commission.app.base.drawing import lift
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_points
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 from commission.site.project import Project
@@ -22,15 +23,7 @@ class AccumulatedLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._inliers, self._outliers = (
-            scene.add_point_cloud(
-                f"/run/accumulated/{name}",
-                NO_POINTS,
-                color,
-                point_size=0.03,
-                point_shape="circle",
-                point_shading="flat",
-                precision="float32",
-            )
+            add_points(scene, f"/run/accumulated/{name}", color, 0.03)
             for name, color in (("inliers", theme.INLIER), ("outliers", theme.OUTLIER_ASSOCIATION))
         )
 

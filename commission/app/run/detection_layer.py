@@ -10,6 +10,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_POINTS, lift
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_points
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 from commission.localization.estimate import Status
@@ -35,15 +36,7 @@ class DetectionLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._clouds = {
-            status: scene.add_point_cloud(
-                f"/run/detections/{status.name.lower()}",
-                NO_POINTS,
-                color,
-                point_size=0.08,
-                point_shape=shape,
-                point_shading="flat",
-                precision="float32",
-            )
+            status: add_points(scene, f"/run/detections/{status.name.lower()}", color, 0.08, shape=shape)
             for status, (color, shape, _) in STYLES.items()
         }
 

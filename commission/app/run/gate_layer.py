@@ -6,8 +6,9 @@ import numpy as np
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_SEGMENTS, outline_segments
+from commission.app.base.drawing import outline_segments
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 
@@ -21,9 +22,7 @@ class GateLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._lines = scene.add_line_segments(
-            "/run/gates", NO_SEGMENTS, theme.GATE, thickness=1.5, thickness_units="screen"
-        )
+        self._lines = add_lines(scene, "/run/gates", theme.GATE, 1.5)
 
     def draw(self, view: PageView) -> None:
         """Draw the ellipses, larger than they are when asked to."""

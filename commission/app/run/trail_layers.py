@@ -6,8 +6,9 @@ import numpy as np
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_SEGMENTS, polyline_segments, thinned
+from commission.app.base.drawing import polyline_segments, thinned
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 
@@ -23,9 +24,7 @@ class TrailLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._line = scene.add_line_segments(
-            "/run/trail", NO_SEGMENTS, theme.TRAIL, thickness=1.5, thickness_units="screen"
-        )
+        self._line = add_lines(scene, "/run/trail", theme.TRAIL, 1.5)
 
     def draw_slowly(self, view: PageView) -> None:
         """Draw the whole trail."""
@@ -50,9 +49,7 @@ class ReferenceLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._line = scene.add_line_segments(
-            "/run/reference", NO_SEGMENTS, theme.REFERENCE, thickness=3.0, thickness_units="screen"
-        )
+        self._line = add_lines(scene, "/run/reference", theme.REFERENCE, 3.0)
 
     def draw_slowly(self, view: PageView) -> None:
         """Draw the reference positions up to now."""

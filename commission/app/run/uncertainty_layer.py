@@ -6,8 +6,9 @@ import numpy as np
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_SEGMENTS, lift, outline_segments
+from commission.app.base.drawing import lift, outline_segments
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 from commission.geometry.gaussian import ellipse_points
@@ -25,9 +26,7 @@ class UncertaintyLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._lines = scene.add_line_segments(
-            "/vehicle/covariance", NO_SEGMENTS, theme.POSE, thickness=2.0, thickness_units="screen"
-        )
+        self._lines = add_lines(scene, "/vehicle/covariance", theme.POSE, 2.0)
 
     def draw(self, view: PageView) -> None:
         """Draw ellipse and rays."""

@@ -11,8 +11,9 @@ import numpy as np
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_SEGMENTS, heading_mark, outline_segments, stroke_segments, yaw_quaternion
+from commission.app.base.drawing import heading_mark, outline_segments, stroke_segments, yaw_quaternion
 from commission.app.base.layer import BaseLayer
+from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 from commission.geometry import se2
@@ -73,13 +74,9 @@ class VehicleLayer(BaseLayer):
         super().__init__(scene)
         self._project = Project()
         self._frame = scene.add_frame("/vehicle", show_axes=False, visible=False)
-        self._lines = scene.add_line_segments(
-            "/vehicle/outline", NO_SEGMENTS, theme.VEHICLE, thickness=2.0, thickness_units="screen"
-        )
+        self._lines = add_lines(scene, "/vehicle/outline", theme.VEHICLE, 2.0)
         self._near, self._far = (
-            scene.add_line_segments(
-                f"/vehicle/field/{name}", NO_SEGMENTS, color, thickness=1.0, thickness_units="screen"
-            )
+            add_lines(scene, f"/vehicle/field/{name}", color, 1.0)
             for name, color in (("near", theme.FIELD), ("far", theme.FAR_FIELD))
         )
         self._drives = False
