@@ -72,6 +72,7 @@ def neighbor_risks(planned: PlannedRoute, prediction: RoutePrediction) -> tuple[
         separations(
             scans,
             planned.drive.poses,
+            planned.drive.scanners,
             prediction.prior_covariances,
             planned.places,
             reflector,
@@ -101,7 +102,9 @@ def _reach(planned: PlannedRoute, prediction: RoutePrediction, gate: float) -> f
     variances = np.diagonal(prediction.prior_covariances, axis1=1, axis2=2).max(axis=0)
     noise = planned.parameters.observation
     surveyed = float(planned.places[:, 2].max(initial=0.0))
-    farthest = float(planned.farthest.max(initial=0.0)) + float(np.hypot(*planned.scanner.mounting[:2]))
+    farthest = float(planned.farthest.max(initial=0.0)) + max(
+        float(np.hypot(*scanner.mounting[:2])) for scanner in planned.scanners
+    )
     # Range and bearing each within sqrt(gate) of their own sigma; the bearing seen from the farthest reflector.
     along = variances[0] + variances[1] + noise.range_sigma**2 + surveyed
     across = variances[0] + variances[1] + surveyed + farthest**2 * (variances[2] + noise.bearing_sigma**2)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -65,7 +66,9 @@ class _Optics(NamedTuple):
     farthest: float
 
 
-def detection_noise(reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorParameters) -> DetectionNoise:
+def detection_noise(
+    reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorParameters, farthest: float | None = None
+) -> DetectionNoise:
     """Find out what detections of the reflectors of a map are worth, out to the scanner's range.
 
     Parameters
@@ -73,16 +76,22 @@ def detection_noise(reflectors: ReflectorMap, scanner: Scanner, parameters: Dete
     reflectors : their distinct radii and kinds are looked at; a plate is taken to face the scanner.
     scanner : beams and their noise.
     parameters : of the detector: its window rejects, and its rule for the center has a noise of its own.
+    farthest : out to where [m]; None: to the scanner's range.
     """
     optics = _Optics(
         scanner.angle_increment,
         BeamModel(
             0.5 * math.radians(scanner.beam_width_deg), math.radians(scanner.bearing_sigma_deg), scanner.range_sigma
         ),
-        max(min(scanner.range[1], scanner.reflector_range), 2.0 * NEAREST),
+        farthest or _reach(scanner),
     )
     radii, flat, *rest = detector_model(reflectors, scanner, parameters)
     return _experiment(tuple(radii.tolist()), tuple(flat.tolist()), tuple(rest), optics)
+
+
+def _reach(scanner: Scanner) -> float:
+    """Out to where detections are looked at [m]."""
+    return max(min(scanner.range[1], scanner.reflector_range), 2.0 * NEAREST)
 
 
 def classes_of(reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorParameters) -> IntArray:
@@ -106,20 +115,29 @@ class DetectionQuality(NamedTuple):
     """What detections of each reflector of a map are worth."""
 
     classes: IntArray
-    """(M,) row of `noise.columns` of each reflector."""
+    """(S, M) row of `noise.columns` of each reflector, for each scanner."""
     noise: DetectionNoise
     """By class and distance."""
 
 
-def detection_quality(reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorParameters) -> DetectionQuality:
-    """Gather `classes_of` and `detection_noise`.
+def detection_quality(
+    reflectors: ReflectorMap, scanners: Sequence[Scanner], parameters: DetectorParameters
+) -> DetectionQuality:
+    """Gather `classes_of` and `detection_noise` of several scanners.
 
     Parameters
     ----------
-    reflectors, scanner, parameters : as in `detection_noise`.
+    reflectors, parameters : as in `detection_noise`.
+    scanners : S of them; all are looked at out to the range of the one that sees farthest.
     """
-    site = reflectors, scanner, parameters
-    return DetectionQuality(classes_of(*site), detection_noise(*site))
+    farthest = max(map(_reach, scanners))
+    noises = [detection_noise(reflectors, scanner, parameters, farthest) for scanner in scanners]
+    starts = np.cumsum([0, *(len(noise.columns) for noise in noises)])
+    classes = [
+        classes_of(reflectors, scanner, parameters) + start for scanner, start in zip(scanners, starts, strict=False)
+    ]
+    columns = np.concatenate([noise.columns for noise in noises])
+    return DetectionQuality(np.stack(classes), DetectionNoise(read_only(columns), noises[0].per_log))
 
 
 @compiled_inline

@@ -11,7 +11,7 @@ from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.se2 import compose_scalars, inverse_scalars
 from commission.localization.kalman import Gain, Innovation, correct, corrected_covariance, gain, innovation
-from commission.localization.observation import Expected, ObservationModel, expect, scanner_offset
+from commission.localization.observation import Expected, ObservationModel, expect, observation_at, scanner_offset
 from commission.localization.odometry import OdometryNoise, predict
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.planning.detection_noise import DetectionNoise, Worth, worth
@@ -25,8 +25,8 @@ class ErrorModel(NamedTuple):
     """What the recursion reads besides the drive."""
 
     odometry: OdometryNoise
-    observation: ObservationModel
-    """What the filter believes of its detections."""
+    observations: FloatArray
+    """(S, 6) what the filter believes of the detections of each scanner: `observation_rows`."""
     noise: DetectionNoise
     """What they are truly worth."""
     gate_d2: float
@@ -35,10 +35,8 @@ class ErrorModel(NamedTuple):
     """Probability of that, by the filter's own belief."""
     free_per_m: float
     """Probability per metre of ray that nobody is in the way."""
-    angle_min: float
-    """Bearing of the first beam [rad]."""
-    increment: float
-    """Step between beams [rad]."""
+    beams: FloatArray
+    """(S, 2) of each scanner: bearing of the first beam and step between beams [rad]."""
 
 
 class _Passing(NamedTuple):
@@ -60,6 +58,7 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
     indices: IntArray,
     places: FloatArray,
     kinds: IntArray,
+    scanners: IntArray,
     priors: FloatArray,
     start_sigmas: FloatArray,
     model: ErrorModel,
@@ -72,7 +71,8 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
     stamps_ns, poses : the K scans of a drive.
     offsets, indices : visible reflectors of each scan.
     places : (M, 3) x, y and variance of the surveyed place of each reflector.
-    kinds : (M,) row of `model.noise` of each.
+    kinds : (S, M) row of `model.noise` of each reflector for each scanner.
+    scanners : (K,) scanner of each scan.
     priors : (K, 3, 3) what the filter believes before the detections of each scan.
     start_sigmas : (3,) of the start pose.
     model : what the filter believes of its detections, and what they are truly worth.
@@ -85,8 +85,10 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
     of the detection), with the gain K that the filter believes in.
     """
     # Per reflector, what one unit of its error moves the pose by: two quarters of its wave, two axes of its place.
-    responses = np.zeros((len(places), 3, 4))
-    followed, is_followed, count = np.empty(len(places), np.int64), np.zeros(len(places), np.bool_), 0
+    # Every scanner has waves of its own; the place of a reflector stands with the waves of the first.
+    rows = kinds.size
+    responses = np.zeros((rows, 3, 4))
+    followed, is_followed, count = np.empty(rows, np.int64), np.zeros(rows, np.bool_), 0
     bias = np.zeros(3)
     x, y, theta = poses[0, 0], poses[0, 1], poses[0, 2]
     sx, sy, st = start_sigmas[0], start_sigmas[1], start_sigmas[2]
@@ -97,25 +99,28 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
             seconds = 1e-9 * (stamps_ns[k] - stamps_ns[k - 1])
             error = _moved(error, x, y, theta, seconds, model.odometry)
             _turn(responses, followed[:count], bias, x - poses[k - 1, 0], y - poses[k - 1, 1])
-        belief = _at(x, y, theta, priors[k])
-        offset_x, offset_y = scanner_offset(theta, model.observation)
+        belief, scanner = _at(x, y, theta, priors[k]), scanners[k]
+        observation = observation_at(model.observations, scanner)
+        offset_x, offset_y = scanner_offset(theta, observation)
         for i in range(offsets[k], offsets[k + 1]):
             m = indices[i]
-            mount = model.observation.mount_theta
+            mount = observation.mount_theta
             e = expect(x, y, theta, offset_x, offset_y, places[m, 0], places[m, 1], mount)
-            true = worth(model.noise, int(kinds[m]), e.range)
-            says = innovation(belief, e, e.range, e.bearing, places[m, 2], model.observation)
+            true = worth(model.noise, int(kinds[scanner, m]), e.range)
+            says = innovation(belief, e, e.range, e.bearing, places[m, 2], observation)
             k_says = gain(says)
-            passing = _passing(belief, e, says, true, places[m, 2], model)
+            passing = _passing(belief, e, says, true, places[m, 2], observation, model.gate_d2)
             seen = true.probability * model.free_per_m**e.range
-            error = _after(error, e, k_says, true, passing, seen, model.observation)
-            if not is_followed[m]:
-                followed[count], is_followed[m] = m, True
-                count += 1
+            error = _after(error, e, k_says, true, passing, seen, observation)
+            row = scanner * len(places) + m
+            for each in (row, m):
+                if not is_followed[each]:
+                    followed[count], is_followed[each] = each, True
+                    count += 1
             share = seen * passing.probability
             _respond(responses, followed[:count], bias, e, k_says, share)
-            _disturb(responses, m, bias, e, k_says, share, true, model)
-            corrected = correct(belief, e.range, e.bearing, places[m, 0], places[m, 1], places[m, 2], model.observation)
+            _disturb(responses, row, m, bias, e, k_says, share, true, model.beams[scanner])
+            corrected = correct(belief, e.range, e.bearing, places[m, 0], places[m, 1], places[m, 2], observation)
             belief = mixed(belief, corrected, model.inside_gate * model.free_per_m**e.range)
         count = _forget(responses, followed, is_followed, count)
         _gather(error, responses, followed[:count], places, bias, squares[k])
@@ -140,7 +145,13 @@ def _at(x: float, y: float, theta: float, c: FloatArray) -> PoseGaussian:
 
 @compiled_inline
 def _passing(  # noqa: PLR0917 - a detection, number by number
-    belief: PoseGaussian, e: Expected, says: Innovation, true: Worth, surveyed: float, model: ErrorModel
+    belief: PoseGaussian,
+    e: Expected,
+    says: Innovation,
+    true: Worth,
+    surveyed: float,
+    o: ObservationModel,
+    gate_d2: float,
 ) -> _Passing:
     """What the gate g does when the filter says S of innovations whose covariance is T.
 
@@ -148,12 +159,11 @@ def _passing(  # noqa: PLR0917 - a detection, number by number
     trace of S^-1 T. T has the true noise, but the pose's covariance is the filter's: with the true one, the few drives
     that are rejected would widen it until all drives seemed to be.
     """
-    o = model.observation
     actual = ObservationModel(o.mount_x, o.mount_y, o.mount_theta, true.range_variance, true.bearing_variance, 0.0)
     is_so = innovation(belief, e, e.range, e.bearing, surveyed, actual)
     across = is_so.w - says.w
     trace = is_so.s_rr / says.s_rr + (is_so.schur + across * across * is_so.s_rr) / says.schur
-    u = model.gate_d2 / trace
+    u = gate_d2 / trace
     outside = math.exp(-u)
     # Without a gate, or far inside it, nothing is rejected.
     if outside < 1e-12:
@@ -232,16 +242,17 @@ def _less(  # noqa: PLR0917 - an error, number by number
 @compiled
 def _disturb(  # noqa: PLR0917 - a detection, number by number
     responses: FloatArray,
-    m: int,
+    row: int,
+    place: int,
     bias: FloatArray,
     e: Expected,
     k: Gain,
     share: float,
     true: Worth,
-    model: ErrorModel,
+    beams: FloatArray,
 ) -> None:
     """Add what a detection brings in: its mean error, its wave, and one metre of survey error along each axis."""
-    psi = 2.0 * math.pi * (e.bearing - model.angle_min) / model.increment
+    psi = 2.0 * math.pi * (e.bearing - beams[0]) / beams[1]
     c, s = math.cos(psi), math.sin(psi)
     # A wave of unknown phase is a cosine and a sine of independent amplitudes, each with half of the square.
     in_range = (math.sqrt(0.5) * true.range_wave * c, -math.sqrt(0.5) * true.range_wave * s, -e.range_x, -e.range_y)
@@ -253,6 +264,7 @@ def _disturb(  # noqa: PLR0917 - a detection, number by number
     )
     for column in range(4):
         r, b = share * in_range[column], share * in_bearing[column]
+        m = row if column < 2 else place
         responses[m, 0, column] += k.xr * r + k.xb * b
         responses[m, 1, column] += k.yr * r + k.yb * b
         responses[m, 2, column] += k.tr * r + k.tb * b
@@ -295,4 +307,4 @@ def _gather(  # noqa: PLR0917 - all kinds of error
             for m in followed:
                 b = responses[m]
                 square[i, j] += b[i, 0] * b[j, 0] + b[i, 1] * b[j, 1]
-                square[i, j] += places[m, 2] * (b[i, 2] * b[j, 2] + b[i, 3] * b[j, 3])
+                square[i, j] += places[m % len(places), 2] * (b[i, 2] * b[j, 2] + b[i, 3] * b[j, 3])

@@ -81,7 +81,7 @@ class LayoutSearch:
     ----------
     planned : the routes, with all M reflectors that stay or could be taken.
     site : parameters, scanner and stations.
-    model : visibility of the site with these reflectors.
+    model : visibility of the site with these reflectors, for its first scanner.
     kept : number of reflectors that stay; they come first.
     options : demands and effort.
     progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
@@ -100,7 +100,7 @@ class LayoutSearch:
         self._planned, self._options, self._progress, self._fraction = planned, options, progress, 0.0
         count, demands = len(model.reflectors), options.demands
         self._fixed = np.arange(count) < kept
-        self._covers = [route.visible.incidence(count) for route in planned]
+        self._covers = [route.sees() for route in planned]
         self._seen = [covers.any(axis=0) for covers in self._covers]
         self._base = demands.visible + int(demands.survive_failure)
         self._needs = [np.full(len(route.drive), self._base, dtype=np.int64) for route in planned]

@@ -6,6 +6,7 @@ No noise and no control law: the base stays on the route, at the speeds of its l
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,7 +16,7 @@ from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.site.checks import at_least
 from commission.site.path import CREEP, KINK, Leg, MotionLimits, legs_of
 from commission.site.routes import Route
-from commission.site.scanner import Scanner
+from commission.site.scanner import Scanner, scan_moments
 from commission.site.vehicle import TricycleVehicle, Vehicle
 
 
@@ -45,6 +46,12 @@ class NominalDrive:
     """(K, 3) `T_map_base` at each scan [m, m, rad]."""
     metres: FloatArray
     """(K,) way driven since the start [m], never falling."""
+    scanners: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    """(K,) scanner of each scan; of none said, the first."""
+
+    def __post_init__(self) -> None:
+        if len(self.scanners) != len(self.stamps_ns):
+            object.__setattr__(self, "scanners", read_only(np.zeros(len(self.stamps_ns), np.int64)))
 
     def __len__(self) -> int:
         """Return the number of scans."""
@@ -56,14 +63,16 @@ class NominalDrive:
         return float(self.metres[-1])
 
 
-def nominal_drive(route: Route, vehicle: Vehicle, scanner: Scanner, plan: DrivePlan | None = None) -> NominalDrive:
+def nominal_drive(
+    route: Route, vehicle: Vehicle, scanners: Sequence[Scanner], plan: DrivePlan | None = None
+) -> NominalDrive:
     """Plan the drive along a route from rest to rest.
 
     Parameters
     ----------
     route : what to drive.
     vehicle : all but a tricycle turn on the spot where the route has a kink; a tricycle steers on after it.
-    scanner : its rate gives the stamps.
+    scanners : their rates give the stamps.
     plan : rests and limits; the defaults when None.
 
     Returns
@@ -86,10 +95,10 @@ def nominal_drive(route: Route, vehicle: Vehicle, scanner: Scanner, plan: DriveP
     # Rows of time, x, y, unwrapped heading and way; what lies between two legs is a rest or a turn on the spot.
     rows = np.concatenate(pieces)
     rows[:, 3] = np.unwrap(rows[:, 3])
-    stamps = np.arange(0, round((clock + plan.rest) * 1e9) + 1, scanner.period_ns, dtype=np.int64)
+    stamps, indices = scan_moments(scanners, round((clock + plan.rest) * 1e9))
     x, y, heading, metres = (np.interp(stamps * 1e-9, rows[:, 0], rows[:, column]) for column in range(1, 5))
     poses = np.stack((x, y, wrap(heading)), axis=1)
-    return NominalDrive(read_only(stamps), read_only(poses), read_only(metres))
+    return NominalDrive(read_only(stamps), read_only(poses), read_only(metres), read_only(indices))
 
 
 def _timed(leg: Leg, start: float, driven: float) -> FloatArray:

@@ -63,9 +63,7 @@ def place(
     """
     options = options or PlacementOptions()
     names = tuple(route.name for route in site.routes) if routes is None else routes
-    drives = [
-        nominal_drive(site.route(name), site.vehicle, site.scanners[0], options.prediction.plan) for name in names
-    ]
+    drives = [nominal_drive(site.route(name), site.vehicle, site.scanners, options.prediction.plan) for name in names]
     path = np.concatenate([np.empty((0, 2)), *(drive.poses[:, :2] for drive in drives)])
     return choose(site, names, _candidates(site, path, options), options, progress)
 
@@ -80,9 +78,10 @@ def choose(
     """Choose among given candidates; parameters as for `place`, and `centers`, (C, 2) places [m], map frame."""
     kept = _kept(site, options)
     everything = ReflectorMap((*kept, *_named(centers, kept, options.candidates)))
-    model = build_visibility(everything, site.scanners[0], walls_of(site.floor_map), VisibilityOptions())
-    planned = [plan_route(site, name, options.prediction, model) for name in routes]
-    search = LayoutSearch(planned, site, model, kept=len(kept), options=options, progress=progress)
+    walls = walls_of(site.floor_map)
+    models = [build_visibility(everything, scanner, walls, VisibilityOptions()) for scanner in site.scanners]
+    planned = [plan_route(site, name, options.prediction, models) for name in routes]
+    search = LayoutSearch(planned, site, models[0], kept=len(kept), options=options, progress=progress)
     taken = search.run()
     # Named anew, so that the new ones count without gaps.
     added = _named(everything.centers[len(kept) :][taken[len(kept) :]], kept, options.candidates)

@@ -12,7 +12,7 @@ from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.se2 import compose_scalars, inverse_scalars
 from commission.localization.kalman import correct, innovation, squared_distance
-from commission.localization.observation import ObservationModel, expect, scanner_offset
+from commission.localization.observation import ObservationModel, expect, observation_at, scanner_offset
 from commission.localization.odometry import OdometryNoise, predict
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.supervisor import SupervisorLimits, supervise
@@ -22,7 +22,8 @@ class PredictionModel(NamedTuple):
     """What the recursion reads besides the drive."""
 
     odometry: OdometryNoise
-    observation: ObservationModel
+    observations: FloatArray
+    """(S, 6) `observation_rows` of the scanners."""
     limits: SupervisorLimits
     gate_d2: float
     """Squared Mahalanobis distance from which an expected innovation is rejected; infinite without the filter."""
@@ -48,6 +49,7 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
     stamps_ns: IntArray,
     poses: FloatArray,
     metres: FloatArray,
+    scanners: IntArray,
     offsets: IntArray,
     indices: IntArray,
     places: FloatArray,
@@ -61,7 +63,7 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
 
     Parameters
     ----------
-    stamps_ns, poses, metres : the K scans of a drive.
+    stamps_ns, poses, metres, scanners : the K scans of a drive.
     offsets, indices : visible reflectors of each scan.
     places : (M, 3) x, y and variance of each reflector as the map has it.
     shifts : (M, 2) what the reflectors have moved since [m].
@@ -85,19 +87,21 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
             seconds = 1e-9 * (stamps_ns[k] - stamps_ns[k - 1])
             belief = predict(belief, dx, dy, dtheta, seconds, model.odometry)
         _write_covariance(belief, k, prior_covariances)
-        prior = belief
-        offset_x, offset_y = scanner_offset(theta, model.observation)
+        prior, observation = belief, observation_at(model.observations, scanners[k])
+        offset_x, offset_y = scanner_offset(theta, observation)
         found = 0
         for i in range(offsets[k], offsets[k + 1]):
             m = indices[i]
             target_x, target_y = places[m, 0] + shifts[m, 0], places[m, 1] + shifts[m, 1]
-            mount = model.observation.mount_theta
+            mount = observation.mount_theta
             truth = expect(x, y, theta, offset_x, offset_y, target_x, target_y, mount)
-            if truth.range > reach[m] or not _inside_gate(prior, truth.range, truth.bearing, places, m, model):
+            if truth.range > reach[m] or not _inside_gate(
+                prior, truth.range, truth.bearing, places, m, observation, model.gate_d2
+            ):
                 continue
             found += 1
             corrected = correct(
-                belief, truth.range, truth.bearing, places[m, 0], places[m, 1], places[m, 2], model.observation
+                belief, truth.range, truth.bearing, places[m, 0], places[m, 1], places[m, 2], observation
             )
             probability = model.inside_gate * model.free_per_m**truth.range
             belief = mixed(belief, corrected, probability)
@@ -113,6 +117,7 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
 def separations(  # noqa: PLR0917 - the columns of a drive
     scans: IntArray,
     poses: FloatArray,
+    scanners: IntArray,
     prior_covariances: FloatArray,
     places: FloatArray,
     reflector: int,
@@ -126,6 +131,7 @@ def separations(  # noqa: PLR0917 - the columns of a drive
     ----------
     scans : (n,) rows of `poses` and `prior_covariances`.
     poses : (K, 3) `T_map_base` of the scans of a drive [m, m, rad].
+    scanners : (K,) scanner of each.
     prior_covariances : (K, 3, 3) before the detections of each scan.
     places : (M, 3) as in `predict_covariances`.
     reflector, neighbor : rows of `places`; the covariance is that of the reflector's innovation.
@@ -141,25 +147,30 @@ def separations(  # noqa: PLR0917 - the columns of a drive
         x, y, theta = poses[scans[i], 0], poses[scans[i], 1], poses[scans[i], 2]
         c = prior_covariances[scans[i]]
         belief = PoseGaussian(x, y, theta, c[0, 0], c[0, 1], c[0, 2], c[1, 1], c[1, 2], c[2, 2])
-        offset_x, offset_y = scanner_offset(theta, model.observation)
-        mount = model.observation.mount_theta
+        observation = observation_at(model.observations, int(scanners[int(scans[i])]))
+        offset_x, offset_y = scanner_offset(theta, observation)
+        mount = observation.mount_theta
         own = expect(x, y, theta, offset_x, offset_y, places[reflector, 0], places[reflector, 1], mount)
         other = expect(x, y, theta, offset_x, offset_y, places[neighbor, 0], places[neighbor, 1], mount)
-        between = innovation(belief, own, other.range, other.bearing, places[reflector, 2], model.observation)
+        between = innovation(belief, own, other.range, other.bearing, places[reflector, 2], observation)
         squared[i] = squared_distance(between)
 
 
 @compiled_inline
 def _inside_gate(  # noqa: PLR0917 - a measurement, number by number
-    prior: PoseGaussian, distance: float, bearing: float, places: FloatArray, m: int, model: PredictionModel
+    prior: PoseGaussian,
+    distance: float,
+    bearing: float,
+    places: FloatArray,
+    m: int,
+    observation: ObservationModel,
+    gate_d2: float,
 ) -> bool:
     """Whether the expected detection passes the association filter at the predicted belief."""
-    offset_x, offset_y = scanner_offset(prior.theta, model.observation)
-    mount = model.observation.mount_theta
+    offset_x, offset_y = scanner_offset(prior.theta, observation)
+    mount = observation.mount_theta
     expected = expect(prior.x, prior.y, prior.theta, offset_x, offset_y, places[m, 0], places[m, 1], mount)
-    return squared_distance(innovation(prior, expected, distance, bearing, places[m, 2], model.observation)) <= (
-        model.gate_d2
-    )
+    return squared_distance(innovation(prior, expected, distance, bearing, places[m, 2], observation)) <= gate_d2
 
 
 @compiled_inline

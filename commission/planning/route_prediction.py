@@ -18,13 +18,13 @@ from commission.geometry.angles import difference
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.geometry.gaussian import chi_square_gate
 from commission.localization.estimate import Belief, Mode
-from commission.localization.observation import ObservationModel
+from commission.localization.observation import observation_model, observation_rows
 from commission.localization.odometry import odometry_noise
 from commission.localization.pose_gaussian import from_belief
 from commission.localization.supervisor import supervisor_limits
 from commission.planning.nominal_drive import DrivePlan, NominalDrive, nominal_drive
 from commission.planning.prediction_kernels import PredictionColumns, PredictionModel, predict_covariances
-from commission.planning.visibility import VisibilityModel, VisibleReflectors, visibility_model
+from commission.planning.visibility import VisibilityModel, VisibleReflectors, seen_in_turn, visibility_models
 from commission.site.checks import above, between
 from commission.site.parameters import Parameters, SupervisorParameters
 from commission.site.parts import Driven
@@ -88,24 +88,37 @@ class PlannedRoute:
     places: FloatArray
     """(M, 3) x, y [m], map frame, and variance of the surveyed place [m^2] of each reflector."""
     farthest: FloatArray
-    """(M,) largest distance from which each reflector is seen [m]."""
+    """(M,) largest distance from which each reflector is seen by any scanner [m]."""
     reflectors: ReflectorMap
     """The M reflectors."""
-    scanner: Scanner
-    """Mounting, and noise of its beams."""
+    scanners: tuple[Scanner, ...]
+    """Mounting, and noise of their beams."""
     parameters: Parameters
     """Tunables of the localizer."""
     options: PredictionOptions
     """Start and hall."""
 
+    def sees(self) -> BoolArray:
+        """Whether each of the M reflectors is seen at each scan, by it or the newest of another scanner: (K, M)."""
+        alone = self.visible.incidence(len(self.reflectors))
+        if len(self.scanners) == 1:
+            return alone
+        together = np.zeros_like(alone)
+        for scanner in range(len(self.scanners)):
+            rows = np.flatnonzero(self.drive.scanners == scanner)
+            # Before its first scan, that one: the vehicle rests.
+            newest = np.maximum(np.searchsorted(rows, np.arange(len(alone)), side="right") - 1, 0)
+            together |= alone[rows[newest]]
+        return together
+
     def model(self) -> PredictionModel:
         """Numbers of the recursion."""
-        x, y, theta = (float(value) for value in self.scanner.mounting)
-        given, association = self.parameters.observation, self.parameters.association
+        association = self.parameters.association
+        # The range bias is left out: measurements here are without it, and the filter takes it off.
+        unbiased = replace(self.parameters.observation, range_bias=0.0)
         return PredictionModel(
             odometry_noise(self.parameters.odometry),
-            # The range bias is left out: measurements here are without it, and the filter takes it off.
-            ObservationModel(x, y, theta, given.range_sigma**2, given.bearing_sigma**2, 0.0),
+            observation_rows([observation_model(scanner, unbiased) for scanner in self.scanners]),
             supervisor_limits(self.parameters.supervisor),
             chi_square_gate(association.gate_probability, 2) if association.enabled else math.inf,
             association.gate_probability if association.enabled else 1.0,
@@ -211,7 +224,7 @@ def plan_route(
     site: Driven,
     route_name: str,
     options: PredictionOptions | None = None,
-    model: VisibilityModel | None = None,
+    models: Sequence[VisibilityModel] | None = None,
 ) -> PlannedRoute:
     """Plan a drive and find what it sees.
 
@@ -220,7 +233,7 @@ def plan_route(
     site : a project, or what of it says how a vehicle drives and what it sees.
     route_name : which route.
     options : start and hall; the defaults when None.
-    model : of the same site, when it is at hand; made here when None.
+    models : of the scanners of the same site, when they are at hand; made here when None.
 
     Raises
     ------
@@ -228,18 +241,18 @@ def plan_route(
         unknown route.
     """
     options = options or PredictionOptions()
-    model = model or visibility_model(site)
-    drive = nominal_drive(site.route(route_name), site.vehicle, site.scanners[0], options.plan)
+    models = models or visibility_models(site)
+    drive, model = nominal_drive(site.route(route_name), site.vehicle, site.scanners, options.plan), models[0]
     surveyed = np.array([reflector.sigma**2 for reflector in model.reflectors.reflectors])
     places = np.column_stack((model.reflectors.centers, surveyed))
     return PlannedRoute(
         name=route_name,
         drive=drive,
-        visible=model.visible_from_poses(drive.poses),
+        visible=seen_in_turn(models, drive.poses, drive.scanners),
         places=read_only(places),
-        farthest=read_only(model.targets.farthest),
+        farthest=read_only(np.max([each.targets.farthest for each in models], axis=0)),
         reflectors=model.reflectors,
-        scanner=site.scanners[0],
+        scanners=site.scanners,
         parameters=site.parameters,
         options=options,
     )
@@ -302,6 +315,7 @@ def predict_route(planned: PlannedRoute, damage: Damage = NO_DAMAGE) -> RoutePre
         planned.drive.stamps_ns,
         planned.drive.poses,
         planned.drive.metres,
+        planned.drive.scanners,
         read_only(planned.visible.offsets),
         read_only(planned.visible.indices),
         planned.places,

@@ -71,17 +71,17 @@ def predict_errors(
         read_only(planned.visible.indices),
         planned.places,
         quality.classes,
+        planned.drive.scanners,
         prediction.prior_covariances,
         np.array(planned.options.start_sigmas),
         ErrorModel(
             model.odometry,
-            model.observation,
+            model.observations,
             quality.noise,
             model.gate_d2,
             model.inside_gate,
             model.free_per_m,
-            planned.scanner.angle_min,
-            planned.scanner.angle_increment,
+            np.array([(scanner.angle_min, scanner.angle_increment) for scanner in planned.scanners]),
         ),
         squares,
     )
@@ -90,7 +90,7 @@ def predict_errors(
 
 def quality_of(planned: PlannedRoute) -> DetectionQuality:
     """Find out what detections on a route are worth; the same for all routes of a site, and with fewer reflectors."""
-    return detection_quality(planned.reflectors, planned.scanner, planned.parameters.detector)
+    return detection_quality(planned.reflectors, planned.scanners, planned.parameters.detector)
 
 
 def two_sigma_of(planned: PlannedRoute, quality: DetectionQuality | None = None) -> FloatArray:

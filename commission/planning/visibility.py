@@ -7,7 +7,7 @@ the rays unnecessary. What the sight is worth for localization is in `dilution`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -174,7 +174,7 @@ class VisibilityModel:
 
 
 def visibility_model(site: Sighted, options: VisibilityOptions | None = None) -> VisibilityModel:
-    """Prepare the reflectors and walls of a site; one without a floor map is an open field.
+    """Prepare the reflectors and walls of a site for its first scanner; one without a floor map is an open field.
 
     Parameters
     ----------
@@ -183,6 +183,36 @@ def visibility_model(site: Sighted, options: VisibilityOptions | None = None) ->
     """
     caster = walls_of(site.floor_map)
     return build_visibility(site.reflectors, site.scanners[0], caster, options or VisibilityOptions())
+
+
+def visibility_models(site: Sighted, options: VisibilityOptions | None = None) -> tuple[VisibilityModel, ...]:
+    """Prepare the reflectors and walls of a site for each of its scanners; see `visibility_model`."""
+    caster, chosen = walls_of(site.floor_map), options or VisibilityOptions()
+    return tuple(build_visibility(site.reflectors, scanner, caster, chosen) for scanner in site.scanners)
+
+
+def seen_in_turn(models: Sequence[VisibilityModel], poses: FloatArray, scanners: IntArray) -> VisibleReflectors:
+    """Reflectors that scanners see which take turns.
+
+    Parameters
+    ----------
+    models : of each scanner.
+    poses : (N, 3) array `T_map_base` [m, m, rad].
+    scanners : (N,) which scanner looks from each pose.
+    """
+    if len(models) == 1:
+        return models[0].visible_from_poses(poses)
+    found = [model.visible_from_poses(poses[scanners == index]) for index, model in enumerate(models)]
+    counts = np.empty(len(poses), dtype=np.int64)
+    for index, each in enumerate(found):
+        counts[scanners == index] = each.counts()
+    offsets = np.concatenate(([0], np.cumsum(counts)))
+    indices = np.empty(int(offsets[-1]), dtype=np.int64)
+    is_of = np.repeat(scanners, counts)
+    for index, each in enumerate(found):
+        # Of one scanner, poses stand in their order: so do its entries.
+        indices[is_of == index] = each.indices
+    return VisibleReflectors(offsets, indices)
 
 
 def walls_of(floor_map: FloorMap | None) -> RayCaster:

@@ -26,7 +26,7 @@ from commission.site.path import legs_of
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.records import ORDER_WITHIN_A_STAMP, Odometry, Record, ReferencePose, Scan
-from commission.site.scanner import Scanner
+from commission.site.scanner import scan_moments
 
 START, WHEELS, BEAMS, PEOPLE, LOSSES = range(5)
 """Streams of random numbers of one seed."""
@@ -128,29 +128,6 @@ def virtual_drive(
     names = tuple(scanner.name for scanner in project.scanners)
     log = RecordLog.collect(records(project, route_name, seed, options=options, progress=progress), names)
     return replace(log, truth=draw_truth(project, route_name, seed))
-
-
-def scan_moments(scanners: Sequence[Scanner], duration_ns: int) -> tuple[IntArray, IntArray]:
-    """Stamps at which scanners scan, and which one does.
-
-    Parameters
-    ----------
-    scanners : the first begins at once, the others each a share of their period later: those of one rate take turns.
-    duration_ns : of the drive [ns].
-
-    Returns
-    -------
-    stamps_ns, scanners : (K,) arrays in order of time; of equal stamps the first scanner comes first.
-    """
-    begins = [round(index * scanner.period_ns / len(scanners)) for index, scanner in enumerate(scanners)]
-    stamps = [
-        np.arange(begin, duration_ns + 1, scanner.period_ns, dtype=np.int64)
-        for begin, scanner in zip(begins, scanners, strict=True)
-    ]
-    indices = np.repeat(np.arange(len(scanners)), [len(each) for each in stamps])
-    together = np.concatenate(stamps)
-    order = np.argsort(together, kind="stable")
-    return together[order], indices[order]
 
 
 def _odometry(motion: TrueMotion, displacements: FloatArray) -> Iterator[Record]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Annotated
 
-from commission.geometry.arrays import FloatArray, equal_fields, frozen
+import numpy as np
+
+from commission.geometry.arrays import FloatArray, IntArray, equal_fields, frozen
 from commission.site.checks import check_fields
 from commission.site.quantity import (
     AS_DEGREES,
@@ -197,3 +200,26 @@ class Scanner:
     def period_ns(self) -> int:
         """Time between scans [ns]."""
         return round(1e9 / self.rate)
+
+
+def scan_moments(scanners: Sequence[Scanner], duration_ns: int) -> tuple[IntArray, IntArray]:
+    """Stamps at which scanners scan, and which one does.
+
+    Parameters
+    ----------
+    scanners : the first begins at once, the others each a share of their period later: those of one rate take turns.
+    duration_ns : of the drive [ns].
+
+    Returns
+    -------
+    stamps_ns, scanners : (K,) arrays in order of time; of equal stamps the first scanner comes first.
+    """
+    begins = [round(index * scanner.period_ns / len(scanners)) for index, scanner in enumerate(scanners)]
+    stamps = [
+        np.arange(begin, duration_ns + 1, scanner.period_ns, dtype=np.int64)
+        for begin, scanner in zip(begins, scanners, strict=True)
+    ]
+    indices = np.repeat(np.arange(len(scanners)), [len(each) for each in stamps])
+    together = np.concatenate(stamps)
+    order = np.argsort(together, kind="stable")
+    return together[order], indices[order]

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from commission.planning.route_prediction import PlannedRoute, PredictionOptions, plan_route
-from commission.planning.visibility import VisibilityOptions, visibility_model
+from commission.planning.visibility import VisibilityOptions, visibility_models
 from commission.progress import Progress, silent
 from commission.site.floor_map import FloorMap
 from commission.site.parameters import Parameters
@@ -101,9 +101,9 @@ def plan_drives(inputs: DrivesInput, progress: Progress = silent, known: Planned
     if known is not None and known.inputs == inputs:
         return known
     progress(0.0, "sight of each reflector")
-    model = visibility_model(inputs, inputs.visibility)
+    models = visibility_models(inputs, inputs.visibility)
     planned: list[PlannedRoute] = []
     for number, route in enumerate(inputs.routes):
         progress(SEEING + (1.0 - SEEING) * number / len(inputs.routes), f"route {route.name}")
-        planned.append(plan_route(inputs, route.name, inputs.prediction, model))
+        planned.append(plan_route(inputs, route.name, inputs.prediction, models))
     return PlannedDrives(inputs, tuple(planned))

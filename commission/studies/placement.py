@@ -154,7 +154,7 @@ def _stretches(inputs: PlacementInput, unmet: tuple[Unmet, ...]) -> list[UnmetSt
     """Metres where demands do not hold, those in a row together, in the order of their routes."""
     found: list[UnmetStretch] = []
     for each in unmet:
-        drive = nominal_drive(inputs.route(each.route), inputs.vehicle, inputs.scanners[0])
+        drive = nominal_drive(inputs.route(each.route), inputs.vehicle, inputs.scanners)
         metres = np.array(each.metres)
         for stretch in np.split(metres, np.flatnonzero(np.diff(metres) > 1) + 1):
             first, last = int(stretch[0]), int(stretch[-1]) + 1

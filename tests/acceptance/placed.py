@@ -32,7 +32,7 @@ def demands_met_by(project: Project) -> Demands:
     model = visibility_model(project)
     visible, worst = [], np.zeros(3)
     for route in project.routes:
-        planned = plan_route(project, route.name, model=model)
+        planned = plan_route(project, route.name, models=[model])
         visible.append(int(planned.visible.counts().min()))
         everyone = np.arange(len(project.reflectors))
         for gone in (-1, *np.unique(planned.visible.indices).tolist()):

@@ -21,7 +21,7 @@ KEYS_WITH_REFERENCE = [
     *("anees", "anees_position", "wrong_while_operational"),
 ]
 ESTIMATES = "stamp_ns,x,y,theta,var_x,cov_xy,cov_xtheta,var_y,cov_ytheta,var_theta,mode,inliers,outliers"
-DETECTIONS = "stamp_ns,range,bearing,x,y,status,reflector_id,d2"
+DETECTIONS = "stamp_ns,range,bearing,x,y,status,reflector_id,d2,scanner"
 
 
 def rows(path):
@@ -34,7 +34,7 @@ def test_the_results_are_those_of_the_recording(commission, project, recording, 
     code, told, err = commission("localize", project, recording, "--out", out)
     assert (code, err) == (0, "")
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    assert list(summary) == [*KEYS, *KEYS_WITH_REFERENCE, "findings"]
+    assert list(summary) == [*KEYS, *KEYS_WITH_REFERENCE, "scanners", "findings"]
     assert summary["cycles"] == 61
     assert summary["duration_s"] == pytest.approx(12.0)
     assert summary["inliers"] + summary["outliers_association"] == 61 * 5
@@ -69,7 +69,11 @@ def test_without_a_reference_the_errors_are_left_out_and_the_route_says_where_it
     assert code == 0
     assert "start of the first route" in told
     assert "errors are unknown" in told
-    assert list(json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))) == [*KEYS, "findings"]
+    assert list(json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))) == [
+        *KEYS,
+        "scanners",
+        "findings",
+    ]
 
 
 @pytest.mark.parametrize("form", [["--initial-pose", "-0.1,0.1,-0.01"], ["--initial-pose=-0.1,0.1,-0.01,0.2,0.2,0.1"]])

@@ -42,7 +42,7 @@ class SmallCase:
         """Whether any layout of that many of the candidates meets the demands."""
         every = ReflectorMap(tuple(Reflector(id=f"C{i}", x=x, y=y) for i, (x, y) in enumerate(self.centers.tolist())))
         site = replace(self.project, reflectors=every)
-        planned = plan_route(site, ROUTE, model=visibility_model(site))
+        planned = plan_route(site, ROUTE, models=[visibility_model(site)])
         layouts = itertools.combinations(range(len(self.centers)), size)
         return any(self._holds(site, planned, chosen) for chosen in layouts)
 

@@ -31,7 +31,11 @@ def test_only_reflectors_close_to_each_other_are_named():
 
 def separations(planned, prediction, scan: int) -> np.ndarray:
     """(M, M) squared Mahalanobis distance of each reflector's expected observation from that of another; diagonal 0."""
-    pose, mounting, observation = planned.drive.poses[scan], planned.scanner.mounting, planned.parameters.observation
+    pose, mounting, observation = (
+        planned.drive.poses[scan],
+        planned.scanners[0].mounting,
+        planned.parameters.observation,
+    )
     centers, surveyed = planned.places[:, :2], np.sqrt(planned.places[:, 2])
     sigmas = observation.range_sigma, observation.bearing_sigma
     S = plain.innovation_covariances(pose, prediction.prior_covariances[scan], mounting, centers, sigmas, surveyed)

@@ -63,7 +63,7 @@ def test_prediction_equals_the_localizer_on_exact_records():
 
 def test_nominal_drive_rests_and_keeps_to_the_speed_of_the_route():
     project = open_field(LINE)
-    drive = nominal_drive(project.routes[0], project.vehicle, project.scanners[0], DrivePlan(rest=2.0))
+    drive = nominal_drive(project.routes[0], project.vehicle, project.scanners, DrivePlan(rest=2.0))
     seconds = drive.stamps_ns * 1e-9
     assert drive.length == pytest.approx(20.0)
     assert np.all(drive.metres[seconds <= 2.0] == 0.0)

@@ -48,7 +48,7 @@ def test_it_is_the_motion_that_is_planned_and_takes_its_time():
     route = Route("r", (line((0, 0), (4, 0)), line((4, 0), (1, 0), Direction.REVERSE)), speed=0.6)
     vehicle, plan = DifferentialVehicle(), DrivePlan()
     profile = route_profile(route, vehicle, plan.limits)
-    drive = nominal_drive(route, vehicle, Scanner(rate=100.0), plan)
+    drive = nominal_drive(route, vehicle, (Scanner(rate=100.0),), plan)
     rests = 2.0 * plan.rest + plan.pause
     assert profile.stops == 1
     assert profile.seconds + rests == pytest.approx(drive.stamps_ns[-1] * 1e-9, abs=0.02)

@@ -35,12 +35,13 @@ def squares_with(planned, prediction, worth: tuple[float, ...], start: tuple[flo
         read_only(planned.visible.offsets),
         read_only(planned.visible.indices),
         planned.places,
-        np.zeros(len(planned.places), np.int64),
+        np.zeros((1, len(planned.places)), np.int64),
+        planned.drive.scanners,
         prediction.prior_covariances,
         np.array(start),
         ErrorModel(
-            *(model.odometry, model.observation, noise, model.gate_d2, model.inside_gate, model.free_per_m),
-            *(planned.scanner.angle_min, planned.scanner.angle_increment),
+            *(model.odometry, model.observations, noise, model.gate_d2, model.inside_gate, model.free_per_m),
+            np.array([(each.angle_min, each.angle_increment) for each in planned.scanners]),
         ),
         squares,
     )
