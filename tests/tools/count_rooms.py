@@ -10,26 +10,27 @@ from __future__ import annotations
 
 import ast
 import sys
+import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 PACKAGE = "commission.app"
-APP = Path(__file__).parents[2] / "commission" / "app"
+REPOSITORY = Path(__file__).parents[2]
+APP = REPOSITORY / "commission" / "app"
 
 Order = Sequence[Sequence[str]]
 
-ORDER: Order = (
-    ("launch",),
-    ("page", "runtime"),
-    (
-        *("run", "tune", "floor_map", "exchange", "project", "problems"),
-        *("coverage", "prediction", "failures", "ambiguity", "placement"),
-    ),
-    ("editing",),
-    ("base",),
-)
-"""From the top to the bottom."""
+
+def order_of_contract() -> Order:
+    """The rows of the import contract `features`, from the top to the bottom."""
+    with (REPOSITORY / "pyproject.toml").open("rb") as file:
+        contracts = tomllib.load(file)["tool"]["importlinter"]["contracts"]
+    (features,) = [contract for contract in contracts if contract["id"] == "features"]
+    return [row.split(" | ") for row in features["layers"]]
+
+
+ORDER = order_of_contract()
 
 ORDER_BEFORE: Order = [
     [room]

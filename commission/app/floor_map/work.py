@@ -72,17 +72,14 @@ def read(effect: ReadMapFile, progress: Progress, reach: Reach = EVERYWHERE, sen
     """
     file = effect.file
     progress(0.0, "")
-    try:
+
+    def opened() -> Action:
         with _path_of(file) as path:
             if file.ending in MAP_ENDINGS:
                 return _read_map(effect, path, reach, sender)
             return MapOpened(file, _read(effect, path, progress), effect.reading)
-    except JobError:
-        raise
-    except FileFormatError as error:
-        return MapFailed(str(_as_named(error, file)))
-    except (CommissionError, ValueError) as error:
-        return MapFailed(f"{file.name}: {error}")
+
+    return _or_failed(file, opened)
 
 
 def draw(effect: DrawMap, progress: Progress) -> Action:
@@ -90,8 +87,13 @@ def draw(effect: DrawMap, progress: Progress) -> Action:
     draft, file = effect.draft, effect.draft.file
     notes = draft.read.warnings if isinstance(draft.read, Drawing) else ()
     progress(0.0, "")
+    return _or_failed(file, lambda: MapMade(file, _drawn(effect, progress), notes))
+
+
+def _or_failed(file: MapFile, make: Callable[[], Action]) -> Action:
+    """Return what is made of a file, or what a person can mend."""
     try:
-        return MapMade(file, _drawn(effect, progress), notes)
+        return make()
     except JobError:
         raise
     except FileFormatError as error:

@@ -1,1 +1,1 @@
-"""The drive that is localized: source, play clock, time line, plots, and what a cycle looks like on the floor."""
+"""The drive that is localized: source, virtual world, play clock, time line, plots, and each cycle on the floor."""
