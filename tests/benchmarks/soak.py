@@ -156,7 +156,7 @@ def soak(minutes: float) -> Measured:
     seconds = 60.0 * minutes
     command = [sys.executable, "-m", "tests.benchmarks.soak", "--readers-of", str(server.get_port())]
     readers = subprocess.Popen([*command, "--minutes", str(minutes)])
-    measured, editor = Measured(), Editor(tool=runtime, selected=server, point=project.routes[0].name)
+    measured, editor = Measured(), Editor(runtime, server, project.routes[0].name)
     started = time.monotonic()
     turn = 0
     while (now := time.monotonic() - started) < seconds:
