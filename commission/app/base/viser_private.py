@@ -10,6 +10,7 @@ import logging
 import uuid
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import replace
 from typing import Any, TypeVar
 
 import viser
@@ -17,6 +18,7 @@ from viser import (
     ClientHandle,
     GuiApi,
     GuiButtonHandle,
+    GuiEvent,
     GuiFormHandle,
     SceneApi,
     ViserServer,
@@ -66,21 +68,45 @@ class LoopEvent(asyncio.Event):
         super().set()
 
 
+class Said:
+    """A widget with the value that a person gave it, whatever has been written to it since."""
+
+    __slots__ = ("_widget", "value")
+
+    def __init__(self, widget: Any) -> None:
+        self._widget = widget
+        self.value = widget.value
+
+    def __getattr__(self, name: str) -> Any:
+        """Return anything else as the widget has it now."""
+        return getattr(self._widget, name)
+
+
+def _as_said(argument: Any) -> Any:
+    """Return an event with the value that came with it."""
+    if isinstance(argument, GuiEvent) and hasattr(argument.target, "value"):
+        return replace(argument, target=Said(argument.target))
+    return argument
+
+
 class Callbacks(ThreadPoolExecutor):
     """Runs the callbacks of widgets one after the other, so that what they post arrives as it was done.
 
-    viser runs them in 32 threads, in no order, and prints what they raise to the terminal.
+    viser runs them in 32 threads, in no order, and prints what they raise to the terminal. And it hands them the widget
+    itself: where the page, which does not know yet what a person did, writes what holds to it before a callback has
+    read it, that would be lost.
     """
 
     def __init__(self) -> None:
         super().__init__(max_workers=1, thread_name_prefix="callbacks")
 
     def submit(self, fn: Callable[..., Result], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """Queue a call; what it raises is logged."""
+        """Queue a call with what a person has said by now; what it raises is logged."""
+        said = tuple(_as_said(each) for each in args)
 
         def reporting() -> Result | None:
             try:
-                return fn(*args, **kwargs)
+                return fn(*said, **kwargs)
             except Exception as error:
                 report(error)
                 return None
