@@ -90,9 +90,10 @@ def _report(result: RunResult) -> list[str]:
         f"Detections   {result.count(Status.INLIER)} inliers, "
         f"{result.count(Status.OUTLIER_DETECTOR)} outliers of the detector, "
         f"{result.count(Status.OUTLIER_ASSOCIATION)} of the association",
-        f"NIS          mean {result.nis_mean:.2f} of the accepted ({result.nis_expected:.2f} is consistent), "
-        f"{result.nis_before_gate_mean:.2f} of all near a reflector; {100.0 * result.rejected_fraction:.1f} % rejected",
-        f"Unseen       {100.0 * result.unseen_fraction:.1f} % of the cycles without an accepted detection, "
+        f"NIS          mean {_known(result.nis_mean)} of the accepted ({result.nis_expected:.2f} is consistent), "
+        f"{_known(result.nis_before_gate_mean)} of all near a reflector; "
+        f"{_known(100.0 * result.rejected_fraction, 1)} % rejected",
+        f"Unseen       {_known(100.0 * result.unseen_fraction, 1)} % of the cycles without an accepted detection, "
         f"{result.longest_unseen:.1f} s at most",
         *_by_scanner(result),
         f"Supervisor   operational {100.0 * result.operational_fraction:.1f} %, lost "
@@ -111,6 +112,11 @@ def _report(result: RunResult) -> list[str]:
         f"Danger       {errors.wrong_while_operational} of {errors.compared} cycles operational with an error "
         f"beyond {limit * 1e3:.0f} mm",
     ]
+
+
+def _known(figure: float, digits: int = 2) -> str:
+    """A figure of detections, of which there may be none."""
+    return "unknown" if math.isnan(figure) else f"{figure:.{digits}f}"
 
 
 def _by_scanner(result: RunResult) -> list[str]:

@@ -251,3 +251,16 @@ def test_numbers_at_the_edge_of_sense_are_calculated_with(file, text, words, com
     assert (code, err) == (0, "")
     assert "Supervisor" in told
     json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+
+
+def test_figures_of_detections_are_unknown_where_there_are_none(commission, project, recording, tmp_path):
+    stamps = [row["stamp_ns"] for row in rows(recording / "detections.csv")]
+    nothing = ["stamp_ns,range,bearing", *(f"{stamp},," for stamp in dict.fromkeys(stamps))]
+    (recording / "detections.csv").write_text("\n".join(nothing) + "\n", encoding="utf-8")
+    code, told, _ = commission("localize", project, recording, "--out", tmp_path / "result")
+    assert code == 0
+    assert "mean unknown of the accepted" in told
+    assert "nan" not in told
+    summary = json.loads((tmp_path / "result" / "summary.json").read_text(encoding="utf-8"))
+    assert summary["nis_mean"] is None
+    assert summary["unseen_fraction"] == 1.0
