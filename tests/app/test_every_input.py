@@ -26,7 +26,6 @@ from commission.app.base.state import AppState
 from commission.app.base.view import view_of
 from commission.app.base.widget_values import problem_with
 from commission.app.coverage.settings import CoverageSettings
-from commission.app.editing import equipment_fields
 from commission.app.editing.actions import (
     ChooseTool,
     MirrorSelected,
@@ -38,6 +37,7 @@ from commission.app.editing.actions import (
     SetSelected,
 )
 from commission.app.editing.editor import ControlPoint, editor_of
+from commission.app.editing.scanner_fields import UNSEEN as NOT_YET
 from commission.app.editing.selection_panel import SelectionPanel
 from commission.app.editing.station_actions import SelectStation, SetStation
 from commission.app.editing.tool_panel import SnappingPanel
@@ -165,7 +165,7 @@ VEHICLES: dict[str, tuple[Vehicle, Row]] = {
         Row(label="Height [m]", read=vehicle("height"), allowed=(0.25, 2.5), refused=(2e9,)),
     ),
 }
-UNSEEN: frozenset[str] = getattr(equipment_fields, "UNSEEN", frozenset())
+UNSEEN: frozenset[str] = NOT_YET | {"name"}
 """Numbers of a scanner that stand in the project's file alone."""
 ROWS: dict[str, Row] = {f"scanners[0].{name}": row for name, row in SCANNER.items() if name not in UNSEEN} | {
     "given_heading": Row(

@@ -16,7 +16,7 @@ from commission.app.base.panel import clock, escaped, posting
 from commission.app.base.server import start_server
 from commission.app.base.state import AppState, LastEdit
 from commission.app.base.view import view_of
-from commission.app.editing.equipment_fields import source_html
+from commission.app.editing.scanner_fields import source_html
 from commission.app.page import Page
 from commission.app.project.top_bar import title
 from commission.app.run.actions import Seek

@@ -194,8 +194,21 @@ class SetVehicle(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class AddScanner(Action):
+    """Add a scanner like the last one, on the opposite corner of the vehicle."""
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveScanner(Action):
+    """Remove a scanner; the last one stays."""
+
+    name: str
+    """Its name."""
+
+
+@dataclass(frozen=True, slots=True)
 class SetScanner(Action):
-    """Use another scanner, or mount it elsewhere."""
+    """Use another scanner in the place of the one of the same name."""
 
     scanner: Scanner
     """The new one."""

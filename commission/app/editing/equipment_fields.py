@@ -1,58 +1,24 @@
-"""Inputs of the vehicle and of its scanner; common scanners are chosen from presets that name their sources."""
+"""Inputs of the vehicle and of its scanners."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import Any
 
-from viser import GuiApi, GuiEvent, GuiInputHandle
+from viser import GuiApi, GuiInputHandle
 
-from commission.app.base import actions as page_actions
-from commission.app.base.inputs import Inputs, show, write_html
-from commission.app.base.panel import BasePanel, Post, escaped, posting, write
+from commission.app.base.inputs import Inputs, show
+from commission.app.base.panel import BasePanel, Post, posting, write
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing import actions
+from commission.app.editing.scanner_fields import ScannerFields
 from commission.site.fields import field_info, get_field, names_of
-from commission.site.presets import SCANNERS, Origin, ScannerPreset, with_preset
 from commission.site.project import Project
-from commission.site.scanner import Scanner
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
 
 KINDS: dict[str, type[Vehicle]] = {
     kind.kind: kind for kind in (DifferentialVehicle, TricycleVehicle, OmnidirectionalVehicle)
-}
-OWN = "as entered"
-UNSEEN = frozenset(
-    {
-        "name",
-        "upside_down",
-        "blind_sectors_deg",
-        "beam_aperture",
-        "sweep_duration",
-        "sweep_direction",
-        "stamp_of",
-        "clock_offset",
-    }
-)
-"""Fields of a scanner that nothing acts upon yet."""
-
-
-FIGURES = {
-    "field_of_view_deg": "field of view",
-    "resolution_deg": "resolution",
-    "rate": "scans per s",
-    "range": "range",
-    "range_sigma": "range 1σ",
-    "bearing_sigma_deg": "bearing 1σ",
-    "beam_width_deg": "beam width",
-    "reflector_range": "reach for reflectors",
-}
-"""What the fields of the scanner are called in a sentence."""
-ORIGINS = {
-    Origin.DOCUMENT: "Read in the document",
-    Origin.QUOTED: "The maker's, as others quote it",
-    Origin.ASSUMED: "Ours, without a source; measure it",
 }
 LIKE = {"outline": "corners like 0.5 0.3, -0.5 0.3, -0.5 -0.3", "wheel_angles_deg": "angles like 0 120 240"}
 """How the lists of a vehicle are typed: numbers with blanks between, corners with commas between."""
@@ -85,20 +51,6 @@ def of_kind(vehicle: Vehicle, kind: str) -> Vehicle:
     return KINDS[kind](outline=vehicle.outline, height=vehicle.height)
 
 
-def source_html(preset: ScannerPreset | None) -> str:
-    """Say where the figures of a preset come from, and which ones are nobody's but ours."""
-    if preset is None:
-        return ""
-    origins = preset.origins()
-    lines = [
-        f"{text}: {', '.join(FIGURES[name] for name, its in origins.items() if its is origin)}."
-        for origin, text in ORIGINS.items()
-        if origin in origins.values()
-    ]
-    parts = "".join(f"<div style='padding-top:3px'>{escaped(line)}</div>" for line in (preset.source, *lines))
-    return f"<div class='c-note' style='padding:2px 6px'>{parts}</div>"
-
-
 class EquipmentFields(BasePanel):
     """The two folders."""
 
@@ -112,14 +64,7 @@ class EquipmentFields(BasePanel):
                 posting(post, lambda event: actions.SetVehicle(of_kind(self._project.vehicle, event.target.value)))
             )
             self._parts = self._add_vehicle()
-        with gui.add_folder("Scanner", expand_by_default=False):
-            names = (OWN, *(preset.name for preset in SCANNERS))
-            self._preset = gui.add_dropdown("Preset", names, hint="Figures of a common scanner; its mounting stays.")
-            self._preset.on_update(posting(post, self._from_preset))
-            self._source = gui.add_html("")
-            for name in names_of(Scanner):
-                if name not in UNSEEN:
-                    self._inputs.field(f"scanners[0].{name}", project)
+        self._scanners = ScannerFields(gui, post, project)
 
     def _add_vehicle(self) -> dict[str, GuiInputHandle[Any]]:
         """Add an input for each field of every kind, lists last; those of other kinds are hidden."""
@@ -142,11 +87,6 @@ class EquipmentFields(BasePanel):
         self._inputs.connect(name, widget, lambda text: list_value(info.name, str(text)), shown)
         return widget
 
-    def _from_preset(self, event: GuiEvent[Any]) -> page_actions.Action:
-        if event.target.value == OWN:
-            return actions.SetScanner(self._project.scanners[0])
-        return actions.SetScanner(with_preset(self._project.scanners[0], event.target.value))
-
     def draw_slowly(self, view: PageView) -> None:
         """Follow the project."""
         project = view.state.project
@@ -158,9 +98,7 @@ class EquipmentFields(BasePanel):
         for name, part in self._parts.items():
             show(part, visible=name in own)
         self._inputs.follow(view.state)
-        preset = next((p for p in SCANNERS if with_preset(project.scanners[0], p.name) == project.scanners[0]), None)
-        write(self._preset, OWN if preset is None else preset.name)
-        write_html(self._source, source_html(preset))
+        self._scanners.follow(view.state)
 
 
 def value_of(state: AppState, name: str) -> Any:

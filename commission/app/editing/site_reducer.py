@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +20,7 @@ from commission.site.editing import routes as edits
 from commission.site.fields import get_field, with_field
 from commission.site.layout_brief import LayoutBrief
 from commission.site.routes import Route, Segment
+from commission.site.scanner import Scanner
 
 EQUIPMENT = {"vehicle": "vehicle", "scanners": "scanner"}
 """Parts of a project that are equipment, and what each is called."""
@@ -157,10 +160,36 @@ def set_vehicle(action: actions.SetVehicle, state: AppState, sender: Sender) -> 
 
 @reduce.register
 def set_scanner(action: actions.SetScanner, state: AppState, sender: Sender) -> Outcome:
-    if action.scanner == state.project.scanners[0]:
+    before = state.project.scanners
+    scanners = tuple(action.scanner if each.name == action.scanner.name else each for each in before)
+    if scanners == before:
         return Outcome(state)
-    edit = Edit("change the scanner", sender, "scanner")
-    return Outcome(edited(state, replace(state.project, scanners=(action.scanner, *state.project.scanners[1:])), edit))
+    edit = Edit("change the scanner", sender, f"scanner {action.scanner.name}")
+    return Outcome(edited(state, replace(state.project, scanners=scanners), edit))
+
+
+@reduce.register
+def add_scanner(_action: actions.AddScanner, state: AppState, sender: Sender) -> Outcome:
+    before = state.project.scanners
+    taken = {each.name.casefold() for each in before}
+    name = next(name for number in itertools.count(2) if (name := f"scanner {number}") not in taken)
+    scanners = (*before, opposite(before[-1], name))
+    return Outcome(edited(state, replace(state.project, scanners=scanners), Edit(f"add {name}", sender)))
+
+
+@reduce.register
+def remove_scanner(action: actions.RemoveScanner, state: AppState, sender: Sender) -> Outcome:
+    scanners = tuple(each for each in state.project.scanners if each.name != action.name)
+    if not scanners:
+        raise UsageError(f"{action.name!r} is the only scanner; expected another one to stay")
+    return Outcome(edited(state, replace(state.project, scanners=scanners), Edit(f"remove {action.name}", sender)))
+
+
+def opposite(scanner: Scanner, name: str) -> Scanner:
+    """Return a scanner like another on the opposite corner of the vehicle, facing the other way."""
+    x, y, heading = scanner.mounting.tolist()
+    turned = heading - math.pi if heading > 0.0 else heading + math.pi
+    return replace(scanner, name=name, mounting=np.array([-x, -y, turned]))
 
 
 @reduce.register

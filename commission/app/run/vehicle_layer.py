@@ -83,7 +83,7 @@ class VehicleLayer(BaseLayer):
         self._scanner = scene.add_frame("/vehicle/scanner", axes_length=0.15, axes_radius=0.008, origin_radius=0.02)
 
     def show_site(self, project: Project) -> None:
-        """Draw the outline and the scanner's place on the vehicle."""
+        """Draw the outline, the place of the first scanner, and the field of view of each."""
         self._project = project
         outline = np.array(project.vehicle.outline)
         sides = outline_segments(outline[np.newaxis], theme.Height.VEHICLE)
@@ -94,8 +94,10 @@ class VehicleLayer(BaseLayer):
         self._scanner.wxyz = yaw_quaternion(heading)
         size = float(np.abs(outline).max())
         self._scanner.axes_length = 0.3 * size
-        for node, radius in ((self._near, NEAR_FAN * size), (self._far, reach_of(project.scanners[0]))):
-            node.points = stroke_segments(fan(project.scanners[0], radius), theme.Height.GRID)
+        near = [fan(scanner, NEAR_FAN * size) for scanner in project.scanners]
+        far = [fan(scanner, reach_of(scanner)) for scanner in project.scanners]
+        for node, fans in ((self._near, near), (self._far, far)):
+            node.points = stroke_segments(np.concatenate(fans), theme.Height.GRID)
         if not self._drives:
             self._wait(project)
 
