@@ -348,7 +348,7 @@ def test_a_bar_of_several_metres_shows_the_worst_of_them(
     chances = rng.uniform(0.0, 0.5, 300)
     risk = RiskView(reflector="A", neighbor="B", chance=0.5, metres=(3,), points=np.zeros((1, 2)), worst=(1.0, 2.0))
     chart(
-        replace(expected_route, metres=metres, errors=errors, loads=alone, risk=chances, risks=(risk,)),
+        replace(expected_route, metres=metres, errors=errors, limit_shares=alone, risk=chances, risks=(risk,)),
         None,
     )
     bars = {title: track.levels.tolist() for title, track in drawn.items()}
