@@ -53,11 +53,11 @@ def state() -> AppState:
 
 
 def test_its_action_changes_what_the_feature_keeps(order: Any, state: AppState) -> None:
-    after = reduce(order.actions.SetSpares(0.5), state, Sender()).state
+    after = reduce(order.actions.SetOrder("spares", 0.5), state, Sender()).state
     assert state.part(order.state.Order).spares == 0.1
     assert after.part(order.state.Order).spares == 0.5
-    with pytest.raises(ValueError, match="spares are 150 %; expected 0 to 100 %"):
-        reduce(order.actions.SetSpares(1.5), state, Sender())
+    with pytest.raises(ValueError, match=r"spares is 1\.5; expected 0 to 1"):
+        reduce(order.actions.SetOrder("spares", 1.5), state, Sender())
 
 
 def test_its_panel_posts_what_is_moved_and_shows_what_it_comes_to(order: Any, state: AppState) -> None:
@@ -65,13 +65,15 @@ def test_its_panel_posts_what_is_moved_and_shows_what_it_comes_to(order: Any, st
     try:
         actions: list[Action] = []
         panel = order.order_panel.OrderPanel(server.gui, taking(actions))
-        panel._spares._impl.value = 50
+        assert (panel._spares.label, panel._spares.value) == ("Spares [%]", 10.0)
+        panel._spares._impl.value = 50.0
         for callback in panel._spares._impl.update_cb:
             callback(SimpleNamespace(client=SimpleNamespace(client_id=1), client_id=1, target=panel._spares))
-        assert actions == [order.actions.SetSpares(0.5)]
+        assert actions == [order.actions.SetOrder("spares", 0.5)]
         count = len(state.project.reflectors)
         assert count > 1
         panel.draw_slowly(view_of(state.with_part(replace(order.state.Order(), spares=0.5))))
+        assert panel._spares.value == 50.0
         assert panel._text.content == f"{count} reflectors and {-(-count // 2)} spare ones"
     finally:
         server.stop()

@@ -120,6 +120,16 @@ class Shown:
     scale: float
     """Number of these in one unit of the file."""
 
+    def text(self, value: float, form: str = ".0f") -> str:
+        """Return a value as it is written: number and unit.
+
+        Parameters
+        ----------
+        value : in the unit of code and files.
+        form : how Python formats the number: `.1f`, `.4g`.
+        """
+        return _joined(f"{value * self.scale:{form}}", self.unit)
+
 
 MILLIMETRES = Shown("mm", 1000.0)
 DEGREES = Shown("°", math.degrees(1.0))
@@ -180,6 +190,11 @@ class Quantity:
     def text(self, value: float) -> str:
         """Return a value as the page writes it: number, with the decimals of its step, and unit."""
         return _joined(f"{value * self.scale:.{_decimals(self.step)}f}", self.shown_unit)
+
+    def change_text(self, before: float, after: float) -> str:
+        """Return how a value changes, `1.250 → 1.275 m`; empty: by less than the last digit."""
+        old, new = (f"{value * self.scale:.{_decimals(self.step)}f}" for value in (before, after))
+        return "" if old == new else f"{old} → {_joined(new, self.shown_unit)}"
 
     def brief(self, value: float) -> str:
         """Return a value as the page writes it where room is scarce: with no digit that says nothing."""

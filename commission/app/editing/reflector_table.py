@@ -16,7 +16,7 @@ from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
 from commission.app.editing import actions
 from commission.app.editing.editor import Editor
-from commission.site.quantity import Bounds, Quantity
+from commission.site.quantity import MILLIMETRES, Bounds, Quantity
 from commission.site.reflectors import Reflector
 
 ROWS = 40
@@ -43,7 +43,8 @@ def row_text(reflector: Reflector) -> str:
     """Return a reflector on one line."""
     kind = "" if reflector.kind.value == "cylinder" else "  flat"
     rest = "  ".join(text for text in (reflector.layer, "locked" if reflector.locked else "") if text)
-    return f"{reflector.id}   {reflector.x:.3f}  {reflector.y:.3f} m   r {reflector.radius * 1000:.0f} mm{kind}  {rest}"
+    radius = MILLIMETRES.text(reflector.radius)
+    return f"{reflector.id}   {reflector.x:.3f}  {reflector.y:.3f} m   r {radius}{kind}  {rest}"
 
 
 class ReflectorTable(BasePanel):

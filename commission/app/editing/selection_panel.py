@@ -21,6 +21,7 @@ from commission.app.editing.route_fields import RouteFields
 from commission.app.editing.site_tools import measurement
 from commission.app.editing.station_fields import StationFields
 from commission.site.fields import get_field, names_of
+from commission.site.quantity import DEGREES
 from commission.site.reflectors import Reflector, ReflectorKind
 
 ALONE = ("id", "x", "y")
@@ -134,7 +135,7 @@ def _head(editor: Editor, reflectors: tuple[Reflector, ...]) -> str:
     if found is not None:
         rows += [
             ("Distance", f"{found.distance:.3f} m"),
-            ("Bearing", f"{math.degrees(found.bearing):.2f} °"),
+            ("Bearing", DEGREES.text(found.bearing, ".2f")),
             ("dx, dy", f"{found.dx:.3f}, {found.dy:.3f} m"),
         ]
     if editor.last_click is not None and not reflectors:

@@ -21,6 +21,7 @@ from commission.app.editing.tool import Label, Tool
 from commission.geometry.arrays import FloatArray
 from commission.site.editing import reflectors as edits
 from commission.site.editing import routes as route_edits
+from commission.site.quantity import DEGREES
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +110,7 @@ class MeasureTool(Tool):
         found = self.measurement()
         if found is None:
             return ()
-        text = f"{found.distance:.3f} m, {math.degrees(found.bearing):.1f}°"
+        text = f"{found.distance:.3f} m, {DEGREES.text(found.bearing, '.1f')}"
         (x0, y0), (x1, y1) = self.points
         middle = (0.5 * (x0 + x1), 0.5 * (y0 + y1))
         return ((f"{text}  (dx {found.dx:.3f} m, dy {found.dy:.3f} m)", middle),)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from viser import GuiApi
 
 from commission.app.base.panel import BasePanel, escaped
@@ -13,6 +11,7 @@ from commission.app.editing.editor import Editor, editor_of
 from commission.app.editing.gestures import moved, selected_of
 from commission.app.editing.station_gestures import moved_station
 from commission.site.project import Project
+from commission.site.quantity import DEGREES
 
 
 def hint(state: AppState, browser: int) -> str:
@@ -27,7 +26,7 @@ def _dragging(project: Project, editor: Editor) -> str:
     """Say where what is being dragged would come to lie."""
     station = moved_station(project, editor)
     if station is not None:
-        heading = f"{math.degrees(station.heading):.1f}°"
+        heading = DEGREES.text(station.heading, ".1f")
         return f"{escaped(station.name)} to x {station.x:.3f} m, y {station.y:.3f} m, heading {heading}"
     selected = selected_of(project, editor)
     if editor.drag is None or len(selected) == 0:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
 from commission.app.base.panel import escaped
 from commission.app.exchange.preview import Preview
 from commission.geometry.angles import wrap_scalar
+from commission.site.fields import field_info, get_field
 from commission.site.network_diff import course_shift, length_of
+from commission.site.quantity import DEGREES, MILLIMETRES
 from commission.site.reflector_diff import ReflectorChange
 from commission.site.reflectors import Reflector
 from commission.site.routes import Route
@@ -24,38 +25,31 @@ TEXT_LIMIT = 160
 
 T = TypeVar("T")
 
-_NUMBERS = {
-    "x": (1.0, 3, "m"),
-    "y": (1.0, 3, "m"),
-    "radius": (1000.0, 1, "mm"),
-    "heading": (math.degrees(1.0), 1, "°"),
-    "height": (1.0, 3, "m"),
-    "sigma": (1000.0, 1, "mm"),
-}
-"""Factor, digits and unit with which a value of a reflector is shown."""
-
 
 def reflector_line(reflector: Reflector) -> str:
     """Return a reflector as one line of a list."""
-    return f"{reflector.id}: {reflector.x:.3f}, {reflector.y:.3f} m, r {1000.0 * reflector.radius:.0f} mm"
+    return f"{reflector.id}: {reflector.x:.3f}, {reflector.y:.3f} m, r {MILLIMETRES.text(reflector.radius)}"
 
 
 def reflector_changes(change: ReflectorChange) -> str:
     """Say which values change: `R1: x 1.250 → 1.275 m`."""
     said = [_value_change(name, change) for name in change.fields]
     if change.moved >= 0.0005:
-        said.append(f"moves {1000.0 * change.moved:.0f} mm")
+        said.append(f"moves {MILLIMETRES.text(change.moved)}")
     return f"{change.before.id}: {', '.join(said)}"
 
 
+def _number_change(name: str, before: object, after: object) -> str:
+    """Say how a number changes, with the unit and digits of its field."""
+    quantity = field_info(before, name).quantity
+    text = "" if quantity is None else quantity.change_text(get_field(before, name), get_field(after, name))
+    return f"{name} {text or 'by less than the last digit'}"
+
+
 def _value_change(name: str, change: ReflectorChange) -> str:
-    before, after = getattr(change.before, name), getattr(change.after, name)
-    if name in _NUMBERS:
-        scale, digits, unit = _NUMBERS[name]
-        shown = tuple(f"{value * scale:.{digits}f}" for value in (before, after))
-        if shown[0] == shown[1]:
-            return f"{name} by less than the last digit"
-        return f"{name} {shown[0]} → {shown[1]} {unit}"
+    if field_info(change.before, name).quantity is not None:
+        return _number_change(name, change.before, change.after)
+    before, after = get_field(change.before, name), get_field(change.after, name)
     if isinstance(before, bool):
         before, after = ("yes" if value else "no" for value in (before, after))
     return f"{name} {before or '(none)'} → {after or '(none)'}"
@@ -75,9 +69,10 @@ def route_changes(before: Route, after: Route) -> str:
     if lengths[0] != lengths[1]:
         said.append(f"length {lengths[0]} → {lengths[1]} m")
     pairs = list(zip(before.segments, after.segments, strict=False))
-    shift = 1000.0 * max(course_shift(old, new) for old, new in pairs)
+    shift = max(course_shift(old, new) for old, new in pairs)
     if shift > 0.0:
-        said.append(f"course moves by {'less than 1' if shift < 0.5 else f'up to {shift:.0f}'} mm")
+        is_seen = MILLIMETRES.text(shift) != MILLIMETRES.text(0.0)
+        said.append(f"course moves by {f'up to {MILLIMETRES.text(shift)}' if is_seen else 'less than 1 mm'}")
     turned = sum(old.direction is not new.direction for old, new in pairs)
     if turned:
         said.append(f"{turned} segments change between forward and reverse")
@@ -88,18 +83,14 @@ def route_changes(before: Route, after: Route) -> str:
 
 def station_line(station: Station) -> str:
     """Return a station as one line of a list."""
-    return f"{station.name}: {station.x:.3f}, {station.y:.3f} m, {math.degrees(station.heading):.1f}°"
+    return f"{station.name}: {station.x:.3f}, {station.y:.3f} m, {DEGREES.text(station.heading, '.1f')}"
 
 
 def station_changes(before: Station, after: Station) -> str:
     """Say what differs between two stations."""
-    said = [
-        f"{axis} {getattr(before, axis):.3f} → {getattr(after, axis):.3f} m"
-        for axis in ("x", "y")
-        if getattr(before, axis) != getattr(after, axis)
-    ]
+    said = [_number_change(name, before, after) for name in ("x", "y") if getattr(before, name) != getattr(after, name)]
     if wrap_scalar(after.heading - before.heading) != 0.0:
-        said.append(f"heading {math.degrees(before.heading):.1f} → {math.degrees(after.heading):.1f}°")
+        said.append(_number_change("heading", before, after))
     return f"{after.name}: {', '.join(said) or 'written otherwise'}"
 
 

@@ -18,7 +18,7 @@ from commission.app.editing.tool import Label, Tool
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
 from commission.site.editing.alignment import DOUBTFUL, Alignment, KnownPoint, align, aligned
-from commission.site.quantity import COORDINATE, Quantity, Words
+from commission.site.quantity import COORDINATE, MILLIMETRES, PERCENT, Quantity, Words
 
 LETTERS = "AB"
 
@@ -106,9 +106,9 @@ def align_map(state: AppState, sender: Sender) -> Outcome:
     project = aligned(state.project, found, everything=tool.everything)
     names = " and ".join(point.name or letter for letter, point in zip(LETTERS, tool.known, strict=True))
     after = edited(with_tool(state, sender, None), project, Edit(f"align to {names}", sender))
-    text = f"aligned to {names}, each {abs(500.0 * found.residual):.0f} mm off"
+    text = f"aligned to {names}, each {MILLIMETRES.text(abs(0.5 * found.residual))} off"
     if found.share > DOUBTFUL:
-        text += f"; that is {100.0 * found.share:.1f} % of their distance: look at the points and their numbers"
+        text += f"; that is {PERCENT.text(found.share, '.1f')} of their distance: look at the points and their numbers"
     if tool.everything:
         text += "; a drive that was loaded before is in the old coordinates: start it again"
     told = Tell(text, failed=found.share > DOUBTFUL)

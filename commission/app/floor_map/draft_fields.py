@@ -23,6 +23,7 @@ from commission.io.dxf_units import UNITS
 from commission.io.image_map import Picture
 from commission.io.mesh import Model
 from commission.site.fields import field_hints, field_info, get_field
+from commission.site.quantity import MILLIMETRES
 
 OPTIONS = MapOptions()
 """What the widgets begin with."""
@@ -82,7 +83,7 @@ def facts(draft: MapDraft) -> list[tuple[str, str]]:
             else:
                 edge = placement.resolution
                 rows += [
-                    ("Pixel", f"{1000 * edge:.4g} mm"),
+                    ("Pixel", MILLIMETRES.text(edge, ".4g")),
                     ("Measures", f"{width * edge:.1f} x {height * edge:.1f} m"),
                 ]
     return rows

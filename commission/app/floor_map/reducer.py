@@ -32,6 +32,7 @@ from commission.io.image_map import Picture
 from commission.io.mesh import Model
 from commission.site.fields import with_field
 from commission.site.project import Project
+from commission.site.quantity import MILLIMETRES
 
 
 @reduce.register
@@ -170,7 +171,8 @@ def align_map(_action: actions.AlignMap, state: AppState, sender: Sender) -> Out
 @reduce.register
 def map_made(action: actions.MapMade, state: AppState, sender: Sender) -> Outcome:
     width, height = action.floor_map.size
-    said = f"{action.file.name}: {width:.1f} x {height:.1f} m, cells of {1000 * action.floor_map.resolution:.4g} mm"
+    cell = MILLIMETRES.text(action.floor_map.resolution, ".4g")
+    said = f"{action.file.name}: {width:.1f} x {height:.1f} m, cells of {cell}"
     project = replace(state.project, floor_map=action.floor_map)
     edit = Edit(f"load floor map {action.file.name}", sender)
     loaded = edited(state, project, edit).with_part(MapLoading(notes=(said, *action.notes)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Literal
 
 from viser import GuiApi, GuiEvent
@@ -23,6 +22,7 @@ from commission.app.floor_map.pen import MapPen
 from commission.app.floor_map.tools import EraseTool, ObstacleTool, WallTool
 from commission.site.editing.alignment import DOUBTFUL, WRONG
 from commission.site.fields import field_info, get_field
+from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
 
 FREE, UNKNOWN = "free", "unknown"
 MAP_ONLY, EVERYTHING = "the map alone", "what is on it, too"
@@ -134,17 +134,18 @@ def alignment_text(tool: AlignTool) -> str:
         missing = f"click {LETTERS[len(tool.known)]}" if len(tool.known) < 2 else "they are too close to each other"
         return f"{table(clicked)}<div class='c-note'>Points: {missing}</div>"
     color = "#ff8a80" if found.share > WRONG else "#ffb74d" if found.share > DOUBTFUL else "inherit"
-    residual = f"<span style='color:{color}'>{1000.0 * found.residual:+.0f} mm ({100.0 * found.share:.2f} %)</span>"
+    difference = f"{MILLIMETRES.text(found.residual, '+.0f')} ({PERCENT.text(found.share, '.2f')})"
+    residual = f"<span style='color:{color}'>{difference}</span>"
     rows = [
         ("Difference", residual),
         ("A to B, map", f"{found.on_map:.3f} m"),
         ("A to B, plant", f"{found.in_plant:.3f} m"),
-        ("Turns by", f"{math.degrees(float(found.T_plant_map[2])):.3f} °"),
+        ("Turns by", DEGREES.text(float(found.T_plant_map[2]), ".3f")),
         *clicked,
     ]
     note = ""
     if found.share > WRONG:
-        note = f"More than {100.0 * WRONG:g} %: a wrong point, number or scale."
+        note = f"More than {PERCENT.text(WRONG, 'g')}: a wrong point, number or scale."
     elif found.share > DOUBTFUL:
-        note = f"More than {100.0 * DOUBTFUL:g} %: look at the points and their numbers."
+        note = f"More than {PERCENT.text(DOUBTFUL, 'g')}: look at the points and their numbers."
     return f"{table(rows)}<div class='c-note'>{note}</div>"

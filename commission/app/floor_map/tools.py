@@ -16,7 +16,7 @@ from commission.app.editing.drawing_tools import DrawingTool, area_dragged
 from commission.app.editing.editor import with_tool
 from commission.app.editing.tool import Tool
 from commission.app.floor_map.draft import MapLoading
-from commission.app.floor_map.pen import MapPen
+from commission.app.floor_map.pen import THICKNESS, MapPen
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
 from commission.site.editing.floor_map import draw_obstacle, draw_wall, fill
@@ -117,7 +117,7 @@ class WallTool(ShapeTool):
 
     def hint(self, state: AppState, browser: int) -> str:
         """Say how thick the wall is, and how many points there are."""
-        thickness = f"{1000.0 * state.of_browser(browser, MapPen).thickness:g} mm thick"
+        thickness = f"{THICKNESS.brief(state.of_browser(browser, MapPen).thickness)} thick"
         return f"Wall, {thickness}: click its points{self.so_far()} &nbsp; (Esc ends)"
 
     def sketch(self, state: AppState, browser: int) -> list[FloatArray]:

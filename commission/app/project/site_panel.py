@@ -7,6 +7,7 @@ from viser import GuiApi
 from commission.app.base.panel import BasePanel, escaped, table
 from commission.app.base.view import PageView
 from commission.site.project import Project
+from commission.site.quantity import MILLIMETRES
 
 
 def rows(project: Project) -> list[tuple[str, str]]:
@@ -20,7 +21,7 @@ def rows(project: Project) -> list[tuple[str, str]]:
         width, height = floor_map.size
         shown += [
             ("Floor map", f"{width:.1f} x {height:.1f} m"),
-            ("Cell", f"{floor_map.resolution * 1000:.0f} mm"),
+            ("Cell", MILLIMETRES.text(floor_map.resolution)),
         ]
     shown += [
         ("Reflectors", str(len(project.reflectors))),

@@ -34,7 +34,7 @@ def test_changed_values_are_said_from_to_in_the_units_that_people_read() -> None
     before = Reflector(id="R1", x=1.25, y=2.0, heading=0.0)
     after = replace(before, x=1.275, radius=0.05, heading=math.pi / 2, note="pillar", locked=True)
     assert reflector_changes(ReflectorChange(before, after)) == (
-        "R1: x 1.250 → 1.275 m, radius 40.0 → 50.0 mm, heading 0.0 → 90.0 °, note (none) → pillar, "
+        "R1: x 1.250 → 1.275 m, radius 40.0 → 50.0 mm, heading 0.00 → 90.00°, note (none) → pillar, "
         "locked no → yes, moves 25 mm"
     )
 
@@ -76,5 +76,5 @@ def test_changes_of_a_route_are_said() -> None:
 def test_changes_of_a_station_are_said() -> None:
     before = Station(name="Dock", x=1.0, y=2.0)
     assert station_changes(before, replace(before, x=1.5, heading=math.pi / 2)) == (
-        "Dock: x 1.000 → 1.500 m, heading 0.0 → 90.0°"
+        "Dock: x 1.000 → 1.500 m, heading 0.00 → 90.00°"
     )
