@@ -197,6 +197,8 @@ class _Replay:
                     return
                 self._digests = tuple((str(name), str(digest)) for name, digest in entry["on_disk"])
             self._saving = bool(entry.get("saving", self._saving))
+            if not isinstance(entry.get("change", {}), dict):
+                raise TypeError("a change is no table of what is changed")
             if "change" in entry and self._make(entry["change"], place.number) and "what" in entry:
                 self._what, self._at = str(entry["what"]), datetime.fromtimestamp(float(entry["at"]))
                 self._edits += bool(entry["change"])

@@ -73,14 +73,19 @@ class Measured:
 
 
 def read(port: int, seconds: float) -> None:
-    """Be 20 browsers that come, read for some seconds, and go; in a process of its own."""
+    """Be 20 browsers that come, read for some seconds, and go, until the server is gone; in a process of its own."""
     end = time.monotonic() + seconds
 
     def come_and_go(seed: int) -> None:
         chance = random.Random(seed)
         while time.monotonic() < end:
-            with suppress(OSError, WebSocketException, TimeoutError):
+            try:
                 reader = RawClient(Address(port))  # type: ignore[arg-type]
+            except ConnectionRefusedError:
+                return
+            except (OSError, WebSocketException, TimeoutError):
+                continue
+            with suppress(OSError, WebSocketException, TimeoutError):
                 leaves_at = min(end, time.monotonic() + chance.uniform(2.0, 20.0))
                 try:
                     while time.monotonic() < leaves_at:
@@ -166,7 +171,7 @@ def soak(minutes: float) -> Measured:
         measured.latencies.append(editor.edit())
         if turn % 3 == 0:
             editor.undo()
-        if turn % 20 == 0:
+        if turn % 20 == 2:
             editor.start_and_stop_a_job()
             measured.jobs += 1
             runtime.post(Play(playing=True))

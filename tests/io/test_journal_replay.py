@@ -92,6 +92,20 @@ def test_what_a_lost_line_makes_impossible_is_told_and_the_rest_of_the_edit_is_m
     assert "line 3 is damaged or missing; line 4 is intact, but not possible without what is lost" in restored.damage
 
 
+@pytest.mark.parametrize("change", [None, 5, True, "5", [5]])
+def test_a_line_whose_change_is_none_is_told_and_the_others_are_made(
+    tmp_path: Path, journal: Written, change: object
+) -> None:
+    lines = journal.content.splitlines(keepends=True)
+    odd = signed({"line": len(lines), "change": change, "what": "odd", "at": 0.0})
+    (tmp_path / FILE_NAME).write_bytes(b"".join(lines[:-1]) + odd)
+    restored = restore(tmp_path, journal.project)
+    assert restored is not None
+    assert restored.project.name == f"edit {EDITS - 1}"
+    assert f"line {len(lines)} is intact, but not possible" in restored.damage
+    assert restored.kept is not None
+
+
 @pytest.mark.parametrize("content", [b"", b"\n", b"no journal at all", bytes(5000)])
 def test_a_file_that_is_no_journal_is_put_aside_and_told_once(tmp_path: Path, journal: Written, content: bytes) -> None:
     restored = check_restored(tmp_path, journal, content)

@@ -1,0 +1,24 @@
+"""The soak, for seconds: it has to be able to run when somebody takes half an hour for it."""
+
+from __future__ import annotations
+
+import socket
+import time
+
+from tests.benchmarks.soak import read, soak
+
+
+def test_drive_is_edited_and_read_and_a_job_is_stopped() -> None:
+    found = soak(0.1)
+    assert len(found.latencies) == len(found.memory) >= 2
+    assert max(found.latencies) < 20.0  # the time after which an edit counts as lost
+    assert found.jobs == 1
+    assert len(found.readers) > 1
+
+
+def test_readers_go_when_the_server_is_gone() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    started = time.monotonic()
+    read(port, 60.0)
+    assert time.monotonic() - started < 30.0
