@@ -12,15 +12,20 @@ from commission.compiled import compiled, compiled_parallel, parallel_range
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.localization.detector import (
     INLIER,
-    Beams,
+    BeamColumns,
     DetectorModel,
+    beams_at,
     beams_of,
     count_clusters,
     detect_clusters,
     reflective_beams,
 )
 from commission.localization.setup import LocalizerSetup
-from commission.site.record_log import RecordLog, ScanLog
+from commission.site.record_log import RecordLog
+from commission.site.record_store import ScanLog
+
+SCANS_AT_ONCE = 4096
+"""Scans that are in memory at once: 9 MB of ranges of 541 beams."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -132,7 +137,7 @@ def detect_log(scans: ScanLog, setup: LocalizerSetup, *, scanner: int = 0, paral
     ranges = read_only(np.asarray(scans.ranges, dtype=np.float32))
     threshold = setup.parameters.detector.intensity_threshold
     flags = reflective_beams(ranges, scans.intensities, scans.reflector, threshold)
-    beams = beams_of(ranges.shape[1], scans.angle_min, scans.angle_increment)
+    beams = beams_of(scans.beams, scans.angle_min, scans.angle_increment)
     count, fill = (_count_parallel, _fill_parallel) if parallel else (_count, _fill)
     offsets = np.concatenate(([0], np.cumsum(count(ranges, flags, beams, model))))
     total = int(offsets[-1])
@@ -157,7 +162,10 @@ def _in_scans(log: RecordLog, setup: LocalizerSetup, cycles: tuple[int, int], *,
             # Of one scanner, scans are delivered in the order in which they stand.
             first, last = int(numbers[where[0]]) - start, int(numbers[where[-1]]) - start + 1
             scanner = int(indices[scans.scanner])
-            parts.append(detect_log(scans.between(first, last), setup, scanner=scanner, parallel=parallel))
+            blocks = (
+                scans.block(begin, min(begin + SCANS_AT_ONCE, last)) for begin in range(first, last, SCANS_AT_ONCE)
+            )
+            parts.append(joined([detect_log(each, setup, scanner=scanner, parallel=parallel) for each in blocks]))
             places.append(where)
         start += len(scans)
     return _interleaved(parts, places)
@@ -236,20 +244,22 @@ def _log(  # noqa: PLR0917 - the columns of the log
 
 
 @compiled
-def _count(ranges: NDArray[np.float32], flags: BoolArray, beams: Beams, model: DetectorModel) -> IntArray:
+def _count(ranges: NDArray[np.float32], flags: BoolArray, beams: BeamColumns, model: DetectorModel) -> IntArray:
     """(K,) clusters in each scan."""
     counts = np.empty(len(ranges), dtype=np.int64)
     for k in range(len(ranges)):
-        counts[k] = count_clusters(ranges[k], flags[k], beams, model)
+        counts[k] = count_clusters(ranges[k], flags[k], beams_at(beams, k), model)
     return counts
 
 
 @compiled_parallel
-def _count_parallel(ranges: NDArray[np.float32], flags: BoolArray, beams: Beams, model: DetectorModel) -> IntArray:
+def _count_parallel(
+    ranges: NDArray[np.float32], flags: BoolArray, beams: BeamColumns, model: DetectorModel
+) -> IntArray:
     """`_count` on all cores."""
     counts = np.empty(len(ranges), dtype=np.int64)
     for k in parallel_range(len(ranges)):
-        counts[k] = count_clusters(ranges[k], flags[k], beams, model)
+        counts[k] = count_clusters(ranges[k], flags[k], beams_at(beams, k), model)
     return counts
 
 
@@ -257,7 +267,7 @@ def _count_parallel(ranges: NDArray[np.float32], flags: BoolArray, beams: Beams,
 def _fill(  # noqa: PLR0917 - the columns of the log
     ranges: NDArray[np.float32],
     flags: BoolArray,
-    beams: Beams,
+    beams: BeamColumns,
     model: DetectorModel,
     offsets: IntArray,
     range_bearing: FloatArray,
@@ -266,14 +276,14 @@ def _fill(  # noqa: PLR0917 - the columns of the log
 ) -> None:
     """Write the clusters of every scan to its rows."""
     for k in range(len(ranges)):
-        detect_clusters(ranges[k], flags[k], beams, model, int(offsets[k]), range_bearing, widths, status)
+        detect_clusters(ranges[k], flags[k], beams_at(beams, k), model, int(offsets[k]), range_bearing, widths, status)
 
 
 @compiled_parallel
 def _fill_parallel(  # noqa: PLR0917 - the columns of the log
     ranges: NDArray[np.float32],
     flags: BoolArray,
-    beams: Beams,
+    beams: BeamColumns,
     model: DetectorModel,
     offsets: IntArray,
     range_bearing: FloatArray,
@@ -282,4 +292,4 @@ def _fill_parallel(  # noqa: PLR0917 - the columns of the log
 ) -> None:
     """`_fill` on all cores."""
     for k in parallel_range(len(ranges)):
-        detect_clusters(ranges[k], flags[k], beams, model, int(offsets[k]), range_bearing, widths, status)
+        detect_clusters(ranges[k], flags[k], beams_at(beams, k), model, int(offsets[k]), range_bearing, widths, status)

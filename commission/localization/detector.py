@@ -63,6 +63,15 @@ class Beams(NamedTuple):
     """Whether the last beam is the first one's neighbor."""
 
 
+class BeamColumns(NamedTuple):
+    """`Beams` of many scans, a row for each."""
+
+    used: IntArray
+    angle_min: FloatArray
+    increment: FloatArray
+    full_turn: BoolArray
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class DetectedReflectors:
     """Clusters of one scan, those that the detector filter rejects included."""
@@ -102,24 +111,33 @@ def detector_model(reflectors: ReflectorMap, scanner: Scanner, parameters: Detec
     )
 
 
-def beams_of(count: int, angle_min: float, increment: float) -> Beams:
-    """Return the bearings of a scan for the kernels.
+def beams_of(counts: IntArray, angle_min: FloatArray, increments: FloatArray) -> BeamColumns:
+    """Return the bearings of scans for the kernels.
 
     Parameters
     ----------
-    count : beams of a scan.
-    angle_min, increment : first bearing and step between beams [rad].
+    counts : (K,) beams of each scan.
+    angle_min, increments : (K,) first bearing and step between beams of each scan [rad].
 
     Raises
     ------
     ValueError
-        the beams do not advance.
+        the beams of a scan do not advance.
     """
-    if not (math.isfinite(angle_min) and math.isfinite(increment) and increment != 0.0):
-        raise ValueError(f"scan starts at {angle_min} rad with steps of {increment} rad; expected a finite step, not 0")
-    step = abs(increment)
-    once = min(count, math.floor(TURN / step + 0.5))
-    return Beams(once, float(angle_min), float(increment), once * step > TURN - 0.5 * step)
+    wrong = np.flatnonzero(~(np.isfinite(angle_min) & np.isfinite(increments) & (increments != 0.0)))
+    if len(wrong):
+        start, step = angle_min[wrong[0]], increments[wrong[0]]
+        raise ValueError(f"scan starts at {start} rad with steps of {step} rad; expected a finite step, not 0")
+    steps = np.abs(increments)
+    once = np.minimum(counts, np.floor(TURN / steps + 0.5)).astype(np.int64)
+    full_turn = once * steps > TURN - 0.5 * steps
+    return BeamColumns(read_only(once), read_only(angle_min), read_only(increments), read_only(full_turn))
+
+
+@compiled_inline
+def beams_at(columns: BeamColumns, row: int) -> Beams:
+    """Bearings of one scan of many."""
+    return Beams(columns.used[row], columns.angle_min[row], columns.increment[row], columns.full_turn[row])
 
 
 def reflective_beams(
@@ -162,7 +180,8 @@ def detect(scan: Scan, model: DetectorModel, parameters: DetectorParameters) -> 
     """
     ranges = read_only(np.asarray(scan.ranges, dtype=np.float32))
     flags = reflective_beams(ranges, scan.intensities, scan.reflector, parameters.intensity_threshold)
-    beams = beams_of(len(ranges), scan.angle_min, scan.angle_increment)
+    columns = beams_of(np.array([len(ranges)]), np.array([scan.angle_min]), np.array([scan.angle_increment]))
+    beams = Beams(int(columns.used[0]), scan.angle_min, scan.angle_increment, bool(columns.full_turn[0]))
     count = count_clusters(ranges, flags, beams, model)
     range_bearing = np.empty((count, 2))
     widths = np.empty(count, dtype=np.int64)

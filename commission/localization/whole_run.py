@@ -26,7 +26,8 @@ from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, state_at_start
 from commission.progress import Progress, part, silent
 from commission.site.parameters import Parameters
-from commission.site.record_log import RecordLog, ScanLog
+from commission.site.record_log import RecordLog
+from commission.site.record_store import ScanLog
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 
@@ -250,13 +251,6 @@ def warm_up() -> None:
     setup = LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), (Scanner(),), Parameters())
     ranges = np.full((1, 4), 1.96, dtype=np.float32)
     flags = np.array([[False, False, True, False]])
-    scans = ScanLog(
-        stamps_ns=np.array([2]),
-        ranges=ranges,
-        angle_min=-0.02,
-        angle_increment=0.01,
-        intensities=None,
-        reflector=flags,
-    )
+    scans = ScanLog.even(np.array([2]), ranges, (-0.02, 0.01), reflector=flags)
     log = RecordLog(odometry_stamps_ns=np.array([0, 1]), displacements=np.zeros((2, 3)), scans=(scans,))
     run(log, setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3))).points_map()

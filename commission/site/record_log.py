@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray, IntArray
+from commission.site.record_store import ScanLog, ScanStore, stacked
 from commission.site.records import (
     ORDER_WITHIN_A_STAMP,
     Detections,
@@ -26,53 +27,6 @@ def _stamps(records: list[Record]) -> IntArray:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class ScanLog:
-    """Scans of one scanner; all have the same beams."""
-
-    stamps_ns: IntArray
-    """(K,) time of each scan [ns], ascending."""
-    ranges: NDArray[np.float32]
-    """(K, B) distance along each beam [m]; NaN where nothing came back."""
-    angle_min: float
-    """Bearing of the first beam [rad], scanner frame."""
-    angle_increment: float
-    """Bearing step from beam to beam [rad]."""
-    intensities: NDArray[np.float32] | None = None
-    """(K, B) strength of each echo, or None."""
-    reflector: NDArray[np.bool_] | None = None
-    """(K, B) reflector flag of each beam, or None."""
-    scanner: int = 0
-    """Which scanner: index into the names that the log has."""
-
-    def __len__(self) -> int:
-        """Return the number of scans."""
-        return len(self.stamps_ns)
-
-    def between(self, first: int, last: int) -> ScanLog:
-        """Return the scans from `first` to before `last` (views, no copies)."""
-        rows = slice(first, last)
-        return replace(
-            self,
-            stamps_ns=self.stamps_ns[rows],
-            ranges=self.ranges[rows],
-            intensities=None if self.intensities is None else self.intensities[rows],
-            reflector=None if self.reflector is None else self.reflector[rows],
-        )
-
-    def scan(self, index: int) -> Scan:
-        """Return one scan (views, no copies)."""
-        return Scan(
-            stamp_ns=int(self.stamps_ns[index]),
-            ranges=self.ranges[index],
-            angle_min=self.angle_min,
-            angle_increment=self.angle_increment,
-            intensities=None if self.intensities is None else self.intensities[index],
-            reflector=None if self.reflector is None else self.reflector[index],
-            scanner=self.scanner,
-        )
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RecordLog:
     """All records of one drive, by kind, each kind in ascending order of its stamps."""
 
@@ -82,8 +36,8 @@ class RecordLog:
     """(M, 3) motion since the row before, in the base frame of the row before [m, m, rad]."""
     scanners: tuple[str, ...] = (ONLY_NAME,)
     """Names of the scanners; records have indices into them. A log that knows no names calls its only one so."""
-    scans: tuple[ScanLog, ...] = ()
-    """Scans of each scanner that has any, in the order of the names."""
+    scans: tuple[ScanStore, ...] = ()
+    """Scans of each scanner that has any, in the order of the names; in memory or in a file."""
     detection_stamps_ns: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     """(D,) time of each scan whose detections the sensor reported [ns]."""
     detection_offsets: IntArray = field(default_factory=lambda: np.zeros(1, np.int64))
@@ -98,7 +52,7 @@ class RecordLog:
     """(R, 3) `T_map_base` [m, m, rad]."""
     truth: Truth | None = None
     """The constants that were drawn for a virtual drive; None of a real vehicle."""
-    order: NDArray[np.int64] = field(init=False, repr=False)
+    order: NDArray[np.int32] = field(init=False, repr=False)
     """(E, 2) every record in order of delivery: rank of its kind in ORDER_WITHIN_A_STAMP, index within its kind."""
     stamps_ns: IntArray = field(init=False, repr=False)
     """(E,) stamp of every record in order of delivery [ns]."""
@@ -119,12 +73,15 @@ class RecordLog:
             scan_stamps,
         )
         stamps = np.concatenate(columns)
-        kinds = np.concatenate([np.full(len(column), rank, np.int64) for rank, column in enumerate(columns)])
-        indices = np.concatenate([np.arange(len(column), dtype=np.int64) for column in columns])
-        order = np.lexsort((indices, kinds, stamps))
-        object.__setattr__(self, "order", np.stack([kinds[order], indices[order]], axis=1))
-        object.__setattr__(self, "stamps_ns", stamps[order])
-        scan_order = indices[order][kinds[order] == ORDER_WITHIN_A_STAMP[Scan]]
+        order = np.empty((len(stamps), 2), dtype=np.int32)
+        order[:, 0] = np.repeat(np.arange(len(columns)), [len(column) for column in columns])
+        order[:, 1] = np.concatenate([np.arange(len(column), dtype=np.int32) for column in columns])
+        # Stable: within a stamp kinds stay in their order, and within a kind records do.
+        by_stamp = np.argsort(stamps, kind="stable")
+        order = order[by_stamp]
+        object.__setattr__(self, "order", order)
+        object.__setattr__(self, "stamps_ns", stamps[by_stamp])
+        scan_order = order[order[:, 0] == ORDER_WITHIN_A_STAMP[Scan], 1].astype(np.int64)
         object.__setattr__(self, "scan_order", scan_order)
         object.__setattr__(self, "scan_stamps_ns", scan_stamps[scan_order])
 
@@ -144,7 +101,7 @@ class RecordLog:
 
         Parameters
         ----------
-        records : in any order; scans of one scanner have the same beams (ValueError says which one differs).
+        records : in any order; of one scanner all scans have flags, or none, and so for intensities (else ValueError).
         scanners : names of the scanners.
         """
         kinds: dict[type, list[Record]] = {kind: [] for kind in ORDER_WITHIN_A_STAMP}
@@ -196,32 +153,6 @@ class RecordLog:
 def _scan_logs(scans: list[Scan]) -> tuple[ScanLog, ...]:
     """Stack the scans of each scanner."""
     return tuple(
-        _scan_log([scan for scan in scans if scan.scanner == scanner])
+        stacked([scan for scan in scans if scan.scanner == scanner])
         for scanner in sorted({scan.scanner for scan in scans})
-    )
-
-
-def _scan_log(scans: list[Scan]) -> ScanLog:
-    """Stack scans of one scanner, or say which one does not fit the first."""
-    first = scans[0]
-    for index, scan in enumerate(scans):
-        same = (
-            scan.ranges.shape == first.ranges.shape
-            and scan.angle_min == first.angle_min
-            and scan.angle_increment == first.angle_increment
-            and (scan.intensities is None) == (first.intensities is None)
-            and (scan.reflector is None) == (first.reflector is None)
-        )
-        if not same:
-            raise ValueError(f"scan {index} has other beams than scan 0; expected one scanner per recording")
-    intensities = [scan.intensities for scan in scans if scan.intensities is not None]
-    reflector = [scan.reflector for scan in scans if scan.reflector is not None]
-    return ScanLog(
-        scanner=first.scanner,
-        stamps_ns=np.array([scan.stamp_ns for scan in scans], dtype=np.int64),
-        ranges=np.stack([scan.ranges for scan in scans]),
-        angle_min=first.angle_min,
-        angle_increment=first.angle_increment,
-        intensities=np.stack(intensities) if intensities else None,
-        reflector=np.stack(reflector) if reflector else None,
     )

@@ -15,9 +15,11 @@ from commission.geometry.angles import wrap
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.progress import Progress, silent
 from commission.site.project import Project
-from commission.site.record_log import RecordLog, ScanLog
+from commission.site.record_log import RecordLog
+from commission.site.record_store import ScanStore
 from commission.site.scanner import Scanner
 from commission.studies.inputs import StudyInput
+from commission.studies.recording_overview import beams_in_words
 
 FASTEST = 15.0
 """Speed beyond which no vehicle of this kind drives [m/s]."""
@@ -110,7 +112,7 @@ def _kinds(log: RecordLog) -> tuple[tuple[str, IntArray], ...]:
     return tuple((name, stamps) for name, stamps in kinds if len(stamps))
 
 
-def scans_name(log: RecordLog, scans: ScanLog) -> str:
+def scans_name(log: RecordLog, scans: ScanStore) -> str:
     """What the scans of one scanner are called: `scans`, of several `scans of front left`."""
     return "scans" if len(log.scanners) == 1 else f"scans of {log.scanners[scans.scanner]}"
 
@@ -302,22 +304,21 @@ def _scans(inputs: PlausibilityInput) -> Iterator[Finding]:
             yield from _scans_of(inputs, scans, scanner)
 
 
-def _scans_of(inputs: PlausibilityInput, scans: ScanLog, scanner: Scanner) -> Iterator[Finding]:
+def _scans_of(inputs: PlausibilityInput, scans: ScanStore, scanner: Scanner) -> Iterator[Finding]:
     """Scans of one scanner that are not what the project says of it."""
     called = scans_name(inputs.log, scans)
     # A few scans spread over the drive tell as much as all of them.
     chosen = np.unique(np.linspace(0, len(scans.stamps_ns) - 1, 200).astype(int))
-    ranges = np.asarray(scans.ranges[chosen], dtype=np.float64)
+    some = scans.chosen(chosen)
+    ranges = np.asarray(some.ranges, dtype=np.float64)
     returned = np.isfinite(ranges)
     yield from _ranges(called, ranges[returned], scanner)
-    if scans.intensities is not None and scans.reflector is None and returned.any():
-        yield from _intensities(
-            np.asarray(scans.intensities[chosen], dtype=np.float64)[returned], inputs.intensity_threshold
-        )
-    step, expected = abs(scans.angle_increment), scanner.angle_increment
+    if some.intensities is not None and some.reflector is None and returned.any():
+        yield from _intensities(np.asarray(some.intensities, dtype=np.float64)[returned], inputs.intensity_threshold)
+    step, expected = float(np.median(np.abs(scans.angle_increment))), scanner.angle_increment
     if not expected / RATE_RATIO <= step <= expected * RATE_RATIO:
         yield Finding(
-            found=f"the {called} have {ranges.shape[1]} beams {math.degrees(step):.3g} deg apart",
+            found=f"the {called} have {beams_in_words(scans.beams)} {math.degrees(step):.3g} deg apart",
             probably=f"another scanner was recorded than the project's ({scanner.resolution_deg:g} deg)",
             remedy="correct the project's scanner (resolution_deg), by which the detector counts beams",
         )

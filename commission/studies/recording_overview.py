@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.site.record_log import RecordLog, ScanLog
+from commission.site.record_log import RecordLog
+from commission.site.record_store import ScanStore
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,19 +93,26 @@ def _odometry_values(log: RecordLog) -> str:
     return f"{way:.1f} m driven, speed up to {speeds.max():.3g} m/s, turning up to {turns.max():.3g} rad/s"
 
 
-def _scan_values(scans: ScanLog) -> str:
+def _scan_values(scans: ScanStore) -> str:
     chosen = np.unique(np.linspace(0, len(scans.stamps_ns) - 1, 200).astype(int))
-    ranges = np.asarray(scans.ranges[chosen], dtype=np.float64)
+    some = scans.chosen(chosen)
+    ranges = np.asarray(some.ranges, dtype=np.float64)
     hit = np.isfinite(ranges)
-    parts = [f"{ranges.shape[1]} beams {np.degrees(abs(scans.angle_increment)):.4g} deg apart"]
+    parts = [f"{beams_in_words(scans.beams)} {np.degrees(np.median(np.abs(scans.angle_increment))):.4g} deg apart"]
     if hit.any():
         parts.append(f"range {ranges[hit].min():.4g} to {ranges[hit].max():.4g} m")
-    if scans.intensities is not None and hit.any():
-        strengths = np.asarray(scans.intensities[chosen], dtype=np.float64)[hit]
+    if some.intensities is not None and hit.any():
+        strengths = np.asarray(some.intensities, dtype=np.float64)[hit]
         parts.append(f"intensity {strengths.min():.4g} to {strengths.max():.4g}")
-    if scans.reflector is not None:
-        parts.append(f"{100.0 * float(np.mean(scans.reflector[chosen])):.2g} % of the beams flagged as reflector")
+    if some.reflector is not None:
+        parts.append(f"{100.0 * float(np.mean(some.reflector)):.2g} % of the beams flagged as reflector")
     return ", ".join(parts)
+
+
+def beams_in_words(beams: IntArray) -> str:
+    """How many beams scans have: `541 beams`, `540 to 542 beams`."""
+    fewest, most = int(beams.min()), int(beams.max())
+    return f"{most} beams" if fewest == most else f"{fewest} to {most} beams"
 
 
 def _spans(values: FloatArray, names: tuple[str, ...], units: tuple[str, ...]) -> str:

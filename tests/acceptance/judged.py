@@ -64,6 +64,6 @@ def seen_within(log: RecordLog, half_angle_deg: float) -> RecordLog:
     """The recording with every reflector flag beyond a bearing ignored: a narrower field of view by software."""
     (scans,) = log.scans
     assert scans.reflector is not None
-    bearings = np.degrees(scans.angle_min + scans.angle_increment * np.arange(scans.ranges.shape[1]))
+    bearings = np.degrees(scans.scan(0).bearings)
     inside = np.abs(bearings) <= half_angle_deg
     return replace(log, scans=(replace(scans, reflector=scans.reflector & inside),))

@@ -14,7 +14,7 @@ import numpy as np
 from commission.localization.detection_log import detect_log
 from commission.localization.setup import LocalizerSetup
 from commission.site.parameters import DetectorParameters, Parameters
-from commission.site.record_log import ScanLog
+from commission.site.record_store import ScanLog
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 
@@ -34,14 +34,7 @@ def scans(count: int, beams: int) -> ScanLog:
             flags[k, center - half : center + half] = True
             ranges[k, center - half : center + half] = distance + rng.normal(0.0, 0.01, 2 * half)
     stamps = 40_000_000 * np.arange(count, dtype=np.int64)
-    return ScanLog(
-        stamps_ns=stamps,
-        ranges=ranges,
-        angle_min=-math.radians(135.0),
-        angle_increment=increment,
-        intensities=None,
-        reflector=flags,
-    )
+    return ScanLog.even(stamps, ranges, (-math.radians(135.0), increment), reflector=flags)
 
 
 def best(log: ScanLog, setup: LocalizerSetup, *, parallel: bool) -> float:

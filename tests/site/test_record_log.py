@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -37,9 +39,17 @@ def test_records_come_out_in_order_of_stamps_and_within_a_stamp_motion_comes_fir
     assert delivered[5].reflector.tolist() == [False, False, False, True, True]
 
 
-def test_a_scan_with_other_beams_is_refused_by_its_index():
-    with pytest.raises(ValueError, match="scan 1 has other beams than scan 0"):
-        RecordLog.collect([scan(0), scan(1, beams=6)])
+def test_a_scan_with_other_arrays_is_refused_by_its_index():
+    with pytest.raises(ValueError, match="scan 1 has other arrays than scan 0"):
+        RecordLog.collect([scan(0), replace(scan(1), reflector=None)])
+
+
+def test_scans_of_different_lengths_come_out_as_long_as_they_were():
+    scans = [scan(0), scan(1, beams=7), scan(2, beams=4)]
+    delivered = list(RecordLog.collect(scans).records())
+    for given, found in zip(scans, delivered, strict=True):
+        assert found.ranges.tolist() == given.ranges.tolist()
+        assert found.reflector.tolist() == given.reflector.tolist()
 
 
 def test_an_empty_log_has_no_records():

@@ -11,7 +11,8 @@ from commission.geometry import se2
 from commission.localization.estimate import Belief
 from commission.site.parameters import ObservationParameters, Parameters
 from commission.site.project import Project
-from commission.site.record_log import RecordLog, ScanLog
+from commission.site.record_log import RecordLog
+from commission.site.record_store import ScanLog
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 
@@ -77,10 +78,9 @@ def start() -> Belief:
 
 def scan_log(intensities: np.ndarray, *, ranges: float = 5.0, rate: float = 10.0, step_deg: float = 0.5) -> ScanLog:
     """Scans of one range, with these intensities (K, B)."""
-    return ScanLog(
-        stamps_ns=np.arange(1, len(intensities) + 1) * round(SECOND / rate),
-        ranges=np.full(intensities.shape, ranges, dtype=np.float32),
-        angle_min=-math.pi,
-        angle_increment=math.radians(step_deg),
+    return ScanLog.even(
+        np.arange(1, len(intensities) + 1) * round(SECOND / rate),
+        np.full(intensities.shape, ranges, dtype=np.float32),
+        (-math.pi, math.radians(step_deg)),
         intensities=intensities.astype(np.float32),
     )

@@ -18,7 +18,8 @@ from commission.geometry.arrays import FloatArray, IntArray
 from commission.io.csv_table import Block, read_table
 from commission.io.recordings.scan_archive import ScanArchive
 from commission.io.recordings.truth_file import TRUTH, read_truth
-from commission.site.record_log import RecordLog, ScanLog
+from commission.site.record_log import RecordLog
+from commission.site.record_store import ScanStore
 from commission.site.records import (
     ORDER_WITHIN_A_STAMP,
     Detections,
@@ -96,9 +97,9 @@ class CsvFolder:
             raise FileFormatError(self.path / SCANS, "", found, f"a file {scans_file(tuple(names), 0)} for each")
         return tuple(names) or (ONLY_NAME,)
 
-    def _loaded_scans(self) -> tuple[ScanLog, ...]:
-        found = ((index, archive.load()) for index, archive in enumerate(self._archives))
-        return tuple(replace(scans, scanner=index) for index, scans in found if scans is not None)
+    def _loaded_scans(self) -> tuple[ScanStore, ...]:
+        found = (archive.load(index) for index, archive in enumerate(self._archives))
+        return tuple(scans for scans in found if scans is not None)
 
     @staticmethod
     def recognizes(path: Path) -> bool:

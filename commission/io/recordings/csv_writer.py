@@ -6,7 +6,8 @@ import math
 import os
 import shutil
 import zipfile
-from collections.abc import Iterable, Sequence
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any
@@ -54,7 +55,7 @@ def write_recording(
     Raises
     ------
     FileFormatError
-        the folder cannot be written, or a scan has other beams than the first one.
+        the folder cannot be written, or a scan has other arrays than the first one.
     """
     try:
         with staged(folder, last=ODOMETRY) as scratch:
@@ -125,6 +126,8 @@ class _ScanWriter:
         self.files: dict[str, IO[bytes]] = {}
         self.first: Scan | None = None
         self.count = 0
+        self.beams = array("q")
+        self.angles = {"angle_min": array("d"), "angle_increment": array("d")}
 
     def add(self, scan: Scan) -> None:
         """Append one scan."""
@@ -141,38 +144,30 @@ class _ScanWriter:
                 self.files[name] = self.stack.enter_context(
                     (self.scratch / f"{self.target.stem}.{name}.raw").open("w+b")
                 )
-        self._check(scan, present)
+        if present.keys() != self.files.keys() or any(
+            len(row) != len(scan.ranges) for name, row in present.items() if name != "stamp_ns"
+        ):
+            found = f"scan {self.count + 1} has other arrays than the first"
+            raise FileFormatError(self.target, "", found, "the same arrays in all scans of one scanner")
         for name, row in present.items():
             self.files[name].write(row.tobytes())
+        self.beams.append(len(scan.ranges))
+        for name in self.angles:
+            self.angles[name].append(getattr(scan, name))
         self.count += 1
-
-    def _check(self, scan: Scan, present: dict[str, NDArray[Any]]) -> None:
-        first = self.first
-        same = (
-            first is not None
-            and present.keys() == self.files.keys()
-            and scan.angle_min == first.angle_min
-            and scan.angle_increment == first.angle_increment
-            and all(len(row) == len(first.ranges) for name, row in present.items() if name != "stamp_ns")
-        )
-        if not same:
-            found = f"scan {self.count + 1} has other beams or arrays than the first"
-            raise FileFormatError(self.target, "", found, "the same beams in all scans of one scanner")
 
     def finish(self) -> None:
         """Pack what was added into `scans.npz`."""
         if self.first is None:
             return
-        shapes = {name: (self.count, len(self.first.ranges)) for name in self.files} | {"stamp_ns": (self.count,)}
+        most = max(self.beams)
+        shapes = {name: (self.count, most) for name in self.files} | {"stamp_ns": (self.count,)}
         types = {"stamp_ns": "<i8", "ranges": "<f4", "intensities": "<f4", "reflector": "|b1"}
         with (self.scratch / self.target.name).open("wb") as target:
             with zipfile.ZipFile(target, "w", allowZip64=True) as archive:
-                for name, value in (
-                    ("angle_min", self.first.angle_min),
-                    ("angle_increment", self.first.angle_increment),
-                ):
+                for name, values in self._small(most):
                     with archive.open(f"{name}.npy", "w") as member:
-                        npy.write_array(member, np.array(value, dtype="<f8"))
+                        npy.write_array(member, values)
                 for name, source in self.files.items():
                     info = zipfile.ZipInfo(f"{name}.npy")
                     # Flags shrink to almost nothing; noisy ranges would only cost time.
@@ -181,6 +176,24 @@ class _ScanWriter:
                         header = {"descr": types[name], "fortran_order": False, "shape": shapes[name]}
                         npy.write_array_header_1_0(member, header)
                         source.seek(0)
-                        shutil.copyfileobj(source, member, 1 << 20)
+                        if name == "stamp_ns" or min(self.beams) == most:
+                            shutil.copyfileobj(source, member, 1 << 20)
+                        else:
+                            self._pad(source, member, np.dtype(types[name]), most)
             target.flush()
             os.fsync(target.fileno())
+
+    def _small(self, most: int) -> Iterator[tuple[str, NDArray[Any]]]:
+        """Angles, one number where they are those of all scans; beams of each scan where they differ."""
+        for name, values in self.angles.items():
+            column = np.array(values, dtype="<f8")
+            yield name, np.array(column[0]) if (column == column[0]).all() else column
+        if min(self.beams) < most:
+            yield "beams", np.array(self.beams, dtype="<i8")
+
+    def _pad(self, source: IO[bytes], member: IO[bytes], kind: np.dtype[Any], most: int) -> None:
+        """Copy rows of different lengths; behind the last beam of a scan nothing came back."""
+        nothing = np.full(most, np.nan if kind.kind == "f" else 0).astype(kind).tobytes()
+        for beams in self.beams:
+            row = source.read(beams * kind.itemsize)
+            member.write(row + nothing[len(row) :])

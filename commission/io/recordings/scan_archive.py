@@ -11,7 +11,7 @@ import zipfile
 import zlib
 from collections.abc import Generator, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -20,35 +20,46 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from commission.errors import FileFormatError
+from commission.geometry.arrays import FloatArray, IntArray
 from commission.io.reading import cannot_read, check_size
+from commission.io.recordings.scan_file import ScanFile, array_place, joined_scans
 from commission.site.quantity import STAMP_LIMIT
-from commission.site.record_log import ScanLog
+from commission.site.record_store import ScanLog, ScanStore, everywhere
 
 BEAM_LIMIT = 100_000
 """Beams in one scan."""
-LOAD_LIMIT = 16_000_000_000
-"""Bytes of scans that `load` unpacks; a larger recording is read scan by scan."""
+IN_MEMORY = 64_000_000
+"""Bytes of scans that `load` keeps in memory; those of a larger recording stay in the file."""
 BOMB_SIZE = 256_000_000
 """Unpacked bytes from which an archive is suspected: no harm is done by less."""
 BOMB_RATIO = 200
 """Unpacked bytes for each packed one that no suspected archive may reach. Deflate ends at 1032; scans that saw next to
 nothing, 1,000 beams of which 20 came back, reach 40."""
+_SMALL_LIMIT = 50_000_000
+"""Scans of a recording: 23 days at 25 a second; their stamps and angles are in memory."""
 _FILE_LIMIT = 1_000_000_000_000
 _BYTES_AT_ONCE = 4_000_000
+_ROWS = ("ranges", "intensities", "reflector")
+"""Arrays with a row for each scan and a number for each beam."""
+_ANGLES = ("angle_min", "angle_increment")
 _GARBAGE = (zipfile.BadZipFile, zlib.error, EOFError, ValueError, struct.error, NotImplementedError, RuntimeError)
 """What zipfile and numpy raise for files that end early or were never a zip (an encrypted one: RuntimeError)."""
 
 
 @dataclass(frozen=True, slots=True)
-class _Column:
+class ScanColumn:
     """One array of the archive, still packed."""
 
     name: str
+    """Its name."""
     shape: tuple[int, ...]
+    """Its shape, rows first."""
     dtype: np.dtype[Any]
+    """Type of its numbers."""
 
     @property
     def row_bytes(self) -> int:
+        """Bytes of one row."""
         return math.prod(self.shape[1:]) * self.dtype.itemsize
 
 
@@ -72,20 +83,20 @@ class ScanArchive:
         with self._open() as archive:
             members = set(archive.namelist())
             self._refuse_bomb(archive)
-            self._columns = {
+            self.columns = {
                 name: self._header(archive, name)
-                for name in ("stamp_ns", "ranges", "angle_min", "angle_increment", "intensities", "reflector")
+                for name in ("stamp_ns", *_ROWS, *_ANGLES, "beams")
                 if f"{name}.npy" in members
             }
             self._check_columns()
-            self.angle_min = self._scalar(archive, "angle_min")
-            self.angle_increment = self._scalar(archive, "angle_increment")
-        if self.angle_increment == 0.0:
+            self.angle_min, self.angle_increment = (self._angles(archive, name) for name in _ANGLES)
+            self.beams = self._beams(archive)
+        if (self.angle_increment == 0.0).any():
             raise self._error("angle_increment", "is 0", "the step from beam to beam [rad]")
 
     def __len__(self) -> int:
         """Return the number of scans."""
-        return self._columns["stamp_ns"].shape[0]
+        return self.columns["stamp_ns"].shape[0]
 
     def blocks(self) -> Iterator[ScanLog]:
         """Read some scans at a time; memory does not grow with the file.
@@ -95,8 +106,8 @@ class ScanArchive:
         FileFormatError
             the archive ends early, stamps do not ascend, or a range is negative.
         """
-        rows_at_once = max(1, _BYTES_AT_ONCE // max(1, sum(c.row_bytes for c in self._columns.values())))
-        names = [name for name in self._columns if name not in ("angle_min", "angle_increment")]
+        names = [name for name in ("stamp_ns", *_ROWS) if name in self.columns]
+        rows_at_once = max(1, _BYTES_AT_ONCE // sum(self.columns[name].row_bytes for name in names))
         last_stamp: int | None = None
         with self._open() as archive, ExitStack() as stack:
             files = {name: stack.enter_context(archive.open(f"{name}.npy")) for name in names}
@@ -104,35 +115,42 @@ class ScanArchive:
                 _read_header(file)
             for start in range(0, len(self), rows_at_once):
                 count = min(rows_at_once, len(self) - start)
-                block = self._scan_log({name: self._rows(files[name], name, count) for name in names}, start)
+                arrays = {name: self._rows(files[name], name, count) for name in names}
+                part = slice(start, start + count)
+                arrays |= {"angle_min": self.angle_min[part], "angle_increment": self.angle_increment[part]}
+                block = self.scan_log(arrays | {"beams": self.beams[part]}, start)
                 self._check_order(block, start, last_stamp)
                 last_stamp = int(block.stamps_ns[-1])
                 yield block
 
-    def load(self) -> ScanLog | None:
-        """Read all scans; None when there are none."""
+    def load(self, scanner: int = 0) -> ScanStore | None:
+        """Check all scans, and keep them in memory or in the file, by their size; None when there are none.
+
+        Parameters
+        ----------
+        scanner : which scanner they are of: index into the names that the log has.
+
+        Raises
+        ------
+        FileFormatError
+            as `blocks`, or what is compressed finds no room on the disk.
+        """
         if len(self) == 0:
             return None
-        total = len(self) * sum(c.row_bytes for c in self._columns.values())
-        if total > LOAD_LIMIT:
-            raise self._error("ranges", f"need {total} bytes", f"at most {LOAD_LIMIT} bytes to load at once")
-        shape = self._columns["ranges"].shape
-        log = ScanLog(
-            stamps_ns=np.empty(len(self), np.int64),
-            ranges=np.empty(shape, np.float32),
+        if sum(len(self) * column.row_bytes for column in self.columns.values()) <= IN_MEMORY:
+            return replace(joined_scans(list(self.blocks())), scanner=scanner)
+        stamps = np.concatenate([block.stamps_ns for block in self.blocks()])
+        with self._open() as archive:
+            places = {name: array_place(self, archive, name) for name in _ROWS if name in self.columns}
+        return ScanFile(
+            archive=self,
+            places=places,
+            stamps_ns=stamps,
             angle_min=self.angle_min,
             angle_increment=self.angle_increment,
-            intensities=np.empty(shape, np.float32) if "intensities" in self._columns else None,
-            reflector=np.empty(shape, np.bool_) if "reflector" in self._columns else None,
+            beams=self.beams,
+            scanner=scanner,
         )
-        start = 0
-        for block in self.blocks():
-            rows = slice(start, start + len(block.stamps_ns))
-            for name in ("stamps_ns", "ranges", "intensities", "reflector"):
-                if getattr(log, name) is not None:
-                    getattr(log, name)[rows] = getattr(block, name)
-            start = rows.stop
-        return log
 
     @contextmanager
     def _open(self) -> Generator[zipfile.ZipFile]:
@@ -152,7 +170,7 @@ class ScanArchive:
             found = f"would unpack {packed} bytes into {unpacked}"
             raise FileFormatError(self.path, "", found, f"at most {BOMB_RATIO} times its size: real scans have noise")
 
-    def _header(self, archive: zipfile.ZipFile, name: str) -> _Column:
+    def _header(self, archive: zipfile.ZipFile, name: str) -> ScanColumn:
         info = archive.getinfo(f"{name}.npy")
         with archive.open(info) as file:
             try:
@@ -163,18 +181,18 @@ class ScanArchive:
                 raise self._error(name, "is pickled", "plain numbers; pickles are not read, they could run programs")
             if fortran_order and len(shape) > 1:
                 raise self._error(name, "is stored column by column", "rows (C order): numpy.ascontiguousarray")
-            column = _Column(name, shape, dtype)
+            column = ScanColumn(name, shape, dtype)
             if math.prod(shape) * dtype.itemsize != info.file_size - file.tell():
                 raise self._error(name, f"has another size than its shape {shape} says", "a complete array")
         return column
 
     def _check_columns(self) -> None:
         for name in ("stamp_ns", "ranges", "angle_min", "angle_increment"):
-            if name not in self._columns:
+            if name not in self.columns:
                 raise self._error(name, "is missing", "the arrays stamp_ns, ranges, angle_min, angle_increment")
-        if "intensities" not in self._columns and "reflector" not in self._columns:
+        if "intensities" not in self.columns and "reflector" not in self.columns:
             raise self._error("", "has neither intensities nor reflector", "at least one of these arrays")
-        stamps, ranges = self._columns["stamp_ns"], self._columns["ranges"]
+        stamps, ranges = self.columns["stamp_ns"], self.columns["ranges"]
         if stamps.dtype.kind not in "iu" or stamps.dtype.itemsize > 8 or len(stamps.shape) != 1:
             raise self._error("stamp_ns", f"is {stamps.dtype} {stamps.shape}", "int64 (N,) nanoseconds")
         if len(ranges.shape) != 2 or ranges.shape[0] != stamps.shape[0] or not 0 < ranges.shape[1] <= BEAM_LIMIT:
@@ -185,34 +203,73 @@ class ScanArchive:
             ("intensities", "fiu", "numbers"),
             ("reflector", "biu", "booleans"),
         ):
-            column = self._columns.get(name)
+            column = self.columns.get(name)
             if column is not None and column.dtype.kind not in kinds:
                 raise self._error(name, f"is {column.dtype}", wanted)
             if column is not None and column.shape != ranges.shape:
                 raise self._error(name, f"has shape {column.shape}", f"{ranges.shape} like ranges")
 
-    def _scalar(self, archive: zipfile.ZipFile, name: str) -> float:
-        column = self._columns[name]
-        if column.dtype.kind not in "fiu" or math.prod(column.shape) != 1:
-            raise self._error(name, f"is {column.dtype} {column.shape}", "one number [rad]")
+    def _angles(self, archive: zipfile.ZipFile, name: str) -> FloatArray:
+        """(N,) angles: one number in the file is that of all scans."""
+        values = self._small(archive, name, "fiu", "one number, or one for each scan [rad]").astype(np.float64)
+        wrong = np.flatnonzero(~(np.abs(values) <= 4.0 * math.pi))
+        if len(wrong):
+            raise self._error(name, f"is {values[wrong[0]]:g}{_row(values, wrong[0])}", "an angle in radians")
+        return everywhere(float(values[0]), len(self)) if len(values) == 1 else values
+
+    def _beams(self, archive: zipfile.ZipFile) -> IntArray:
+        """(N,) beams of each scan: those behind them are no beams."""
+        most = self.columns["ranges"].shape[1]
+        if "beams" not in self.columns:
+            return np.broadcast_to(np.int64(most), (len(self),))
+        values = self._small(archive, "beams", "iu", "whole numbers, one for each scan")
+        wrong = np.flatnonzero((values < 1) | (values > most))
+        if len(wrong):
+            found = f"is {values[wrong[0]]}{_row(values, wrong[0])}"
+            raise self._error("beams", found, f"1 to {most}, as many as ranges has columns")
+        counts = values.astype(np.int64)
+        return np.broadcast_to(counts, (len(self),)) if len(counts) == 1 else counts
+
+    def _small(self, archive: zipfile.ZipFile, name: str, kinds: str, expected: str) -> NDArray[Any]:
+        """(1,) or (N,) numbers of an array."""
+        column = self.columns[name]
+        count = math.prod(column.shape)
+        if column.dtype.kind not in kinds or not (count == 1 or column.shape == (len(self),)) or count > _SMALL_LIMIT:
+            raise self._error(name, f"is {column.dtype} {column.shape}", expected)
         with archive.open(f"{name}.npy") as file:
             _read_header(file)
-            value = float(np.frombuffer(file.read(column.dtype.itemsize), column.dtype)[0])
-        if not math.isfinite(value) or abs(value) > 4.0 * math.pi:
-            raise self._error(name, f"is {value:g}", "an angle in radians")
-        return value
+            data = file.read(count * column.dtype.itemsize)
+        if len(data) != count * column.dtype.itemsize:
+            raise self._error(name, "ends early", f"{count} numbers")
+        return np.frombuffer(data, column.dtype)
 
     def _rows(self, file: IO[bytes], name: str, count: int) -> NDArray[Any]:
-        column = self._columns[name]
+        column = self.columns[name]
         data = file.read(count * column.row_bytes)
         if len(data) != count * column.row_bytes:
             raise self._error(name, "ends early", f"{column.shape[0]} rows")
         return np.frombuffer(data, column.dtype).reshape(count, *column.shape[1:])
 
-    def _scan_log(self, arrays: dict[str, NDArray[Any]], start: int) -> ScanLog:
+    def scan_log(self, arrays: dict[str, NDArray[Any]], start: int) -> ScanLog:
+        """Convert and check some rows of the file.
+
+        Parameters
+        ----------
+        arrays : rows of each array, by its name.
+        start : index of the first one, for messages.
+
+        Raises
+        ------
+        FileFormatError
+            a range is negative, or a stamp too large.
+        """
         # Other systems write infinity or a huge number for "no echo"; here that is NaN.
         ranges = arrays["ranges"].astype(np.float32)
         ranges[np.isinf(ranges)] = np.nan
+        beams = arrays["beams"]
+        beyond_last = np.arange(ranges.shape[1]) >= beams[:, np.newaxis] if (beams < ranges.shape[1]).any() else None
+        if beyond_last is not None:
+            ranges[beyond_last] = np.nan
         if (ranges < 0.0).any():
             row, beam = (int(i) for i in np.argwhere(ranges < 0.0)[0])
             found = f"is {ranges[row, beam]:g} in row {start + row}, beam {beam}"
@@ -223,14 +280,19 @@ class ScanArchive:
         if len(beyond):
             found = f"is {stamps[beyond[0]]} in row {start + int(beyond[0])}"
             raise self._error("stamp_ns", found, f"nanoseconds, less than {STAMP_LIMIT}")
-        intensities, reflector = arrays.get("intensities"), arrays.get("reflector")
+        intensities = arrays["intensities"].astype(np.float32) if "intensities" in arrays else None
+        reflector = arrays["reflector"].astype(np.bool_) if "reflector" in arrays else None
+        for column in (intensities, reflector):
+            if column is not None and beyond_last is not None:
+                column[beyond_last] = 0
         return ScanLog(
             stamps_ns=stamps.astype(np.int64),
             ranges=ranges,
-            angle_min=self.angle_min,
-            angle_increment=self.angle_increment,
-            intensities=None if intensities is None else intensities.astype(np.float32),
-            reflector=None if reflector is None else reflector.astype(np.bool_),
+            angle_min=arrays["angle_min"],
+            angle_increment=arrays["angle_increment"],
+            beams=beams,
+            intensities=intensities,
+            reflector=reflector,
         )
 
     def _check_order(self, block: ScanLog, start: int, last_stamp: int | None) -> None:
@@ -243,6 +305,11 @@ class ScanArchive:
 
     def _error(self, name: str, problem: str, remedy: str) -> FileFormatError:
         return FileFormatError(self.path, f"array {name}" if name else "", problem, remedy)
+
+
+def _row(values: NDArray[Any], index: int) -> str:
+    """Where a wrong number is, where there are several."""
+    return "" if len(values) == 1 else f" in row {index}"
 
 
 def _read_header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
