@@ -27,8 +27,9 @@ COLUMNS = (
     *("visible", "on_odometry", "over_limit", "mode"),
     *("error_two_sigma_x", "error_two_sigma_y", "error_two_sigma_theta"),
 )
-FAILURE_COLUMNS = ("blocked", "reflector_id", "route", "failing_metres", "limit_share", "metres")
-DEPENDENT_COLUMNS = ("reflector_id", "failure", "route", "failing_metres", "limit_share", "metres")
+# `load` is the share of the limit: files keep the column that others read, whatever the page calls it.
+FAILURE_COLUMNS = ("blocked", "reflector_id", "route", "failing_metres", "load", "metres")
+DEPENDENT_COLUMNS = ("reflector_id", "failure", "route", "failing_metres", "load", "metres")
 
 
 def write_prediction(

@@ -42,7 +42,7 @@ def test_what_if_ranks_the_reflectors(commission, project, tmp_path):
     with (tmp_path / "out" / "dependents.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert sorted(row["reflector_id"] for row in rows) == ["R0", "R1", "R2", "R3", "R4"]
-    shares = [float(row["limit_share"]) for row in rows]
+    shares = [float(row["load"]) for row in rows]
     assert shares == sorted(shares, reverse=True)
 
 
