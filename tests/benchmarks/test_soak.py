@@ -5,15 +5,14 @@ from __future__ import annotations
 import socket
 import time
 
-from tests.benchmarks.soak import read, soak
+from tests.benchmarks.soak import LOST_AFTER_S, read, soak
 
 
 def test_drive_is_edited_and_read_and_a_job_is_stopped() -> None:
     found = soak(0.1)
     assert len(found.latencies) == len(found.memory) >= 2
-    assert max(found.latencies) < 20.0  # the time after which an edit counts as lost
+    assert max(found.latencies) < LOST_AFTER_S
     assert found.jobs == 1
-    assert len(found.readers) > 1
 
 
 def test_readers_go_when_the_server_is_gone() -> None:
