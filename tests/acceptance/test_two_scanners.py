@@ -16,6 +16,7 @@ from commission.site.disturbances import ConstantErrors, Disturbances, ScannerEr
 from commission.site.scanner import Scanner
 from commission.studies.run import RunInput, RunResult, judged_run
 from commission.studies.start import start_of
+from tests.planning.driven import AXES, compare, driven_along, planned_route, undisturbed
 
 FIELD = (-137.5, 137.5)
 NAMES = ("front left", "rear right")
@@ -116,3 +117,15 @@ def test_a_recording_of_a_scanner_that_the_project_lacks_is_refused_by_name(shop
     code, _, err = commission("localize", tmp_path / "site", tmp_path / "drive", "--out", tmp_path / "out")
     assert code == 2
     assert "scanner 'front left' is none of the project's; expected top" in err
+
+
+def test_a_drive_with_two_scanners_errs_as_predicted():
+    project = with_two(undisturbed("shop_floor"))
+    name = project.routes[0].name
+    planned = planned_route(project, name)
+    length = planned.drive.length
+    found = compare(planned, (driven_along(project, name, length, seed) for seed in range(8)))
+    for of in AXES:
+        assert 0.9 < float(np.median(found.ratio(of))) < 1.1
+        assert found.inside(of) >= 0.9
+    assert found.agreement == 1.0
