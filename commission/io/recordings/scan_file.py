@@ -7,6 +7,7 @@ system removes with the program. Stamps, angles and numbers of beams are in memo
 from __future__ import annotations
 
 import tempfile
+import threading
 import weakref
 import zipfile
 from collections.abc import Sequence
@@ -78,13 +79,7 @@ class ScanFile:
         place, column = self.places[name], self.archive.columns[name]
         begin, size = place.begin + first * column.row_bytes, count * column.row_bytes
         try:
-            if place.unpacked is not None:
-                place.unpacked.seek(begin)
-                data = place.unpacked.read(size)
-            else:
-                with self.archive.path.open("rb") as file:
-                    file.seek(begin)
-                    data = file.read(size)
+            data = place.read(begin, size)
         except OSError as error:
             raise cannot_read(self.archive.path, error) from error
         if len(data) != size:
@@ -94,20 +89,39 @@ class ScanFile:
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class ArrayPlace:
-    """Where the rows of an array lie."""
+    """Where the rows of an array lie: a file of its own that stays open, read by several threads."""
 
     begin: int
-    """Offset of the first row in the archive, or in the unpacked file [bytes]."""
-    unpacked: IO[bytes] | None = field(default=None)
-    """Temporary file that holds what the archive holds compressed."""
+    """Offset of the first row in the file [bytes]."""
+    file: IO[bytes]
+    """The archive as it was when opened, though another one replaces it; or the unpacked temporary file."""
+    lock: threading.Lock = field(default_factory=threading.Lock)
+    """Held from seek to read: jobs and the page read at once, and a file has one position."""
 
     def __post_init__(self) -> None:
-        if self.unpacked is not None:
-            weakref.finalize(self, self.unpacked.close)
+        weakref.finalize(self, self.file.close)
+
+    def read(self, begin: int, size: int) -> bytes:
+        """Return some bytes, fewer when the file ends early; raises OSError."""
+        with self.lock:
+            self.file.seek(begin)
+            return self.file.read(size)
 
 
 def array_place(archive: ScanArchive, zipped: zipfile.ZipFile, name: str) -> ArrayPlace:
-    """Find the rows of an array, and unpack them where they are compressed; raises OSError when the disk is full."""
+    """Find the rows of an array, and unpack them where they are compressed.
+
+    Parameters
+    ----------
+    archive : whose array it is.
+    zipped : the same file, open.
+    name : of the array.
+
+    Raises
+    ------
+    OSError
+        what is unpacked finds no room on the disk.
+    """
     info = zipped.getinfo(f"{name}.npy")
     column = archive.columns[name]
     size = column.row_bytes * column.shape[0]
@@ -116,7 +130,8 @@ def array_place(archive: ScanArchive, zipped: zipfile.ZipFile, name: str) -> Arr
             file.seek(info.header_offset)
             fixed = file.read(_LOCAL_HEADER)
         variable = int.from_bytes(fixed[26:28], "little") + int.from_bytes(fixed[28:30], "little")
-        return ArrayPlace(info.header_offset + _LOCAL_HEADER + variable + info.file_size - size)
+        begin = info.header_offset + _LOCAL_HEADER + variable + info.file_size - size
+        return ArrayPlace(begin, archive.path.open("rb"))
     unpacked = tempfile.TemporaryFile()
     with zipped.open(info) as member:
         member.read(info.file_size - size)

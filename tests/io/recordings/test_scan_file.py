@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -120,6 +121,22 @@ def test_what_stands_behind_the_last_beam_of_a_scan_is_none(tmp_path: Path) -> N
     arrays["ranges"][beyond], arrays["reflector"][beyond] = 1.0, True
     np.savez(tmp_path / "scans.npz", **arrays)
     same(load_log(tmp_path).scans[0].block(0, 20), before)
+
+
+def test_threads_that_read_at_once_get_the_scans_they_asked_for(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (memory,) = load_log(folder).scans
+    (file,) = in_file(folder, monkeypatch).scans
+    asked = [first for _ in range(100) for first in range(0, 60, 3)]
+    with ThreadPoolExecutor(4) as pool:
+        for first, block in zip(asked, pool.map(file.block, asked, [first + 3 for first in asked]), strict=True):
+            same(block, memory.block(first, first + 3))
+
+
+def test_a_recording_that_another_one_replaces_is_read_as_it_was(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = load_log(folder).scans[0].block(0, 60)
+    (file,) = in_file(folder, monkeypatch).scans
+    write_recording(folder, uneven(90))
+    same(file.block(0, 60), before)
 
 
 def test_a_file_that_was_cut_meanwhile_is_an_error_and_no_garbage(

@@ -178,8 +178,8 @@ LOCALIZATION = (
     Mutant(
         name="cluster of a full turn cut where the turn begins",
         file=FOLDER + "detector.py",
-        find="once * step > TURN - 0.5 * step",
-        replace="once * step > TURN + 0.5 * step",
+        find="once * steps > TURN - 0.5 * steps",
+        replace="once * steps > TURN + 0.5 * steps",
         tests=(TESTS + "test_detector.py::test_post_is_found_where_it_stands_at_any_bearing_of_a_full_turn",),
     ),
     Mutant(
