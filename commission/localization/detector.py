@@ -136,7 +136,7 @@ def beams_of(counts: IntArray, angle_min: FloatArray, increments: FloatArray) ->
 
 @compiled_inline
 def beams_at(columns: BeamColumns, row: int) -> Beams:
-    """Kernel: bearings of one scan of many."""
+    """Bearings of one scan of many, as `beams_of` gives them."""
     return Beams(columns.used[row], columns.angle_min[row], columns.increment[row], columns.full_turn[row])
 
 
