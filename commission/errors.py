@@ -82,3 +82,15 @@ class JobCancelled(JobError):
 
 class UsageError(CommissionError):
     """A command or an action asks for something that does not exist."""
+
+
+def reason_of(error: BaseException) -> str:
+    """Say in words what a library found wrong with a file.
+
+    Parameters
+    ----------
+    error : what it raised. The text of a KeyError is the key alone, which says nothing to a person; some have no text.
+    """
+    if isinstance(error, KeyError) and error.args:
+        return f"it refers to {error.args[0]!r}, which is not in it"
+    return str(error).strip() or type(error).__name__

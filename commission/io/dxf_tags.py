@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from commission.errors import FileFormatError
+from commission.errors import FileFormatError, reason_of
 from commission.io.reading import cannot_read, check_size, read_bytes
 from commission.progress import Progress
 
@@ -179,4 +179,4 @@ def _binary_tags(path: Path) -> Iterator[tuple[int, int, bytes]]:
             value = tag.value
             yield number, tag.code, value if isinstance(value, bytes) else str(value).encode("utf-8", "replace")
     except (DXFError, ValueError, IndexError, TypeError, struct.error) as error:
-        raise FileFormatError(path, "", f"is no binary DXF ({error})", "a complete DXF drawing") from error
+        raise FileFormatError(path, "", f"is no binary DXF ({reason_of(error)})", "a complete DXF drawing") from error

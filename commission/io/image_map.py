@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from commission.errors import FileFormatError
+from commission.errors import FileFormatError, reason_of
 from commission.io.map_server import CELL_LIMIT
 from commission.io.reading import check_size
 from commission.site.checks import above, between
@@ -140,7 +140,9 @@ def read_picture(path: Path) -> Picture:
         raise FileFormatError(path, "", "is too large", f"1 to {CELL_LIMIT} pixels") from error
     except (OSError, ValueError, SyntaxError, EOFError, OverflowError, struct.error, zlib.error, LookupError) as error:
         # What Pillow raises for garbage and for files that end early depends on format and place.
-        raise FileFormatError(path, "", f"is no readable image ({error})", f"one of: {', '.join(FORMATS)}") from error
+        raise FileFormatError(
+            path, "", f"is no readable image ({reason_of(error)})", f"one of: {', '.join(FORMATS)}"
+        ) from error
 
 
 def _picture(image: Image.Image) -> Picture:

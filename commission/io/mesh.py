@@ -13,7 +13,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from commission.errors import FileFormatError, UsageError
+from commission.errors import FileFormatError, UsageError, reason_of
 from commission.geometry.arrays import FloatArray, read_only
 from commission.io.dxf_units import UNITS
 from commission.io.glb_header import check_announced
@@ -150,7 +150,9 @@ def read_model(path: Path, *, unit: str | None = None, y_up: bool | None = None,
     except OSError as error:
         raise cannot_read(path, error) from error
     except _GARBAGE as error:
-        raise FileFormatError(path, "", f"is no readable {kind.upper()} ({error})", "a complete model") from error
+        raise FileFormatError(
+            path, "", f"is no readable {kind.upper()} ({reason_of(error)})", "a complete model"
+        ) from error
     return Model(path, triangles, is_y_up)
 
 

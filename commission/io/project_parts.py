@@ -16,7 +16,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from commission.errors import FileFormatError
+from commission.errors import FileFormatError, reason_of
 from commission.io.conversion import convert
 from commission.io.map_server import CELL_LIMIT
 from commission.io.project_file import VEHICLES
@@ -103,7 +103,9 @@ def apply(project: Project, values: dict[str, Any], path: Path) -> Project:
     except FileFormatError:
         raise
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, zlib.error) as error:
-        raise FileFormatError(path, "", f"holds no change of a project ({error})", "what this program wrote") from error
+        raise FileFormatError(
+            path, "", f"holds no change of a project ({reason_of(error)})", "what this program wrote"
+        ) from error
 
 
 def _apply(project: Project, values: dict[str, Any], path: Path) -> Project:
