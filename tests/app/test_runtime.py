@@ -182,13 +182,13 @@ def test_a_mistake_of_ours_while_drawing_is_listed_and_the_page_lives_on(bench: 
     bench.page.fail_once = True
     bench.play()
     bench.until(lambda: bool(bench.runtime.state.faults))
-    assert "RuntimeError: no such thing" in bench.runtime.state.faults[0]
+    assert "a fault of the program (RuntimeError)" in bench.runtime.state.faults[0]
     bench.until(lambda: len(bench.page.views) > 3)
 
 
 def test_a_value_out_of_range_is_told_and_changes_nothing(bench: Bench) -> None:
     before = bench.runtime.state.project
-    bench.post(SetParameter("association.gate_probability", 7.0))
+    bench.post(Envelope(SetParameter("association.gate_probability", 7.0), Sender(1)))
     bench.until(lambda: bool(bench.page.told))
     assert "gate_probability is 7" in bench.page.told[0][0]
     assert bench.runtime.state.project is before
