@@ -103,7 +103,7 @@ class GrowingRun:
     def feed(self, record: Record) -> tuple[Estimate, ...]:
         """Take in one record; arguments, result and errors are those of `Localizer.feed`."""
         self._localizer.push(record)
-        return self._pulled()
+        return tuple(iter(self.pull, None))
 
     def push(self, record: Record) -> None:
         """Take in one record without processing it, see `Localizer.push`."""
@@ -120,17 +120,8 @@ class GrowingRun:
 
     def flush(self) -> tuple[Estimate, ...]:
         """Process everything that waits, since no more records come; returns the estimates of its scans."""
-        estimates = self._localizer.flush()
-        for estimate in estimates:
-            self._append(estimate)
-        return estimates
-
-    def _pulled(self) -> tuple[Estimate, ...]:
-        """Return every estimate that can be made now."""
-        estimates: list[Estimate] = []
-        while (estimate := self.pull()) is not None:
-            estimates.append(estimate)
-        return tuple(estimates)
+        self._localizer.release()
+        return tuple(iter(self.pull, None))
 
     def columns(self) -> RunColumns:
         """Return the run so far: views of rows that never change again."""

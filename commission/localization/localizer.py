@@ -62,7 +62,7 @@ class Localizer:
     def __init__(self, setup: LocalizerSetup, start: Belief | FilterState) -> None:
         self._setup = setup
         self._state = state_at_start(start) if isinstance(start, Belief) else start
-        self._newest_ns = self._state.newest_ns
+        self._newest_ns = self._horizon_ns = self._state.newest_ns
         self._waiting: deque[Record] = deque()
 
     @property
@@ -116,7 +116,7 @@ class Localizer:
             when the record is older than one before it.
         """
         self.push(record)
-        return self._pulled()
+        return tuple(iter(self.pull, None))
 
     def push(self, record: Record) -> None:
         """Take in one record without processing it; raises SourceError when it is older than one before it."""
@@ -125,7 +125,7 @@ class Localizer:
                 f"{type(record).__name__} has stamp {record.stamp_ns} ns, {self._newest_ns - record.stamp_ns} ns "
                 "before the record that came before it; expected ascending stamps"
             )
-        self._newest_ns = int(record.stamp_ns)
+        self._newest_ns = self._horizon_ns = int(record.stamp_ns)
         self._waiting.append(record)
 
     def pull(self) -> Estimate | None:
@@ -145,17 +145,12 @@ class Localizer:
 
     def flush(self) -> tuple[Estimate, ...]:
         """Process everything that waits, since no more records come; returns the estimates of its scans."""
-        self._newest_ns = LAST_NS
-        estimates = self._pulled()
-        self._newest_ns = self._state.newest_ns
-        return estimates
+        self.release()
+        return tuple(iter(self.pull, None))
 
-    def _pulled(self) -> tuple[Estimate, ...]:
-        """Return every estimate that can be made now."""
-        estimates: list[Estimate] = []
-        while (estimate := self.pull()) is not None:
-            estimates.append(estimate)
-        return tuple(estimates)
+    def release(self) -> None:
+        """Let nothing that has been pushed wait any longer: every `pull` processes more of it."""
+        self._horizon_ns = LAST_NS
 
     def _following(self, stamp_ns: int) -> NextOdometry | None:
         """Odometry that follows the first scan that waits; None while it may still come in time."""
@@ -166,7 +161,7 @@ class Localizer:
                     return NOT_YET
                 dx, dy, dtheta = (float(value) for value in record.displacement)
                 return NextOdometry(True, int(record.stamp_ns), dx, dy, dtheta)
-        return NOT_YET if until_ns == stamp_ns or self._newest_ns > until_ns else None
+        return NOT_YET if until_ns == stamp_ns or self._horizon_ns > until_ns else None
 
     def _taken_in(self, record: Record, following: NextOdometry) -> Estimate | None:
         """Process one record."""

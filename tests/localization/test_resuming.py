@@ -303,3 +303,16 @@ def test_a_setup_that_is_replaced_before_a_cycle_comes_begins_no_segment_of_its_
     growing.begin_segment(SETUPS["another map"])
     growing.begin_segment(SETUPS["narrow gate"])
     assert growing.columns().segments == (RunSegment(0, SETUPS["narrow gate"]),)
+
+
+def test_cycles_of_a_flush_are_checkpoints_like_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growing_run, "CHECKPOINT_CYCLES", 1)
+    drive = random_drive(SETUPS["drive"], np.random.default_rng(8), PLANS["scans between odometry"])
+    growing = GrowingRun(SETUPS["drive"], drive.initial)
+    records = list(drive.log.records())
+    last = max(index for index, record in enumerate(records) if isinstance(record, Detections))
+    for record in records[: last + 1]:
+        growing.feed(record)
+    before = len(growing)
+    assert len(growing.flush()) == len(growing) - before == 1
+    assert growing.columns().checkpoints[-1] == (len(growing), growing.state)
