@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 from commission.errors import UsageError
+from commission.site.quantity import PERCENT, PLAIN_DEGREES
 
 if TYPE_CHECKING:
     from commission.site.reflectors import ReflectorMap
@@ -73,11 +74,12 @@ class Ambiguity:
 def _cold_start(found: AmbiguityResult, reflectors: ReflectorMap) -> list[str]:
     """Lines about the floor, and the pairs that most poses confuse."""
     on, area = found.drivable, found.lattice.spacing**2
-    share = 100.0 * found.ambiguous.sum() / max(on.sum(), 1)
+    share = found.ambiguous.sum() / max(on.sum(), 1)
     rival, few = found.has_twin.sum() * area, (found.visible[on] < 2).sum() * area
     lines = [
         f"Cold start   {found.ambiguous.sum() * area:.1f} of {on.sum() * area:.1f} m2 ambiguous in some heading "
-        f"({share:.1f} %): {rival:.1f} m2 look like another place, {few:.1f} m2 see fewer than two reflectors",
+        f"({PERCENT.text(share, '.1f')}): {rival:.1f} m2 look like another place, "
+        f"{few:.1f} m2 see fewer than two reflectors",
     ]
     for pair in found.cold.pairs[:NAMED]:
         names, images = (
@@ -91,7 +93,7 @@ def _cold_start(found: AmbiguityResult, reflectors: ReflectorMap) -> list[str]:
 
 def _pose(pose: tuple[float, float, float]) -> str:
     x, y, heading = pose
-    return f"{x:.2f}, {y:.2f} m, {math.degrees(heading):.0f} deg"
+    return f"{x:.2f}, {y:.2f} m, {PLAIN_DEGREES.text(heading)}"
 
 
 def _tracking(routes: tuple[RouteRisks, ...], reflectors: ReflectorMap) -> list[str]:
@@ -107,6 +109,6 @@ def _tracking(routes: tuple[RouteRisks, ...], reflectors: ReflectorMap) -> list[
         names = [reflectors.reflectors[index].id for index in (worst.reflector, worst.neighbor)]
         lines.append(
             f"Tracking     route {each.route!r}: neighbors inside the gate on {len(metres_at_risk(each.risks))} m; "
-            f"worst {names[0]} for {names[1]}, {100.0 * worst.worst:.1f} % of detections"
+            f"worst {names[0]} for {names[1]}, {PERCENT.text(worst.worst, '.1f')} of detections"
         )
     return lines

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import Positional, arg
 
 from commission.errors import UsageError
+from commission.site.quantity import MILLIMETRES, PERCENT, PLAIN_DEGREES, Shown
 
 if TYPE_CHECKING:
     from commission.studies.coverage import CoverageOptions
@@ -89,21 +90,20 @@ def _report(entries: dict[str, int | float | None]) -> list[str]:
 
     def share(key: str) -> str:
         value = entries[key]
-        return "unknown" if value is None else f"{100.0 * value:.1f} %"
+        return "unknown" if value is None else PERCENT.text(value, ".1f")
 
-    def scaled(key: str, factor: float, form: str) -> str:
+    def figure(key: str, unit: Shown, form: str) -> str:
         value = entries[key]
-        return "none" if value is None else form.format(factor * value)
+        return "none" if value is None else unit.text(value, form)
 
-    degrees = math.degrees(1.0)
     return [
         f"Floor        {entries['area_m2']:.0f} m2 in {entries['points']} points; {entries['reflectors']} reflectors",
         f"Visible      1 or more on {share('share_1_visible')}, 2 on {share('share_2_visible')}, "
         f"3 on {share('share_3_visible')}",
         f"One fix      possible on {share('share_with_fix')}; two sigma within the supervisor's limits on "
         f"{share('share_within_limits')}",
-        f"1-sigma      position {scaled('position_sigma_median_m', 1e3, '{:.1f} mm')} median, "
-        f"{scaled('position_sigma_p95_m', 1e3, '{:.1f} mm')} at 95 % of the floor; heading "
-        f"{scaled('heading_sigma_median_rad', degrees, '{:.2f} deg')} and "
-        f"{scaled('heading_sigma_p95_rad', degrees, '{:.2f} deg')}",
+        f"1-sigma      position {figure('position_sigma_median_m', MILLIMETRES, '.1f')} median, "
+        f"{figure('position_sigma_p95_m', MILLIMETRES, '.1f')} at 95 % of the floor; heading "
+        f"{figure('heading_sigma_median_rad', PLAIN_DEGREES, '.2f')} and "
+        f"{figure('heading_sigma_p95_rad', PLAIN_DEGREES, '.2f')}",
     ]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 from commission.cli.parsing import initial_pose
+from commission.site.quantity import MILLIMETRES, PERCENT, PLAIN_DEGREES
 
 if TYPE_CHECKING:
     from commission.studies.run import RunResult
@@ -86,31 +87,37 @@ def _report(result: RunResult) -> list[str]:
     x, y, theta = start.belief.mean
     lines = [
         f"Recording    {result.cycles} cycles in {result.duration:.1f} s",
-        f"Start        x {x:.3f} m, y {y:.3f} m, heading {math.degrees(theta):.1f} deg ({start.origin.value})",
+        f"Start        x {x:.3f} m, y {y:.3f} m, heading {PLAIN_DEGREES.text(theta, '.1f')} ({start.origin.value})",
         f"Detections   {result.count(Status.INLIER)} inliers, "
         f"{result.count(Status.OUTLIER_DETECTOR)} outliers of the detector, "
         f"{result.count(Status.OUTLIER_ASSOCIATION)} of the association",
         f"NIS          mean {_known(result.nis_mean)} of the accepted ({result.nis_expected:.2f} is consistent), "
         f"{_known(result.nis_before_gate_mean)} of all near a reflector; "
-        f"{_known(100.0 * result.rejected_fraction, 1)} % rejected",
-        f"Unseen       {_known(100.0 * result.unseen_fraction, 1)} % of the cycles without an accepted detection, "
+        f"{_known(PERCENT.of(result.rejected_fraction), 1)} % rejected",
+        f"Unseen       {_known(PERCENT.of(result.unseen_fraction), 1)} % of the cycles without an accepted detection, "
         f"{result.longest_unseen:.1f} s at most",
         *_by_scanner(result),
-        f"Supervisor   operational {100.0 * result.operational_fraction:.1f} %, lost "
-        f"{100.0 * result.lost_fraction:.1f} %; fail episodes: {len(result.episodes)}" + "".join(_longest(result)),
+        f"Supervisor   operational {PERCENT.text(result.operational_fraction, '.1f')}, lost "
+        f"{PERCENT.text(result.lost_fraction, '.1f')}; fail episodes: {len(result.episodes)}"
+        + "".join(_longest(result)),
     ]
     errors = result.statistics
     if errors is None:
         return [*lines, "Reference    none: errors are unknown"]
-    heading = "" if math.isnan(errors.heading_rmse) else f"; heading {math.degrees(errors.heading_rmse):.2f} deg RMS"
+    heading = (
+        "" if math.isnan(errors.heading_rmse) else f"; heading {PLAIN_DEGREES.text(errors.heading_rmse, '.2f')} RMS"
+    )
+    rms, median, p95, most = (
+        MILLIMETRES.number(error, ".1f")
+        for error in (errors.position_rmse, errors.position_median, errors.position_p95, errors.position_max)
+    )
     consistency = "" if math.isnan(errors.anees) else f"{errors.anees:.2f}, of the "
     return [
         *lines,
-        f"Error        position {errors.position_rmse * 1e3:.1f} mm RMS, {errors.position_median * 1e3:.1f} median, "
-        f"{errors.position_p95 * 1e3:.1f} at 95 %, {errors.position_max * 1e3:.1f} at most{heading}",
+        f"Error        position {rms} mm RMS, {median} median, {p95} at 95 %, {most} at most{heading}",
         f"Consistency  ANEES {consistency}position {errors.anees_position:.2f} (1 is consistent, more is too sure)",
         f"Danger       {errors.wrong_while_operational} of {errors.compared} cycles operational with an error "
-        f"beyond {limit * 1e3:.0f} mm",
+        f"beyond {MILLIMETRES.text(limit)}",
     ]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import Positional, arg
 
 from commission.errors import UsageError
+from commission.site.quantity import MILLIMETRES, PLAIN_DEGREES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -113,10 +113,11 @@ def _report(name: str, prediction: RoutePrediction, errors: PredictedErrors) -> 
     return [
         f"Route        {name!r}, {prediction.drive.length:.1f} m in "
         f"{prediction.drive.stamps_ns[-1] * 1e-9:.1f} s, {len(prediction.drive)} scans",
-        f"2-sigma      x {x * 1e3:.1f} mm, y {y * 1e3:.1f} mm (limit {limits.position_limit * 1e3:.0f}), "
-        f"heading {math.degrees(heading):.2f} deg (limit {math.degrees(limits.heading_limit):.2f}) at most",
-        f"True error   2-sigma x {error_x * 1e3:.1f} mm, y {error_y * 1e3:.1f} mm, "
-        f"heading {math.degrees(error_heading):.2f} deg at most",
+        f"2-sigma      x {MILLIMETRES.text(x, '.1f')}, y {MILLIMETRES.text(y, '.1f')} "
+        f"(limit {MILLIMETRES.number(limits.position_limit)}), heading {PLAIN_DEGREES.text(heading, '.2f')} "
+        f"(limit {PLAIN_DEGREES.number(limits.heading_limit, '.2f')}) at most",
+        f"True error   2-sigma x {MILLIMETRES.text(error_x, '.1f')}, y {MILLIMETRES.text(error_y, '.1f')}, "
+        f"heading {PLAIN_DEGREES.text(error_heading, '.2f')} at most",
         f"Reflectors   {prediction.seen.min()} seen at least, {prediction.seen.mean():.1f} on average; "
         f"at most {prediction.on_odometry.max():.1f} m on odometry alone",
         f"Supervisor   stops at: {stops or 'none'}{f'; drives on at: {starts}' if starts else ''}; "
@@ -129,7 +130,7 @@ def _at_stations(stations: Sequence[StationAccuracy]) -> list[str]:
     if not stations:
         return []
     missed = [
-        f"{each.station} {each.expected * 1e3:.1f} mm (allowed {each.required * 1e3:.0f})"
+        f"{each.station} {MILLIMETRES.text(each.expected, '.1f')} (allowed {MILLIMETRES.number(each.required)})"
         for each in stations
         if not each.is_met
     ]

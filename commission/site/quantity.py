@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import TypeAlias
+from typing import TypeAlias, overload
+
+from commission.geometry.arrays import FloatArray
 
 LARGEST = 1e9
 """No length, angle, speed or sigma that anybody means is larger; squares and products of much larger ones overflow."""
@@ -120,6 +122,14 @@ class Shown:
     scale: float
     """Number of these in one unit of the file."""
 
+    @overload
+    def of(self, value: float) -> float: ...
+    @overload
+    def of(self, value: FloatArray) -> FloatArray: ...
+    def of(self, value: float | FloatArray) -> float | FloatArray:
+        """Return the number, or the numbers, that people read for a value in the unit of code and files."""
+        return value * self.scale
+
     def text(self, value: float, form: str = ".0f") -> str:
         """Return a value as it is written: number and unit.
 
@@ -128,11 +138,23 @@ class Shown:
         value : in the unit of code and files.
         form : how Python formats the number: `.1f`, `.4g`.
         """
-        return _joined(f"{value * self.scale:{form}}", self.unit)
+        return joined(self.number(value, form), self.unit)
+
+    def number(self, value: float, form: str = ".0f") -> str:
+        """Return a value as it is written where the unit stands elsewhere: no minus before a zero."""
+        written = f"{value * self.scale:{form}}"
+        return written.replace("-", "") if float(written) == 0.0 and "+" not in form else written
+
+    def against(self, value: float, limit: float, forms: tuple[str, str] = (".1f", ".0f")) -> str:
+        """Return a value and its limit, `12.3 / 60 mm`; `forms` are those of the two."""
+        return f"{self.number(value, forms[0])} / {self.text(limit, forms[1])}"
 
 
 MILLIMETRES = Shown("mm", 1000.0)
 DEGREES = Shown("°", math.degrees(1.0))
+PLAIN_DEGREES = Shown("deg", math.degrees(1.0))
+"""Of what commands print and files say: characters that every terminal has."""
+MILLISECONDS = Shown("ms", 1000.0)
 PERCENT = Shown("%", 100.0)
 AS_DEGREES = Shown("°", 1.0)
 """Of a field whose name ends in `_deg`."""
@@ -189,12 +211,12 @@ class Quantity:
 
     def text(self, value: float) -> str:
         """Return a value as the page writes it: number, with the decimals of its step, and unit."""
-        return _joined(f"{value * self.scale:.{_decimals(self.step)}f}", self.shown_unit)
+        return joined(f"{value * self.scale:.{_decimals(self.step)}f}", self.shown_unit)
 
     def change_text(self, before: float, after: float) -> str:
         """Return how a value changes, `1.250 → 1.275 m`; empty: by less than the last digit."""
         old, new = (f"{value * self.scale:.{_decimals(self.step)}f}" for value in (before, after))
-        return "" if old == new else f"{old} → {_joined(new, self.shown_unit)}"
+        return "" if old == new else f"{old} → {joined(new, self.shown_unit)}"
 
     def brief(self, value: float) -> str:
         """Return a value as the page writes it where room is scarce: with no digit that says nothing."""
@@ -265,9 +287,9 @@ def _decimals(step: float) -> int:
 
 
 def _with_unit(number: float, unit: str) -> str:
-    return _joined(f"{number:g}", unit)
+    return joined(f"{number:g}", unit)
 
 
-def _joined(number: str, unit: str) -> str:
-    """Number and unit, with the blank that stands between all but a degree sign."""
+def joined(number: str, unit: str) -> str:
+    """Return number and unit, with the blank that stands between all but a degree sign."""
     return f"{number}{unit}" if unit == "°" else f"{number} {unit}".rstrip()

@@ -21,6 +21,7 @@ from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress, silent
 from commission.site.disturbances import WheelNoise
+from commission.site.quantity import MILLIMETRES, MILLISECONDS, PERCENT
 from commission.site.record_log import RecordLog
 from commission.studies.inputs import StudyInput
 from commission.studies.plausibility import Finding
@@ -135,7 +136,7 @@ def _lost(run: RunColumns) -> Iterator[Finding]:
         return
     rejected = 1.0 - accepted[since:].sum() / max(1, judged[since:].sum())
     yield Finding(
-        found=f"{100.0 * rejected:.0f} % of the detections are rejected from {times[since]:.1f} s on",
+        found=f"{PERCENT.text(rejected)} of the detections are rejected from {times[since]:.1f} s on",
         probably="the vehicle is lost there, whatever its covariance says, or most of what it detects is no reflector",
         remedy="look at what happens just before, and at the other notes",
     )
@@ -168,8 +169,8 @@ def _mounting(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iter
         return
     heading = float(wrap(inputs.setup.scanners[0].mounting[2] + turn))
     yield Finding(
-        found=f"{100.0 * before.accepted:.0f} % of the detections fit the reflectors, "
-        f"{100.0 * best.accepted:.0f} % once they are {name}",
+        found=f"{PERCENT.text(before.accepted)} of the detections fit the reflectors, "
+        f"{PERCENT.text(best.accepted)} once they are {name}",
         probably=meaning,
         remedy=cure.format(heading),
     )
@@ -187,8 +188,8 @@ def _range_bias(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> It
     if abs(bias) < 0.5 * inputs.setup.parameters.observation.range_sigma or not fit.is_far_better_than(before):
         return
     yield Finding(
-        found=f"ranges are {bias * 1e3:+.0f} mm off on average ({100.0 * before.accepted:.0f} % of the detections are "
-        f"accepted, {100.0 * fit.accepted:.0f} % without that)",
+        found=f"ranges are {MILLIMETRES.text(bias, '+.0f')} off on average ({PERCENT.text(before.accepted)} of the "
+        f"detections are accepted, {PERCENT.text(fit.accepted)} without that)",
         probably="the scanner has a range bias; reflective tape often causes one",
         remedy=f"observation.range_bias = {present + bias:.3f}",
     )
@@ -219,12 +220,12 @@ def _lag(inputs: MisfitInput, detected: DetectionLog) -> Iterator[Finding]:
     if abs(lag) < _SMALLEST_LAG_S or not fit.is_far_better_than(before):
         return
     yield Finding(
-        found=f"the scans fit the odometry best when they are taken {abs(lag) * 1e3:.0f} ms "
+        found=f"the scans fit the odometry best when they are taken {MILLISECONDS.text(abs(lag))} "
         f"{'earlier' if lag > 0.0 else 'later'} than stamped (misfit {before.misfit:.2f} becomes {fit.misfit:.2f})",
-        probably=f"the scans lag behind the odometry by about {lag * 1e3:.0f} ms"
+        probably=f"the scans lag behind the odometry by about {MILLISECONDS.text(lag)}"
         if lag > 0.0
-        else f"the odometry lags behind the scans by about {-lag * 1e3:.0f} ms",
-        remedy=f"shift the stamps of the scans by {-lag * 1e3:+.0f} ms",
+        else f"the odometry lags behind the scans by about {MILLISECONDS.text(-lag)}",
+        remedy=f"shift the stamps of the scans by {MILLISECONDS.text(-lag, '+.0f')}",
     )
 
 

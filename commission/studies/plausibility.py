@@ -15,6 +15,7 @@ from commission.geometry.angles import wrap
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.progress import Progress, silent
 from commission.site.project import Project
+from commission.site.quantity import PERCENT, PLAIN_DEGREES
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanStore
 from commission.site.scanner import Scanner
@@ -290,7 +291,7 @@ def _ranges(name: str, ranges: FloatArray, scanner: Scanner) -> Iterator[Finding
     typical = float(np.median(ranges))
     in_millimetres = typical > 10.0 * farthest
     yield Finding(
-        found=f"{100.0 * beyond:.0f} % of the ranges of {name} are beyond the scanner's {farthest:g} m"
+        found=f"{PERCENT.text(beyond)} of the ranges of {name} are beyond the scanner's {farthest:g} m"
         f" (typical: {typical:.4g} m)",
         probably="they are in millimetres" if in_millimetres else "another scanner was recorded",
         remedy="expected metres" if in_millimetres else "correct the project's scanner (range)",
@@ -318,7 +319,7 @@ def _scans_of(inputs: PlausibilityInput, scans: ScanStore, scanner: Scanner) -> 
     step, expected = float(np.median(np.abs(scans.angle_increment))), scanner.angle_increment
     if not expected / RATE_RATIO <= step <= expected * RATE_RATIO:
         yield Finding(
-            found=f"the {called} have {beams_in_words(scans.beams)} {math.degrees(step):.3g} deg apart",
+            found=f"the {called} have {beams_in_words(scans.beams)} {PLAIN_DEGREES.text(step, '.3g')} apart",
             probably=f"another scanner was recorded than the project's ({scanner.resolution_deg:g} deg)",
             remedy="correct the project's scanner (resolution_deg), by which the detector counts beams",
         )
@@ -337,7 +338,7 @@ def _intensities(values: FloatArray, threshold: float) -> Iterator[Finding]:
     where = f"detector.intensity_threshold {threshold:g} (intensities are {low:.4g} to {high:.4g})"
     if share > _FULL_SHARE:
         yield Finding(
-            found=f"{100.0 * share:.0f} % of the beams reach {where}",
+            found=f"{PERCENT.text(share)} of the beams reach {where}",
             probably="every wall counts as a reflector",
             remedy="set the threshold between the intensities of walls and of reflectors",
         )

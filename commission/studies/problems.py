@@ -24,6 +24,7 @@ from commission.site.floor_map import FloorMap
 from commission.site.parameters import Parameters
 from commission.site.parts import Told
 from commission.site.project import Project
+from commission.site.quantity import MILLIMETRES, PLAIN_DEGREES
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
@@ -216,13 +217,13 @@ def _asked_too_much(violation: Violation) -> str:
         case ViolationKind.CORNER:
             is_fatal = violation.is_fatal
             remedy = "a curve: it cannot do that" if is_fatal else "a stop there: a segment of its own"
-            return f"the vehicle turns by {math.degrees(found):.0f} deg on the spot; expected {remedy}"
+            return f"the vehicle turns by {PLAIN_DEGREES.text(found)} on the spot; expected {remedy}"
         case ViolationKind.WALL:
             return f"the vehicle's outline cuts a wall over {length:.2f} m"
         case ViolationKind.ROOM:
             return (
-                f"{1000 * found:.0f} mm between the vehicle's outline and a wall; "
-                f"expected {1000 * expected:.0f} mm or more"
+                f"{MILLIMETRES.text(found)} between the vehicle's outline and a wall; "
+                f"expected {MILLIMETRES.text(expected)} or more"
             )
 
 
@@ -263,7 +264,7 @@ def _scanner_problems(site: ProblemsInput) -> Iterable[Problem]:
     if depth > 0.01 and _inside(position, outline):
         if depth > _SLIT:
             text = (
-                f"The scanner is {1000 * depth:.0f} mm inside the vehicle's outline; "
+                f"The scanner is {MILLIMETRES.text(depth)} inside the vehicle's outline; "
                 "expected at its edge, unless it stands above the body"
             )
             yield Problem(severity=Severity.NOTE, text=text, subject=Subject.SCANNER)
@@ -271,10 +272,11 @@ def _scanner_problems(site: ProblemsInput) -> Iterable[Problem]:
     bearings = scanner.angle_min + np.arange(scanner.beam_count) * scanner.angle_increment
     blocked = np.flatnonzero(_crosses(position, bearings + scanner.mounting[2], outline))
     if len(blocked):
-        low, high = (math.degrees(bearings[index]) for index in (blocked[0], blocked[-1]))
+        low, high = (float(bearings[index]) for index in (blocked[0], blocked[-1]))
         text = (
-            f"The vehicle's own outline blocks {len(blocked)} of {scanner.beam_count} beams, between {low:.1f} and "
-            f"{high:.1f} deg; expected a field of view that leaves the vehicle out"
+            f"The vehicle's own outline blocks {len(blocked)} of {scanner.beam_count} beams, between "
+            f"{PLAIN_DEGREES.number(low, '.1f')} and {PLAIN_DEGREES.text(high, '.1f')}; "
+            "expected a field of view that leaves the vehicle out"
         )
         yield Problem(severity=Severity.WARNING, text=text, subject=Subject.SCANNER)
 
@@ -326,7 +328,7 @@ def _pair_problem(first: Reflector, second: Reflector, distance: float, needed: 
     touch = first.radius + second.radius
     is_one = distance < touch
     expected = f"expected {needed:.2f} m or more to tell them apart at any range"
-    text = f"Reflectors {names} are {1000 * distance:.0f} mm apart{' and overlap' if is_one else ''}; {expected}"
+    text = f"Reflectors {names} are {MILLIMETRES.text(distance)} apart{' and overlap' if is_one else ''}; {expected}"
     return Problem(
         severity=Severity.ERROR if is_one else Severity.WARNING,
         text=text,
@@ -413,8 +415,9 @@ def _missed_stations(site: ProblemsInput, passed: Passed) -> Iterable[Problem]:
     return _limited(
         Problem(
             severity=Severity.WARNING,
-            text=f"Station {station.name!r}: no route passes it; expected one within {1000 * AT_STATION:.0f} mm that "
-            f"looks its way to {math.degrees(FACING_STATION):.0f} deg, else its accuracy is not checked",
+            text=f"Station {station.name!r}: no route passes it; expected one within "
+            f"{MILLIMETRES.text(AT_STATION)} that looks its way to "
+            f"{PLAIN_DEGREES.text(FACING_STATION)}, else its accuracy is not checked",
             subject=Subject.STATION,
             ids=(station.name,),
             place=(station.x, station.y),

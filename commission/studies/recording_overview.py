@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import FloatArray, IntArray
+from commission.site.quantity import PERCENT, PLAIN_DEGREES
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanStore
 
@@ -98,14 +99,16 @@ def _scan_values(scans: ScanStore) -> str:
     some = scans.chosen(chosen)
     ranges = np.asarray(some.ranges, dtype=np.float64)
     hit = np.isfinite(ranges)
-    parts = [f"{beams_in_words(scans.beams)} {np.degrees(np.median(np.abs(scans.angle_increment))):.4g} deg apart"]
+    parts = [
+        f"{beams_in_words(scans.beams)} {PLAIN_DEGREES.text(np.median(np.abs(scans.angle_increment)), '.4g')} apart"
+    ]
     if hit.any():
         parts.append(f"range {ranges[hit].min():.4g} to {ranges[hit].max():.4g} m")
     if some.intensities is not None and hit.any():
         strengths = np.asarray(some.intensities, dtype=np.float64)[hit]
         parts.append(f"intensity {strengths.min():.4g} to {strengths.max():.4g}")
     if some.reflector is not None:
-        parts.append(f"{100.0 * float(np.mean(some.reflector)):.2g} % of the beams flagged as reflector")
+        parts.append(f"{PERCENT.text(float(np.mean(some.reflector)), '.2g')} of the beams flagged as reflector")
     return ", ".join(parts)
 
 

@@ -16,6 +16,7 @@ from commission.geometry.angles import wrap
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.localization.estimate import Status
 from commission.localization.run_columns import RunColumns
+from commission.site.quantity import DEGREES, MILLIMETRES
 
 BELONGS = 1.0
 """A detection that lies farther from its reflector [m], seen from the reference, is of something else."""
@@ -145,7 +146,9 @@ def told(figures: ScannerFigures) -> str:
     if not math.isfinite(ranges):
         return text
     source = "reference" if has_reference else "estimate"
-    return f"{text}, residuals {ranges * 1e3:+.1f} mm, {math.degrees(bearings):+.2f}° against the {source}"
+    return (
+        f"{text}, residuals {MILLIMETRES.text(ranges, '+.1f')}, {DEGREES.text(bearings, '+.2f')} against the {source}"
+    )
 
 
 def figures_entries(figures: tuple[ScannerFigures, ...]) -> list[dict[str, str | int | float | None]]:

@@ -211,7 +211,7 @@ def test_the_badge_shows_the_larger_sigma_and_both_limits(at: At, site: Project)
     assert word == "OPERATIONAL"
     position = 1000.0 * max(two_sigma(at, 0), two_sigma(at, 1))
     assert_reads(beside.replace("&nbsp;", " "), position, 87.0, DEGREES * two_sigma(at, 2), DEGREES * 0.061)
-    assert re.search(r"/ 87 mm .* °$", beside)
+    assert re.search(r"/ 87 mm .*°$", beside)
 
 
 @pytest.fixture(scope="module")
@@ -387,7 +387,7 @@ def test_a_wrong_association_is_told_in_percent_at_its_metres(expected_route: Ro
 FIGURES = {
     Figure.VISIBLE: (3.0, "3"),
     Figure.POSITION_SIGMA: (0.0123, "12.3 mm"),
-    Figure.HEADING_SIGMA: (0.0123, "0.705 °"),
+    Figure.HEADING_SIGMA: (0.0123, "0.705°"),
     Figure.POSITION_DOP: (1.23, "1.23"),
     Figure.HEADING_DOP: (0.456, "0.456"),
     Figure.EXPECTED_VISIBLE: (2.5, "2.5"),

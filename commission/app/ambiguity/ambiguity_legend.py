@@ -12,6 +12,7 @@ from commission.app.base.inputs import write_html
 from commission.app.base.panel import BasePanel, escaped
 from commission.app.base.ramp import scales_html
 from commission.app.base.view import PageView
+from commission.site.quantity import PERCENT
 
 COLD_START_TEXTS = {
     UNIQUE: "every heading tells the place",
@@ -39,7 +40,7 @@ def cold_start_scale(cold: ColdStartView) -> str:
     rows = "".join(
         "<div style='display:flex;align-items:center;gap:8px'><span style='width:18px;height:12px;"
         f"background:{theme.css(MAP_COLORS[index])}'></span><span style='flex:1'>{escaped(text)}</span>"
-        f"<span>{100 * shares[index - UNIQUE]:.1f} %</span></div>"
+        f"<span>{PERCENT.text(shares[index - UNIQUE], '.1f')}</span></div>"
         for index, text in COLD_START_TEXTS.items()
     )
     note = "<div class='c-note'>the site has changed since</div>" if cold.outdated else ""

@@ -13,6 +13,7 @@ from commission.app.base.panel import Post, escaped, posting, write
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.site.fields import field_info, get_field
+from commission.site.quantity import PERCENT
 
 Setting: TypeAlias = bool | int | float | str | None
 Read: TypeAlias = Callable[[AppState, str], Any]
@@ -136,7 +137,7 @@ class WorkBar:
         show(self._cancel, visible=job is not None or waiting is not None)
         note = ""
         if job is not None:
-            write(self._bar, 100.0 * job.fraction)
+            write(self._bar, PERCENT.of(job.fraction))
             note = f"{job.message} {job.fraction:.0%}"
         elif waiting is not None:
             ahead = next((each for each in view.jobs if each.lane is waiting.lane), None)

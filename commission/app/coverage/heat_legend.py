@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from viser import GuiApi
 
 from commission.app.base import theme
@@ -18,6 +16,7 @@ from commission.app.coverage.scale import NO_FIX_COLORS
 from commission.app.coverage.settings import CoverageSettings, Figure
 from commission.app.coverage.view import EllipseView, FloorReading, HeatView, coverage_of
 from commission.app.coverage.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES, value_text
+from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT, Shown
 
 AMONG_PEOPLE = (Figure.EXPECTED_VISIBLE, Figure.TWO_OR_MORE, Figure.THREE_OR_MORE)
 HATCH_CSS = "repeating-linear-gradient(135deg,{0} 0 3px,{1} 3px 6px)"
@@ -44,7 +43,7 @@ def heat_scale(heat: HeatView, state: AppState) -> str:
     tuples = [(int(r), int(g), int(b)) for r, g, b in heat.scale.colors()]
     bounds = [number_text(bound) for bound in heat.scale.bounds]
     head = f"<b>{escaped(quantity.label)}</b><div class='c-note'>{_conditions(state, heat.scale.figure)}</div>"
-    shares = [f"{100 * share:.0f}" for share in heat.shares[1:]]
+    shares = [PERCENT.number(share) for share in heat.shares[1:]]
     none = "none visible" if heat.scale.figure is Figure.VISIBLE else "no fix"
     hatch = HATCH_CSS.format(*(theme.css(color) for color in NO_FIX_COLORS))
     counts = _count_labels(heat) if heat.scale.figure is Figure.VISIBLE else None
@@ -54,7 +53,7 @@ def heat_scale(heat: HeatView, state: AppState) -> str:
         f"{''.join(cell_html(share) for share in shares)}</div>",
         "<div class='c-note'>second row: % of the floor</div>",
         f"<div style='display:flex;align-items:center;gap:8px;padding-top:3px'><span style='width:18px;height:12px;"
-        f"background:{hatch}'></span><span>{none}: {100 * heat.shares[0]:.1f} % of the floor</span></div>",
+        f"background:{hatch}'></span><span>{none}: {PERCENT.text(heat.shares[0], '.1f')} of the floor</span></div>",
     ]
     limit = _limit(heat, state)
     if limit:
@@ -92,7 +91,7 @@ def _conditions(state: AppState, figure: Figure) -> str:
     settings, blocked_per_m = state.part(CoverageSettings), state.part(Conditions).blocked_per_m
     parts = [HEADING_NAMES[settings.heading], MEASUREMENT_NAMES[settings.measurement]]
     if blocked_per_m > 0.0:
-        parts.append(f"people {100 * blocked_per_m:.1f} %/m")
+        parts.append(f"people {PERCENT.number(blocked_per_m, '.1f')} %/m")
     elif figure in AMONG_PEOPLE:
         parts.append("nobody about: set People [%/m]")
     return escaped("; ".join(parts))
@@ -102,11 +101,15 @@ def _limit(heat: HeatView, state: AppState) -> str:
     """Say where the supervisor's limit lies on the scale."""
     limits = state.project.parameters.supervisor
     if heat.scale.figure is Figure.POSITION_SIGMA:
-        return f"limit of 2σ {1000 * limits.position_limit:.0f} mm: 1σ {500 * limits.position_limit:.0f} mm"
+        return _limit_text(MILLIMETRES, limits.position_limit, (".0f", ".0f"))
     if heat.scale.figure is Figure.HEADING_SIGMA:
-        degrees = math.degrees(limits.heading_limit)
-        return f"limit of 2σ {degrees:.1f}°: 1σ {0.5 * degrees:.2f}°"
+        return _limit_text(DEGREES, limits.heading_limit, (".1f", ".2f"))
     return ""
+
+
+def _limit_text(unit: Shown, limit: float, forms: tuple[str, str]) -> str:
+    """The limit of 2-sigma, and half of it, which is that of the 1-sigma shown."""
+    return f"limit of 2σ {unit.text(limit, forms[0])}: 1σ {unit.text(0.5 * limit, forms[1])}"
 
 
 def _count_labels(heat: HeatView) -> list[str]:

@@ -17,6 +17,7 @@ from commission.app.base.ramp import colors
 from commission.app.coverage.settings import Figure
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.planning.dilution import Measurement
+from commission.site.quantity import BARE, DEGREES, MILLIMETRES, PERCENT, Shown
 
 NOTHING, NO_FIX, FIRST = 0, 1, 2
 """Classes: beside the floor, no fix; the steps of the scale follow."""
@@ -26,7 +27,7 @@ HATCH = 3
 """Width of a stripe, in points of the lattice."""
 NO_FIX_COLORS = ((228, 92, 60), (58, 22, 22))
 COUNTS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
-PERCENT = (50.0, 70.0, 80.0, 90.0, 95.0, 98.0, 99.0, 99.9)
+CHANCES = (50.0, 70.0, 80.0, 90.0, 95.0, 98.0, 99.0, 99.9)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,10 +36,8 @@ class ShownFigure:
 
     label: str
     """Its name, with unit where it has one."""
-    unit: str
-    """Unit on the page."""
-    factor: float
-    """Number on the page for one SI unit."""
+    shown: Shown = BARE
+    """Its unit on the page."""
     bounds: tuple[float, ...] = ()
     """Fixed bounds of its classes in the page's unit; none: chosen from the values."""
     more_is_better: bool = False
@@ -46,19 +45,19 @@ class ShownFigure:
 
 
 QUANTITIES: dict[Figure, ShownFigure] = {
-    Figure.VISIBLE: ShownFigure(label="Visible reflectors", unit="", factor=1.0, bounds=COUNTS, more_is_better=True),
-    Figure.POSITION_SIGMA: ShownFigure(label="Position error, 1σ [mm]", unit="mm", factor=1000.0),
-    Figure.HEADING_SIGMA: ShownFigure(label="Heading error, 1σ [°]", unit="°", factor=math.degrees(1.0)),
-    Figure.POSITION_DOP: ShownFigure(label="Position dilution (DOP)", unit="", factor=1.0),
-    Figure.HEADING_DOP: ShownFigure(label="Heading dilution (DOP)", unit="", factor=1.0),
+    Figure.VISIBLE: ShownFigure(label="Visible reflectors", bounds=COUNTS, more_is_better=True),
+    Figure.POSITION_SIGMA: ShownFigure(label="Position error, 1σ [mm]", shown=MILLIMETRES),
+    Figure.HEADING_SIGMA: ShownFigure(label="Heading error, 1σ [°]", shown=DEGREES),
+    Figure.POSITION_DOP: ShownFigure(label="Position dilution (DOP)"),
+    Figure.HEADING_DOP: ShownFigure(label="Heading dilution (DOP)"),
     Figure.EXPECTED_VISIBLE: ShownFigure(
-        label="Visible among people, mean", unit="", factor=1.0, bounds=(1.0, *COUNTS), more_is_better=True
+        label="Visible among people, mean", bounds=(1.0, *COUNTS), more_is_better=True
     ),
     Figure.TWO_OR_MORE: ShownFigure(
-        label="Chance of 2 or more [%]", unit="%", factor=100.0, bounds=PERCENT, more_is_better=True
+        label="Chance of 2 or more [%]", shown=PERCENT, bounds=CHANCES, more_is_better=True
     ),
     Figure.THREE_OR_MORE: ShownFigure(
-        label="Chance of 3 or more [%]", unit="%", factor=100.0, bounds=PERCENT, more_is_better=True
+        label="Chance of 3 or more [%]", shown=PERCENT, bounds=CHANCES, more_is_better=True
     ),
 }
 
@@ -90,7 +89,7 @@ class Scale:
         values : (N,) array, SI; not finite where there is no fix.
         floor : (N,) whether there is floor at all.
         """
-        shown = values * self.quantity.factor
+        shown = self.quantity.shown.of(values)
         # A hair, so that 3 reflectors and 0.95 are in the class that begins with them, however they were rounded.
         steps = np.digitize(shown * (1.0 + 1e-12), self.bounds).astype(np.uint8)
         found = np.where(is_fix(self.figure, values), steps + FIRST, NO_FIX)
@@ -113,7 +112,7 @@ def scale_for(figure: Figure, values: FloatArray) -> Scale:
     quantity = QUANTITIES[figure]
     if quantity.bounds:
         return Scale(figure, quantity.bounds)
-    known = np.sort(values[np.isfinite(values)]) * quantity.factor
+    known = quantity.shown.of(np.sort(values[np.isfinite(values)]))
     if not len(known):
         return Scale(figure, (1.0,))
     low, high = (float(known[int(share * (len(known) - 1))]) for share in (0.02, 0.98))
@@ -153,4 +152,4 @@ def picture(classes: NDArray[np.uint8], scale: Scale, opacity: float) -> NDArray
 def unit_of(figure: Figure, measurement: Measurement) -> str:
     """Return the unit of a figure; a position's dilution of bearings alone is not a plain number."""
     triangulates = measurement is Measurement.BEARING_ONLY
-    return "m/rad" if figure is Figure.POSITION_DOP and triangulates else QUANTITIES[figure].unit
+    return "m/rad" if figure is Figure.POSITION_DOP and triangulates else QUANTITIES[figure].shown.unit

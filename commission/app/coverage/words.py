@@ -8,6 +8,7 @@ from commission.app.base.numbers import number_text
 from commission.app.coverage.scale import QUANTITIES, is_fix, unit_of
 from commission.app.coverage.settings import Figure
 from commission.planning.dilution import Heading, Measurement
+from commission.site.quantity import PERCENT, joined
 
 FIGURE_NAMES: dict[Figure, str] = {Figure.NONE: "Off"} | {figure: each.label for figure, each in QUANTITIES.items()}
 HEADING_NAMES: dict[Heading, str] = {
@@ -35,10 +36,10 @@ def value_text(figure: Figure, value: float, measurement: Measurement) -> str:
     if not is_fix(figure, value):
         return "none visible" if figure is Figure.VISIBLE else "no fix"
     quantity = QUANTITIES[figure]
-    shown = value * quantity.factor
-    if quantity.unit == "%":
+    shown = quantity.shown.of(value)
+    if quantity.shown is PERCENT:
         # 100 % would be a promise: what is shown is never rounded up to it.
         text = f"{math.floor(shown * 10.0) / 10.0:.1f}"
     else:
         text = number_text(shown)
-    return f"{text} {unit_of(figure, measurement)}".rstrip()
+    return joined(text, unit_of(figure, measurement))

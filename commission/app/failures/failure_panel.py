@@ -17,6 +17,7 @@ from commission.app.failures.settings import FailureSettings
 from commission.app.failures.view import FailureView
 from commission.planning.dependence import Failure
 from commission.site.fields import get_field
+from commission.site.quantity import PERCENT
 
 FAILURE_NAMES: dict[Failure, str] = {
     Failure.BLOCKED: "blocked",
@@ -86,7 +87,7 @@ def ranking_table(failures: FailureView) -> str:
     if failures.fallen:
         rows.insert(0, ("Failed before", ", ".join(escaped(name) for name in failures.fallen)))
     rows += [
-        (escaped(name), f"{each.failing_metres} m; {100 * each.limit_share:.0f} %")
+        (escaped(name), f"{each.failing_metres} m; {PERCENT.text(each.limit_share)}")
         for name, each in list(zip(failures.names, failures.ranking, strict=True))[:RANKED_SHOWN]
     ]
     chosen = failures.chosen

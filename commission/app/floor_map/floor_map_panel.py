@@ -16,6 +16,7 @@ from commission.app.floor_map import actions
 from commission.app.floor_map.draft import ENDINGS, MapFile, MapLoading, MapTrouble
 from commission.app.floor_map.draft_fields import MapDraftFields
 from commission.site.project import Project
+from commission.site.quantity import PERCENT
 
 UPLOAD_LIMIT = 256_000_000
 """Bytes of one upload: it is held in memory until it is read."""
@@ -67,7 +68,7 @@ class FloorMapPanel(BasePanel):
             if widget.visible is not (job is not None):
                 widget.visible = job is not None
         if job is not None:
-            self._bar.value = 100.0 * job.fraction
+            self._bar.value = PERCENT.of(job.fraction)
 
     def draw_slowly(self, view: PageView) -> None:
         """Show what is under way and what came of it."""

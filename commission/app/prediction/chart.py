@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from commission.app.base import theme
@@ -13,6 +11,7 @@ from commission.app.prediction.limit_colors import limit_classes, palette
 from commission.app.prediction.tracks import Limited, Plain, TrackAxis, limited, plain, round_up
 from commission.app.prediction.view import RouteView
 from commission.planning.station_accuracy import StationAccuracy
+from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
 
 MOST_BARS = 120
 MOST_STOPS = 6
@@ -32,17 +31,17 @@ def chart(route: RouteView, run: DrivenMetres | None) -> str:
     worst, errors = (np.maximum.reduceat(values, starts, axis=0) for values in (metres.two_sigma, route.errors))
     position = Limited(
         title="2σ of position [mm]",
-        levels=1000.0 * worst[:, :2].max(axis=1),
-        limit=1000.0 * limits.position_limit,
-        errors=1000.0 * errors[:, :2].max(axis=1),
-        driven=None if run is None else (run.metres, 1000.0 * run.two_sigma[:, :2].max(axis=1)),
+        levels=MILLIMETRES.of(worst[:, :2].max(axis=1)),
+        limit=MILLIMETRES.of(limits.position_limit),
+        errors=MILLIMETRES.of(errors[:, :2].max(axis=1)),
+        driven=None if run is None else (run.metres, MILLIMETRES.of(run.two_sigma[:, :2].max(axis=1))),
     )
     heading = Limited(
         title="2σ of heading [°]",
-        levels=np.degrees(worst[:, 2]),
-        limit=math.degrees(limits.heading_limit),
-        errors=np.degrees(errors[:, 2]),
-        driven=None if run is None else (run.metres, np.degrees(run.two_sigma[:, 2])),
+        levels=DEGREES.of(worst[:, 2]),
+        limit=DEGREES.of(limits.heading_limit),
+        errors=DEGREES.of(errors[:, 2]),
+        driven=None if run is None else (run.metres, DEGREES.of(run.two_sigma[:, 2])),
     )
     seen = np.minimum.reduceat(metres.seen, starts)
     alone = np.maximum.reduceat(metres.on_odometry, starts)
@@ -54,7 +53,7 @@ def chart(route: RouteView, run: DrivenMetres | None) -> str:
         plain(Plain("On odometry alone [m]", alone, (round_up(max(0.5, float(alone.max()))),)), axis),
     ]
     if route.risks:
-        drawn.append(plain(Plain("Chance of a wrong association [%]", 100.0 * risk, (50.0,)), axis))
+        drawn.append(plain(Plain("Chance of a wrong association [%]", PERCENT.of(risk), (50.0,)), axis))
     return (
         f"<div class='c-prediction' style='padding:2px 6px'>{table(_numbers(route))}{_stations(route.stations)}"
         f"{''.join(drawn)}<div class='c-note'>{_note(route, run)}</div></div>"
@@ -92,16 +91,10 @@ def _numbers(route: RouteView) -> list[tuple[str, str]]:
     largest, error = metres.two_sigma.max(axis=0), route.errors.max(axis=0)
     rows = [
         ("Length", f"{prediction.drive.length:.1f} m"),
-        (
-            "Largest 2σ x, y / limit",
-            f"{1000 * largest[:2].max():.1f} / {1000 * limits.position_limit:.0f} mm",
-        ),
-        (
-            "Largest 2σ heading / limit",
-            f"{math.degrees(largest[2]):.2f} / {math.degrees(limits.heading_limit):.1f} °",
-        ),
-        ("True error, 2σ x, y", f"{1000 * error[:2].max():.1f} mm"),
-        ("True error, 2σ heading", f"{math.degrees(error[2]):.2f} °"),
+        ("Largest 2σ x, y / limit", MILLIMETRES.against(largest[:2].max(), limits.position_limit)),
+        ("Largest 2σ heading / limit", DEGREES.against(largest[2], limits.heading_limit, (".2f", ".1f"))),
+        ("True error, 2σ x, y", MILLIMETRES.text(error[:2].max(), ".1f")),
+        ("True error, 2σ heading", DEGREES.text(error[2], ".2f")),
         ("Fewest reflectors seen", str(int(metres.seen.min()))),
         ("Longest on odometry", f"{metres.on_odometry.max():.1f} m"),
         ("Supervisor stops", _places(prediction.trips())),
@@ -125,7 +118,7 @@ def _stations(stations: tuple[StationAccuracy, ...]) -> str:
     rows = [
         (
             f"{escaped(each.station)}, {each.metre:.0f} m",
-            f"{1000 * each.expected:.1f} / {1000 * each.required:.0f} mm "
+            f"{MILLIMETRES.against(each.expected, each.required)} "
             f"<span style='color:{good if each.is_met else bad}'>{'met' if each.is_met else 'not met'}</span>",
         )
         for each in stations

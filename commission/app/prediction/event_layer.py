@@ -17,6 +17,7 @@ from commission.app.prediction.view import RouteView
 from commission.geometry.arrays import FloatArray
 from commission.planning.route_prediction import RoutePrediction
 from commission.site.project import Project
+from commission.site.quantity import MILLIMETRES
 
 MOST_RISKY = 600
 MOST_LABELS = 40
@@ -48,7 +49,7 @@ def events(route: RouteView) -> tuple[Event, ...]:
     going_on = [(f"may go on at {m:.0f} m", float(m), theme.RECOVERY) for m in prediction.recoveries()]
     stations = [
         (
-            f"{each.station}: {1000 * each.two_sigma:.1f} of {1000 * each.required:.0f} mm"
+            f"{each.station}: {MILLIMETRES.number(each.two_sigma, '.1f')} of {MILLIMETRES.text(each.required)}"
             f"{'' if each.is_met else ', not met'}",
             each.metre,
             theme.RECOVERY if each.is_met else theme.OVER_LIMIT,

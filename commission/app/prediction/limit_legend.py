@@ -11,6 +11,7 @@ from commission.app.base.ramp import ramp_html, scales_html
 from commission.app.base.view import PageView
 from commission.app.prediction.limit_colors import BOUNDS, palette
 from commission.app.prediction.view import RouteView
+from commission.site.quantity import PERCENT
 
 
 class LimitLegend(BasePanel):
@@ -28,6 +29,6 @@ class LimitLegend(BasePanel):
 def limit_scale(route: RouteView) -> str:
     """Return the colors of the ribbon."""
     colors = [theme.css(color) for color in palette()]
-    bounds = [f"{100 * bound:.0f}" for bound in BOUNDS]
+    bounds = [PERCENT.number(bound) for bound in BOUNDS]
     title = f"<div style='padding-top:8px'><b>2σ along {escaped(route.name)}</b> [% of limit]</div>"
     return title + ramp_html(colors, bounds) + "<div class='c-note'>red: the supervisor stops the vehicle</div>"

@@ -18,6 +18,7 @@ from commission.app.prediction.driven import driven
 from commission.app.prediction.service import PREDICTION
 from commission.app.prediction.settings import PredictionSettings, PredictRoute
 from commission.app.prediction.view import RiskView, RouteView
+from commission.site.quantity import PERCENT
 
 NO_ROUTE = "Off"
 MOST_RISKS = 12
@@ -95,7 +96,7 @@ class RoutePanel(BasePanel):
         self._rows.show(
             [
                 (
-                    f"{risk.reflector} taken for {risk.neighbor}: {100 * risk.chance:.0f} % at worst, "
+                    f"{risk.reflector} taken for {risk.neighbor}: {PERCENT.text(risk.chance)} at worst, "
                     f"{metres_text(list(risk.metres))}",
                     theme.WARNING_LINE,
                 )

@@ -22,6 +22,7 @@ from commission.app.editing.route_gestures import route_of
 from commission.app.problems.view import inspection_of
 from commission.geometry.arrays import FloatArray
 from commission.planning.route_profile import RouteProfile
+from commission.site.quantity import DEGREES
 from commission.studies.violations import Violation, ViolationKind
 
 NOTHING = "Select a route on the floor: its curvature, heading and speed are drawn here over its metres."
@@ -54,7 +55,7 @@ class RouteChart:
 CURVATURE = RouteChart("Curvature [1/m] over metres, to the left positive", lambda profile: profile.curvatures)
 CHARTS = (
     CURVATURE,
-    RouteChart("Heading of the vehicle [°] over metres", lambda profile: np.degrees(profile.headings)),
+    RouteChart("Heading of the vehicle [°] over metres", lambda profile: DEGREES.of(profile.headings)),
     RouteChart("Planned speed [m/s] over metres", lambda profile: profile.speeds, from_zero=True),
 )
 

@@ -27,7 +27,7 @@ def rows(project: Project) -> list[tuple[str, str]]:
         ("Reflectors", str(len(project.reflectors))),
         ("Routes", str(len(project.routes))),
         ("Vehicle", escaped(project.vehicle.kind)),
-        ("Scanner", f"{scanner.beam_count} beams, {first:g} to {last:g} °"),
+        ("Scanner", f"{scanner.beam_count} beams, {first:g} to {last:g}°"),
     ]
     return shown
 

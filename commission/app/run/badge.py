@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from viser import GuiApi
 
 from commission.app.base import theme
@@ -11,6 +9,7 @@ from commission.app.base.panel import BasePanel, escaped
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 from commission.localization.estimate import Mode
+from commission.site.quantity import DEGREES, MILLIMETRES
 
 
 def badge_text(view: PageView) -> tuple[str, str, str]:
@@ -22,8 +21,8 @@ def badge_text(view: PageView) -> tuple[str, str, str]:
     limits = run.segment.setup.parameters.supervisor
     x, y, heading = run.result.two_sigma[run.newest]
     beside = (
-        f"2σ {max(x, y) * 1000:.0f} / {limits.position_limit * 1000:.0f} mm"
-        f" &nbsp; {math.degrees(heading):.2f} / {math.degrees(limits.heading_limit):.1f} °"
+        f"2σ {MILLIMETRES.against(max(x, y), limits.position_limit, ('.0f', '.0f'))}"
+        f" &nbsp; {DEGREES.against(heading, limits.heading_limit, ('.2f', '.1f'))}"
     )
     if run.mode is not Mode.OPERATIONAL:
         lived = run.lived_episodes

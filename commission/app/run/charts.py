@@ -14,6 +14,7 @@ from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
 from commission.localization.estimate import Status
 from commission.site.parameters import Parameters
+from commission.site.quantity import DEGREES, MILLIMETRES
 from commission.studies.run import RunResult
 
 
@@ -72,27 +73,30 @@ def _decade_below(value: float) -> float:
 
 def _heading_errors(run: RunResult) -> FloatArray:
     """(K,) amount of the heading error [deg]; NaN where it is unknown."""
-    return np.degrees(np.abs(run.errors[:, 2]))
+    return DEGREES.of(np.abs(run.errors[:, 2]))
 
 
 CHARTS = (
     Chart(
         title="2σ of x, y [mm]",
         lines=(
-            Line("x [mm]", TURQUOISE, lambda run: run.two_sigma[:, 0] * 1000.0),
-            Line("y [mm]", ORANGE, lambda run: run.two_sigma[:, 1] * 1000.0),
+            Line("x [mm]", TURQUOISE, lambda run: MILLIMETRES.of(run.two_sigma[:, 0])),
+            Line("y [mm]", ORANGE, lambda run: MILLIMETRES.of(run.two_sigma[:, 1])),
         ),
-        limits=(Limit("limit", lambda p: p.supervisor.position_limit * 1000.0),),
-        span=lambda p: (5.0 * p.supervisor.position_limit, 3000.0 * p.supervisor.position_limit),
+        limits=(Limit("limit", lambda p: MILLIMETRES.of(p.supervisor.position_limit)),),
+        span=lambda p: (
+            MILLIMETRES.of(0.005 * p.supervisor.position_limit),
+            MILLIMETRES.of(3.0 * p.supervisor.position_limit),
+        ),
         is_logarithmic=True,
     ),
     Chart(
         title="2σ of heading [°]",
-        lines=(Line("heading [°]", TURQUOISE, lambda run: np.degrees(run.two_sigma[:, 2])),),
-        limits=(Limit("limit", lambda p: math.degrees(p.supervisor.heading_limit)),),
+        lines=(Line("heading [°]", TURQUOISE, lambda run: DEGREES.of(run.two_sigma[:, 2])),),
+        limits=(Limit("limit", lambda p: DEGREES.of(p.supervisor.heading_limit)),),
         span=lambda p: (
-            _decade_below(0.005 * math.degrees(p.supervisor.heading_limit)),
-            3.0 * math.degrees(p.supervisor.heading_limit),
+            _decade_below(DEGREES.of(0.005 * p.supervisor.heading_limit)),
+            DEGREES.of(3.0 * p.supervisor.heading_limit),
         ),
         is_logarithmic=True,
     ),
@@ -120,7 +124,7 @@ CHARTS = (
             Line(
                 "error against reference [mm]",
                 theme.css(theme.REFERENCE),
-                lambda run: run.position_errors * 1000.0,
+                lambda run: MILLIMETRES.of(run.position_errors),
                 has_gaps=True,
             ),
         ),

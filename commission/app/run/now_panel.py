@@ -12,6 +12,7 @@ from commission.app.base.view import PageView
 from commission.app.editing.editor import editor_of
 from commission.app.run.view import RunView
 from commission.localization.estimate import Mode, Status
+from commission.site.quantity import DEGREES, MILLIMETRES
 from commission.site.truth import truth_told
 from commission.studies.scanner_figures import told
 
@@ -30,21 +31,20 @@ def rows(run: RunView) -> list[tuple[str, str]]:
         ("Mode", MODES[run.mode]),
         ("Fail episodes so far", str(len(run.lived_episodes))),
         ("Position x, y", f"{x:.3f}, {y:.3f} m"),
-        ("Heading", f"{round(math.degrees(heading), 2) + 0.0:.2f} °"),
+        ("Heading", DEGREES.text(heading, ".2f")),
     ]
     if run.estimate is None:
         return shown
     result, newest = run.result, run.newest
     limits = run.segment.setup.parameters.supervisor
     sigma_x, sigma_y, sigma_heading = result.two_sigma[newest]
-    limit_mm = f"{limits.position_limit * 1000:.0f} mm"
     estimate = run.estimate
     nis = f"{result.nis[newest]:.2f}" if math.isfinite(result.nis[newest]) else "none seen"
     error = result.position_errors[newest]
     shown += [
-        ("2σ x / limit", f"{sigma_x * 1000:.1f} / {limit_mm}"),
-        ("2σ y / limit", f"{sigma_y * 1000:.1f} / {limit_mm}"),
-        ("2σ heading / limit", f"{math.degrees(sigma_heading):.2f} / {math.degrees(limits.heading_limit):.1f} °"),
+        ("2σ x / limit", MILLIMETRES.against(sigma_x, limits.position_limit)),
+        ("2σ y / limit", MILLIMETRES.against(sigma_y, limits.position_limit)),
+        ("2σ heading / limit", DEGREES.against(sigma_heading, limits.heading_limit, (".2f", ".1f"))),
         ("Inliers", str(estimate.count(Status.INLIER))),
         (
             "Outliers by beams, gate",
@@ -52,7 +52,7 @@ def rows(run: RunView) -> list[tuple[str, str]]:
         ),
         ("Largest NIS / gate", f"{nis} / {estimate.gate:.2f}"),
         ("Cycle time", f"{result.microseconds_per_cycle:.1f} µs, mean of the drive"),
-        ("Position error", f"{error * 1000:.1f} mm" if math.isfinite(error) else "no reference"),
+        ("Position error", MILLIMETRES.text(error, ".1f") if math.isfinite(error) else "no reference"),
     ]
     if len(result.scanners) > 1:
         shown += [(f"Scanner {each.name}, drive", told(each)) for each in result.scanners]

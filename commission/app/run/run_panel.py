@@ -15,6 +15,7 @@ from commission.app.base.view import PageView
 from commission.app.run.actions import ChooseSource, Cover, RecordedDrive, Repeat, Restart, VirtualDrive
 from commission.app.run.state import RunState
 from commission.app.run.view import RunView
+from commission.site.quantity import PERCENT
 
 NO_ROUTE = ("(the project has none)",)
 
@@ -104,7 +105,7 @@ class RunPanel(BasePanel):
         jobs = view.jobs
         self._progress.visible = bool(jobs)
         if jobs:
-            self._progress.value = 100.0 * min(max(jobs[0].fraction, 0.0), 1.0)
+            self._progress.value = PERCENT.of(min(max(jobs[0].fraction, 0.0), 1.0))
         run = view.part(RunView)
         if run is not None and self._cover.value is not run.covered:
             self._cover.value = run.covered

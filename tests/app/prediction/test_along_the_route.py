@@ -95,7 +95,7 @@ def test_the_chart_draws_the_true_error_that_the_command_writes(project: Project
     drawn = chart(route, None)
     assert drawn.count("class='c-error'") == 2
     assert f">{1000 * errors[:, :2].max():.1f} mm<" in drawn
-    assert f">{np.degrees(errors[:, 2].max()):.2f} °<" in drawn
+    assert f">{np.degrees(errors[:, 2].max()):.2f}°<" in drawn
 
 
 def test_the_floor_is_marked_where_the_supervisor_stops_and_lets_go_on(project: Project) -> None:
