@@ -7,6 +7,7 @@ no danger: a scanner knows left from right. What happens while the pose is track
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -18,7 +19,8 @@ from commission.geometry.angles import difference, wrap
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.geometry.se2 import compose
 from commission.planning.coverage import Lattice
-from commission.planning.visibility import VisibilityModel, VisibleReflectors
+from commission.planning.vehicle_visibility import VehicleVisibility
+from commission.planning.visibility import VisibleReflectors
 from commission.progress import Progress, silent
 from commission.site.checks import above, between
 from commission.site.scanner import Scanner
@@ -39,7 +41,7 @@ class AmbiguityOptions:
     turn: float = math.radians(15.0)
     """Difference of heading from which two poses at one place are different [rad]."""
     headings: int = DEFAULT_HEADINGS
-    """Evenly spaced headings that are tried at each spot; a scanner that sees all around needs one."""
+    """Evenly spaced headings that are tried at each spot; scanners that see all around need one."""
 
     def __post_init__(self) -> None:
         above(self.tolerance, 0.0, "ambiguity.tolerance", "m")
@@ -160,7 +162,7 @@ class PairTable:
 
 
 def cold_start(
-    model: VisibilityModel,
+    visible: VehicleVisibility,
     lattice: Lattice,
     options: AmbiguityOptions | None = None,
     progress: Progress = silent,
@@ -169,7 +171,7 @@ def cold_start(
 
     Parameters
     ----------
-    model : reflectors, scanner and walls.
+    visible : reflectors, scanners and walls.
     lattice : positions of the base; half a metre to a metre is fine enough.
     options : tolerance and headings; the defaults when None.
     progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
@@ -180,21 +182,21 @@ def cold_start(
     """
     options = options or AmbiguityOptions()
     points = lattice.points()
-    points = points[~model.caster.grid.is_occupied(points)]
-    headings = headings_tried(model.scanner, options)
+    points = points[~visible.caster.grid.is_occupied(points)]
+    headings = headings_tried(visible.scanners, options)
     count = len(headings)
     poses = np.column_stack((np.tile(points, (count, 1)), np.repeat(headings, len(points))))
-    return ambiguous_poses(model, poses, options, progress)
+    return ambiguous_poses(visible, poses, options, progress)
 
 
-def headings_tried(scanner: Scanner, options: AmbiguityOptions) -> FloatArray:
+def headings_tried(scanners: Sequence[Scanner], options: AmbiguityOptions) -> FloatArray:
     """Headings [rad] that stand for all at a spot: evenly spaced ones, or one where the heading does not matter."""
-    count = 1 if _sees_all_around(scanner) else options.headings
+    count = 1 if all(map(_sees_all_around, scanners)) else options.headings
     return np.arange(count, dtype=np.float64) * (2.0 * math.pi / count)
 
 
 def ambiguous_poses(
-    model: VisibilityModel,
+    visible: VehicleVisibility,
     T_map_base: ArrayLike,
     options: AmbiguityOptions | None = None,
     progress: Progress = silent,
@@ -206,24 +208,24 @@ def ambiguous_poses(
 
     Parameters
     ----------
-    model : reflectors, scanner and walls.
+    visible : reflectors, scanners and walls.
     T_map_base : (N, 3) poses [m, m, rad].
     options : tolerance; the defaults when None.
     progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
     """
     options = options or AmbiguityOptions()
     poses = np.asarray(T_map_base, dtype=np.float64).reshape(-1, 3)
-    visible = model.visible_from_poses(poses)
+    seen = visible.visible_from_poses(poses)
     partners = np.full((len(poses), 3), np.nan)
-    table = PairTable.of(model.reflectors.centers, 2.0 * float(model.targets.farthest.max(initial=0.0)))
+    table = PairTable.of(visible.reflectors.centers, visible.widest)
     pairs: dict[tuple[tuple[int, ...], tuple[int, ...]], AmbiguousPair] = {}
-    groups = [group for group in _groups(visible) if len(group[0]) >= 2]
+    groups = [group for group in _groups(seen) if len(group[0]) >= 2]
     for start in range(0, len(groups), GROUPS_AT_ONCE):
         progress(start / len(groups), "ambiguity")
         suspects: list[_Suspect] = []
         for constellation, members in groups[start : start + GROUPS_AT_ONCE]:
             suspects += _suspects(table, poses, constellation, members, options)
-        for suspect, alike in zip(suspects, _seen_exactly(model, suspects), strict=True):
+        for suspect, alike in zip(suspects, _seen_exactly(visible, suspects), strict=True):
             if not alike.any():
                 continue
             chosen = suspect.members[alike]
@@ -237,7 +239,7 @@ def ambiguous_poses(
             )
             pairs[pair.constellation, pair.image] = pair
     progress(1.0, "ambiguity")
-    counts = visible.counts()
+    counts = seen.counts()
     ambiguous = np.isfinite(partners[:, 0]) | (counts < 2)
     ranked = sorted(pairs.values(), key=lambda pair: (-pair.poses, pair.constellation, pair.image))
     return ColdStart(
@@ -281,23 +283,23 @@ def _suspects(
     return found
 
 
-def _seen_exactly(model: VisibilityModel, suspects: list[_Suspect]) -> list[BoolArray]:
+def _seen_exactly(visible: VehicleVisibility, suspects: list[_Suspect]) -> list[BoolArray]:
     """Whether the other poses of each suspect are on the floor, and see its image and no other reflectors."""
     if not suspects:
         return []
     poses = np.concatenate([suspect.others for suspect in suspects])
-    grid = model.caster.grid
+    grid = visible.caster.grid
     on_floor = ~grid.is_occupied(poses[:, :2])
     # An open field has a grid of one free cell, and no end.
     if grid.occupied.any():
         on_floor &= grid.contains(poses[:, :2])
-    visible = model.visible_from_poses(poses)
+    seen = visible.visible_from_poses(poses)
     results: list[BoolArray] = []
     first = 0
     for suspect in suspects:
         wanted = np.sort(suspect.image)
         rows = range(first, first + len(suspect.others))
-        results.append(np.array([bool(on_floor[n]) and np.array_equal(visible.of(n), wanted) for n in rows]))
+        results.append(np.array([bool(on_floor[n]) and np.array_equal(seen.of(n), wanted) for n in rows]))
         first = rows.stop
     return results
 

@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 from commission.compiled import compiled
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.geometry.raycast import RayTables
-from commission.planning import dilution, visibility
-from commission.planning.dilution import Fixes, FixOptions, as_fixes, fix_model, survey_sigmas
-from commission.planning.dilution_kernels import FIGURES, FixModel, fill_fixes
+from commission.planning import vehicle_fixes
+from commission.planning.dilution import Fixes, FixOptions, as_fixes
+from commission.planning.dilution_kernels import FIGURES
 from commission.planning.shadow_kernels import BitMask, Targets, see_points
-from commission.planning.visibility import VisibilityModel, build_visibility, copied, mask_words, replace_target
+from commission.planning.vehicle_fixes import Seen, views_of
+from commission.planning.vehicle_visibility import VehicleVisibility, vehicle_visibility
+from commission.planning.view_kernels import ViewMask
+from commission.planning.visibility import build_visibility, copied, mask_words, replace_target
 from commission.progress import Progress, silent
 from commission.site.checks import above
 from commission.site.parts import Extended
@@ -27,8 +30,8 @@ from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 
 POINTS_PER_TILE = 1 << 17
-"""A tile is a band of whole rows; its mask and its grouping take about 40 bytes per point and 8 more for every 64
-reflectors: some 14 MB with 500 reflectors, however large the floor."""
+"""A tile is a band of whole rows; its masks and its grouping take about 40 bytes per point and 8 more for every 64
+reflectors, and view: some 14 MB with 500 reflectors, however large the floor."""
 MARGIN = 5.0
 """Floor around reflectors and routes where there is no map [m]."""
 
@@ -96,8 +99,9 @@ class Coverage:
     """One of each figure per point; as images: `image`."""
     floor: BoolArray = field(repr=False)
     """(N,) whether a point is on the floor and not in a wall."""
-    sight: BitMask = field(repr=False)
-    """(N, ceil(M / 64)) which of the M reflectors each point sees, as in `VisibilityModel.visible`."""
+    sight: ViewMask = field(repr=False)
+    """(V, N, ceil(M / 64)) which of the M reflectors each view sees, as in `VisibilityModel.visible`; a single scanner
+    has one view, several have one each, for each heading that is looked at."""
 
     def image(self, figure: str) -> NDArray[np.generic]:
         """One figure as a (rows, columns) array; row 0 is the lowest y."""
@@ -129,31 +133,34 @@ def lattice_of(site: Extended, spacing: float = 0.25) -> Lattice:
 
 
 def coverage(
-    model: VisibilityModel,
+    visible: VehicleVisibility,
     lattice: Lattice,
     options: FixOptions,
     progress: Progress = silent,
 ) -> Coverage:
     """Visibility and dilution at every point of a lattice.
 
-    Memory: about 100 bytes per point of the lattice, and 8 more for every 64 reflectors; time is linear in the area.
+    Memory: about 100 bytes per point of the lattice, and 8 more for every view and 64 reflectors; time is linear in the
+    area.
 
     Parameters
     ----------
-    model : reflectors, scanner and walls.
-    lattice : positions of the base for a given heading, of the scanner otherwise.
+    visible : reflectors, scanners and walls.
+    lattice : positions as in `vehicle_fixes.fixes`.
     options : measurement model and headings.
     progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
     """
     points, counts, figures = lattice.points(), np.empty(len(lattice), np.int32), np.empty((len(lattice), FIGURES))
-    kernel_model = fix_model(model.scanner, options)
-    floor = ~model.caster.grid.is_occupied(points)
-    scanner_points = points + np.array([kernel_model.lever_x, kernel_model.lever_y])
-    sight = np.empty((len(lattice), mask_words(len(model.reflectors))), dtype=np.uint64)
+    floor = ~visible.caster.grid.is_occupied(points)
+    views = views_of(visible.scanners, options)
+    sight = np.empty((len(views), len(lattice), mask_words(len(visible.reflectors))), dtype=np.uint64)
     for tile in tiles(lattice):
         progress(tile.start / len(lattice), "coverage")
-        sight[tile] = model.visible(scanner_points[tile])
-        _fill(model, kernel_model, scanner_points[tile], sight[tile], counts[tile], figures[tile])
+        places = views.places(points[tile])
+        sight[:, tile] = views.sight(visible.models, places)
+        seen = Seen(points[tile], np.ascontiguousarray(sight[:, tile]), views.stands(places, visible.caster))
+        every = np.arange(len(seen.points))
+        views.fill(visible.reflectors, seen, every, counts=counts[tile], figures=figures[tile])
     progress(1.0, "coverage")
     return Coverage(lattice=lattice, options=options, fixes=as_fixes(counts, figures), floor=floor, sight=sight)
 
@@ -168,25 +175,26 @@ class LiveCoverage:
     """Coverage that follows reflectors while they are dragged.
 
     It changes in place, unlike the frozen values around it: to copy a floor's figures takes longer than to update
-    them. It keeps which reflectors each point sees (8 bytes per point for every 64 reflectors), and sums a changed
+    them. It keeps which reflectors each view sees (8 bytes per point for every 64 reflectors), and sums a changed
     point anew from those bits; nothing is subtracted, so nothing drifts.
 
     Parameters
     ----------
-    model : reflectors, scanner and walls.
-    found : the coverage under it, from which it sets out; it stays as it is.
+    visible : reflectors, scanners and walls.
+    found : the coverage under them, from which it sets out; it stays as it is.
     """
 
-    def __init__(self, model: VisibilityModel, found: Coverage) -> None:
+    def __init__(self, visible: VehicleVisibility, found: Coverage) -> None:
         lattice, fixes = found.lattice, found.fixes
         self._lattice = lattice
-        self._model = replace(model, targets=copied(model.targets))
-        self._kernel_model = fix_model(model.scanner, found.options)
-        self._scanner_points = lattice.points() + np.array([self._kernel_model.lever_x, self._kernel_model.lever_y])
-        self._sight, self._counts = found.sight.copy(), fixes.visible.copy()
-        self._figures = np.stack(fixes[1:], axis=-1)
+        self._models = [replace(model, targets=copied(model.targets)) for model in visible.models]
+        self._views = views_of(visible.scanners, found.options)
+        points = lattice.points()
+        self._places = self._views.places(points)
+        self._seen = Seen(points, found.sight.copy(), self._views.stands(self._places, visible.caster))
+        self._counts, self._figures = fixes.visible.copy(), np.stack(fixes[1:], axis=-1)
         self._changed = np.empty(len(lattice), dtype=np.int64)
-        self._coverage = replace(found, fixes=as_fixes(self._counts, self._figures), sight=self._sight)
+        self._coverage = replace(found, fixes=as_fixes(self._counts, self._figures), sight=self._seen.mask)
 
     @property
     def coverage(self) -> Coverage:
@@ -194,18 +202,19 @@ class LiveCoverage:
         return self._coverage
 
     @property
-    def model(self) -> VisibilityModel:
-        """The current reflectors, scanner and walls; its shadow maps change with the next `move`."""
-        return self._model
+    def visible(self) -> VehicleVisibility:
+        """The current reflectors, scanners and walls; its shadow maps change with the next `move`."""
+        return VehicleVisibility(tuple(self._models))
 
     @property
     def reflectors(self) -> ReflectorMap:
         """The current reflectors."""
-        return self._model.reflectors
+        return self._models[0].reflectors
 
     def sees(self, reflector: int) -> BoolArray:
-        """Whether each point sees a reflector, all around: (N,) array."""
-        return (self._sight[:, reflector >> 6] >> np.uint64(reflector & 63)) & np.uint64(1) == 1
+        """Whether any view of each point sees a reflector, all around: (N,) array."""
+        words = self._seen.mask[:, :, reflector >> 6]
+        return ((words >> np.uint64(reflector & 63)) & np.uint64(1) == 1).any(axis=0)
 
     def move(self, index: int, reflector: Reflector) -> list[Window]:
         """Put a reflector elsewhere, or change it.
@@ -219,73 +228,60 @@ class LiveCoverage:
         -------
         windows : parts of the lattice outside which nothing changed: around the old and around the new place.
         """
-        changed = list(self._model.reflectors.reflectors)
+        changed = list(self.reflectors.reflectors)
         changed[index] = reflector
         reflectors = ReflectorMap(tuple(changed))
-        if self._model.bins_for(reflector) > self._model.targets.clear.shape[1]:
-            before = self._model
-            self._model = build_visibility(reflectors, before.scanner, before.caster, before.options)
+        if any(model.bins_for(reflector) > model.targets.clear.shape[1] for model in self._models):
+            self._models = [
+                build_visibility(reflectors, before.scanner, before.caster, before.options) for before in self._models
+            ]
             self._fill_all()
             return [Window(0, self._lattice.rows, 0, self._lattice.columns)]
-        targets = self._model.targets
-        windows = [self._window_around(index)]
-        replace_target(targets, index, reflector, self._model)
-        self._model = replace(self._model, reflectors=reflectors)
-        windows.append(self._window_around(index))
-        count = _change_bits(
-            self._model.caster.tables,
-            targets,
-            index,
-            np.array(windows),
-            self._lattice.columns,
-            self._scanner_points,
-            self._sight,
-            self._changed,
-        )
-        fill_fixes(
-            targets.centers,
-            survey_sigmas(self._model),
-            self._scanner_points,
-            self._changed[:count],
-            self._sight,
-            self._kernel_model,
-            self._counts,
-            self._figures,
-        )
-        return windows
+        before = [self._window_around(index, view) for view in range(len(self._views))]
+        for model in self._models:
+            replace_target(model.targets, index, reflector, model)
+        self._models = [replace(model, reflectors=reflectors) for model in self._models]
+        after = [self._window_around(index, view) for view in range(len(self._views))]
+        rows = self._change_views(index, before, after)
+        self._views.fill(reflectors, self._seen, rows, counts=self._counts, figures=self._figures)
+        return [*before, *after]
+
+    def _change_views(self, index: int, before: list[Window], after: list[Window]) -> IntArray:
+        """Set the bits of a reflector anew in each view; return the points that saw it or see it now, each once."""
+        rows: list[IntArray] = []
+        for view, scanner in enumerate(self._views.scanners):
+            model = self._models[scanner]
+            count = _change_bits(
+                model.caster.tables,
+                model.targets,
+                index,
+                np.array((before[view], after[view])),
+                self._lattice.columns,
+                self._places[view],
+                self._seen.mask[view],
+                self._changed,
+            )
+            rows.append(self._changed[:count].copy())
+        return rows[0] if len(rows) == 1 else np.unique(np.concatenate(rows))
 
     def _fill_all(self) -> None:
         """Compute every point anew."""
-        for tile in tiles(self._lattice):
-            points, model = self._scanner_points[tile], self._model
-            self._sight[tile] = model.visible(points)
-            _fill(model, self._kernel_model, points, self._sight[tile], self._counts[tile], self._figures[tile])
+        self._seen.mask[:] = self._views.sight(self._models, self._places)
+        every = np.arange(len(self._lattice))
+        self._views.fill(self.reflectors, self._seen, every, counts=self._counts, figures=self._figures)
 
-    def _window_around(self, index: int) -> Window:
-        """Part of the lattice within reach of a reflector."""
-        lattice, targets = self._lattice, self._model.targets
+    def _window_around(self, index: int, view: int) -> Window:
+        """Part of the lattice within reach of a reflector in one view."""
+        lattice, targets = self._lattice, self._models[self._views.scanners[view]].targets
         reach = targets.farthest[index] / lattice.spacing + 1.0
-        column = (targets.centers[index, 0] - self._scanner_points[0, 0]) / lattice.spacing
-        row = (targets.centers[index, 1] - self._scanner_points[0, 1]) / lattice.spacing
+        column = (targets.centers[index, 0] - self._places[view, 0, 0]) / lattice.spacing
+        row = (targets.centers[index, 1] - self._places[view, 0, 1]) / lattice.spacing
         return Window(
             min(max(0, math.floor(row - reach)), lattice.rows),
             max(0, min(lattice.rows, math.ceil(row + reach) + 1)),
             min(max(0, math.floor(column - reach)), lattice.columns),
             max(0, min(lattice.columns, math.ceil(column + reach) + 1)),
         )
-
-
-def _fill(  # noqa: PLR0917 - what goes in, what comes out
-    model: VisibilityModel,
-    kernel_model: FixModel,
-    points: FloatArray,
-    mask: BitMask,
-    counts: NDArray[np.int32],
-    figures: FloatArray,
-) -> None:
-    """Fill the figures of all the points given."""
-    every = np.arange(len(points))
-    fill_fixes(model.targets.centers, survey_sigmas(model), points, every, mask, kernel_model, counts, figures)
 
 
 @compiled
@@ -332,9 +328,9 @@ def _change_bits(  # noqa: PLR0917 - arrays in, arrays out
 
 
 def warm_up() -> None:
-    """Compile the kernels of this module and of `dilution`."""
-    dilution.warm_up()
+    """Compile the kernels of this module and of `vehicle_fixes`."""
+    vehicle_fixes.warm_up()
     project = Project(reflectors=ReflectorMap((Reflector(id="1", x=2.0, y=0.0),)))
-    model = visibility.visibility_model(project)
-    live = LiveCoverage(model, coverage(model, Lattice(x=0.0, y=0.0, spacing=1.0, rows=2, columns=2), FixOptions()))
+    visible = vehicle_visibility(project)
+    live = LiveCoverage(visible, coverage(visible, Lattice(x=0.0, y=0.0, spacing=1.0, rows=2, columns=2), FixOptions()))
     live.move(0, Reflector(id="1", x=1.0, y=0.0))

@@ -1,7 +1,7 @@
 """How well a fix can be from one scan: Fisher information of a pose from visible reflectors, covariance, dilution.
 
 Nothing is filtered or simulated here: the covariance is the Cramér-Rao bound of a single measurement of all visible
-reflectors. A singular geometry is a result, infinite in every figure.
+reflectors. A singular geometry is a result, infinite in every figure. The figures of a vehicle are in `vehicle_fixes`.
 """
 
 from __future__ import annotations
@@ -12,17 +12,15 @@ from enum import StrEnum
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from commission.geometry.arrays import FloatArray
 from commission.geometry.se2 import compose
-from commission.planning import dilution_kernels, visibility
+from commission.planning import dilution_kernels
 from commission.planning.dilution_kernels import FixModel
-from commission.planning.visibility import VisibilityModel, field_of_view
+from commission.planning.visibility import field_of_view
 from commission.site.checks import above, between
 from commission.site.parameters import ObservationParameters, OdometryParameters
-from commission.site.project import Project
-from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
 
 DEFAULT_HEADINGS = 16
@@ -46,7 +44,8 @@ class Heading(StrEnum):
     """The worst over evenly spaced headings, of each figure on its own."""
     BEST = "best"
     ALL_ROUND = "all-round"
-    """As if the scanner saw a full turn."""
+    """As if the scanner saw a full turn. Of several scanners, as if they stood at the point and shared the turn: each
+    reflector counts once."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,70 +127,6 @@ def fix_options(observation: ObservationParameters, **changes: Any) -> FixOption
     return replace(FixOptions(range_sigma=observation.range_sigma, bearing_sigma=observation.bearing_sigma), **changes)
 
 
-def fixes(model: VisibilityModel, points: ArrayLike, options: FixOptions) -> Fixes:
-    """Figures of a fix from points of the floor.
-
-    Parameters
-    ----------
-    model : reflectors, scanner and walls.
-    points : (N, 2) array [m], map frame: positions of the base for a given heading, of the scanner otherwise. (Seen
-        from a base, a scanner off its center would stand elsewhere for each heading.)
-    options : measurement model and headings.
-
-    Returns
-    -------
-    fixes : N of each figure; infinite where the geometry is singular.
-    """
-    xy = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-    kernel_model = fix_model(model.scanner, options)
-    scanner_xy = xy + np.array([kernel_model.lever_x, kernel_model.lever_y])
-    counts, figures = np.empty(len(xy), dtype=np.int32), np.empty((len(xy), dilution_kernels.FIGURES))
-    mask = model.visible(scanner_xy)
-    dilution_kernels.fill_fixes(
-        model.targets.centers,
-        survey_sigmas(model),
-        scanner_xy,
-        np.arange(len(xy)),
-        mask,
-        kernel_model,
-        counts,
-        figures,
-    )
-    return as_fixes(counts, figures)
-
-
-def fix_covariances(model: VisibilityModel, T_map_base: ArrayLike, options: FixOptions) -> FloatArray:
-    """Covariance of a fix from poses of the vehicle, with mounting and field of view of its scanner.
-
-    Parameters
-    ----------
-    model : reflectors, scanner and walls.
-    T_map_base : (N, 3) array of poses [m, m, rad].
-    options : measurement model; with `all-round` the field of view does not limit, with any other heading it does, and
-        the heading itself is that of the pose.
-
-    Returns
-    -------
-    covariances : (N, 3, 3) array of x, y and heading of the base, map axes [m, m, rad]; where the geometry is singular
-        its diagonal is infinite and the rest zero.
-    """
-    poses = np.asarray(T_map_base, dtype=np.float64).reshape(-1, 3)
-    visible = model.visible_from_poses(poses, all_round=options.heading is Heading.ALL_ROUND)
-    T_map_scanner = compose(poses, model.scanner.mounting)
-    covariances = np.empty((len(poses), 3, 3))
-    dilution_kernels.fill_covariances(
-        model.targets.centers,
-        survey_sigmas(model),
-        T_map_scanner,
-        T_map_scanner[:, :2] - poses[:, :2],
-        visible.offsets,
-        visible.indices,
-        fix_model(model.scanner, replace(options, heading=Heading.ALL_ROUND)),
-        covariances,
-    )
-    return covariances
-
-
 def fix_model(scanner: Scanner, options: FixOptions) -> FixModel:
     """Options as plain numbers for the kernels."""
     headings = np.zeros(1)
@@ -225,19 +160,11 @@ def fix_model(scanner: Scanner, options: FixOptions) -> FixModel:
     )
 
 
-def survey_sigmas(model: VisibilityModel) -> FloatArray:
+def survey_sigmas(reflectors: ReflectorMap) -> FloatArray:
     """1-sigma uncertainty of each reflector's place: (M,) array [m]."""
-    return np.array([reflector.sigma for reflector in model.reflectors.reflectors], dtype=np.float64)
+    return np.array([reflector.sigma for reflector in reflectors.reflectors], dtype=np.float64)
 
 
 def as_fixes(counts: dilution_kernels.Counts, figures: FloatArray) -> Fixes:
     """Arrays that a kernel filled, by name; no copy is made."""
     return Fixes(counts, *(figures[:, i] for i in range(dilution_kernels.FIGURES)))
-
-
-def warm_up() -> None:
-    """Compile the kernels of this module and of `visibility`."""
-    visibility.warm_up()
-    model = visibility.visibility_model(Project(reflectors=ReflectorMap((Reflector(id="1", x=2.0, y=0.0),))))
-    fixes(model, [[0.0, 0.0]], FixOptions())
-    fix_covariances(model, [[0.0, 0.0, 0.0]], FixOptions())

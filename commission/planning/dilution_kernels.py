@@ -259,6 +259,47 @@ def fix_at_heading(  # noqa: PLR0917 - one point and heading
 
 
 @compiled
+def keep_worse_or_better(one: FloatArray, combine: int, best: FloatArray) -> None:
+    """Keep of each figure the worse or the better one of two headings.
+
+    Parameters
+    ----------
+    one : (FIGURES,) of another heading.
+    combine : WORST; anything else keeps the better.
+    best : (FIGURES,) what is kept, changed in place.
+
+    Notes
+    -----
+    No formula: the larger is worse of the first figures, better of those from `PROMISING` on.
+    """
+    for i in range(FIGURES):
+        takes_larger = (i < PROMISING) == (combine == WORST)
+        best[i] = max(best[i], one[i]) if takes_larger else min(best[i], one[i])
+
+
+@compiled
+def fill_figures(best: FloatArray, model: FixModel, figures: FloatArray) -> None:
+    """Store the figures of one point: sigmas and dilutions from variances.
+
+    Parameters
+    ----------
+    best : (FIGURES,) as `fix_at_heading` fills them.
+    model : its noises are the divisors of the dilutions.
+    figures : (FIGURES,) output.
+
+    Notes
+    -----
+    sigma = sqrt(variance), DOP = sigma / noise of one measurement, by definition. Roots and quotients keep the order,
+    so they can wait until the heading is chosen.
+    """
+    figures[0], figures[1] = math.sqrt(best[0]), math.sqrt(best[1])
+    figures[2] = math.sqrt(best[2]) / model.position_noise
+    figures[3] = figures[1] / math.sqrt(model.bearing_variance)
+    for i in range(PROMISING, FIGURES):
+        figures[i] = best[i]
+
+
+@compiled
 def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
     centers: FloatArray,
     survey_sigmas: FloatArray,
@@ -320,16 +361,9 @@ def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
         for h in range(1, len(headings)):
             other = fix_at_heading(seen, parts, turns, free, headings[h], model, one)
             count = min(count, other) if model.combine == WORST else max(count, other)
-            for i in range(FIGURES):
-                takes_larger = (i < PROMISING) == (model.combine == WORST)
-                best[i] = max(best[i], one[i]) if takes_larger else min(best[i], one[i])
+            keep_worse_or_better(one, model.combine, best)
         counts[n] = count
-        # Roots and quotients keep the order, so they can wait until the heading is chosen.
-        figures[n, 0], figures[n, 1] = math.sqrt(best[0]), math.sqrt(best[1])
-        figures[n, 2] = math.sqrt(best[2]) / model.position_noise
-        figures[n, 3] = figures[n, 1] / math.sqrt(model.bearing_variance)
-        for i in range(PROMISING, FIGURES):
-            figures[n, i] = best[i]
+        fill_figures(best, model, figures[n])
 
 
 @compiled

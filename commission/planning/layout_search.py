@@ -22,7 +22,7 @@ from commission.planning.route_prediction import PlannedRoute, PredictionOptions
 from commission.planning.telling_apart import ChosenPlace, Distinction, chosen_places, nearest_on_routes
 from commission.planning.true_error import quality_of, two_sigma_of
 from commission.planning.unmet import Unmet
-from commission.planning.visibility import VisibilityModel
+from commission.planning.vehicle_visibility import VehicleVisibility
 from commission.progress import Progress
 from commission.site.checks import at_least
 from commission.site.layout_brief import CandidateOptions, Demands
@@ -81,7 +81,7 @@ class LayoutSearch:
     ----------
     planned : the routes, with all M reflectors that stay or could be taken.
     site : parameters, scanner and stations.
-    model : visibility of the site with these reflectors, for its first scanner.
+    visible : visibility of the site with these reflectors.
     kept : number of reflectors that stay; they come first.
     options : demands and effort.
     progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
@@ -91,23 +91,23 @@ class LayoutSearch:
         self,
         planned: Sequence[PlannedRoute],
         site: Equipped,
-        model: VisibilityModel,
+        visible: VehicleVisibility,
         *,
         kept: int,
         options: PlacementOptions,
         progress: Progress,
     ) -> None:
         self._planned, self._options, self._progress, self._fraction = planned, options, progress, 0.0
-        count, demands = len(model.reflectors), options.demands
+        count, demands = len(visible.reflectors), options.demands
         self._fixed = np.arange(count) < kept
         self._covers = [route.sees() for route in planned]
         self._seen = [covers.any(axis=0) for covers in self._covers]
         self._base = demands.visible + int(demands.survive_failure)
         self._needs = [np.full(len(route.drive), self._base, dtype=np.int64) for route in planned]
         self._limits = [_limits(route, site, demands) for route in planned]
-        self._conflicts = _conflicts(model.reflectors.centers, demands.spacing)
-        self._places = chosen_places(demands, planned, site.stations, site.scanners[0], options.ambiguity)
-        self._distinction = Distinction(model, self._places, demands.survive_failure, options.ambiguity)
+        self._conflicts = _conflicts(visible.reflectors.centers, demands.spacing)
+        self._places = chosen_places(demands, planned, site.stations, site.scanners, options.ambiguity)
+        self._distinction = Distinction(visible, self._places, demands.survive_failure, options.ambiguity)
         self._apart: list[BoolArray] = []
         self._quality = quality_of(planned[0]) if planned else None
 

@@ -15,6 +15,7 @@ from commission.planning.layout_search import LayoutSearch, PlacementOptions
 from commission.planning.nominal_drive import nominal_drive
 from commission.planning.route_prediction import plan_route
 from commission.planning.unmet import Unmet
+from commission.planning.vehicle_visibility import VehicleVisibility
 from commission.planning.visibility import VisibilityOptions, build_visibility, walls_of
 from commission.progress import Progress, silent
 from commission.site.layout_brief import CandidateOptions, Demands
@@ -79,9 +80,9 @@ def choose(
     kept = _kept(site, options)
     everything = ReflectorMap((*kept, *_named(centers, kept, options.candidates)))
     walls = walls_of(site.floor_map)
-    models = [build_visibility(everything, scanner, walls, VisibilityOptions()) for scanner in site.scanners]
+    models = tuple(build_visibility(everything, scanner, walls, VisibilityOptions()) for scanner in site.scanners)
     planned = [plan_route(site, name, options.prediction, models) for name in routes]
-    search = LayoutSearch(planned, site, models[0], kept=len(kept), options=options, progress=progress)
+    search = LayoutSearch(planned, site, VehicleVisibility(models), kept=len(kept), options=options, progress=progress)
     taken = search.run()
     # Named anew, so that the new ones count without gaps.
     added = _named(everything.centers[len(kept) :][taken[len(kept) :]], kept, options.candidates)

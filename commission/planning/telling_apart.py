@@ -17,7 +17,7 @@ from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.geometry.se2 import compose, inverse, transform_points
 from commission.planning.ambiguity import AmbiguityOptions, ambiguous_poses, headings_tried
 from commission.planning.route_prediction import PlannedRoute
-from commission.planning.visibility import VisibilityModel
+from commission.planning.vehicle_visibility import VehicleVisibility
 from commission.site.layout_brief import Demands
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
@@ -42,7 +42,7 @@ def chosen_places(
     demands: Demands,
     planned: Sequence[PlannedRoute],
     stations: Sequence[Station],
-    scanner: Scanner,
+    scanners: Sequence[Scanner],
     options: AmbiguityOptions,
 ) -> tuple[ChosenPlace, ...]:
     """List the places that the demands name: starts of the routes, stations, spots.
@@ -52,7 +52,7 @@ def chosen_places(
     demands : what must be unambiguous.
     planned : routes that count, with their drives.
     stations : of the project.
-    scanner, options : say which headings are tried where a spot names none.
+    scanners, options : say which headings are tried where a spot names none.
     """
     places: list[ChosenPlace] = []
     if demands.unambiguous_starts:
@@ -60,7 +60,7 @@ def chosen_places(
     if demands.unambiguous_stations:
         places += [ChosenPlace(f"station {each.name!r}", each.pose[np.newaxis]) for each in stations]
     for spot in demands.unambiguous_spots:
-        headings = np.array(spot[2:]) if len(spot) == 3 else headings_tried(scanner, options)
+        headings = np.array(spot[2:]) if len(spot) == 3 else headings_tried(scanners, options)
         poses = np.column_stack((np.tile(spot[:2], (len(headings), 1)), headings))
         places.append(ChosenPlace(f"spot {spot[0]:g}, {spot[1]:g} m", poses))
     return tuple(places)
@@ -71,20 +71,24 @@ class Distinction:
 
     Parameters
     ----------
-    model : visibility of everything that could be taken, M reflectors.
+    visible : visibility of everything that could be taken, M reflectors.
     places : chosen places.
     survive_failure : whether a place must stay clear without any single reflector.
     options : when two poses count as alike.
     """
 
     def __init__(
-        self, model: VisibilityModel, places: Sequence[ChosenPlace], survive_failure: bool, options: AmbiguityOptions
+        self,
+        visible: VehicleVisibility,
+        places: Sequence[ChosenPlace],
+        survive_failure: bool,
+        options: AmbiguityOptions,
     ) -> None:
-        self._model, self._fragile, self._options = model, survive_failure, options
+        self._visible, self._fragile, self._options = visible, survive_failure, options
         self._poses = np.concatenate([np.empty((0, 3)), *(place.poses for place in places)])
         self._place = np.repeat(np.arange(len(places)), [len(place.poses) for place in places])
         self._count = len(places)
-        self.sees = model.visible_from_poses(self._poses).incidence(len(model.reflectors))
+        self.sees = visible.visible_from_poses(self._poses).incidence(len(visible.reflectors))
         """(P, M) whether each pose of the places sees each reflector."""
         self.need = FEWEST + int(survive_failure)
         """Reflectors that each of these poses must see at least."""
@@ -96,7 +100,9 @@ class Distinction:
         result = np.zeros(self._count, dtype=np.int64)
         for blocked in self._failures(taken):
             poses = self._affected(blocked)
-            found = ambiguous_poses(self._model.restricted(_without(taken, blocked)), self._poses[poses], self._options)
+            found = ambiguous_poses(
+                self._visible.restricted(_without(taken, blocked)), self._poses[poses], self._options
+            )
             np.add.at(result, self._place[poses[found.ambiguous]], 1)
         return result
 
@@ -108,7 +114,7 @@ class Distinction:
         rows: list[BoolArray] = []
         for blocked in self._failures(taken):
             layout, poses = _without(taken, blocked), self._affected(blocked)
-            found = ambiguous_poses(self._model.restricted(layout), self._poses[poses], self._options)
+            found = ambiguous_poses(self._visible.restricted(layout), self._poses[poses], self._options)
             rivals = np.flatnonzero(np.isfinite(found.partners[:, 0]))
             rows += [self._row(layout, self._poses[poses[n]], found.partners[n]) for n in rivals]
         return rows
@@ -124,9 +130,9 @@ class Distinction:
 
     def _row(self, layout: BoolArray, place: FloatArray, rival: FloatArray) -> BoolArray:
         """(M,) reflectors that one of two poses would see while nothing stands where the other one misses it."""
-        centers = self._model.reflectors.centers
+        centers = self._visible.reflectors.centers
         motion = compose(rival, inverse(place))
-        seen = self._model.visible_from_poses(np.stack((place, rival))).incidence(len(centers))
+        seen = self._visible.visible_from_poses(np.stack((place, rival))).incidence(len(centers))
         here = seen[0] & ~_occupied(transform_points(motion, centers), centers[seen[1] & layout], self._options)
         there = seen[1] & ~_occupied(
             transform_points(inverse(motion), centers), centers[seen[0] & layout], self._options

@@ -173,20 +173,14 @@ class VisibilityModel:
         return _bins(_limits(reflector, self.scanner, self.options)[1], self.caster.grid)
 
 
-def visibility_model(site: Sighted, options: VisibilityOptions | None = None) -> VisibilityModel:
-    """Prepare the reflectors and walls of a site for its first scanner; one without a floor map is an open field.
+def visibility_models(site: Sighted, options: VisibilityOptions | None = None) -> tuple[VisibilityModel, ...]:
+    """Prepare the reflectors and walls of a site for each of its scanners; one without a floor map is an open field.
 
     Parameters
     ----------
     site : a project, or what of it says which reflectors are seen from where.
     options : what counts as visible; the defaults when None.
     """
-    caster = walls_of(site.floor_map)
-    return build_visibility(site.reflectors, site.scanners[0], caster, options or VisibilityOptions())
-
-
-def visibility_models(site: Sighted, options: VisibilityOptions | None = None) -> tuple[VisibilityModel, ...]:
-    """Prepare the reflectors and walls of a site for each of its scanners; see `visibility_model`."""
     caster, chosen = walls_of(site.floor_map), options or VisibilityOptions()
     return tuple(build_visibility(site.reflectors, scanner, caster, chosen) for scanner in site.scanners)
 

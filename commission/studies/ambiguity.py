@@ -15,7 +15,8 @@ from commission.planning.ambiguity import AmbiguityOptions, AmbiguousPair, ColdS
 from commission.planning.association_risk import NeighborRisk, neighbor_risks
 from commission.planning.coverage import Lattice, lattice_of
 from commission.planning.route_prediction import predict_route
-from commission.planning.visibility import VisibilityOptions, visibility_model
+from commission.planning.vehicle_visibility import vehicle_visibility
+from commission.planning.visibility import VisibilityOptions
 from commission.progress import Progress, part, silent
 from commission.site.floor_map import FloorMap
 from commission.site.project import Project
@@ -157,13 +158,13 @@ def ambiguity(inputs: AmbiguityInput, progress: Progress = silent) -> AmbiguityR
     lattice = inputs.lattice()
     warm_up((SIGHT,), part(progress, 0.0, COMPILING))
     progress(COMPILING, "sight of each reflector")
-    model = visibility_model(inputs, inputs.visibility)
-    cold = cold_start(model, lattice, inputs.options, part(progress, PREPARING, 1.0))
+    seen = vehicle_visibility(inputs, inputs.visibility)
+    cold = cold_start(seen, lattice, inputs.options, part(progress, PREPARING, 1.0))
     drivable = free_floor(inputs, lattice.points())
     share, partners = np.full(len(lattice), np.nan), np.full((len(lattice), 3), np.nan)
     visible = np.full(len(lattice), -1, dtype=np.int64)
     # The poses are the points outside walls, heading by heading.
-    points = np.flatnonzero(~model.caster.grid.is_occupied(lattice.points()))
+    points = np.flatnonzero(~seen.caster.grid.is_occupied(lattice.points()))
     if len(points):
         share[points] = cold.ambiguous.reshape(-1, len(points)).mean(axis=0)
         visible[points] = cold.visible.reshape(-1, len(points)).min(axis=0)

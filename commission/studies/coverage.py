@@ -1,4 +1,4 @@
-"""Coverage of a site: what its scanner sees over the floor and how well it can localize there, with a summary.
+"""Coverage of a site: what its scanners see over the floor and how well it can localize there, with a summary.
 
 The figures themselves come from `planning`; files and images are elsewhere.
 """
@@ -18,7 +18,8 @@ from commission.planning.coverage import Coverage, Lattice, lattice_of
 from commission.planning.coverage import coverage as over_lattice
 from commission.planning.dilution import FixOptions, Heading, Measurement, fix_options, odometry_prior
 from commission.planning.fix_ellipses import every_nth, position_covariances
-from commission.planning.visibility import VisibilityModel, VisibilityOptions, visibility_model
+from commission.planning.vehicle_visibility import VehicleVisibility, vehicle_visibility
+from commission.planning.visibility import VisibilityOptions
 from commission.progress import Progress, part, silent
 from commission.site.floor_map import FREE, FloorMap
 from commission.site.parameters import ObservationParameters, OdometryParameters, SupervisorParameters
@@ -28,7 +29,7 @@ from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.studies.inputs import StudyInput
-from commission.studies.kernels import DILUTION, SIGHT
+from commission.studies.kernels import DILUTION, SEVERAL_SCANNERS, SIGHT
 
 Number = int | float | None
 
@@ -141,7 +142,7 @@ class CoverageResult:
 
     coverage: Coverage
     """The figures at each of N points."""
-    model: VisibilityModel
+    visible: VehicleVisibility
     """What is visible from where."""
     drivable: BoolArray
     """(N,) whether each point lies on floor that the map knows to be free; all of it without a map."""
@@ -161,12 +162,13 @@ def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResu
         the spacing is not above 0.
     """
     lattice = inputs.lattice()
-    warm_up((SIGHT, DILUTION), part(progress, 0.0, COMPILING))
+    several = (SEVERAL_SCANNERS,) if len(inputs.scanners) > 1 else ()
+    warm_up((SIGHT, DILUTION, *several), part(progress, 0.0, COMPILING))
     progress(COMPILING, "sight of each reflector")
-    model = visibility_model(inputs, inputs.visibility)
-    found = over_lattice(model, lattice, inputs.fix, part(progress, PREPARING, 1.0))
+    visible = vehicle_visibility(inputs, inputs.visibility)
+    found = over_lattice(visible, lattice, inputs.fix, part(progress, PREPARING, 1.0))
     floor = np.array(found.floor) if inputs.floor_map is None else free_floor(inputs, lattice.points())
-    return CoverageResult(found, model, floor)
+    return CoverageResult(found, visible, floor)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,7 +188,7 @@ def ellipses_of(result: CoverageResult, spacing: float) -> Ellipses:
     found = result.coverage
     chosen = every_nth(found.lattice, max(1, math.ceil(spacing / found.lattice.spacing - 1e-9)))
     points = found.lattice.points()[chosen[result.drivable[chosen]]]
-    covariances = position_covariances(result.model, points, found.options)
+    covariances = position_covariances(result.visible, points, found.options)
     known = np.isfinite(covariances).all(axis=(1, 2))
     return Ellipses(points[known], *ellipse_axes(covariances[known]))
 
@@ -216,7 +218,7 @@ def summary(result: CoverageResult, limits: SupervisorParameters) -> dict[str, N
         "points": int(on.sum()),
         "spacing_m": found.lattice.spacing,
         "area_m2": float(on.sum() * found.lattice.spacing**2),
-        "reflectors": len(result.model.reflectors),
+        "reflectors": len(result.visible.reflectors),
         "visible_mean": _mean(fixes.visible[on]),
         "visible_min": int(fixes.visible[on].min()) if on.any() else None,
     }

@@ -6,10 +6,11 @@ A study warms up what it needs as its first part, so that progress does not stan
 from __future__ import annotations
 
 from commission.geometry import spline_kernels
-from commission.planning import dilution, route_check, route_prediction, true_error, visibility
+from commission.planning import route_check, route_prediction, true_error, vehicle_fixes, visibility
 
 SIGHT = ("lines of sight", visibility.warm_up)
-DILUTION = ("dilution", dilution.warm_up)
+DILUTION = ("dilution", vehicle_fixes.warm_up)
+SEVERAL_SCANNERS = ("dilution of several scanners", vehicle_fixes.warm_up_several)
 CURVES = ("curves", spline_kernels.warm_up)
 PREDICTION = ("prediction", route_prediction.warm_up)
 ERRORS = ("true error", true_error.warm_up)

@@ -43,12 +43,11 @@ LOST_SHARE = 0.4
 """Accepted share over a window of 5 s below which the vehicle is probably lost [0..1]."""
 _CLIPPED_AT = 4.0
 """A detection counts at most this often the gate: false ones weigh the same under every suspicion."""
-_TURN = "set the heading of scanner.mounting to {:+.3f} rad"
 _MOUNTINGS = (
-    ("mirrored", -1.0, 0.0, "the scanner is mounted upside down (or the map is mirrored)", "negate the bearings"),
-    ("turned by 90 deg", 1.0, 0.5 * math.pi, "the scanner is turned to the left", _TURN),
-    ("turned by -90 deg", 1.0, -0.5 * math.pi, "the scanner is turned to the right", _TURN),
-    ("turned by 180 deg", 1.0, math.pi, "the scanner looks to the rear", _TURN),
+    ("mirrored", -1.0, 0.0, "mounted upside down (or the map is mirrored)"),
+    ("turned by 90 deg", 1.0, 0.5 * math.pi, "turned to the left"),
+    ("turned by -90 deg", 1.0, -0.5 * math.pi, "turned to the right"),
+    ("turned by 180 deg", 1.0, math.pi, "turned to the rear"),
 )
 _BIASES_M = np.arange(-0.12, 0.1201, 0.02)
 _LAGS_S = np.arange(-0.4, 0.4001, 0.02)
@@ -64,7 +63,7 @@ class MisfitInput(StudyInput):
     log: RecordLog
     """The recording."""
     setup: LocalizerSetup
-    """Reflectors, scanner and parameters of the run."""
+    """Reflectors, scanners and parameters of the run."""
     initial: Belief
     """Belief before the first record."""
     run: RunColumns
@@ -77,6 +76,8 @@ class _Fit:
 
     accepted: float
     """Share of the detector's detections that are accepted [0..1]."""
+    worst: float
+    """The same of the scanner with the least of it, among those that detect anything."""
     misfit: float
     """Mean squared Mahalanobis distance of all of them to their likeliest reflectors, each clipped."""
     count: int
@@ -108,7 +109,7 @@ def misfit(inputs: MisfitInput, progress: Progress = silent) -> tuple[Finding, .
     progress(0.0, "as recorded")
     before = _fit(inputs, detected)
     progress(0.1, "mounting")
-    mounting = tuple(_mounting(inputs, detected, before)) if before.accepted < POOR_SHARE else ()
+    mounting = tuple(_mounting(inputs, detected, before)) if before.worst < POOR_SHARE else ()
     if mounting:
         return (*lost, *mounting)
     progress(0.3, "range bias")
@@ -159,20 +160,38 @@ def _lost_and_found(run: RunColumns, times: FloatArray) -> Iterator[Finding]:
 
 
 def _mounting(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iterator[Finding]:
-    fits: list[tuple[_Fit, str, str, str, float]] = []
-    for name, sign, turn, meaning, cure in _MOUNTINGS:
-        seen = np.array(detected.range_bearing)
-        seen[:, 1] = wrap(sign * seen[:, 1] + turn)
-        fits.append((_fit(inputs, replace(detected, range_bearing=read_only(seen))), name, meaning, cure, turn))
-    best, name, meaning, cure, turn = max(fits, key=lambda fit: fit[0].accepted)
-    if best.accepted < GOOD_SHARE or best.accepted < before.accepted + 0.2:
+    """Suspect all scanners at once, and where there are several each alone."""
+    scanners = range(len(inputs.setup.scanners))
+    suspected = [tuple(scanners), *((each,) for each in scanners if len(scanners) > 1)]
+    fits: list[tuple[_Fit, tuple[int, ...], tuple[str, float, float, str]]] = []
+    for chosen in suspected:
+        rows = np.isin(np.repeat(detected.scanners, np.diff(detected.offsets)), chosen)
+        for mounting in _MOUNTINGS:
+            _, sign, turn, _ = mounting
+            seen = np.array(detected.range_bearing)
+            seen[rows, 1] = wrap(sign * seen[rows, 1] + turn)
+            fits.append((_fit(inputs, replace(detected, range_bearing=read_only(seen))), chosen, mounting))
+    best, chosen, (name, sign, turn, meaning) = max(fits, key=lambda fit: fit[0].worst)
+    if best.worst < GOOD_SHARE or best.worst < before.worst + 0.2:
         return
-    heading = float(wrap(inputs.setup.scanners[0].mounting[2] + turn))
+    own = inputs.setup.scanners[chosen[0]].name
+    what, who = "they", "all scanners are"
+    if len(scanners) == 1:
+        who = "the scanner is"
+    elif len(chosen) == 1:
+        what, who = f"those of {own}", f"the scanner {own} is"
+    cures = ["negate the bearings"]
+    if sign > 0.0:
+        cures = [
+            f"set the heading of {'scanner.mounting' if len(scanners) == 1 else f'the mounting of {one.name}'} "
+            f"to {float(wrap(one.mounting[2] + turn)):+.3f} rad"
+            for one in (inputs.setup.scanners[index] for index in chosen)
+        ]
     yield Finding(
         found=f"{PERCENT.text(before.accepted)} of the detections fit the reflectors, "
-        f"{PERCENT.text(best.accepted)} once they are {name}",
-        probably=meaning,
-        remedy=cure.format(heading),
+        f"{PERCENT.text(best.accepted)} once {what} are {name}",
+        probably=f"{who} {meaning}",
+        remedy=", ".join(cures),
     )
 
 
@@ -249,8 +268,13 @@ def _fit(inputs: MisfitInput, detected: DetectionLog) -> _Fit:
     judged = run.status != Status.OUTLIER_DETECTOR
     total = int(np.count_nonzero(judged))
     d2 = np.nan_to_num(run.d2[judged], nan=math.inf)
+    count = len(inputs.setup.scanners)
+    of = np.repeat(detected.scanners, np.diff(detected.offsets))
+    seen = np.bincount(of[judged], minlength=count)
+    accepted = np.bincount(of[run.status == Status.INLIER], minlength=count)
     return _Fit(
-        accepted=float(np.count_nonzero(run.status[judged] == Status.INLIER)) / max(1, total),
+        accepted=float(accepted.sum()) / max(1, total),
+        worst=float(min(accepted[seen > 0] / seen[seen > 0], default=0.0)),
         misfit=float(np.minimum(d2, _CLIPPED_AT * inputs.setup.filter.gate.d2).sum()) / max(1, total),
         count=total,
     )

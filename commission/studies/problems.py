@@ -257,14 +257,20 @@ def _map_problems(site: ProblemsInput, floor: FloorDistances | None) -> Iterable
 
 
 def _scanner_problems(site: ProblemsInput) -> Iterable[Problem]:
-    """Beams that meet the vehicle's own outline."""
-    scanner, outline = site.scanners[0], np.asarray(site.vehicle.outline, dtype=np.float64)
-    position = scanner.mounting[:2]
+    """Beams that meet the vehicle's own outline, scanner by scanner."""
+    alone = len(site.scanners) == 1
+    for scanner in site.scanners:
+        yield from _outline_problems(scanner, site.vehicle, "" if alone else f" {scanner.name!r}")
+
+
+def _outline_problems(scanner: Scanner, vehicle: Vehicle, name: str) -> Iterable[Problem]:
+    """Beams of one scanner that meet the outline; its name is said where there are others."""
+    outline, position = np.asarray(vehicle.outline, dtype=np.float64), scanner.mounting[:2]
     depth = float(np.hypot(*(outline_points(outline, 0.01) - position).T).min())
     if depth > 0.01 and _inside(position, outline):
         if depth > _SLIT:
             text = (
-                f"The scanner is {MILLIMETRES.text(depth)} inside the vehicle's outline; "
+                f"The scanner{name} is {MILLIMETRES.text(depth)} inside the vehicle's outline; "
                 "expected at its edge, unless it stands above the body"
             )
             yield Problem(severity=Severity.NOTE, text=text, subject=Subject.SCANNER)
@@ -274,7 +280,8 @@ def _scanner_problems(site: ProblemsInput) -> Iterable[Problem]:
     if len(blocked):
         low, high = (float(bearings[index]) for index in (blocked[0], blocked[-1]))
         text = (
-            f"The vehicle's own outline blocks {len(blocked)} of {scanner.beam_count} beams, between "
+            f"The vehicle's own outline blocks {len(blocked)} of {scanner.beam_count} beams"
+            f"{name and f' of the scanner{name}'}, between "
             f"{PLAIN_DEGREES.number(low, '.1f')} and {PLAIN_DEGREES.text(high, '.1f')}; "
             "expected a field of view that leaves the vehicle out"
         )
@@ -310,13 +317,18 @@ def separation_needed(site: Told) -> tuple[float, float]:
     -------
     apart : between centers, so that a detection of one cannot fall nearer to the other and still be accepted while the
         supervisor is content: twice the gate's radius at the alarm limit, but for the reflectors' own uncertainty [m].
-    gap : between their edges, so that the detector sees two clusters up to the scanner's range for reflectors [m].
+    gap : between their edges, so that the detector sees two clusters up to each scanner's range for reflectors [m].
     """
-    parameters, scanner = site.parameters, site.scanners[0]
+    parameters = site.parameters
     sigma = math.hypot(0.5 * parameters.supervisor.position_limit, parameters.observation.range_sigma)
     apart = 2.0 * math.sqrt(chi_square_gate(parameters.association.gate_probability, 2)) * sigma
+    return apart, max(map(_gap_needed, site.scanners))
+
+
+def _gap_needed(scanner: Scanner) -> float:
+    """Distance between the edges of two reflectors that a scanner tells apart as far as it sees them [m]."""
     angle = BRIDGED_BEAMS * scanner.angle_increment + math.radians(scanner.beam_width_deg)
-    return apart, min(scanner.range[1], scanner.reflector_range) * angle
+    return min(scanner.range[1], scanner.reflector_range) * angle
 
 
 def _pair_problem(first: Reflector, second: Reflector, distance: float, needed: float) -> Problem:

@@ -12,7 +12,7 @@ from commission.localization.estimate import Mode
 from commission.planning.placement import Demands, Placement, PlacementOptions, place
 from commission.planning.route_prediction import plan_route, restricted
 from commission.planning.true_error import two_sigma_of
-from commission.planning.visibility import visibility_model
+from commission.planning.vehicle_visibility import vehicle_visibility
 from commission.simulation.drive import DriveOptions
 from commission.simulation.scenario import virtual_drive
 from commission.site.disturbances import Disturbances
@@ -29,10 +29,10 @@ def demands_met_by(project: Project) -> Demands:
     Limits are those of 2-sigma, of the filter and of the true error, rounded up to tenths of a millimetre and to
     thousandths of a degree.
     """
-    model = visibility_model(project)
+    models = vehicle_visibility(project).models
     visible, worst = [], np.zeros(3)
     for route in project.routes:
-        planned = plan_route(project, route.name, models=[model])
+        planned = plan_route(project, route.name, models=models)
         visible.append(int(planned.visible.counts().min()))
         everyone = np.arange(len(project.reflectors))
         for gone in (-1, *np.unique(planned.visible.indices).tolist()):
@@ -90,7 +90,7 @@ def blocked_drive(project: Project, route: str, seed: int, disturbances: Disturb
         bool(np.all(judged.run.modes == Mode.OPERATIONAL)),
         judged.errors,
         np.cumsum(steps),
-        visibility_model(hall).visible_from_poses(truth).counts(),
+        vehicle_visibility(hall).visible_from_poses(truth).counts(),
     )
 
 

@@ -17,9 +17,7 @@ from commission.site.scanner import Scanner
 from commission.studies.run import RunInput, RunResult, judged_run
 from commission.studies.start import start_of
 from tests.planning.driven import AXES, compare, driven_along, planned_route, undisturbed
-
-FIELD = (-137.5, 137.5)
-NAMES = ("front left", "rear right")
+from tests.two_scanners import NAMES, with_two
 
 
 @pytest.fixture
@@ -33,19 +31,6 @@ def commission(capsys):
         return finished.value.code, shown.out, shown.err
 
     return run
-
-
-def with_two(project, **changes):
-    """The vehicle of a site with a scanner of 275 degrees on its front left and one on its rear right corner."""
-    (only,) = project.scanners
-    x, y = np.array(project.vehicle.outline).max(axis=0)
-    back = float(np.array(project.vehicle.outline)[:, 0].min())
-    front, rear = (x, y, math.radians(45.0)), (back, -y, math.radians(-135.0))
-    scanners = tuple(
-        replace(only, name=name, mounting=np.array(mounting), field_of_view_deg=FIELD)
-        for name, mounting in zip(NAMES, (front, rear), strict=True)
-    )
-    return replace(project, scanners=scanners, **changes)
 
 
 @pytest.fixture(scope="module", params=["shop_floor", "warehouse"])

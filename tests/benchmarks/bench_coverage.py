@@ -30,7 +30,8 @@ from commission.geometry.raycast import RayCaster
 from commission.planning import coverage as coverage_module
 from commission.planning.coverage import Coverage, Lattice, LiveCoverage, coverage
 from commission.planning.dilution import FixOptions, Heading
-from commission.planning.visibility import VisibilityModel, VisibilityOptions, build_visibility, unpack
+from commission.planning.vehicle_visibility import VehicleVisibility
+from commission.planning.visibility import VisibilityOptions, build_visibility, unpack
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 from tests.benchmarks.bench_raycast import RESOLUTION, plant
@@ -124,7 +125,7 @@ def same(first: Coverage, second: Coverage) -> bool:
     return all(np.array_equal(one, other) for one, other in zip(first.fixes, second.fixes, strict=True))
 
 
-def move_times(model: VisibilityModel, options: FixOptions) -> tuple[list[float], bool]:
+def move_times(model: VehicleVisibility, options: FixOptions) -> tuple[list[float], bool]:
     """Processor times of 30 moves by 0.3 m [s]; whether the end equals a full computation."""
     live = LiveCoverage(model, coverage(model, LATTICE, options))
     rng, times = np.random.default_rng(1), []
@@ -134,17 +135,22 @@ def move_times(model: VisibilityModel, options: FixOptions) -> tuple[list[float]
         start = time.thread_time()
         live.move(int(index), moved)
         times.append(time.thread_time() - start)
-    anew = build_visibility(live.reflectors, model.scanner, model.caster, model.options)
+    anew = prepared(live.reflectors, model.caster)
     return times, same(live.coverage, coverage(anew, LATTICE, options))
 
 
-def time_per_point(model: VisibilityModel, caster: RayCaster, times: int) -> float:
+def prepared(reflectors: ReflectorMap, caster: RayCaster) -> VehicleVisibility:
+    """Reflectors and walls for the one scanner."""
+    return VehicleVisibility((build_visibility(reflectors, SCANNER, caster, VisibilityOptions()),))
+
+
+def time_per_point(model: VehicleVisibility, caster: RayCaster, times: int) -> float:
     """Processor time per point on a floor that repeats the plant side by side [s]; the same reflectors to the area."""
     places = model.reflectors.reflectors
     wide = OccupancyGrid(np.tile(caster.grid.occupied, (1, times)), RESOLUTION)
     width = caster.grid.occupied.shape[1] * RESOLUTION
     repeated = [replace(r, id=f"{k}-{r.id}", x=r.x + k * width) for k in range(times) for r in places]
-    larger = build_visibility(ReflectorMap(tuple(repeated)), SCANNER, RayCaster(wide), VisibilityOptions())
+    larger = prepared(ReflectorMap(tuple(repeated)), RayCaster(wide))
     lattice = replace(LATTICE, columns=times * LATTICE.columns)
     return timed(lambda: coverage(larger, lattice, ALL_ROUND))[0] / len(lattice)
 
@@ -164,14 +170,13 @@ def main() -> int:
     in_range *= EVERY
 
     def compute(options: FixOptions) -> Coverage:
-        model = build_visibility(reflectors, SCANNER, caster, VisibilityOptions())
-        return coverage(model, LATTICE, options)
+        return coverage(prepared(reflectors, caster), LATTICE, options)
 
-    model = build_visibility(reflectors, SCANNER, caster, VisibilityOptions())
-    shadows, _ = timed(lambda: build_visibility(reflectors, SCANNER, caster, VisibilityOptions()))
+    model = prepared(reflectors, caster)
+    shadows, _ = timed(lambda: prepared(reflectors, caster))
     whole, _ = timed(lambda: compute(ALL_ROUND))
     with_headings, _ = timed(lambda: compute(HEADINGS))
-    differing = int((unpack(model.visible(sample), REFLECTORS) != expected).sum())
+    differing = int((unpack(model.models[0].visible(sample), REFLECTORS) != expected).sum())
     moves, equal = move_times(model, ALL_ROUND)
     moves_headings, equal_headings = move_times(model, HEADINGS)
 

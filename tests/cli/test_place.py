@@ -4,7 +4,7 @@ from PIL import Image
 
 from commission.io.project_file import load_project
 from commission.planning.ambiguity import ambiguous_poses
-from commission.planning.visibility import visibility_model
+from commission.planning.vehicle_visibility import vehicle_visibility
 
 
 @pytest.fixture
@@ -75,7 +75,7 @@ def test_chosen_places_are_told_from_all_others(commission, walled, tmp_path):
     assert (code, err) == (0, "")
     assert "Not met" not in told
     poses = [(6.0, 0.0, 0.0), (0.0, 0.0, 0.0), (3.0, 1.5, np.pi / 2)]
-    assert not ambiguous_poses(visibility_model(load_project(tmp_path / "placed")), poses).ambiguous.any()
+    assert not ambiguous_poses(vehicle_visibility(load_project(tmp_path / "placed")), poses).ambiguous.any()
 
 
 def test_a_place_that_nothing_clears_is_named(commission, walled, tmp_path):

@@ -11,7 +11,7 @@ from commission.errors import FileFormatError
 from commission.io.coverage_files import NO_FIX, NO_FLOOR, write_coverage
 from commission.planning.coverage import Coverage, Lattice, coverage
 from commission.planning.dilution import FixOptions
-from commission.planning.visibility import visibility_model
+from commission.planning.vehicle_visibility import vehicle_visibility
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
@@ -24,7 +24,7 @@ def found() -> Coverage:
     """A strip of 40 m; its far end is out of reach of the two reflectors at its start."""
     reflectors = ReflectorMap((Reflector(id="a", x=0.0, y=2.0), Reflector(id="b", x=4.0, y=2.0)))
     project = Project(reflectors=reflectors, scanners=(Scanner(resolution_deg=0.1),))
-    return coverage(visibility_model(project), LATTICE, FixOptions())
+    return coverage(vehicle_visibility(project), LATTICE, FixOptions())
 
 
 def test_files_hold_the_figures_of_the_floor(found, tmp_path):
@@ -56,7 +56,7 @@ def test_image_has_north_up_and_a_color_of_its_own_for_no_fix(found, tmp_path):
 
 
 def test_image_of_floor_without_any_fix_is_drawn(tmp_path):
-    nothing = coverage(visibility_model(Project()), LATTICE, FixOptions())
+    nothing = coverage(vehicle_visibility(Project()), LATTICE, FixOptions())
     write_coverage(tmp_path, nothing, np.ones(len(LATTICE), dtype=bool), {})
     assert Image.open(tmp_path / "coverage.png").convert("RGB").getpixel((0, 0)) == NO_FIX
 

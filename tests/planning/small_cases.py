@@ -11,7 +11,8 @@ from commission.planning.ambiguity import ambiguous_poses
 from commission.planning.placement import Placement, PlacementOptions, choose
 from commission.planning.route_prediction import PlannedRoute, plan_route, predict_route
 from commission.planning.true_error import predict_errors
-from commission.planning.visibility import VisibleReflectors, visibility_model
+from commission.planning.vehicle_visibility import vehicle_visibility
+from commission.planning.visibility import VisibleReflectors
 from commission.site.layout_brief import Demands
 from commission.site.parameters import OdometryParameters, Parameters
 from commission.site.project import Project
@@ -42,7 +43,7 @@ class SmallCase:
         """Whether any layout of that many of the candidates meets the demands."""
         every = ReflectorMap(tuple(Reflector(id=f"C{i}", x=x, y=y) for i, (x, y) in enumerate(self.centers.tolist())))
         site = replace(self.project, reflectors=every)
-        planned = plan_route(site, ROUTE, models=[visibility_model(site)])
+        planned = plan_route(site, ROUTE, models=vehicle_visibility(site).models)
         layouts = itertools.combinations(range(len(self.centers)), size)
         return any(self._holds(site, planned, chosen) for chosen in layouts)
 
@@ -78,7 +79,7 @@ class SmallCase:
         if not poses:
             return True
         layout = ReflectorMap(tuple(site.reflectors.reflectors[i] for i in sorted(left)))
-        return not ambiguous_poses(visibility_model(replace(site, reflectors=layout)), poses).ambiguous.any()
+        return not ambiguous_poses(vehicle_visibility(replace(site, reflectors=layout)), poses).ambiguous.any()
 
 
 def only(planned: PlannedRoute, left: set[int]) -> PlannedRoute:

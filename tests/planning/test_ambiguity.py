@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from commission.geometry.angles import difference
 from commission.planning.ambiguity import AmbiguityOptions, PairTable, ambiguous_poses, cold_start
 from commission.planning.coverage import Lattice, lattice_of
-from commission.planning.visibility import visibility_model
+from commission.planning.vehicle_visibility import vehicle_visibility
 from commission.site.project import Project
 from commission.site.scanner import Scanner
 from tests.planning.sites import reflectors_at, room
@@ -26,7 +26,7 @@ def hall(places, scanner=ALL_AROUND) -> Project:
 
 def start_in(project):
     """The middle of the hall: near the walls a reflector may be too close to be measured."""
-    return cold_start(visibility_model(project), Lattice(x=1.0, y=1.0, spacing=0.5, rows=13, columns=21))
+    return cold_start(vehicle_visibility(project), Lattice(x=1.0, y=1.0, spacing=0.5, rows=13, columns=21))
 
 
 def test_a_symmetric_hall_is_flagged_with_its_pairs():
@@ -79,10 +79,10 @@ def test_a_further_reflector_in_sight_tells_two_places_apart():
     scanner = replace(ALL_AROUND, reflector_range=6.0)
     spot = [[0.5, 0.5, 0.0]]
     alike = Project(reflectors=reflectors_at([*triangle, *shifted]), scanners=(scanner,))
-    found = ambiguous_poses(visibility_model(alike), spot)
+    found = ambiguous_poses(vehicle_visibility(alike), spot)
     np.testing.assert_allclose(found.partners, [[40.5, 0.5, 0.0]], atol=1e-9)
     accompanied = Project(reflectors=reflectors_at([*triangle, *shifted, (43.0, 2.0)]), scanners=(scanner,))
-    assert not ambiguous_poses(visibility_model(accompanied), spot).ambiguous.any()
+    assert not ambiguous_poses(vehicle_visibility(accompanied), spot).ambiguous.any()
 
 
 def test_a_narrow_field_of_view_makes_a_hall_ambiguous_that_is_not_all_around():
@@ -91,6 +91,33 @@ def test_a_narrow_field_of_view_makes_a_hall_ambiguous_that_is_not_all_around():
     narrow = Scanner(field_of_view_deg=(-90.0, 90.0), reflector_range=20.0)
     assert not start_in(hall(places)).ambiguous.any()
     assert start_in(hall(places, narrow)).ambiguous.any()
+
+
+def test_two_scanners_back_to_back_are_as_clear_as_one_that_sees_all_around():
+    places = [(4.0, 0.2), (7.0, 0.2), (5.0, 7.8), (8.0, 7.8), (11.8, 6.0)]
+    front = Scanner(name="front", field_of_view_deg=(-90.0, 90.0), reflector_range=20.0)
+    rear = replace(front, name="rear", mounting=(0.0, 0.0, math.pi))
+    assert start_in(replace(hall(places), scanners=(front,))).ambiguous.any()
+    both = start_in(replace(hall(places), scanners=(front, rear)))
+    assert not both.ambiguous.any()
+    # All eight headings of a spot see what the full turn sees from there.
+    around = start_in(hall(places))
+    assert both.visible.reshape(8, -1).tolist() == [around.visible.tolist()] * 8
+
+
+def test_reflectors_that_only_both_scanners_together_see_are_compared():
+    # Two pairs of one distance, farther apart than either scanner sees: 11 m of at most 12.1 m.
+    front = Scanner(name="front", mounting=(0.5, 0.0, 0.0), field_of_view_deg=(-30.0, 30.0), reflector_range=5.0)
+    rear = replace(front, name="rear", mounting=(-0.5, 0.0, math.pi))
+    pair = np.array([(-5.5, 0.0), (5.5, 0.0)])
+    project = Project(
+        reflectors=reflectors_at(np.concatenate((pair, np.add(pair, (40.0, 0.0))))), scanners=(front, rear)
+    )
+    found = ambiguous_poses(vehicle_visibility(project), [[0.0, 0.0, 0.0]])
+    assert found.visible.tolist() == [2]
+    assert found.ambiguous.tolist() == [True]
+    np.testing.assert_allclose(found.partners[0, 1], 0.0, atol=1e-9)
+    assert any(abs(found.partners[0, 0] - x) < 1e-9 for x in (0.0, 40.0))
 
 
 @given(
@@ -117,7 +144,7 @@ def test_a_moved_copy_of_a_constellation_is_always_found(places, motion, seed):
 def test_progress_rises_to_one():
     seen = []
     project = hall(CORNERS)
-    cold_start(visibility_model(project), lattice_of(project, 1.0), progress=lambda done, _: seen.append(done))
+    cold_start(vehicle_visibility(project), lattice_of(project, 1.0), progress=lambda done, _: seen.append(done))
     assert seen == sorted(seen)
     assert seen[-1] == 1.0
 

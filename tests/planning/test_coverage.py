@@ -13,8 +13,10 @@ from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
 from commission.planning import coverage as coverage_module
 from commission.planning.coverage import Lattice, LiveCoverage, coverage, lattice_of
-from commission.planning.dilution import FixOptions, Heading, Measurement, fixes
-from commission.planning.visibility import VisibilityModel, VisibilityOptions, build_visibility, unpack
+from commission.planning.dilution import FixOptions, Heading, Measurement
+from commission.planning.vehicle_fixes import fixes
+from commission.planning.vehicle_visibility import VehicleVisibility
+from commission.planning.visibility import VisibilityOptions, build_visibility, unpack
 from commission.site.floor_map import OCCUPIED, FloorMap
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
@@ -25,7 +27,7 @@ from commission.site.scanner import Scanner
 LATTICE = Lattice(x=0.11, y=0.12, spacing=0.25, rows=40, columns=60)
 
 
-def hall(seed: int, count: int = 70) -> VisibilityModel:
+def hall(seed: int, count: int = 70, scanners: tuple[Scanner, ...] = ()) -> VehicleVisibility:
     """A 15 m x 10 m hall with boxes; more than 64 reflectors, plates among them."""
     rng = np.random.default_rng(seed)
     occupied = np.zeros((200, 300), dtype=bool)
@@ -43,8 +45,16 @@ def hall(seed: int, count: int = 70) -> VisibilityModel:
         for i in range(count)
     )
     scanner = Scanner(range=(0.05, 6.0), resolution_deg=0.1, mounting=(0.3, 0.1, 0.2))
-    return build_visibility(
-        ReflectorMap(reflectors), scanner, RayCaster(OccupancyGrid(occupied, 0.05)), VisibilityOptions()
+    caster, chosen = RayCaster(OccupancyGrid(occupied, 0.05)), VisibilityOptions()
+    return VehicleVisibility(
+        tuple(build_visibility(ReflectorMap(reflectors), each, caster, chosen) for each in scanners or (scanner,))
+    )
+
+
+def anew(visible: VehicleVisibility, reflectors: ReflectorMap) -> VehicleVisibility:
+    """The same scanners and walls, prepared from nothing."""
+    return VehicleVisibility(
+        tuple(build_visibility(reflectors, m.scanner, m.caster, m.options) for m in visible.models)
     )
 
 
@@ -62,9 +72,16 @@ OPTIONS = [
 ]
 
 
+TWO = (
+    Scanner(name="front left", range=(0.05, 6.0), resolution_deg=0.1, mounting=(0.5, 0.3, 0.8)),
+    Scanner(name="rear right", range=(0.05, 5.0), resolution_deg=0.2, mounting=(-0.6, -0.3, -2.3)),
+)
+
+
+@pytest.mark.parametrize("scanners", [(), TWO], ids=["one scanner", "two scanners"])
 @pytest.mark.parametrize("options", OPTIONS, ids=lambda o: f"{o.measurement}, {o.heading}")
-def test_coverage_after_many_moves_equals_a_full_recomputation_bit_for_bit(options):
-    model = hall(1)
+def test_coverage_after_many_moves_equals_a_full_recomputation_bit_for_bit(options, scanners):
+    model = hall(1, scanners=scanners)
     live = LiveCoverage(model, coverage(model, LATTICE, options))
     assert_same(live.coverage, coverage(model, LATTICE, options))
     rng = np.random.default_rng(2)
@@ -72,27 +89,26 @@ def test_coverage_after_many_moves_equals_a_full_recomputation_bit_for_bit(optio
         index = int(rng.integers(0, len(live.reflectors)))
         place = rng.uniform([-3, -3], [18, 13])
         live.move(index, replace(live.reflectors.reflectors[index], x=float(place[0]), y=float(place[1])))
-    anew = build_visibility(live.reflectors, model.scanner, model.caster, model.options)
-    assert_same(live.coverage, coverage(anew, LATTICE, options))
+    assert_same(live.coverage, coverage(anew(model, live.reflectors), LATTICE, options))
 
 
 def test_coverage_follows_a_reflector_that_grows_and_turns_into_a_plate():
     model = hall(3)
     live = LiveCoverage(model, coverage(model, LATTICE, FixOptions()))
-    small = replace(model.scanner, resolution_deg=2.0, beam_width_deg=0.0, range=(0.05, 30.0), reflector_range=30.0)
-    short_sighted = build_visibility(model.reflectors, small, model.caster, model.options)
+    (scanner,) = model.scanners
+    small = replace(scanner, resolution_deg=2.0, beam_width_deg=0.0, range=(0.05, 30.0), reflector_range=30.0)
+    short_sighted = VehicleVisibility((build_visibility(model.reflectors, small, model.caster, model.options),))
     live = LiveCoverage(short_sighted, coverage(short_sighted, LATTICE, FixOptions()))
     for changes in ({"radius": 0.5}, {"kind": ReflectorKind.FLAT, "heading": 1.0}, {"sigma": 0.1}):
         live.move(4, replace(live.reflectors.reflectors[4], **changes))
-        anew = build_visibility(live.reflectors, small, model.caster, model.options)
-        assert_same(live.coverage, coverage(anew, LATTICE, FixOptions()))
+        assert_same(live.coverage, coverage(anew(short_sighted, live.reflectors), LATTICE, FixOptions()))
 
 
 def test_a_move_says_where_it_changed_something_and_leaves_the_model_alone():
     model = hall(4)
     live = LiveCoverage(model, coverage(model, LATTICE, FixOptions()))
     before = [np.copy(figure) for figure in live.coverage.fixes]
-    x_before = model.targets.centers[3, 0]
+    x_before = model.models[0].targets.centers[3, 0]
     windows = live.move(3, replace(model.reflectors.reflectors[3], x=1.0, y=1.0))
     inside = np.zeros((LATTICE.rows, LATTICE.columns), dtype=bool)
     for window in windows:
@@ -100,7 +116,7 @@ def test_a_move_says_where_it_changed_something_and_leaves_the_model_alone():
     for old, new in zip(before, live.coverage.fixes, strict=True):
         assert (old[~inside.ravel()] == new[~inside.ravel()]).all()
     assert not all(np.array_equal(old, new) for old, new in zip(before, live.coverage.fixes, strict=True))
-    assert model.targets.centers[3, 0] == x_before
+    assert model.models[0].targets.centers[3, 0] == x_before
 
 
 def test_a_reflector_dragged_off_the_floor_is_seen_from_nowhere():
@@ -116,13 +132,14 @@ def test_a_reflector_dragged_off_the_floor_is_seen_from_nowhere():
 def test_live_coverage_knows_who_sees_a_reflector():
     model = hall(6)
     live = LiveCoverage(model, coverage(model, LATTICE, FixOptions()))
-    seen = unpack(model.visible(LATTICE.points()), 70)
+    seen = unpack(model.models[0].visible(LATTICE.points()), 70)
     for reflector in (0, 63, 64, 69):
         assert (live.sees(reflector) == seen[:, reflector]).all()
 
 
-def test_tiles_do_not_show(monkeypatch):
-    model, options = hall(7), FixOptions(blocked_per_m=0.01)
+@pytest.mark.parametrize("scanners", [(), TWO], ids=["one scanner", "two scanners"])
+def test_tiles_do_not_show(monkeypatch, scanners):
+    model, options = hall(7, scanners=scanners), FixOptions(blocked_per_m=0.01, heading=Heading.WORST, headings=3)
     whole = coverage(model, LATTICE, options)
     monkeypatch.setattr(coverage_module, "POINTS_PER_TILE", 7 * 60)
     assert len(coverage_module.tiles(LATTICE)) == 6
@@ -188,6 +205,7 @@ from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
 from commission.planning.coverage import Lattice, coverage
 from commission.planning.dilution import FixOptions
+from commission.planning.vehicle_visibility import VehicleVisibility
 from commission.planning.visibility import VisibilityOptions, build_visibility
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
@@ -195,7 +213,7 @@ import numpy as np
 places = np.random.default_rng(0).uniform(0.0, 100.0, (200, 2))
 reflectors = ReflectorMap(tuple(Reflector(id=str(i), x=x, y=y) for i, (x, y) in enumerate(places.tolist())))
 grid = OccupancyGrid(np.zeros((200, 200), dtype=np.bool_), 0.5)
-model = build_visibility(reflectors, Scanner(), RayCaster(grid), VisibilityOptions())
+model = VehicleVisibility((build_visibility(reflectors, Scanner(), RayCaster(grid), VisibilityOptions()),))
 coverage(model, Lattice(x=0.0, y=0.0, spacing=1.0, rows=4, columns=4), FixOptions())
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 rows = int(sys.argv[1])

@@ -15,12 +15,11 @@ from commission.planning.dilution import (
     FixOptions,
     Heading,
     Measurement,
-    fix_covariances,
     fix_options,
-    fixes,
     odometry_prior,
 )
-from commission.planning.visibility import VisibilityModel, visibility_model
+from commission.planning.vehicle_fixes import fix_covariances, fixes
+from commission.planning.vehicle_visibility import VehicleVisibility, vehicle_visibility
 from commission.site.parameters import ObservationParameters, OdometryParameters
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -29,10 +28,10 @@ from commission.site.scanner import Scanner
 FULL_TURN = Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=0.02, range=(0.05, 100.0), reflector_range=100.0)
 
 
-def open_field(centers: np.ndarray, scanner: Scanner = FULL_TURN, sigma: float = 0.0) -> VisibilityModel:
+def open_field(centers: np.ndarray, scanner: Scanner = FULL_TURN, sigma: float = 0.0) -> VehicleVisibility:
     """Reflectors without walls."""
     reflectors = tuple(Reflector(id=str(i), x=float(x), y=float(y), sigma=sigma) for i, (x, y) in enumerate(centers))
-    return visibility_model(Project(reflectors=ReflectorMap(reflectors), scanners=(scanner,)))
+    return vehicle_visibility(Project(reflectors=ReflectorMap(reflectors), scanners=(scanner,)))
 
 
 def on_circle(n: int, radius: float) -> np.ndarray:

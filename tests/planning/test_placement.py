@@ -10,7 +10,7 @@ from commission.planning.ambiguity import ambiguous_poses
 from commission.planning.placement import Demands, PlacementOptions, place
 from commission.planning.route_prediction import plan_route, predict_route
 from commission.planning.true_error import predict_errors
-from commission.planning.visibility import visibility_model
+from commission.planning.vehicle_visibility import vehicle_visibility
 from commission.site.layout_brief import CandidateOptions
 from commission.site.parameters import OdometryParameters, Parameters
 from commission.site.project import Project
@@ -171,7 +171,7 @@ def symmetric_hall(scanner=None, **changes) -> Project:
 
 
 def ambiguous(project: Project, reflectors: ReflectorMap, *poses) -> list[bool]:
-    return ambiguous_poses(visibility_model(replace(project, reflectors=reflectors)), poses).ambiguous.tolist()
+    return ambiguous_poses(vehicle_visibility(replace(project, reflectors=reflectors)), poses).ambiguous.tolist()
 
 
 def without_each(reflectors: ReflectorMap) -> list[ReflectorMap]:

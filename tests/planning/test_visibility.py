@@ -16,7 +16,7 @@ from commission.planning.visibility import (
     build_visibility,
     promised_range,
     unpack,
-    visibility_model,
+    visibility_models,
 )
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
@@ -89,7 +89,8 @@ def test_line_of_sight_is_that_of_cell_by_cell_traversal_for_every_pair(seed, on
 def open_field(*reflectors: Reflector, scanner: Scanner = SHARP, **options: float) -> VisibilityModel:
     """Reflectors without a map."""
     project = Project(reflectors=ReflectorMap(reflectors), scanners=(scanner,))
-    return visibility_model(project, VisibilityOptions(**options))
+    (only,) = visibility_models(project, VisibilityOptions(**options))
+    return only
 
 
 def sees(model: VisibilityModel, *points: tuple[float, float]) -> list[bool]:
@@ -222,8 +223,8 @@ def test_a_restricted_model_equals_one_built_of_those_reflectors_alone():
     project = Project(floor_map=room(12.0, 6.0), reflectors=reflectors_at(places))
     kept = np.array([True, False, True, False, True])
     alone = ReflectorMap(tuple(np.array(project.reflectors.reflectors, dtype=object)[kept]))
-    restricted = visibility_model(project).restricted(kept)
-    anew = visibility_model(replace(project, reflectors=alone))
+    restricted = visibility_models(project)[0].restricted(kept)
+    (anew,) = visibility_models(replace(project, reflectors=alone))
     assert restricted.reflectors == anew.reflectors
     poses = np.random.default_rng(2).uniform((0.2, 0.2, -3.0), (11.8, 5.8, 3.0), (300, 3))
     seen, expected = restricted.visible_from_poses(poses), anew.visible_from_poses(poses)

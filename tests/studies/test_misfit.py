@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from commission.io.project_file import load_project
 from commission.localization import whole_run
 from commission.localization.setup import LocalizerSetup
+from commission.simulation.scenario import virtual_drive
+from commission.site.disturbances import Disturbances
+from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.studies.misfit import MisfitInput, misfit
 from commission.studies.plausibility import Finding
+from commission.studies.start import start_of
 from tests.studies.recorded import PROJECT, drive, start
+from tests.two_scanners import NAMES, with_two
 
 SETUP = LocalizerSetup.of(PROJECT)
 
@@ -56,6 +64,27 @@ def test_late_or_early_scans_are_named_to_a_fifth_of_a_tenth(late_s: float) -> N
     assert "scans lag" in finding.probably if late_s > 0 else "odometry lags" in finding.probably
     milliseconds = float(finding.remedy.removeprefix("shift the stamps of the scans by ").removesuffix(" ms"))
     assert milliseconds == pytest.approx(-1e3 * late_s, abs=20.0)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_one_of_two_scanners_that_is_mounted_otherwise_is_named(repository: Path, name: str) -> None:
+    true = with_two(load_project(repository / "maps" / "shop_floor"), disturbances=Disturbances())
+    log = virtual_drive(true, true.routes[0].name, 1)
+    assert found_with(true, log) == ()
+    right = next(each for each in true.scanners if each.name == name)
+    believed = replace(right, mounting=right.mounting - [0.0, 0.0, 0.5 * math.pi])
+    wrong = replace(true, scanners=tuple(believed if each is right else each for each in true.scanners))
+    (finding,) = (each for each in found_with(wrong, log) if "mounting" in each.remedy)
+    assert f"once those of {name} are turned by 90 deg" in finding.found
+    assert finding.probably == f"the scanner {name} is turned to the left"
+    assert finding.remedy == f"set the heading of the mounting of {name} to {right.mounting[2]:+.3f} rad"
+
+
+def found_with(project: Project, log: RecordLog) -> tuple[Finding, ...]:
+    """What a project's setup makes of a recording."""
+    setup, initial = LocalizerSetup.of(project), start_of(project, log).belief
+    run = whole_run.run(log, setup, initial)
+    return misfit(MisfitInput(log=log, setup=setup, initial=initial, run=run))
 
 
 def test_drive_without_detections_has_nothing_to_say() -> None:

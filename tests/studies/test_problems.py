@@ -213,3 +213,26 @@ def test_only_what_changed_is_checked_again_with_the_same_result(monkeypatch):
     assert checked(replace(moved, name="x"), again).problems == again.problems
     with pytest.raises(TypeError):
         checked(replace(moved, vehicle=TricycleVehicle()), again)
+
+
+def test_each_of_several_scanners_is_looked_at_and_named():
+    rear = replace(EDGE, name="rear", mounting=[-0.5, 0.0, math.pi])
+    assert texts(replace(SITE, scanners=(replace(EDGE, name="front"), rear))) == []
+    wide, inside = replace(rear, field_of_view_deg=(-135.0, 135.0)), Scanner(name="top")
+    found = texts(replace(SITE, scanners=(replace(EDGE, name="front"), wide, inside)))
+    assert [text.split(" between ")[0] for text in found[:1]] == [
+        "The vehicle's own outline blocks 180 of 541 beams of the scanner 'rear',"
+    ]
+    assert found[1].startswith("The scanner 'top' is 300 mm inside the vehicle's outline")
+    assert len(found) == 2
+
+
+def test_reflectors_must_be_told_apart_by_the_coarsest_scanner():
+    fine, coarse = replace(EDGE, name="fine", resolution_deg=0.1), replace(EDGE, name="coarse", resolution_deg=1.0)
+    gaps = {
+        names: separation_needed(replace(SITE, scanners=scanners))[1]
+        for names, scanners in (("fine", (fine,)), ("coarse", (coarse,)), ("both", (fine, coarse)))
+    }
+    # Two bridged beams and the width of one, at the 20 m up to which reflectors are told.
+    assert gaps["coarse"] == pytest.approx(20.0 * math.radians(2.0 * 1.0 + 0.25), rel=1e-12)
+    assert gaps["both"] == gaps["coarse"] > gaps["fine"]

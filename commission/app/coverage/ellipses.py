@@ -32,7 +32,7 @@ def ellipses(covered: Covered, places: tuple[Place, ...], factor: float, *, grid
     chosen = np.unique(np.concatenate([near, _coarse(covered) if grid else near]))
     chosen = chosen[covered.floor[chosen]]
     points = lattice.points()[chosen]
-    covariances = position_covariances(covered.live.model, points, options)
+    covariances = position_covariances(covered.live.visible, points, options)
     known = np.isfinite(covariances).all(axis=(1, 2))
     lengths = np.full(len(points), np.inf)
     lengths[known] = factor * ellipse_axes(covariances[known])[0].max(axis=-1, initial=0.0)

@@ -58,7 +58,7 @@ def cover(inputs: CoverageInput, progress: Progress) -> Covered:
     found = coverage(inputs, part(progress, 0.0, 0.95))
     progress(0.95, "compiling moved reflectors")
     coverage_kernels.warm_up()
-    return Covered(LiveCoverage(found.model, found.coverage), found.drivable)
+    return Covered(LiveCoverage(found.visible, found.coverage), found.drivable)
 
 
 def changed_reflectors(before: ReflectorMap, after: ReflectorMap) -> list[int] | None:
