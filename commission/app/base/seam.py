@@ -67,6 +67,7 @@ class Seam:
             return self._refuse(number, refusal)
         if isinstance(message, wire.GuiUpdateMessage):
             self._forget(number, message.uuid)
+            viser_private.carry_out(message.uuid, message.updates["value"])
         return wire.encoded(message)
 
     def refusal(self, number: int, message: AnyMessage) -> Refusal | None:

@@ -10,8 +10,9 @@ import logging
 import uuid
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextvars import ContextVar
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import viser
 from viser import (
@@ -73,20 +74,42 @@ class Said:
 
     __slots__ = ("_widget", "value")
 
-    def __init__(self, widget: Any) -> None:
+    def __init__(self, widget: Any, value: Any) -> None:
         self._widget = widget
-        self.value = widget.value
+        self.value = value
 
     def __getattr__(self, name: str) -> Any:
         """Return anything else as the widget has it now."""
         return getattr(self._widget, name)
 
 
+_ENTERED: ContextVar[tuple[str, Any] | None] = ContextVar("entered", default=None)
+"""Widget and value of the message that the loop carries out at the moment; None when it enters no value."""
+
+
+def carry_out(widget: str, value: Any) -> None:
+    """Say which value is being entered by the message that this task of the loop carries out from now on."""
+    _ENTERED.set((widget, value))
+
+
 def _as_said(argument: Any) -> Any:
     """Return an event with the value that came with it."""
-    if isinstance(argument, GuiEvent) and hasattr(argument.target, "value"):
-        return replace(argument, target=Said(argument.target))
-    return argument
+    if not isinstance(argument, GuiEvent) or not hasattr(argument.target, "value"):
+        return argument
+    widget: Any = argument.target
+    entered = _ENTERED.get()
+    value = widget.value
+    if entered is not None and entered[0] == identifier(widget):
+        # As viser casts what comes over the wire; between that and here the page may have written to the widget.
+        value = _cast(entered[1], value)
+    return replace(argument, target=Said(widget, value))
+
+
+def _cast(value: Any, held: Any) -> Any:
+    """Return what came over the wire in the type of what a widget holds."""
+    if isinstance(held, tuple):
+        return tuple(type(one)(each) for one, each in zip(cast("tuple[Any, ...]", held), value, strict=True))
+    return type(held)(value)
 
 
 class Callbacks(ThreadPoolExecutor):

@@ -395,6 +395,28 @@ def test_what_a_person_did_is_not_lost_where_the_page_writes_what_held_before(be
     assert heard == [(not before, "Switch")]
 
 
+@pytest.mark.parametrize(
+    ("name", "entered"),
+    [("slider", 3), ("count", 41), ("text", "depot"), ("vector2", [4, 5]), ("dropdown", "b"), ("checkbox", True)],
+)
+def test_nor_where_it_writes_while_the_others_are_told_of_it(bench: WidgetBench, name: str, entered: Any) -> None:
+    """Between viser's own note of a value and its callbacks lies the message to every other browser."""
+    widget = bench.widgets[name]
+    before, heard, tell_others = widget.value, [], widget._impl.sync_cb
+
+    def tell_others_while_the_owner_thread_draws(*told: Any) -> None:
+        tell_others(*told)
+        widget.value = before
+
+    widget._impl.sync_cb = tell_others_while_the_owner_thread_draws
+    widget.on_update(lambda event: event.client is not None and heard.append(event.target.value))
+    bench.guest.update(widget, entered)
+    bench.until(lambda: bool(heard))
+    expected = tuple(map(float, entered)) if isinstance(entered, list) else type(before)(entered)
+    assert heard == [expected]
+    assert isinstance(heard[0], type(before))
+
+
 def test_a_callback_that_fails_is_one_line_in_the_log_and_the_next_one_runs(
     bench: WidgetBench, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
 ) -> None:
