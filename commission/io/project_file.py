@@ -31,6 +31,7 @@ from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
 
 SCHEMA = 2
@@ -66,6 +67,8 @@ class ProjectDocument:
     """Planned routes."""
     parameters: Parameters = field(default_factory=Parameters)
     """Tunables of the localizer."""
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    """How well the constants of the site and the vehicle are known."""
     disturbances: Disturbances = field(default_factory=Disturbances)
     """What a virtual drive suffers."""
     stations: tuple[Station, ...] = ()
@@ -146,6 +149,7 @@ def load_project(path: Path, found: Findings | None = None) -> Project:
             vehicle=_vehicle(document, keys.vehicle),
             scanners=_scanners(document, keys),
             parameters=keys.parameters,
+            uncertainty=keys.uncertainty,
             disturbances=_disturbances(document, keys),
             stations=keys.stations,
             layout=keys.layout,

@@ -30,10 +30,11 @@ from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.uncertainty import Uncertainty
 
 _LISTS = {"reflectors": "id", "scanners": "name", "routes": "name", "stations": "name"}
 """Parts that are lists, and the field that tells their elements apart."""
-_WHOLE = ("name", "parameters", "disturbances", "layout")
+_WHOLE = ("name", "parameters", "uncertainty", "disturbances", "layout")
 """Parts that are written as they are."""
 
 
@@ -45,6 +46,7 @@ class _Parts:
     scanner: Scanner = field(default_factory=Scanner)
     """The only one, in journals of old."""
     parameters: Parameters = field(default_factory=Parameters)
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
     disturbances: Disturbances = field(default_factory=Disturbances)
     layout: LayoutBrief = field(default_factory=LayoutBrief)
     scanners: tuple[Scanner, ...] = ()

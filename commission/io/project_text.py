@@ -52,6 +52,8 @@ def project_text(project: Project, schema: int, floor_map: str | None, reflector
         *(_entry("stations", project.stations, "", "") if project.stations else ()),
         "parameters:",
         *_fields(project.parameters, "  "),
+        "uncertainty:",
+        *_fields(project.uncertainty, "  "),
         "disturbances:",
         *_fields(project.disturbances, "  "),
         *(_entry("layout", project.layout, "", "") if project.layout != LayoutBrief() else ()),

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.gaussian import chi_square_gate
+from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering, innovation_with, seen_with, take_out
 from commission.localization.estimate import Status
 from commission.localization.kalman import innovation, squared_distance
 from commission.localization.observation import SMALLEST_RANGE, ObservationModel, expect, scanner_offset
@@ -70,6 +71,36 @@ def viewpoint(belief: PoseGaussian, model: ObservationModel) -> Viewpoint:
 
 
 @compiled_inline
+def widened(view: Viewpoint, largest_variance: float, given: Considering) -> Viewpoint:
+    """Bounds that hold the constants, too, whatever their covariance with the pose is.
+
+    Parameters
+    ----------
+    view : of the belief alone.
+    largest_variance : of all surveyed places, each axis [m^2].
+    given : of the scan.
+
+    Notes
+    -----
+    sigma(a + b) <= sigma(a) + sigma(b), whatever their covariance is; the constants are independent of each other.
+    Derived.
+    """
+    p = given.variances
+    # The scanner is as fast as base, and faster by what it turns about base.
+    speed2 = given.speed_x * given.speed_x + given.speed_y * given.speed_y
+    lever2 = view.offset_x * view.offset_x + view.offset_y * view.offset_y
+    speed = math.sqrt(speed2) + abs(given.turn_rate) * math.sqrt(lever2)
+    position2 = largest_variance + p.mount_position + p.range_bias + p.clock * speed * speed
+    heading2 = p.mount_heading + p.clock * given.turn_rate * given.turn_rate
+    return Viewpoint(
+        view.offset_x,
+        view.offset_y,
+        view.position_sigma + math.sqrt(position2),
+        view.heading_sigma + math.sqrt(heading2),
+    )
+
+
+@compiled_inline
 def search_radius(
     d2: float, measured_range: float, view: Viewpoint, model: ObservationModel, largest_variance: float
 ) -> float:
@@ -114,6 +145,9 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     surveyed_variance: float,
     view: Viewpoint,
     model: ObservationModel,
+    given: Considering | None,
+    work: FloatArray | None,
+    at: int,
 ) -> tuple[float, float]:
     """Squared Mahalanobis distance to one reflector, and -2 ln(likelihood) up to a constant.
 
@@ -124,6 +158,8 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     x, y : the reflector's center [m], map frame.
     surveyed_variance : of the reflector's place, each axis [m^2].
     view, model : scanner's place, and model of the observation.
+    given, work : of the scan, where constants are considered, else None.
+    at : first column of the reflector in `work`.
 
     Notes
     -----
@@ -131,7 +167,11 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     likelihood lacks.
     """
     expected = expect(belief.x, belief.y, belief.theta, view.offset_x, view.offset_y, x, y, model.mount_theta)
-    v = innovation(belief, expected, measured_range, measured_bearing, surveyed_variance, model)
+    if given is None or work is None:
+        v = innovation(belief, expected, measured_range, measured_bearing, surveyed_variance, model)
+    else:
+        seen = seen_with(belief.theta, expected, surveyed_variance, given, work, at)
+        v = innovation_with(belief, expected, measured_range, measured_bearing, model, seen)
     d2 = squared_distance(v)
     return d2, d2 + math.log(v.s_rr * v.schur / (model.range_variance * model.bearing_variance))
 
@@ -147,6 +187,10 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     cells: Cells,
     places: FloatArray,
     cell_offsets: IntArray,
+    cross: FloatArray | None,
+    given: Considering | None,
+    work: FloatArray | None,
+    at: int,
 ) -> tuple[int, float]:
     """Most likely reflector of the whole map, found near the detection: its row in `places`, and d2.
 
@@ -163,6 +207,8 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     view, model : scanner's place, and model of the observation.
     gate : of the association filter.
     cells, places, cell_offsets : the map, see `ReflectorIndex`.
+    cross, given, work : of the scan, where constants are considered, else None.
+    at : column of `work` that is free for reflectors to be tried.
 
     Notes
     -----
@@ -172,9 +218,11 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     px = belief.x + view.offset_x + measured_range * math.cos(direction) - cells.origin_x
     py = belief.y + view.offset_y + measured_range * math.sin(direction) - cells.origin_y
     best, best_d2, best_cost = NOBODY, math.nan, math.inf
-    bound = gate.d2
+    bound, reach, spread = gate.d2, view, cells.largest_variance
+    if given is not None:
+        reach, spread = widened(view, cells.largest_variance, given), 0.0
     while True:
-        radius = search_radius(bound, measured_range, view, model, cells.largest_variance)
+        radius = search_radius(bound, measured_range, reach, model, spread)
         first_row, last_row = cell_range(py - radius, py + radius, cells.size, cells.rows)
         first_column, last_column = cell_range(px - radius, px + radius, cells.size, cells.columns)
         for row in range(first_row, last_row + 1 if last_column >= first_column else first_row):
@@ -184,7 +232,10 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
                 dx, dy = x - cells.origin_x - px, y - cells.origin_y - py
                 if dx * dx + dy * dy > radius * radius:
                     continue
-                d2, cost = score(belief, measured_range, measured_bearing, x, y, places[entry, 2], view, model)
+                if cross is not None and given is not None and work is not None:
+                    take_out(work, at, cross, entry, given)
+                variance = places[entry, 2]
+                d2, cost = score(belief, measured_range, measured_bearing, x, y, variance, view, model, given, work, at)
                 if cost < best_cost or (cost == best_cost and places[entry, 3] < places[best, 3]):
                     best, best_d2, best_cost = entry, d2, cost
         if best != NOBODY:
@@ -208,6 +259,9 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
     cells: Cells,
     places: FloatArray,
     cell_offsets: IntArray,
+    cross: FloatArray | None,
+    given: Considering | None,
+    work: FloatArray | None,
     status: NDArray[np.int8],
     entries: IntArray,
     d2: FloatArray,
@@ -222,6 +276,7 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
     model : of the observation.
     gate : of the association filter.
     cells, places, cell_offsets : the map, see `ReflectorIndex`.
+    cross, given, work : of the scan, where constants are considered, else None.
     status : (n,) in: INLIER or OUTLIER_DETECTOR, the latter is left alone; out: a `Status`.
     entries : (n,) out: row of `places`, or NOBODY.
     d2 : (n,) out: squared Mahalanobis distance, NaN for nobody.
@@ -241,7 +296,21 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
         if status[i] != INLIER:
             continue
         measured = detections[i, 0] - model.range_bias
-        best, best_d2 = likeliest(belief, measured, detections[i, 1], view, model, gate, cells, places, cell_offsets)
+        best, best_d2 = likeliest(
+            belief,
+            measured,
+            detections[i, 1],
+            view,
+            model,
+            gate,
+            cells,
+            places,
+            cell_offsets,
+            cross,
+            given,
+            work,
+            BLOCKS + PER_REFLECTOR * (i - first),
+        )
         entries[i] = best
         d2[i] = best_d2
         if best == NOBODY or (gate.enabled and not best_d2 <= gate.d2):

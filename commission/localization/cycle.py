@@ -14,6 +14,17 @@ from numpy.typing import NDArray
 from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.association import INLIER, NOBODY, associate
+from commission.localization.consider import (
+    BLOCKS,
+    PER_REFLECTOR,
+    Considering,
+    considering,
+    correct_with,
+    put_back,
+    put_block,
+    take_out,
+    working_array,
+)
 from commission.localization.kalman import correct
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import NextOdometry, OdometryNoise, advance, reach
@@ -55,6 +66,8 @@ def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
         state.output_ns,
         stamp_ns,
         state.sensor_detects,
+        state.pivot,
+        state.cross,
     )
 
 
@@ -69,6 +82,8 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     observation: ObservationModel,
     places: FloatArray,
     cell_offsets: IntArray,
+    cross: FloatArray | None,
+    scanner: int,
     status: NDArray[np.int8],
     reflectors: IntArray,
     d2: FloatArray,
@@ -85,6 +100,8 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     model : of the whole filter.
     observation : mounting and noise of the scan's scanner.
     places, cell_offsets : the map, see `ReflectorIndex`.
+    cross : (3, 2 N + 5 S) in and out: covariance of the pose with the considered constants; None: none is considered.
+    scanner : index of the scan's scanner.
     status : (n,) in: INLIER or OUTLIER_DETECTOR; out: a `Status`.
     reflectors : (n,) out: index into the reflector map, or -1.
     d2 : (n,) out: squared Mahalanobis distance at the prior, NaN for none.
@@ -96,6 +113,8 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     then the rule by rejections, which overrules it.
     """
     prior, motion = reach(state.belief, state.motion, stamp_ns, following, model.odometry)
+    given = considering(cross, prior, state.pivot, state.motion, following, model.consider)
+    work = working_array(cross, given, len(places), scanner, last - first)
     associate(
         prior,
         first,
@@ -106,26 +125,26 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         model.cells,
         places,
         cell_offsets,
+        cross,
+        given,
+        work,
         status,
         reflectors,
         d2,
     )
-    posterior = prior
+    if cross is None or given is None or work is None:
+        posterior, pivot = (
+            corrected(prior, first, last, detections, observation, places, status, reflectors),
+            state.pivot,
+        )
+    else:
+        posterior = corrected_with(
+            prior, first, last, detections, observation, places, cross, given, work, scanner, status, reflectors
+        )
+        pivot = (posterior.x, posterior.y)
     for i in range(first, last):
-        entry = int(reflectors[i])
-        if entry == NOBODY:
-            continue
-        if status[i] == INLIER:
-            posterior = correct(
-                posterior,
-                detections[i, 0] - observation.range_bias,
-                detections[i, 1],
-                places[entry, 0],
-                places[entry, 1],
-                places[entry, 2],
-                observation,
-            )
-        reflectors[i] = int(places[entry, 3])
+        if reflectors[i] != NOBODY:
+            reflectors[i] = int(places[reflectors[i], 3])
     evidence = weigh(
         state.evidence,
         stamp_ns,
@@ -149,5 +168,123 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         output, output_ns = posterior, stamp_ns
     return Cycle(
         prior,
-        FilterState(posterior, stamp_ns, motion, mode, evidence, output, output_ns, stamp_ns, state.sensor_detects),
+        FilterState(
+            posterior,
+            stamp_ns,
+            motion,
+            mode,
+            evidence,
+            output,
+            output_ns,
+            stamp_ns,
+            state.sensor_detects,
+            pivot,
+            state.cross,
+        ),
     )
+
+
+@compiled_inline
+def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by array
+    prior: PoseGaussian,
+    first: int,
+    last: int,
+    detections: FloatArray,
+    observation: ObservationModel,
+    places: FloatArray,
+    status: NDArray[np.int8],
+    entries: IntArray,
+) -> PoseGaussian:
+    """Correct a belief by all accepted detections of a scan.
+
+    Parameters
+    ----------
+    prior : after *predict*.
+    first, last : rows of the scan's detections, the last one excluded.
+    detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
+    observation : mounting and noise of the scanner.
+    places : the map, see `ReflectorIndex`.
+    status : (n,) a `Status` each.
+    entries : (n,) row of `places` of each, or NOBODY.
+
+    Notes
+    -----
+    No formula: `correct` for each in turn, from the freshest state.
+    """
+    belief = prior
+    for i in range(first, last):
+        if status[i] == INLIER:
+            entry = entries[i]
+            belief = correct(
+                belief,
+                detections[i, 0] - observation.range_bias,
+                detections[i, 1],
+                places[entry, 0],
+                places[entry, 1],
+                places[entry, 2],
+                observation,
+            )
+    return belief
+
+
+@compiled_inline
+def corrected_with(  # noqa: PLR0917 - the scan's detections and the map, array by array
+    prior: PoseGaussian,
+    first: int,
+    last: int,
+    detections: FloatArray,
+    observation: ObservationModel,
+    places: FloatArray,
+    cross: FloatArray,
+    given: Considering,
+    work: FloatArray,
+    scanner: int,
+    status: NDArray[np.int8],
+    entries: IntArray,
+) -> PoseGaussian:
+    """Correct a belief, and its covariance with the considered constants, by all accepted detections of a scan.
+
+    Parameters
+    ----------
+    prior, first, last, detections, observation, places, status, entries : as in `corrected`.
+    cross : covariance of the pose with the constants, written in place.
+    given, work : of the scan.
+    scanner : index of the scanner.
+
+    Notes
+    -----
+    No formula: `correct_with` for each in turn; what the scan does not see is carried over it at the end, in one go.
+    """
+    for i in range(first, last):
+        if status[i] == INLIER and _block(i, first, status, entries) == i:
+            take_out(work, BLOCKS + PER_REFLECTOR * (i - first), cross, entries[i], given)
+    belief = prior
+    for i in range(first, last):
+        if status[i] == INLIER:
+            entry = entries[i]
+            belief = correct_with(
+                belief,
+                detections[i, 0] - observation.range_bias,
+                detections[i, 1],
+                places[entry, 0],
+                places[entry, 1],
+                places[entry, 2],
+                observation,
+                given,
+                work,
+                BLOCKS + PER_REFLECTOR * (_block(i, first, status, entries) - first),
+            )
+    put_back(cross, work, len(places), scanner)
+    for i in range(first, last):
+        if status[i] == INLIER and _block(i, first, status, entries) == i:
+            put_block(cross, work, BLOCKS + PER_REFLECTOR * (i - first), entries[i])
+    return belief
+
+
+@compiled_inline
+def _block(i: int, first: int, status: NDArray[np.int8], entries: IntArray) -> int:
+    """First accepted detection of the scan of that reflector: without the association filter there may be several."""
+    for other in range(first, i):
+        if status[other] == INLIER and entries[other] == entries[i]:
+            return other
+    return i

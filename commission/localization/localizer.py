@@ -12,6 +12,7 @@ import numpy as np
 
 from commission.errors import SourceError
 from commission.geometry.arrays import IntArray, read_only
+from commission.localization.cross_covariance import columns_of, cross_covariance
 from commission.localization.cycle import process_odometry, process_scan
 from commission.localization.detector import DetectedReflectors, detect
 from commission.localization.estimate import Belief, Estimate, Mode, Status
@@ -189,7 +190,9 @@ class Localizer:
         """Predict over the motion of an odometry record."""
         dx, dy, dtheta = (float(value) for value in record.displacement)
         noise = self._setup.filter.odometry
-        self._state = process_odometry(self._state, record.stamp_ns, dx, dy, dtheta, noise)
+        state = self._state
+        moved = process_odometry(state._replace(cross=None), record.stamp_ns, dx, dy, dtheta, noise)
+        self._state = moved._replace(cross=state.cross)
 
     def _process(self, scan: Scan | Detections, seen: DetectedReflectors, following: NextOdometry) -> Estimate:
         """Predict to the scan's stamp, associate, correct, supervise."""
@@ -199,8 +202,10 @@ class Localizer:
         status = seen.status.copy()
         reflector: IntArray = np.empty(count, dtype=np.int64)
         d2 = np.empty(count)
+        constants = self._setup.constants
+        cross = columns_of(self._state.cross, constants)
         cycle = process_scan(
-            self._state,
+            self._state._replace(cross=None),
             stamp_ns,
             0,
             count,
@@ -209,12 +214,14 @@ class Localizer:
             self._setup.observations[scan.scanner],
             self._setup.index.places,
             self._setup.index.offsets,
+            cross,
+            scan.scanner,
             status,
             reflector,
             d2,
             following,
         )
-        self._state = cycle.state
+        self._state = cycle.state._replace(cross=cross_covariance(cross, constants))
         posterior = belief_of(cycle.state)
         offsets = np.array((0, count), dtype=np.int64)
         scanners = np.array((scan.scanner,), dtype=np.int64)

@@ -45,10 +45,15 @@ class ReflectorIndex(NamedTuple):
     """(rows * columns + 1,) first row of `places` of each cell."""
 
 
-def build_index(reflectors: ReflectorMap) -> ReflectorIndex:
-    """Sort a reflector map into cells. Cells grow with the hall, so that there are at most a few per reflector."""
+def build_index(reflectors: ReflectorMap, survey_sigmas: FloatArray | None = None) -> ReflectorIndex:
+    """Sort a reflector map into cells. Cells grow with the hall, so that there are at most a few per reflector.
+
+    The places of the reflectors are known to 1-sigma (N,) [m], each axis; None: to their own.
+    """
     centers = np.asarray(reflectors.centers)
-    sigmas = np.array([reflector.sigma for reflector in reflectors.reflectors], dtype=np.float64)
+    if survey_sigmas is None:
+        survey_sigmas = np.array([reflector.sigma for reflector in reflectors.reflectors], dtype=np.float64)
+    sigmas = survey_sigmas
     low = centers.min(axis=0) if len(centers) else np.zeros(2)
     extent = centers.max(axis=0) - low if len(centers) else np.zeros(2)
     most_cells = 4 * len(centers) + 1024

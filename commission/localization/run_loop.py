@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.localization.cross_covariance import columns_of, cross_covariance
 from commission.localization.cycle import process_odometry, process_scan
 from commission.localization.detection_log import DetectionLog
 from commission.localization.observation import observation_at
@@ -117,7 +118,8 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
     first, last = stretch.rows
     # One row more than is delivered: the last scans may lie between it and the row before.
     rows = slice(first, last + 1)
-    state = _run(
+    cross = columns_of(state.cross, setup.constants)
+    after = _run(
         read_only(log.odometry_stamps_ns[rows]),
         read_only(log.displacements[rows]),
         last - first,
@@ -129,9 +131,12 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
         setup.observation_rows,
         setup.index.places,
         setup.index.offsets,
-        state,
+        cross,
+        state._replace(cross=None),
         stretch.columns,
     )
+    # Odometry alone changes nothing of it, nor does another setup before its first scan.
+    state = after._replace(cross=cross_covariance(cross, setup.constants) if len(detected) else state.cross)
     if len(own) and len(detected) and detected.stamps_ns[-1] >= own[0]:
         return state._replace(sensor_detects=True)
     return state
@@ -150,6 +155,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
     observations: FloatArray,
     places: FloatArray,
     cell_offsets: IntArray,
+    cross: FloatArray | None,
     state: FilterState,
     columns: Columns,
 ) -> FilterState:
@@ -178,6 +184,8 @@ def _run(  # noqa: PLR0917 - the columns of the log
             observation_at(observations, scanners[k]),
             places,
             cell_offsets,
+            cross,
+            scanners[k],
             status,
             reflectors,
             d2,

@@ -12,6 +12,8 @@ from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.gaussian import ellipse_points
 from commission.localization.association import Gate, gate_of
+from commission.localization.consider import ConsiderModel
+from commission.localization.cross_covariance import Constants, constants_of, survey_variance
 from commission.localization.detector import DetectorModel, detector_model
 from commission.localization.estimate import Belief
 from commission.localization.observation import (
@@ -28,6 +30,7 @@ from commission.site.parameters import Parameters
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
+from commission.site.uncertainty import Uncertainty
 
 
 class FilterModel(NamedTuple):
@@ -38,6 +41,12 @@ class FilterModel(NamedTuple):
     gate: Gate
     limits: SupervisorLimits
     rejection: RejectionRule
+    consider: ConsiderModel
+
+
+def consider_model(known: Uncertainty) -> ConsiderModel:
+    """Return the variances of the constants of a scanner."""
+    return ConsiderModel(known.mounting_position**2, known.mounting_heading**2, known.range_bias**2, known.clock**2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +62,12 @@ class LocalizerSetup:
     """Mounting and resolution of the scanners."""
     parameters: Parameters
     """Tunables of every stage."""
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    """How well map and mounting are known: what the filter considers."""
     filter: FilterModel = field(init=False, repr=False, compare=False)
     """Scalars of the filter."""
+    constants: Constants | None = field(init=False, repr=False, compare=False)
+    """What the filter considers; None: nothing."""
     index: ReflectorIndex = field(init=False, repr=False, compare=False)
     """The reflector map for the filter."""
     observations: tuple[ObservationModel, ...] = field(init=False, repr=False, compare=False)
@@ -65,14 +78,19 @@ class LocalizerSetup:
     """Scalars and tables of the detector, for each scanner."""
 
     def __post_init__(self) -> None:
-        index = build_index(self.reflectors)
+        considers, known = self.parameters.filter.consider, self.uncertainty
+        index = build_index(self.reflectors, self.survey_sigmas)
         model = FilterModel(
             odometry_noise(self.parameters.odometry),
             index.cells,
             gate_of(self.parameters.association),
             supervisor_limits(self.parameters.supervisor),
             rejection_rule(self.parameters.supervisor),
+            consider_model(known),
         )
+        order = index.places[:, 3].astype(np.int64)
+        constants = constants_of(self.reflectors.reflectors, order, self.scanners, known) if considers else None
+        object.__setattr__(self, "constants", constants)
         object.__setattr__(self, "index", index)
         object.__setattr__(self, "filter", model)
         observations = tuple(observation_model(each, self.parameters.observation) for each in self.scanners)
@@ -80,6 +98,14 @@ class LocalizerSetup:
         object.__setattr__(self, "observation_rows", observation_rows(observations))
         detectors = tuple(detector_model(self.reflectors, each, self.parameters.detector) for each in self.scanners)
         object.__setattr__(self, "detectors", detectors)
+
+    @property
+    def survey_sigmas(self) -> FloatArray:
+        """(N,) 1-sigma of each reflector's place, each axis [m]: without considering, of those that have one alone."""
+        each = self.reflectors.reflectors
+        if not self.parameters.filter.consider:
+            return np.array([reflector.sigma for reflector in each], dtype=np.float64)
+        return np.sqrt([survey_variance(reflector, self.uncertainty) for reflector in each])
 
     def detects_like(self, other: LocalizerSetup) -> bool:
         """Whether the same is detected in every scan: what the filter does with it afterwards may differ."""
@@ -118,12 +144,11 @@ class LocalizerSetup:
     @staticmethod
     def of(project: Project) -> LocalizerSetup:
         """Return the setup of a project."""
-        return LocalizerSetup(project.reflectors, project.scanners, project.parameters)
+        return LocalizerSetup(project.reflectors, project.scanners, project.parameters, project.uncertainty)
 
     def validation_ellipses(self, belief: Belief, scanner: int = 0) -> FloatArray:
         """(N, 2, 2) 1-sigma region [m^2] on the floor in which a scanner is expected to detect each reflector."""
-        sigmas = [reflector.sigma for reflector in self.reflectors.reflectors]
-        return validation_ellipses(belief, self.observations[scanner], self.reflectors.centers, sigmas)
+        return validation_ellipses(belief, self.observations[scanner], self.reflectors.centers, self.survey_sigmas)
 
     def validation_outlines(self, belief: Belief, n: int = 48, *, scanner: int = 0) -> FloatArray:
         """(N, n, 2) outline [m] of the validation gate around each reflector, map frame (the paper's Fig. 12).

@@ -1,12 +1,14 @@
 """The filter's whole state as one value: with it and the records to come, the rest of a run is decided.
 
-Scalars only, the form in which kernels hand it to each other; what the filter is given and does not change is `setup`.
+Scalars, the form in which kernels hand it to each other, but for one array that they are handed beside it; what the
+filter is given and does not change is `setup`.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+from commission.localization.cross_covariance import CrossCovariance
 from commission.localization.estimate import Belief, Mode
 from commission.localization.odometry import AT_REST, Motion
 from commission.localization.pose_gaussian import PoseGaussian, from_belief, to_belief
@@ -37,6 +39,10 @@ class FilterState(NamedTuple):
     """Stamp of the newest record of any kind [ns]."""
     sensor_detects: bool
     """Whether the sensor has ever sent detections of its own: from then on its scans are not detected from."""
+    pivot: tuple[float, float]
+    """Where the belief was after the newest scan [m]: `cross` is about that place."""
+    cross: CrossCovariance | None
+    """Covariance with the considered constants; None: all are zero. Kernels are handed its array, and None here."""
 
 
 def state_at_start(initial: Belief) -> FilterState:
@@ -53,6 +59,8 @@ def state_at_start(initial: Belief) -> FilterState:
         output_ns=stamp_ns,
         newest_ns=NO_RECORD_NS,
         sensor_detects=False,
+        pivot=(belief.x, belief.y),
+        cross=None,
     )
 
 

@@ -174,6 +174,17 @@ class AssociationParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FilterParameters:
+    """How detections correct the pose."""
+
+    consider: Annotated[bool, Switch("Consider constant errors")] = False
+    """Whether errors of map, mounting, range and clock (the project's uncertainty) are known not to average out."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, "filter.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SupervisorParameters:
     """When the estimate is no longer good enough to drive on (Algorithm 4)."""
 
@@ -236,6 +247,8 @@ class Parameters:
     """From a scan to detections."""
     association: Annotated[AssociationParameters, Group("Association")] = field(default_factory=AssociationParameters)
     """From detections to reflectors."""
+    filter: Annotated[FilterParameters, Group("Filter")] = field(default_factory=FilterParameters)
+    """From reflectors to a pose."""
     supervisor: Annotated[SupervisorParameters, Group("Supervisor limits")] = field(
         default_factory=SupervisorParameters
     )

@@ -13,6 +13,7 @@ from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route, route_named
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import DifferentialVehicle, Vehicle
 
 
@@ -34,6 +35,8 @@ class Project:
     """The laser scanners, one at least; names are unique."""
     parameters: Parameters = field(default_factory=Parameters)
     """Tunables of the localizer."""
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    """How well the constants of the site and the vehicle are known."""
     disturbances: Disturbances = field(default_factory=Disturbances)
     """What a virtual drive suffers."""
     stations: tuple[Station, ...] = ()

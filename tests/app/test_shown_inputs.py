@@ -53,6 +53,7 @@ PARAMETERS = {
     "detector.max_model_error": ("Beams too many", 1.0),
     "detector.range_jump": ("Range jump [mm]", 1000.0),
     "detector.center": ("Center from", None),
+    "filter.consider": ("Consider constant errors", None),
     "supervisor.enabled": ("Supervisor", None),
     "supervisor.position_limit": ("2σ position [mm]", 1000.0),
     "supervisor.heading_limit": ("2σ heading [°]", DEGREES),

@@ -168,12 +168,7 @@ class PlainLocalizer:
                         status[i] = "outlier"
         for z, j, kept in zip(measured, chosen, status, strict=True):
             if kept == "inlier":
-                v, H, S, R = (of_all[j] for of_all in self.innovations(self.mean, self.cov, z))
-                K = self.cov @ H.T @ np.linalg.inv(S)
-                A = np.eye(3) - K @ H
-                self.mean = self.mean + K @ v
-                self.mean[2] = turned(self.mean[2])
-                self.cov = A @ self.cov @ A.T + K @ R @ K.T
+                self.correct(z, j)
         self.supervise()
         self.count_rejections(now, prior[0], measured, status)
         return {
@@ -186,6 +181,15 @@ class PlainLocalizer:
             "chosen": chosen,
             "d2": d2s,
         }
+
+    def correct(self, z: Array, j: int) -> None:
+        """Take in one detection of reflector j."""
+        v, H, S, R = (of_all[j] for of_all in self.innovations(self.mean, self.cov, z))
+        K = self.cov @ H.T @ np.linalg.inv(S)
+        A = np.eye(3) - K @ H
+        self.mean = self.mean + K @ v
+        self.mean[2] = turned(self.mean[2])
+        self.cov = A @ self.cov @ A.T + K @ R @ K.T
 
     def count_rejections(self, now: float, prior: Array, measured: Array, status: list[str]) -> None:
         """The rule by rejections, over lists: every past detection keeps a weight that is forgotten."""

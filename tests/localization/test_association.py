@@ -18,16 +18,19 @@ from commission.localization.association import (
     likeliest,
     search_radius,
     viewpoint,
+    widened,
 )
+from commission.localization.consider import Considering, ConsiderModel, innovation_with, seen_with
 from commission.localization.estimate import Status
 from commission.localization.kalman import correct
-from commission.localization.observation import ObservationModel
+from commission.localization.observation import ObservationModel, expect
 from commission.localization.pose_gaussian import PoseGaussian, covariance_of, mean_of
 from commission.localization.reflector_index import ReflectorIndex, build_index
 from commission.site.parameters import AssociationParameters
 from commission.site.reflectors import Reflector, ReflectorMap
 from tests.localization.plain_observation import innovation_covariances, innovations, log_likelihoods, matrix
 
+NOTHING_CONSIDERED = (None, None, None)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -81,7 +84,17 @@ def test_nearby_search_equals_a_plain_search_over_all_reflectors(seed: int, enab
     view = viewpoint(belief, model)
     for z in rng.uniform([0.0, -math.pi], [25.0, math.pi], (8, 2)):
         best, d2 = likeliest(
-            belief, float(z[0]), float(z[1]), view, model, gate, index.cells, index.places, index.offsets
+            belief,
+            float(z[0]),
+            float(z[1]),
+            view,
+            model,
+            gate,
+            index.cells,
+            index.places,
+            index.offsets,
+            *NOTHING_CONSIDERED,
+            0,
         )
         scored = over_all(belief, z, model, index)
         if not scored:
@@ -134,6 +147,44 @@ def test_no_reflector_within_a_squared_distance_lies_beyond_the_radius_that_is_s
             assert math.dist(place, point) <= radius
 
 
+@settings(max_examples=300)
+@given(SEEDS)
+def test_bounds_that_hold_the_constants_hold_any_correlation_of_theirs_with_the_pose(seed: int) -> None:
+    """The whole of pose and constants drawn at random: S of every reflector stays below what is searched by."""
+    rng = np.random.default_rng(seed)
+    sigmas = np.exp(rng.uniform(-8.0, -2.0, 9))
+    root = rng.normal(size=(9, 9))
+    joint = root @ root.T
+    # Correlated with the pose alone: constants are independent of each other.
+    joint[3:, 3:] = 0.0
+    np.fill_diagonal(joint, np.diag(root @ root.T))
+    joint[:3, 3:] *= rng.uniform() / 9.0
+    joint[3:, :3] = joint[:3, 3:].T
+    scale = sigmas / np.sqrt(np.diag(joint))
+    joint = joint * np.outer(scale, scale)
+    joint[4, 4] = joint[3, 3]
+    joint[6, 6] = joint[5, 5]
+    if np.linalg.eigvalsh(joint)[0] <= 0.0:
+        return
+    P = joint[:3, :3]
+    belief = PoseGaussian(*rng.uniform(-3, 3, 3), P[0, 0], P[0, 1], P[0, 2], P[1, 1], P[1, 2], P[2, 2])
+    model = random_model(rng)
+    bias, clock = np.exp(rng.uniform(-8.0, -3.0, 2))
+    speed = rng.uniform(-1.0, 1.0, 3)
+    given = Considering(ConsiderModel(joint[5, 5], joint[7, 7], bias**2, clock**2), 0.0, 0.0, *speed)
+    view = viewpoint(belief, model)
+    wide = widened(view, joint[3, 3], given)
+    place = np.array([belief.x, belief.y]) + rng.uniform(-9, 9, 2)
+    e = expect(belief.x, belief.y, belief.theta, view.offset_x, view.offset_y, *place, model.mount_theta)
+    work = np.zeros((3, 10))
+    work[:, 8:10], work[:, 3:6] = joint[:3, 3:5], joint[:3, 5:8]
+    seen = seen_with(belief.theta, e, joint[3, 3], given, work, 8)
+    v = innovation_with(belief, e, e.range, e.bearing, model, seen)
+    assert v.s_rr <= wide.position_sigma**2 + model.range_variance * (1.0 + 1e-9)
+    bearing = (wide.position_sigma / e.range + wide.heading_sigma) ** 2 + model.bearing_variance
+    assert v.schur + v.w * v.w * v.s_rr <= bearing * (1.0 + 1e-9)
+
+
 def test_radius_that_is_searched_is_no_larger_than_it_must_be_along_a_ray_and_across_it() -> None:
     # A pose known to 30 mm each way and 1 mrad, noise of 40 mm and 3 mrad, a survey of 120 mm: 130 mm along the ray.
     view = Viewpoint(0.0, 0.0, 0.03, 0.001)
@@ -161,7 +212,8 @@ def associated(
     count = len(detections)
     status, entries, d2 = np.zeros(count, np.int8), np.empty(count, np.int64), np.empty(count)
     gate = Gate(enabled, 5.991)
-    associate(belief, 0, count, detections, model, gate, index.cells, index.places, index.offsets, status, entries, d2)
+    the_map = (index.cells, index.places, index.offsets)
+    associate(belief, 0, count, detections, model, gate, *the_map, *NOTHING_CONSIDERED, status, entries, d2)
     return status.tolist(), entries.tolist(), d2.tolist()
 
 

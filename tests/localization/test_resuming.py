@@ -21,7 +21,13 @@ from commission.localization.setup import LocalizerSetup
 from commission.localization.state import state_at_start
 from commission.localization.whole_run import run, run_segments, state_before
 from commission.simulation.faults import cover
-from commission.site.parameters import AssociationParameters, DetectorParameters, Parameters, SupervisorParameters
+from commission.site.parameters import (
+    AssociationParameters,
+    DetectorParameters,
+    FilterParameters,
+    Parameters,
+    SupervisorParameters,
+)
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Record, Scan
 from commission.site.scanner import Scanner
@@ -50,6 +56,11 @@ SETUPS = {
     "drive": setup_of(),
     "narrow gate": setup_of(association=AssociationParameters(gate_probability=0.3)),
     "another map": setup_of(seed=4),
+    "white noise alone": setup_of(filter=FilterParameters(consider=False)),
+    "constants considered": setup_of(filter=FilterParameters(consider=True)),
+    "constants and a narrow gate": setup_of(
+        filter=FilterParameters(consider=True), association=AssociationParameters(gate_probability=0.3)
+    ),
     "another detector": setup_of(detector=DetectorParameters(min_model_error=0, max_model_error=0)),
 }
 

@@ -14,7 +14,7 @@ from commission.localization.localizer import Localizer
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import state_at_start
 from commission.localization.whole_run import run
-from commission.site.parameters import AssociationParameters, Parameters, SupervisorParameters
+from commission.site.parameters import AssociationParameters, FilterParameters, Parameters, SupervisorParameters
 from commission.site.record_log import RecordLog
 from commission.site.scanner import Scanner
 from tests.localization.drives import Plan, random_drive, random_map
@@ -55,9 +55,15 @@ def assert_same_estimate(a: Estimate, b: Estimate) -> None:
 @pytest.mark.parametrize(
     ("filtered", "scanners"), [(True, 1), (False, 1), (True, 2)], ids=["filtered", "unfiltered", "two scanners"]
 )
-def test_whole_run_equals_live_localizer_to_the_last_bit(plan: Plan, filtered: bool, scanners: int) -> None:
+@pytest.mark.parametrize("consider", [True, False], ids=["constants considered", "white noise alone"])
+def test_whole_run_equals_live_localizer_to_the_last_bit(
+    plan: Plan, filtered: bool, scanners: int, consider: bool
+) -> None:
     rng = np.random.default_rng(3)
-    setup = setup_of(rng, Parameters(association=AssociationParameters(enabled=filtered)), scanners)
+    parameters = Parameters(
+        association=AssociationParameters(enabled=filtered), filter=FilterParameters(consider=consider)
+    )
+    setup = setup_of(rng, parameters, scanners)
     drive = random_drive(setup, rng, plan)
     arrays = run(drive.log, setup, drive.initial)
     localizer = Localizer(setup, drive.initial)
@@ -67,6 +73,7 @@ def test_whole_run_equals_live_localizer_to_the_last_bit(plan: Plan, filtered: b
     for cycle, estimate in enumerate(estimates):
         assert_same_estimate(estimate, arrays.estimate(cycle))
     assert localizer.state == arrays.final
+    assert (localizer.state.cross is not None) is consider
 
 
 def test_withheld_output_of_a_whole_run_is_that_of_the_live_localizer() -> None:

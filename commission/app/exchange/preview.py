@@ -22,6 +22,7 @@ PARTS = {
     "vehicle": "vehicle",
     "scanners": "scanners",
     "parameters": "parameters of the localizer",
+    "uncertainty": "uncertainty of map, mounting, range and clock",
     "disturbances": "disturbances of virtual drives",
     "layout": "demands on a suggested layout",
 }

@@ -1,0 +1,447 @@
+"""Considered constants: errors of map, mounting, range and clock, which the filter knows of and does not estimate.
+
+A constant averages to nothing only in a filter that takes it for noise. Here its covariance with the pose is kept
+(Schmidt 1966), so that a reflector seen a hundred times says no more of the pose than its survey allows.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from commission.compiled import compiled_inline
+from commission.geometry.angles import wrap_scalar
+from commission.geometry.arrays import FloatArray
+from commission.geometry.se2 import log_scalars
+from commission.localization.kalman import Gain, Innovation, corrected_covariance, gain
+from commission.localization.observation import Expected, ObservationModel, expect, scanner_offset
+from commission.localization.odometry import Motion, NextOdometry
+from commission.localization.pose_gaussian import PoseGaussian
+
+PER_REFLECTOR = 2
+"""Considered constants of a reflector: its place along x and y of the map."""
+PER_SCANNER = 5
+"""Of a scanner: x, y and heading of its mounting, range bias, clock."""
+MOUNT_X, MOUNT_Y, MOUNT_HEADING, RANGE_BIAS, CLOCK, BLOCKS = range(3, 9)
+"""Columns of a scan's working array: three of the transition, those of the scanner, then two for each detection."""
+NOTHING = 1e-60
+"""What is smaller is 0 [m^2]: numbers that fade away take a processor a hundred times as long before they vanish."""
+
+
+class ConsiderModel(NamedTuple):
+    """Variances of the constants of every scanner; those of reflectors stand in `ReflectorIndex.places`."""
+
+    mount_position: float
+    """Along x and along y of base [m^2]."""
+    mount_heading: float
+    range_bias: float
+    clock: float
+
+
+class Considering(NamedTuple):
+    """What is common to all detections of a scan."""
+
+    variances: ConsiderModel
+    moved_x: float
+    """Motion of the belief since the cross covariance was written [m], map axes."""
+    moved_y: float
+    speed_x: float
+    """Velocity of base at the scan [m/s], in base."""
+    speed_y: float
+    turn_rate: float
+
+
+class Seen(NamedTuple):
+    """What the constants have to do with one detection of one reflector."""
+
+    xr: float
+    """C J^T: covariance of the pose with what they add to the range (r) and to the bearing (b)."""
+    xb: float
+    yr: float
+    yb: float
+    tr: float
+    tb: float
+    rr: float
+    """J P_p J^T: covariance of what they add."""
+    rb: float
+    bb: float
+    mount_xr: float
+    """J: of range and bearing with respect to the mounting and the clock; the rest of it is plain."""
+    mount_xb: float
+    mount_yr: float
+    mount_yb: float
+    clock_r: float
+    clock_b: float
+
+
+@compiled_inline
+def considering(  # noqa: PLR0917 - what the filter knows of its motion
+    cross: FloatArray | None,
+    belief: PoseGaussian,
+    pivot: tuple[float, float],
+    motion: Motion,
+    following: NextOdometry,
+    variances: ConsiderModel,
+) -> Considering | None:
+    """What the detections of a scan have in common; None where nothing is considered.
+
+    Parameters
+    ----------
+    cross : (3, 2 N + 5 S) covariance of the pose with the constants, or None.
+    belief : after *predict*.
+    pivot : place of the belief [m] when `cross` was written.
+    motion, following : odometry before the scan and after it.
+    variances : of the constants.
+
+    Notes
+    -----
+    Velocity is log(displacement) / time, by definition of a constant twist.
+    """
+    if cross is None:
+        return None
+    forward, left, turn = 0.0, 0.0, 0.0
+    if following.known:
+        forward, left, turn = log_scalars(following.dx, following.dy, following.dtheta)
+        per_second = 1e9 / (following.stamp_ns - motion.odometry_ns)
+    elif motion.period_ns > 0:
+        forward, left, turn = log_scalars(motion.dx, motion.dy, motion.dtheta)
+        per_second = 1e9 / motion.period_ns
+    else:
+        per_second = 0.0
+    return Considering(
+        variances,
+        belief.x - pivot[0],
+        belief.y - pivot[1],
+        per_second * forward,
+        per_second * left,
+        per_second * turn,
+    )
+
+
+@compiled_inline
+def working_array(
+    cross: FloatArray | None, given: Considering | None, reflectors: int, scanner: int, detections: int
+) -> FloatArray | None:
+    """Array in which a scan is worked out: (3, 8 + 2 detections), its first eight columns written.
+
+    Parameters
+    ----------
+    cross : covariance of the pose with the constants; None gives None.
+    given : of the scan.
+    reflectors : N of the map.
+    scanner : index of the scanner.
+    detections : of the scan.
+
+    Notes
+    -----
+    F = [[1, 0, -my], [0, 1, mx], [0, 0, 1]] of all motion since `cross` was written, and F C of the scanner: Sobreira
+    et al. 2016, Algorithm 1, line 3. Every correction multiplies all columns alike, so the first three become the
+    transition of those constants that the scan says nothing of.
+    """
+    if cross is None or given is None:
+        return None
+    work = np.zeros((3, BLOCKS + PER_REFLECTOR * detections))
+    for row in range(3):
+        for column in range(3):
+            work[row, column] = 1.0 if row == column else 0.0
+    work[0, 2], work[1, 2] = -given.moved_y, given.moved_x
+    start = PER_REFLECTOR * reflectors + PER_SCANNER * scanner
+    for i in range(PER_SCANNER):
+        _move(work, 3 + i, cross, start + i, given)
+    return work
+
+
+@compiled_inline
+def take_out(work: FloatArray, at: int, cross: FloatArray, entry: int, given: Considering) -> None:
+    """Write the columns of a reflector, carried to the scan.
+
+    Parameters
+    ----------
+    work : working array of the scan.
+    at : first of the two columns to write.
+    cross : covariance of the pose with the constants.
+    entry : row of the reflector in `places`.
+    given : of the scan.
+
+    Notes
+    -----
+    C = F C: Sobreira et al. 2016, Algorithm 1, line 3, of a state augmented by a constant.
+    """
+    _move(work, at, cross, PER_REFLECTOR * entry, given)
+    _move(work, at + 1, cross, PER_REFLECTOR * entry + 1, given)
+
+
+@compiled_inline
+def _move(work: FloatArray, at: int, cross: FloatArray, column: int, given: Considering) -> None:
+    """Carry one column to the scan."""
+    heading = cross[2, column]
+    work[0, at] = cross[0, column] - given.moved_y * heading
+    work[1, at] = cross[1, column] + given.moved_x * heading
+    work[2, at] = heading
+
+
+@compiled_inline
+def seen_with(  # noqa: PLR0917 - a detection and the constants, number by number
+    theta: float, e: Expected, surveyed_variance: float, given: Considering, work: FloatArray, at: int
+) -> Seen:
+    """What the constants have to do with a detection.
+
+    Parameters
+    ----------
+    theta : heading of base [rad].
+    e : what is expected of the reflector.
+    surveyed_variance : of its place, each axis [m^2].
+    given : of the scan.
+    work : working array of the scan.
+    at : first of the two columns of the reflector.
+
+    Notes
+    -----
+    J: the place of the reflector -H_xy; the mounting H_xy R(theta), and -1 of the bearing; the range bias 1 of the
+    range; a clock that is late by one second H less by a velocity. Derived from equation 2 of Sobreira et al. 2016.
+    """
+    c, s = math.cos(theta), math.sin(theta)
+    mount_xr, mount_yr = c * e.range_x + s * e.range_y, c * e.range_y - s * e.range_x
+    mount_xb, mount_yb = c * e.bearing_x + s * e.bearing_y, c * e.bearing_y - s * e.bearing_x
+    # In base axes, H of the place is that of the mounting.
+    clock_r = -(mount_xr * given.speed_x + mount_yr * given.speed_y + e.range_theta * given.turn_rate)
+    clock_b = -(mount_xb * given.speed_x + mount_yb * given.speed_y + e.bearing_theta * given.turn_rate)
+    p = given.variances
+    places = surveyed_variance
+    rr = p.mount_position * (mount_xr * mount_xr + mount_yr * mount_yr)
+    rr += places * (e.range_x * e.range_x + e.range_y * e.range_y) + p.range_bias + p.clock * clock_r * clock_r
+    rb = p.mount_position * (mount_xr * mount_xb + mount_yr * mount_yb)
+    rb += places * (e.range_x * e.bearing_x + e.range_y * e.bearing_y) + p.clock * clock_r * clock_b
+    bb = p.mount_position * (mount_xb * mount_xb + mount_yb * mount_yb) + p.mount_heading
+    bb += places * (e.bearing_x * e.bearing_x + e.bearing_y * e.bearing_y) + p.clock * clock_b * clock_b
+    jr = (mount_xr, mount_yr, clock_r, -e.range_x, -e.range_y)
+    jb = (mount_xb, mount_yb, clock_b, -e.bearing_x, -e.bearing_y)
+    return Seen(
+        _times(work, 0, at, jr) + work[0, RANGE_BIAS],
+        _times(work, 0, at, jb) - work[0, MOUNT_HEADING],
+        _times(work, 1, at, jr) + work[1, RANGE_BIAS],
+        _times(work, 1, at, jb) - work[1, MOUNT_HEADING],
+        _times(work, 2, at, jr) + work[2, RANGE_BIAS],
+        _times(work, 2, at, jb) - work[2, MOUNT_HEADING],
+        rr,
+        rb,
+        bb,
+        mount_xr,
+        mount_xb,
+        mount_yr,
+        mount_yb,
+        clock_r,
+        clock_b,
+    )
+
+
+@compiled_inline
+def _times(work: FloatArray, row: int, at: int, j: tuple[float, float, float, float, float]) -> float:
+    """One element of C J^T, but for the constants whose Jacobian is 1 or -1."""
+    mounted = work[row, MOUNT_X] * j[0] + work[row, MOUNT_Y] * j[1] + work[row, CLOCK] * j[2]
+    return mounted + work[row, at] * j[3] + work[row, at + 1] * j[4]
+
+
+@compiled_inline
+def innovation_with(  # noqa: PLR0917 - a measurement, number by number
+    belief: PoseGaussian,
+    e: Expected,
+    measured_range: float,
+    measured_bearing: float,
+    model: ObservationModel,
+    seen: Seen,
+) -> Innovation:
+    """Innovation of a detection, constants considered.
+
+    Parameters
+    ----------
+    belief : before the correction.
+    e : observation expected from its mean.
+    measured_range, measured_bearing : range bias already taken off [m], [rad].
+    model : of the observation.
+    seen : what the constants have to do with it.
+
+    Notes
+    -----
+    S = H P H^T + H C J^T + (H C J^T)^T + J P_p J^T + R, and P H^T + C J^T for the gain: Schmidt 1966; Jazwinski 1970,
+    section 8.5.
+    """
+    range_px = belief.xx * e.range_x + belief.xy * e.range_y + belief.xt * e.range_theta + seen.xr
+    range_py = belief.xy * e.range_x + belief.yy * e.range_y + belief.yt * e.range_theta + seen.yr
+    range_pt = belief.xt * e.range_x + belief.yt * e.range_y + belief.tt * e.range_theta + seen.tr
+    bearing_px = belief.xx * e.bearing_x + belief.xy * e.bearing_y + belief.xt * e.bearing_theta + seen.xb
+    bearing_py = belief.xy * e.bearing_x + belief.yy * e.bearing_y + belief.yt * e.bearing_theta + seen.yb
+    bearing_pt = belief.xt * e.bearing_x + belief.yt * e.bearing_y + belief.tt * e.bearing_theta + seen.tb
+    s_rr = e.range_x * (range_px + seen.xr) + e.range_y * (range_py + seen.yr) + e.range_theta * (range_pt + seen.tr)
+    s_rb = e.bearing_x * range_px + e.bearing_y * range_py + e.bearing_theta * range_pt
+    s_rb += e.range_x * seen.xb + e.range_y * seen.yb + e.range_theta * seen.tb + seen.rb
+    s_bb = e.bearing_x * (bearing_px + seen.xb) + e.bearing_y * (bearing_py + seen.yb)
+    s_bb += e.bearing_theta * (bearing_pt + seen.tb) + seen.bb + model.bearing_variance
+    # S - R is positive semi-definite; rounding may not say so.
+    s_rr = max(s_rr + seen.rr + model.range_variance, model.range_variance)
+    w = s_rb / s_rr
+    return Innovation(
+        measured_range - e.range,
+        wrap_scalar(measured_bearing - e.bearing),
+        s_rr,
+        w,
+        max(s_bb - w * s_rb, model.bearing_variance),
+        model.range_variance,
+        model.bearing_variance,
+        range_px,
+        range_py,
+        range_pt,
+        bearing_px,
+        bearing_py,
+        bearing_pt,
+    )
+
+
+@compiled_inline
+def correct_with(  # noqa: PLR0917 - a measurement and a reflector, number by number
+    belief: PoseGaussian,
+    measured_range: float,
+    measured_bearing: float,
+    reflector_x: float,
+    reflector_y: float,
+    surveyed_variance: float,
+    model: ObservationModel,
+    given: Considering,
+    work: FloatArray,
+    at: int,
+) -> PoseGaussian:
+    """Correct a belief, and its covariance with the constants, by one detection of one reflector.
+
+    Parameters
+    ----------
+    belief : before the correction; it is linearized there.
+    measured_range, measured_bearing : range bias already taken off [m], [rad].
+    reflector_x, reflector_y : the reflector's center [m], map frame.
+    surveyed_variance : of the reflector's place, each axis [m^2].
+    model : of the observation.
+    given : of the scan.
+    work : working array of the scan, corrected in place.
+    at : first of the two columns of the reflector.
+
+    Notes
+    -----
+    x = x + K v, P = A P A^T + K N K^T - D K^T - K D^T with D = C J^T and N = R + J P_p J^T + H D + (H D)^T, which is
+    Joseph's form of the whole state, and C = A C - K J P_p: Schmidt 1966; A = I - K H.
+    """
+    offset_x, offset_y = scanner_offset(belief.theta, model)
+    e = expect(belief.x, belief.y, belief.theta, offset_x, offset_y, reflector_x, reflector_y, model.mount_theta)
+    d = seen_with(belief.theta, e, surveyed_variance, given, work, at)
+    v = innovation_with(belief, e, measured_range, measured_bearing, model, d)
+    k = gain(v)
+    hd_rr = e.range_x * d.xr + e.range_y * d.yr + e.range_theta * d.tr
+    hd_rb = e.range_x * d.xb + e.range_y * d.yb + e.range_theta * d.tb
+    hd_br = e.bearing_x * d.xr + e.bearing_y * d.yr + e.bearing_theta * d.tr
+    hd_bb = e.bearing_x * d.xb + e.bearing_y * d.yb + e.bearing_theta * d.tb
+    n_rb = d.rb + hd_rb + hd_br
+    xx, xy, xt, yy, yt, tt = corrected_covariance(
+        belief, e, k, v.range_noise + d.rr + 2.0 * hd_rr, v.bearing_noise + d.bb + 2.0 * hd_bb
+    )
+    _correct_cross(work, e, k)
+    _add_constants(work, at, e, k, d, surveyed_variance, given.variances)
+    return PoseGaussian(
+        belief.x + k.xr * v.range + k.xb * v.bearing,
+        belief.y + k.yr * v.range + k.yb * v.bearing,
+        wrap_scalar(belief.theta + k.tr * v.range + k.tb * v.bearing),
+        xx + 2.0 * (n_rb * k.xr * k.xb - d.xr * k.xr - d.xb * k.xb),
+        xy + n_rb * (k.xr * k.yb + k.xb * k.yr) - d.xr * k.yr - d.xb * k.yb - k.xr * d.yr - k.xb * d.yb,
+        xt + n_rb * (k.xr * k.tb + k.xb * k.tr) - d.xr * k.tr - d.xb * k.tb - k.xr * d.tr - k.xb * d.tb,
+        yy + 2.0 * (n_rb * k.yr * k.yb - d.yr * k.yr - d.yb * k.yb),
+        yt + n_rb * (k.yr * k.tb + k.yb * k.tr) - d.yr * k.tr - d.yb * k.tb - k.yr * d.tr - k.yb * d.tb,
+        tt + 2.0 * (n_rb * k.tr * k.tb - d.tr * k.tr - d.tb * k.tb),
+    )
+
+
+@compiled_inline
+def _correct_cross(work: FloatArray, e: Expected, k: Gain) -> None:
+    """A C of every column."""
+    for j in range(work.shape[1]):
+        x, y, theta = work[0, j], work[1, j], work[2, j]
+        r = e.range_x * x + e.range_y * y + e.range_theta * theta
+        b = e.bearing_x * x + e.bearing_y * y + e.bearing_theta * theta
+        work[0, j] = x - k.xr * r - k.xb * b
+        work[1, j] = y - k.yr * r - k.yb * b
+        work[2, j] = theta - k.tr * r - k.tb * b
+
+
+@compiled_inline
+def _add_constants(  # noqa: PLR0917 - a detection and the constants, number by number
+    work: FloatArray, at: int, e: Expected, k: Gain, d: Seen, surveyed_variance: float, p: ConsiderModel
+) -> None:
+    """Take K J P_p off the columns of those constants that a detection has to do with."""
+    _add(work, MOUNT_X, k, p.mount_position * d.mount_xr, p.mount_position * d.mount_xb)
+    _add(work, MOUNT_Y, k, p.mount_position * d.mount_yr, p.mount_position * d.mount_yb)
+    _add(work, MOUNT_HEADING, k, 0.0, -p.mount_heading)
+    _add(work, RANGE_BIAS, k, p.range_bias, 0.0)
+    _add(work, CLOCK, k, p.clock * d.clock_r, p.clock * d.clock_b)
+    _add(work, at, k, -surveyed_variance * e.range_x, -surveyed_variance * e.bearing_x)
+    _add(work, at + 1, k, -surveyed_variance * e.range_y, -surveyed_variance * e.bearing_y)
+
+
+@compiled_inline
+def _add(work: FloatArray, column: int, k: Gain, r: float, b: float) -> None:
+    """Take K J P_p off one column."""
+    work[0, column] -= k.xr * r + k.xb * b
+    work[1, column] -= k.yr * r + k.yb * b
+    work[2, column] -= k.tr * r + k.tb * b
+
+
+@compiled_inline
+def put_back(cross: FloatArray, work: FloatArray, reflectors: int, scanner: int) -> None:
+    """Carry the covariance with all constants over a scan, those of the scanner from the working array.
+
+    Parameters
+    ----------
+    cross : covariance of the pose with the constants, written in place; reflectors of the scan follow by `put_block`.
+    work : working array of the scan.
+    reflectors : N of the map.
+    scanner : index of the scanner.
+
+    Notes
+    -----
+    C = A_n ... A_1 F C of what no detection has to do with: Schmidt 1966.
+    """
+    xx, xy, xt = work[0, 0], work[0, 1], work[0, 2]
+    yx, yy, yt = work[1, 0], work[1, 1], work[1, 2]
+    tx, ty, tt = work[2, 0], work[2, 1], work[2, 2]
+    for j in range(cross.shape[1]):
+        x, y, theta = cross[0, j], cross[1, j], cross[2, j]
+        cross[0, j] = _or_nothing(xx * x + xy * y + xt * theta)
+        cross[1, j] = _or_nothing(yx * x + yy * y + yt * theta)
+        cross[2, j] = _or_nothing(tx * x + ty * y + tt * theta)
+    start = PER_REFLECTOR * reflectors + PER_SCANNER * scanner
+    for row in range(3):
+        for i in range(PER_SCANNER):
+            cross[row, start + i] = work[row, 3 + i]
+
+
+@compiled_inline
+def _or_nothing(value: float) -> float:
+    """0 for what has faded away."""
+    return value if abs(value) > NOTHING else 0.0
+
+
+@compiled_inline
+def put_block(cross: FloatArray, work: FloatArray, at: int, entry: int) -> None:
+    """Write the columns of a reflector of the scan back.
+
+    Parameters
+    ----------
+    cross : covariance of the pose with the constants, after `put_back`.
+    work : working array of the scan.
+    at : first of the two columns of the reflector.
+    entry : row of the reflector in `places`.
+
+    Notes
+    -----
+    C[:, i] = its column of the working array, by definition.
+    """
+    for row in range(3):
+        cross[row, PER_REFLECTOR * entry] = work[row, at]
+        cross[row, PER_REFLECTOR * entry + 1] = work[row, at + 1]
