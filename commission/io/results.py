@@ -24,7 +24,9 @@ ESTIMATE_COLUMNS = (
     *("stamp_ns", "x", "y", "theta", "var_x", "cov_xy", "cov_xtheta", "var_y", "cov_ytheta", "var_theta"),
     *("mode", "inliers", "outliers"),
 )
-DETECTION_COLUMNS = ("stamp_ns", "range", "bearing", "x", "y", "status", "reflector_id", "d2", "scanner")
+BEAM_COLUMNS = ("beams", "expected_beams")
+"""Width of each cluster, and that of the likeliest kind of reflector there; empty where the sensor itself detected."""
+DETECTION_COLUMNS = ("stamp_ns", "range", "bearing", "x", "y", "status", "reflector_id", "d2", "scanner", *BEAM_COLUMNS)
 
 UPPER_TRIANGLE = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 ROWS_AT_ONCE = 50_000
@@ -69,6 +71,8 @@ def _detection_rows(run: RunColumns) -> Iterator[Iterable[Any]]:
     points = run.points_map()
     distances = run.d2.astype(object)
     distances[np.isnan(run.d2)] = ""
+    beams, expected = run.beams.astype(object), run.expected_beams.round(1).astype(object)
+    beams[run.beams == 0], expected[np.isnan(run.expected_beams)] = "", ""
     columns = [
         np.repeat(run.stamps_ns, np.diff(run.offsets)),
         *(run.range_bearing[:, axis] for axis in range(2)),
@@ -77,6 +81,8 @@ def _detection_rows(run: RunColumns) -> Iterator[Iterable[Any]]:
         _reflector_ids(run),
         distances,
         _scanner_names(run),
+        beams,
+        expected,
     ]
     return _blocks(columns)
 

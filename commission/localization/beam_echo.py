@@ -12,17 +12,59 @@ from commission.compiled import compiled_inline
 
 LIT_SHARE = 0.2
 """Share of a beam (or, if narrower, of the object) that must meet for a flag: less returns too weak an echo."""
+LARGEST_INCIDENCE = math.radians(65.0)
+"""Angle of incidence beyond which a flat reflector returns no more than a wall does [rad]."""
 
 
 class BeamModel(NamedTuple):
     """Width and noise of a scanner's beams, for kernels."""
 
-    half_width: float
+    half_divergence: float
     """Half of a beam's divergence [rad]."""
+    half_aperture: float
+    """Half of a beam's width where it leaves the scanner [m]."""
     bearing_sigma: float
     """1-sigma noise of a beam's bearing [rad]."""
     range_sigma: float
     """1-sigma noise of a beam's range [m]."""
+
+
+@compiled_inline
+def half_width_at(distance: float, half_divergence: float, half_aperture: float) -> float:
+    """Half of the angle that a beam takes up at a distance, seen from the scanner [rad].
+
+    Parameters
+    ----------
+    distance : from the scanner [m], more than 0.
+    half_divergence : half of the beam's divergence [rad].
+    half_aperture : half of its width where it leaves the scanner [m].
+
+    Notes
+    -----
+    w = D / 2 + atan(a / (2 d)): a beam is a + D d wide, by definition (NAV350: 20 mm and 5 mrad).
+    """
+    if half_aperture == 0.0:
+        return half_divergence
+    return half_divergence + math.atan(half_aperture / distance)
+
+
+@compiled_inline
+def flagged_span(high: float, half_width: float, share: float) -> float:
+    """Angle within which the middles of the beams lie that an object flags [rad].
+
+    Parameters
+    ----------
+    high : half of the angle that the object takes up [rad].
+    half_width : half of the beam's width there [rad].
+    share : of the beam (or, if narrower, of the object) that must meet: 0 where a touch is enough, 0.5 where the
+        middle must.
+
+    Notes
+    -----
+    2 (high + w - share min(2 w, 2 high)): the bearings at which `is_flagged` holds, derived. With no width this is the
+    2 asin(radius / distance) of Sobreira et al. 2016, equation 3; with a share of 0.5 the larger of the two angles.
+    """
+    return 2.0 * (high + half_width - 2.0 * share * min(half_width, high))
 
 
 @compiled_inline

@@ -19,6 +19,7 @@ from commission.localization.detector import (
     count_clusters,
     detect_clusters,
     reflective_beams,
+    room_for,
 )
 from commission.localization.setup import LocalizerSetup
 from commission.site.record_log import RecordLog
@@ -42,6 +43,8 @@ class DetectionLog:
     """(n, 2) range [m] and bearing [rad] of each detection and rejected cluster, scanner frame."""
     beams: IntArray
     """(n,) width of each cluster [beams]; 0 where the sensor itself detected."""
+    expected: FloatArray
+    """(n,) width that the likeliest kind of reflector has there [beams]; NaN where nobody knows."""
     status: NDArray[np.int8]
     """(n,) `Status.INLIER`, or `Status.OUTLIER_DETECTOR` for a rejected cluster."""
 
@@ -60,6 +63,7 @@ class DetectionLog:
             self.offsets[first : last + 1] - self.offsets[first],
             self.range_bearing[rows],
             self.beams[rows],
+            self.expected[rows],
             self.status[rows],
         )
 
@@ -118,9 +122,8 @@ def extract_detections(
 def nothing_detected(stamps_ns: IntArray) -> DetectionLog:
     """Return what is detected at these stamps while all reflectors are covered."""
     offsets = np.zeros(len(stamps_ns) + 1, dtype=np.int64)
-    nothing = np.empty(0, dtype=np.int64)
     scanners = np.zeros(len(stamps_ns), dtype=np.int64)
-    return _log(stamps_ns, scanners, offsets, np.empty((0, 2)), nothing, np.empty(0, dtype=np.int8))
+    return _log(stamps_ns, scanners, offsets, *room_for(0))
 
 
 def detect_log(scans: ScanLog, setup: LocalizerSetup, *, scanner: int = 0, parallel: bool = False) -> DetectionLog:
@@ -140,13 +143,10 @@ def detect_log(scans: ScanLog, setup: LocalizerSetup, *, scanner: int = 0, paral
     beams = beams_of(scans.beams, scans.angle_min, scans.angle_increment)
     count, fill = (_count_parallel, _fill_parallel) if parallel else (_count, _fill)
     offsets = np.concatenate(([0], np.cumsum(count(ranges, flags, beams, model))))
-    total = int(offsets[-1])
-    range_bearing = np.empty((total, 2))
-    widths = np.empty(total, dtype=np.int64)
-    status = np.empty(total, dtype=np.int8)
-    fill(ranges, flags, beams, model, offsets, range_bearing, widths, status)
+    clusters = room_for(int(offsets[-1]))
+    fill(ranges, flags, beams, model, offsets, *clusters)
     scanners = np.full(len(scans), scanner, dtype=np.int64)
-    return _log(np.asarray(scans.stamps_ns), scanners, offsets, range_bearing, widths, status)
+    return _log(np.asarray(scans.stamps_ns), scanners, offsets, *clusters)
 
 
 def _in_scans(log: RecordLog, setup: LocalizerSetup, cycles: tuple[int, int], *, parallel: bool) -> DetectionLog:
@@ -180,14 +180,13 @@ def _interleaved(parts: Sequence[DetectionLog], places: Sequence[IntArray]) -> D
     for part, where in zip(parts, places, strict=True):
         counts[where], stamps[where], scanners[where] = np.diff(part.offsets), part.stamps_ns, part.scanners
     offsets = np.concatenate(([0], np.cumsum(counts)))
-    total = int(offsets[-1])
-    range_bearing, beams = np.empty((total, 2)), np.empty(total, dtype=np.int64)
-    status = np.empty(total, dtype=np.int8)
+    clusters = room_for(int(offsets[-1]))
     for part, where in zip(parts, places, strict=True):
         shift = np.repeat(offsets[where] - part.offsets[:-1], np.diff(part.offsets))
         rows = np.arange(len(part.range_bearing)) + shift
-        range_bearing[rows], beams[rows], status[rows] = part.range_bearing, part.beams, part.status
-    return _log(stamps, scanners, offsets, range_bearing, beams, status)
+        clusters.range_bearing[rows], clusters.widths[rows] = part.range_bearing, part.beams
+        clusters.expected[rows], clusters.status[rows] = part.expected, part.status
+    return _log(stamps, scanners, offsets, *clusters)
 
 
 def _sensor_detections(log: RecordLog, setup: LocalizerSetup) -> DetectionLog:
@@ -196,7 +195,8 @@ def _sensor_detections(log: RecordLog, setup: LocalizerSetup) -> DetectionLog:
     status = np.full(count, INLIER, dtype=np.int8)
     beams = np.zeros(count, dtype=np.int64)
     scanners = setup.indices_of(log.scanners)[log.detection_scanners]
-    return _log(log.detection_stamps_ns, scanners, log.detection_offsets, log.range_bearing, beams, status)
+    expected = np.full(count, np.nan)
+    return _log(log.detection_stamps_ns, scanners, log.detection_offsets, log.range_bearing, beams, expected, status)
 
 
 def _scans_used(log: RecordLog, sensor_detects: bool) -> int:
@@ -220,6 +220,7 @@ def joined(logs: Sequence[DetectionLog]) -> DetectionLog:
         np.concatenate(([0], *(log.offsets[1:] + start for log, start in zip(logs, starts, strict=False)))),
         np.concatenate([log.range_bearing for log in logs]),
         np.concatenate([log.beams for log in logs]),
+        np.concatenate([log.expected for log in logs]),
         np.concatenate([log.status for log in logs]),
     )
 
@@ -230,6 +231,7 @@ def _log(  # noqa: PLR0917 - the columns of the log
     offsets: IntArray,
     range_bearing: FloatArray,
     beams: IntArray,
+    expected: FloatArray,
     status: NDArray[np.int8],
 ) -> DetectionLog:
     """Return a log of read-only arrays."""
@@ -239,6 +241,7 @@ def _log(  # noqa: PLR0917 - the columns of the log
         offsets=read_only(np.asarray(offsets, dtype=np.int64)),
         range_bearing=read_only(np.asarray(range_bearing, dtype=np.float64)),
         beams=read_only(beams),
+        expected=read_only(expected),
         status=read_only(status),
     )
 
@@ -272,11 +275,13 @@ def _fill(  # noqa: PLR0917 - the columns of the log
     offsets: IntArray,
     range_bearing: FloatArray,
     widths: IntArray,
+    expected: FloatArray,
     status: NDArray[np.int8],
 ) -> None:
     """Write the clusters of every scan to its rows."""
     for k in range(len(ranges)):
-        detect_clusters(ranges[k], flags[k], beams_at(beams, k), model, int(offsets[k]), range_bearing, widths, status)
+        row = int(offsets[k])
+        detect_clusters(ranges[k], flags[k], beams_at(beams, k), model, row, range_bearing, widths, expected, status)
 
 
 @compiled_parallel
@@ -288,8 +293,10 @@ def _fill_parallel(  # noqa: PLR0917 - the columns of the log
     offsets: IntArray,
     range_bearing: FloatArray,
     widths: IntArray,
+    expected: FloatArray,
     status: NDArray[np.int8],
 ) -> None:
     """`_fill` on all cores."""
     for k in parallel_range(len(ranges)):
-        detect_clusters(ranges[k], flags[k], beams_at(beams, k), model, int(offsets[k]), range_bearing, widths, status)
+        row = int(offsets[k])
+        detect_clusters(ranges[k], flags[k], beams_at(beams, k), model, row, range_bearing, widths, expected, status)

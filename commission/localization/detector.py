@@ -2,7 +2,7 @@
 
 A cluster is a run of neighboring reflective beams whose ranges do not jump. One missing beam inside a run (no echo, or
 an echo at the same range without the flag) is bridged, since scanners drop single flags; it counts as a beam, because
-equation 3 speaks of width. Two missing beams, or one that sees something nearer or farther, end the cluster.
+the filter's window speaks of width. Two missing beams, or one that sees something nearer or farther, end the cluster.
 """
 
 from __future__ import annotations
@@ -17,9 +17,16 @@ from numpy.typing import NDArray
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.angles import TURN, wrap_scalar
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
-from commission.localization.beam_echo import BeamModel
+from commission.localization.beam_echo import BeamModel, half_width_at
+from commission.localization.beam_window import (
+    BeamWindow,
+    Tilt,
+    window_of_cylinder,
+    window_of_equation_3,
+    window_of_plate,
+)
 from commission.localization.estimate import Status
-from commission.localization.reflector_center import central_beam, circle_fit, plate
+from commission.localization.reflector_center import central_beam, circle_fit, plate, rest_of_cylinder
 from commission.site.parameters import DetectorParameters
 from commission.site.records import Scan
 from commission.site.reflectors import ReflectorMap
@@ -42,10 +49,16 @@ class DetectorModel(NamedTuple):
     more: int
     """MaxModelError: beams that may be too many."""
     range_jump: float
+    mixed: bool
+    """Whether there are plates and cylinders, which the shape of a cluster tells apart."""
     circle: bool
     """Whether the center is a fitted circle rather than the paper's central beam."""
-    half_width: float
+    by_width: bool
+    """Whether the window reckons with the width of the beams; else it is that of equation 3 as printed."""
+    half_divergence: float
     """Half of a beam's divergence [rad]. A `BeamModel` laid out flat: parallel kernels take no nested tuples."""
+    half_aperture: float
+    """Half of a beam's width where it leaves the scanner [m]."""
     bearing_sigma: float
     """1-sigma noise of a beam's bearing [rad]."""
     range_sigma: float
@@ -72,6 +85,19 @@ class BeamColumns(NamedTuple):
     full_turn: BoolArray
 
 
+class Clusters(NamedTuple):
+    """Clusters as the kernels write them, a row for each."""
+
+    range_bearing: FloatArray
+    """(n, 2) center [m, rad], scanner frame."""
+    widths: IntArray
+    """(n,) [beams]."""
+    expected: FloatArray
+    """(n,) width that the likeliest kind of reflector has there [beams]."""
+    status: NDArray[np.int8]
+    """(n,) INLIER or OUTLIER_DETECTOR."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class DetectedReflectors:
     """Clusters of one scan, those that the detector filter rejects included."""
@@ -80,6 +106,8 @@ class DetectedReflectors:
     """(N, 2) range [m] and bearing [rad] of each center, scanner frame."""
     beams: IntArray
     """(N,) width of each cluster [beams]."""
+    expected: FloatArray
+    """(N,) width that the likeliest kind of reflector has there [beams]; NaN without any reflector in the map."""
     status: NDArray[np.int8]
     """(N,) `Status.INLIER`, or `Status.OUTLIER_DETECTOR` where the detector filter rejects the cluster."""
 
@@ -104,8 +132,11 @@ def detector_model(reflectors: ReflectorMap, scanner: Scanner, parameters: Detec
         int(parameters.min_model_error),
         int(parameters.max_model_error),
         float(parameters.range_jump),
+        bool(flat.any() and not flat.all()) and parameters.expected_beams == "beam_width",
         parameters.center == "circle",
+        parameters.expected_beams == "beam_width",
         0.5 * math.radians(scanner.beam_width_deg),
+        0.5 * scanner.beam_aperture,
         math.radians(scanner.bearing_sigma_deg),
         max(float(scanner.range_sigma), 1e-3),
     )
@@ -183,28 +214,16 @@ def detect(scan: Scan, model: DetectorModel, parameters: DetectorParameters) -> 
     columns = beams_of(np.array([len(ranges)]), np.array([scan.angle_min]), np.array([scan.angle_increment]))
     beams = Beams(int(columns.used[0]), scan.angle_min, scan.angle_increment, bool(columns.full_turn[0]))
     count = count_clusters(ranges, flags, beams, model)
-    range_bearing = np.empty((count, 2))
-    widths = np.empty(count, dtype=np.int64)
-    status = np.empty(count, dtype=np.int8)
-    detect_clusters(ranges, flags, beams, model, 0, range_bearing, widths, status)
-    return DetectedReflectors(range_bearing, widths, status)
+    clusters = room_for(count)
+    detect_clusters(ranges, flags, beams, model, 0, *clusters)
+    return DetectedReflectors(*clusters)
 
 
-@compiled_inline
-def expected_beams(distance: float, radius: float, increment: float) -> int:
-    """Beams that a reflector intercepts.
-
-    Parameters
-    ----------
-    distance : to its center [m].
-    radius : of the reflector [m].
-    increment : step between beams [rad].
-
-    Notes
-    -----
-    floor(2 asin(radius / distance) / increment): Sobreira et al. 2016, equation 3.
-    """
-    return math.floor(2.0 * math.asin(min(1.0, radius / max(distance, radius))) / abs(increment))
+def room_for(count: int) -> Clusters:
+    """Return rows for so many clusters, to be written."""
+    return Clusters(
+        np.empty((count, 2)), np.empty(count, dtype=np.int64), np.empty(count), np.empty(count, dtype=np.int8)
+    )
 
 
 @compiled_inline
@@ -292,6 +311,7 @@ def detect_clusters(  # noqa: PLR0917 - outputs are written into the arrays of t
     row: int,
     range_bearing: FloatArray,
     widths: IntArray,
+    expected: FloatArray,
     status: NDArray[np.int8],
 ) -> int:
     """Write center, width and status of each cluster of a scan; return the row after the last.
@@ -304,22 +324,23 @@ def detect_clusters(  # noqa: PLR0917 - outputs are written into the arrays of t
     row : of the first cluster in the outputs.
     range_bearing : (n, 2) output: center [m, rad], scanner frame.
     widths : (n,) output: [beams].
+    expected : (n,) output: width of the likeliest kind of reflector there [beams].
     status : (n,) output: INLIER or OUTLIER_DETECTOR.
 
     Notes
     -----
-    Inlier if -min_model_error <= counted - expected beams <= max_model_error: Sobreira et al. 2016, Algorithm 2, line
-    7, whose lower bound is printed without its sign.
+    Inlier if fewest - min_model_error <= counted beams <= most + max_model_error: Sobreira et al. 2016, Algorithm 2,
+    line 7, where fewest = most, and whose lower bound is printed without its sign.
     """
     position = _start_of_turn(ranges, flags, beams)
     end = position + beams.used if beams.full_turn else beams.used
     while position < end:
         first, last = _next_cluster(ranges, flags, beams.used, position, end, model.range_jump)
         if first < end:
-            distance, bearing, passed = _judge(ranges, flags, beams, first, last, model)
+            distance, bearing, likely, passed = _judge(ranges, flags, beams, first, last, model)
             range_bearing[row, 0] = distance
             range_bearing[row, 1] = wrap_scalar(bearing)
-            widths[row] = last - first + 1
+            widths[row], expected[row] = last - first + 1, likely
             status[row] = INLIER if passed or not model.enabled else OUTLIER_DETECTOR
             row += 1
         position = last + 1
@@ -329,18 +350,17 @@ def detect_clusters(  # noqa: PLR0917 - outputs are written into the arrays of t
 @compiled_inline
 def _judge(  # noqa: PLR0917 - a scan and a cluster in it
     ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, first: int, last: int, model: DetectorModel
-) -> tuple[float, float, bool]:
-    """Center of a cluster as the class of reflectors that fits best, and whether it passes the detector filter.
+) -> tuple[float, float, float, bool]:
+    """Center and expected width of a cluster as the class of reflectors that fits best; whether it passes the filter.
 
-    A plate seen obliquely shows fewer beams than equation 3 says: for plates the window has no lower bound. Without
-    any reflector in the map, every cluster is a post of no radius that fails.
+    Without any reflector in the map, every cluster is a post of no radius that fails.
     """
-    distance, bearing, passed = math.nan, math.nan, False
-    least = math.inf
+    distance, bearing, likely, passed = math.nan, math.nan, math.nan, False
+    least, width, slope, spread, rest = math.inf, last - first + 1, 0.0, 0.0, 0.0
     for kind in range(len(model.radii)):
         radius = model.radii[kind]
         if model.flat[kind]:
-            r, b = plate(ranges, flags, beams.used, first, last, beams.angle_min, beams.increment)
+            r, b, slope, spread, rest = plate(ranges, flags, beams.used, first, last, beams.angle_min, beams.increment)
         elif model.circle:
             r, b = circle_fit(
                 ranges,
@@ -351,15 +371,50 @@ def _judge(  # noqa: PLR0917 - a scan and a cluster in it
                 beams.angle_min,
                 beams.increment,
                 radius,
-                BeamModel(model.half_width, model.bearing_sigma, model.range_sigma),
+                _beam(model),
                 beams.full_turn,
             )
         else:
             r, b = central_beam(ranges, flags, beams.used, first, last, beams.angle_min, beams.increment, radius)
-        error = last - first + 1 - expected_beams(r, radius, beams.increment)
-        fits = error <= model.more and (error >= -model.fewer or model.flat[kind])
-        if (fits and not passed) or (fits == passed and abs(error) < least):
-            distance, bearing, passed, least = r, b, fits, abs(error)
+        window = _window(r, Tilt(slope, spread), beams.increment, kind, model)
+        misfit = abs(width - window.likely)
+        if model.mixed:
+            if not model.flat[kind]:
+                rest = rest_of_cylinder(
+                    ranges,
+                    flags,
+                    beams.used,
+                    first,
+                    last,
+                    beams.angle_min,
+                    beams.increment,
+                    r,
+                    b,
+                    radius,
+                    half_width_at(r, model.half_divergence, model.half_aperture),
+                )
+            # Post and plate of one width differ by less than a beam; their ranges tell which it is.
+            misfit += 0.5 * rest / (model.range_sigma * model.range_sigma)
+        fits = window.fewest - model.fewer <= width <= window.most + model.more
+        if (fits and not passed) or (fits == passed and misfit < least):
+            distance, bearing, likely, passed, least = r, b, window.likely, fits, misfit
     if least == math.inf:
-        distance, bearing = plate(ranges, flags, beams.used, first, last, beams.angle_min, beams.increment)
-    return distance, bearing, passed
+        distance, bearing, _, _, _ = plate(ranges, flags, beams.used, first, last, beams.angle_min, beams.increment)
+    return distance, bearing, likely, passed
+
+
+@compiled_inline
+def _window(distance: float, tilt: Tilt, step: float, kind: int, model: DetectorModel) -> BeamWindow:
+    """Beams that a class of reflectors shows at a distance; a plate as its ranges say that it stands."""
+    radius, flat = model.radii[kind], model.flat[kind]
+    if not model.by_width:
+        return window_of_equation_3(distance, radius, flat, step)
+    if flat:
+        return window_of_plate(distance, radius, tilt, step, _beam(model))
+    return window_of_cylinder(distance, radius, step, _beam(model))
+
+
+@compiled_inline
+def _beam(model: DetectorModel) -> BeamModel:
+    """Width and noise of the beams."""
+    return BeamModel(model.half_divergence, model.half_aperture, model.bearing_sigma, model.range_sigma)

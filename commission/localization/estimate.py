@@ -60,6 +60,8 @@ class Estimate:
     """(N, 2) range [m] and bearing [rad] of each detection and rejected cluster, scanner frame."""
     beams: IntArray
     """(N,) beams of each cluster; 0 where the sensor itself detected."""
+    expected_beams: FloatArray
+    """(N,) beams that the likeliest kind of reflector has there; NaN where nobody knows."""
     points_map: FloatArray
     """(N, 2) the detections seen from the posterior [m], map frame."""
     status: NDArray[np.int8]

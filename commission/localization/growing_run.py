@@ -39,6 +39,7 @@ class DetectionRows(NamedTuple):
 
     range_bearing: FloatArray
     beams: IntArray
+    expected_beams: FloatArray
     detected: NDArray[np.int8]
     status: NDArray[np.int8]
     reflectors: IntArray
@@ -74,6 +75,7 @@ class GrowingRun:
         self._detections = DetectionRows(
             np.empty((n, 2)),
             np.empty(n, np.int64),
+            np.empty(n),
             np.empty(n, np.int8),
             np.empty(n, np.int8),
             np.empty(n, np.int64),
@@ -135,6 +137,7 @@ class GrowingRun:
             offsets=offsets,
             range_bearing=rows.range_bearing,
             beams=rows.beams,
+            expected=rows.expected_beams,
             status=rows.detected,
         )
         return RunColumns(
@@ -168,6 +171,7 @@ class GrowingRun:
         cycles.modes[row] = estimate.mode
         rejected = estimate.status == Status.OUTLIER_DETECTOR
         found.range_bearing[first:last], found.beams[first:last] = estimate.detections, estimate.beams
+        found.expected_beams[first:last] = estimate.expected_beams
         found.detected[first:last] = np.where(rejected, estimate.status, INLIER)
         found.status[first:last], found.reflectors[first:last] = estimate.status, estimate.reflector
         found.d2[first:last] = estimate.d2

@@ -176,8 +176,8 @@ class Localizer:
             case Detections():
                 self._state = self._state._replace(sensor_detects=True)
                 count = len(record.range_bearing)
-                status = np.full(count, Status.INLIER, dtype=np.int8)
-                seen = DetectedReflectors(record.range_bearing, np.zeros(count, dtype=np.int64), status)
+                status, unknown = np.full(count, Status.INLIER, dtype=np.int8), np.full(count, np.nan)
+                seen = DetectedReflectors(record.range_bearing, np.zeros(count, dtype=np.int64), unknown, status)
                 return self._process(record, seen, following)
             case Scan():
                 if self._state.sensor_detects:
@@ -236,6 +236,7 @@ class Localizer:
             mode=self.mode,
             detections=detections,
             beams=seen.beams,
+            expected_beams=seen.expected,
             points_map=points,
             status=status,
             reflector=reflector,

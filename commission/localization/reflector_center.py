@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commission.compiled import compiled_inline
-from commission.localization.beam_echo import LIT_SHARE, BeamModel, lit_part
+from commission.localization.beam_echo import LIT_SHARE, BeamModel, cylinder_echo, flagged_span, half_width_at, lit_part
 
 GRAZING = 0.9
 """Beams whose lit part passes the axis at more than this share of the radius do not shape the fit: there the surface
@@ -24,6 +24,8 @@ NEARER = 3.0
 """Sigmas of a beam's range by which something beside the cluster is nearer than the reflector."""
 MEAN_DEPTH = math.pi / 4.0
 """Mean distance, in radii, from the lit half of a circle to the line through its center across the beam."""
+STEEPEST_SHARE = 0.5
+"""Largest product of slope and half width of a plate that shapes its center: a plate at 63 degrees, 28 degrees wide."""
 ITERATIONS = 3
 """Gauss-Newton steps. Of 60 noisy posts at 0.4 to 9 m, the median center is then 0.01 micrometres from where it
 settles, the worst 0.6 mm."""
@@ -85,6 +87,22 @@ def central_beam(  # noqa: PLR0917 - a scan, a cluster in it and the reflector
     return distance + radius, angle_min + 0.5 * increment * (first + last)
 
 
+class PlateFit(NamedTuple):
+    """What the beams of a plate tell."""
+
+    range: float
+    """Of its center [m]."""
+    bearing: float
+    """Of its center [rad], not wrapped."""
+    slope: float
+    """Tangent of the angle of incidence, positive where the range grows with the bearing; 0 of a single beam."""
+    spread: float
+    """Sum of squared distances of the beams from their middle, across the line of sight [m^2]: the slope's variance is
+    that of a range over it. 0 of a single beam."""
+    rest: float
+    """Sum of squared differences between its beams and the line [m^2]."""
+
+
 @compiled_inline
 def plate(  # noqa: PLR0917 - a scan and a cluster in it
     ranges: NDArray[np.float32],
@@ -94,8 +112,11 @@ def plate(  # noqa: PLR0917 - a scan and a cluster in it
     last: int,
     angle_min: float,
     increment: float,
-) -> tuple[float, float]:
-    """Center of a flat plate: the middle of its beams, their mean range, no radius added.
+) -> PlateFit:
+    """Center of a flat plate: a line through its beams, halfway between where the cluster's two edges meet it.
+
+    Halfway in bearing is not halfway along a plate that stands obliquely: at 1 m, a plate of 0.5 m at 45 degrees would
+    be off by 31 mm.
 
     Parameters
     ----------
@@ -106,9 +127,45 @@ def plate(  # noqa: PLR0917 - a scan and a cluster in it
 
     Notes
     -----
-    r = mean of ranges, b = angle_min + increment (first + last) / 2, derived for a plate that is faced squarely.
+    z = z0 + slope a by least squares, with a = r sin(b), z = r cos(b), b from the middle beam; the edges at b = +-e, e
+    half the width of the cluster, meet it at a = +-z0 t / (1 -+ slope t), t = tan(e). The angle of incidence is that of
+    the ray to the center, atan(slope) + atan(a / z). Derived.
     """
-    return _mean_range(ranges, flags, count, first, last), angle_min + 0.5 * increment * (first + last)
+    middle = 0.5 * (first + last)
+    n, sum_a, sum_z, sum_aa, sum_az, sum_zz = 0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for beam in range(first, last + 1):
+        distance = _range_at(ranges, flags, count, beam)
+        if math.isnan(distance):
+            continue
+        off = increment * (beam - middle)
+        a, z = distance * math.sin(off), distance * math.cos(off)
+        n += 1
+        sum_a += a
+        sum_z += z
+        sum_aa += a * a
+        sum_az += a * z
+        sum_zz += z * z
+    at = angle_min + increment * middle
+    if n < 2:
+        return PlateFit(sum_z / max(n, 1), at, 0.0, 0.0, 0.0)
+    spread = sum_aa - sum_a * sum_a / n
+    slope = (sum_az - sum_a * sum_z / n) / spread
+    start = (sum_z - slope * sum_a) / n
+    rest = max(sum_zz - start * sum_z - slope * sum_az, 0.0)
+    edge = math.tan(min(0.5 * abs(increment) * (last - first + 1), 0.25 * math.pi))
+    # Steeper than the beams themselves is no plate, but a row of things behind each other.
+    reach = min(max(slope * edge, -STEEPEST_SHARE), STEEPEST_SHARE)
+    across = start * edge * reach / (1.0 - reach * reach)
+    along = start + slope * across
+    aside = across / along
+    seen = (slope + aside) / max(1.0 - slope * aside, STEEPEST_SHARE)
+    return PlateFit(
+        math.hypot(across, along),
+        at + math.atan2(across, along),
+        seen,
+        spread,
+        math.sqrt(rest / (n - 2)) if n > 2 else 0.0,
+    )
 
 
 @compiled_inline
@@ -151,7 +208,8 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it, the reflector and th
     middle = angle_min + 0.5 * increment * (first + last)
     mean = _mean_range(ranges, flags, count, first, last)
     start = mean + MEAN_DEPTH * radius
-    aside, variance = _from_edges(ranges, count, first, last, increment, start, radius, model, full_turn)
+    half_width = half_width_at(start, model.half_divergence, model.half_aperture)
+    aside, variance = _from_edges(ranges, count, first, last, increment, start, radius, half_width, model, full_turn)
     distance, turned = start, aside
     bearing_variance = model.bearing_sigma * model.bearing_sigma
     range_variance = model.range_sigma * model.range_sigma
@@ -163,11 +221,11 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it, the reflector and th
             measured = _range_at(ranges, flags, count, beam)
             off = angle_min + increment * beam - middle
             # Which beams count, and how much, is settled at the start: else the fit would not settle.
-            initial = _expected_echo(start, radius, off - aside, model.half_width)
+            initial = _expected_echo(start, radius, off - aside, half_width)
             if math.isnan(measured) or initial.grazes:
                 continue
             weight = 1.0 / (range_variance + initial.slope * initial.slope * bearing_variance)
-            echo = _expected_echo(distance, radius, off - turned, model.half_width)
+            echo = _expected_echo(distance, radius, off - turned, half_width)
             residual = measured - echo.range
             n_rr += weight
             n_rt -= weight * echo.slope
@@ -193,6 +251,7 @@ def _from_edges(  # noqa: PLR0917 - a scan, a cluster in it, the reflector and t
     increment: float,
     distance: float,
     radius: float,
+    half_width: float,
     model: BeamModel,
     full_turn: bool,
 ) -> tuple[float, float]:
@@ -208,7 +267,7 @@ def _from_edges(  # noqa: PLR0917 - a scan, a cluster in it, the reflector and t
     """
     step = abs(increment)
     high = math.asin(min(1.0, radius / distance))
-    whole = 2.0 * (high + model.half_width - LIT_SHARE * min(2.0 * model.half_width, 2.0 * high)) / step
+    whole = flagged_span(high, half_width, LIT_SHARE) / step
     missing = whole - (last - first + 1)
     bearing_variance = model.bearing_sigma * model.bearing_sigma
     nearer = NEARER * model.range_sigma
@@ -233,6 +292,45 @@ def _is_hidden_beside(  # noqa: PLR0917 - a scan and two beams of it
     here = ranges[edge if edge < count else edge - count]
     there = ranges[beside % count]
     return 0.0 < there < here - nearer
+
+
+@compiled_inline
+def rest_of_cylinder(  # noqa: PLR0917 - a scan, a cluster in it and the reflector
+    ranges: NDArray[np.float32],
+    flags: NDArray[np.bool_],
+    count: int,
+    first: int,
+    last: int,
+    angle_min: float,
+    increment: float,
+    distance: float,
+    bearing: float,
+    radius: float,
+    half_width: float,
+) -> float:
+    """Sum of squared differences between the ranges of a cluster and those of a cylinder [m^2].
+
+    Parameters
+    ----------
+    ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
+    count : beams of a turn, or of the scan.
+    first, last : the cluster's first and last beam, which count on past a full turn.
+    angle_min, increment : first bearing and step between beams [rad].
+    distance, bearing, radius : of the cylinder [m, rad, m].
+    half_width : of the beams there [rad].
+
+    Notes
+    -----
+    sum (range - echo)^2 with the echo of the middle of each beam's lit part, see `cylinder_echo`: by definition.
+    """
+    total = 0.0
+    high = math.asin(min(1.0, radius / distance))
+    for beam in range(first, last + 1):
+        measured = _range_at(ranges, flags, count, beam)
+        if not math.isnan(measured):
+            lower, upper = lit_part(angle_min + increment * beam - bearing, half_width, -high, high)
+            total += (measured - cylinder_echo(distance, radius, 0.5 * (lower + upper))) ** 2
+    return total
 
 
 class _Echo(NamedTuple):

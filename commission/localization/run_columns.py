@@ -114,6 +114,11 @@ class RunColumns:
         """(n,) width of each cluster [beams]; 0 where the sensor itself detected."""
         return self.detected.beams
 
+    @property
+    def expected_beams(self) -> FloatArray:
+        """(n,) width that the likeliest kind of reflector has there [beams]; NaN where nobody knows."""
+        return self.detected.expected
+
     def segment(self, cycle: int) -> RunSegment:
         """Return the segment of a cycle."""
         return self.segments[int(np.searchsorted(self.firsts, cycle, side="right")) - 1]
@@ -160,6 +165,7 @@ class RunColumns:
             mode=Mode(int(self.modes[cycle])),
             detections=detections,
             beams=self.beams[rows],
+            expected_beams=self.expected_beams[rows],
             points_map=points,
             status=self.status[rows],
             reflector=self.reflector[rows],

@@ -15,7 +15,7 @@ import numpy as np
 
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
-from commission.localization.beam_echo import BeamModel, cylinder_echo, is_flagged, lit_part
+from commission.localization.beam_echo import BeamModel, cylinder_echo, half_width_at, is_flagged, lit_part
 from commission.localization.detector import INLIER, Beams, DetectorModel, detect_clusters, detector_model
 from commission.site.parameters import DetectorParameters
 from commission.site.reflectors import ReflectorMap
@@ -81,7 +81,10 @@ def detection_noise(
     optics = _Optics(
         scanner.angle_increment,
         BeamModel(
-            0.5 * math.radians(scanner.beam_width_deg), math.radians(scanner.bearing_sigma_deg), scanner.range_sigma
+            0.5 * math.radians(scanner.beam_width_deg),
+            0.5 * scanner.beam_aperture,
+            math.radians(scanner.bearing_sigma_deg),
+            scanner.range_sigma,
         ),
         farthest or _reach(scanner),
     )
@@ -188,7 +191,8 @@ def _judge(  # noqa: PLR0917 - one reflector
 ) -> Worth:
     """Scan a reflector often and gather what the detector makes of it."""
     beam = optics.beam
-    widest = math.asin(radius / distance) + beam.half_width + MARGIN * beam.bearing_sigma
+    half_width = half_width_at(distance, beam.half_divergence, beam.half_aperture)
+    widest = math.asin(radius / distance) + half_width + MARGIN * beam.bearing_sigma
     reach = int(widest / optics.increment) + 2
     rng = np.random.default_rng(seed)
     noise = rng.standard_normal((SCANS, 2 * reach + 1, 2))
@@ -237,8 +241,8 @@ def _detect_often(  # noqa: PLR0917 - one reflector
     beams = Beams(count, -(count // 2) * optics.increment, optics.increment, False)
     ranges, flags = np.empty(count, np.float32), np.empty(count, np.bool_)
     range_bearing, widths = np.empty((count, 2)), np.empty(count, np.int64)
-    status = np.empty(count, np.int8)
-    half_width = optics.beam.half_width
+    expected, status = np.empty(count), np.empty(count, np.int8)
+    half_width = half_width_at(distance, optics.beam.half_divergence, optics.beam.half_aperture)
     high = math.atan(radius / distance) if flat else math.asin(radius / distance)
     for k in range(len(noise)):
         bearing = places[k] * optics.increment
@@ -249,7 +253,7 @@ def _detect_often(  # noqa: PLR0917 - one reflector
             lit = 0.5 * (lower + upper)
             echo = distance / math.cos(lit) if flat else cylinder_echo(distance, radius, lit)
             ranges[i] = echo + optics.beam.range_sigma * noise[k, i, 1] if flags[i] else math.nan
-        found = detect_clusters(ranges, flags, beams, model, 0, range_bearing, widths, status)
+        found = detect_clusters(ranges, flags, beams, model, 0, range_bearing, widths, expected, status)
         errors[k, 0], errors[k, 1] = math.nan, math.nan
         for i in range(found):
             if status[i] == INLIER:

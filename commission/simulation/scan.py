@@ -97,6 +97,7 @@ def _beams(scanner: Scanner) -> ScannerBeams:
         scanner.angle_min,
         scanner.angle_increment,
         0.5 * math.radians(scanner.beam_width_deg),
+        0.5 * scanner.beam_aperture,
         math.radians(scanner.bearing_sigma_deg),
         scanner.range_sigma,
         scanner.range[0],

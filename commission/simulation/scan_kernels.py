@@ -16,9 +16,15 @@ from commission.compiled import compiled
 from commission.geometry.angles import TURN, wrap_scalar
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.geometry.ray_kernels import RayTables, cast_ray
-from commission.localization.beam_echo import cylinder_echo, is_flagged, lit_part
+from commission.localization.beam_echo import (
+    LARGEST_INCIDENCE,
+    cylinder_echo,
+    half_width_at,
+    is_flagged,
+    lit_part,
+)
 
-FLAT_COSINE = math.cos(math.radians(65.0))
+FLAT_COSINE = math.cos(LARGEST_INCIDENCE)
 """Cosine of the angle of incidence beyond which a flat reflector returns no more than a wall does."""
 BEARING_MARGIN = 5.0
 """Sigmas of bearing noise by which the interval of beams of an object is widened before each beam is checked."""
@@ -33,8 +39,10 @@ class ScannerBeams(NamedTuple):
     """Bearing of the first beam [rad]."""
     increment: float
     """Bearing step [rad]."""
-    half_width: float
+    half_divergence: float
     """Half of a beam's divergence [rad]."""
+    half_aperture: float
+    """Half of a beam's width where it leaves the scanner [m]."""
     bearing_sigma: float
     """[rad]."""
     range_sigma: float
@@ -157,7 +165,8 @@ def _interval(
     bearing = wrap_scalar(math.atan2(dy, dx) - moment.pose[2])
     middle, turn = _first_beam(beams, bearing, count)
     high = math.asin(radius / distance)
-    reach = int((high + beams.half_width + BEARING_MARGIN * beams.bearing_sigma) / beams.increment) + 1
+    half_width = half_width_at(distance, beams.half_divergence, beams.half_aperture)
+    reach = int((high + half_width + BEARING_MARGIN * beams.bearing_sigma) / beams.increment) + 1
     return middle - reach, middle + reach, turn, distance, bearing, high
 
 
@@ -198,10 +207,11 @@ def _meet_reflective(hall: Hall, beams: ScannerBeams, moment: Moment, index: int
     """Flag every beam of which a part meets a reflective object before its middle meets anything else.
 
     Retroreflecting tape outshines what the rest of the beam meets, so the echo is that of the lit part of the object:
-    its middle gives the range. Counts of equation 3 or up to two more follow (beams no wider than their step).
+    its middle gives the range.
     """
     first, last, turn, distance, bearing, high = _interval(hall, beams, moment, index, len(echoes.flags))
     low, facing = -high, 0.0
+    half_width = half_width_at(distance, beams.half_divergence, beams.half_aperture)
     if last >= first and hall.flat[index]:
         facing = wrap_scalar(hall.headings[index] - bearing - moment.pose[2])
         if -math.cos(facing) < FLAT_COSINE:
@@ -212,8 +222,8 @@ def _meet_reflective(hall: Hall, beams: ScannerBeams, moment: Moment, index: int
         if i >= len(echoes.flags):
             continue
         off = wrap_scalar(echoes.bearings[i] - bearing)
-        lower, upper = lit_part(off, beams.half_width, low, high)
-        if not is_flagged(lower, upper, beams.half_width, high - low):
+        lower, upper = lit_part(off, half_width, low, high)
+        if not is_flagged(lower, upper, half_width, high - low):
             continue
         lit = 0.5 * (upper + lower)
         if hall.flat[index]:

@@ -138,19 +138,22 @@ class DetectorParameters:
             label="Beams too few", unit="beams", shown=Shown("", 1.0), bounds=NOT_NEGATIVE, step=1, slider=(0, 20)
         ),
     ] = 1
-    """Beams that a cluster may have fewer than equation 3 says."""
+    """Beams that a cluster may have fewer than the fewest expected."""
     max_model_error: Annotated[
         int,
         Quantity(
             label="Beams too many", unit="beams", shown=Shown("", 1.0), bounds=NOT_NEGATIVE, step=1, slider=(0, 20)
         ),
     ] = 2
-    """Beams that a cluster may have more than equation 3 says."""
+    """Beams that a cluster may have more than the most expected."""
     range_jump: Annotated[
         float,
         Quantity(label="Range jump", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=10.0, slider=(10.0, 1000.0)),
     ] = 0.25
     """Difference in range between neighboring beams that separates two clusters."""
+    expected_beams: Annotated[str, Choice("Beams expected by", ("beam_width", "equation_3"))] = "beam_width"
+    """Beams that a reflector is expected to show: `beam_width` reckons with width and aperture of a beam, `equation_3`
+    is the paper's, without them."""
     center: Annotated[str, Choice("Center from", ("circle", "central_beam"))] = "circle"
     """Center of a reflector from its cluster: `circle` fits a circle of known radius, `central_beam` is the paper's."""
 

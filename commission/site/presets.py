@@ -62,6 +62,7 @@ FIGURES = frozenset(
         "range_sigma",
         "bearing_sigma_deg",
         "beam_width_deg",
+        "beam_aperture",
         "reflector_range",
     }
 )
@@ -146,12 +147,13 @@ SCANNERS: tuple[ScannerPreset, ...] = (
             range_sigma=0.015,
             bearing_sigma_deg=0.05,
             beam_width_deg=0.286,
+            beam_aperture=0.02,
             reflector_range=70.0,
         ),
-        source="0.5 to 70 m and a beam that widens by 5.0 mrad: operating instructions NAV350 (8013889, 2017), "
-        "section 3.10.3 and table 8; 1,440 beams of 0.25 deg at 8 Hz: telegram listing (8013892), as quoted.",
+        source="0.5 to 70 m and a beam of 20 mm that widens by 5.0 mrad: operating instructions NAV350 (8013889, "
+        "2017), section 3.10.3 and table 8; 1,440 beams of 0.25 deg at 8 Hz: telegram listing (8013892), as quoted.",
         quoted=frozenset({"field_of_view_deg", "resolution_deg", "rate"}),
-        read=frozenset({"range", "beam_width_deg"}),
+        read=frozenset({"range", "beam_width_deg", "beam_aperture"}),
     ),
     ScannerPreset(
         name="Hokuyo UAM-05LP",

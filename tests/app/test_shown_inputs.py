@@ -52,6 +52,7 @@ PARAMETERS = {
     "detector.min_model_error": ("Beams too few", 1.0),
     "detector.max_model_error": ("Beams too many", 1.0),
     "detector.range_jump": ("Range jump [mm]", 1000.0),
+    "detector.expected_beams": ("Beams expected by", None),
     "detector.center": ("Center from", None),
     "filter.consider": ("Consider constant errors", None),
     "supervisor.enabled": ("Supervisor", None),

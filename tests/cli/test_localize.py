@@ -21,7 +21,7 @@ KEYS_WITH_REFERENCE = [
     *("anees", "anees_position", "wrong_while_operational"),
 ]
 ESTIMATES = "stamp_ns,x,y,theta,var_x,cov_xy,cov_xtheta,var_y,cov_ytheta,var_theta,mode,inliers,outliers"
-DETECTIONS = "stamp_ns,range,bearing,x,y,status,reflector_id,d2,scanner"
+DETECTIONS = "stamp_ns,range,bearing,x,y,status,reflector_id,d2,scanner,beams,expected_beams"
 
 
 def rows(path):

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from commission.localization.detector import DetectedReflectors, detect, detector_model, expected_beams
+from commission.localization.beam_window import expected_beams
+from commission.localization.detector import DetectedReflectors, detect, detector_model
 from commission.localization.estimate import Status
 from commission.site.parameters import DetectorParameters
 from commission.site.records import Scan
@@ -204,9 +205,24 @@ def test_one_missing_beam_is_bridged_and_no_more(ranges: list[float], flags: lis
     assert found(scan).beams.tolist() == beams
 
 
-def test_detector_filter_is_a_window_around_equation_3() -> None:
-    # At 2 m equation 3 says 9 beams: 8 to 11 pass.
-    for width in range(1, 16):
+@pytest.mark.parametrize(
+    ("model", "beam_width", "fewest", "most"),
+    [
+        # At 2 m equation 3 says 9 beams, 2 asin(0.04 / 2) / 0.25 deg = 9.17: 8 to 11 pass, however wide the beams.
+        ("equation_3", 0.0, 8, 11),
+        ("equation_3", math.radians(1.0), 8, 11),
+        # The noise of a bearing, 0.05 deg, moves both edges: 2.29 -+ 0.1 deg are 8 to 9 beams.
+        ("beam_width", 0.0, 7, 11),
+        # Beams of 1 deg whose middle is met as before, or of which any part is: 2.29 + 1 + 0.1 deg are 13 beams.
+        ("beam_width", math.radians(1.0), 7, 15),
+        # Wider than the post: its middle within a beam of 3 deg, less the noise, or a touch: 2.9 to 5.39 deg, 11 to 21.
+        ("beam_width", math.radians(3.0), 10, 23),
+    ],
+)
+def test_detector_filter_is_a_window_around_the_expected_beams(
+    model: str, beam_width: float, fewest: int, most: int
+) -> None:
+    for width in range(1, 30):
         flags = np.zeros(60, dtype=bool)
         flags[20 : 20 + width] = True
         scan = Scan(
@@ -217,8 +233,9 @@ def test_detector_filter_is_a_window_around_equation_3() -> None:
             intensities=None,
             reflector=flags,
         )
-        expected = Status.INLIER if 8 <= width <= 11 else Status.OUTLIER_DETECTOR
-        assert found(scan, center="central_beam").status.tolist() == [expected], width
+        expected = Status.INLIER if fewest <= width <= most else Status.OUTLIER_DETECTOR
+        detected = found(scan, beam_width=beam_width, center="central_beam", expected_beams=model)
+        assert detected.status.tolist() == [expected], width
         assert found(scan, enabled=False).status.tolist() == [Status.INLIER]
 
 
@@ -233,21 +250,55 @@ def test_class_of_reflectors_that_fits_best_is_taken() -> None:
     assert found(cast((2.0, 0.3), radius=0.05), both).status.tolist() == [Status.OUTLIER_DETECTOR]
 
 
-def test_oblique_plate_passes_with_fewer_beams_and_has_no_radius() -> None:
-    plates = ReflectorMap((Reflector(id="plate", x=0.0, y=0.0, radius=0.1, kind=ReflectorKind.FLAT),))
-    flags = np.zeros(60, dtype=bool)
-    flags[20:25] = True
-    scan = Scan(
+def facing(incidence: float, half_length: float = 0.1, distance: float = 2.0) -> Scan:
+    """A scan of thin beams over a plate straight ahead whose normal is turned away by an angle, without noise."""
+    bearings = STEP * np.arange(-60, 61)
+    ranges = distance * math.cos(incidence) / np.cos(bearings + incidence)
+    x, y = ranges * np.cos(bearings) - distance, ranges * np.sin(bearings)
+    return Scan(
         stamp_ns=0,
-        ranges=np.full(60, 2.0, np.float32),
-        angle_min=-0.1,
+        ranges=ranges.astype(np.float32),
+        angle_min=-60 * STEP,
         angle_increment=STEP,
         intensities=None,
-        reflector=flags,
+        reflector=np.hypot(x, y) <= half_length,
     )
-    detected = found(scan, plates)
+
+
+PLATES = ReflectorMap((Reflector(id="plate", x=0.0, y=0.0, radius=0.1, kind=ReflectorKind.FLAT),))
+
+
+@pytest.mark.parametrize("incidence_deg", [-60.0, -30.0, 0.0, 30.0, 60.0])
+def test_plate_passes_with_the_beams_that_it_shows_as_it_stands_and_has_no_radius(incidence_deg: float) -> None:
+    detected = found(facing(math.radians(incidence_deg)), PLATES)
+    # 0.2 m across at 2 m: 5.73 deg, of which its slope leaves the cosine.
+    seen = 22.9 * math.cos(math.radians(incidence_deg))
+    assert detected.beams[0] == pytest.approx(seen, abs=1.0)
+    assert detected.expected[0] == pytest.approx(seen, rel=0.1, abs=1.0)
     assert detected.status.tolist() == [Status.INLIER]
-    assert detected.range_bearing[0, 0] == pytest.approx(2.0)
+    # A beam more to one side than to the other moves the middle by half a step.
+    assert detected.range_bearing[0] == pytest.approx(
+        [2.0, 0.0], abs=0.5 * STEP * (1.0 + 4.0 * abs(math.sin(incidence_deg)))
+    )
+
+
+def test_plate_that_is_faced_squarely_but_shows_few_beams_is_none() -> None:
+    # A plate half as long, of which equation 3 says nothing: how steep it stands is unknown to it.
+    half = facing(0.0, half_length=0.05)
+    assert found(half, PLATES).status.tolist() == [Status.OUTLIER_DETECTOR]
+    assert found(half, PLATES, expected_beams="equation_3").status.tolist() == [Status.INLIER]
+    steep = facing(math.radians(60.0), half_length=0.1)
+    assert abs(int(found(half, PLATES).beams[0]) - int(found(steep, PLATES).beams[0])) <= 1
+
+
+@pytest.mark.parametrize("incidence_deg", [-45.0, 45.0])
+def test_center_of_a_plate_that_stands_obliquely_near_by_is_that_of_its_length(incidence_deg: float) -> None:
+    # Half way in bearing would be 31 mm aside, see the geometry: atan(0.177 / 0.823) and atan(0.177 / 1.177).
+    scan = facing(math.radians(incidence_deg), half_length=0.25, distance=1.0)
+    longer = ReflectorMap((dataclasses.replace(PLATES.reflectors[0], radius=0.25),))
+    detected = found(scan, longer)
+    assert detected.range_bearing[0] == pytest.approx([1.0, 0.0], abs=0.005)
+    assert detected.status.tolist() == [Status.INLIER]
 
 
 def test_intensity_counts_where_the_scanner_gives_no_flag() -> None:

@@ -80,7 +80,7 @@ def assert_same(a: RunColumns, b: RunColumns, *, after: int = 0) -> None:
     first = int(b.offsets[after])
     for name in ("prior_means", "prior_covariances", "means", "covariances", "modes", "stamps_ns"):
         assert getattr(a, name).tobytes() == getattr(b, name)[after:].tobytes(), name
-    for name in ("status", "reflector", "d2", "range_bearing", "beams"):
+    for name in ("status", "reflector", "d2", "range_bearing", "beams", "expected_beams"):
         assert getattr(a, name).tobytes() == getattr(b, name)[first:].tobytes(), name
     assert (a.offsets + first).tolist() == b.offsets[after:].tolist()
     assert a.final == b.final
@@ -123,7 +123,18 @@ def assert_is_fed(columns: RunColumns, drive: Drive, segments: tuple[RunSegment,
     assert len(estimates) == len(columns) > 0
     for cycle, live in enumerate(estimates):
         whole = columns.estimate(cycle)
-        for name in ("detections", "beams", "points_map", "status", "reflector", "d2", "mode", "gate", "stamp_ns"):
+        for name in (
+            "detections",
+            "beams",
+            "expected_beams",
+            "points_map",
+            "status",
+            "reflector",
+            "d2",
+            "mode",
+            "gate",
+            "stamp_ns",
+        ):
             given, expected = np.asarray(getattr(whole, name)), np.asarray(getattr(live, name))
             assert given.tobytes() == expected.tobytes(), f"{name} of cycle {cycle}"
         for name in ("prior", "posterior", "output"):

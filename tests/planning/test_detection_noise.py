@@ -81,7 +81,13 @@ def test_a_window_too_tight_for_the_scanner_loses_detections() -> None:
     reflectors, scanner = ReflectorMap((Reflector(id="R", x=0.0, y=0.0),)), Scanner()
     usual, tight = (
         worth(
-            detection_noise(reflectors, scanner, replace(DetectorParameters(), max_model_error=n)), 0, 5.0
+            detection_noise(
+                reflectors,
+                scanner,
+                replace(DetectorParameters(), expected_beams="equation_3", max_model_error=n),
+            ),
+            0,
+            5.0,
         ).probability
         for n in (2, 0)
     )
