@@ -161,6 +161,8 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     )
     was_lost = state.mode == LOST
     mode = supervise(FAIL if was_lost else state.mode, posterior, model.limits)
+    if evidence.confirmed < model.rejection.confirmations:
+        mode = FAIL
     if rejects_the_world(was_lost, evidence, model.rejection):
         mode = LOST
     output, output_ns = state.output, state.output_ns

@@ -17,7 +17,7 @@ class Mode(IntEnum):
     OPERATIONAL = 0
     """The vehicle may drive on the estimate."""
     FAIL = 1
-    """The covariance is too large: the output is withheld."""
+    """The covariance is too large, or was so and no detections confirm the pose yet: the output is withheld."""
     LOST = 2
     """Too many detections fit no reflector, however small the covariance is: the output is withheld."""
 

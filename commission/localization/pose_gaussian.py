@@ -5,10 +5,12 @@ Only the upper triangle of the covariance exists, so that it is symmetric by con
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
+from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Belief
 
@@ -25,6 +27,22 @@ class PoseGaussian(NamedTuple):
     yy: float
     yt: float
     tt: float
+
+
+@compiled_inline
+def position_variance(pose: PoseGaussian) -> float:
+    """Largest variance of the position, along whichever direction it lies [m^2].
+
+    Parameters
+    ----------
+    pose : its covariance.
+
+    Notes
+    -----
+    (P_xx + P_yy) / 2 + sqrt(((P_xx - P_yy) / 2)^2 + P_xy^2): the larger eigenvalue of a symmetric 2 x 2 matrix.
+    """
+    half_difference = 0.5 * (pose.xx - pose.yy)
+    return 0.5 * (pose.xx + pose.yy) + math.sqrt(half_difference * half_difference + pose.xy * pose.xy)
 
 
 def from_belief(belief: Belief) -> PoseGaussian:

@@ -1,7 +1,8 @@
 """Second rule of the supervisor, beside Algorithm 4: a vehicle whose detections fit no reflector is not localized.
 
 The covariance knows nothing of a wheel that slipped or of a wrong association: it stays small while the gate rejects
-what is really there. So the share of rejected detections is watched, over a window that forgets.
+what is really there. So the share of rejected detections is watched, over windows that forget. And where the gate was
+so wide that any reflector would have been accepted, one that was is no proof: more of them must confirm the pose.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.association import INLIER, OUTLIER_ASSOCIATION
 from commission.localization.observation import ObservationModel, scanner_offset
-from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.pose_gaussian import PoseGaussian, position_variance
 from commission.localization.reflector_index import Cells, cell_range
 from commission.site.parameters import SupervisorParameters
 
@@ -31,36 +32,60 @@ class Evidence(NamedTuple):
     """Time of the scan that was counted last [ns]."""
     near_accepted: float
     near_rejected: float
-    """Rejected although a reflector of the map is near; forgotten at a pace of their own."""
+    """Rejected although a reflector of the map is near: over the short window."""
     accepted: float
     rejected: float
-    """All of them."""
+    """All of them: over the long window."""
+    confirmed: float
+    """Accepted since the belief was too wide to tell reflectors apart; infinite where it never was."""
 
 
-NO_EVIDENCE = Evidence(0, 0.0, 0.0, 0.0, 0.0)
+NO_EVIDENCE = Evidence(0, 0.0, 0.0, 0.0, 0.0, math.inf)
 
 
 class RejectionRule(NamedTuple):
-    """Window and limits, for kernels."""
+    """Windows and limits, for kernels."""
 
     enabled: bool
     window_s: float
+    long_window_s: float
     fewest: float
-    """Detections that the window holds at least, however long ago they were."""
+    """Detections that the short window holds at least, however long ago they were."""
+    fewest_of_all: float
+    """The same of the long window."""
     reach: float
+    turn: float
+    """A detection at range r is near a reflector up to reach + turn r."""
+    harmless: float
+    harmless_turn: float
+    """It says nothing up to harmless + harmless_turn r: an error that the supervisor allows explains it."""
     near_limit: float
     limit: float
+    doubtful_position: float
+    doubtful_heading: float
+    """2-sigma before a scan beyond which what is accepted proves nothing."""
+    confirmations: float
+    """Detections that then have to be accepted."""
 
 
 def rejection_rule(parameters: SupervisorParameters) -> RejectionRule:
-    """Return window and limits for the kernel; the rule is off where the supervisor is."""
+    """Return windows and limits for the kernel; the rule is off where the supervisor is."""
+    longer = parameters.rejection_long_window / parameters.rejection_window
     return RejectionRule(
-        bool(parameters.enabled and parameters.rejection_enabled),
-        float(parameters.rejection_window),
-        float(parameters.rejection_evidence),
-        float(parameters.rejection_reach),
-        float(parameters.rejection_near_limit),
-        float(parameters.rejection_limit),
+        enabled=bool(parameters.enabled and parameters.rejection_enabled),
+        window_s=float(parameters.rejection_window),
+        long_window_s=float(parameters.rejection_long_window),
+        fewest=float(parameters.rejection_evidence),
+        fewest_of_all=float(parameters.rejection_evidence * longer),
+        reach=float(parameters.rejection_reach),
+        turn=float(parameters.rejection_turn),
+        harmless=float(parameters.rejection_harmless * parameters.position_limit),
+        harmless_turn=float(parameters.rejection_harmless * parameters.heading_limit),
+        near_limit=float(parameters.rejection_near_limit),
+        limit=float(parameters.rejection_limit),
+        doubtful_position=float(parameters.doubt_ratio * parameters.position_limit),
+        doubtful_heading=float(parameters.doubt_ratio * parameters.heading_limit),
+        confirmations=float(parameters.confirmations if parameters.enabled else 0.0),
     )
 
 
@@ -91,7 +116,7 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     model : of the observation.
     cells, places, cell_offsets : the map, see `ReflectorIndex`.
     status : (n,) a `Status` each; what the detector filter rejected does not count.
-    rule : window and limits.
+    rule : windows and limits.
 
     Notes
     -----
@@ -103,31 +128,56 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
         if status[i] == INLIER:
             accepted += 1.0
         elif status[i] == OUTLIER_ASSOCIATION:
-            rejected += 1.0
             direction = belief.theta + model.mount_theta + detections[i, 1]
             measured = detections[i, 0] - model.range_bias
             offset_x, offset_y = scanner_offset(belief.theta, model)
             x = belief.x + offset_x + measured * math.cos(direction)
             y = belief.y + offset_y + measured * math.sin(direction)
-            if is_near(x, y, rule.reach, cells, places, cell_offsets):
-                near += 1.0
-    passed = math.exp(-(stamp_ns - evidence.stamp_ns) * 1e-9 / rule.window_s)
-    kept = max(passed, min(1.0, rule.fewest / max(evidence.accepted + evidence.rejected, 1e-9)))
-    kept_near = max(passed, min(1.0, rule.fewest / max(evidence.near_accepted + evidence.near_rejected, 1e-9)))
+            reach = rule.reach + rule.turn * measured
+            distance = nearest(x, y, reach, cells, places, cell_offsets)
+            if distance > rule.harmless + rule.harmless_turn * measured:
+                rejected += 1.0
+                near += 1.0 if distance <= reach else 0.0
+    confirmed = evidence.confirmed
+    if is_doubtful(belief, rule):
+        accepted, confirmed = 0.0, 0.0
+    seconds = (stamp_ns - evidence.stamp_ns) * 1e-9
+    of_near, of_all = evidence.near_accepted + evidence.near_rejected, evidence.accepted + evidence.rejected
+    kept_near = max(math.exp(-seconds / rule.window_s), min(1.0, rule.fewest / max(of_near, 1e-9)))
+    kept = max(math.exp(-seconds / rule.long_window_s), min(1.0, rule.fewest_of_all / max(of_all, 1e-9)))
     return Evidence(
         stamp_ns,
         kept_near * evidence.near_accepted + accepted,
         kept_near * evidence.near_rejected + near,
         kept * evidence.accepted + accepted,
         kept * evidence.rejected + rejected,
+        confirmed + accepted,
     )
 
 
 @compiled_inline
-def is_near(  # noqa: PLR0917 - a place and the map, array by array
+def is_doubtful(prior: PoseGaussian, rule: RejectionRule) -> bool:
+    """Whether a belief is so wide that a detection which is accepted there proves nothing.
+
+    Parameters
+    ----------
+    prior : before the detections of a scan.
+    rule : windows and limits.
+
+    Notes
+    -----
+    No formula: the largest 2-sigma of the position, or that of the heading, beyond a multiple of the supervisor's
+    limit. A covariance that is not a number is doubtful.
+    """
+    position, heading = 2.0 * math.sqrt(position_variance(prior)), 2.0 * math.sqrt(prior.tt)
+    return not (position <= rule.doubtful_position and heading <= rule.doubtful_heading)
+
+
+@compiled_inline
+def nearest(  # noqa: PLR0917 - a place and the map, array by array
     x: float, y: float, reach: float, cells: Cells, places: FloatArray, cell_offsets: IntArray
-) -> bool:
-    """Whether a reflector of the map is within reach of a place.
+) -> float:
+    """Distance from a place to the nearest reflector of the map [m]; infinite where none is within reach.
 
     Parameters
     ----------
@@ -137,18 +187,18 @@ def is_near(  # noqa: PLR0917 - a place and the map, array by array
 
     Notes
     -----
-    min |place - reflector| <= reach, by definition.
+    min |place - reflector|, by definition.
     """
     px, py = x - cells.origin_x, y - cells.origin_y
     first_row, last_row = cell_range(py - reach, py + reach, cells.size, cells.rows)
     first_column, last_column = cell_range(px - reach, px + reach, cells.size, cells.columns)
+    least = math.inf
     for row in range(first_row, last_row + 1 if last_column >= first_column else first_row):
         start = cell_offsets[row * cells.columns + first_column]
         for entry in range(start, cell_offsets[row * cells.columns + last_column + 1]):
             dx, dy = places[entry, 0] - x, places[entry, 1] - y
-            if dx * dx + dy * dy <= reach * reach:
-                return True
-    return False
+            least = min(least, math.sqrt(dx * dx + dy * dy))
+    return least if least <= reach else math.inf
 
 
 @compiled_inline
@@ -159,7 +209,7 @@ def rejects_the_world(was_lost: bool, evidence: Evidence, rule: RejectionRule) -
     ----------
     was_lost : whether they were before: then both shares must fall well below their limits.
     evidence : after the scan.
-    rule : window and limits.
+    rule : windows and limits.
 
     Notes
     -----
@@ -168,7 +218,7 @@ def rejects_the_world(was_lost: bool, evidence: Evidence, rule: RejectionRule) -
     if not rule.enabled:
         return False
     near = evidence.near_rejected / max(evidence.near_rejected + evidence.near_accepted, rule.fewest)
-    whole = evidence.rejected / max(evidence.rejected + evidence.accepted, rule.fewest)
+    whole = evidence.rejected / max(evidence.rejected + evidence.accepted, rule.fewest_of_all)
     if was_lost:
         return near >= CLEARED * rule.near_limit or whole >= CLEARED * rule.limit
     return near > rule.near_limit or whole > rule.limit

@@ -20,6 +20,7 @@ from commission.site.quantity import (
     NOT_NEGATIVE,
     PERCENT,
     POSITIVE,
+    SHARE,
     Bounds,
     Choice,
     Group,
@@ -197,7 +198,9 @@ class SupervisorParameters:
         float,
         Quantity(label="2σ position", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=1.0, slider=(5.0, 500.0)),
     ] = 0.1
-    """Largest allowed 2-sigma of x and of y, Err_p."""
+    """Largest allowed 2-sigma of the position, Err_p."""
+    position_sigma: Annotated[str, Choice("Position σ", ("largest", "axes"))] = "largest"
+    """Which one: the `largest` in any direction (longer axis of the ellipse), or of the `axes` x and y (the paper)."""
     heading_limit: Annotated[
         float,
         Quantity(label="2σ heading", unit="rad", shown=DEGREES, bounds=POSITIVE, step=0.1, slider=(0.1, 15.0)),
@@ -212,25 +215,48 @@ class SupervisorParameters:
     rejection_window: Annotated[
         float, Quantity(label="Window", unit="s", bounds=POSITIVE, step=0.1, slider=(0.1, 10.0))
     ] = 0.6
-    """Time after which a detection counts a third in the shares of rejected ones; longer where there are few."""
+    """Time after which a detection counts a third in the share near reflectors; longer where there are few."""
+    rejection_long_window: Annotated[
+        float, Quantity(label="Window of all", unit="s", bounds=POSITIVE, step=0.5, slider=(0.5, 30.0))
+    ] = 3.0
+    """The same for the share of all rejected ones: longer, as a shiny thing alone in sight is rejected for a while."""
     rejection_evidence: Annotated[
         float, Quantity(label="Evidence", unit="detections", bounds=Bounds.at_least(1.0), step=1.0, slider=(5.0, 100.0))
-    ] = 20.0
-    """Detections that the shares of rejected ones are taken of at least: a few rejected ones mean nothing."""
+    ] = 12.0
+    """Detections that the share near reflectors is taken of at least, and that of all in proportion to its window: a
+    few rejected ones mean nothing."""
     rejection_reach: Annotated[
         float, Quantity(label="Near a reflector", unit="m", bounds=POSITIVE, step=0.1, slider=(0.1, 5.0))
-    ] = 1.0
+    ] = 0.8
     """Distance up to which a rejected detection is near a reflector of the map: that one, seen from a wrong pose."""
+    rejection_turn: Annotated[
+        float,
+        Quantity(label="Near, turned by", unit="rad", shown=DEGREES, bounds=NOT_NEGATIVE, step=0.5, slider=(0.0, 20.0)),
+    ] = 0.1
+    """Angle that adds to that distance with the range: a wrong heading moves far reflectors farther."""
+    rejection_harmless: Annotated[
+        float, Quantity(label="Harmless up to", shown=PERCENT, bounds=SHARE, step=5.0, slider=(0.0, 100.0))
+    ] = 0.4
+    """Share of the limits of 2σ: a rejected detection that such an error explains is no sign of being lost."""
     rejection_near_limit: Annotated[
         float,
         Quantity(label="Rejected near", shown=PERCENT, bounds=Bounds.inside(0.0, 1.0), step=1.0, slider=(5.0, 95.0)),
-    ] = 0.4
+    ] = 0.42
     """Share of rejected detections near reflectors, among those and the accepted, beyond which the vehicle is lost."""
     rejection_limit: Annotated[
         float,
         Quantity(label="Rejected at all", shown=PERCENT, bounds=Bounds.inside(0.0, 1.0), step=1.0, slider=(5.0, 95.0)),
     ] = 0.62
     """Share of all rejected detections, false ones among people and shiny things too, beyond which it is lost."""
+    doubt_ratio: Annotated[
+        float, Quantity(label="Doubt from", bounds=Bounds.at_least(1.0), step=0.1, slider=(1.0, 10.0))
+    ] = 2.0
+    """Multiple of the limits: where a 2σ passes it before a scan, any reflector is accepted, and its pose must prove
+    right. So after missing odometry, or long without reflectors."""
+    confirmations: Annotated[
+        int, Quantity(label="Confirmed by", unit="detections", bounds=NOT_NEGATIVE, step=1, slider=(0, 100))
+    ] = 20
+    """Detections accepted after such doubt until the vehicle may drive; 0: none, as Algorithm 4 has it."""
 
     def __post_init__(self) -> None:
         check_fields(self, "supervisor.")

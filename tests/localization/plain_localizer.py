@@ -58,6 +58,7 @@ class PlainLocalizer:
         self.last_move, self.ahead = np.eye(3), np.eye(3)
         self.was_lost, self.counted_at = False, self.initial.stamp_ns * 1e-9
         self.weights: dict[int | None, list[tuple[float, bool]]] = {1: [], None: []}
+        self.confirmed = math.inf
 
     def run(self, log: RecordLog) -> list[dict]:
         self.following = [(stamp * 1e-9, matrix(move)) for stamp, move in zip(*columns(log), strict=True)]
@@ -170,7 +171,7 @@ class PlainLocalizer:
             if kept == "inlier":
                 self.correct(z, j)
         self.supervise()
-        self.count_rejections(now, prior[0], measured, status)
+        self.count_rejections(now, prior, measured, status)
         return {
             "mean": self.mean.copy(),
             "cov": self.cov.copy(),
@@ -191,41 +192,64 @@ class PlainLocalizer:
         self.mean[2] = turned(self.mean[2])
         self.cov = A @ self.cov @ A.T + K @ R @ K.T
 
-    def count_rejections(self, now: float, prior: Array, measured: Array, status: list[str]) -> None:
-        """The rule by rejections, over lists: every past detection keeps a weight that is forgotten."""
+    def widest(self, cov: Array) -> tuple[float, float]:
+        """2-sigma of the position and of the heading, as parts of their limits."""
         p = self.parameters.supervisor
-        place = prior[:2] + rotation(prior[2]) @ self.scanner.mounting[:2]
+        variance = max(cov[0, 0], cov[1, 1]) if p.position_sigma == "axes" else np.linalg.eigvalsh(cov[:2, :2]).max()
+        return 2.0 * math.sqrt(variance) / p.position_limit, 2.0 * math.sqrt(cov[2, 2]) / p.heading_limit
+
+    def count_rejections(self, now: float, prior: tuple[Array, Array], measured: Array, status: list[str]) -> None:
+        """The rule by rejections, over lists: every past detection keeps a weight that is forgotten."""
+        p, (mean, cov) = self.parameters.supervisor, prior
+        place = mean[:2] + rotation(mean[2]) @ self.scanner.mounting[:2]
+        along = 2.0 * math.sqrt(np.linalg.eigvalsh(cov[:2, :2]).max())
+        doubtful = along > p.doubt_ratio * p.position_limit
+        doubtful = doubtful or 2.0 * math.sqrt(cov[2, 2]) > p.doubt_ratio * p.heading_limit
         fresh = []
         for (distance, bearing), kept in zip(measured, status, strict=True):
-            angle = prior[2] + self.scanner.mounting[2] + bearing
+            angle = mean[2] + self.scanner.mounting[2] + bearing
             seen = place + distance * np.array([math.cos(angle), math.sin(angle)])
-            nearest = np.linalg.norm(self.reflectors.centers - seen, axis=1).min() if len(self.reflectors) else math.inf
-            fresh.append((kept == "inlier", kept == "inlier" or nearest <= p.rejection_reach))
+            off = np.linalg.norm(self.reflectors.centers - seen, axis=1).min() if len(self.reflectors) else math.inf
+            if kept == "inlier" and not doubtful:
+                fresh.append((True, True))
+            elif kept != "inlier" and off > p.rejection_harmless * (p.position_limit + p.heading_limit * distance):
+                fresh.append((False, off <= p.rejection_reach + p.rejection_turn * distance))
         shares = []
-        for which, limit in ((1, p.rejection_near_limit), (None, p.rejection_limit)):
+        ways = (
+            (1, p.rejection_near_limit, p.rejection_window, p.rejection_evidence),
+            (
+                None,
+                p.rejection_limit,
+                p.rejection_long_window,
+                p.rejection_evidence / p.rejection_window * p.rejection_long_window,
+            ),
+        )
+        for which, limit, window, fewest in ways:
             weights = self.weights[which]
             total = sum(weight for weight, _ in weights)
-            kept = math.exp(-(now - self.counted_at) / p.rejection_window)
+            kept = math.exp(-(now - self.counted_at) / window)
             if total > 0.0:
-                kept = max(kept, min(1.0, p.rejection_evidence / total))
+                kept = max(kept, min(1.0, fewest / total))
             weights[:] = [(weight * kept, accepted) for weight, accepted in weights]
             weights += [(1.0, accepted) for accepted, near in fresh if which is None or near]
             rejected = sum(weight for weight, accepted in weights if not accepted)
-            shares.append(rejected / max(sum(weight for weight, _ in weights), p.rejection_evidence) / limit)
+            shares.append(rejected / max(sum(weight for weight, _ in weights), fewest) / limit)
         self.counted_at = now
+        self.confirmed = 0.0 if doubtful else self.confirmed + sum(accepted for accepted, _ in fresh)
+        if p.enabled and self.confirmed < p.confirmations:
+            self.mode = "fail"
         if p.enabled and p.rejection_enabled:
             over = max(shares) > 1.0 or (self.was_lost and max(shares) >= 0.5)
             self.mode, self.was_lost = ("lost" if over else self.mode), over
 
     def supervise(self) -> None:
         p = self.parameters.supervisor
-        spread = 2.0 * np.sqrt(np.diag(self.cov))
-        limits = np.array([p.position_limit, p.position_limit, p.heading_limit])
+        share = max(self.widest(self.cov))
         if self.mode == "lost":
             self.mode = "fail"
-        if self.mode == "operational" and (spread > limits).any():
+        if self.mode == "operational" and share > 1.0:
             self.mode = "fail"
-        elif self.mode == "fail" and (spread < limits / p.recovery_ratio).all():
+        elif self.mode == "fail" and share < 1.0 / p.recovery_ratio:
             self.mode = "operational"
         if not p.enabled:
             self.mode = "operational"

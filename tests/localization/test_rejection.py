@@ -20,12 +20,27 @@ from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 from tests.localization.drives import Plan, random_drive, random_map
 
-RULE = RejectionRule(True, 1.0, 20.0, 1.0, 0.4, 0.62)
+RULE = RejectionRule(
+    enabled=True,
+    window_s=1.0,
+    long_window_s=1.0,
+    fewest=20.0,
+    fewest_of_all=20.0,
+    reach=1.0,
+    turn=0.0,
+    harmless=0.0,
+    harmless_turn=0.0,
+    near_limit=0.4,
+    limit=0.62,
+    doubtful_position=math.inf,
+    doubtful_heading=math.inf,
+    confirmations=0.0,
+)
 SECOND = 1_000_000_000
 
 
 def evidence(accepted: float, near: float, rejected: float) -> Evidence:
-    return Evidence(0, accepted, near, accepted, rejected)
+    return Evidence(0, accepted, near, accepted, rejected, math.inf)
 
 
 @pytest.mark.parametrize(
@@ -71,25 +86,86 @@ def see(localizer: Localizer, record: Detections | Scan) -> None:
     assert len(localizer.feed(record)) == 1
 
 
-@pytest.mark.parametrize(("aside", "near"), [(0.99, 1.0), (1.01, 0.0)])
-def test_rejected_detection_is_near_within_reach_of_a_reflector(aside: float, near: float) -> None:
-    localizer = lonely(rejection_reach=1.0)
-    see(localizer, Detections(SECOND, np.array([[math.hypot(5.0, aside), math.atan2(aside, 5.0)]])))
+def aside(metres: float) -> np.ndarray:
+    """A detection this far to the left of the only reflector."""
+    return np.array([[math.hypot(5.0, metres), math.atan2(metres, 5.0)]])
+
+
+@pytest.mark.parametrize(
+    ("metres", "turn", "near"), [(0.99, 0.0, 1.0), (1.01, 0.0, 0.0), (1.5, 0.1, 1.0), (1.53, 0.1, 0.0)]
+)
+def test_rejected_detection_is_near_within_reach_and_turn_of_a_reflector(
+    metres: float, turn: float, near: float
+) -> None:
+    # 1 m + 0.1 rad at 5.22 m of range: 1.522 m.
+    localizer = lonely(rejection_reach=1.0, rejection_turn=turn)
+    see(localizer, Detections(SECOND, aside(metres)))
     counted = localizer.state.evidence
     assert (counted.rejected, counted.near_rejected) == (1.0, near)
     assert (counted.accepted, counted.near_accepted) == (0.0, 0.0)
 
 
+@pytest.mark.parametrize(("metres", "counts"), [(0.147, 0.0), (0.153, 1.0)])
+def test_rejected_detection_that_an_allowed_error_explains_is_no_sign_of_being_lost(
+    metres: float, counts: float
+) -> None:
+    # 40 % of 0.1 m and of 0.055 rad at 5 m: 0.04 m + 0.11 m.
+    localizer = lonely(heading_limit=0.055)
+    see(localizer, Detections(SECOND, aside(metres)))
+    counted = localizer.state.evidence
+    assert (counted.rejected, counted.near_rejected) == (counts, counts)
+
+
+@pytest.mark.parametrize(("sigma", "doubtful"), [(0.099, False), (0.103, True)])
+def test_belief_beyond_twice_the_limits_must_be_confirmed_by_accepted_detections(sigma: float, doubtful: bool) -> None:
+    localizer = lonely(confirmations=3)
+    localizer = Localizer(localizer.setup, Belief(0, np.zeros(3), np.diag([sigma**2, 1e-6, 1e-6])))
+    localizer.feed(Odometry(0, np.zeros(3)))
+    modes, counted = [], []
+    for number in range(1, 6):
+        stamp = number * SECOND // 25
+        localizer.feed(Odometry(stamp, np.zeros(3)))
+        (estimate,) = localizer.feed(Detections(stamp, np.array([[5.0, 0.0]])))
+        modes.append(estimate.mode)
+        counted.append(localizer.state.evidence.confirmed)
+    if doubtful:
+        assert counted == [0.0, 1.0, 2.0, 3.0, 4.0]
+        assert modes == [Mode.FAIL] * 3 + [Mode.OPERATIONAL] * 2
+    else:
+        assert counted == [math.inf] * 5
+        assert modes[-1] is Mode.OPERATIONAL
+
+
+def test_zero_confirmations_leave_the_covariance_alone_to_decide() -> None:
+    localizer = lonely(confirmations=0)
+    localizer = Localizer(localizer.setup, Belief(0, np.zeros(3), np.diag([1.0, 1e-6, 1e-6])))
+    localizer.feed(Odometry(0, np.zeros(3)))
+    (estimate,) = localizer.feed(Detections(0, np.array([[5.0, 0.0]])))
+    assert estimate.mode is Mode.OPERATIONAL
+
+
+def test_vehicle_whose_odometry_is_missing_for_long_is_confirmed_before_it_drives() -> None:
+    localizer = lonely(confirmations=5)
+    see(localizer, Detections(SECOND, np.array([[5.0, 0.0]])))
+    late = Detections(20 * SECOND, np.array([[5.0, 0.0]]))
+    localizer.feed(Odometry(20 * SECOND, np.zeros(3)))
+    (estimate,) = localizer.feed(late)
+    assert estimate.mode is Mode.FAIL
+
+
 def test_evidence_is_forgotten_to_a_third_in_a_window_but_not_below_what_it_takes() -> None:
-    localizer = lonely(rejection_window=2.0, rejection_evidence=4.0)
-    far = np.tile([[9.0, 1.0]], (30, 1))
+    localizer = lonely(rejection_window=2.0, rejection_long_window=4.0, rejection_evidence=4.0)
+    far = np.concatenate((np.tile([[9.0, 1.0]], (30, 1)), np.tile(aside(0.5), (30, 1))))
     see(localizer, Detections(SECOND, far))
-    assert localizer.state.evidence.rejected == 30.0
+    counted = localizer.state.evidence
+    assert (counted.rejected, counted.near_rejected) == (60.0, 30.0)
     see(localizer, Detections(3 * SECOND, np.empty((0, 2))))
-    assert localizer.state.evidence.rejected == pytest.approx(30.0 / math.e)
+    counted = localizer.state.evidence
+    assert (counted.rejected, counted.near_rejected) == pytest.approx((60.0 / math.sqrt(math.e), 30.0 / math.e))
     see(localizer, Detections(60 * SECOND, np.empty((0, 2))))
-    # However long ago they were, four are kept.
-    assert localizer.state.evidence.rejected == pytest.approx(4.0)
+    # However long ago they were, four are kept in two seconds, and in proportion eight in four.
+    counted = localizer.state.evidence
+    assert (counted.rejected, counted.near_rejected) == pytest.approx((8.0, 4.0))
 
 
 def test_nothing_is_counted_before_the_first_scan() -> None:
