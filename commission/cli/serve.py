@@ -61,7 +61,7 @@ class Demo(_Page):
     """Open the page with a bundled site in which a virtual AGV is driving."""
 
     site: Annotated[str, arg(metavar="NAME")] = "laboratory"
-    """Bundled site: laboratory, shop_floor or warehouse."""
+    """Bundled site: laboratory, shop_floor, warehouse or loading_bay (a vehicle with two scanners)."""
 
     def run(self) -> None:
         """Serve the bundled site."""

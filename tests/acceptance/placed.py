@@ -33,7 +33,7 @@ def demands_met_by(project: Project) -> Demands:
     visible, worst = [], np.zeros(3)
     for route in project.routes:
         planned = plan_route(project, route.name, models=models)
-        visible.append(int(planned.visible.counts().min()))
+        visible.append(int(planned.sees().sum(axis=1).min()))
         everyone = np.arange(len(project.reflectors))
         for gone in (-1, *np.unique(planned.visible.indices).tolist()):
             worst = np.maximum(worst, two_sigma_of(restricted(planned, everyone != gone)).max(axis=0))

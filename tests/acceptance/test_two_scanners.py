@@ -11,13 +11,32 @@ import pytest
 
 from commission import cli
 from commission.io.project_file import load_project, save_project
+from commission.localization.estimate import Status
+from commission.planning.dilution import Heading
+from commission.planning.route_prediction import restricted
+from commission.planning.vehicle_visibility import vehicle_visibility
 from commission.simulation.scenario import virtual_drive
 from commission.site.disturbances import ConstantErrors, Disturbances, ScannerError
+from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
+from commission.studies.coverage import CoverageInput, CoverageOptions, coverage
+from commission.studies.drives import DrivesInput
+from commission.studies.failures import FailuresInput, failures
 from commission.studies.run import RunInput, RunResult, judged_run
 from commission.studies.start import start_of
-from tests.planning.driven import AXES, compare, driven_along, planned_route, undisturbed
+from tests.acceptance.placed import blocked_drive, demands_met_by, suggested, verdict
+from tests.conftest import Seeds
+from tests.planning.driven import AXES, compare, driven_along, planned_route, predicted_along, undisturbed
 from tests.two_scanners import NAMES, with_two
+
+SITES = ("shop_floor", "warehouse", "loading_bay")
+"""The vehicle of the last one has two scanners anyway."""
+ROUTES = (("shop_floor", 0), ("warehouse", 0), ("loading_bay", 1))
+"""Site and number of the route."""
+FEW_DRIVES, DRIVES = 6, 50
+TWO_SIGMA = 0.954
+"""Share of the errors within 2-sigma."""
 
 
 @pytest.fixture
@@ -43,6 +62,12 @@ def site(request, repository):
 @pytest.fixture(scope="module")
 def shop_floor(repository):
     return with_two(load_project(repository / "maps" / "shop_floor"), disturbances=Disturbances())
+
+
+def undisturbed_with_two(name: str) -> Project:
+    """A bundled site without people, with a vehicle that has two scanners."""
+    project = undisturbed(name)
+    return project if len(project.scanners) == 2 else with_two(project)
 
 
 def driven(project, seed: int = 1) -> RunResult:
@@ -104,13 +129,86 @@ def test_a_recording_of_a_scanner_that_the_project_lacks_is_refused_by_name(shop
     assert "scanner 'front left' is none of the project's; expected top" in err
 
 
-def test_a_drive_with_two_scanners_errs_as_predicted():
-    project = with_two(undisturbed("shop_floor"))
-    name = project.routes[0].name
-    planned = planned_route(project, name)
-    length = planned.drive.length
-    found = compare(planned, (driven_along(project, name, length, seed) for seed in range(8)))
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "number"), ROUTES)
+def test_drives_with_two_scanners_err_as_predicted(name, number, seeds: Seeds):
+    project = undisturbed_with_two(name)
+    route = project.routes[number].name
+    planned = planned_route(project, route)
+    drives = (driven_along(project, route, planned.drive.length, seed) for seed in seeds(FEW_DRIVES, DRIVES))
+    found = compare(planned, drives)
+    # Few drives know the RMS error of a metre to some 15 %, its median over the metres far better.
+    margin = 0.0 if seeds.all else 0.05
     for of in AXES:
-        assert 0.9 < float(np.median(found.ratio(of))) < 1.1
-        assert found.inside(of) >= 0.9
+        assert 0.95 - margin < float(np.median(found.ratio(of))) < 1.05 + margin
+        assert found.inside(of) >= (0.9 if seeds.all else 0.8)
     assert found.agreement == 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "number"), ROUTES)
+def test_without_the_reflector_that_counts_most_drives_err_as_the_what_if_says(name, number, seeds: Seeds):
+    project = undisturbed_with_two(name)
+    route = project.routes[number].name
+    gone = failures(FailuresInput(drives=DrivesInput.of(project, (route,)))).ranking[0].reflector
+    kept = np.arange(len(project.reflectors)) != gone
+    planned = planned_route(project, route)
+    without = ReflectorMap(project.reflectors.reflectors[:gone] + project.reflectors.reflectors[gone + 1 :])
+    hall = replace(project, reflectors=without)
+    drives = (driven_along(hall, route, planned.drive.length, seed) for seed in seeds(FEW_DRIVES, DRIVES))
+    found = compare(restricted(planned, kept), drives)
+    margin = 0.0 if seeds.all else 0.05
+    for of in AXES:
+        assert 0.95 - margin < float(np.median(found.ratio(of))) < 1.05 + margin
+    # And it counts: without it the error is predicted to be larger.
+    assert found.predicted.squares.sum() > 1.01 * predicted_along(planned).squares.sum()
+
+
+@pytest.mark.parametrize("name", SITES)
+def test_a_drive_detects_what_the_coverage_of_both_scanners_promises(name):
+    project = undisturbed_with_two(name)
+    result = driven(project, 2)
+    run = result.columns
+    visible = vehicle_visibility(project).visible_from_poses(run.means)
+    shares: list[float] = []
+    for cycle in range(50, len(run), 25):
+        # A scan of each scanner, one right after the other.
+        rows = slice(int(run.offsets[cycle - 1]), int(run.offsets[cycle + 1]))
+        detected = set(run.reflector[rows][run.status[rows] == Status.INLIER].tolist())
+        promised = set(visible.of(cycle).tolist())
+        shares.append(len(detected & promised) / max(1, len(detected | promised)))
+    assert float(np.mean(shares)) > 0.9
+
+
+@pytest.mark.parametrize("name", SITES)
+def test_coverage_with_two_scanners_is_never_worse_than_with_one_of_them(name):
+    project = undisturbed_with_two(name)
+    options = CoverageOptions(heading=Heading.GIVEN, given_heading=0.3, spacing=1.0)
+    both, front, rear = (
+        coverage(CoverageInput.of(replace(project, scanners=scanners), options)).coverage.fixes
+        for scanners in (project.scanners, project.scanners[:1], project.scanners[1:])
+    )
+    # Where the vehicle can stand so: a scanner in a wall sees nothing.
+    stands = both.visible > 0
+    for alone in (front, rear):
+        assert (both.visible >= alone.visible)[stands].all()
+        assert (both.position_sigma <= alone.position_sigma * (1.0 + 1e-9))[stands].all()
+    assert (both.visible[stands] <= front.visible[stands] + rear.visible[stands]).all()
+    assert both.visible[stands].mean() > 1.2 * max(front.visible[stands].mean(), rear.visible[stands].mean())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["shop_floor", "warehouse"])
+def test_a_layout_that_is_suggested_for_two_scanners_holds_in_drives(name, seeds: Seeds):
+    project = undisturbed_with_two(name)
+    project = project if seeds.all else replace(project, routes=project.routes[:1])
+    demands = replace(demands_met_by(project), position_limit=None, heading_limit=None)
+    placed, found = suggested(project, demands, spacing=1.0 if seeds.all else 2.0)
+    assert found.unmet == ()
+    assert found.at_least <= found.added < len(project.reflectors)
+    for route in placed.routes:
+        drives = [blocked_drive(placed, route.name, seed) for seed in seeds(2, DRIVES)]
+        shown = verdict(placed, demands, drives)
+        assert shown.operational == len(drives)
+        assert shown.within >= TWO_SIGMA
+        assert shown.visible >= demands.visible

@@ -50,11 +50,15 @@ def poses_along(route: Route, step: float) -> np.ndarray:
 
 
 def visible_counts(name: str, poses: np.ndarray) -> np.ndarray:
-    """Reflectors in range, in the field of view and in line of sight from each pose."""
-    project = site(name)
-    scanner, centers = project.scanners[0], project.reflectors.centers
-    counts = []
-    for pose in poses:
+    """Reflectors in range, in the field of view and in line of sight of any scanner from each pose."""
+    return np.array([sum(any(seen) for seen in zip(*seen_from(name, pose), strict=True)) for pose in poses])
+
+
+def seen_from(name: str, pose: np.ndarray) -> list[list[bool]]:
+    """Which reflectors each scanner sees from a pose."""
+    project, centers = site(name), site(name).reflectors.centers
+    found: list[list[bool]] = []
+    for scanner in project.scanners:
         T_map_scanner = compose(pose, scanner.mounting)
         offsets = centers - T_map_scanner[:2]
         distances = np.hypot(*offsets.T)
@@ -62,8 +66,9 @@ def visible_counts(name: str, poses: np.ndarray) -> np.ndarray:
         first, last = scanner.field_of_view_deg
         seen = (distances < scanner.reflector_range) & (bearings >= first) & (bearings <= last)
         origins = np.broadcast_to(T_map_scanner[:2], centers[seen].shape)
-        counts.append(int(caster(name).line_of_sight(origins, centers[seen]).sum()))
-    return np.array(counts)
+        seen[seen] = caster(name).line_of_sight(origins, centers[seen])
+        found.append(seen.tolist())
+    return found
 
 
 ROUTES = [(name, route.name) for name, draw in SITES.items() for route in draw().routes]
@@ -78,7 +83,12 @@ def test_bundled_site_is_what_its_script_draws(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "size", "reflectors"),
-    [("laboratory", (12, 8), 4), ("shop_floor", (24, 13), 25), ("warehouse", (100, 60), 120)],
+    [
+        ("laboratory", (12, 8), 4),
+        ("shop_floor", (24, 13), 25),
+        ("warehouse", (100, 60), 120),
+        ("loading_bay", (20, 14), 18),
+    ],
 )
 def test_site_has_its_size_and_reflectors(name: str, size: tuple[int, int], reflectors: int) -> None:
     inner = np.array(floor(name).size) - 0.4
@@ -137,3 +147,17 @@ def test_reflectors_are_visible_from_nearly_everywhere_on_the_route(name: str, r
 def test_laboratory_route_ends_where_it_starts() -> None:
     poses = poses_along(site("laboratory").routes[0], 0.05)
     assert poses[-1] == pytest.approx(poses[0], abs=2e-3)
+
+
+def test_the_two_scanners_of_the_loading_bay_see_past_each_side_of_the_vehicle() -> None:
+    project = site("loading_bay")
+    assert [scanner.name for scanner in project.scanners] == ["front left", "rear right"]
+    outline = np.array(project.vehicle.outline)
+    for scanner in project.scanners:
+        assert scanner.field_of_view_deg == (-137.5, 137.5)
+        # On a corner of the outline, which leaves it three quarters of a turn and a little beside.
+        assert np.hypot(*(outline - scanner.mounting[:2]).T).min() == 0.0
+    # Together they see what neither sees alone.
+    for pose in poses_along(project.routes[1], 2.0):
+        front, rear = (sum(seen) for seen in seen_from("loading_bay", pose))
+        assert max(front, rear) <= visible_counts("loading_bay", pose[np.newaxis])[0]

@@ -1,4 +1,4 @@
-"""Draws the three bundled sites into `maps/`: run `python -m tests.tools.draw_sites` after a change here.
+"""Draws the bundled sites into `maps/`: run `python -m tests.tools.draw_sites` after a change here.
 
 Walls, machines and racks are rectangles, routes are polygons with their corners cut, so that a reader can follow every
 number. Tunables and disturbances of a site that is already there are kept: those are tuned with the simulation.
@@ -19,7 +19,7 @@ from commission.errors import FileFormatError
 from commission.io.project_file import load_project, save_project
 from commission.site.disturbances import Disturbances, ShinyObject, TiltedStretch
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
-from commission.site.parameters import ObservationParameters, Parameters
+from commission.site.parameters import ObservationParameters, OdometryParameters, Parameters
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Direction, Route, Segment
@@ -297,7 +297,65 @@ def warehouse() -> Project:
     )
 
 
-SITES = {"laboratory": laboratory, "shop_floor": shop_floor, "warehouse": warehouse}
+def loading_bay() -> Project:
+    """A hall with a conveyor in its middle, pallets along its walls, and a carrier with a scanner on two corners."""
+    pallets: list[Box] = [
+        (2.0, 10.5, 5.0, 13.0),
+        (8.0, 10.8, 12.0, 13.0),
+        (15.0, 10.5, 18.0, 13.0),
+        (8.0, 1.0, 12.0, 3.0),
+        (17.0, 1.0, 19.0, 3.0),
+    ]
+    conveyor = (7.0, 6.2, 13.0, 7.4)
+    reflectors: list[Point] = [
+        *[(0.06, 2.0), (0.06, 6.4), (0.06, 11.0), (19.94, 3.6), (19.94, 7.8), (19.94, 12.2)],
+        *[(3.2, 0.06), (6.9, 0.06), (13.0, 0.06), (16.1, 0.06)],
+        *[(3.1, 10.44), (10.6, 10.74), (15.9, 10.44), (9.2, 3.06), (11.3, 3.06)],
+        *[(8.4, 6.14), (12.1, 7.46), (6.94, 6.9)],
+    ]
+    away = with_cut_corners([(17.0, 4.8), (14.5, 4.8), (14.5, 1.5)], 1.4)
+    back = with_cut_corners([(14.5, 1.5), (14.5, 4.8), (3.5, 4.8)], 1.4)
+    around = with_cut_corners([(10.0, 4.8), (16.5, 4.8), (16.5, 9.0), (3.5, 9.0), (3.5, 4.8), (10.0, 4.8)], 1.4)
+    scanners = tuple(
+        Scanner(
+            name=name,
+            mounting=np.array([x, y, round(math.radians(faces), 6)]),
+            field_of_view_deg=(-137.5, 137.5),
+            resolution_deg=0.25,
+            reflector_range=15.0,
+        )
+        for name, x, y, faces in (("front left", 0.6, 0.4, 45.0), ("rear right", -0.6, -0.4, -135.0))
+    )
+    return Project(
+        name="Loading bay",
+        floor_map=hall(20.0, 14.0, 0.02, [*pallets, conveyor]),
+        reflectors=reflector_map(reflectors, 0.045, "B"),
+        routes=(
+            Route(
+                "To the dock and back",
+                (
+                    Segment(control_points=np.array([(3.5, 4.8), (8.0, 4.8), (12.5, 4.8), (17.0, 4.8)])),
+                    Segment(control_points=away, direction=Direction.REVERSE),
+                    Segment(control_points=back),
+                ),
+                0.6,
+            ),
+            Route("Around the conveyor", (Segment(control_points=around),), 0.6),
+        ),
+        vehicle=DifferentialVehicle(0.6, ((0.6, 0.4), (-0.6, 0.4), (-0.6, -0.4), (0.6, -0.4)), 0.3),
+        scanners=scanners,
+        parameters=Parameters(
+            observation=ObservationParameters(range_sigma=0.008, bearing_sigma=0.0016),
+            # What the wheels of a virtual drive do, `disturbances.wheels`.
+            odometry=OdometryParameters(
+                forward_per_sqrt_m=0.01, lateral_per_sqrt_m=0.003, heading_per_sqrt_m=0.006, heading_per_sqrt_rad=0.01
+            ),
+        ),
+        disturbances=Disturbances(people=8, glints_per_scan=0.1),
+    )
+
+
+SITES = {"laboratory": laboratory, "shop_floor": shop_floor, "warehouse": warehouse, "loading_bay": loading_bay}
 
 
 def main() -> None:

@@ -23,7 +23,7 @@ from commission.io.project_file import load_project
 from tests.app.owning import Owner
 from tests.tools.lost_in_the_woods import convert
 
-SITES = ("laboratory", "shop_floor", "warehouse", "lost_in_the_woods")
+SITES = ("laboratory", "shop_floor", "warehouse", "loading_bay", "lost_in_the_woods")
 
 
 @pytest.fixture(scope="module", params=SITES)
