@@ -21,6 +21,8 @@ from commission.site.parameters import DetectorParameters
 from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
 
+LIKELY = 0.5
+"""Probability of detection from which on a reflector counts as visible."""
 NEAREST = 0.3
 """Smallest distance that is looked at [m]; nearer ones count as this one."""
 DISTANCES = 64
@@ -58,6 +60,43 @@ class DetectionNoise(NamedTuple):
     """Rows per e-fold of the distance."""
 
 
+class DetectionTable(NamedTuple):
+    """What was found out about each class of reflectors, for who explains it."""
+
+    distances: FloatArray
+    """(DISTANCES,) that were looked at [m]."""
+    noise: DetectionNoise
+    """What its detections are worth."""
+    shown: FloatArray
+    """(C, DISTANCES) probability that it raises a flag at all [0..1]."""
+    beams: FloatArray
+    """(C, DISTANCES) mean width of its widest cluster where there is one [beams]; NaN where there is none."""
+
+    def rejected(self) -> FloatArray:
+        """(C, DISTANCES) share of the scans that show it in which nothing passes the detector filter [0..1]."""
+        return 1.0 - self.noise.columns[:, :, 0] / np.where(self.shown > 0.0, self.shown, np.inf) - (self.shown == 0.0)
+
+    def likely_between(self, kind: int) -> tuple[float, float]:
+        """Nearest and farthest distance between which a class is detected in at least `LIKELY` of all scans [m].
+
+        Of several such stretches the longest; 0 and infinity where it reaches to an end of the table; farthest before
+        nearest where there is none.
+        """
+        probability = self.noise.columns[kind, :, 0]
+        edges = np.flatnonzero(np.diff(np.concatenate(([False], probability >= LIKELY, [False])).astype(np.int8)))
+        if not len(edges):
+            return math.inf, 0.0
+        longest = int(np.argmax(np.diff(edges)[::2]))
+        first, end = int(edges[2 * longest]), int(edges[2 * longest + 1])
+        nearest = 0.0 if first == 0 else self._crossing(probability, first - 1)
+        return nearest, math.inf if end == len(probability) else self._crossing(probability, end - 1)
+
+    def _crossing(self, probability: FloatArray, row: int) -> float:
+        """Distance between a row and the next at which the probability, interpolated as in `worth`, is `LIKELY` [m]."""
+        share = (LIKELY - probability[row]) / (probability[row + 1] - probability[row])
+        return float(self.distances[row] * (self.distances[row + 1] / self.distances[row]) ** share)
+
+
 class _Optics(NamedTuple):
     """What matters of a scanner."""
 
@@ -78,6 +117,13 @@ def detection_noise(
     parameters : of the detector: its window rejects, and its rule for the center has a noise of its own.
     farthest : out to where [m]; None: to the scanner's range.
     """
+    return detection_table(reflectors, scanner, parameters, farthest).noise
+
+
+def detection_table(
+    reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorParameters, farthest: float | None = None
+) -> DetectionTable:
+    """Find out how reflectors of a map are detected: see `detection_noise`, whose arguments it has."""
     optics = _Optics(
         scanner.angle_increment,
         BeamModel(
@@ -173,37 +219,44 @@ def worth(noise: DetectionNoise, kind: int, distance: float) -> Worth:
 
 
 # The same site is predicted again and again while the engineer drags a reflector.
-@functools.lru_cache(maxsize=16)
+@functools.lru_cache(maxsize=64)
 def _experiment(
     radii: tuple[float, ...], flat: tuple[bool, ...], rest: tuple[float, ...], optics: _Optics
-) -> DetectionNoise:
+) -> DetectionTable:
     """Detect each class of reflectors at each distance; `rest` are the other fields of a `DetectorModel`."""
     model = DetectorModel(read_only(np.array(radii, np.float64)), read_only(np.array(flat, np.bool_)), *rest)  # type: ignore[arg-type]
     columns = np.zeros((len(radii), DISTANCES, len(Worth._fields)))
+    shown, beams = np.zeros((len(radii), DISTANCES)), np.full((len(radii), DISTANCES), np.nan)
+    distances = np.geomspace(NEAREST, optics.farthest, DISTANCES)
     for kind, radius in enumerate(radii):
-        for row, distance in enumerate(np.geomspace(NEAREST, optics.farthest, DISTANCES).tolist()):
-            columns[kind, row] = _judge(max(distance, 2.0 * radius), radius, flat[kind], optics, model, row)
-    return DetectionNoise(read_only(columns), (DISTANCES - 1) / math.log(optics.farthest / NEAREST))
+        for row, distance in enumerate(distances.tolist()):
+            worth, widths = _judge(max(distance, 2.0 * radius), radius, flat[kind], optics, model, row)
+            columns[kind, row], seen = worth, widths > 0
+            shown[kind, row] = seen.mean()
+            if seen.any():
+                beams[kind, row] = widths[seen].mean()
+    noise = DetectionNoise(read_only(columns), (DISTANCES - 1) / math.log(optics.farthest / NEAREST))
+    return DetectionTable(read_only(distances), noise, read_only(shown), read_only(beams))
 
 
 def _judge(  # noqa: PLR0917 - one reflector
     distance: float, radius: float, flat: bool, optics: _Optics, model: DetectorModel, seed: int
-) -> Worth:
-    """Scan a reflector often and gather what the detector makes of it."""
+) -> tuple[Worth, IntArray]:
+    """Scan a reflector often: what the detector makes of it, and the width of its widest cluster in each scan."""
     beam = optics.beam
     half_width = half_width_at(distance, beam.half_divergence, beam.half_aperture)
-    widest = math.asin(radius / distance) + half_width + MARGIN * beam.bearing_sigma
-    reach = int(widest / optics.increment) + 2
+    span = math.asin(radius / distance) + half_width + MARGIN * beam.bearing_sigma
+    reach = int(span / optics.increment) + 2
     rng = np.random.default_rng(seed)
     noise = rng.standard_normal((SCANS, 2 * reach + 1, 2))
-    errors = np.empty((SCANS, 2))
-    _detect_often(distance, radius, flat, optics, model, _places(SCANS), noise, errors)
+    errors, widest = np.empty((SCANS, 2)), np.empty(SCANS, np.int64)
+    _detect_often(distance, radius, flat, optics, model, _places(SCANS), noise, errors, widest)
     detected = ~np.isnan(errors[:, 0])
     if detected.sum() < 2:
-        return Worth(0.0, 0.0, beam.range_sigma**2, optics.increment**2, 0.0, 0.0)
+        return Worth(0.0, 0.0, beam.range_sigma**2, optics.increment**2, 0.0, 0.0), widest
     psi = 2.0 * math.pi * _places(SCANS)[detected]
     ranges, bearings = errors[detected].T
-    return Worth(
+    found = Worth(
         float(detected.mean()),
         float(ranges.mean()),
         float(ranges.var()),
@@ -211,6 +264,7 @@ def _judge(  # noqa: PLR0917 - one reflector
         float(2.0 * np.mean(ranges * np.cos(psi))),
         float(2.0 * np.mean(bearings * np.sin(psi))),
     )
+    return found, widest
 
 
 def _places(count: int) -> FloatArray:
@@ -228,6 +282,7 @@ def _detect_often(  # noqa: PLR0917 - one reflector
     places: FloatArray,
     noise: FloatArray,
     errors: FloatArray,
+    widest: IntArray,
 ) -> None:
     """Error of range [m] and bearing [rad] in each of S scans, NaN where nothing passes the detector filter.
 
@@ -236,6 +291,7 @@ def _detect_often(  # noqa: PLR0917 - one reflector
     places : (S,) bearing of the reflector in each scan [steps between beams], from the middle beam.
     noise : (S, B, 2) standard normal draws for bearing and range of each of B beams; the middle one is straight ahead.
     errors : (S, 2) output.
+    widest : (S,) output: width of the widest cluster [beams]; 0 where there is none.
     """
     count = noise.shape[1]
     beams = Beams(count, -(count // 2) * optics.increment, optics.increment, False)
@@ -254,7 +310,9 @@ def _detect_often(  # noqa: PLR0917 - one reflector
             echo = distance / math.cos(lit) if flat else cylinder_echo(distance, radius, lit)
             ranges[i] = echo + optics.beam.range_sigma * noise[k, i, 1] if flags[i] else math.nan
         found = detect_clusters(ranges, flags, beams, model, 0, range_bearing, widths, expected, status)
-        errors[k, 0], errors[k, 1] = math.nan, math.nan
+        errors[k, 0], errors[k, 1], widest[k] = math.nan, math.nan, 0
+        for i in range(found):
+            widest[k] = max(widest[k], widths[i])
         for i in range(found):
             if status[i] == INLIER:
                 errors[k, 0], errors[k, 1] = range_bearing[i, 0] - distance, range_bearing[i, 1] - bearing

@@ -63,6 +63,7 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
     start_sigmas: FloatArray,
     model: ErrorModel,
     squares: FloatArray,
+    inliers: FloatArray,
 ) -> None:
     """Second moments of the error after each scan.
 
@@ -77,6 +78,7 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
     start_sigmas : (3,) of the start pose.
     model : what the filter believes of its detections, and what they are truly worth.
     squares : (K, 3, 3) output.
+    inliers : (K,) output: expected number of inliers of each scan.
 
     Notes
     -----
@@ -100,7 +102,7 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
             error = _moved(error, x, y, theta, seconds, model.odometry)
             _turn(responses, followed[:count], bias, x - poses[k - 1, 0], y - poses[k - 1, 1])
         belief, scanner = _at(x, y, theta, priors[k]), scanners[k]
-        observation = observation_at(model.observations, scanner)
+        observation, inliers[k] = observation_at(model.observations, scanner), 0.0
         offset_x, offset_y = scanner_offset(theta, observation)
         for i in range(offsets[k], offsets[k + 1]):
             m = indices[i]
@@ -118,10 +120,11 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
                     followed[count], is_followed[each] = each, True
                     count += 1
             share = seen * passing.probability
+            inliers[k] += share
             _respond(responses, followed[:count], bias, e, k_says, share)
             _disturb(responses, row, m, bias, e, k_says, share, true, model.beams[scanner])
             corrected = correct(belief, e.range, e.bearing, places[m, 0], places[m, 1], places[m, 2], observation)
-            belief = mixed(belief, corrected, model.inside_gate * model.free_per_m**e.range)
+            belief = mixed(belief, corrected, seen * model.inside_gate)
         count = _forget(responses, followed, is_followed, count)
         _gather(error, responses, followed[:count], places, bias, squares[k])
 

@@ -20,7 +20,7 @@ from commission.planning.ambiguity import AmbiguityOptions
 from commission.planning.cover import CoverProblem, cover, lower_bound, merged, smaller_covers
 from commission.planning.route_prediction import PlannedRoute, PredictionOptions, restricted, station_scans
 from commission.planning.telling_apart import ChosenPlace, Distinction, chosen_places, nearest_on_routes
-from commission.planning.true_error import quality_of, two_sigma_of
+from commission.planning.true_error import two_sigma_of
 from commission.planning.unmet import Unmet
 from commission.planning.vehicle_visibility import VehicleVisibility
 from commission.progress import Progress
@@ -109,7 +109,6 @@ class LayoutSearch:
         self._places = chosen_places(demands, planned, site.stations, site.scanners, options.ambiguity)
         self._distinction = Distinction(visible, self._places, demands.survive_failure, options.ambiguity)
         self._apart: list[BoolArray] = []
-        self._quality = quality_of(planned[0]) if planned else None
 
     def run(self) -> BoolArray:
         """Return which reflectors to take: (M,) array."""
@@ -183,7 +182,7 @@ class LayoutSearch:
         def passed(gone: int) -> BoolArray:
             left = taken.copy()
             left[[gone] if gone >= 0 else []] = False
-            over = two_sigma_of(restricted(route, left), self._quality) > self._limits[index]
+            over = two_sigma_of(restricted(route, left)) > self._limits[index]
             return np.asarray(over.any(axis=1), dtype=np.bool_)
 
         # Some at a time: the kernels run side by side, and whoever has seen enough asks for no more of them.

@@ -80,7 +80,8 @@ def choose(
     kept = _kept(site, options)
     everything = ReflectorMap((*kept, *_named(centers, kept, options.candidates)))
     walls = walls_of(site.floor_map)
-    models = tuple(build_visibility(everything, scanner, walls, VisibilityOptions()) for scanner in site.scanners)
+    seen = VisibilityOptions(detector=site.parameters.detector)
+    models = tuple(build_visibility(everything, scanner, walls, seen) for scanner in site.scanners)
     planned = [plan_route(site, name, options.prediction, models) for name in routes]
     search = LayoutSearch(planned, site, VehicleVisibility(models), kept=len(kept), options=options, progress=progress)
     taken = search.run()

@@ -16,6 +16,7 @@ from commission.localization.observation import ObservationModel, expect, observ
 from commission.localization.odometry import OdometryNoise, predict
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.supervisor import SupervisorLimits, supervise
+from commission.planning.detection_noise import LIKELY, DetectionNoise, worth
 
 
 class PredictionModel(NamedTuple):
@@ -31,6 +32,10 @@ class PredictionModel(NamedTuple):
     """Probability that a detection of a visible reflector passes the association filter."""
     free_per_m: float
     """Probability per metre of ray that nobody is in the way."""
+    noise: DetectionNoise
+    """Probability that a visible reflector passes the detector filter, by class and distance."""
+    kinds: IntArray
+    """(S, M) row of `noise` of each reflector for each scanner."""
 
 
 class PredictionColumns(NamedTuple):
@@ -99,11 +104,12 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
                 prior, truth.range, truth.bearing, places, m, observation, model.gate_d2
             ):
                 continue
-            found += 1
             corrected = correct(
                 belief, truth.range, truth.bearing, places[m, 0], places[m, 1], places[m, 2], observation
             )
-            probability = model.inside_gate * model.free_per_m**truth.range
+            detected = worth(model.noise, int(model.kinds[scanners[k], m]), truth.range).probability
+            found += detected >= LIKELY
+            probability = detected * model.inside_gate * model.free_per_m**truth.range
             belief = mixed(belief, corrected, probability)
         mode = supervise(mode, belief, model.limits)
         if found > 0:

@@ -22,6 +22,7 @@ from commission.localization.observation import observation_model, observation_r
 from commission.localization.odometry import odometry_noise
 from commission.localization.pose_gaussian import from_belief
 from commission.localization.supervisor import supervisor_limits
+from commission.planning.detection_noise import DetectionQuality, detection_quality
 from commission.planning.nominal_drive import DrivePlan, NominalDrive, nominal_drive
 from commission.planning.prediction_kernels import PredictionColumns, PredictionModel, predict_covariances
 from commission.planning.visibility import VisibilityModel, VisibleReflectors, seen_in_turn, visibility_models
@@ -97,6 +98,8 @@ class PlannedRoute:
     """Tunables of the localizer."""
     options: PredictionOptions
     """Start and hall."""
+    quality: DetectionQuality
+    """How likely each reflector is detected, and what its detections are worth."""
 
     def sees(self) -> BoolArray:
         """Whether each of the M reflectors is seen at each scan, by it or the newest of another scanner: (K, M)."""
@@ -123,6 +126,8 @@ class PlannedRoute:
             chi_square_gate(association.gate_probability, 2) if association.enabled else math.inf,
             association.gate_probability if association.enabled else 1.0,
             1.0 - self.options.blocked_per_m,
+            self.quality.noise,
+            self.quality.classes,
         )
 
 
@@ -163,7 +168,7 @@ class RoutePrediction:
     modes: NDArray[np.int8]
     """(K,) a `Mode` each."""
     seen: IntArray
-    """(K,) reflectors seen and inside the gate."""
+    """(K,) reflectors in sight that are detected in at least half of all scans, and inside the gate."""
     on_odometry: FloatArray
     """(K,) way driven since a reflector was seen last [m]."""
 
@@ -255,6 +260,7 @@ def plan_route(
         scanners=site.scanners,
         parameters=site.parameters,
         options=options,
+        quality=detection_quality(model.reflectors, site.scanners, site.parameters.detector),
     )
 
 

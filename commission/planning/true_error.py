@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import FloatArray, read_only
-from commission.planning.detection_noise import DetectionQuality, detection_quality
 from commission.planning.error_kernels import ErrorModel, propagate_errors
 from commission.planning.route_prediction import PerMetre, PlannedRoute, RoutePrediction, predict_route, smallest_route
 
@@ -22,6 +21,8 @@ class PredictedErrors:
 
     squares: FloatArray
     """(K, 3, 3) second moments of the error of x [m], y [m] and heading [rad]: over many drives, biases included."""
+    inliers: FloatArray
+    """(K,) expected number of inliers: of the visible reflectors, those that pass the detector filter and the gate."""
 
     @property
     def sigmas(self) -> FloatArray:
@@ -38,16 +39,13 @@ class PredictedErrors:
         return np.maximum.reduceat(self.two_sigma, metres.first, axis=0)
 
 
-def predict_errors(
-    planned: PlannedRoute, prediction: RoutePrediction, quality: DetectionQuality | None = None
-) -> PredictedErrors:
+def predict_errors(planned: PlannedRoute, prediction: RoutePrediction) -> PredictedErrors:
     """Predict the error along a planned drive on which all reflectors are as in the map but for their survey.
 
     Parameters
     ----------
     planned : drive and visible reflectors.
     prediction : of that drive, without damage.
-    quality : of `quality_of` the route, for who predicts it often; found out here when None.
 
     Returns
     -------
@@ -61,8 +59,8 @@ def predict_errors(
     tenth of a degree of heading, is not. An error of the survey stays. The last two are carried as the response of the
     pose to each reflector; taken as new in every scan, as the filter takes them, they would average out.
     """
-    quality = quality or quality_of(planned)
-    squares = np.empty((len(planned.drive), 3, 3))
+    quality = planned.quality
+    squares, inliers = np.empty((len(planned.drive), 3, 3)), np.empty(len(planned.drive))
     model = planned.model()
     propagate_errors(
         planned.drive.stamps_ns,
@@ -84,19 +82,15 @@ def predict_errors(
             np.array([(scanner.angle_min, scanner.angle_increment) for scanner in planned.scanners]),
         ),
         squares,
+        inliers,
     )
-    return PredictedErrors(read_only(squares))
+    return PredictedErrors(read_only(squares), read_only(inliers))
 
 
-def quality_of(planned: PlannedRoute) -> DetectionQuality:
-    """Find out what detections on a route are worth; the same for all routes of a site, and with fewer reflectors."""
-    return detection_quality(planned.reflectors, planned.scanners, planned.parameters.detector)
-
-
-def two_sigma_of(planned: PlannedRoute, quality: DetectionQuality | None = None) -> FloatArray:
+def two_sigma_of(planned: PlannedRoute) -> FloatArray:
     """(K, 3) 2-sigma of x [m], y [m] and heading [rad]: the larger of the filter's own and of its error."""
     prediction = predict_route(planned)
-    return np.maximum(prediction.two_sigma, predict_errors(planned, prediction, quality).two_sigma)
+    return np.maximum(prediction.two_sigma, predict_errors(planned, prediction).two_sigma)
 
 
 def warm_up() -> None:

@@ -6,6 +6,7 @@ the rays unnecessary. What the sight is worth for localization is in `dilution`.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -19,10 +20,13 @@ from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
 from commission.geometry.se2 import compose
+from commission.localization.beam_echo import LIT_SHARE, flagged_span, half_width_at
 from commission.planning import shadow_kernels
+from commission.planning.detection_noise import detection_table
 from commission.planning.shadow_kernels import BLOCK, BitMask, Targets
 from commission.site.checks import at_least, between
 from commission.site.floor_map import FloorMap
+from commission.site.parameters import DetectorParameters
 from commission.site.parts import Sighted
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
@@ -31,6 +35,8 @@ from commission.site.scanner import Scanner
 BUCKET = 2.0
 # Bearings this far outside the field of view still count [rad]: the last beam of a scan is rounded too.
 BEARING_TOLERANCE = 1e-9
+# Where a promise that holds from here on holds for good [m].
+FARTHEST = 1e6
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +47,9 @@ class VisibilityOptions:
     """Beams that a reflector must get for certain, so that it passes the detector filter (equation 3) [beams]."""
     max_incidence_deg: float = 60.0
     """Largest angle between a flat reflector's normal and the ray at which it still reflects [deg]."""
+
+    detector: DetectorParameters | None = None
+    """The detector, whose filter must pass a reflector in at least half of all scans; None: it passes all."""
 
     def __post_init__(self) -> None:
         at_least(self.min_beams, 1, "visibility.min_beams", "beams")
@@ -70,7 +79,11 @@ class VisibleReflectors(NamedTuple):
         return sees
 
 
-def promised_range(radius: float, resolution: float, min_beams: int, beam_width: float = 0.0) -> float:
+# Asked for each reflector of a map, most of which are alike.
+@functools.lru_cache(maxsize=1024)
+def promised_range(
+    radius: float, resolution: float, min_beams: int, beam_width: float = 0.0, aperture: float = 0.0
+) -> float:
     """Range up to which a reflector gets at least `min_beams` beams wherever it stands between two of them.
 
     Parameters
@@ -80,15 +93,30 @@ def promised_range(radius: float, resolution: float, min_beams: int, beam_width:
     min_beams : number of beams, at least 1.
     beam_width : divergence of a beam [rad]; it widens the angle in which a reflector is met. With 0 this is
         equation 3 of Sobreira et al. 2016 as printed, floor(2 asin(radius / r) / resolution) >= min_beams.
+    aperture : width of a beam where it leaves the scanner [m].
 
     Returns
     -------
     range : largest distance to the reflector's center [m]; inf when the beam width alone is enough.
     """
-    half_angle = 0.5 * (min_beams * resolution - beam_width)
-    if half_angle <= 0.0:
+    needed = min_beams * resolution
+    near, far = radius, FARTHEST
+    if _flagged_span(far, radius, beam_width, aperture) >= needed:
         return math.inf
-    return radius / math.sin(min(half_angle, 0.5 * math.pi))
+    # The span falls with the distance: halve to the last digit.
+    while far - near > 1e-13 * far:
+        middle = 0.5 * (near + far)
+        if _flagged_span(middle, radius, beam_width, aperture) >= needed:
+            near = middle
+        else:
+            far = middle
+    return near
+
+
+def _flagged_span(distance: float, radius: float, beam_width: float, aperture: float) -> float:
+    """Angle within which the beams lie that a reflector flags [rad]."""
+    half_width = half_width_at(distance, 0.5 * beam_width, 0.5 * aperture)
+    return flagged_span(math.asin(radius / distance), half_width, LIT_SHARE)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -317,9 +345,15 @@ def _limits(reflector: Reflector, scanner: Scanner, options: VisibilityOptions) 
         scanner.angle_increment,
         options.min_beams,
         math.radians(scanner.beam_width_deg),
+        scanner.beam_aperture,
     )
-    farthest = min(scanner.range[1], scanner.reflector_range) + depth
-    return scanner.range[0] + depth, min(farthest, promised), promised
+    nearest = scanner.range[0] + depth
+    farthest = min(min(scanner.range[1], scanner.reflector_range) + depth, promised)
+    if options.detector is None or not options.detector.enabled:
+        return nearest, farthest, promised
+    # Of the reflector alone, so that it does not depend on what other reflectors there are.
+    likely = detection_table(ReflectorMap((reflector,)), scanner, options.detector).likely_between(0)
+    return max(nearest, likely[0]), min(farthest, likely[1]), promised
 
 
 def _bins(farthest: float, grid: OccupancyGrid) -> int:

@@ -128,7 +128,7 @@ class AmbiguityInput(StudyInput):
             scanners=project.scanners,
             routes=project.routes if project.floor_map is None else (),
             options=options or AmbiguityOptions(),
-            visibility=visibility or VisibilityOptions(),
+            visibility=replace(visibility or VisibilityOptions(), detector=project.parameters.detector),
             spacing=spacing,
         )
 

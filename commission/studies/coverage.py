@@ -6,7 +6,7 @@ The figures themselves come from `planning`; files and images are elsewhere.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,7 +123,7 @@ class CoverageInput(StudyInput):
             scanners=project.scanners,
             routes=project.routes if project.floor_map is None else (),
             fix=options.fix(project.parameters.observation, project.parameters.odometry, speed),
-            visibility=options.visibility,
+            visibility=replace(options.visibility, detector=project.parameters.detector),
             spacing=options.spacing,
         )
 

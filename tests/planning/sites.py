@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from commission.geometry.arrays import read_only
+from commission.planning.route_prediction import PlannedRoute
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -36,3 +40,11 @@ def open_field(places, length: float = 20.0, *, scanner: Scanner | None = None, 
     scanners = (scanner or Scanner(field_of_view_deg=(-180.0, 180.0)),)
     given = {"scanners": scanners, "routes": (straight(length),), **changes}
     return Project(reflectors=reflectors_at(places), **given)
+
+
+def surely_detected(planned: PlannedRoute) -> PlannedRoute:
+    """The same drive, on which every reflector in sight is detected in every scan."""
+    columns = np.array(planned.quality.noise.columns)
+    columns[:, :, 0] = 1.0
+    noise = planned.quality.noise._replace(columns=read_only(columns))
+    return replace(planned, quality=planned.quality._replace(noise=noise))

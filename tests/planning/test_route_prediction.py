@@ -21,11 +21,19 @@ from commission.planning.route_prediction import (
     restricted,
     station_scans,
 )
-from commission.site.parameters import AssociationParameters, OdometryParameters, Parameters, SupervisorParameters
+from commission.planning.true_error import predict_errors
+from commission.site.parameters import (
+    AssociationParameters,
+    DetectorParameters,
+    OdometryParameters,
+    Parameters,
+    SupervisorParameters,
+)
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry
+from commission.site.scanner import Scanner
 from commission.site.stations import Station
-from tests.planning.sites import open_field
+from tests.planning.sites import open_field, surely_detected
 
 LINE = ((2.0, 3.0), (6.0, -3.0), (11.0, 3.5), (15.0, -2.5), (19.0, 3.0))
 NO_GATE = Parameters(association=AssociationParameters(enabled=False))
@@ -50,7 +58,7 @@ def exact_records(project, planned) -> RecordLog:
 
 def test_prediction_equals_the_localizer_on_exact_records():
     project = open_field(LINE, parameters=NO_GATE)
-    planned = plan_route(project, "Line")
+    planned = surely_detected(plan_route(project, "Line"))
     predicted = predict_route(planned)
     start = Belief(0, planned.drive.poses[0], np.diag(np.square(planned.options.start_sigmas)))
     run = whole_run.run(exact_records(project, planned), LocalizerSetup.of(project), start)
@@ -224,3 +232,16 @@ def test_a_restricted_route_is_that_of_a_site_with_only_those_reflectors():
         assert few.visible.of(scan).tolist() == [m for m in planned.visible.of(scan).tolist() if kept[m]]
     alone = plan_route(open_field([place for place, stays in zip(LINE, kept, strict=True) if stays]), "Line")
     np.testing.assert_array_equal(predict_route(few).covariances, predict_route(alone).covariances)
+
+
+def test_a_reflector_that_is_detected_in_few_scans_is_relied_on_as_little():
+    # Equation 3 rejects most of what beams of 1 deg see.
+    printed = Parameters(detector=DetectorParameters(expected_beams="equation_3"))
+    project = open_field(LINE, scanner=Scanner(beam_width_deg=1.0, resolution_deg=0.25), parameters=printed)
+    planned = plan_route(project, "Line")
+    sure = surely_detected(planned)
+    assert (predict_route(planned).two_sigma >= predict_route(sure).two_sigma - 1e-12).all()
+    assert (predict_route(planned).seen <= predict_route(sure).seen).all()
+    assert predict_route(planned).seen.sum() < predict_route(sure).seen.sum()
+    inliers = [predict_errors(each, predict_route(each)).inliers.sum() for each in (planned, sure)]
+    assert inliers[0] < 0.5 * inliers[1]

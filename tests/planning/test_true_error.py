@@ -19,7 +19,7 @@ from commission.site.reflectors import Reflector, ReflectorMap
 from commission.studies.metrics import pose_errors, reference_at
 from tests.odometry_of import PRECISE
 from tests.planning.driven import QUICK
-from tests.planning.sites import open_field
+from tests.planning.sites import open_field, surely_detected
 
 LINE = ((2.0, 3.0), (6.0, -3.0), (11.0, 3.5), (15.0, -2.5), (19.0, 3.0))
 FITTING = ObservationParameters(range_sigma=0.008, bearing_sigma=0.0025)
@@ -44,6 +44,7 @@ def squares_with(planned, prediction, worth: tuple[float, ...], start: tuple[flo
             np.array([(each.angle_min, each.angle_increment) for each in planned.scanners]),
         ),
         squares,
+        np.empty(len(squares)),
     )
     return squares
 
@@ -52,7 +53,7 @@ def test_error_is_what_the_filter_says_where_detections_are_as_its_parameters_sa
     project = open_field(
         LINE, parameters=Parameters(observation=FITTING, association=AssociationParameters(enabled=False))
     )
-    planned = plan_route(project, "Line")
+    planned = surely_detected(plan_route(project, "Line"))
     prediction = predict_route(planned)
     start = planned.options.start_sigmas
     squares = squares_with(planned, prediction, (1.0, 0.0, 0.008**2, 0.0025**2, 0.0, 0.0), start)
