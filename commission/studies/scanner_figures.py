@@ -134,21 +134,23 @@ def _mean(values: FloatArray) -> float:
     return float(finite.mean()) if len(finite) else math.nan
 
 
-def told(figures: ScannerFigures) -> str:
-    """One line for a person: millimetres and degrees as is the habit; against a reference where there is one."""
-    has_reference = math.isfinite(figures.reference_range_residual)
-    ranges, bearings = (
-        (figures.reference_range_residual, figures.reference_bearing_residual)
-        if has_reference
-        else (figures.range_residual, figures.bearing_residual)
-    )
-    text = f"{figures.accepted} of {figures.seen} accepted"
+def residuals_told(figures: ScannerFigures) -> tuple[str, str] | None:
+    """Say what residuals are against, and how large: the reference where there is one; None where nothing is known.
+
+    Millimetres and degrees, as is the habit.
+    """
+    source, ranges, bearings = "reference", figures.reference_range_residual, figures.reference_bearing_residual
     if not math.isfinite(ranges):
-        return text
-    source = "reference" if has_reference else "estimate"
-    return (
-        f"{text}, residuals {MILLIMETRES.text(ranges, '+.1f')}, {DEGREES.text(bearings, '+.2f')} against the {source}"
-    )
+        source, ranges, bearings = "estimate", figures.range_residual, figures.bearing_residual
+    if not math.isfinite(ranges):
+        return None
+    return source, f"{MILLIMETRES.text(ranges, '+.1f')}, {DEGREES.text(bearings, '+.2f')}"
+
+
+def told(figures: ScannerFigures) -> str:
+    """One line for a person: what was accepted, and the mean residuals."""
+    text, known = f"{figures.accepted} of {figures.seen} accepted", residuals_told(figures)
+    return text if known is None else f"{text}, residuals {known[1]} against the {known[0]}"
 
 
 def figures_entries(figures: tuple[ScannerFigures, ...]) -> list[dict[str, str | int | float | None]]:

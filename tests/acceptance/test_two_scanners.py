@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 from dataclasses import replace
@@ -10,6 +11,8 @@ import numpy as np
 import pytest
 
 from commission import cli
+from commission.app.run.now_panel import rows
+from commission.app.run.playback import Playback
 from commission.io.project_file import load_project, save_project
 from commission.localization.estimate import Status
 from commission.planning.dilution import Heading
@@ -94,15 +97,48 @@ def test_what_the_first_scanner_measures_does_not_depend_on_the_second(shop_floo
     assert np.array_equal(both.displacements, alone.displacements)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_residuals_say_which_scanner_is_turned_by_one_degree(shop_floor, name):
+def with_turned(project: Project, name: str) -> Project:
+    """A virtual world in which a scanner is mounted one degree further counter-clockwise than the project says."""
     turned = ScannerError(scanner=name, mounting=(0.0, 0.0, math.radians(1.0)))
-    errors = ConstantErrors(scanners=(turned,))
-    result = driven(replace(shop_floor, disturbances=Disturbances(constants=errors)))
+    return replace(project, disturbances=Disturbances(constants=ConstantErrors(scanners=(turned,))))
+
+
+# What is truly turned counter-clockwise sees everything as much further clockwise.
+def bearing_off(name: str, turned: str) -> object:
+    """Mean residual of the bearings of a scanner that is to be expected [deg]."""
+    return pytest.approx(-1.0 if name == turned else 0.0, abs=0.1)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_residuals_and_the_page_say_which_scanner_is_turned_by_one_degree(shop_floor, name):
+    result = driven(with_turned(shop_floor, name))
     for figures in result.scanners:
-        # What is truly turned counter-clockwise sees everything as much further clockwise.
-        expected = -1.0 if figures.name == name else 0.0
-        assert math.degrees(figures.reference_bearing_residual) == pytest.approx(expected, abs=0.1), figures.name
+        assert math.degrees(figures.reference_bearing_residual) == bearing_off(figures.name, name)
+    playback = Playback(result)
+    playback.seek(math.inf)
+    shown = dict(rows(playback.view(covered=False)))
+    for each in NAMES:
+        # Such as: +0.4 mm, -1.00°
+        bearing = shown[f"{each}, to reference"].split(", ")[1].removesuffix("°")
+        assert float(bearing) == bearing_off(each, name)
+    # Both cannot be right: what the filter believed first rejects the other one.
+    assert {shown[f"{each.name}, accepted"] for each in result.scanners} == {
+        f"{each.accepted} of {each.seen}" for each in result.scanners
+    }
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_summary_of_localize_says_which_scanner_is_turned_by_one_degree(shop_floor, name, tmp_path, commission):
+    save_project(with_turned(replace(shop_floor, floor_map=None), name), tmp_path / "site")
+    drive, out = tmp_path / "drive", tmp_path / "out"
+    assert commission("simulate", tmp_path / "site", "--out", drive)[0] == 0
+    code, told, _ = commission("localize", tmp_path / "site", drive, "--out", out)
+    assert code == 0
+    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    for figures in summary["scanners"]:
+        assert math.degrees(figures["reference_bearing_residual_rad"]) == bearing_off(figures["name"], name)
+        (line,) = (line for line in told.splitlines() if line.startswith(f"Scanner      {figures['name']}: "))
+        assert float(line.split(", ")[-1].removesuffix("° against the reference")) == bearing_off(figures["name"], name)
 
 
 def test_commands_carry_both_scanners_from_project_to_summary(shop_floor, tmp_path, commission):
@@ -116,8 +152,8 @@ def test_commands_carry_both_scanners_from_project_to_summary(shop_floor, tmp_pa
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
     assert [each["name"] for each in summary["scanners"]] == list(NAMES)
     assert sum(each["accepted"] for each in summary["scanners"]) == summary["inliers"]
-    rows = (out / "detections.csv").read_text(encoding="utf-8").splitlines()
-    assert {row.rsplit(",", 1)[1] for row in rows[1:]} == set(NAMES)
+    written = csv.DictReader((out / "detections.csv").read_text(encoding="utf-8").splitlines())
+    assert {row["scanner"] for row in written} == set(NAMES)
 
 
 def test_a_recording_of_a_scanner_that_the_project_lacks_is_refused_by_name(shop_floor, tmp_path, commission):

@@ -18,6 +18,7 @@ from commission.app.base.state import AppState, LastEdit
 from commission.app.base.view import view_of
 from commission.app.editing.scanner_fields import source_html
 from commission.app.page import Page
+from commission.app.project.site_panel import rows as site_rows
 from commission.app.project.top_bar import title
 from commission.app.run.actions import Seek
 from commission.app.run.badge import badge_text
@@ -214,6 +215,23 @@ def test_before_a_run_the_vehicle_waits_at_the_start_of_the_first_route_with_its
     assert strokes[..., 0].min() == pytest.approx(0.0, abs=1e-5)
     layer.show_site(replace(half, routes=()))
     assert not layer._frame.visible
+
+
+def test_each_scanner_is_drawn_where_it_is_mounted_and_told_with_the_site(
+    server: viser.ViserServer, project: Project
+) -> None:
+    front = replace(project.scanners[0], name="front left", mounting=[0.4, 0.1, 0.5], field_of_view_deg=(-90.0, 90.0))
+    rear = replace(front, name="rear right", mounting=[-0.4, -0.1, -2.5], resolution_deg=1.0)
+    layer = VehicleLayer(server.scene)
+    layer.show_site(replace(project, scanners=(front, rear)))
+    assert [tuple(frame.position[:2]) for frame in layer._scanners] == [(0.4, 0.1), (-0.4, -0.1)]
+    assert all(frame in layer.nodes() for frame in layer._scanners)
+    layer.show_site(replace(project, scanners=(rear,)))
+    assert [tuple(frame.position[:2]) for frame in layer._scanners] == [(-0.4, -0.1)]
+    told = dict(site_rows(replace(project, scanners=(front, rear))))
+    assert told["Scanner front left"] == f"{front.beam_count} beams, -90 to 90°"
+    assert told["Scanner rear right"] == "181 beams, -90 to 90°"
+    assert "Scanner" in dict(site_rows(project))
 
 
 @pytest.mark.parametrize("preset", SCANNERS, ids=lambda preset: preset.name)

@@ -7,11 +7,12 @@ Words choose the pictures whose names hold one of them. The README's are those a
 
 from __future__ import annotations
 
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from playwright.sync_api import Browser, sync_playwright
@@ -33,6 +34,8 @@ from commission.app.run.service import RunService
 from commission.app.runtime import Runtime
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
+from commission.site.disturbances import ConstantErrors, Disturbances, ScannerError
+from commission.site.project import Project
 from tests.browser.page import CHROMIUM, FLAGS, SMALL, WIDE, OpenPage
 from tests.browser.serving import Served
 
@@ -51,6 +54,8 @@ class Picture:
     """What is done on the page before it is taken."""
     time: float = 30.0
     """Time of the drive [s]."""
+    world: Callable[[Project], Project] = lambda project: project
+    """What is otherwise than in the bundled site."""
 
 
 def until(reached: Callable[[], bool], seconds: float = 180.0) -> None:
@@ -76,6 +81,19 @@ def folded(page: OpenPage, runtime: Runtime) -> None:
     """The plots are folded away, for the sake of the panels."""
     selected(page, runtime)
     page.page.locator(".c-fold").click()
+
+
+def unfolded(page: OpenPage, _runtime: Runtime) -> None:
+    """The plots are folded away, so that the numbers of the run have room down to those of each scanner."""
+    page.open_tab("Run")
+    page.page.locator(".c-fold").click()
+    page.page.get_by_text("rear right, to reference").scroll_into_view_if_needed()
+
+
+def rear_turned(project: Project) -> Project:
+    """The rear scanner is mounted one degree otherwise than the project says, and nobody walks about."""
+    turned = ScannerError(scanner="rear right", mounting=(0.0, 0.0, math.radians(1.0)))
+    return replace(project, disturbances=Disturbances(constants=ConstantErrors(scanners=(turned,))))
 
 
 def three_d(page: OpenPage, _runtime: Runtime) -> None:
@@ -232,6 +250,7 @@ PICTURES = (
     Picture("tune", "shop_floor", tab("Tune", "Reflectors")),
     Picture("page_shop_floor", "shop_floor", selected),
     Picture("folded", "shop_floor", folded),
+    Picture("page_two_scanners", "loading_bay", unfolded, world=rear_turned),
     Picture("route", "shop_floor", on_route),
     Picture("measured", "laboratory", measured),
     Picture("page_plan", "shop_floor", heatmap),
@@ -255,9 +274,9 @@ def _is_at(runtime: Runtime, seconds: float) -> bool:
 
 
 @contextmanager
-def served(site: str) -> Iterator[Served]:
+def served(picture: Picture) -> Iterator[Served]:
     """A page of a bundled site, as `commission demo` opens it."""
-    project = load_project(bundled_folder("maps") / site)
+    project = picture.world(load_project(bundled_folder("maps") / picture.site))
     page = Served(project, source=VirtualDrive(project.routes[0].name))
     page.until(lambda: page.runtime.service(RunService).view() is not None)
     try:
@@ -268,7 +287,7 @@ def served(site: str) -> Iterator[Served]:
 
 def take(browser: Browser, picture: Picture, size: tuple[int, int], path: Path) -> None:
     """Take one picture with a window of a size [pixels]."""
-    with served(picture.site) as site:
+    with served(picture) as site:
         runtime, page = site.runtime, OpenPage(browser, site.server, size)
         page.page.set_default_timeout(60_000)
         page.open(nodes=("/floor/map", "/vehicle/outline"))

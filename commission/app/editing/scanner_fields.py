@@ -39,6 +39,7 @@ FIGURES = {
     "range_sigma": "range 1σ",
     "bearing_sigma_deg": "bearing 1σ",
     "beam_width_deg": "beam width",
+    "beam_aperture": "beam aperture",
     "reflector_range": "reach for reflectors",
 }
 """What the fields of the scanner are called in a sentence."""

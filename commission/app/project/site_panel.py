@@ -1,4 +1,4 @@
-"""What the project is about, in numbers: hall, reflectors, routes, vehicle, scanner."""
+"""What the project is about, in numbers: hall, reflectors, routes, vehicle, scanners."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from commission.site.quantity import MILLIMETRES
 
 def rows(project: Project) -> list[tuple[str, str]]:
     """Return what the panel shows, line by line."""
-    floor_map, scanner = project.floor_map, project.scanners[0]
-    first, last = scanner.field_of_view_deg
+    floor_map = project.floor_map
     shown = [("Project", escaped(project.name))]
     if floor_map is None:
         shown.append(("Floor map", "none: an open field"))
@@ -27,8 +26,11 @@ def rows(project: Project) -> list[tuple[str, str]]:
         ("Reflectors", str(len(project.reflectors))),
         ("Routes", str(len(project.routes))),
         ("Vehicle", escaped(project.vehicle.kind)),
-        ("Scanner", f"{scanner.beam_count} beams, {first:g} to {last:g}°"),
     ]
+    for scanner in project.scanners:
+        first, last = scanner.field_of_view_deg
+        label = "Scanner" if len(project.scanners) == 1 else f"Scanner {escaped(scanner.name)}"
+        shown.append((label, f"{scanner.beam_count} beams, {first:g} to {last:g}°"))
     return shown
 
 

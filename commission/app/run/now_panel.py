@@ -14,7 +14,8 @@ from commission.app.run.view import RunView
 from commission.localization.estimate import Mode, Status
 from commission.site.quantity import DEGREES, MILLIMETRES
 from commission.site.truth import truth_told
-from commission.studies.scanner_figures import told
+from commission.studies.run import RunResult
+from commission.studies.scanner_figures import residuals_told
 
 MODES = {
     Mode.OPERATIONAL: "operational",
@@ -51,13 +52,23 @@ def rows(run: RunView) -> list[tuple[str, str]]:
             f"{estimate.count(Status.OUTLIER_DETECTOR)}, {estimate.count(Status.OUTLIER_ASSOCIATION)}",
         ),
         ("Largest NIS / gate", f"{nis} / {estimate.gate:.2f}"),
+        *_of_scanners(result),
         ("Cycle time", f"{result.microseconds_per_cycle:.1f} µs, mean of the drive"),
         ("Position error", MILLIMETRES.text(error, ".1f") if math.isfinite(error) else "no reference"),
     ]
-    if len(result.scanners) > 1:
-        shown += [(f"Scanner {each.name}, drive", told(each)) for each in result.scanners]
     truth = result.inputs.log.truth
     return shown if truth is None else [*shown, *((f"True {what}", text) for what, text in truth_told(truth))]
+
+
+def _of_scanners(result: RunResult) -> list[tuple[str, str]]:
+    """Figures of each of several scanners over the drive: what it contributed, and how far off it is."""
+    shown: list[tuple[str, str]] = []
+    for each in result.scanners if len(result.scanners) > 1 else ():
+        shown.append((f"{each.name}, accepted", f"{each.accepted} of {each.seen}"))
+        known = residuals_told(each)
+        if known is not None:
+            shown.append((f"{each.name}, to {known[0]}", known[1]))
+    return shown
 
 
 class NowPanel(BasePanel):

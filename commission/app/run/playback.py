@@ -100,6 +100,7 @@ class Playback:
         estimate = columns.estimate(lived - 1) if lived else None
         belief = columns.initial if estimate is None else estimate.posterior
         segment = columns.segment(max(lived - 1, 0))
+        scans = self._scan_points(belief, segment.setup)
         return RunView(
             result=self._result,
             lived=lived,
@@ -110,7 +111,8 @@ class Playback:
             estimate=estimate,
             segment=segment,
             covered=covered,
-            scan_map=self._scan_points(belief, segment.setup),
+            scan_map=np.concatenate(scans),
+            first_scan=len(scans[0]),
             gates=_gates(estimate, segment.setup),
             accumulated=self._accumulated(lived) if whole else None,
         )
@@ -120,17 +122,18 @@ class Playback:
         rows = int(self._result.columns.offsets[lived])
         return Accumulated(self._inliers.before(rows), self._outliers.before(rows))
 
-    def _scan_points(self, belief: Belief, setup: LocalizerSetup) -> FloatArray:
-        """(B, 2) end points of the beams of each scanner's newest scan [m], map frame."""
+    def _scan_points(self, belief: Belief, setup: LocalizerSetup) -> list[FloatArray]:
+        """(B, 2) end points of the beams of each scanner's newest scan [m], map frame, in the order of the setup."""
         log = self._result.inputs.log
         indices = setup.indices_of(log.scanners)
-        points = [np.empty((0, 2))]
+        points = [np.empty((0, 2)) for _ in setup.scanners]
         for scans in log.scans:
             newest = int(np.searchsorted(scans.stamps_ns, self._at_ns, side="right")) - 1
             if newest >= 0:
-                T_map_scanner = se2.compose(belief.mean, setup.scanners[int(indices[scans.scanner])].mounting)
-                points.append(se2.transform_points(T_map_scanner, _end_points(scans.scan(newest))))
-        return np.concatenate(points)
+                scanner = int(indices[scans.scanner])
+                T_map_scanner = se2.compose(belief.mean, setup.scanners[scanner].mounting)
+                points[scanner] = se2.transform_points(T_map_scanner, _end_points(scans.scan(newest)))
+        return points
 
 
 def _end_points(scan: Scan) -> FloatArray:

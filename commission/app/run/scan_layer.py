@@ -1,8 +1,8 @@
-"""The newest scan: where each beam ended, seen from the estimated pose."""
+"""The newest scan of each scanner: where each beam ended, seen from the estimated pose."""
 
 from __future__ import annotations
 
-from viser import SceneApi, SceneNodeHandle
+from viser import PointCloudHandle, SceneApi
 
 from commission.app.base import theme
 from commission.app.base.drawing import lift
@@ -19,23 +19,31 @@ class ScanLayer(BaseLayer):
 
     name = "Scan"
     rank = 160
-    legend = (theme.Legend("scan point (paper: dark)", theme.SCAN, theme.Mark.DOT),)
+    legend = (
+        theme.Legend("scan point (paper: dark)", theme.SCAN, theme.Mark.DOT),
+        theme.Legend("scan point of a further scanner", theme.FURTHER_SCAN, theme.Mark.DOT),
+    )
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._points = add_points(scene, "/run/scan", theme.SCAN, 0.04)
+        self._further = add_points(scene, "/run/further_scan", theme.FURTHER_SCAN, 0.04)
 
     def show_site(self, project: Project) -> None:
         """Adapt the size of points to the site's."""
-        self._points.point_size = 0.4 * extent_of(project).mark_size()
+        for points in self.nodes():
+            points.point_size = 0.4 * extent_of(project).mark_size()
 
     def draw(self, view: PageView) -> None:
-        """Draw the newest scan."""
+        """Draw the newest scans."""
         run = view.part(RunView)
         if run is None:
             return
-        self._points.points = lift(run.scan_map, theme.Height.SCAN)
+        self._points.points = lift(run.scan_map[: run.first_scan], theme.Height.SCAN)
+        # An empty cloud is sent only when there was something in it.
+        if run.first_scan < len(run.scan_map) or len(self._further.points):
+            self._further.points = lift(run.scan_map[run.first_scan :], theme.Height.SCAN)
 
-    def nodes(self) -> tuple[SceneNodeHandle, ...]:
-        """Return the points."""
-        return (self._points,)
+    def nodes(self) -> tuple[PointCloudHandle, ...]:
+        """Return the points of the first scanner and those of the others."""
+        return self._points, self._further

@@ -1,14 +1,15 @@
-"""The vehicle at its estimated pose: outline, heading and what its scanner sees in the plan, its body in 3D.
+"""The vehicle at its estimated pose: outline, heading and what its scanners see in the plan, its body in 3D.
 
 Before anything drives it stands at the start of the first route, so that what is edited of it is seen.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from viser import SceneApi, SceneNodeHandle
+from viser import FrameHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import heading_mark, outline_segments, stroke_segments, yaw_quaternion
@@ -80,26 +81,37 @@ class VehicleLayer(BaseLayer):
             for name, color in (("near", theme.FIELD), ("far", theme.FAR_FIELD))
         )
         self._drives = False
-        self._scanner = scene.add_frame("/vehicle/scanner", axes_length=0.15, axes_radius=0.008, origin_radius=0.02)
+        self._scene = scene
+        self._scanners: list[FrameHandle] = []
 
     def show_site(self, project: Project) -> None:
-        """Draw the outline, the place of the first scanner, and the field of view of each."""
+        """Draw the outline, and place and field of view of each scanner."""
         self._project = project
         outline = np.array(project.vehicle.outline)
         sides = outline_segments(outline[np.newaxis], theme.Height.VEHICLE)
         arrow = stroke_segments(heading_mark(outline), theme.Height.VEHICLE)
         self._lines.points = np.concatenate([sides, arrow])
-        x, y, heading = (float(value) for value in project.scanners[0].mounting)
-        self._scanner.position = (x, y, theme.Height.VEHICLE)
-        self._scanner.wxyz = yaw_quaternion(heading)
         size = float(np.abs(outline).max())
-        self._scanner.axes_length = 0.3 * size
+        self._place_scanners(project.scanners, 0.3 * size)
         near = [fan(scanner, NEAR_FAN * size) for scanner in project.scanners]
         far = [fan(scanner, reach_of(scanner)) for scanner in project.scanners]
         for node, fans in ((self._near, near), (self._far, far)):
             node.points = stroke_segments(np.concatenate(fans), theme.Height.GRID)
         if not self._drives:
             self._wait(project)
+
+    def _place_scanners(self, scanners: Sequence[Scanner], length: float) -> None:
+        """Put axes of a length [m] where each scanner is mounted."""
+        for index in range(len(self._scanners), len(scanners)):
+            name = f"/vehicle/scanner/{index}"
+            frame = self._scene.add_frame(name, axes_radius=0.008, origin_radius=0.02, visible=self._lines.visible)
+            self._scanners.append(frame)
+        while len(self._scanners) > len(scanners):
+            self._scanners.pop().remove()
+        for frame, scanner in zip(self._scanners, scanners, strict=True):
+            x, y, heading = (float(value) for value in scanner.mounting)
+            frame.position, frame.wxyz = (x, y, theme.Height.VEHICLE), yaw_quaternion(heading)
+            frame.axes_length = length
 
     def _wait(self, project: Project) -> None:
         """Stand at the start of the first route; without one there is no place to stand at."""
@@ -137,4 +149,4 @@ class VehicleLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the parts that hang on the vehicle's frame (which itself is hidden without a run or a route)."""
-        return self._lines, self._scanner, self._near, self._far
+        return self._lines, *self._scanners, self._near, self._far

@@ -47,7 +47,9 @@ class RunView:
     covered: bool
     """Whether every reflector is covered from the next cycle on, as asked for."""
     scan_map: FloatArray
-    """(B, 2) end points of the newest scan's beams [m], map frame."""
+    """(B, 2) end points of the beams of each scanner's newest scan [m], map frame; those of the first come first."""
+    first_scan: int
+    """How many of these points are the first scanner's."""
     gates: FloatArray
     """(R, n, 2) outlines of the validation areas of the reflectors in view [m], map frame."""
     accumulated: Accumulated | None

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,14 +9,18 @@ from commission.app.run.drives import Drive
 from commission.app.run.playback import Playback
 from commission.app.run.time_line import strip
 from commission.app.run.view import RunView
+from commission.geometry.angles import wrap
+from commission.io.project_file import load_project
 from commission.localization.estimate import Mode, Status
 from commission.localization.localizer import Localizer
 from commission.localization.setup import LocalizerSetup
+from commission.simulation.scenario import virtual_drive
 from commission.site.fields import with_field
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry
 from commission.studies.run import RunInput, RunResult, judged_run
+from commission.studies.start import start_of
 
 COVERED_FROM, COVERED_TO = 15, 75
 """Cycles in which no reflector is seen: with a limit of 30 mm the supervisor fails some seconds later."""
@@ -203,3 +208,21 @@ def test_before_the_first_scan_the_vehicle_stands_at_its_initial_pose(project: P
     assert view.lived == 5
     assert view.scan_map.shape == (0, 2)
     assert np.isnan(view.result.position_errors).all()
+
+
+def test_points_of_the_first_scanner_and_of_the_others_are_told_apart(repository: Path) -> None:
+    site = load_project(repository / "maps" / "loading_bay")
+    site = replace(site, disturbances=site.disturbances.undisturbed())
+    log = virtual_drive(site, site.routes[0].name, 1)
+    playback = Playback(judged_run(RunInput.of(site, log, start_of(site, log))))
+    playback.seek(4.0)
+    view = playback.view(covered=False)
+    assert 0 < view.first_scan < len(view.scan_map)
+    # Each sees past another corner of the vehicle: none of its points lies where its field of view ends.
+    c, s = np.cos(view.pose[2]), np.sin(view.pose[2])
+    points_base = (view.scan_map - view.pose[:2]) @ np.array([[c, -s], [s, c]])
+    parts = points_base[: view.first_scan], points_base[view.first_scan :]
+    for scanner, points in zip(site.scanners, parts, strict=True):
+        offsets = points - scanner.mounting[:2]
+        bearings = wrap(np.arctan2(offsets[:, 1], offsets[:, 0]) - scanner.mounting[2])
+        assert 130.0 < np.degrees(np.abs(bearings)).max() <= 137.5 + 1e-6
