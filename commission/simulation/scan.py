@@ -15,7 +15,7 @@ from commission.geometry.arrays import BoolArray, FloatArray
 from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
 from commission.geometry.se2 import compose
-from commission.simulation.scan_kernels import Hall, Moment, ScannerBeams, cast_scan
+from commission.simulation.scan_kernels import Hall, Moment, ScannerBeams, cast_scan, cast_sweep
 from commission.site.disturbances import Disturbances
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -50,9 +50,15 @@ class VirtualScanner:
         return VirtualScanner(scanner, project.disturbances, hall, _beams(scanner))
 
     def scan(
-        self, T_map_base: FloatArray, circles: FloatArray, rng: np.random.Generator, *, whole: bool = True
+        self,
+        T_map_base: FloatArray,
+        circles: FloatArray,
+        rng: np.random.Generator,
+        *,
+        whole: bool = True,
+        beam_poses: FloatArray | None = None,
     ) -> Echoes:
-        """One scan, taken at one instant.
+        """One scan, taken at one instant or while the vehicle moves.
 
         Parameters
         ----------
@@ -60,7 +66,9 @@ class VirtualScanner:
         circles : (K, 3) x, y and radius of legs and other moving things [m], map frame.
         rng : draws the noise of each beam, then the glints; the number of draws depends on neither pose nor hall.
         whole : False leaves out the beams that can meet no reflector (unless there are glints): what a detector finds
-            is the same to the last bit, in a third of the time.
+            is the same to the last bit, in a third of the time. A sweep is always whole.
+        beam_poses : (B, 3) `T_map_base` at the time of each beam; None takes all beams at one instant. The floor's
+            tilt and the circles are those of the stamp.
 
         Returns
         -------
@@ -72,8 +80,18 @@ class VirtualScanner:
         noise = rng.standard_normal((count, 2))
         T_map_scanner = compose(T_map_base, self.scanner.mounting)
         glinting = self.disturbances.glints_per_scan > 0.0
+        # Upside down, beams go clockwise: the kernel casts them from the last one on, counter-clockwise.
+        if self.scanner.upside_down:
+            noise = np.ascontiguousarray(noise[::-1] * (-1.0, 1.0))
         moment = Moment(T_map_scanner, self.range_limit(T_map_base), circles, noise, whole or glinting)
-        cast_scan(self.hall, self.beams, moment, ranges, flags)
+        if beam_poses is None:
+            cast_scan(self.hall, self.beams, moment, ranges, flags)
+        else:
+            poses = compose(beam_poses, self.scanner.mounting)
+            poses = np.ascontiguousarray(poses[::-1]) if self.scanner.upside_down else poses
+            cast_sweep(self.hall, self.beams, moment._replace(pose=poses), ranges, flags)
+        if self.scanner.upside_down:
+            ranges, flags = ranges[::-1].copy(), flags[::-1].copy()
         self._glint(ranges, flags, rng)
         return ranges, flags
 
@@ -92,9 +110,10 @@ class VirtualScanner:
 
 
 def _beams(scanner: Scanner) -> ScannerBeams:
-    """Numbers of the scanner for the kernel."""
+    """Numbers of the scanner for the kernel, whose beams go counter-clockwise seen from above."""
+    last = scanner.angle_min + (scanner.beam_count - 1) * scanner.angle_increment
     return ScannerBeams(
-        scanner.angle_min,
+        -last if scanner.upside_down else scanner.angle_min,
         scanner.angle_increment,
         0.5 * math.radians(scanner.beam_width_deg),
         0.5 * scanner.beam_aperture,
@@ -124,3 +143,4 @@ def warm_up() -> None:
     scanner = Scanner(field_of_view_deg=(-1.0, 1.0), resolution_deg=1.0)
     virtual = VirtualScanner.of(Project(scanners=(scanner,)), scanner)
     virtual.scan(np.zeros(3), np.array([[1.0, 0.0, 0.1]]), np.random.default_rng(0))
+    virtual.scan(np.zeros(3), np.empty((0, 3)), np.random.default_rng(0), beam_poses=np.zeros((3, 3)))

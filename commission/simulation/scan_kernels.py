@@ -1,7 +1,7 @@
 """One scan, compiled: beams against walls, reflectors, shiny objects and legs, kept by the nearest echo of each beam.
 
-Objects are visited by the interval of beams that can meet them, so their number hardly matters. The scan is taken at
-one instant; a real scanner turns while the vehicle moves (1 cm at 0.5 m/s and 50 turns a second).
+Objects are visited by the interval of beams that can meet them, so their number hardly matters. A scan is taken at one
+instant, or as a sweep, each beam from a pose of its own.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class Moment(NamedTuple):
     """What differs from scan to scan."""
 
     pose: FloatArray
-    """(3,) `T_map_scanner` [m, m, rad]."""
+    """(3,) `T_map_scanner` [m, m, rad]; of a sweep (B, 3), that at the time of each beam."""
     range_limit: float
     """Range at which every beam meets the floor [m]; infinity on even floor."""
     circles: FloatArray
@@ -141,6 +141,34 @@ def cast_scan(hall: Hall, beams: ScannerBeams, moment: Moment, ranges: NDArray[n
         if not beams.nearest <= measured <= beams.farthest:
             measured, flags[i] = math.nan, False
         ranges[i] = measured
+
+
+@compiled
+def cast_sweep(hall: Hall, beams: ScannerBeams, moment: Moment, ranges: NDArray[np.float32], flags: BoolArray) -> None:
+    """Take one scan while the scanner moves.
+
+    Parameters
+    ----------
+    hall, beams, moment : as in `cast_scan`, but with a pose for each beam; all beams are cast.
+    ranges, flags : (B,) outputs as in `cast_scan`.
+
+    Notes
+    -----
+    Each beam is a scan of one beam from its own pose: nothing is approximated.
+    """
+    for i in range(len(ranges)):
+        beam = ScannerBeams(
+            beams.angle_min + i * beams.increment,
+            beams.increment,
+            beams.half_width,
+            beams.bearing_sigma,
+            beams.range_sigma,
+            beams.nearest,
+            beams.farthest,
+            beams.reflector_range,
+        )
+        here = Moment(moment.pose[i], moment.range_limit, moment.circles, moment.noise[i : i + 1], True)
+        cast_scan(hall, beam, here, ranges[i : i + 1], flags[i : i + 1])
 
 
 @compiled

@@ -26,7 +26,7 @@ from commission.site.path import legs_of
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.records import ORDER_WITHIN_A_STAMP, Odometry, Record, ReferencePose, Scan
-from commission.site.scanner import scan_moments
+from commission.site.scanner import Scanner, scan_moments
 
 START, WHEELS, BEAMS, PEOPLE, LOSSES = range(5)
 """Streams of random numbers of one seed."""
@@ -102,13 +102,15 @@ def records(
     stamps, scanners = scan_moments(project.scanners, motion.duration_ns)
     poses = motion.poses_at(stamps)
     moments = list(itertools.starmap(_Moment, zip(stamps.tolist(), scanners.tolist(), poses, strict=True)))
-    scans = _scans(project, site, seed, _told(moments, progress), options.whole_scans)
+    scans = _scans(project, site, seed, _swept(_told(moments, progress), motion, project), options.whole_scans)
     shown, first = np.unique(stamps, return_index=True)
     yield from heapq.merge(
         _odometry(motion, displacements),
         _reference(shown, poses[first]),
         *(
-            _reported(_of_scanner(all_scans, index), error_of(truth, project.scanners[index].name))
+            _reported(
+                _of_scanner(all_scans, index), project.scanners[index], error_of(truth, project.scanners[index].name)
+            )
             for index, all_scans in enumerate(itertools.tee(scans, len(project.scanners)))
         ),
         key=lambda record: (record.stamp_ns, ORDER_WITHIN_A_STAMP[type(record)]),
@@ -143,11 +145,23 @@ def _reference(stamps: IntArray, poses: FloatArray) -> Iterator[Record]:
 
 
 class _Moment(NamedTuple):
-    """When a scanner scans: stamp [ns], index of the scanner, and the true pose of base."""
+    """When a scanner scans: stamp [ns], index of the scanner, pose of base, and (B, 3) those of the beams' times."""
 
     stamp_ns: int
     scanner: int
     pose: FloatArray
+    beam_poses: FloatArray | None = None
+
+
+def _swept(moments: Iterable[_Moment], motion: TrueMotion, project: Project) -> Iterator[_Moment]:
+    """Add the true pose at each beam's time where a sweep takes time; the vehicle stands before and after the drive."""
+    offsets = [np.rint(1e9 * scanner.beam_times).astype(np.int64) for scanner in project.scanners]
+    for moment in moments:
+        if project.scanners[moment.scanner].sweep_duration == 0.0:
+            yield moment
+        else:
+            stamps = np.clip(moment.stamp_ns + offsets[moment.scanner], 0, motion.duration_ns)
+            yield moment._replace(beam_poses=motion.poses_at(stamps))
 
 
 def _scans(
@@ -163,12 +177,12 @@ def _scans(
         crowd = Crowd(WalkableFloor.of(project), disturbances.people, disturbances.walking_speed, walkers)
     nobody = np.empty((0, 3))
     before = -scanners[0].period_ns
-    for stamp, index, pose in moments:
+    for stamp, index, pose, beam_poses in moments:
         if crowd is not None:
             crowd.step(1e-9 * (stamp - before), pose)
         before = stamp
         legs = nobody if crowd is None else crowd.legs()
-        ranges, flags = virtual[index].scan(pose, legs, beams[index], whole=whole)
+        ranges, flags = virtual[index].scan(pose, legs, beams[index], whole=whole, beam_poses=beam_poses)
         if any(0.0 <= 1e-9 * stamp - period.start < period.duration for period in disturbances.covered):
             flags[:] = False
         record = Scan(
@@ -188,9 +202,9 @@ def _of_scanner(scans: Iterable[tuple[int, Scan | None]], scanner: int) -> Itera
     return (record for index, record in scans if index == scanner)
 
 
-def _reported(scans: Iterable[Scan | None], error: ScannerError) -> Iterator[Scan]:
+def _reported(scans: Iterable[Scan | None], scanner: Scanner, error: ScannerError) -> Iterator[Scan]:
     """Scans that a scanner reports whose ranges and clock are off; what it stamps before the drive is lost."""
-    late_ns = round(1e9 * error.clock_offset)
+    late_ns = round(1e9 * (scanner.clock_offset + error.clock_offset))
     for record in scans:
         if record is None:
             continue

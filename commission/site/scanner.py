@@ -197,6 +197,15 @@ class Scanner:
         return count - 1 if (count - 1) * self.resolution_deg > 360.0 - 0.5 * self.resolution_deg else count
 
     @property
+    def beam_times(self) -> FloatArray:
+        """When each beam is measured after the stamp of its scan: (B,) array [s], negative before it."""
+        share = np.arange(self.beam_count) / max(self.beam_count - 1, 1)
+        if self.sweep_direction < 0:
+            share = 1.0 - share
+        at_stamp = {StampOf.FIRST: 0.0, StampOf.MIDDLE: 0.5, StampOf.LAST: 1.0}[self.stamp_of]
+        return self.sweep_duration * (share - at_stamp)
+
+    @property
     def period_ns(self) -> int:
         """Time between scans [ns]."""
         return round(1e9 / self.rate)
