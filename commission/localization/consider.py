@@ -14,10 +14,9 @@ import numpy as np
 from commission.compiled import compiled_inline
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray
-from commission.geometry.se2 import log_scalars
 from commission.localization.kalman import Gain, Innovation, corrected_covariance, gain
 from commission.localization.observation import Expected, ObservationModel, expect, scanner_offset
-from commission.localization.odometry import Motion, NextOdometry
+from commission.localization.odometry import Motion, NextOdometry, velocity
 from commission.localization.pose_gaussian import PoseGaussian
 
 PER_REFLECTOR = 2
@@ -97,27 +96,12 @@ def considering(  # noqa: PLR0917 - what the filter knows of its motion
 
     Notes
     -----
-    Velocity is log(displacement) / time, by definition of a constant twist.
+    No formula: a difference, and `velocity`.
     """
     if cross is None:
         return None
-    forward, left, turn = 0.0, 0.0, 0.0
-    if following.known:
-        forward, left, turn = log_scalars(following.dx, following.dy, following.dtheta)
-        per_second = 1e9 / (following.stamp_ns - motion.odometry_ns)
-    elif motion.period_ns > 0:
-        forward, left, turn = log_scalars(motion.dx, motion.dy, motion.dtheta)
-        per_second = 1e9 / motion.period_ns
-    else:
-        per_second = 0.0
-    return Considering(
-        variances,
-        belief.x - pivot[0],
-        belief.y - pivot[1],
-        per_second * forward,
-        per_second * left,
-        per_second * turn,
-    )
+    speed_x, speed_y, turn_rate = velocity(motion, following)
+    return Considering(variances, belief.x - pivot[0], belief.y - pivot[1], speed_x, speed_y, turn_rate)
 
 
 @compiled_inline

@@ -57,7 +57,9 @@ class Estimate:
     mode: Mode
     """State of the supervisor after this scan."""
     detections: FloatArray
-    """(N, 2) range [m] and bearing [rad] of each detection and rejected cluster, scanner frame."""
+    """(N, 2) range [m] and bearing [rad] of each detection or rejected cluster at the stamp, scanner frame, upright."""
+    measured: FloatArray
+    """(N, 2) the same as the scanner measured them: each at its own time, mirrored where it hangs upside down."""
     beams: IntArray
     """(N,) beams of each cluster; 0 where the sensor itself detected."""
     expected_beams: FloatArray

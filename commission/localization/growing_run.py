@@ -38,6 +38,7 @@ class DetectionRows(NamedTuple):
     """A row per detection."""
 
     range_bearing: FloatArray
+    measured: FloatArray
     beams: IntArray
     expected_beams: FloatArray
     detected: NDArray[np.int8]
@@ -73,6 +74,7 @@ class GrowingRun:
         )
         self._offsets: IntArray = np.zeros(n + 1, np.int64)
         self._detections = DetectionRows(
+            np.empty((n, 2)),
             np.empty((n, 2)),
             np.empty(n, np.int64),
             np.empty(n),
@@ -135,7 +137,7 @@ class GrowingRun:
             stamps_ns=cycles.stamps_ns,
             scanners=cycles.scanners,
             offsets=offsets,
-            range_bearing=rows.range_bearing,
+            range_bearing=rows.measured,
             beams=rows.beams,
             expected=rows.expected_beams,
             status=rows.detected,
@@ -144,6 +146,7 @@ class GrowingRun:
             segments=tuple(segment for segment in self._segments if segment.first < max(n, 1)),
             checkpoints=tuple(self._checkpoints),
             detected=detected,
+            range_bearing=rows.range_bearing,
             prior_means=cycles.prior_means,
             prior_covariances=cycles.prior_covariances,
             means=cycles.means,
@@ -171,6 +174,7 @@ class GrowingRun:
         cycles.modes[row] = estimate.mode
         rejected = estimate.status == Status.OUTLIER_DETECTOR
         found.range_bearing[first:last], found.beams[first:last] = estimate.detections, estimate.beams
+        found.measured[first:last] = estimate.measured
         found.expected_beams[first:last] = estimate.expected_beams
         found.detected[first:last] = np.where(rejected, estimate.status, INLIER)
         found.status[first:last], found.reflectors[first:last] = estimate.status, estimate.reflector

@@ -11,7 +11,7 @@ from collections import deque
 import numpy as np
 
 from commission.errors import SourceError
-from commission.geometry.arrays import IntArray, read_only
+from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.cross_covariance import columns_of, cross_covariance
 from commission.localization.cycle import process_odometry, process_scan
 from commission.localization.detector import DetectedReflectors, detect
@@ -21,6 +21,7 @@ from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import to_belief
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, belief_of, output_of, state_at_start
+from commission.localization.sweep import Sweep, bring_to_stamp
 from commission.site.parameters import Parameters
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -32,7 +33,8 @@ LAST_NS = 2**63 - 1
 
 def warm_up() -> None:
     """Compile every kernel that a live localizer needs, by feeding it one record of each kind."""
-    setup = LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), (Scanner(),), Parameters())
+    sweeping = Scanner(sweep_duration=0.01)
+    setup = LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), (sweeping,), Parameters())
     localizer = Localizer(setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3)))
     localizer.feed(Odometry(0, np.zeros(3)))
     localizer.feed(Odometry(1, np.zeros(3)))
@@ -194,10 +196,20 @@ class Localizer:
         moved = process_odometry(state._replace(cross=None), record.stamp_ns, dx, dy, dtheta, noise)
         self._state = moved._replace(cross=state.cross)
 
+    def _at_stamp(self, scanner: int, measured: FloatArray, following: NextOdometry) -> FloatArray:
+        """Return the detections of a scan at its stamp, upright: what was measured, where there is no other."""
+        setup, sweeps = self._setup, self._setup.sweep_rows
+        if not len(sweeps):
+            return measured
+        settled, sweep, model = np.empty(measured.shape), Sweep(*sweeps[scanner].tolist()), setup.observations[scanner]
+        bring_to_stamp(self._state.motion, following, 0, len(measured), measured, sweep, model, settled)
+        return read_only(settled)
+
     def _process(self, scan: Scan | Detections, seen: DetectedReflectors, following: NextOdometry) -> Estimate:
         """Predict to the scan's stamp, associate, correct, supervise."""
         model, stamp_ns = self._setup.filter, scan.stamp_ns
-        detections = read_only(seen.range_bearing)
+        measured = read_only(seen.range_bearing)
+        detections = self._at_stamp(scan.scanner, measured, following)
         count = len(detections)
         status = seen.status.copy()
         reflector: IntArray = np.empty(count, dtype=np.int64)
@@ -235,6 +247,7 @@ class Localizer:
             output=output_of(cycle.state),
             mode=self.mode,
             detections=detections,
+            measured=measured,
             beams=seen.beams,
             expected_beams=seen.expected,
             points_map=points,

@@ -18,6 +18,9 @@ FIRST_WAIT_NS = 500_000_000
 """How long a scan waits for the second odometry record: before it, nothing says how often one comes."""
 GAP_INTERVALS = 3
 """Odometry is missing where none came for as many of its intervals."""
+TREND_NS = 100_000_000
+"""Time over which the velocity of a sweep is averaged: the noise of one short interval, carried on over a sweep of
+125 ms, is larger than what a vehicle accelerates in this time."""
 LEAST_GAP_NS = 200_000_000
 """No shorter pause means that odometry is missing: drivers send it in bunches."""
 
@@ -62,6 +65,10 @@ class Motion(NamedTuple):
     ahead_theta: float
     usual_ns: int
     """Longest interval between odometry records of late: how long a scan waits for the one that follows it."""
+    trend_x: float
+    """Velocity of late, averaged over `TREND`: one interval of odometry is noisier [m/s, m/s, rad/s], in base."""
+    trend_y: float
+    trend_theta: float
 
 
 class NextOdometry(NamedTuple):
@@ -76,7 +83,7 @@ class NextOdometry(NamedTuple):
     dtheta: float
 
 
-AT_REST = Motion(False, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+AT_REST = Motion(False, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0.0, 0.0, 0.0)
 NOT_YET = NextOdometry(False, 0, 0.0, 0.0, 0.0)
 
 
@@ -113,6 +120,57 @@ def waits_until(motion: Motion, stamp_ns: int) -> int:
     if not motion.started or stamp_ns <= motion.odometry_ns:
         return stamp_ns
     return stamp_ns + (motion.usual_ns if motion.usual_ns > 0 else FIRST_WAIT_NS)
+
+
+@compiled_inline
+def velocity(motion: Motion, following: NextOdometry) -> tuple[float, float, float]:
+    """Forward, left and turning speed at a scan [m/s, m/s, rad/s], in base; zero while no odometry says otherwise.
+
+    Parameters
+    ----------
+    motion : before the scan.
+    following : the odometry record after the scan, where it is known: the scan lies in its interval.
+
+    Notes
+    -----
+    log(displacement) / time: the constant twist of the interval (Solà et al. 2018, equation 157).
+    """
+    if following.known:
+        forward, left, turn = log_scalars(following.dx, following.dy, following.dtheta)
+        per_second = 1e9 / (following.stamp_ns - motion.odometry_ns)
+    elif motion.period_ns > 0:
+        forward, left, turn = log_scalars(motion.dx, motion.dy, motion.dtheta)
+        per_second = 1e9 / motion.period_ns
+    else:
+        return 0.0, 0.0, 0.0
+    return per_second * forward, per_second * left, per_second * turn
+
+
+@compiled_inline
+def trend(motion: Motion, stamp_ns: int, dx: float, dy: float, dtheta: float) -> tuple[float, float, float]:
+    """Velocity of late after one more record [m/s, m/s, rad/s], in base.
+
+    Parameters
+    ----------
+    motion : before the record.
+    stamp_ns : of the record [ns].
+    dx, dy, dtheta : its displacement [m, m, rad].
+
+    Notes
+    -----
+    v + w (log(displacement) / t - v), w = t / (t + TREND): exponential smoothing, of its first value that itself.
+    """
+    period_ns = stamp_ns - motion.odometry_ns
+    if period_ns <= 0:
+        return motion.trend_x, motion.trend_y, motion.trend_theta
+    forward, left, turn = log_scalars(dx, dy, dtheta)
+    rate = 1e9 / period_ns
+    weight = period_ns / (period_ns + TREND_NS) if motion.period_ns > 0 else 1.0
+    return (
+        motion.trend_x + weight * (rate * forward - motion.trend_x),
+        motion.trend_y + weight * (rate * left - motion.trend_y),
+        motion.trend_theta + weight * (rate * turn - motion.trend_theta),
+    )
 
 
 @compiled_inline
@@ -215,7 +273,7 @@ def advance(  # noqa: PLR0917 - one odometry record, number by number
     motion, by definition.
     """
     if not motion.started:
-        return belief, Motion(True, stamp_ns, stamp_ns, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
+        return belief, Motion(True, stamp_ns, stamp_ns, 0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0.0, 0.0, 0.0)
     rest_x, rest_y, rest_theta = dx, dy, dtheta
     if motion.belief_ns != motion.odometry_ns:
         back_x, back_y, back_theta = inverse_scalars(motion.ahead_x, motion.ahead_y, motion.ahead_theta)
@@ -229,7 +287,23 @@ def advance(  # noqa: PLR0917 - one odometry record, number by number
         moved = _spread(moved, _missed(noise, usual_ns, period_ns), _missed(noise, usual_ns, reached_ns))
     else:
         usual_ns = max(period_ns, usual_ns - usual_ns // 16)
-    return moved, Motion(True, stamp_ns, stamp_ns, period_ns, dx, dy, dtheta, 0.0, 0.0, 0.0, usual_ns)
+    trend_x, trend_y, trend_theta = trend(motion, stamp_ns, dx, dy, dtheta)
+    return moved, Motion(
+        True,
+        stamp_ns,
+        stamp_ns,
+        period_ns,
+        dx,
+        dy,
+        dtheta,
+        0.0,
+        0.0,
+        0.0,
+        usual_ns,
+        trend_x,
+        trend_y,
+        trend_theta,
+    )
 
 
 class Unmeasured(NamedTuple):
@@ -366,4 +440,7 @@ def reach(
         ahead_y,
         ahead_theta,
         motion.usual_ns,
+        motion.trend_x,
+        motion.trend_y,
+        motion.trend_theta,
     )

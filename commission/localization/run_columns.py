@@ -61,6 +61,8 @@ class RunColumns:
     """States along the way, the one before the first record first: `whole_run.state_before` resumes from them."""
     detected: DetectionLog
     """Stamps of the cycles, rows of their detections, and the detections as measured."""
+    range_bearing: FloatArray
+    """(n, 2) range [m] and bearing [rad] of each detection at the stamp of its scan, scanner frame, upright."""
     prior_means: FloatArray
     """(K, 3) `T_map_base` after *predict* [m, m, rad]."""
     prior_covariances: FloatArray
@@ -103,11 +105,6 @@ class RunColumns:
     def offsets(self) -> IntArray:
         """(K + 1,) detections of cycle k: offsets[k] to offsets[k + 1]."""
         return self.detected.offsets
-
-    @property
-    def range_bearing(self) -> FloatArray:
-        """(n, 2) range [m] and bearing [rad] of each detection, scanner frame."""
-        return self.detected.range_bearing
 
     @property
     def beams(self) -> IntArray:
@@ -164,6 +161,7 @@ class RunColumns:
             output=self._output(cycle),
             mode=Mode(int(self.modes[cycle])),
             detections=detections,
+            measured=self.detected.range_bearing[rows],
             beams=self.beams[rows],
             expected_beams=self.expected_beams[rows],
             points_map=points,

@@ -21,6 +21,7 @@ from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.run_columns import RunColumns
 from commission.localization.setup import FilterModel, LocalizerSetup
 from commission.localization.state import FilterState
+from commission.localization.sweep import bring_to_stamp, sweep_at
 from commission.site.record_log import RecordLog
 
 
@@ -35,10 +36,18 @@ class Columns(NamedTuple):
     status: NDArray[np.int8]
     reflectors: IntArray
     d2: FloatArray
+    settled: FloatArray
+    """(n, 2) detections at the stamp of their scan, upright; (0, 2) where they are what was measured."""
 
 
-def empty_columns(detected: DetectionLog) -> Columns:
-    """Columns to be written, the detector's verdict in them."""
+def empty_columns(detected: DetectionLog, *, sweeping: bool) -> Columns:
+    """Columns to be written, the detector's verdict in them.
+
+    Parameters
+    ----------
+    detected : what was measured.
+    sweeping : whether any scanner measures other than at once and upright.
+    """
     cycles, total = len(detected), len(detected.range_bearing)
     return Columns(
         np.empty((cycles, 3)),
@@ -49,6 +58,7 @@ def empty_columns(detected: DetectionLog) -> Columns:
         detected.status.copy(),
         np.empty(total, dtype=np.int64),
         np.empty(total),
+        detected.range_bearing.copy() if sweeping else np.empty((0, 2)),
     )
 
 
@@ -71,6 +81,7 @@ def cut(columns: Columns, detected: DetectionLog, first: int, last: int) -> Colu
         columns.status[rows],
         columns.reflectors[rows],
         columns.d2[rows],
+        columns.settled[rows] if len(columns.settled) else columns.settled,
     )
 
 
@@ -91,6 +102,8 @@ def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: in
     columns.status[:detections] = earlier.status[:detections]
     columns.reflectors[:detections] = earlier.reflector[:detections]
     columns.d2[:detections] = earlier.d2[:detections]
+    if len(columns.settled):
+        columns.settled[:detections] = earlier.range_bearing[:detections]
 
 
 class CycleStretch(NamedTuple):
@@ -119,6 +132,7 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
     # One row more than is delivered: the last scans may lie between it and the row before.
     rows = slice(first, last + 1)
     cross = columns_of(state.cross, setup.constants)
+    settled = stretch.columns.settled
     after = _run(
         read_only(log.odometry_stamps_ns[rows]),
         read_only(log.displacements[rows]),
@@ -126,9 +140,11 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
         detected.stamps_ns,
         detected.offsets,
         detected.range_bearing,
+        read_only(settled) if len(settled) else detected.range_bearing,
         detected.scanners,
         setup.filter,
         setup.observation_rows,
+        setup.sweep_rows,
         setup.index.places,
         setup.index.offsets,
         cross,
@@ -149,10 +165,12 @@ def _run(  # noqa: PLR0917 - the columns of the log
     delivered: int,
     scan_stamps: IntArray,
     offsets: IntArray,
+    measured: FloatArray,
     detections: FloatArray,
     scanners: IntArray,
     model: FilterModel,
     observations: FloatArray,
+    sweeps: FloatArray,
     places: FloatArray,
     cell_offsets: IntArray,
     cross: FloatArray | None,
@@ -161,9 +179,10 @@ def _run(  # noqa: PLR0917 - the columns of the log
 ) -> FilterState:
     """Deliver odometry and scans in the order of their stamps, odometry first; return the state after the last.
 
-    Of the odometry the rows up to `delivered`; the one behind them only tells the motion of scans before it.
+    Of the odometry the rows up to `delivered`; the one behind them only tells the motion of scans before it. Where
+    there are sweeps, `detections` is a view of the column `settled`, which is written before it is read.
     """
-    prior_means, prior_covariances, means, covariances, modes, status, reflectors, d2 = columns
+    prior_means, prior_covariances, means, covariances, modes, status, reflectors, d2, settled = columns
     rows = 0
     for k in range(len(scan_stamps)):
         while rows < delivered and odometry_stamps[rows] <= scan_stamps[k]:
@@ -174,6 +193,10 @@ def _run(  # noqa: PLR0917 - the columns of the log
         if rows < len(odometry_stamps) and odometry_stamps[rows] <= waits_until(state.motion, scan_stamps[k]):
             dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
             following = NextOdometry(True, odometry_stamps[rows], dx, dy, dtheta)
+        observation = observation_at(observations, scanners[k])
+        if len(sweeps):
+            sweep = sweep_at(sweeps, scanners[k])
+            bring_to_stamp(state.motion, following, offsets[k], offsets[k + 1], measured, sweep, observation, settled)
         cycle = process_scan(
             state,
             scan_stamps[k],
@@ -181,7 +204,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
             offsets[k + 1],
             detections,
             model,
-            observation_at(observations, scanners[k]),
+            observation,
             places,
             cell_offsets,
             cross,

@@ -26,6 +26,7 @@ from commission.localization.odometry import OdometryNoise, odometry_noise
 from commission.localization.reflector_index import Cells, ReflectorIndex, build_index
 from commission.localization.rejection import RejectionRule, rejection_rule
 from commission.localization.supervisor import SupervisorLimits, supervisor_limits
+from commission.localization.sweep import sweep_of, sweep_rows
 from commission.site.parameters import Parameters
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -74,6 +75,8 @@ class LocalizerSetup:
     """Mounting and noise of each scanner."""
     observation_rows: FloatArray = field(init=False, repr=False, compare=False)
     """(S, 6) the same, for kernels."""
+    sweep_rows: FloatArray = field(init=False, repr=False, compare=False)
+    """(S, 4) when and which way up each scanner measures, for kernels; (0, 4) where nothing is to be done."""
     detectors: tuple[DetectorModel, ...] = field(init=False, repr=False, compare=False)
     """Scalars and tables of the detector, for each scanner."""
 
@@ -96,6 +99,7 @@ class LocalizerSetup:
         observations = tuple(observation_model(each, self.parameters.observation) for each in self.scanners)
         object.__setattr__(self, "observations", observations)
         object.__setattr__(self, "observation_rows", observation_rows(observations))
+        object.__setattr__(self, "sweep_rows", sweep_rows([sweep_of(each) for each in self.scanners]))
         detectors = tuple(detector_model(self.reflectors, each, self.parameters.detector) for each in self.scanners)
         object.__setattr__(self, "detectors", detectors)
 

@@ -121,7 +121,8 @@ def state_before(run: RunColumns, log: RecordLog, cycle: int) -> FilterState:
     state = checkpoint.state
     for segment, first, last in _chunks(run.segments, checkpoint.cycle, cycle):
         detected = run.detected.part(first, last)
-        stretch = CycleStretch(_odometry_rows(log, run.stamps_ns, first, last), detected, empty_columns(detected))
+        columns = empty_columns(detected, sweeping=len(segment.setup.sweep_rows) > 0)
+        stretch = CycleStretch(_odometry_rows(log, run.stamps_ns, first, last), detected, columns)
         state = continued(log, segment.setup, state, stretch)
     return state
 
@@ -187,7 +188,7 @@ def _filtered(
 ) -> RunColumns:
     """Run the filter from the last known checkpoint on; the cycles before it are taken from an earlier run."""
     (begin, state), cycles = known[-1], len(detected)
-    columns = empty_columns(detected)
+    columns = empty_columns(detected, sweeping=any(len(segment.setup.sweep_rows) for segment in segments))
     if earlier is not None:
         take_over(earlier, columns, begin, int(detected.offsets[begin]))
     checkpoints = list(known)
@@ -211,6 +212,7 @@ def _filtered(
         status=columns.status,
         reflector=columns.reflectors,
         d2=columns.d2,
+        range_bearing=columns.settled if len(columns.settled) else detected.range_bearing,
         final=_final(log, segments[-1].setup, detected.part(cycles, cycles), checkpoints[-1], detected.stamps_ns),
     )
 
@@ -221,7 +223,7 @@ def _final(
     """State after the last record: motion after the last scan is taken in, what is no cycle counts as a record."""
     begin, _ = _odometry_rows(log, stamps_ns, last.cycle, last.cycle)
     rows = (begin, len(log.odometry_stamps_ns))
-    final = continued(log, setup, last.state, CycleStretch(rows, nothing, empty_columns(nothing)))
+    final = continued(log, setup, last.state, CycleStretch(rows, nothing, empty_columns(nothing, sweeping=False)))
     if len(log) == 0:
         return final
     own = final.sensor_detects or len(log.detection_stamps_ns) > 0

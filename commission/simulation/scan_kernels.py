@@ -160,7 +160,8 @@ def cast_sweep(hall: Hall, beams: ScannerBeams, moment: Moment, ranges: NDArray[
         beam = ScannerBeams(
             beams.angle_min + i * beams.increment,
             beams.increment,
-            beams.half_width,
+            beams.half_divergence,
+            beams.half_aperture,
             beams.bearing_sigma,
             beams.range_sigma,
             beams.nearest,
