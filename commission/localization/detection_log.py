@@ -10,17 +10,9 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled, compiled_parallel, parallel_range
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
-from commission.localization.detector import (
-    INLIER,
-    BeamColumns,
-    DetectorModel,
-    beams_at,
-    beams_of,
-    count_clusters,
-    detect_clusters,
-    reflective_beams,
-    room_for,
-)
+from commission.localization.clusters import count_clusters
+from commission.localization.detector import INLIER, detect_clusters, reflective_beams, room_for
+from commission.localization.detector_model import BeamColumns, DetectorModel, beams_at, beams_of
 from commission.localization.setup import LocalizerSetup
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanLog

@@ -14,7 +14,7 @@ from commission.geometry.gaussian import ellipse_points
 from commission.localization.association import Gate, gate_of
 from commission.localization.consider import ConsiderModel
 from commission.localization.cross_covariance import Constants, constants_of, survey_variance
-from commission.localization.detector import DetectorModel, detector_model
+from commission.localization.detector_model import DetectorModel, detector_model
 from commission.localization.estimate import Belief
 from commission.localization.observation import (
     ObservationModel,

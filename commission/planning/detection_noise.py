@@ -16,7 +16,8 @@ import numpy as np
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.beam_echo import BeamModel, cylinder_echo, half_width_at, is_flagged, lit_part
-from commission.localization.detector import INLIER, Beams, DetectorModel, detect_clusters, detector_model
+from commission.localization.detector import INLIER, detect_clusters
+from commission.localization.detector_model import Beams, DetectorModel, detector_model
 from commission.site.parameters import DetectorParameters
 from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
@@ -123,7 +124,12 @@ def detection_noise(
 def detection_table(
     reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorParameters, farthest: float | None = None
 ) -> DetectionTable:
-    """Find out how reflectors of a map are detected: see `detection_noise`, whose arguments it has."""
+    """Find out how the reflectors of a map are detected, and what their detections are worth.
+
+    Parameters
+    ----------
+    reflectors, scanner, parameters, farthest : as in `detection_noise`.
+    """
     optics = _Optics(
         scanner.angle_increment,
         BeamModel(

@@ -68,7 +68,10 @@ class Detections:
     """Which of the vehicle's scanners: index into the names that log or setup have."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "range_bearing", frozen(self.range_bearing, (None, 2), "detections"))
+        values = frozen(self.range_bearing, (None, 2), "detections")
+        if len(values) and not values[:, 0].min() > 0.0:
+            raise ValueError(f"detections: a range is {values[:, 0].min():g} m; expected more than 0 m")
+        object.__setattr__(self, "range_bearing", values)
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,6 +30,7 @@ from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
 from commission.site.vehicle import Vehicle
+from commission.studies.detector_problems import detector_findings
 from commission.studies.inputs import StudyInput, is_same
 from commission.studies.kernels import ROOM
 from commission.studies.passed_stations import Passed, passed_stations
@@ -171,6 +172,7 @@ def problems(
     found = [
         *_map_problems(inputs, floor),
         *_scanner_problems(inputs),
+        *_detector_problems(inputs),
         *_close_reflectors(inputs),
         *_reflectors_and_walls(inputs, floor),
         *_station_problems(inputs, floor),
@@ -286,6 +288,18 @@ def _outline_problems(scanner: Scanner, vehicle: Vehicle, name: str) -> Iterable
             "expected a field of view that leaves the vehicle out"
         )
         yield Problem(severity=Severity.WARNING, text=text, subject=Subject.SCANNER)
+
+
+def _detector_problems(site: ProblemsInput) -> Iterable[Problem]:
+    """Reflectors that the detector does not pass, or that the scanner hardly resolves."""
+    farthest = math.inf
+    if site.floor_map is not None:
+        farthest = site.floor_map.resolution * math.hypot(*site.floor_map.cells.shape)
+    for scanner in site.scanners:
+        called = f" (scanner {scanner.name!r})" if len(site.scanners) > 1 else ""
+        for finding in detector_findings(site.reflectors, scanner, site.parameters.detector, farthest):
+            severity = Severity.WARNING if finding.is_loss else Severity.NOTE
+            yield Problem(severity=severity, text=finding.text + called, subject=Subject.SCANNER)
 
 
 def _close_reflectors(site: ProblemsInput) -> Iterable[Problem]:

@@ -10,7 +10,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from commission.localization.detector import detect, detector_model
+from commission.localization.detector import detect
+from commission.localization.detector_model import detector_model
 from commission.localization.estimate import Status
 from commission.site.parameters import DetectorParameters
 from commission.site.records import Scan

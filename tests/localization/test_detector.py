@@ -11,7 +11,8 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from commission.localization.beam_window import expected_beams
-from commission.localization.detector import DetectedReflectors, detect, detector_model
+from commission.localization.detector import DetectedReflectors, detect
+from commission.localization.detector_model import detector_model
 from commission.localization.estimate import Status
 from commission.site.parameters import DetectorParameters
 from commission.site.records import Scan
@@ -203,6 +204,43 @@ def test_one_missing_beam_is_bridged_and_no_more(ranges: list[float], flags: lis
         reflector=np.array(flags, dtype=bool),
     )
     assert found(scan).beams.tolist() == beams
+
+
+@pytest.mark.parametrize(
+    ("ranges", "flags", "beams", "by_equation_3"),
+    [
+        # Posts of 80 mm at 2 m: bodies of up to 11 beams, with the width of a beam and its noise.
+        ([2.0, 2.0, 2.0, 2.0, 2.0, 2.0], [1, 0, 0, 0, 0, 1], [6], [1, 1]),
+        ([2.0, 2.0, np.nan, 2.0], [1, 0, 0, 1], [4], [1, 1]),
+        ([2.0, 8.0, 2.0, 2.0], [1, 0, 1, 1], [4], [1, 2]),
+        ([2.0, 8.0, 8.0, 2.0], [1, 0, 0, 1], [1, 1], [1, 1]),
+        ([2.0, 2.0, 1.0, 2.0], [1, 0, 0, 1], [1, 1], [1, 1]),
+        ([2.0] * 16, [1, 1, *[0] * 12, 1, 1], [2, 2], [2, 2]),
+        ([2.0, 2.0, 2.0, 2.6, 2.6], [1, 0, 0, 0, 1], [1, 1], [1, 1]),
+    ],
+    ids=["dark foil", "and no echo", "past it", "past it twice", "a leg", "two on one wall", "two bodies"],
+)
+def test_dark_beams_at_the_range_of_a_body_are_bridged_up_to_the_width_of_a_reflector(
+    ranges: list[float], flags: list[int], beams: list[int], by_equation_3: list[int]
+) -> None:
+    scan = Scan(
+        stamp_ns=0,
+        ranges=np.array(ranges, np.float32),
+        angle_min=0.0,
+        angle_increment=STEP,
+        intensities=None,
+        reflector=np.array(flags, dtype=bool),
+    )
+    assert found(scan).beams.tolist() == beams
+    # The paper's clusters are runs of reflective beams.
+    assert found(scan, expected_beams="equation_3").beams.tolist() == by_equation_3
+
+
+def test_a_body_across_the_start_of_a_full_turn_is_one_even_where_it_is_dark_inside() -> None:
+    flags, ranges = np.zeros(FULL_TURN, dtype=bool), np.full(FULL_TURN, 2.0, np.float32)
+    flags[[-3, 3]] = True
+    scan = Scan(stamp_ns=0, ranges=ranges, angle_min=-math.pi, angle_increment=STEP, intensities=None, reflector=flags)
+    assert found(scan).beams.tolist() == [7]
 
 
 @pytest.mark.parametrize(

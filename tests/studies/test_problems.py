@@ -38,7 +38,7 @@ def hall() -> FloorMap:
 
 FLOOR = FloorDistances(hall())
 REFLECTORS = ReflectorMap(
-    tuple(Reflector(id=n, x=x, y=y) for n, x, y in (("A", 1, 7.6), ("B", 4, 7.6), ("C", 11, 7.6)))
+    tuple(Reflector(id=n, x=x, y=y, radius=0.12) for n, x, y in (("A", 1, 7.6), ("B", 4, 7.6), ("C", 11, 7.6)))
 )
 EDGE = Scanner(mounting=[0.5, 0.0, 0.0], field_of_view_deg=(-90.0, 90.0))
 SITE = Project(floor_map=FLOOR.floor_map, reflectors=REFLECTORS, vehicle=BOX, scanners=(EDGE,))
@@ -133,7 +133,9 @@ def test_close_reflectors_are_told_by_what_cannot_tell_them_apart():
 
     def pair(distance):
         both = ReflectorMap((Reflector(id="A", x=3.0, y=7.0), Reflector(id="B", x=3.0 + distance, y=7.0)))
-        return [(p.severity, p.text) for p in checked(replace(SITE, reflectors=both)).problems]
+        found = checked(replace(SITE, reflectors=both)).problems
+        # Posts of 80 mm are hardly resolved at the far end of the hall: a problem of the scanner.
+        return [(p.severity, p.text) for p in found if p.subject is Subject.REFLECTOR]
 
     assert pair(needed + 0.01) == []
     assert pair(0.0) == [(Severity.ERROR, "Reflectors 'A' and 'B' are at the same place; expected one of them")]
@@ -146,7 +148,8 @@ def test_close_reflectors_are_told_by_what_cannot_tell_them_apart():
 
 def test_many_close_reflectors_are_counted_instead_of_listed():
     crowd = ReflectorMap(tuple(Reflector(id=str(i), x=1.0 + 0.1 * i, y=7.0) for i in range(90)))
-    found = texts(replace(SITE, reflectors=crowd))
+    given = checked(replace(SITE, reflectors=crowd)).problems
+    found = [problem.text for problem in given if problem.subject is Subject.REFLECTOR]
     assert len(found) == MOST_OF_A_KIND + 1
     assert "more like" in found[-1]
 

@@ -293,10 +293,11 @@ def _check_detections(block: Block, values: FloatArray, empty: np.ndarray) -> No
         row = int(half[0])
         column = "range" if empty[row] else "bearing"
         raise block.error(row, column, "is empty", "range and bearing, or neither for a scan that saw no reflector")
-    negative = np.flatnonzero(values[:, 0] < 0.0)
-    if len(negative):
-        row = int(negative[0])
-        raise block.error(row, "range", f"is {values[row, 0]:g}", "0 m or more")
+    nowhere = np.flatnonzero(values[:, 0] <= 0.0)
+    if len(nowhere):
+        row = int(nowhere[0])
+        expected = "more than 0 m, or an empty range and bearing for a scan that saw no reflector"
+        raise block.error(row, "range", f"is {values[row, 0]:g}", expected)
 
 
 def _joined(blocks: Iterator[_Rows], width: int) -> _Rows:

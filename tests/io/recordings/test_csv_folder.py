@@ -175,7 +175,8 @@ ODOMETRY_ERRORS = [
 DETECTION_ERRORS = [
     ("0,1,\n", "line 2, column bearing: is empty; expected range and bearing, or neither"),
     ("0,,1\n", "line 2, column range: is empty; expected range and bearing, or neither"),
-    ("0,-1,0\n", "line 2, column range: is -1; expected 0 m or more"),
+    ("0,-1,0\n", "line 2, column range: is -1; expected more than 0 m"),
+    ("0,0,0\n", "line 2, column range: is 0; expected more than 0 m, or an empty range and bearing"),
     ("5,1,0\n0,1,0\n", "line 3, column stamp_ns: is 0 after 5; expected the stamp of the row before, or a later one"),
     ("0,1,0\n0,,\n", "line 3, column range: an empty row and another row have one stamp"),
     ("0,,\n0,,\n", "line 3, column range: an empty row and another row have one stamp"),

@@ -1,0 +1,159 @@
+"""Runs of reflective beams in a scan: which beams are one body. Not what the body is.
+
+A cluster is a run of neighboring reflective beams whose ranges do not jump: one body. Scanners drop single flags, and
+real foils have dark beams in their middle. A dark beam at the range of the body is bridged, and one beam that misses it
+(no echo, or one from behind), as long as the body is no wider than the largest reflector; a single one in any case.
+They count as beams, because the filter's window speaks of width. A beam that sees something nearer ends a cluster.
+With equation 3 as printed, single missing beams alone are bridged.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.compiled import compiled, compiled_inline
+from commission.localization.beam_echo import half_width_at
+from commission.localization.detector_model import Beams, DetectorModel
+
+DARK_AT_START = 32
+"""Dark beams before the one with which a full turn begins, where there are so many: bodies have dark beams inside."""
+
+
+@compiled_inline
+def _lit(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beam: int) -> bool:
+    """Whether a beam is reflective and has a range."""
+    return flags[beam] and ranges[beam] > 0.0 and ranges[beam] < math.inf
+
+
+@compiled_inline
+def next_cluster(  # noqa: PLR0917 - a scan and a position in it
+    ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, position: int, end: int, model: DetectorModel
+) -> tuple[int, int]:
+    """First and last beam of the cluster at or after a position; first = end when none. Beams count on past a turn.
+
+    Parameters
+    ----------
+    ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
+    beams : bearings of the scan.
+    position, end : first beam to look at, and the one before which to end.
+    model : the largest jump of the range within a cluster, and the width of the largest reflector.
+
+    Notes
+    -----
+    No formula: what a cluster is, is said at the top of the module (Sobreira et al. 2016, Algorithm 2, lines 2 and 3).
+    """
+    first, count = position, beams.used
+    while True:
+        # Most beams are dark: this loop is most of the detector's time, so it does nothing else.
+        while first < min(end, count) and not flags[first]:
+            first += 1
+        if first >= end or _lit(ranges, flags, first if first < count else first - count):
+            break
+        first += 1
+    last = first
+    while last + 1 < end:
+        after = _next_of_body(ranges, flags, beams, first, last, end, model)
+        if after == last:
+            break
+        last = after
+    return first, last
+
+
+@compiled_inline
+def _next_of_body(  # noqa: PLR0917 - a scan and a cluster in it
+    ranges: NDArray[np.float32],
+    flags: NDArray[np.bool_],
+    beams: Beams,
+    first: int,
+    last: int,
+    end: int,
+    model: DetectorModel,
+) -> int:
+    """Next reflective beam of the body of a cluster; its last one where there is none."""
+    count, step = beams.used, abs(beams.increment)
+    here = ranges[last if last < count else last - count]
+    missed, beyond = 0, 0
+    beam = last + 1
+    while beam < end:
+        k = beam if beam < count else beam - count
+        if _lit(ranges, flags, k):
+            fits = abs(ranges[k] - here) <= model.range_jump
+            # One beam may be missing whatever the width; more only within that of the largest reflector.
+            dark = beam - last - 1
+            one = dark == 0 or (dark == 1 and beyond == 0)
+            return beam if fits and (one or (beam - first) * step <= _widest(float(here), step, model)) else last
+        if ranges[k] < here - model.range_jump:
+            return last
+        missed += not ranges[k] <= here + model.range_jump
+        beyond += ranges[k] > here + model.range_jump
+        if missed > 1 or (beam > last + 1 and (beam - first) * step > _widest(float(here), step, model)):
+            return last
+        beam += 1
+    return last
+
+
+@compiled_inline
+def _widest(distance: float, step: float, model: DetectorModel) -> float:
+    """Angle between the first and the last beam of the largest reflector [rad]; 0 where bodies do not count."""
+    if model.widest == 0.0:
+        return 0.0
+    # A beam more: bearings have noise.
+    half_width = half_width_at(distance, model.half_divergence, model.half_aperture)
+    return model.widest / distance + 2.0 * half_width + step
+
+
+@compiled_inline
+def start_of_turn(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, model: DetectorModel) -> int:
+    """First beam after some dark ones, so that no cluster lies across the start of a full turn.
+
+    Parameters
+    ----------
+    ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
+    beams : bearings of the scan.
+    model : whether dark beams belong to a body.
+
+    Notes
+    -----
+    No formula: the first beam after `DARK_AT_START` dark ones, by definition; after two where there are not so many.
+    """
+    if not beams.full_turn:
+        return 0
+    needed = 2 if model.widest == 0.0 else DARK_AT_START
+    while True:
+        dark = 0
+        for position in range(max(beams.used - needed, 0), 2 * beams.used):
+            beam = position if position < beams.used else position - beams.used
+            if dark >= needed and position >= beams.used:
+                return beam
+            dark = 0 if _lit(ranges, flags, beam) else dark + 1
+        if needed == 2:
+            return 0
+        needed = 2
+
+
+@compiled
+def count_clusters(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, model: DetectorModel) -> int:
+    """Count the clusters in a scan, to reserve space for them.
+
+    Parameters
+    ----------
+    ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
+    beams : bearings of the scan.
+    model : the largest jump of the range within a cluster is read.
+
+    Notes
+    -----
+    No formula: what a cluster is, is said at the top of the module (Sobreira et al. 2016, Algorithm 2, lines 2 and 3).
+    """
+    position = start_of_turn(ranges, flags, beams, model)
+    end = position + beams.used if beams.full_turn else beams.used
+    found = 0
+    while position < end:
+        first, last = next_cluster(ranges, flags, beams, position, end, model)
+        if first < end:
+            found += 1
+        position = last + 1
+    return found
