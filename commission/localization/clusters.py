@@ -55,6 +55,12 @@ def next_cluster(  # noqa: PLR0917 - a scan and a position in it
         first += 1
     last = first
     while last + 1 < end:
+        k = last + 1 if last + 1 < count else last + 1 - count
+        if _lit(ranges, flags, k):
+            if not abs(ranges[k] - ranges[last if last < count else last - count]) <= model.range_jump:
+                break
+            last += 1
+            continue
         after = _next_of_body(ranges, flags, beams, first, last, end, model)
         if after == last:
             break
