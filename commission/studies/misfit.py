@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -21,10 +22,11 @@ from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress, silent
 from commission.site.disturbances import WheelNoise
-from commission.site.quantity import MILLIMETRES, MILLISECONDS, PERCENT
+from commission.site.quantity import DEGREES, MILLIMETRES, MILLISECONDS, PERCENT
 from commission.site.record_log import RecordLog
 from commission.studies.inputs import StudyInput
 from commission.studies.plausibility import Finding
+from commission.studies.scanner_figures import scanner_figures
 
 JUDGED_CYCLES = 6000
 """Scans from the start of the drive that are localized under each suspicion: four minutes at 25 per second."""
@@ -41,6 +43,11 @@ LOST_FOR_S = 1.0
 LOST_WINDOW_S = 5.0
 LOST_SHARE = 0.4
 """Accepted share over a window of 5 s below which the vehicle is probably lost [0..1]."""
+DISAGREEMENT = math.radians(0.25)
+"""Difference between the mean bearings of two scanners from which their mountings are suspected [rad]. A smaller error
+is shared out by the filter, which gives way to both: it is the business of a calibration."""
+FEWEST_SEEN = 100
+"""Detections of a scanner below which its mean says nothing."""
 _CLIPPED_AT = 4.0
 """A detection counts at most this often the gate: false ones weigh the same under every suspicion."""
 _MOUNTINGS = (
@@ -112,12 +119,13 @@ def misfit(inputs: MisfitInput, progress: Progress = silent) -> tuple[Finding, .
     mounting = tuple(_mounting(inputs, detected, before)) if before.worst < POOR_SHARE else ()
     if mounting:
         return (*lost, *mounting)
+    apart = tuple(_disagreement(inputs.run))
     progress(0.3, "range bias")
     biases = tuple(_range_bias(inputs, detected, before))
     progress(0.5, "clock offset")
     lags = tuple(_lag(replace(inputs, setup=trusting(inputs.setup)), detected))
     progress(1.0, "")
-    return (*lost, *biases, *lags)
+    return (*lost, *apart, *biases, *lags)
 
 
 def _lost(run: RunColumns) -> Iterator[Finding]:
@@ -193,6 +201,22 @@ def _mounting(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iter
         probably=f"{who} {meaning}",
         remedy=", ".join(cures),
     )
+
+
+def _disagreement(run: RunColumns) -> Iterator[Finding]:
+    """Say which scanners see the same reflectors in other directions."""
+    figures = scanner_figures(run, np.full((len(run), 3), math.nan))
+    known = [each for each in figures if math.isfinite(each.bearing_residual) and each.seen >= FEWEST_SEEN]
+    for one, other in combinations(known, 2):
+        apart = one.bearing_residual - other.bearing_residual
+        if abs(apart) < DISAGREEMENT:
+            continue
+        yield Finding(
+            found=f"{one.name} sees the reflectors {DEGREES.text(apart, '+.2f')} from where {other.name} sees them "
+            f"({one.accepted} of {one.seen} and {other.accepted} of {other.seen} detections are accepted)",
+            probably="one of the two is mounted askew; the filter goes by the one that it began with",
+            remedy="measure both mountings; against a reference the residuals of each scanner say which one it is",
+        )
 
 
 def _range_bias(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iterator[Finding]:

@@ -1,7 +1,7 @@
 """What each scanner of a vehicle contributed to a run, and how far its detections lie from where they should.
 
-One scanner that is mounted askew pulls the estimate, so that all residuals against it grow; against a reference only
-its own do.
+One scanner that is mounted askew pulls the estimate, or is rejected as a whole: against the estimate the residuals of
+the scanners differ, and do not say which one is right. Against a reference only its own residuals grow.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from commission.localization.run_columns import RunColumns
 from commission.site.quantity import DEGREES, MILLIMETRES
 
 BELONGS = 1.0
-"""A detection that lies farther from its reflector [m], seen from the reference, is of something else."""
+"""A detection that lies farther from its reflector [m], seen from reference or estimate, is of something else."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -37,9 +37,10 @@ class ScannerFigures:
     nis_mean: float
     """Mean squared Mahalanobis distance of the accepted (2 degrees of freedom)."""
     range_residual: float
-    """Mean of the accepted detections' ranges minus those expected after the scan [m]."""
+    """Mean of ranges minus those expected from the estimate after the scan [m], of all detections near their
+    reflector: of a scanner that is mounted askew none may be accepted."""
     bearing_residual: float
-    """Mean of the accepted detections' bearings minus those expected after the scan [rad]."""
+    """Mean of bearings minus those expected from the estimate after the scan [rad], of the same."""
     reference_range_residual: float
     """Mean of ranges minus those expected from the reference pose [m], of all detections near their reflector."""
     reference_bearing_residual: float
@@ -57,14 +58,16 @@ def scanner_figures(columns: RunColumns, references: FloatArray) -> tuple[Scanne
     names = [scanner.name for scanner in columns.segments[-1].setup.scanners]
     cycle_names = _names(columns)
     cycles = np.repeat(np.arange(len(columns)), np.diff(columns.offsets))
-    own, known = residuals(columns, columns.means), residuals(columns, references)
-    expected = columns.range_bearing[:, 0] - known[:, 0]
+    own, known = (_of_near(columns, residuals(columns, poses)) for poses in (columns.means, references))
+    return tuple(_figures(name, columns, cycle_names == name, (cycles, own, known)) for name in names)
+
+
+def _of_near(columns: RunColumns, found: FloatArray) -> FloatArray:
+    """Residuals (n, 2) of the detections near their reflector; NaN for the others."""
+    expected = columns.range_bearing[:, 0] - found[:, 0]
     with np.errstate(invalid="ignore"):
-        near = np.hypot(known[:, 0], expected * known[:, 1]) < BELONGS
-    return tuple(
-        _figures(name, columns, cycle_names == name, (cycles, own, np.where(near[:, np.newaxis], known, math.nan)))
-        for name in names
-    )
+        near = np.hypot(found[:, 0], expected * found[:, 1]) < BELONGS
+    return np.where(near[:, np.newaxis], found, math.nan)
 
 
 def residuals(columns: RunColumns, poses: FloatArray) -> FloatArray:
@@ -122,8 +125,8 @@ def _figures(
         seen=int(np.count_nonzero(its & (columns.status != Status.OUTLIER_DETECTOR))),
         accepted=int(np.count_nonzero(accepted)),
         nis_mean=_mean(columns.d2[accepted]),
-        range_residual=_mean(own[accepted, 0]),
-        bearing_residual=_mean(own[accepted, 1]),
+        range_residual=_mean(own[its, 0]),
+        bearing_residual=_mean(own[its, 1]),
         reference_range_residual=_mean(known[its, 0]),
         reference_bearing_residual=_mean(known[its, 1]),
     )

@@ -14,7 +14,7 @@ from commission.io.project_file import load_project
 from commission.localization import whole_run
 from commission.localization.setup import LocalizerSetup
 from commission.simulation.scenario import virtual_drive
-from commission.site.disturbances import Disturbances
+from commission.site.disturbances import ConstantErrors, Disturbances, ScannerError
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.studies.misfit import MisfitInput, misfit
@@ -78,6 +78,26 @@ def test_the_one_of_two_scanners_that_is_mounted_otherwise_is_named(repository: 
     assert f"once those of {name} are turned by 90 deg" in finding.found
     assert finding.probably == f"the scanner {name} is turned to the left"
     assert finding.remedy == f"set the heading of the mounting of {name} to {right.mounting[2]:+.3f} rad"
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("turned_deg", "is_told"), [(1.0, True), (0.15, False), (0.0, False)])
+def test_scanners_that_disagree_are_told_without_a_reference(
+    repository: Path, name: str, turned_deg: float, is_told: bool
+) -> None:
+    project = with_two(load_project(repository / "maps" / "shop_floor"))
+    turned = ScannerError(scanner=name, mounting=(0.0, 0.0, math.radians(turned_deg)))
+    project = replace(project, disturbances=Disturbances(constants=ConstantErrors(scanners=(turned,))))
+    findings = found_with(project, virtual_drive(project, project.routes[0].name, 2))
+    told = [each.found for each in findings if " sees the reflectors " in each.found]
+    assert len(told) == int(is_told)
+    for text in told:
+        # What is truly turned counter-clockwise sees everything further clockwise; the first is compared. The estimate
+        # errs itself when it goes by the one that is turned, which takes up to a third of the angle.
+        expected = -turned_deg if name == NAMES[0] else turned_deg
+        apart = float(text.split("the reflectors ")[1].split("°")[0])
+        assert text.startswith("front left sees ")
+        assert apart == pytest.approx(expected, abs=0.33)
 
 
 def found_with(project: Project, log: RecordLog) -> tuple[Finding, ...]:
