@@ -29,6 +29,8 @@ HEIGHTS_FORM = "LOW,HIGH or LOW,HIGH,X1,Y1,X2,Y2 (metres)"
 class Place:
     """Suggest few reflectors on walls and pillars, so that the routes are driven within limits; writes a project.
 
+    Ctrl+C ends the search with the best layout so far, where there is one.
+
     What is not given here is as the project asks for it.
     """
 
@@ -189,6 +191,8 @@ def _report(found: Placement) -> list[str]:
         f"Reflectors   {found.added} suggested among {len(found.candidates)} places, "
         f"{len(found.reflectors) - found.added} kept; fewer than {found.at_least} new ones cannot be enough",
     ]
+    if found.was_ended:
+        lines.append("Ended        before its time, with the best layout so far: fewer reflectors might do")
     return lines + [f"Not met      {_told(unmet)}" for unmet in found.unmet]
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog  # pyright: ignore[reportUnknownVariableType]
 from scipy.sparse import csr_array, vstack  # pyright: ignore[reportUnknownVariableType]
 
-from commission.geometry.arrays import BoolArray, IntArray
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 
 ROUNDING = 1e-6
 """What the solver of the linear program may be off, before its bound is rounded up."""
@@ -98,15 +98,28 @@ def cover(
     return _two_for_one(problem, goal, best)
 
 
-def lower_bound(problem: CoverProblem) -> int:
-    """Fewest columns, besides the fixed ones, that any cover needs: the linear program's optimum, rounded up."""
+def lower_bound(problem: CoverProblem, gains: FloatArray | None = None, needs: FloatArray | None = None) -> int:
+    """Fewest columns, besides the fixed ones, that any cover needs: the linear program's optimum, rounded up.
+
+    Parameters
+    ----------
+    problem : rows to be covered.
+    gains, needs : (K, C) and (K,) further rows: what each column adds, and how much of it is needed.
+    """
     goal = problem.attainable() - problem.counts(problem.fixed)
     rows, columns = np.flatnonzero(goal > 0), np.flatnonzero(~problem.fixed)
-    if len(rows) == 0:
+    matrix, goal = problem.covers[np.ix_(rows, columns)].astype(np.float64), goal[rows].astype(np.float64)
+    if gains is not None and needs is not None and len(gains):
+        further = needs - gains[:, problem.fixed].sum(axis=1)
+        # What no set reaches, or every set has, says nothing about how many there must be.
+        asks = (further > 0.0) & (further <= gains[:, columns].sum(axis=1))
+        matrix = np.concatenate((matrix, gains[np.ix_(asks, columns)]))
+        goal = np.concatenate((goal, further[asks]))
+    if len(goal) == 0:
         return 0
-    matrix = csr_array(problem.covers[np.ix_(rows, columns)].astype(np.float64))
+    matrix = csr_array(matrix)
     pairs = [(a, b) for a, b in _conflicting_pairs(problem) if not problem.fixed[a] and not problem.fixed[b]]
-    sides, bounds = -matrix, -goal[rows].astype(np.float64)
+    sides, bounds = -matrix, -goal
     if pairs:
         place = np.full(len(problem.fixed), -1)
         place[columns] = np.arange(len(columns))
@@ -169,24 +182,6 @@ def _two_for_one(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> Boo
         if found is None:
             return taken
         taken = found
-
-
-def smaller_covers(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> Iterator[BoolArray]:
-    """All sets (C,) of one column less than a set that cover as well: without one, then without two and with another.
-
-    Parameters
-    ----------
-    problem : columns and their conflicts.
-    goal : (R,) how often each row must be covered, where the set does so.
-    taken : (C,) the set.
-    """
-    counts = problem.counts(taken)
-    for out in np.flatnonzero(taken & ~problem.fixed):
-        if np.all(counts - problem.covers[:, out] >= np.minimum(goal, counts)):
-            tried = taken.copy()
-            tried[out] = False
-            yield tried
-    yield from _exchanged(problem, goal, taken)
 
 
 def _exchanged(problem: CoverProblem, goal: IntArray, taken: BoolArray) -> Iterator[BoolArray]:

@@ -58,6 +58,11 @@ class NominalDrive:
         return len(self.stamps_ns)
 
     @property
+    def sets_off(self) -> int:
+        """The last scan before the vehicle moves: until then it rests, and is sure of its pose by and by."""
+        return max(int(np.searchsorted(self.metres, self.metres[0], side="right")) - 1, 0)
+
+    @property
     def length(self) -> float:
         """Length of the whole way [m]."""
         return float(self.metres[-1])

@@ -39,6 +39,8 @@ class Placement:
     """(C, 2) places that were looked at [m], map frame."""
     unmet: tuple[Unmet, ...]
     """Demands that do not hold; empty when all do."""
+    was_ended: bool = False
+    """Whether the search was ended before its time: then fewer reflectors might do."""
 
 
 def place(
@@ -55,7 +57,8 @@ def place(
         put a reflector on.
     routes : names of the routes that count; all when None.
     options : demands and candidates; the defaults when None.
-    progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
+    progress : called with the fraction done [0..1] and what is being done; may raise `JobCancelled` to end it: with
+        the best layout so far, where one holds already.
 
     Raises
     ------
@@ -93,6 +96,7 @@ def choose(
         at_least=search.bound(),
         candidates=centers,
         unmet=search.unmet(taken),
+        was_ended=search.was_stopped,
     )
 
 

@@ -274,12 +274,14 @@ def restricted(planned: PlannedRoute, kept: BoolArray) -> PlannedRoute:
 def station_scans(drive: NominalDrive, stations: Sequence[Station]) -> Iterator[tuple[Station, IntArray]]:
     """Scans of a drive at which the vehicle is at a station, for each station that the route passes.
 
-    A vehicle is at a station within `AT_STATION` of it and with less than `FACING_STATION` between the headings.
+    A vehicle is at a station within `AT_STATION` of it and with less than `FACING_STATION` between the headings. At one
+    where the route starts it counts from when the vehicle sets off: how sure it was of its pose before was assumed.
     """
     for station in stations:
         distance = np.hypot(*(drive.poses[:, :2] - station.pose[:2]).T)
         turned = np.abs(difference(drive.poses[:, 2], station.pose[2]))
         scans = np.flatnonzero((distance <= AT_STATION) & (turned < FACING_STATION))
+        scans = scans[scans >= drive.sets_off]
         if len(scans):
             yield station, scans
 

@@ -25,7 +25,7 @@ from commission.site.scanner import Scanner
 from commission.site.stations import Station
 from commission.site.vehicle import Vehicle
 from commission.studies.inputs import StudyInput
-from commission.studies.kernels import DRIVES, ERRORS
+from commission.studies.kernels import DRIVES, ERRORS, INFORMATION
 
 COMPILING = 0.1
 """Share of the time until which kernels are compiled."""
@@ -144,7 +144,7 @@ def placement(inputs: PlacementInput, progress: Progress = silent) -> PlacementR
     inputs : the site, and what is asked.
     progress : told how far it is; may raise to cancel.
     """
-    warm_up((*DRIVES, ERRORS), part(progress, 0.0, COMPILING))
+    warm_up((*DRIVES, ERRORS, INFORMATION), part(progress, 0.0, COMPILING))
     names = tuple(route.name for route in inputs.routes)
     found = place(inputs, names, inputs.options, part(progress, COMPILING, 1.0))
     return PlacementResult(inputs, found, tuple(_stretches(inputs, found.unmet)))

@@ -67,6 +67,7 @@ class SmallCase:
         for station in site.stations:
             there = np.hypot(*(drive.poses[:, :2] - (station.x, station.y)).T) <= 0.2
             limits[there, :2] = np.minimum(limits[there, :2], station.required_accuracy)
+        limits[: np.flatnonzero(drive.metres == 0.0).max()] = np.inf
         few = only(planned, left)
         prediction = predict_route(few)
         said, true = prediction.covariances, predict_errors(few, prediction).squares

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commission.errors import UsageError
+from commission.errors import JobCancelled, UsageError
 from commission.planning.ambiguity import ambiguous_poses
 from commission.planning.placement import Demands, PlacementOptions, place
-from commission.planning.route_prediction import plan_route, predict_route
+from commission.planning.route_prediction import PredictionOptions, plan_route, predict_route
 from commission.planning.true_error import predict_errors
 from commission.planning.vehicle_visibility import vehicle_visibility
 from commission.site.layout_brief import CandidateOptions
@@ -40,6 +40,8 @@ def holds(project: Project, reflectors: ReflectorMap, demands: Demands) -> bool:
     for station in project.stations:
         there = np.hypot(*(planned.drive.poses[:, :2] - (station.x, station.y)).T) <= 0.2
         limits[there, :2] = np.minimum(limits[there, :2], station.required_accuracy)
+    # While the vehicle rests at the start, its pose is as sure as was assumed.
+    limits[: np.flatnonzero(planned.drive.metres == 0.0).max()] = np.inf
     layouts = [reflectors, *(without_each(reflectors) if demands.survive_failure else ())]
     return all(bool(np.all(said_and_true(replace(project, reflectors=layout)) <= limits)) for layout in layouts)
 
@@ -231,3 +233,58 @@ def test_locked_reflectors_stay_where_the_layout_starts_empty():
     assert found.reflectors.reflectors[0] == locked
     assert found.added == len(found.reflectors) - 1 > 0
     assert found.unmet == ()
+
+
+def test_the_first_scans_before_the_vehicle_sets_off_ask_for_nothing():
+    """Its pose there is as sure as was assumed, whatever the layout; so is that at a station where the route starts."""
+    project = hall(stations=(Station(name="Dock", x=2.0, y=4.0, required_accuracy=0.025),))
+    assumed = PredictionOptions(start_sigmas=(0.05, 0.05, 0.02))
+    demands = Demands(visible=1, survive_failure=False, position_limit=0.03)
+    found = place(project, options=PlacementOptions(demands=demands, prediction=assumed))
+    assert found.unmet == ()
+    planned = plan_route(replace(project, reflectors=found.reflectors), "Through", assumed)
+    prediction = predict_route(planned)
+    assert prediction.two_sigma[0, 0] > 0.03
+    assert prediction.two_sigma[planned.drive.sets_off :, :2].max() <= 0.03
+    assert planned.drive.metres[planned.drive.sets_off] == 0.0 < planned.drive.metres[planned.drive.sets_off + 1]
+
+
+TIGHT = Demands(visible=1, position_limit=0.025)
+
+
+@pytest.mark.parametrize("limit", [0.02, 0.03])
+def test_more_effort_never_gives_more_reflectors(limit: float):
+    demands = Demands(visible=1, position_limit=limit)
+    sizes = [
+        place(hall(parameters=POOR), options=PlacementOptions(demands=demands, checks=checks)).added
+        for checks in (0, 1, 5, 150)
+    ]
+    assert sizes == sorted(sizes, reverse=True)
+
+
+def test_a_search_that_is_ended_gives_its_best_layout_so_far():
+    whole = place(hall(parameters=POOR), options=PlacementOptions(demands=TIGHT))
+
+    def end_when_fewer_are_looked_for(_done: float, what: str) -> None:
+        if what == "doing with fewer":
+            raise JobCancelled("enough")
+
+    ended = place(
+        hall(parameters=POOR), options=PlacementOptions(demands=TIGHT), progress=end_when_fewer_are_looked_for
+    )
+    assert ended.was_ended
+    assert not whole.was_ended
+    assert ended.unmet == ()
+    assert holds(hall(parameters=POOR), ended.reflectors, TIGHT)
+    assert ended.added >= whole.added
+
+
+def test_the_bound_knows_the_limits_and_not_only_what_is_seen():
+    """One reflector in sight is enough to be seen; it is far too few for such limits."""
+    loose = Demands(visible=1, survive_failure=False)
+    tight = replace(loose, position_limit=0.012)
+    by_sight, by_limit = (
+        place(hall(parameters=POOR), options=PlacementOptions(demands=each)) for each in (loose, tight)
+    )
+    assert by_limit.unmet == ()
+    assert by_sight.at_least < by_limit.at_least <= by_limit.added

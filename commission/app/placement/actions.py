@@ -21,6 +21,11 @@ class SetLayout(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class EndSearch(Action):
+    """End the search with the best layout found so far; without one, nothing is suggested."""
+
+
+@dataclass(frozen=True, slots=True)
 class CountRoute(Action):
     """Let a route count for the suggested layout, or not."""
 

@@ -14,7 +14,15 @@ from commission.app.base.rows import Rows
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing.actions import ChooseTool
-from commission.app.placement.actions import AcceptLayout, AskLayout, CountRoute, DiscardLayout, FreeAreas, SetLayout
+from commission.app.placement.actions import (
+    AcceptLayout,
+    AskLayout,
+    CountRoute,
+    DiscardLayout,
+    EndSearch,
+    FreeAreas,
+    SetLayout,
+)
 from commission.app.placement.keep_out_tool import KeepOutTool
 from commission.app.placement.service import LAYOUT
 from commission.app.placement.view import LayoutView
@@ -66,7 +74,7 @@ class LayoutPanel(BasePanel):
         # What was found stands above the demands: below them, it would be out of sight on a small screen.
         self._ask = gui.add_button("Suggest reflectors", hint="Fewest reflectors on walls that meet the demands.")
         self._ask.on_click(posting(post, lambda _event: AskLayout()))
-        self._work = WorkBar(gui, post, LAYOUT, DiscardLayout())
+        self._work = WorkBar(gui, post, LAYOUT, EndSearch())
         self._found = Text(gui)
         self._decide = gui.add_button_group("", ("Accept", "Discard"), visible=False)
         self._decide.on_click(posting(post, self._decided))
@@ -158,6 +166,8 @@ def found_text(found: LayoutView) -> str:
     if len(suggestion.removed):
         rows.insert(1, ("Taken down", str(len(suggestion.removed))))
     notes = [] if suggestion.unmet else ["All demands hold."]
+    if placement.was_ended:
+        notes.append("The search was ended: fewer might do.")
     if placement.added == 0 and not suggestion.unmet:
         notes = ["The present reflectors meet all demands."]
     if suggestion.unmet:

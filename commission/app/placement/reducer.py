@@ -86,6 +86,12 @@ def ask_layout(_action: actions.AskLayout, state: AppState, _sender: Sender) -> 
 
 
 @reduce.register
+def end_search(_action: actions.EndSearch, state: AppState, _sender: Sender) -> Outcome:
+    wish = state.part(LayoutWish)
+    return _wishing(state, replace(wish, enough=wish.asked))
+
+
+@reduce.register
 def discard_layout(_action: actions.DiscardLayout, state: AppState, _sender: Sender) -> Outcome:
     return _wishing(state, replace(state.part(LayoutWish), inputs=None))
 

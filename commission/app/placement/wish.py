@@ -25,6 +25,8 @@ class LayoutWish:
     """The site as it was when a layout was asked for, and what was asked; none: no layout is looked for or shown."""
     asked: int = 0
     """Number of times a layout was asked for: asking again is told apart from having asked."""
+    enough: int = 0
+    """The number of the search that is to end with the best layout found so far."""
 
 
 def placement_input(project: Project, *, extend: bool) -> PlacementInput:

@@ -1,0 +1,180 @@
+"""Whether a layout keeps to the limits of the uncertainty on all routes, and what it lacks where it does not."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from commission.geometry.arrays import BoolArray, FloatArray
+from commission.planning.information import tangent_at
+from commission.planning.route_prediction import (
+    PlannedRoute,
+    RoutePrediction,
+    predict_route,
+    restricted,
+    station_scans,
+)
+from commission.planning.true_error import predict_errors
+from commission.site.layout_brief import Demands
+from commission.site.parts import Equipped
+
+CORES = os.cpu_count() or 1
+NOTHING = -1
+"""Number of the reflector that fails where none does."""
+PER_DAMAGE = 8
+"""Scans of one route that a row each is made of: the worst ones, apart from each other."""
+APART_M = 2.0
+NECESSARY = 600
+"""Rows that the bound rests on, at most."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Excess:
+    """A limit that a layout passes, and what the layout lacks: a row that it does not fulfil."""
+
+    gains: FloatArray
+    """(M,) what each reflector adds."""
+    need: float
+    """Sum of them at which the limit is kept, as far as a tangent says."""
+
+
+class LayoutLimits:
+    """The limits of one site, asked for one layout after the other.
+
+    Parameters
+    ----------
+    planned : the routes, with all M reflectors that could be taken.
+    site : parameters and stations.
+    demands : limits, and whether any reflector may fail.
+    step : called with every prediction; may raise to cancel.
+    """
+
+    def __init__(self, planned: list[PlannedRoute], site: Equipped, demands: Demands, step: Callable[[], None]) -> None:
+        self._planned, self._step, self._survives = planned, step, demands.survive_failure
+        self._count = len(planned[0].reflectors) if planned else 0
+        self._demanded = [_limits(route, site, demands) for route in planned]
+        self._allowed = [limits.copy() for limits in self._demanded]
+        self._hard: dict[tuple[int, int], None] = {}
+        """Route and reflector failing that were too much of late, the latest last."""
+        self._necessary: list[tuple[FloatArray, float]] = []
+
+    @property
+    def necessary(self) -> tuple[FloatArray, FloatArray]:
+        """Rows (K, M) and needs (K,) that every layout fulfils that keeps the limits."""
+        gains = np.array([gains for gains, _ in self._necessary]).reshape(len(self._necessary), self._count)
+        return gains, np.array([need for _, need in self._necessary])
+
+    def over(self, taken: BoolArray) -> list[BoolArray]:
+        """Per route, which scans pass a limit, with nothing broken or with any single reflector failing."""
+        result = [np.zeros(len(route.drive), dtype=np.bool_) for route in self._planned]
+        for (index, _), _, variances in self._predicted(taken, self._damages(taken)):
+            result[index] |= np.any(2.0 * np.sqrt(variances) > self._demanded[index], axis=1)
+        return result
+
+    def allow(self, over: list[BoolArray]) -> None:
+        """Ask no more of scans: nothing that could be put up keeps their limits."""
+        for allowed, mask in zip(self._allowed, over, strict=True):
+            allowed[mask] = np.inf
+
+    def allow_what_nothing_keeps(self, fixed: BoolArray) -> None:
+        """Ask nothing of scans that pass a limit even with all M reflectors, those that stay (M,) among them."""
+        everything = np.ones_like(fixed)
+        damages = [(index, NOTHING) for index in range(len(self._planned))]
+        for (index, _), _, variances in self._predicted(everything, damages):
+            self._allowed[index][np.any(2.0 * np.sqrt(variances) > self._allowed[index], axis=1)] = np.inf
+
+    def excess(self, taken: BoolArray, enough: int = 1) -> list[Excess]:
+        """Return rows that a layout does not fulfil: none when it keeps all limits.
+
+        Parameters
+        ----------
+        taken : (M,) the layout.
+        enough : number of rows from which it is not looked at any further.
+        """
+        found: list[Excess] = []
+        damages = self._damages(taken)
+        # Those that were too much before are the likeliest to be so again.
+        for key, prediction, variances in self._predicted(taken, damages):
+            rows = list(self._rows(taken, key, prediction, variances))
+            if rows:
+                self._hard.pop(key, None)
+                self._hard[key] = None
+            found += rows
+            if len(found) >= enough:
+                break
+        return found
+
+    def _damages(self, taken: BoolArray) -> list[tuple[int, int]]:
+        """Route and reflector failing: all that there are, the hardest first."""
+        every = [(index, NOTHING) for index in range(len(self._planned))]
+        if self._survives:
+            for index, route in enumerate(self._planned):
+                seen = np.unique(route.visible.indices)
+                every += [(index, int(gone)) for gone in seen[taken[seen]]]
+        rank = {key: number for number, key in enumerate(self._hard)}
+        return sorted(every, key=lambda key: -rank.get(key, -1))
+
+    def _predicted(
+        self, taken: BoolArray, damages: list[tuple[int, int]]
+    ) -> Iterator[tuple[tuple[int, int], RoutePrediction, FloatArray]]:
+        """Predict damages in turn: each with (K, 3) variances, of the filter or of its error, whichever is larger."""
+        # First without all that is not taken, which is most.
+        routes = [restricted(route, taken) for route in self._planned]
+
+        def predicted(key: tuple[int, int]) -> tuple[tuple[int, int], RoutePrediction, FloatArray]:
+            route = restricted(routes[key[0]], _without(taken, key[1]))
+            prediction = predict_route(route)
+            error = predict_errors(route, prediction).squares
+            said, true = (np.diagonal(each, axis1=1, axis2=2) for each in (prediction.covariances, error))
+            return key, prediction, np.maximum(said, true)
+
+        # Some at a time: the kernels run side by side, and whoever has seen enough asks for no more of them.
+        with ThreadPoolExecutor(CORES) as pool:
+            for start in range(0, len(damages), CORES):
+                self._step()
+                yield from pool.map(predicted, damages[start : start + CORES])
+
+    def _rows(
+        self, taken: BoolArray, key: tuple[int, int], prediction: RoutePrediction, variances: FloatArray
+    ) -> Iterator[Excess]:
+        """Rows at the worst scans of a route."""
+        index, gone = key
+        route, limits, left = self._planned[index], self._allowed[index], _without(taken, gone)
+        shares = 4.0 * variances / limits**2
+        axes, worst = shares.argmax(axis=1), shares.max(axis=1)
+        for _ in range(PER_DAMAGE):
+            scan = int(worst.argmax())
+            if worst[scan] <= 1.0:
+                return
+            axis, share = int(axes[scan]), float(worst[scan])
+            tangent = tangent_at(route, prediction, scan, axis)
+            gains = np.where(np.arange(len(left)) == gone, 0.0, tangent.gains)
+            # The tangent knows neither the error beyond what the filter says nor chance: it is held against itself.
+            yield Excess(gains, float(gains[left].sum()) + 1.0 - 1.0 / share)
+            if len(self._necessary) < NECESSARY:
+                self._necessary.append((gains, tangent.need(0.25 * limits[scan, axis] ** 2)))
+            metres = route.drive.metres
+            worst[np.abs(metres - metres[scan]) < APART_M] = 0.0
+
+
+def _without(taken: BoolArray, gone: int) -> BoolArray:
+    left = taken.copy()
+    if gone != NOTHING:
+        left[gone] = False
+    return left
+
+
+def _limits(route: PlannedRoute, site: Equipped, demands: Demands) -> FloatArray:
+    """(K, 3) largest 2-sigma of x [m], y [m] and heading [rad] at each scan, from when the vehicle sets off."""
+    supervisor = site.parameters.supervisor
+    position = supervisor.position_limit if demands.position_limit is None else demands.position_limit
+    heading = supervisor.heading_limit if demands.heading_limit is None else demands.heading_limit
+    limits = np.tile((position, position, heading), (len(route.drive), 1))
+    for station, scans in station_scans(route.drive, site.stations):
+        limits[scans, :2] = np.minimum(limits[scans, :2], station.required_accuracy)
+    limits[: route.drive.sets_off] = np.inf
+    return limits
