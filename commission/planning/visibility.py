@@ -26,6 +26,7 @@ from commission.planning.detection_noise import detection_table
 from commission.planning.shadow_kernels import BLOCK, BitMask, Targets
 from commission.site.checks import at_least, between
 from commission.site.floor_map import FloorMap
+from commission.site.glued import depths_in_walls
 from commission.site.parameters import DetectorParameters
 from commission.site.parts import Sighted
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -35,6 +36,8 @@ from commission.site.scanner import Scanner
 BUCKET = 2.0
 # Bearings this far outside the field of view still count [rad]: the last beam of a scan is rounded too.
 BEARING_TOLERANCE = 1e-9
+# A ray to a plate that is drawn inside a wall ends this far in front of the wall [m].
+OUT_OF_WALL = 0.005
 # Where a promise that holds from here on holds for good [m].
 FARTHEST = 1e6
 
@@ -262,7 +265,7 @@ def build_visibility(
     normals = np.stack((np.cos(reflectors.headings), np.sin(reflectors.headings)), axis=-1)
     targets = Targets(
         centers=np.array(reflectors.centers),
-        radii=np.array(reflectors.radii),
+        radii=_arrival(reflectors, caster.grid, options),
         normals=np.where(reflectors.is_flat[:, np.newaxis], normals, 0.0),
         nearest=np.ascontiguousarray(limits[:, 0]),
         farthest=np.ascontiguousarray(limits[:, 1]),
@@ -301,7 +304,7 @@ def replace_target(targets: Targets, index: int, reflector: Reflector, model: Vi
     nearest, farthest, promised = _limits(reflector, model.scanner, model.options)
     is_flat = reflector.kind == "flat"
     targets.centers[index] = reflector.x, reflector.y
-    targets.radii[index] = reflector.radius
+    targets.radii[index] = _arrival(ReflectorMap((reflector,)), model.caster.grid, model.options)[0]
     targets.normals[index] = (math.cos(reflector.heading), math.sin(reflector.heading)) if is_flat else (0.0, 0.0)
     targets.nearest[index], targets.farthest[index], targets.promised[index] = nearest, farthest, promised
     shadow_kernels.cast_shadow(model.caster.tables, targets, index)
@@ -354,6 +357,12 @@ def _limits(reflector: Reflector, scanner: Scanner, options: VisibilityOptions) 
     # Of the reflector alone, so that it does not depend on what other reflectors there are.
     likely = detection_table(ReflectorMap((reflector,)), scanner, options.detector).likely_between(0)
     return max(nearest, likely[0]), min(farthest, likely[1]), promised
+
+
+def _arrival(reflectors: ReflectorMap, grid: OccupancyGrid, options: VisibilityOptions) -> FloatArray:
+    """(M,) how near to each center a ray has arrived [m]: its radius, or out of the wall that a plate is drawn into."""
+    depths = depths_in_walls(reflectors, grid) / math.cos(math.radians(options.max_incidence_deg))
+    return np.maximum(reflectors.radii, np.where(depths > 0.0, depths + OUT_OF_WALL, 0.0))
 
 
 def _bins(farthest: float, grid: OccupancyGrid) -> int:

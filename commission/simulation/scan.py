@@ -15,8 +15,9 @@ from commission.geometry.arrays import BoolArray, FloatArray
 from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
 from commission.geometry.se2 import compose
-from commission.simulation.scan_kernels import Hall, Moment, ScannerBeams, cast_scan, cast_sweep
+from commission.simulation.scan_kernels import FLAT_COSINE, Hall, Moment, ScannerBeams, cast_scan, cast_sweep
 from commission.site.disturbances import Disturbances
+from commission.site.glued import depths_in_walls
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
@@ -46,7 +47,10 @@ class VirtualScanner:
         floor = project.floor_map
         grid = OccupancyGrid(np.zeros((1, 1), np.bool_), 1.0, np.zeros(3)) if floor is None else floor.occupancy()
         wall_depth = 0.0 if floor is None else 0.5 * floor.resolution
-        hall = _hall(RayCaster(grid), project.reflectors, project.disturbances, wall_depth)
+        glued = depths_in_walls(project.reflectors, grid) / FLAT_COSINE
+        shiny = np.zeros(len(project.disturbances.shiny_objects))
+        wall_depths = np.maximum(np.concatenate([glued, shiny]), wall_depth)
+        hall = _hall(RayCaster(grid), project.reflectors, project.disturbances, wall_depths)
         return VirtualScanner(scanner, project.disturbances, hall, _beams(scanner))
 
     def scan(
@@ -125,7 +129,7 @@ def _beams(scanner: Scanner) -> ScannerBeams:
     )
 
 
-def _hall(caster: RayCaster, reflectors: ReflectorMap, disturbances: Disturbances, wall_depth: float) -> Hall:
+def _hall(caster: RayCaster, reflectors: ReflectorMap, disturbances: Disturbances, wall_depths: FloatArray) -> Hall:
     """Walls, then reflectors and shiny objects as the kernel's columns."""
     shiny = disturbances.shiny_objects
     return Hall(
@@ -134,7 +138,7 @@ def _hall(caster: RayCaster, reflectors: ReflectorMap, disturbances: Disturbance
         np.concatenate([reflectors.radii, np.array([s.radius for s in shiny])]),
         np.concatenate([reflectors.headings, np.zeros(len(shiny))]),
         np.concatenate([reflectors.is_flat, np.zeros(len(shiny), np.bool_)]),
-        wall_depth,
+        wall_depths,
     )
 
 

@@ -68,7 +68,7 @@ class Hall(NamedTuple):
     """(N,) direction that a flat plate faces [rad], map frame."""
     flat: BoolArray
     """(N,) plate instead of cylinder."""
-    wall_depth: float
+    wall_depths: FloatArray
     """How far behind the surface of a wall's cell a reflector mounted on it may be drawn [m]."""
 
 
@@ -259,7 +259,7 @@ def _meet_reflective(hall: Hall, beams: ScannerBeams, moment: Moment, index: int
             echo = distance * math.cos(facing) / math.cos(facing - lit)
         else:
             echo = cylinder_echo(distance, hall.radii[index], lit)
-        if echo < echoes.distances[i] + hall.wall_depth:
+        if echo < echoes.distances[i] + hall.wall_depths[index]:
             echoes.distances[i], echoes.flags[i] = echo, True
 
 

@@ -21,6 +21,7 @@ from commission.planning.route_check import FloorDistances, Way, outline_points,
 from commission.planning.route_prediction import AT_STATION, FACING_STATION
 from commission.progress import Progress, silent
 from commission.site.floor_map import FloorMap
+from commission.site.glued import depths_in_walls
 from commission.site.parameters import Parameters
 from commission.site.parts import Told
 from commission.site.project import Project
@@ -376,7 +377,8 @@ def _reflectors_and_walls(site: ProblemsInput, floor: FloorDistances | None) -> 
     # A plate is seen from the side that it faces.
     turns = np.cos(angles - reflectors.headings[:, np.newaxis])
     seen = ~reflectors.is_flat[:, np.newaxis] | (turns > 0.0)
-    walled = (grid.is_occupied(rims) | ~seen).all(axis=1)
+    # A plate up to a cell behind the surface of a wall is glued to it.
+    walled = (grid.is_occupied(rims) | ~seen).all(axis=1) & (depths_in_walls(reflectors, grid) == 0.0)
     outside = ~grid.contains(reflectors.centers)
     found: list[Problem] = []
     for indices, severity, text in (

@@ -177,17 +177,41 @@ LOCALIZATION = (
     ),
     Mutant(
         name="cluster of a full turn cut where the turn begins",
-        file=FOLDER + "detector.py",
+        file=FOLDER + "detector_model.py",
         find="once * steps > TURN - 0.5 * steps",
         replace="once * steps > TURN + 0.5 * steps",
         tests=(TESTS + "test_detector.py::test_post_is_found_where_it_stands_at_any_bearing_of_a_full_turn",),
     ),
     Mutant(
         name="window of beams the other way round",
-        file=FOLDER + "detector.py",
+        file=FOLDER + "detector_model.py",
         find="int(parameters.min_model_error),\n        int(parameters.max_model_error)",
         replace="int(parameters.max_model_error),\n        int(parameters.min_model_error)",
-        tests=(TESTS + "test_detector.py::test_detector_filter_is_a_window_around_equation_3",),
+        tests=(TESTS + "test_detector.py::test_detector_filter_is_a_window_around_the_expected_beams",),
+    ),
+    Mutant(
+        name="a beam's aperture taken for half of it",
+        file=FOLDER + "detector_model.py",
+        find="0.5 * scanner.beam_aperture",
+        replace="scanner.beam_aperture",
+        tests=(TESTS + "test_beam_window.py::test_nearly_all_true_clusters_pass_however_wide_the_beams",),
+    ),
+    Mutant(
+        name="most beams are those of half a beam",
+        file=FOLDER + "beam_window.py",
+        find="flagged_span(wide, half_width, TOUCH)",
+        replace="flagged_span(wide, half_width, MIDDLE)",
+        tests=(TESTS + "test_beam_window.py::test_nearly_all_true_clusters_pass_however_wide_the_beams",),
+    ),
+    Mutant(
+        name="dark beams bridged however wide the body",
+        file=FOLDER + "clusters.py",
+        find="return model.widest / distance",
+        replace="return 10.0 * model.widest / distance",
+        tests=(
+            TESTS
+            + "test_detector.py::test_dark_beams_at_the_range_of_a_body_are_bridged_up_to_the_width_of_a_reflector",
+        ),
     ),
     Mutant(
         name="central beam without the radius behind it",

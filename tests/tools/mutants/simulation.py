@@ -36,8 +36,8 @@ SIMULATION = (
     Mutant(
         name="reflector behind a wall shines",
         file=FOLDER + "scan_kernels.py",
-        find="if echo < echoes.distances[i] + hall.wall_depth:",
-        replace="if echo < echoes.distances[i] + 1000.0 * hall.wall_depth:",
+        find="if echo < echoes.distances[i] + hall.wall_depths[index]:",
+        replace="if echo < echoes.distances[i] + 1000.0 * hall.wall_depths[index]:",
         tests=(TESTS + "test_scan.py::test_wall_hides_the_reflector_behind",),
     ),
     Mutant(
