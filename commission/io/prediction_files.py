@@ -13,7 +13,7 @@ from commission.io.table_writer import angle, figure, place, write_table
 from commission.planning.dependence import Dependence, RouteDependence
 from commission.planning.route_prediction import RoutePrediction
 from commission.planning.station_accuracy import StationAccuracy
-from commission.planning.true_error import PredictedErrors
+from commission.planning.true_error import CONTRIBUTIONS, PredictedErrors
 from commission.site.reflectors import ReflectorMap
 
 PREDICTION = "prediction.csv"
@@ -26,6 +26,7 @@ COLUMNS = (
     *("metre", "x", "y", "theta", "two_sigma_x", "two_sigma_y", "two_sigma_theta"),
     *("visible", "on_odometry", "over_limit", "mode"),
     *("error_two_sigma_x", "error_two_sigma_y", "error_two_sigma_theta"),
+    *(f"{part}_two_sigma_position" for part in CONTRIBUTIONS),
 )
 # `load` is the share of the limit: files keep the column that others read, whatever the page calls it.
 FAILURE_COLUMNS = ("blocked", "reflector_id", "route", "failing_metres", "load", "metres")
@@ -64,6 +65,7 @@ def write_prediction(
         np.isin(metres.metre, prediction.failing_metres()).astype(np.int64).tolist(),
         np.where(metres.fails, "fail", "operational").tolist(),
         *(map(figure, column) for column in errors.per_metre(metres).T.tolist()),
+        *(map(figure, column) for column in errors.parts_per_metre(metres).T.tolist()),
     ]
     write_table(folder / PREDICTION, COLUMNS, zip(*columns, strict=True))
     entries = {**summary(route, prediction, errors), "stations": [_station_entry(station) for station in stations]}

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.gaussian import chi_square_gate
-from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering, innovation_with, seen_with, take_out
+from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering, innovation_given, take_out
 from commission.localization.estimate import Status
-from commission.localization.kalman import innovation, squared_distance
+from commission.localization.kalman import squared_distance
 from commission.localization.observation import SMALLEST_RANGE, ObservationModel, expect, scanner_offset
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.reflector_index import Cells, cell_range
@@ -167,11 +167,7 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     likelihood lacks.
     """
     expected = expect(belief.x, belief.y, belief.theta, view.offset_x, view.offset_y, x, y, model.mount_theta)
-    if given is None or work is None:
-        v = innovation(belief, expected, measured_range, measured_bearing, surveyed_variance, model)
-    else:
-        seen = seen_with(belief.theta, expected, surveyed_variance, given, work, at)
-        v = innovation_with(belief, expected, measured_range, measured_bearing, model, seen)
+    v = innovation_given(belief, expected, measured_range, measured_bearing, surveyed_variance, model, given, work, at)
     d2 = squared_distance(v)
     return d2, d2 + math.log(v.s_rr * v.schur / (model.range_variance * model.bearing_variance))
 

@@ -14,7 +14,7 @@ import numpy as np
 from commission.compiled import compiled_inline
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray
-from commission.localization.kalman import Gain, Innovation, corrected_covariance, gain
+from commission.localization.kalman import Gain, Innovation, correct, corrected_covariance, gain, innovation
 from commission.localization.observation import Expected, ObservationModel, expect, scanner_offset
 from commission.localization.odometry import Motion, NextOdometry, velocity
 from commission.localization.pose_gaussian import PoseGaussian
@@ -88,20 +88,43 @@ def considering(  # noqa: PLR0917 - what the filter knows of its motion
 
     Parameters
     ----------
+    cross, belief, pivot, variances : as in `considering_at`.
+    motion, following : odometry before the scan and after it.
+
+    Notes
+    -----
+    No formula: `considering_at` the `velocity`.
+    """
+    if cross is None:
+        return None
+    return considering_at(cross, belief, pivot, velocity(motion, following), variances)
+
+
+@compiled_inline
+def considering_at(
+    cross: FloatArray | None,
+    belief: PoseGaussian,
+    pivot: tuple[float, float],
+    twist: tuple[float, float, float],
+    variances: ConsiderModel,
+) -> Considering | None:
+    """What the detections of a scan have in common; None where nothing is considered.
+
+    Parameters
+    ----------
     cross : (3, 2 N + 5 S) covariance of the pose with the constants, or None.
     belief : after *predict*.
     pivot : place of the belief [m] when `cross` was written.
-    motion, following : odometry before the scan and after it.
+    twist : velocity of base at the scan [m/s, m/s, rad/s], in base.
     variances : of the constants.
 
     Notes
     -----
-    No formula: a difference, and `velocity`.
+    moved = belief - pivot: what F of all motion since then is made of, by definition.
     """
     if cross is None:
         return None
-    speed_x, speed_y, turn_rate = velocity(motion, following)
-    return Considering(variances, belief.x - pivot[0], belief.y - pivot[1], speed_x, speed_y, turn_rate)
+    return Considering(variances, belief.x - pivot[0], belief.y - pivot[1], twist[0], twist[1], twist[2])
 
 
 @compiled_inline
@@ -124,7 +147,9 @@ def working_array(
     et al. 2016, Algorithm 1, line 3. Every correction multiplies all columns alike, so the first three become the
     transition of those constants that the scan says nothing of.
     """
-    if cross is None or given is None:
+    if given is None:
+        return None
+    if cross is None:
         return None
     work = np.zeros((3, BLOCKS + PER_REFLECTOR * detections))
     for row in range(3):
@@ -166,6 +191,46 @@ def _move(work: FloatArray, at: int, cross: FloatArray, column: int, given: Cons
     work[2, at] = heading
 
 
+class ScannerJacobian(NamedTuple):
+    """J of range (r) and bearing (b) with respect to mounting and clock; the rest of it is plain."""
+
+    mount_xr: float
+    mount_xb: float
+    mount_yr: float
+    mount_yb: float
+    clock_r: float
+    clock_b: float
+
+
+@compiled_inline
+def scanner_jacobian(theta: float, e: Expected, speed_x: float, speed_y: float, turn_rate: float) -> ScannerJacobian:
+    """How mounting and clock of the scanner change what it sees.
+
+    Parameters
+    ----------
+    theta : heading of base [rad].
+    e : what is expected of a reflector.
+    speed_x, speed_y, turn_rate : velocity of base [m/s, m/s, rad/s], in base.
+
+    Notes
+    -----
+    H_xy R(theta) of the mounting; -H xdot of a clock that is late by one second. Derived from equation 2 of Sobreira et
+    al. 2016.
+    """
+    c, s = math.cos(theta), math.sin(theta)
+    mount_xr, mount_yr = c * e.range_x + s * e.range_y, c * e.range_y - s * e.range_x
+    mount_xb, mount_yb = c * e.bearing_x + s * e.bearing_y, c * e.bearing_y - s * e.bearing_x
+    # In base axes, H of the place is that of the mounting.
+    return ScannerJacobian(
+        mount_xr,
+        mount_xb,
+        mount_yr,
+        mount_yb,
+        -(mount_xr * speed_x + mount_yr * speed_y + e.range_theta * turn_rate),
+        -(mount_xb * speed_x + mount_yb * speed_y + e.bearing_theta * turn_rate),
+    )
+
+
 @compiled_inline
 def seen_with(  # noqa: PLR0917 - a detection and the constants, number by number
     theta: float, e: Expected, surveyed_variance: float, given: Considering, work: FloatArray, at: int
@@ -183,15 +248,12 @@ def seen_with(  # noqa: PLR0917 - a detection and the constants, number by numbe
 
     Notes
     -----
-    J: the place of the reflector -H_xy; the mounting H_xy R(theta), and -1 of the bearing; the range bias 1 of the
-    range; a clock that is late by one second H less by a velocity. Derived from equation 2 of Sobreira et al. 2016.
+    J = -H_xy of the reflector's place, -1 of the bearing by the mounting's heading, 1 of the range by its bias; the
+    rest is `scanner_jacobian`. C J^T and J P_p J^T: derived from equation 2 of Sobreira et al. 2016.
     """
-    c, s = math.cos(theta), math.sin(theta)
-    mount_xr, mount_yr = c * e.range_x + s * e.range_y, c * e.range_y - s * e.range_x
-    mount_xb, mount_yb = c * e.bearing_x + s * e.bearing_y, c * e.bearing_y - s * e.bearing_x
-    # In base axes, H of the place is that of the mounting.
-    clock_r = -(mount_xr * given.speed_x + mount_yr * given.speed_y + e.range_theta * given.turn_rate)
-    clock_b = -(mount_xb * given.speed_x + mount_yb * given.speed_y + e.bearing_theta * given.turn_rate)
+    mount_xr, mount_xb, mount_yr, mount_yb, clock_r, clock_b = scanner_jacobian(
+        theta, e, given.speed_x, given.speed_y, given.turn_rate
+    )
     p = given.variances
     places = surveyed_variance
     rr = p.mount_position * (mount_xr * mount_xr + mount_yr * mount_yr)
@@ -429,3 +491,73 @@ def put_block(cross: FloatArray, work: FloatArray, at: int, entry: int) -> None:
     for row in range(3):
         cross[row, PER_REFLECTOR * entry] = work[row, at]
         cross[row, PER_REFLECTOR * entry + 1] = work[row, at + 1]
+
+
+@compiled_inline
+def innovation_given(  # noqa: PLR0917 - a measurement, number by number
+    belief: PoseGaussian,
+    e: Expected,
+    measured_range: float,
+    measured_bearing: float,
+    surveyed_variance: float,
+    model: ObservationModel,
+    given: Considering | None,
+    work: FloatArray | None,
+    at: int,
+) -> Innovation:
+    """Innovation of a detection, with constants where they are considered.
+
+    Parameters
+    ----------
+    belief, e, measured_range, measured_bearing, surveyed_variance, model : as in `kalman.innovation`.
+    given, work, at : as in `seen_with`, or None.
+
+    Notes
+    -----
+    No formula: `innovation` or `innovation_with`.
+    """
+    if given is None or work is None:
+        return innovation(belief, e, measured_range, measured_bearing, surveyed_variance, model)
+    seen = seen_with(belief.theta, e, surveyed_variance, given, work, at)
+    return innovation_with(belief, e, measured_range, measured_bearing, model, seen)
+
+
+@compiled_inline
+def correct_given(  # noqa: PLR0917 - a measurement and a reflector, number by number
+    belief: PoseGaussian,
+    measured_range: float,
+    measured_bearing: float,
+    reflector_x: float,
+    reflector_y: float,
+    surveyed_variance: float,
+    model: ObservationModel,
+    given: Considering | None,
+    work: FloatArray | None,
+    at: int,
+) -> PoseGaussian:
+    """Correct a belief by a detection, with constants where they are considered.
+
+    Parameters
+    ----------
+    belief, measured_range, measured_bearing : as in `kalman.correct`.
+    reflector_x, reflector_y, surveyed_variance, model : as in `kalman.correct`.
+    given, work, at : as in `correct_with`, or None.
+
+    Notes
+    -----
+    No formula: `correct` or `correct_with`.
+    """
+    if given is None or work is None:
+        return correct(belief, measured_range, measured_bearing, reflector_x, reflector_y, surveyed_variance, model)
+    return correct_with(
+        belief,
+        measured_range,
+        measured_bearing,
+        reflector_x,
+        reflector_y,
+        surveyed_variance,
+        model,
+        given,
+        work,
+        at,
+    )

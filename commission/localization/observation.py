@@ -203,7 +203,23 @@ def validation_ellipses(
     covariances : (N, 2, 2) array [m^2], map axes. A detection lies inside the gate when it falls inside the ellipse of
         `sqrt(gate)` sigmas around the reflector, up to the curvature of polar coordinates.
     """
-    S = innovation_covariances(belief, model, centers, sigmas)
+    return laid_on_the_floor(belief, model, centers, innovation_covariances(belief, model, centers, sigmas))
+
+
+def laid_on_the_floor(belief: Belief, model: ObservationModel, centers: ArrayLike, S: FloatArray) -> FloatArray:
+    """Covariances of expected observations laid on the floor around their reflectors.
+
+    Parameters
+    ----------
+    belief : pose of base.
+    model : mounting of the scanner.
+    centers : (N, 2) reflector centers [m], map frame.
+    S : (N, 2, 2) of range [m] and bearing [rad].
+
+    Returns
+    -------
+    covariances : (N, 2, 2) array [m^2], map axes.
+    """
     scanner = se2.compose(belief.mean, (model.mount_x, model.mount_y, model.mount_theta))[:2]
     delta = np.asarray(centers, dtype=np.float64).reshape(-1, 2) - scanner
     distance = np.maximum(np.hypot(delta[:, 0], delta[:, 1]), SMALLEST_RANGE)

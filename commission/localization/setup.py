@@ -10,17 +10,14 @@ import numpy as np
 
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.geometry.gaussian import ellipse_points
 from commission.localization.association import Gate, gate_of
 from commission.localization.consider import ConsiderModel
 from commission.localization.cross_covariance import Constants, constants_of, survey_variance
 from commission.localization.detector_model import DetectorModel, detector_model
-from commission.localization.estimate import Belief
 from commission.localization.observation import (
     ObservationModel,
     observation_model,
     observation_rows,
-    validation_ellipses,
 )
 from commission.localization.odometry import OdometryNoise, odometry_noise
 from commission.localization.reflector_index import Cells, ReflectorIndex, build_index
@@ -149,19 +146,3 @@ class LocalizerSetup:
     def of(project: Project) -> LocalizerSetup:
         """Return the setup of a project."""
         return LocalizerSetup(project.reflectors, project.scanners, project.parameters, project.uncertainty)
-
-    def validation_ellipses(self, belief: Belief, scanner: int = 0) -> FloatArray:
-        """(N, 2, 2) 1-sigma region [m^2] on the floor in which a scanner is expected to detect each reflector."""
-        return validation_ellipses(belief, self.observations[scanner], self.reflectors.centers, self.survey_sigmas)
-
-    def validation_outlines(self, belief: Belief, n: int = 48, *, scanner: int = 0) -> FloatArray:
-        """(N, n, 2) outline [m] of the validation gate around each reflector, map frame (the paper's Fig. 12).
-
-        Parameters
-        ----------
-        belief : the pose and its covariance.
-        n : points of each outline.
-        scanner : index of the scanner that measures.
-        """
-        scale = self.filter.gate.d2**0.5
-        return ellipse_points(self.reflectors.centers, self.validation_ellipses(belief, scanner), scale, n)

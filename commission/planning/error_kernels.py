@@ -10,12 +10,35 @@ import numpy as np
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.se2 import compose_scalars, inverse_scalars
-from commission.localization.kalman import Gain, Innovation, correct, corrected_covariance, gain, innovation
+from commission.localization.consider import (
+    BLOCKS,
+    PER_REFLECTOR,
+    PER_SCANNER,
+    Considering,
+    ConsiderModel,
+    ScannerJacobian,
+    considering_at,
+    correct_given,
+    innovation_given,
+    scanner_jacobian,
+    working_array,
+)
+from commission.localization.kalman import Gain, Innovation, corrected_covariance, gain, innovation
 from commission.localization.observation import Expected, ObservationModel, expect, observation_at, scanner_offset
 from commission.localization.odometry import OdometryNoise, predict
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.planning.detection_noise import DetectionNoise, Worth, worth
-from commission.planning.prediction_kernels import mixed
+from commission.planning.prediction_kernels import (
+    count_of,
+    mix,
+    mixed,
+    put_all_back,
+    remember,
+    same_size,
+    step_to,
+    take_out_all,
+    twist_of,
+)
 
 FORGOTTEN = 1e-16
 """Squared response below which a reflector is no longer followed [m^2, rad^2]."""
@@ -37,6 +60,13 @@ class ErrorModel(NamedTuple):
     """Probability per metre of ray that nobody is in the way."""
     beams: FloatArray
     """(S, 2) of each scanner: bearing of the first beam and step between beams [rad]."""
+    consider: ConsiderModel
+    """Variances of the constants of a scanner."""
+
+
+NOISE, MAP, MOUNTING, RANGE, CLOCK_PART = range(5)
+"""What contributes to an error: what is new in every scan or repeats with the beams; survey; mounting; range; clock."""
+PARTS = 5
 
 
 class _Passing(NamedTuple):
@@ -61,9 +91,12 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
     scanners: IntArray,
     priors: FloatArray,
     start_sigmas: FloatArray,
+    cross: FloatArray | None,
+    blocks: IntArray,
     model: ErrorModel,
     squares: FloatArray,
     inliers: FloatArray,
+    parts: FloatArray,
 ) -> None:
     """Second moments of the error after each scan.
 
@@ -71,49 +104,57 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
     ----------
     stamps_ns, poses : the K scans of a drive.
     offsets, indices : visible reflectors of each scan.
-    places : (M, 3) x, y and variance of the surveyed place of each reflector.
+    places : (M, 4) x, y, and variance of the surveyed place of each reflector, as the filter has it and as it is.
     kinds : (S, M) row of `model.noise` of each reflector for each scanner.
     scanners : (K,) scanner of each scan.
     priors : (K, 3, 3) what the filter believes before the detections of each scan.
     start_sigmas : (3,) of the start pose.
+    cross, blocks : as in `predict_covariances`.
     model : what the filter believes of its detections, and what they are truly worth.
     squares : (K, 3, 3) output.
     inliers : (K,) output: expected number of inliers of each scan.
+    parts : (K, 5, 3) output: of each diagonal, what each of `PARTS` contributes.
 
     Notes
     -----
-    E[e e^T] = P + b b^T + sum of R R^T over the reflectors: white errors P, mean error b, and the response R of the
-    pose to the errors of a reflector that stay (its wave and its place). Derived: e = (I - K H) F e before + K (error
-    of the detection), with the gain K that the filter believes in.
+    E[e e^T] = P + b b^T + sum of R V R^T over reflectors and scanners: white errors P, mean error b, and the response R
+    of the pose to errors that stay (waves, places, mounting, range, clock), of variance V. Derived: e = (I - K H) F e
+    before + K (error of the detection), with the gain K that the filter believes in.
     """
     # Per reflector, what one unit of its error moves the pose by: two quarters of its wave, two axes of its place.
     # Every scanner has waves of its own; the place of a reflector stands with the waves of the first.
     rows = kinds.size
     responses = np.zeros((rows, 3, 4))
     followed, is_followed, count = np.empty(rows, np.int64), np.zeros(rows, np.bool_), 0
+    askew = np.zeros((len(model.observations), 3, PER_SCANNER))
     bias = np.zeros(3)
     x, y, theta = poses[0, 0], poses[0, 1], poses[0, 2]
     sx, sy, st = start_sigmas[0], start_sigmas[1], start_sigmas[2]
     error = PoseGaussian(x, y, theta, sx * sx, 0.0, 0.0, sy * sy, 0.0, st * st)
     for k in range(len(stamps_ns)):
         x, y, theta = poses[k, 0], poses[k, 1], poses[k, 2]
+        step, pivot = step_to(poses, stamps_ns, k), (x, y)
         if k > 0:
-            seconds = 1e-9 * (stamps_ns[k] - stamps_ns[k - 1])
-            error = _moved(error, x, y, theta, seconds, model.odometry)
-            _turn(responses, followed[:count], bias, x - poses[k - 1, 0], y - poses[k - 1, 1])
-        belief, scanner = _at(x, y, theta, priors[k]), scanners[k]
+            pivot = (poses[k - 1, 0], poses[k - 1, 1])
+            error = _moved(error, x, y, theta, step[3], model.odometry)
+            _turn(responses, followed[:count], bias, askew, x - pivot[0], y - pivot[1])
+        belief, scanner, first, last = _at(x, y, theta, priors[k]), scanners[k], offsets[k], offsets[k + 1]
         observation, inliers[k] = observation_at(model.observations, scanner), 0.0
         offset_x, offset_y = scanner_offset(theta, observation)
-        for i in range(offsets[k], offsets[k + 1]):
-            m = indices[i]
+        twist = twist_of(step)
+        given = considering_at(cross, belief, pivot, twist, model.consider)
+        work = working_array(cross, given, count_of(cross, model.observations), scanner, last - first)
+        take_out_all(cross, given, work, blocks, indices, first, last)
+        kept = same_size(work)
+        for i in range(first, last):
+            m, at = indices[i], BLOCKS + PER_REFLECTOR * (i - first)
             mount = observation.mount_theta
             e = expect(x, y, theta, offset_x, offset_y, places[m, 0], places[m, 1], mount)
             true = worth(model.noise, int(kinds[scanner, m]), e.range)
-            says = innovation(belief, e, e.range, e.bearing, places[m, 2], observation)
-            k_says = gain(says)
-            passing = _passing(belief, e, says, true, places[m, 2], observation, model.gate_d2)
+            says = innovation_given(belief, e, e.range, e.bearing, places[m, 2], observation, given, work, at)
+            passing = _passing(belief, e, says, true, places[m, 2], observation, model.gate_d2, given, work, at)
             seen = true.probability * model.free_per_m**e.range
-            error = _after(error, e, k_says, true, passing, seen, observation)
+            error = _after(error, e, gain(says), true, passing, seen, observation)
             row = scanner * len(places) + m
             for each in (row, m):
                 if not is_followed[each]:
@@ -121,12 +162,21 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
                     count += 1
             share = seen * passing.probability
             inliers[k] += share
-            _respond(responses, followed[:count], bias, e, k_says, share)
-            _disturb(responses, row, m, bias, e, k_says, share, true, model.beams[scanner])
-            corrected = correct(belief, e.range, e.bearing, places[m, 0], places[m, 1], places[m, 2], observation)
-            belief = mixed(belief, corrected, seen * model.inside_gate)
+            _respond(responses, followed[:count], bias, askew, e, gain(says), share)
+            _disturb(responses, row, m, bias, e, gain(says), share, true, model.beams[scanner])
+            j = scanner_jacobian(theta, e, twist[0], twist[1], twist[2])
+            _disturb_all(askew[scanner], j, gain(says), share)
+            remember(work, kept)
+            probability = seen * model.inside_gate
+            corrected = correct_given(
+                belief, e.range, e.bearing, places[m, 0], places[m, 1], places[m, 2], observation, given, work, at
+            )
+            belief = mixed(belief, corrected, probability)
+            mix(work, kept, probability)
+        put_all_back(cross, work, blocks, indices, first, last, count_of(cross, model.observations), scanner)
         count = _forget(responses, followed, is_followed, count)
-        _gather(error, responses, followed[:count], places, bias, squares[k])
+        _gather(error, responses, followed[:count], places, bias, squares[k], parts[k])
+        _gather_scanners(askew, model.consider, squares[k], parts[k])
 
 
 @compiled_inline
@@ -155,6 +205,9 @@ def _passing(  # noqa: PLR0917 - a detection, number by number
     surveyed: float,
     o: ObservationModel,
     gate_d2: float,
+    given: Considering | None,
+    work: FloatArray | None,
+    at: int,
 ) -> _Passing:
     """What the gate g does when the filter says S of innovations whose covariance is T.
 
@@ -163,7 +216,7 @@ def _passing(  # noqa: PLR0917 - a detection, number by number
     that are rejected would widen it until all drives seemed to be.
     """
     actual = ObservationModel(o.mount_x, o.mount_y, o.mount_theta, true.range_variance, true.bearing_variance, 0.0)
-    is_so = innovation(belief, e, e.range, e.bearing, surveyed, actual)
+    is_so = innovation_given(belief, e, e.range, e.bearing, surveyed, actual, given, work, at)
     across = is_so.w - says.w
     trace = is_so.s_rr / says.s_rr + (is_so.schur + across * across * is_so.s_rr) / says.schur
     u = gate_d2 / trace
@@ -210,8 +263,14 @@ def _corrected(error: PoseGaussian, e: Expected, k: Gain, is_so: Innovation) -> 
 
 
 @compiled
-def _turn(responses: FloatArray, followed: IntArray, bias: FloatArray, mx: float, my: float) -> None:
+def _turn(  # noqa: PLR0917 - all kinds of error
+    responses: FloatArray, followed: IntArray, bias: FloatArray, askew: FloatArray, mx: float, my: float
+) -> None:
     """A motion by (mx, my) [m] turns an error of the heading into one of the position."""
+    for scanner in range(len(askew)):
+        for column in range(PER_SCANNER):
+            askew[scanner, 0, column] -= my * askew[scanner, 2, column]
+            askew[scanner, 1, column] += mx * askew[scanner, 2, column]
     bias[0] -= my * bias[2]
     bias[1] += mx * bias[2]
     for m in followed:
@@ -222,9 +281,19 @@ def _turn(responses: FloatArray, followed: IntArray, bias: FloatArray, mx: float
 
 @compiled
 def _respond(  # noqa: PLR0917 - a detection, number by number
-    responses: FloatArray, followed: IntArray, bias: FloatArray, e: Expected, k: Gain, share: float
+    responses: FloatArray,
+    followed: IntArray,
+    bias: FloatArray,
+    askew: FloatArray,
+    e: Expected,
+    k: Gain,
+    share: float,
 ) -> None:
     """A correction takes a share of every error back: B -= share K H B."""
+    for scanner in range(len(askew)):
+        b = askew[scanner]
+        for c in range(PER_SCANNER):
+            b[0, c], b[1, c], b[2, c] = _less(b[0, c], b[1, c], b[2, c], e, k, share)
     bias[0], bias[1], bias[2] = _less(bias[0], bias[1], bias[2], e, k, share)
     for m in followed:
         b = responses[m]
@@ -276,6 +345,18 @@ def _disturb(  # noqa: PLR0917 - a detection, number by number
     bias[2] += k.tr * share * true.range_bias
 
 
+@compiled_inline
+def _disturb_all(b: FloatArray, j: ScannerJacobian, k: Gain, share: float) -> None:
+    """Add what one unit of each constant of a scanner brings in with a detection: B += share K J."""
+    in_range = (j.mount_xr, j.mount_yr, 0.0, 1.0, j.clock_r)
+    in_bearing = (j.mount_xb, j.mount_yb, -1.0, 0.0, j.clock_b)
+    for column in range(PER_SCANNER):
+        r, across = share * in_range[column], share * in_bearing[column]
+        b[0, column] += k.xr * r + k.xb * across
+        b[1, column] += k.yr * r + k.yb * across
+        b[2, column] += k.tr * r + k.tb * across
+
+
 @compiled
 def _forget(responses: FloatArray, followed: IntArray, is_followed: np.ndarray, count: int) -> int:
     """Follow no longer what has faded; return how many are left."""
@@ -299,15 +380,36 @@ def _gather(  # noqa: PLR0917 - all kinds of error
     places: FloatArray,
     bias: FloatArray,
     square: FloatArray,
+    part: FloatArray,
 ) -> None:
-    """Add up the four kinds of error into a (3, 3) second moment."""
+    """Add up what is not the scanner's into a (3, 3) second moment, and of its diagonal each part."""
     square[0, 0], square[0, 1], square[0, 2] = error.xx, error.xy, error.xt
     square[1, 0], square[1, 1], square[1, 2] = error.xy, error.yy, error.yt
     square[2, 0], square[2, 1], square[2, 2] = error.xt, error.yt, error.tt
+    part[:] = 0.0
     for i in range(3):
         for j in range(3):
             square[i, j] += bias[i] * bias[j]
             for m in followed:
                 b = responses[m]
                 square[i, j] += b[i, 0] * b[j, 0] + b[i, 1] * b[j, 1]
-                square[i, j] += places[m % len(places), 2] * (b[i, 2] * b[j, 2] + b[i, 3] * b[j, 3])
+                surveyed = places[m % len(places), 3] * (b[i, 2] * b[j, 2] + b[i, 3] * b[j, 3])
+                square[i, j] += surveyed
+                if i == j:
+                    part[MAP, i] += surveyed
+        part[NOISE, i] = square[i, i] - part[MAP, i]
+
+
+@compiled
+def _gather_scanners(askew: FloatArray, variances: ConsiderModel, square: FloatArray, part: FloatArray) -> None:
+    """Add what the constants of the scanners contribute."""
+    p = variances
+    each = (p.mount_position, p.mount_position, p.mount_heading, p.range_bias, p.clock)
+    kinds = (MOUNTING, MOUNTING, MOUNTING, RANGE, CLOCK_PART)
+    for scanner in range(len(askew)):
+        b = askew[scanner]
+        for column in range(PER_SCANNER):
+            for i in range(3):
+                for j in range(3):
+                    square[i, j] += each[column] * b[i, column] * b[j, column]
+                part[kinds[column], i] += each[column] * b[i, column] * b[i, column]

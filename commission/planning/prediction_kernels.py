@@ -10,8 +10,22 @@ from numpy.typing import NDArray
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.geometry.se2 import compose_scalars, inverse_scalars
-from commission.localization.kalman import correct, innovation, squared_distance
+from commission.geometry.se2 import compose_scalars, inverse_scalars, log_scalars
+from commission.localization.consider import (
+    BLOCKS,
+    PER_REFLECTOR,
+    PER_SCANNER,
+    Considering,
+    ConsiderModel,
+    considering_at,
+    correct_given,
+    innovation_given,
+    put_back,
+    put_block,
+    take_out,
+    working_array,
+)
+from commission.localization.kalman import innovation, squared_distance
 from commission.localization.observation import ObservationModel, expect, observation_at, scanner_offset
 from commission.localization.odometry import OdometryNoise, predict
 from commission.localization.pose_gaussian import PoseGaussian
@@ -36,6 +50,8 @@ class PredictionModel(NamedTuple):
     """Probability that a visible reflector passes the detector filter, by class and distance."""
     kinds: IntArray
     """(S, M) row of `noise` of each reflector for each scanner."""
+    consider: ConsiderModel
+    """Variances of the constants of a scanner."""
 
 
 class PredictionColumns(NamedTuple):
@@ -61,6 +77,8 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
     shifts: FloatArray,
     reach: FloatArray,
     belief: PoseGaussian,
+    cross: FloatArray | None,
+    blocks: IntArray,
     model: PredictionModel,
     columns: PredictionColumns,
 ) -> None:
@@ -70,10 +88,12 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
     ----------
     stamps_ns, poses, metres, scanners : the K scans of a drive.
     offsets, indices : visible reflectors of each scan.
-    places : (M, 3) x, y and variance of each reflector as the map has it.
+    places : (M, 4) x, y and variance of each reflector as the filter has it.
     shifts : (M, 2) what the reflectors have moved since [m].
     reach : (M,) distance up to which each is seen [m]; negative: never.
     belief : at the first scan, before its detections.
+    cross : (3, 2 B + 5 S) zeros, for the covariance with the considered constants; None: none is considered.
+    blocks : (M,) which two columns of it a reflector has that is seen at all.
     model : what the filter reads besides the drive.
     columns : outputs.
 
@@ -83,40 +103,221 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
     with the localizer's own *predict* and *correct*.
     """
     prior_covariances, means, covariances, modes, seen, on_odometry = columns
-    mode, last_seen_at = 0, metres[0]
+    mode, last_seen_at, pivot = 0, metres[0], (belief.x, belief.y)
     for k in range(len(stamps_ns)):
         x, y, theta = poses[k, 0], poses[k, 1], poses[k, 2]
+        step = step_to(poses, stamps_ns, k)
         if k > 0:
-            back_x, back_y, back_theta = inverse_scalars(poses[k - 1, 0], poses[k - 1, 1], poses[k - 1, 2])
-            dx, dy, dtheta = compose_scalars(back_x, back_y, back_theta, x, y, theta)
-            seconds = 1e-9 * (stamps_ns[k] - stamps_ns[k - 1])
-            belief = predict(belief, dx, dy, dtheta, seconds, model.odometry)
+            belief = predict(belief, step[0], step[1], step[2], step[3], model.odometry)
         _write_covariance(belief, k, prior_covariances)
-        prior, observation = belief, observation_at(model.observations, scanners[k])
+        prior, observation, first, last = (
+            belief,
+            observation_at(model.observations, scanners[k]),
+            offsets[k],
+            offsets[k + 1],
+        )
         offset_x, offset_y = scanner_offset(theta, observation)
-        found = 0
-        for i in range(offsets[k], offsets[k + 1]):
+        given = considering_at(cross, prior, pivot, twist_of(step), model.consider)
+        work = working_array(cross, given, count_of(cross, model.observations), scanners[k], last - first)
+        take_out_all(cross, given, work, blocks, indices, first, last)
+        kept = same_size(work)
+        passes, found = np.empty(last - first, np.bool_), 0
+        for i in range(first, last):
             m = indices[i]
             target_x, target_y = places[m, 0] + shifts[m, 0], places[m, 1] + shifts[m, 1]
-            mount = observation.mount_theta
-            truth = expect(x, y, theta, offset_x, offset_y, target_x, target_y, mount)
-            if truth.range > reach[m] or not _inside_gate(
-                prior, truth.range, truth.bearing, places, m, observation, model.gate_d2
-            ):
+            truth = expect(x, y, theta, offset_x, offset_y, target_x, target_y, observation.mount_theta)
+            at = BLOCKS + PER_REFLECTOR * (i - first)
+            passes[i - first] = truth.range <= reach[m] and _inside_gate(
+                prior, truth.range, truth.bearing, places, m, observation, model.gate_d2, given, work, at
+            )
+        for i in range(first, last):
+            if not passes[i - first]:
                 continue
-            corrected = correct(
-                belief, truth.range, truth.bearing, places[m, 0], places[m, 1], places[m, 2], observation
+            m = indices[i]
+            target_x, target_y = places[m, 0] + shifts[m, 0], places[m, 1] + shifts[m, 1]
+            truth = expect(x, y, theta, offset_x, offset_y, target_x, target_y, observation.mount_theta)
+            remember(work, kept)
+            corrected = correct_given(
+                belief,
+                truth.range,
+                truth.bearing,
+                places[m, 0],
+                places[m, 1],
+                places[m, 2],
+                observation,
+                given,
+                work,
+                BLOCKS + PER_REFLECTOR * (i - first),
             )
             detected = worth(model.noise, int(model.kinds[scanners[k], m]), truth.range).probability
             found += detected >= LIKELY
             probability = detected * model.inside_gate * model.free_per_m**truth.range
             belief = mixed(belief, corrected, probability)
+            mix(work, kept, probability)
+        put_all_back(cross, work, blocks, indices, first, last, count_of(cross, model.observations), scanners[k])
+        pivot = (belief.x, belief.y)
         mode = supervise(mode, belief, model.limits)
         if found > 0:
             last_seen_at = metres[k]
         means[k, 0], means[k, 1], means[k, 2] = belief.x, belief.y, belief.theta
         _write_covariance(belief, k, covariances)
         modes[k], seen[k], on_odometry[k] = mode, found, metres[k] - last_seen_at
+
+
+@compiled_inline
+def step_to(poses: FloatArray, stamps_ns: IntArray, k: int) -> tuple[float, float, float, float]:
+    """Motion from the scan before to a scan [m, m, rad], and its time [s]; none to the first.
+
+    Parameters
+    ----------
+    poses, stamps_ns : the scans of a drive.
+    k : number of the scan.
+
+    Notes
+    -----
+    T_k-1^-1 T_k, by definition.
+    """
+    if k == 0:
+        return 0.0, 0.0, 0.0, 0.0
+    back_x, back_y, back_theta = inverse_scalars(poses[k - 1, 0], poses[k - 1, 1], poses[k - 1, 2])
+    dx, dy, dtheta = compose_scalars(back_x, back_y, back_theta, poses[k, 0], poses[k, 1], poses[k, 2])
+    return dx, dy, dtheta, 1e-9 * (stamps_ns[k] - stamps_ns[k - 1])
+
+
+@compiled_inline
+def twist_of(step: tuple[float, float, float, float]) -> tuple[float, float, float]:
+    """Velocity of base in a motion [m/s, m/s, rad/s], in base; none where it took no time.
+
+    Notes
+    -----
+    log(displacement) / time, by definition of a constant twist.
+    """
+    if not step[3] > 0.0:
+        return 0.0, 0.0, 0.0
+    forward, left, turn = log_scalars(step[0], step[1], step[2])
+    return forward / step[3], left / step[3], turn / step[3]
+
+
+@compiled_inline
+def count_of(cross: FloatArray | None, observations: FloatArray) -> int:
+    """Number of reflectors that a cross covariance has columns for.
+
+    Notes
+    -----
+    (columns - 5 S) / 2, by definition.
+    """
+    if cross is None:
+        return 0
+    return (cross.shape[1] - PER_SCANNER * len(observations)) // PER_REFLECTOR
+
+
+@compiled_inline
+def take_out_all(  # noqa: PLR0917 - the columns of a drive
+    cross: FloatArray | None,
+    given: Considering | None,
+    work: FloatArray | None,
+    blocks: IntArray,
+    indices: IntArray,
+    first: int,
+    last: int,
+) -> None:
+    """Write the columns of all visible reflectors of a scan.
+
+    Parameters
+    ----------
+    cross, given, work : as in `consider.take_out`, or None.
+    blocks : (M,) columns of each reflector in `cross`.
+    indices : visible reflectors of all scans.
+    first, last : those of this one, the last one excluded.
+
+    Notes
+    -----
+    No formula: `take_out` of each.
+    """
+    if cross is None or given is None or work is None:
+        return
+    for i in range(first, last):
+        take_out(work, BLOCKS + PER_REFLECTOR * (i - first), cross, int(blocks[indices[i]]), given)
+
+
+@compiled_inline
+def put_all_back(  # noqa: PLR0917 - the columns of a drive
+    cross: FloatArray | None,
+    work: FloatArray | None,
+    blocks: IntArray,
+    indices: IntArray,
+    first: int,
+    last: int,
+    reflectors: int,
+    scanner: int,
+) -> None:
+    """Carry the covariance with all constants over a scan.
+
+    Parameters
+    ----------
+    cross, work : as in `consider.put_back`, or None.
+    blocks, indices, first, last : as in `take_out_all`.
+    reflectors : that `cross` has columns for.
+    scanner : index of the scanner.
+
+    Notes
+    -----
+    No formula: `put_back`, and `put_block` of each.
+    """
+    if cross is None or work is None:
+        return
+    put_back(cross, work, reflectors, scanner)
+    for i in range(first, last):
+        put_block(cross, work, BLOCKS + PER_REFLECTOR * (i - first), int(blocks[indices[i]]))
+
+
+@compiled_inline
+def same_size(work: FloatArray | None) -> FloatArray | None:
+    """Array of the same size, or None.
+
+    Notes
+    -----
+    No formula.
+    """
+    if work is None:
+        return None
+    return np.empty((3, work.shape[1]))
+
+
+@compiled_inline
+def remember(work: FloatArray | None, kept: FloatArray | None) -> None:
+    """Copy a working array.
+
+    Notes
+    -----
+    No formula.
+    """
+    if work is None or kept is None:
+        return
+    for row in range(3):
+        for j in range(work.shape[1]):
+            kept[row, j] = work[row, j]
+
+
+@compiled_inline
+def mix(work: FloatArray | None, kept: FloatArray | None, probability: float) -> None:
+    """Mean of the covariance with the constants with a detection and without it, as `mixed`.
+
+    Parameters
+    ----------
+    work : with the detection; in place.
+    kept : without it.
+    probability : that there is one [0..1].
+
+    Notes
+    -----
+    C = p C_after + (1 - p) C_before: Sinopoli et al. 2004, of the whole covariance.
+    """
+    if work is None or kept is None:
+        return
+    for row in range(3):
+        for j in range(work.shape[1]):
+            work[row, j] = probability * work[row, j] + (1.0 - probability) * kept[row, j]
 
 
 @compiled
@@ -139,7 +340,7 @@ def separations(  # noqa: PLR0917 - the columns of a drive
     poses : (K, 3) `T_map_base` of the scans of a drive [m, m, rad].
     scanners : (K,) scanner of each.
     prior_covariances : (K, 3, 3) before the detections of each scan.
-    places : (M, 3) as in `predict_covariances`.
+    places : (M, 4) as in `predict_covariances`.
     reflector, neighbor : rows of `places`; the covariance is that of the reflector's innovation.
     model : of the observation.
     squared : (n,) output.
@@ -171,12 +372,16 @@ def _inside_gate(  # noqa: PLR0917 - a measurement, number by number
     m: int,
     observation: ObservationModel,
     gate_d2: float,
+    given: Considering | None,
+    work: FloatArray | None,
+    at: int,
 ) -> bool:
     """Whether the expected detection passes the association filter at the predicted belief."""
     offset_x, offset_y = scanner_offset(prior.theta, observation)
     mount = observation.mount_theta
     expected = expect(prior.x, prior.y, prior.theta, offset_x, offset_y, places[m, 0], places[m, 1], mount)
-    return squared_distance(innovation(prior, expected, distance, bearing, places[m, 2], observation)) <= gate_d2
+    v = innovation_given(prior, expected, distance, bearing, places[m, 2], observation, given, work, at)
+    return squared_distance(v) <= gate_d2
 
 
 @compiled_inline

@@ -17,10 +17,13 @@ from numpy.typing import NDArray
 from commission.geometry.angles import difference
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.geometry.gaussian import chi_square_gate
+from commission.localization.consider import PER_REFLECTOR, PER_SCANNER
+from commission.localization.cross_covariance import survey_variance
 from commission.localization.estimate import Belief, Mode
 from commission.localization.observation import observation_model, observation_rows
 from commission.localization.odometry import odometry_noise
 from commission.localization.pose_gaussian import from_belief
+from commission.localization.setup import consider_model
 from commission.localization.supervisor import supervisor_limits
 from commission.planning.detection_noise import DetectionQuality, detection_quality
 from commission.planning.nominal_drive import DrivePlan, NominalDrive, nominal_drive
@@ -34,6 +37,7 @@ from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.uncertainty import Uncertainty
 
 AT_STATION = 0.2
 """Distance within which the vehicle is at a station [m]."""
@@ -87,7 +91,7 @@ class PlannedRoute:
     visible: VisibleReflectors
     """Reflectors visible at each scan."""
     places: FloatArray
-    """(M, 3) x, y [m], map frame, and variance of the surveyed place [m^2] of each reflector."""
+    """(M, 4) x, y [m], map frame, of each reflector; variance of its place as the filter has it, and as it is [m^2]."""
     farthest: FloatArray
     """(M,) largest distance from which each reflector is seen by any scanner [m]."""
     reflectors: ReflectorMap
@@ -96,6 +100,8 @@ class PlannedRoute:
     """Mounting, and noise of their beams."""
     parameters: Parameters
     """Tunables of the localizer."""
+    uncertainty: Uncertainty
+    """How well the constants of the site and the vehicle are known."""
     options: PredictionOptions
     """Start and hall."""
     quality: DetectionQuality
@@ -128,7 +134,20 @@ class PlannedRoute:
             1.0 - self.options.blocked_per_m,
             self.quality.noise,
             self.quality.classes,
+            consider_model(self.uncertainty),
         )
+
+    def constants(self) -> tuple[FloatArray | None, IntArray]:
+        """(3, 2 B + 5 S) zeros for the covariance with what the filter considers, and (M,) the columns of reflectors.
+
+        Only the B reflectors that are seen have columns; None where nothing is considered.
+        """
+        blocks = np.zeros(len(self.places), dtype=np.int64)
+        seen = np.unique(self.visible.indices)
+        blocks[seen] = np.arange(len(seen))
+        if not self.parameters.filter.consider:
+            return None, blocks
+        return np.zeros((3, PER_REFLECTOR * len(seen) + PER_SCANNER * len(self.scanners))), blocks
 
 
 class PerMetre(NamedTuple):
@@ -248,8 +267,11 @@ def plan_route(
     options = options or PredictionOptions()
     models = models or visibility_models(site)
     drive, model = nominal_drive(site.route(route_name), site.vehicle, site.scanners, options.plan), models[0]
-    surveyed = np.array([reflector.sigma**2 for reflector in model.reflectors.reflectors])
-    places = np.column_stack((model.reflectors.centers, surveyed))
+    reflectors = model.reflectors
+    surveyed = np.array([survey_variance(each, site.uncertainty) for each in reflectors.reflectors])
+    own = np.array([each.sigma**2 for each in reflectors.reflectors])
+    believed = surveyed if site.parameters.filter.consider else own
+    places = np.column_stack((reflectors.centers, believed, surveyed))
     return PlannedRoute(
         name=route_name,
         drive=drive,
@@ -259,6 +281,7 @@ def plan_route(
         reflectors=model.reflectors,
         scanners=site.scanners,
         parameters=site.parameters,
+        uncertainty=site.uncertainty,
         options=options,
         quality=detection_quality(model.reflectors, site.scanners, site.parameters.detector),
     )
@@ -318,6 +341,7 @@ def predict_route(planned: PlannedRoute, damage: Damage = NO_DAMAGE) -> RoutePre
         np.empty(count, np.int64),
         np.empty(count),
     )
+    cross, blocks = planned.constants()
     start = Belief(0, planned.drive.poses[0], np.diag(np.square(planned.options.start_sigmas)))
     predict_covariances(
         planned.drive.stamps_ns,
@@ -330,6 +354,8 @@ def predict_route(planned: PlannedRoute, damage: Damage = NO_DAMAGE) -> RoutePre
         read_only(shifts),
         read_only(reach),
         from_belief(start),
+        cross,
+        blocks,
         planned.model(),
         columns,
     )

@@ -14,6 +14,9 @@ from commission.geometry.arrays import FloatArray, read_only
 from commission.planning.error_kernels import ErrorModel, propagate_errors
 from commission.planning.route_prediction import PerMetre, PlannedRoute, RoutePrediction, predict_route, smallest_route
 
+CONTRIBUTIONS = ("noise", "map", "mounting", "range", "clock")
+"""What an error comes from: noise of odometry and beams; survey; mounting; range bias and clock of the scanners."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedErrors:
@@ -23,6 +26,8 @@ class PredictedErrors:
     """(K, 3, 3) second moments of the error of x [m], y [m] and heading [rad]: over many drives, biases included."""
     inliers: FloatArray
     """(K,) expected number of inliers: of the visible reflectors, those that pass the detector filter and the gate."""
+    parts: FloatArray
+    """(K, 5, 3) what each of `CONTRIBUTIONS` has in the second moments of x, y and heading."""
 
     @property
     def sigmas(self) -> FloatArray:
@@ -33,6 +38,15 @@ class PredictedErrors:
     def two_sigma(self) -> FloatArray:
         """(K, 3) twice the expected RMS error of x [m], y [m] and heading [rad]: as the filter's own is told."""
         return 2.0 * self.sigmas
+
+    @property
+    def part_two_sigma(self) -> FloatArray:
+        """(K, 5) 2-sigma of the position that each of `CONTRIBUTIONS` alone has, along its worse axis [m]."""
+        return 2.0 * np.sqrt(self.parts[:, :, :2].max(axis=2))
+
+    def parts_per_metre(self, metres: PerMetre) -> FloatArray:
+        """(B, 5) the largest `part_two_sigma` of each metre of the prediction [m]."""
+        return np.maximum.reduceat(self.part_two_sigma, metres.first, axis=0)
 
     def per_metre(self, metres: PerMetre) -> FloatArray:
         """(B, 3) the largest `two_sigma` of each metre of the prediction."""
@@ -59,8 +73,9 @@ def predict_errors(planned: PlannedRoute, prediction: RoutePrediction) -> Predic
     tenth of a degree of heading, is not. An error of the survey stays. The last two are carried as the response of the
     pose to each reflector; taken as new in every scan, as the filter takes them, they would average out.
     """
-    quality = planned.quality
-    squares, inliers = np.empty((len(planned.drive), 3, 3)), np.empty(len(planned.drive))
+    quality, count = planned.quality, len(planned.drive)
+    squares, inliers, parts = np.empty((count, 3, 3)), np.empty(count), np.empty((count, len(CONTRIBUTIONS), 3))
+    cross, blocks = planned.constants()
     model = planned.model()
     propagate_errors(
         planned.drive.stamps_ns,
@@ -72,6 +87,8 @@ def predict_errors(planned: PlannedRoute, prediction: RoutePrediction) -> Predic
         planned.drive.scanners,
         prediction.prior_covariances,
         np.array(planned.options.start_sigmas),
+        cross,
+        blocks,
         ErrorModel(
             model.odometry,
             model.observations,
@@ -80,11 +97,13 @@ def predict_errors(planned: PlannedRoute, prediction: RoutePrediction) -> Predic
             model.inside_gate,
             model.free_per_m,
             np.array([(scanner.angle_min, scanner.angle_increment) for scanner in planned.scanners]),
+            model.consider,
         ),
         squares,
         inliers,
+        parts,
     )
-    return PredictedErrors(read_only(squares), read_only(inliers))
+    return PredictedErrors(read_only(squares), read_only(inliers), read_only(parts))
 
 
 def two_sigma_of(planned: PlannedRoute) -> FloatArray:

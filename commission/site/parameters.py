@@ -181,7 +181,7 @@ class AssociationParameters:
 class FilterParameters:
     """How detections correct the pose."""
 
-    consider: Annotated[bool, Switch("Consider constant errors")] = False
+    consider: Annotated[bool, Switch("Consider constant errors")] = True
     """Whether errors of map, mounting, range and clock (the project's uncertainty) are known not to average out."""
 
     def __post_init__(self) -> None:

@@ -13,6 +13,7 @@ from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import Vehicle
 
 
@@ -79,6 +80,15 @@ class HasParameters(Protocol):
         ...
 
 
+class HasUncertainty(Protocol):
+    """How well constants are known."""
+
+    @property
+    def uncertainty(self) -> Uncertainty:
+        """1-sigma of errors that stay over a drive."""
+        ...
+
+
 class Extended(HasFloorMap, HasReflectors, HasRoutes, Protocol):
     """What says how far a site reaches."""
 
@@ -91,7 +101,7 @@ class Told(HasParameters, HasScanners, Protocol):
     """What says which reflectors are told apart."""
 
 
-class Driven(Sighted, HasVehicle, HasParameters, Protocol):
+class Driven(Sighted, HasVehicle, HasParameters, HasUncertainty, Protocol):
     """What says how a vehicle drives a route, and what it sees and believes on it."""
 
     def route(self, name: str, /) -> Route:

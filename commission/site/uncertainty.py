@@ -19,6 +19,16 @@ def _length(label: str) -> Quantity:
     return Quantity(label=label, unit="m", shown=MILLIMETRES, bounds=_SHORT, step=0.5, slider=(0.0, 20.0), decimals=6)
 
 
+EXACT = {
+    "survey": "every reflector without a sigma of its own is taken to stand exactly where the map says",
+    "mounting_position": "scanners are taken to be mounted exactly where the project says",
+    "mounting_heading": "scanners are taken to be mounted exactly in the direction that the project says",
+    "range_bias": "scanners are taken to measure without any range bias but `observation.range_bias`",
+    "clock": "scans are taken to be stamped exactly when they were taken",
+}
+"""What it means that a field is 0."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Uncertainty:
     """1-sigma of what stays as it is while a vehicle drives, and is not known exactly."""
@@ -55,6 +65,14 @@ class Uncertainty:
         ),
     ] = 0.005
     """1-sigma of how much later than they were taken the scans of a scanner are stamped."""
+
+    def taken_for_exact(self) -> tuple[str, ...]:
+        """Say what is taken for exact, one line each: nothing is unless somebody has said so."""
+        return tuple(
+            f"uncertainty.{name} is 0: {meaning}; expected more than 0"
+            for name, meaning in EXACT.items()
+            if getattr(self, name) == 0.0
+        )
 
     def __post_init__(self) -> None:
         check_fields(self, "uncertainty.")

@@ -14,6 +14,7 @@ from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route, route_named
 from commission.site.scanner import Scanner
+from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import Vehicle
 from commission.studies.inputs import StudyInput
 
@@ -35,6 +36,8 @@ class DrivesInput(StudyInput):
     """Wheels and outline."""
     parameters: Parameters
     """Tunables of the localizer."""
+    uncertainty: Uncertainty
+    """How well the constants of the site and the vehicle are known."""
     routes: tuple[Route, ...]
     """The routes, and no others."""
     prediction: PredictionOptions
@@ -69,6 +72,7 @@ class DrivesInput(StudyInput):
             scanners=project.scanners,
             vehicle=project.vehicle,
             parameters=project.parameters,
+            uncertainty=project.uncertainty,
             routes=project.routes if names is None else tuple(map(project.route, names)),
             prediction=prediction or PredictionOptions(),
             visibility=visibility or VisibilityOptions(),

@@ -23,6 +23,7 @@ from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route, route_named
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import Vehicle
 from commission.studies.inputs import StudyInput
 from commission.studies.kernels import DRIVES, ERRORS, INFORMATION
@@ -45,6 +46,8 @@ class PlacementInput(StudyInput):
     """Wheels and outline."""
     parameters: Parameters
     """Tunables of the localizer."""
+    uncertainty: Uncertainty
+    """How well the constants of the site and the vehicle are known."""
     routes: tuple[Route, ...]
     """The routes that count."""
     stations: tuple[Station, ...]
@@ -79,6 +82,7 @@ class PlacementInput(StudyInput):
             scanners=project.scanners,
             vehicle=project.vehicle,
             parameters=project.parameters,
+            uncertainty=project.uncertainty,
             routes=tuple(map(project.route, names)),
             stations=project.stations,
             options=options or PlacementOptions(demands=brief.demands, candidates=brief.candidates),

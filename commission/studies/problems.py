@@ -30,6 +30,7 @@ from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import Vehicle
 from commission.studies.detector_problems import detector_findings
 from commission.studies.inputs import StudyInput, is_same
@@ -113,6 +114,8 @@ class ProblemsInput(StudyInput):
     """The laser scanners."""
     parameters: Parameters
     """Tunables of the localizer."""
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    """How well the constants of the site and the vehicle are known."""
     limits: CheckLimits = field(default_factory=CheckLimits)
     """What is expected."""
 
@@ -127,6 +130,7 @@ class ProblemsInput(StudyInput):
             vehicle=project.vehicle,
             scanners=project.scanners,
             parameters=project.parameters,
+            uncertainty=project.uncertainty,
             limits=limits or CheckLimits(),
         )
 
@@ -174,6 +178,7 @@ def problems(
         *_map_problems(inputs, floor),
         *_scanner_problems(inputs),
         *_detector_problems(inputs),
+        *_exact_constants(inputs),
         *_close_reflectors(inputs),
         *_reflectors_and_walls(inputs, floor),
         *_station_problems(inputs, floor),
@@ -257,6 +262,12 @@ def _map_problems(site: ProblemsInput, floor: FloorDistances | None) -> Iterable
             text="No reflectors; expected at least 3 around every route",
             subject=Subject.REFLECTOR,
         )
+
+
+def _exact_constants(site: ProblemsInput) -> Iterable[Problem]:
+    """What is taken for exact: a budget that leaves something out says so."""
+    for text in site.uncertainty.taken_for_exact():
+        yield Problem(severity=Severity.NOTE, text=text, subject=Subject.SCANNER)
 
 
 def _scanner_problems(site: ProblemsInput) -> Iterable[Problem]:

@@ -18,6 +18,7 @@ import pytest
 from tests.tools.lost_in_the_woods import convert
 
 PERFECT_COURSE = (
+    "filter.consider=false",
     "odometry.forward_per_sqrt_s=0.021",
     "odometry.heading_per_sqrt_s=0.0286",
     "odometry.forward_per_sqrt_m=0",

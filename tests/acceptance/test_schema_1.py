@@ -16,8 +16,10 @@ import pytest
 from commission.io.project_file import load_project, save_project
 from commission.io.recordings.base import load_log
 from commission.simulation.scenario import virtual_drive
+from commission.site.parameters import FilterParameters
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
+from commission.site.uncertainty import Uncertainty
 from commission.studies.coverage import CoverageInput, CoverageOptions, coverage
 from commission.studies.prediction import PredictionInput, prediction
 from commission.studies.run import RunInput, judged_run
@@ -34,9 +36,12 @@ ERRORS = [0.010807362688393224]
 
 @pytest.fixture(scope="module")
 def project() -> Project:
-    loaded = load_project(OLD / "project")
-    detector = replace(loaded.parameters.detector, expected_beams="equation_3")
-    return replace(loaded, parameters=replace(loaded.parameters, detector=detector))
+    """The project as its filter was then: it considered no constants, and predictions took them for exact."""
+    old = load_project(OLD / "project")
+    detector = replace(old.parameters.detector, expected_beams="equation_3")
+    parameters = replace(old.parameters, detector=detector, filter=FilterParameters(consider=False))
+    exact = Uncertainty(survey=0.0, mounting_position=0.0, mounting_heading=0.0, range_bias=0.0, clock=0.0)
+    return replace(old, parameters=parameters, uncertainty=exact)
 
 
 def sizes(*arrays: np.ndarray) -> list[float]:

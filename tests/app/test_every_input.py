@@ -49,7 +49,7 @@ from commission.app.floor_map.pen import MapPen
 from commission.app.floor_map.tool_fields import MapToolFields
 from commission.app.floor_map.tools import WallTool
 from commission.app.run.actions import ChooseSource, SetDisturbance, VirtualDrive
-from commission.app.tune.actions import SetParameter
+from commission.app.tune.actions import SetParameter, SetUncertainty
 from commission.errors import CommissionError
 from commission.io.dxf import Drawing
 from commission.io.image_map import Picture
@@ -286,7 +286,7 @@ def named_widgets(bench: PageBench) -> Iterator[tuple[Action, Any]]:
     for widget in bench.widgets:
         if is_number(widget) and widget._impl.update_cb:
             (posted,) = bench.change(widget, another(widget))
-            if not isinstance(posted, SetParameter | SetDisturbance | Report):
+            if not isinstance(posted, SetParameter | SetUncertainty | SetDisturbance | Report):
                 yield posted, widget
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from commission.io.project_file import load_project
 from commission.simulation.scenario import virtual_drive
 from tests.acceptance.judged import Judged, judge, seen_within, with_filters
+from tests.planning.driven import EXACT
 
 MAPS = Path(__file__).resolve().parents[2] / "maps"
 DRIVES = 20
@@ -21,7 +23,7 @@ def rms(values: np.ndarray) -> float:
 
 def precision() -> None:
     """Print position errors in the laboratory, 360 and 180 degrees."""
-    project = load_project(MAPS / "laboratory")
+    project = replace(load_project(MAPS / "laboratory"), uncertainty=EXACT)
     route = project.routes[0].name
     logs = [virtual_drive(project, route, seed) for seed in range(DRIVES)]
     full = [judge(project, route, log) for log in logs]
@@ -46,7 +48,7 @@ def _row(name: str, drives: list[Judged], chosen: list[np.ndarray]) -> None:
 
 def robustness() -> None:
     """Print errors and jumps on the shop floor under the three settings of Fig. 13."""
-    project = load_project(MAPS / "shop_floor")
+    project = replace(load_project(MAPS / "shop_floor"), uncertainty=EXACT)
     settings = {"none": (False, False), "detector filter": (True, False), "both filters": (True, True)}
     judged: dict[str, list[Judged]] = {name: [] for name in settings}
     for seed in range(DRIVES):

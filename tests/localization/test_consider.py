@@ -129,7 +129,9 @@ def test_without_anything_uncertain_considering_changes_nothing_but_the_last_dig
 
 def test_the_state_of_a_filter_that_considers_nothing_holds_no_covariance_with_constants() -> None:
     rng = np.random.default_rng(2)
-    setup = dataclasses.replace(considered(random_map(rng, 12)), parameters=Parameters(filter=FilterParameters()))
+    setup = dataclasses.replace(
+        considered(random_map(rng, 12)), parameters=Parameters(filter=FilterParameters(consider=False))
+    )
     drive = random_drive(setup, rng, Plan(scans=20))
     assert setup.constants is None
     assert run(drive.log, setup, drive.initial).final.cross is None

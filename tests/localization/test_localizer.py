@@ -18,6 +18,7 @@ from commission.localization.setup import LocalizerSetup
 from commission.localization.whole_run import run
 from commission.site.parameters import (
     AssociationParameters,
+    FilterParameters,
     ObservationParameters,
     OdometryParameters,
     Parameters,
@@ -31,6 +32,8 @@ from tests.localization.drives import Drive, Plan, random_drive, random_map
 from tests.localization.plain_localizer import PlainLocalizer
 
 MOUNTING = np.array([0.3, 0.1, 0.2])
+WHITE = FilterParameters(consider=False)
+"""White noise alone, as the plain localizer has it; `test_consider` has one with constants."""
 INITIAL = Belief(0, np.array([0.0, 0.0, 0.0]), np.diag([1e-4, 1e-4, 1e-4]))
 
 
@@ -67,6 +70,7 @@ def with_close_neighbors(rng: np.random.Generator, reflectors: ReflectorMap) -> 
 )
 def test_localizer_agrees_with_the_plain_one(plan: Plan, parameters: Parameters) -> None:
     rng = np.random.default_rng(11)
+    parameters = dataclasses.replace(parameters, filter=WHITE)
     setup = LocalizerSetup(with_close_neighbors(rng, random_map(rng, 12)), (Scanner(mounting=MOUNTING),), parameters)
     drive = random_drive(setup, rng, plan)
     arrays = run(drive.log, setup, drive.initial)
@@ -99,7 +103,7 @@ def assert_close(means: np.ndarray, expected: np.ndarray, tolerance: float) -> N
 )
 def test_pose_errors_and_innovations_are_as_large_as_the_filter_says(plan: Plan) -> None:
     # The gate is wide open, so that it cuts no tail off.
-    parameters = Parameters(association=AssociationParameters(gate_probability=0.9999))
+    parameters = Parameters(association=AssociationParameters(gate_probability=0.9999), filter=WHITE)
     nees, nis, count = 0.0, 0.0, 0
     drives = 40
     for seed in range(drives):

@@ -26,10 +26,12 @@ from commission.localization.observation import (
     validation_ellipses,
 )
 from commission.localization.setup import LocalizerSetup
+from commission.localization.validation import validation_outlines
 from commission.site.parameters import AssociationParameters, ObservationParameters, Parameters
-from commission.site.records import Detections
+from commission.site.records import Detections, Odometry
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
+from commission.site.uncertainty import Uncertainty
 from tests.localization import plain_observation as plain
 
 MODEL = ObservationModel(0.3, -0.1, 0.4, 4e-4, 1.6e-5, 0.05)
@@ -138,7 +140,7 @@ def test_drawn_outline_of_the_gate_parts_what_the_localizer_takes_from_what_it_l
     setup = LocalizerSetup(reflectors, (Scanner(mounting=MOUNTING),), parameters)
     covariance = np.array([[4e-4, 1e-4, 1e-5], [1e-4, 9e-4, -2e-5], [1e-5, -2e-5, 1e-5]])
     belief = Belief(0, np.array([0.5, -0.5, 0.3]), covariance)
-    outlines = setup.validation_outlines(belief)
+    outlines = validation_outlines(setup, belief)
     for reflector, outline in zip(reflectors.reflectors, outlines, strict=True):
         center = np.array([reflector.x, reflector.y])
         # Polar coordinates bend an outline of 0.2 m at 4 m by up to 3 % of its size.
@@ -146,6 +148,32 @@ def test_drawn_outline_of_the_gate_parts_what_the_localizer_takes_from_what_it_l
             for corner in outline[::4]:
                 seen = plain.observed(belief.mean, MOUNTING, center + size * (corner - center)[np.newaxis])
                 (estimate,) = Localizer(setup, belief).feed(Detections(0, seen))
+                assert estimate.status.tolist() == [status], (reflector.id, size, estimate.d2)
+
+
+def test_drawn_outline_follows_the_gate_once_constants_are_correlated_with_the_pose() -> None:
+    reflectors = ReflectorMap((Reflector(id="near", x=4.0, y=1.0, sigma=0.02), Reflector(id="far", x=-3.0, y=11.0)))
+    known = Uncertainty(survey=0.03, mounting_position=0.02, mounting_heading=0.01, range_bias=0.05, clock=0.1)
+    setup = LocalizerSetup(reflectors, (Scanner(mounting=MOUNTING),), Parameters(), known)
+    driven = Localizer(setup, Belief(0, np.array([0.5, -0.5, 0.3]), np.diag([4e-4, 9e-4, 1e-4])))
+    stamp, twist = 0, np.array([0.5, 0.0, 0.2])
+    for _ in range(20):
+        driven.feed(Odometry(stamp, np.zeros(3) if stamp == 0 else se2.exp(0.04 * twist)))
+        seen = plain.observed(driven.belief.mean, MOUNTING, reflectors.centers)
+        (estimate,) = driven.feed(Detections(stamp, seen))
+        stamp += 40_000_000
+    before = driven.state
+    driven.feed(Odometry(stamp, se2.exp(0.04 * twist)))
+    prior, moved = driven.belief, driven.state
+    outlines = validation_outlines(setup, prior, before=before, twist=twist)
+    alone = validation_outlines(setup, prior, twist=twist)
+    assert np.ptp(outlines[0], axis=0).max() < 0.9 * np.ptp(alone[0], axis=0).max(), "the correlation counts"
+    for reflector, outline in zip(reflectors.reflectors, outlines, strict=True):
+        center = np.array([reflector.x, reflector.y])
+        for size, status in ((0.95, Status.INLIER), (1.05, Status.OUTLIER_ASSOCIATION)):
+            for corner in outline[::4]:
+                place = plain.observed(prior.mean, MOUNTING, center + size * (corner - center)[np.newaxis])
+                (estimate,) = Localizer(setup, moved).feed(Detections(stamp, place))
                 assert estimate.status.tolist() == [status], (reflector.id, size, estimate.d2)
 
 

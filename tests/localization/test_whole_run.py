@@ -78,7 +78,8 @@ def test_whole_run_equals_live_localizer_to_the_last_bit(
 
 def test_withheld_output_of_a_whole_run_is_that_of_the_live_localizer() -> None:
     rng = np.random.default_rng(9)
-    setup = setup_of(rng, Parameters(supervisor=SupervisorParameters(position_limit=0.02), odometry=PRECISE))
+    limit, noise = SupervisorParameters(position_limit=0.02), FilterParameters(consider=False)
+    setup = setup_of(rng, Parameters(supervisor=limit, odometry=PRECISE, filter=noise))
     drive = random_drive(setup, rng, Plan(scans=600, reach=6.0))
     arrays = run(drive.log, setup, drive.initial)
     localizer = Localizer(setup, drive.initial)

@@ -18,10 +18,12 @@ from commission.simulation.drive import DriveOptions
 from commission.simulation.scenario import start_of, virtual_drive
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
+from commission.site.uncertainty import Uncertainty
 from commission.studies.metrics import pose_errors, reference_at
 
 QUICK = DriveOptions(whole_scans=False)
 """Without beams that can meet no reflector: the same detections to the last bit."""
+EXACT = Uncertainty(survey=0.0, mounting_position=0.0, mounting_heading=0.0, range_bias=0.0, clock=0.0)
 SITES = ("laboratory", "shop_floor", "warehouse")
 AXES = {"position": [0, 1], "heading": [2]}
 
@@ -65,9 +67,9 @@ class Comparison:
 
 
 def undisturbed(site: str) -> Project:
-    """A bundled site without people, glints and tilted floor."""
+    """A bundled site without people, glints and tilted floor, whose constants are exact and known to be."""
     project = load_project(bundled_folder("maps") / site)
-    return replace(project, disturbances=project.disturbances.undisturbed())
+    return replace(project, disturbances=project.disturbances.undisturbed(), uncertainty=EXACT)
 
 
 def thinned(project: Project, keep: int) -> Project:

@@ -33,7 +33,8 @@ def accuracies(said: list[tuple[float, float]], true: list[tuple[float, float]])
         on_odometry=np.zeros(count),
     )
     stations = (Station(name="Dock", x=1.0, y=0.0, required_accuracy=0.02), Station(name="Far", x=9.0, y=9.0))
-    return station_accuracies(prediction, PredictedErrors(squares, np.zeros(len(squares))), stations)
+    errors = PredictedErrors(squares, np.zeros(len(squares)), np.zeros((len(squares), 5, 3)))
+    return station_accuracies(prediction, errors, stations)
 
 
 def test_the_worst_moment_at_a_station_and_the_worse_axis_count() -> None:

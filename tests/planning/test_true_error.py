@@ -12,13 +12,15 @@ from commission.localization.setup import LocalizerSetup
 from commission.planning.detection_noise import DetectionNoise
 from commission.planning.error_kernels import ErrorModel, propagate_errors
 from commission.planning.route_prediction import PredictionOptions, plan_route, predict_route
-from commission.planning.true_error import predict_errors
+from commission.planning.true_error import CONTRIBUTIONS, predict_errors
 from commission.simulation.scenario import start_of, virtual_drive
-from commission.site.parameters import AssociationParameters, ObservationParameters, Parameters
+from commission.site.disturbances import ConstantErrors, Disturbances
+from commission.site.parameters import AssociationParameters, FilterParameters, ObservationParameters, Parameters
 from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.uncertainty import Uncertainty
 from commission.studies.metrics import pose_errors, reference_at
 from tests.odometry_of import PRECISE
-from tests.planning.driven import QUICK
+from tests.planning.driven import EXACT, QUICK
 from tests.planning.sites import open_field, surely_detected
 
 LINE = ((2.0, 3.0), (6.0, -3.0), (11.0, 3.5), (15.0, -2.5), (19.0, 3.0))
@@ -27,7 +29,8 @@ FITTING = ObservationParameters(range_sigma=0.008, bearing_sigma=0.0025)
 
 def squares_with(planned, prediction, worth: tuple[float, ...], start: tuple[float, float, float]) -> np.ndarray:
     """(K, 3, 3) errors when every detection is worth the same."""
-    squares, model = np.empty((len(planned.drive), 3, 3)), planned.model()
+    squares, parts = np.empty((len(planned.drive), 3, 3)), np.empty((len(planned.drive), 5, 3))
+    model, constants = planned.model(), planned.constants()
     noise = DetectionNoise(read_only(np.broadcast_to(np.array(worth), (1, 2, 6)).copy()), 0.2)
     propagate_errors(
         planned.drive.stamps_ns,
@@ -39,13 +42,17 @@ def squares_with(planned, prediction, worth: tuple[float, ...], start: tuple[flo
         planned.drive.scanners,
         prediction.prior_covariances,
         np.array(start),
+        *constants,
         ErrorModel(
             *(model.odometry, model.observations, noise, model.gate_d2, model.inside_gate, model.free_per_m),
             np.array([(each.angle_min, each.angle_increment) for each in planned.scanners]),
+            model.consider,
         ),
         squares,
         np.empty(len(squares)),
+        parts,
     )
+    np.testing.assert_allclose(parts.sum(axis=1), np.diagonal(squares, axis1=1, axis2=2), rtol=1e-9)
     return squares
 
 
@@ -85,7 +92,8 @@ def test_a_range_that_is_always_too_long_does_not_average_out():
 def test_errors_of_the_survey_stay_and_are_those_of_drives_among_displaced_reflectors():
     sigma, drives = 0.02, 48
     surveyed = ReflectorMap(tuple(Reflector(id=f"R{i}", x=x, y=y, sigma=sigma) for i, (x, y) in enumerate(LINE)))
-    project = replace(open_field(LINE, parameters=Parameters(observation=FITTING)), reflectors=surveyed)
+    field = open_field(LINE, parameters=Parameters(observation=FITTING), uncertainty=EXACT)
+    project = replace(field, reflectors=surveyed)
     start = start_of(project, "Line")
     planned = plan_route(project, "Line", PredictionOptions(start_sigmas=tuple(start.sigmas.tolist())))
     predicted = np.square(predict_errors(planned, predict_route(planned)).sigmas)
@@ -119,3 +127,45 @@ def test_a_gate_that_rejects_more_leaves_larger_errors(gate: float):
 
     assert np.all(sigmas(gate) > 0.95 * sigmas(0.9999))
     assert np.all(sigmas(gate) < 2.0 * sigmas(0.9999))
+
+
+def test_every_constant_has_its_own_part_of_the_error_and_none_that_is_exact():
+    field = open_field(LINE, parameters=Parameters(observation=FITTING))
+    alone = {
+        "map": {"survey": 0.003},
+        "mounting": {"mounting_position": 0.002, "mounting_heading": 0.001745},
+        "range": {"range_bias": 0.005},
+        "clock": {"clock": 0.005},
+    }
+    for name, known in alone.items():
+        planned = plan_route(replace(field, uncertainty=replace(EXACT, **known)), "Line")
+        errors = predict_errors(planned, predict_route(planned))
+        share = errors.parts[-1].sum(axis=1)
+        assert {CONTRIBUTIONS[i] for i in np.flatnonzero(share)} == {"noise", name}
+        np.testing.assert_allclose(errors.parts.sum(axis=1), np.diagonal(errors.squares, axis1=1, axis2=2), rtol=1e-9)
+
+
+@pytest.mark.parametrize("consider", [True, False], ids=["considered", "taken for noise"])
+def test_predicted_error_is_that_of_drives_with_all_constants_drawn(consider: bool):
+    drives, known = 40, Uncertainty()
+    mounting = (known.mounting_position, known.mounting_position, known.mounting_heading)
+    constants = ConstantErrors(
+        survey_sigma=known.survey,
+        mounting_sigma=mounting,
+        range_bias_sigma=known.range_bias,
+        clock_offset_sigma=known.clock,
+    )
+    parameters = Parameters(observation=FITTING, odometry=PRECISE, filter=FilterParameters(consider=consider))
+    project = open_field(LINE, parameters=parameters, disturbances=Disturbances(constants=constants))
+    start = start_of(project, "Line")
+    planned = plan_route(project, "Line", PredictionOptions(start_sigmas=tuple(start.sigmas.tolist())))
+    predicted = np.square(predict_errors(planned, predict_route(planned)).sigmas)
+    squares = []
+    for seed in range(drives):
+        log = virtual_drive(project, "Line", seed, options=QUICK)
+        run = whole_run.run(log, LocalizerSetup.of(project), Belief(0, start.pose, np.diag(start.sigmas**2)))
+        truth = reference_at(run.stamps_ns, log.reference_stamps_ns, log.reference_poses)
+        squares.append(pose_errors(run.means, truth)[100:450] ** 2)
+    ratio = np.sqrt(predicted[100:450] / np.mean(squares, axis=0))
+    # A drive is one draw of its constants: 40 of them know an RMS of one axis to 11 %.
+    assert (np.abs(np.median(ratio, axis=0) - 1.0) < 0.25).all(), np.median(ratio, axis=0)

@@ -11,6 +11,7 @@ from commission.app.prediction.limit_colors import limit_classes, palette
 from commission.app.prediction.tracks import Limited, Plain, TrackAxis, limited, plain, round_up
 from commission.app.prediction.view import RouteView
 from commission.planning.station_accuracy import StationAccuracy
+from commission.planning.true_error import CONTRIBUTIONS
 from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
 
 MOST_BARS = 120
@@ -95,6 +96,7 @@ def _numbers(route: RouteView) -> list[tuple[str, str]]:
         ("Largest 2σ heading / limit", DEGREES.against(largest[2], limits.heading_limit, (".2f", ".1f"))),
         ("True error, 2σ x, y", MILLIMETRES.text(error[:2].max(), ".1f")),
         ("True error, 2σ heading", DEGREES.text(error[2], ".2f")),
+        *_budget(route),
         ("Fewest reflectors seen", str(int(metres.seen.min()))),
         ("Longest on odometry", f"{metres.on_odometry.max():.1f} m"),
         ("Supervisor stops", _places(prediction.trips())),
@@ -102,6 +104,12 @@ def _numbers(route: RouteView) -> list[tuple[str, str]]:
     if len(prediction.trips()):
         rows.append(("May drive again", _places(prediction.recoveries())))
     return rows
+
+
+def _budget(route: RouteView) -> list[tuple[str, str]]:
+    """What each source of error contributes alone, at most."""
+    largest = route.parts.max(axis=0)
+    return [(f"… of {name}", MILLIMETRES.text(part, ".1f")) for name, part in zip(CONTRIBUTIONS, largest, strict=True)]
 
 
 def _places(metres: np.ndarray) -> str:

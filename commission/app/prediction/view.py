@@ -47,6 +47,8 @@ class RouteView:
     """The worst of each metre."""
     errors: FloatArray
     """(B, 3) largest 2-sigma of the true error of x [m], y [m] and heading [rad] in each metre."""
+    parts: FloatArray
+    """(B, 5) largest 2-sigma of the position that each of `CONTRIBUTIONS` alone has in each metre [m]."""
     limit_shares: FloatArray
     """(B,) largest share of the supervisor's limit in each metre [1]."""
     risk: FloatArray
@@ -77,6 +79,7 @@ def route_view(predicted: PredictionResult, *, outdated: bool) -> RouteView:
         prediction=prediction,
         metres=metres,
         errors=predicted.errors.per_metre(metres),
+        parts=predicted.errors.parts_per_metre(metres),
         limit_shares=np.maximum.reduceat(prediction.limit_share, metres.first),
         risk=np.maximum.reduceat(chances, metres.first),
         risks=tuple(_risk_view(predicted, risk) for risk in predicted.risks),

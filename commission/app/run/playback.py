@@ -6,6 +6,7 @@ It is called by the owner thread alone and knows neither widgets, files nor jobs
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,11 @@ from commission.geometry import se2
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.estimate import Belief, Estimate, Mode, Status
 from commission.localization.observation import project_detections, range_bearing
-from commission.localization.run_columns import RunColumns
+from commission.localization.run_columns import Checkpoint, RunColumns
 from commission.localization.setup import LocalizerSetup
+from commission.localization.state import FilterState
+from commission.localization.validation import validation_outlines
+from commission.localization.whole_run import state_before
 from commission.site.records import Scan
 from commission.studies.run import RunResult
 
@@ -67,6 +71,7 @@ class Playback:
     def replace(self, result: RunResult) -> None:
         """Show another run over the same drive; the cursor stays."""
         self._result = result
+        self._near: tuple[Checkpoint, ...] = ()
         self._inliers, self._outliers = (
             _Cloud(result.columns, chosen)
             for chosen in (result.columns.status == Status.INLIER, result.columns.status != Status.INLIER)
@@ -113,9 +118,36 @@ class Playback:
             covered=covered,
             scan_map=np.concatenate(scans),
             first_scan=len(scans[0]),
-            gates=_gates(estimate, segment.setup),
+            gates=self._gates(lived, estimate, segment.setup),
             accumulated=self._accumulated(lived) if whole else None,
         )
+
+    def _gates(self, lived: int, estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
+        """(R, n, 2) validation areas of the reflectors that the scanner could see if nothing stood in between."""
+        if estimate is None or not len(setup.reflectors):
+            return np.empty((0, GATE_POINTS, 2))
+        scanner, before, twist = setup.scanners[estimate.scanner], None, np.zeros(3)
+        seen = range_bearing(estimate.prior.mean, scanner.mounting, setup.reflectors.centers)
+        first, last = (math.radians(limit) for limit in scanner.field_of_view_deg)
+        inside = np.mod(seen[:, 1] - first, 2.0 * math.pi) <= last - first
+        in_view = inside & (seen[:, 0] <= min(scanner.reflector_range, scanner.range[1]))
+        if setup.constants is not None and lived > 1:
+            before, columns = self._state_before(lived - 1), self._result.columns
+            seconds = (estimate.stamp_ns - columns.stamps_ns[lived - 2]) * 1e-9
+            moved = se2.log(se2.compose(se2.inverse(columns.means[lived - 2]), estimate.prior.mean))
+            twist = moved / seconds if seconds > 0.0 else twist
+        outlines = validation_outlines(
+            setup, estimate.prior, points=GATE_POINTS, scanner=estimate.scanner, before=before, twist=twist
+        )
+        return outlines[in_view]
+
+    def _state_before(self, cycle: int) -> FilterState:
+        """State before a cycle; while the vehicle drives on, from the one before it."""
+        columns = self._result.columns
+        near = replace(columns, checkpoints=(*columns.checkpoints, *self._near))
+        state = state_before(near, self._result.inputs.log, cycle)
+        self._near = (Checkpoint(cycle, state),)
+        return state
 
     def _accumulated(self, lived: int) -> Accumulated:
         """Return every detection's place so far."""
@@ -176,15 +208,3 @@ def _points_of(columns: RunColumns, rows: IntArray) -> FloatArray:
             scanners=columns.detected.scanners[cycles[here]],
         )
     return points
-
-
-def _gates(estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
-    """(R, n, 2) validation areas of the reflectors that the scan's scanner could see if nothing stood in between."""
-    if estimate is None or not len(setup.reflectors):
-        return np.empty((0, GATE_POINTS, 2))
-    scanner = setup.scanners[estimate.scanner]
-    seen = range_bearing(estimate.prior.mean, scanner.mounting, setup.reflectors.centers)
-    first, last = (math.radians(limit) for limit in scanner.field_of_view_deg)
-    inside = np.mod(seen[:, 1] - first, 2.0 * math.pi) <= last - first
-    in_view = inside & (seen[:, 0] <= min(scanner.reflector_range, scanner.range[1]))
-    return setup.validation_outlines(estimate.prior, GATE_POINTS, scanner=estimate.scanner)[in_view]

@@ -21,5 +21,15 @@ class SetParameter(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class SetUncertainty(Action):
+    """Say how well a constant is known."""
+
+    name: str
+    """Its field in the project's uncertainty."""
+    value: ParameterValue | None
+    """New 1-sigma, SI and radians."""
+
+
+@dataclass(frozen=True, slots=True)
 class ResetParameters(Action):
-    """Go back to the parameters of the saved project."""
+    """Go back to the parameters and the uncertainty of the saved project."""

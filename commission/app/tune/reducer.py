@@ -7,7 +7,7 @@ from dataclasses import replace
 from commission.app.base.actions import Sender
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
-from commission.app.tune.actions import ResetParameters, SetParameter
+from commission.app.tune.actions import ResetParameters, SetParameter, SetUncertainty
 from commission.site.fields import with_field
 
 
@@ -24,9 +24,20 @@ def set_parameter(action: SetParameter, state: AppState, sender: Sender) -> Outc
 
 
 @reduce.register
-def reset_parameters(_action: ResetParameters, state: AppState, sender: Sender) -> Outcome:
-    """Go back to the saved parameters: one undo step."""
-    if state.project.parameters == state.saved.parameters:
+def set_uncertainty(action: SetUncertainty, state: AppState, sender: Sender) -> Outcome:
+    """Say how well one constant is known: one undo step for a moved slider."""
+    uncertainty = with_field(state.project.uncertainty, action.name, action.value, "uncertainty")
+    if uncertainty == state.project.uncertainty:
         return Outcome(state)
-    project = replace(state.project, parameters=state.saved.parameters)
+    edit = Edit(f"set uncertainty of {action.name.replace('_', ' ')}", sender, f"uncertainty.{action.name}")
+    return Outcome(edited(state, replace(state.project, uncertainty=uncertainty), edit))
+
+
+@reduce.register
+def reset_parameters(_action: ResetParameters, state: AppState, sender: Sender) -> Outcome:
+    """Go back to the saved parameters and uncertainty: one undo step."""
+    saved = state.saved
+    project = replace(state.project, parameters=saved.parameters, uncertainty=saved.uncertainty)
+    if (project.parameters, project.uncertainty) == (state.project.parameters, state.project.uncertainty):
+        return Outcome(state)
     return Outcome(edited(state, project, Edit("reset parameters", sender)))

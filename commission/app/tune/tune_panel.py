@@ -1,4 +1,4 @@
-"""Every tunable of the localizer: a widget for each field of the parameters, made from what is said beside it.
+"""Every tunable of the localizer, and how well constants are known: a widget for each, from its field.
 
 The page shows degrees, millimetres and percent; actions carry SI and radians.
 """
@@ -10,12 +10,14 @@ from typing import Any
 from viser import GuiApi, GuiInputHandle
 
 from commission.app.base.field_widget import add_widget, held, meant, write_held
+from commission.app.base.inputs import Inputs
 from commission.app.base.panel import BasePanel, Post, posting
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.tune.actions import ResetParameters, SetParameter
-from commission.site.fields import FieldInfo, fields_of, get_field
+from commission.app.tune.actions import ResetParameters, SetParameter, SetUncertainty
+from commission.site.fields import FieldInfo, fields_of, get_field, names_of
 from commission.site.parameters import Parameters
+from commission.site.uncertainty import Uncertainty
 
 FIRST = ("association", "detector", "supervisor")
 """Groups that are tuned first; the others follow in their own order."""
@@ -40,6 +42,10 @@ class TunePanel(BasePanel):
         for name in (*FIRST, *(name for name in groups if name not in FIRST)):
             with gui.add_folder(groups[name].label, expand_by_default=name not in FOLDED):
                 self._add_group(name, getattr(state.project.parameters, name))
+        self._constants = Inputs(gui, post, SetUncertainty, _constant)
+        with gui.add_folder("Constants known to"):
+            for name in names_of(Uncertainty):
+                self._constants.field(name, state.project.uncertainty, f"(uncertainty.{name})")
         reset = gui.add_button("Reset to saved", color="gray", hint="Back to the parameters of project.yaml.")
         reset.on_click(posting(post, lambda _event: ResetParameters()))
 
@@ -62,8 +68,14 @@ class TunePanel(BasePanel):
         """Follow undo, redo and reset; while somebody moves a slider, leave it alone."""
         if view.state.last_edit is None:
             self.show(view.state.project.parameters)
+            self._constants.follow(view.state)
 
     def show(self, parameters: Parameters) -> None:
         """Set every widget."""
         for key, widget in self._widgets.items():
             write_held(widget, held(self._infos[key], get_field(parameters, key)))
+
+
+def _constant(state: AppState, name: str) -> Any:
+    """Return the 1-sigma of a constant of the project."""
+    return get_field(state.project.uncertainty, name)
