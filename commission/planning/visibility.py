@@ -314,7 +314,7 @@ def field_of_view(scanner: Scanner) -> tuple[float, float]:
     """First bearing and width [rad], scanner frame, widened by a rounding tolerance; a full turn sees everything."""
     if scanner.is_full_turn:
         return -math.pi, 2.0 * math.pi
-    first, last = (math.radians(bearing) for bearing in scanner.field_of_view_deg)
+    first, last = scanner.field_of_view
     return first - BEARING_TOLERANCE, last - first + 2.0 * BEARING_TOLERANCE
 
 

@@ -196,6 +196,16 @@ class Scanner:
         count = math.floor((last - first) / self.resolution_deg + 1e-6) + 1
         return count - 1 if (count - 1) * self.resolution_deg > 360.0 - 0.5 * self.resolution_deg else count
 
+    def upright(self, bearings: FloatArray) -> FloatArray:
+        """Bearings [rad] counter-clockwise seen from above, of those that the scanner reports."""
+        return -bearings if self.upside_down else bearings
+
+    @property
+    def field_of_view(self) -> tuple[float, float]:
+        """First and last bearing [rad], scanner frame, counter-clockwise seen from above, however it hangs."""
+        first, last = np.sort(self.upright(np.radians(self.field_of_view_deg))).tolist()
+        return first, last
+
     @property
     def beam_times(self) -> FloatArray:
         """When each beam is measured after the stamp of its scan: (B,) array [s], negative before it."""

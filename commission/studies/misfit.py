@@ -7,7 +7,7 @@ mistakes of a setup (scans late by less than about 80 ms fit as well); fine figu
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import combinations
 
@@ -24,6 +24,7 @@ from commission.progress import Progress, silent
 from commission.site.disturbances import WheelNoise
 from commission.site.quantity import DEGREES, MILLIMETRES, MILLISECONDS, PERCENT
 from commission.site.record_log import RecordLog
+from commission.site.scanner import Scanner
 from commission.studies.inputs import StudyInput
 from commission.studies.plausibility import Finding
 from commission.studies.scanner_figures import scanner_figures
@@ -188,13 +189,25 @@ def _mounting(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iter
         who = "the scanner is"
     elif len(chosen) == 1:
         what, who = f"those of {own}", f"the scanner {own} is"
-    cures = ["negate the bearings"]
+    accused = [inputs.setup.scanners[index] for index in chosen]
     if sign > 0.0:
+        # Of a scanner that hangs upside down, bearings count the other way.
+        if all(one.upside_down for one in accused):
+            meaning = next(mean for _, _, other, mean in _MOUNTINGS[1:] if abs(wrap(turn + other)) < 1e-9)
         cures = [
             f"set the heading of {'scanner.mounting' if len(scanners) == 1 else f'the mounting of {one.name}'} "
-            f"to {float(wrap(one.mounting[2] + turn)):+.3f} rad"
-            for one in (inputs.setup.scanners[index] for index in chosen)
+            f"to {float(wrap(one.mounting[2] + one.upright(np.array(turn)))):+.3f} rad"
+            for one in accused
         ]
+    else:
+        cures = [
+            f"set {'scanner.upside_down' if len(scanners) == 1 else f'upside_down of {one.name}'} "
+            f"to {str(not one.upside_down).lower()}"
+            for one in accused
+        ]
+        if any(one.upside_down for one in accused):
+            meaning = "not mounted as the project says: some are said to hang upside down"
+            meaning = "not mounted upside down, as the project says" if len(accused) == 1 else meaning
     yield Finding(
         found=f"{PERCENT.text(before.accepted)} of the detections fit the reflectors, "
         f"{PERCENT.text(best.accepted)} once {what} are {name}",
@@ -268,7 +281,16 @@ def _lag(inputs: MisfitInput, detected: DetectionLog) -> Iterator[Finding]:
         probably=f"the scans lag behind the odometry by about {MILLISECONDS.text(lag)}"
         if lag > 0.0
         else f"the odometry lags behind the scans by about {MILLISECONDS.text(-lag)}",
-        remedy=f"shift the stamps of the scans by {MILLISECONDS.text(-lag, '+.0f')}",
+        remedy=_later_clocks(inputs.setup.scanners, lag),
+    )
+
+
+def _later_clocks(scanners: Sequence[Scanner], lag: float) -> str:
+    """Say by which clock offsets stamps that are late by `lag` [s] are made good."""
+    return ", ".join(
+        f"set {'scanner.clock_offset' if len(scanners) == 1 else f'clock_offset of {one.name}'} "
+        f"to {one.clock_offset + lag:.3f} s"
+        for one in scanners
     )
 
 

@@ -289,8 +289,9 @@ def _outline_problems(scanner: Scanner, vehicle: Vehicle, name: str) -> Iterable
             )
             yield Problem(severity=Severity.NOTE, text=text, subject=Subject.SCANNER)
         return
-    bearings = scanner.angle_min + np.arange(scanner.beam_count) * scanner.angle_increment
-    blocked = np.flatnonzero(_crosses(position, bearings + scanner.mounting[2], outline))
+    bearings = scanner.angle_min + np.arange(scanner.beam_count, dtype=np.float64) * scanner.angle_increment
+    upright = scanner.upright(np.asarray(bearings, dtype=np.float64))
+    blocked = np.flatnonzero(_crosses(position, upright + scanner.mounting[2], outline))
     if len(blocked):
         low, high = (float(bearings[index]) for index in (blocked[0], blocked[-1]))
         text = (

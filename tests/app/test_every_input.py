@@ -326,6 +326,16 @@ def test_a_number_of_a_vehicle_is_shown_taken_and_bounded_as_its_row_says(bench:
     holds(bench, widget, row, state)
 
 
+def test_the_way_of_a_sweep_is_chosen_by_its_name(bench: PageBench) -> None:
+    (widget,) = [widget for widget in bench.widgets if getattr(widget, "label", "") == "Sweep direction"]
+    assert widget.value == "counter-clockwise"
+    (posted,) = bench.change(widget, "clockwise")
+    changed = after(bench.state, posted).state
+    assert changed.project.scanners[0].sweep_direction == -1
+    bench.draw(changed)
+    assert widget.value == "clockwise"
+
+
 def numbers(cls: type, prefix: str = "") -> set[str]:
     """All numbers that are described in a value."""
     infos = fields_of(cls)

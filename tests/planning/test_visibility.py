@@ -175,6 +175,14 @@ def test_poses_see_only_what_lies_inside_the_field_of_view_of_the_mounted_scanne
     assert seen.counts().tolist() == [3, 3, 0]
 
 
+def test_a_scanner_upside_down_sees_the_other_side():
+    left, right = Reflector(id="left", x=0.0, y=5.0), Reflector(id="right", x=0.0, y=-5.0)
+    for upside_down, expected in ((False, [0]), (True, [1])):
+        scanner = replace(SHARP, field_of_view_deg=(-30.0, 120.0), upside_down=upside_down)
+        seen = open_field(left, right, scanner=scanner).visible_from_poses([[0, 0, 0]])
+        assert seen.of(0).tolist() == expected
+
+
 def test_a_full_turn_sees_behind_itself_whatever_its_first_bearing():
     scanner = replace(SHARP, field_of_view_deg=(0.0, 360.0))
     seen = open_field(Reflector(id="a", x=-3, y=0), Reflector(id="b", x=3, y=0), scanner=scanner).visible_from_poses(

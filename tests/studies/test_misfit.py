@@ -26,9 +26,9 @@ from tests.two_scanners import NAMES, with_two
 SETUP = LocalizerSetup.of(PROJECT)
 
 
-def judged(log: RecordLog) -> tuple[Finding, ...]:
-    run = whole_run.run(log, SETUP, start())
-    return misfit(MisfitInput(log=log, setup=SETUP, initial=start(), run=run))
+def judged(log: RecordLog, setup: LocalizerSetup = SETUP) -> tuple[Finding, ...]:
+    run = whole_run.run(log, setup, start())
+    return misfit(MisfitInput(log=log, setup=setup, initial=start(), run=run))
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -39,7 +39,7 @@ def test_right_setup_is_left_alone(seed: int) -> None:
 @pytest.mark.parametrize(
     ("mistake", "remedy"),
     [
-        ({"mirrored": True}, "negate the bearings"),
+        ({"mirrored": True}, "set scanner.upside_down to true"),
         ({"turned": 0.5 * math.pi}, "set the heading of scanner.mounting to +1.571 rad"),
         ({"turned": -0.5 * math.pi}, "set the heading of scanner.mounting to -1.571 rad"),
         ({"turned": math.pi}, "set the heading of scanner.mounting to"),
@@ -62,8 +62,21 @@ def test_range_bias_is_named_to_two_millimetres(bias: float) -> None:
 def test_late_or_early_scans_are_named_to_a_fifth_of_a_tenth(late_s: float) -> None:
     (finding,) = judged(drive(late_s=late_s))
     assert "scans lag" in finding.probably if late_s > 0 else "odometry lags" in finding.probably
-    milliseconds = float(finding.remedy.removeprefix("shift the stamps of the scans by ").removesuffix(" ms"))
-    assert milliseconds == pytest.approx(-1e3 * late_s, abs=20.0)
+    seconds = float(finding.remedy.removeprefix("set scanner.clock_offset to ").removesuffix(" s"))
+    assert seconds == pytest.approx(late_s, abs=0.02)
+    cured = replace(SETUP, scanners=(replace(SETUP.scanners[0], clock_offset=seconds),))
+    assert judged(drive(late_s=late_s), cured) == ()
+
+
+def test_a_scanner_that_hangs_upside_down_is_cured_by_what_the_finding_says() -> None:
+    cured = replace(SETUP, scanners=(replace(SETUP.scanners[0], upside_down=True),))
+    assert judged(drive(mirrored=True), cured) == ()
+    finding = judged(drive(), cured)[-1]
+    assert finding.remedy == "set scanner.upside_down to false"
+    assert finding.probably == "the scanner is not mounted upside down, as the project says"
+    turned = judged(drive(mirrored=True, turned=0.5 * math.pi), cured)[-1]
+    assert turned.remedy == "set the heading of scanner.mounting to +1.571 rad"
+    assert turned.probably == "the scanner is turned to the left"
 
 
 @pytest.mark.parametrize("name", NAMES)

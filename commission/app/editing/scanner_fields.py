@@ -19,18 +19,10 @@ from commission.site.scanner import Scanner
 
 OWN = "as entered"
 NAMES = (OWN, *(preset.name for preset in SCANNERS))
-UNSEEN = frozenset(
-    {
-        "upside_down",
-        "blind_sectors_deg",
-        "beam_aperture",
-        "sweep_duration",
-        "sweep_direction",
-        "stamp_of",
-        "clock_offset",
-    }
-)
-"""Fields of a scanner that nothing acts upon yet."""
+UNSEEN = frozenset({"blind_sectors_deg"})
+"""Fields of a scanner that stand in the project's file alone."""
+DIRECTIONS = {1: "counter-clockwise", -1: "clockwise"}
+"""What the ways of a sweep are called."""
 FIGURES = {
     "field_of_view_deg": "field of view",
     "resolution_deg": "resolution",
@@ -125,13 +117,19 @@ class ScannerFields:
         for field in names_of(Scanner):
             # What the only scanner is called matters to nobody.
             if field not in UNSEEN and (several or field != "name"):
-                made.append(self._inputs.field(f"scanners[{index}].{field}", project))
+                made.append(self._add_field(f"scanners[{index}].{field}", project))
         if several:
             remove = self._gui.add_button(f"Remove {name}", color="gray")
             remove.on_click(posting(self._post, lambda _event: actions.RemoveScanner(name)))
         else:
             self._removable += [preset, source, *made]
         return _Widgets(preset, source)
+
+    def _add_field(self, name: str, project: Project) -> Any:
+        """Add the input of one field."""
+        if name.endswith(".sweep_direction"):
+            return self._inputs.choice(name, project, DIRECTIONS)
+        return self._inputs.field(name, project)
 
     def follow(self, state: AppState) -> None:
         """Show the scanners of a state."""

@@ -22,6 +22,7 @@ from commission.localization.state import FilterState
 from commission.localization.validation import validation_outlines
 from commission.localization.whole_run import state_before
 from commission.site.records import Scan
+from commission.site.scanner import Scanner
 from commission.studies.run import RunResult
 
 GATE_POINTS = 40
@@ -128,7 +129,7 @@ class Playback:
             return np.empty((0, GATE_POINTS, 2))
         scanner, before, twist = setup.scanners[estimate.scanner], None, np.zeros(3)
         seen = range_bearing(estimate.prior.mean, scanner.mounting, setup.reflectors.centers)
-        first, last = (math.radians(limit) for limit in scanner.field_of_view_deg)
+        first, last = scanner.field_of_view
         inside = np.mod(seen[:, 1] - first, 2.0 * math.pi) <= last - first
         in_view = inside & (seen[:, 0] <= min(scanner.reflector_range, scanner.range[1]))
         if setup.constants is not None and lived > 1:
@@ -164,14 +165,15 @@ class Playback:
             if newest >= 0:
                 scanner = int(indices[scans.scanner])
                 T_map_scanner = se2.compose(belief.mean, setup.scanners[scanner].mounting)
-                points[scanner] = se2.transform_points(T_map_scanner, _end_points(scans.scan(newest)))
+                ends = _end_points(scans.scan(newest), setup.scanners[scanner])
+                points[scanner] = se2.transform_points(T_map_scanner, ends)
         return points
 
 
-def _end_points(scan: Scan) -> FloatArray:
+def _end_points(scan: Scan, scanner: Scanner) -> FloatArray:
     """(B, 2) end points of the beams of a scan that came back [m], scanner frame."""
     hit = np.isfinite(scan.ranges)
-    ranges, bearings = scan.ranges[hit].astype(np.float64), scan.bearings[hit]
+    ranges, bearings = scan.ranges[hit].astype(np.float64), scanner.upright(scan.bearings[hit])
     return ranges[:, np.newaxis] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
 
 

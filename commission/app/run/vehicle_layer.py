@@ -40,7 +40,7 @@ def reach_of(scanner: Scanner) -> float:
 
 def fan(scanner: Scanner, radius: float) -> np.ndarray:
     """Return the (N, 2, 2) strokes of a field of view [m], base frame: an arc, and its two edges if there are any."""
-    first, last = np.radians(scanner.field_of_view_deg)
+    first, last = scanner.field_of_view
     count = max(2, int(np.degrees(last - first) / ARC_STEP_DEG) + 1)
     bearings = np.linspace(first, last, count)
     arc = radius * np.stack((np.cos(bearings), np.sin(bearings)), axis=1)

@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from commission.app.run import playback as playback_module
 from commission.app.run.drives import Drive
@@ -226,3 +227,19 @@ def test_points_of_the_first_scanner_and_of_the_others_are_told_apart(repository
         offsets = points - scanner.mounting[:2]
         bearings = wrap(np.arctan2(offsets[:, 1], offsets[:, 0]) - scanner.mounting[2])
         assert 130.0 < np.degrees(np.abs(bearings)).max() <= 137.5 + 1e-6
+
+
+def test_points_of_a_scanner_upside_down_lie_on_the_walls(repository: Path) -> None:
+    site = load_project(repository / "maps" / "shop_floor")
+    scanner = replace(site.scanners[0], upside_down=True, field_of_view_deg=(-100.0, 60.0))
+    site = replace(site, scanners=(scanner,), disturbances=site.disturbances.undisturbed())
+    log = virtual_drive(site, site.routes[0].name, 1)
+    playback = Playback(judged_run(RunInput.of(site, log, start_of(site, log))))
+    view = at(playback, 4.0)
+    assert site.floor_map is not None
+    grid = site.floor_map.occupancy()
+    cells = np.argwhere(grid.occupied.copy())[:, ::-1]
+    centers = np.asarray(grid.origin[:2]) + (cells + 0.5) * grid.resolution
+    apart = KDTree(np.concatenate((centers, site.reflectors.centers))).query(view.scan_map)[0]
+    # Nothing else than walls and reflectors is met: noise of ranges, and errors of the pose.
+    assert np.quantile(apart, 0.9) < 0.15
