@@ -112,8 +112,11 @@ def _report(result: RunResult) -> list[str]:
         for error in (errors.position_rmse, errors.position_median, errors.position_p95, errors.position_max)
     )
     consistency = "" if math.isnan(errors.anees) else f"{errors.anees:.2f}, of the "
+    outside, in_gap = result.without_reference
     return [
         *lines,
+        f"Reference    for {errors.compared} of {result.cycles} cycles; {outside} are outside of its time, {in_gap} in "
+        "its gaps",
         f"Error        position {rms} mm RMS, {median} median, {p95} at 95 %, {most} at most{heading}",
         f"Consistency  ANEES {consistency}position {errors.anees_position:.2f} (1 is consistent, more is too sure)",
         f"Danger       {errors.wrong_while_operational} of {errors.compared} cycles operational with an error "

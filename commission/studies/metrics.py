@@ -83,6 +83,27 @@ def reference_at(
     return poses
 
 
+def without_reference(stamps_ns: IntArray, reference_stamps_ns: IntArray, references: FloatArray) -> tuple[int, int]:
+    """Count the cycles that nothing can be compared with, by the reason.
+
+    Parameters
+    ----------
+    stamps_ns : (K,) array [ns].
+    reference_stamps_ns : (R,) array [ns], ascending.
+    references : (K, 3) what `reference_at` found for them.
+
+    Returns
+    -------
+    outside, in_gap : cycles before the first or after the last reference pose, and cycles between two of them that are
+        too far apart to be joined by a line.
+    """
+    missing = np.isnan(references[:, 0])
+    if len(reference_stamps_ns) == 0:
+        return int(missing.sum()), 0
+    outside = (stamps_ns < reference_stamps_ns[0]) | (stamps_ns > reference_stamps_ns[-1])
+    return int(np.count_nonzero(missing & outside)), int(np.count_nonzero(missing & ~outside))
+
+
 def pose_errors(means: FloatArray, references: FloatArray) -> FloatArray:
     """Estimate minus reference.
 

@@ -32,6 +32,7 @@ from commission.studies.metrics import (
     nees,
     pose_errors,
     reference_at,
+    without_reference,
 )
 from commission.studies.scanner_figures import ScannerFigures, scanner_figures
 from commission.studies.start import Start
@@ -189,6 +190,18 @@ class RunResult:
         seen = self.times[self.counts[:, Status.INLIER] > 0]
         return float(np.diff(np.concatenate((self.times[:1], seen, self.times[-1:]))).max())
 
+    @property
+    def without_reference(self) -> tuple[int, int]:
+        """Cycles outside of the time of the reference, and in its gaps."""
+        return without_reference(self.columns.stamps_ns, self.inputs.log.reference_stamps_ns, self.references)
+
+    def position_two_sigma(self, cycle: int) -> float:
+        """2-sigma of the position after a cycle that the supervisor holds against its limit [m]."""
+        covariance = self.columns.covariances[cycle, :2, :2]
+        by_axes = self.inputs.segment(cycle).setup.parameters.supervisor.position_sigma == "axes"
+        variance = float((np.diagonal(covariance) if by_axes else np.linalg.eigvalsh(covariance)).max())
+        return 2.0 * math.sqrt(max(variance, 0.0))
+
     def count(self, status: Status) -> int:
         """Return the number of detections of one status."""
         return int(self.counts[:, status].sum())
@@ -331,6 +344,8 @@ def summary(result: RunResult) -> dict[str, Number]:
     if result.statistics is not None:
         entries |= {
             "reference_cycles": result.statistics.compared,
+            "outside_reference_cycles": result.without_reference[0],
+            "reference_gap_cycles": result.without_reference[1],
             "position_rmse_m": result.statistics.position_rmse,
             "position_median_m": result.statistics.position_median,
             "position_p95_m": result.statistics.position_p95,

@@ -206,10 +206,10 @@ def test_outliers_are_those_of_the_detector_and_those_of_the_gate(at: At) -> Non
     assert outliers.values(counted).tolist() == [4.0, 4.0]
 
 
-def test_the_badge_shows_the_larger_sigma_and_both_limits(at: At, site: Project) -> None:
+def test_the_badge_shows_the_largest_sigma_in_any_direction_and_both_limits(at: At, site: Project) -> None:
     word, beside, _ = badge_text(view_of(AppState(project=site, saved=site), at.run))
     assert word == "OPERATIONAL"
-    position = 1000.0 * max(two_sigma(at, 0), two_sigma(at, 1))
+    position = 2000.0 * math.sqrt(np.linalg.svd(at.covariance[:2, :2])[1].max())
     assert_reads(beside.replace("&nbsp;", " "), position, 87.0, DEGREES * two_sigma(at, 2), DEGREES * 0.061)
     assert re.search(r"/ 87 mm .*°$", beside)
 

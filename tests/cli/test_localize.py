@@ -12,6 +12,8 @@ KEYS = [
 KEYS_WITH_REFERENCE = [
     *(
         "reference_cycles",
+        "outside_reference_cycles",
+        "reference_gap_cycles",
         "position_rmse_m",
         "position_median_m",
         "position_p95_m",

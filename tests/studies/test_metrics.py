@@ -34,6 +34,14 @@ def test_reference_heading_that_crosses_pi_stays_wrapped():
     assert found < 0.0
 
 
+def test_cycles_without_a_reference_are_outside_of_its_time_or_in_its_gaps():
+    reference = stamps(1.0, 1.1, 1.2, 3.0, 3.1)
+    cycles = stamps(0.9, 1.0, 1.15, 2.0, 2.9, 3.05, 3.2, 9.0)
+    found = metrics.reference_at(cycles, reference, np.zeros((5, 3)))
+    assert metrics.without_reference(cycles, reference, found) == (3, 2)
+    assert metrics.without_reference(cycles, stamps(), np.full((8, 3), np.nan)) == (8, 0)
+
+
 def test_nothing_is_extrapolated_before_the_first_and_after_the_last_reference():
     poses = np.array([[1.0, 1.0, 0.0], [2.0, 1.0, 0.0]])
     found = metrics.reference_at(stamps(-0.1, 0.0, 0.1, 0.11), stamps(0.0, 0.1), poses)

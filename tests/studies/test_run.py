@@ -28,6 +28,8 @@ ALWAYS = [
 WITH_REFERENCE = [
     *(
         "reference_cycles",
+        "outside_reference_cycles",
+        "reference_gap_cycles",
         "position_rmse_m",
         "position_median_m",
         "position_p95_m",
