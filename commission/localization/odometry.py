@@ -158,7 +158,8 @@ def trend(motion: Motion, stamp_ns: int, dx: float, dy: float, dtheta: float) ->
 
     Notes
     -----
-    v + w (log(displacement) / t - v), w = t / (t + TREND): exponential smoothing, of its first value that itself.
+    v + w (log(displacement) / t - v), w = t / (t + TREND): exponential smoothing, derived; of its
+    first value that itself.
     """
     period_ns = stamp_ns - motion.odometry_ns
     if period_ns <= 0:

@@ -39,7 +39,8 @@ def position_variance(pose: PoseGaussian) -> float:
 
     Notes
     -----
-    (P_xx + P_yy) / 2 + sqrt(((P_xx - P_yy) / 2)^2 + P_xy^2): the larger eigenvalue of a symmetric 2 x 2 matrix.
+    (P_xx + P_yy) / 2 + sqrt(((P_xx - P_yy) / 2)^2 + P_xy^2): the larger eigenvalue of a symmetric 2 x 2 matrix, by
+    definition.
     """
     half_difference = 0.5 * (pose.xx - pose.yy)
     return 0.5 * (pose.xx + pose.yy) + math.sqrt(half_difference * half_difference + pose.xy * pose.xy)

@@ -187,7 +187,7 @@ def nearest(  # noqa: PLR0917 - a place and the map, array by array
 
     Notes
     -----
-    min |place - reflector|, by definition.
+    d = min |place - reflector|, by definition.
     """
     px, py = x - cells.origin_x, y - cells.origin_y
     first_row, last_row = cell_range(py - reach, py + reach, cells.size, cells.rows)

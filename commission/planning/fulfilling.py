@@ -89,7 +89,14 @@ class Choice:
 
 
 def grown(system: Needs, choice: Choice, taken: BoolArray) -> BoolArray:
-    """Add the column that brings most of what is lacking, again and again, until nothing is or none brings any."""
+    """Add the column that brings most of what is lacking, again and again, until nothing is or none brings any.
+
+    Parameters
+    ----------
+    system : the rows.
+    choice : which sets are allowed.
+    taken : (C,) the set at the start.
+    """
     taken = taken.copy()
     while True:
         lacking = system.lacking(taken)
@@ -102,7 +109,14 @@ def grown(system: Needs, choice: Choice, taken: BoolArray) -> BoolArray:
 
 
 def pruned(system: Needs, choice: Choice, taken: BoolArray) -> BoolArray:
-    """Take out columns without which no row lacks more, those that are missed least first."""
+    """Take out columns without which no row lacks more, those that are missed least first.
+
+    Parameters
+    ----------
+    system : the rows.
+    choice : which sets are allowed.
+    taken : (C,) the set at the start.
+    """
     taken, missing = taken.copy(), system.missing(taken)
     movable = np.flatnonzero(taken & ~choice.fixed)
     for column in movable[np.argsort(_missed(system, missing, movable, np.ones_like(missing)), kind="stable")]:
@@ -112,8 +126,33 @@ def pruned(system: Needs, choice: Choice, taken: BoolArray) -> BoolArray:
     return taken
 
 
+def with_one(system: Needs, choice: Choice, taken: BoolArray, lacked: BoolArray) -> BoolArray:
+    """Add the column that brings most of what another set lacks.
+
+    Parameters
+    ----------
+    system : the rows.
+    choice : which sets are allowed.
+    taken : (C,) the set that gets one more, where one may be added.
+    lacked : (C,) the other set.
+    """
+    lacking = system.lacking(lacked)
+    worth = np.minimum(system.gains, lacking).sum(axis=1) * choice.addable(taken)
+    taken = taken.copy()
+    if worth.max(initial=0.0) > 0.0:
+        taken[worth.argmax()] = True
+    return taken
+
+
 def without_one(system: Needs, choice: Choice, taken: BoolArray) -> BoolArray:
-    """Take out the column that is missed least."""
+    """Take out the column that is missed least.
+
+    Parameters
+    ----------
+    system : the rows.
+    choice : which sets are allowed.
+    taken : (C,) the set at the start.
+    """
     movable = np.flatnonzero(taken & ~choice.fixed)
     if len(movable) == 0:
         return taken

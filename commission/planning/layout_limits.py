@@ -28,6 +28,8 @@ NOTHING = -1
 PER_DAMAGE = 8
 """Scans of one route that a row each is made of: the worst ones, apart from each other."""
 APART_M = 2.0
+LEAST_MORE = 1e-3
+"""What is asked for more at least, of the information that there is: more than rounding hides."""
 NECESSARY = 600
 """Rows that the bound rests on, at most."""
 
@@ -154,7 +156,7 @@ class LayoutLimits:
             tangent = tangent_at(route, prediction, scan, axis)
             gains = np.where(np.arange(len(left)) == gone, 0.0, tangent.gains)
             # The tangent knows neither the error beyond what the filter says nor chance: it is held against itself.
-            yield Excess(gains, float(gains[left].sum()) + 1.0 - 1.0 / share)
+            yield Excess(gains, float(gains[left].sum()) + max(1.0 - 1.0 / share, LEAST_MORE))
             if len(self._necessary) < NECESSARY:
                 self._necessary.append((gains, tangent.need(0.25 * limits[scan, axis] ** 2)))
             metres = route.drive.metres

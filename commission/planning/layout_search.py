@@ -20,7 +20,7 @@ from commission.errors import JobCancelled
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.planning.ambiguity import AmbiguityOptions
 from commission.planning.cover import CoverProblem, cover, lower_bound, merged
-from commission.planning.fulfilling import Choice, Needs, exchanged, grown, pruned, without_one
+from commission.planning.fulfilling import Choice, Needs, exchanged, grown, pruned, with_one, without_one
 from commission.planning.layout_limits import Excess, LayoutLimits
 from commission.planning.route_prediction import PlannedRoute, PredictionOptions
 from commission.planning.telling_apart import ChosenPlace, Distinction, chosen_places, nearest_on_routes
@@ -33,8 +33,10 @@ from commission.site.parts import Equipped
 
 FIRST_EXCHANGES = 120
 """Exchanges tried for the first layout, which only has to see enough."""
-FIRST_ROUNDS = 200
+FIRST_ROUNDS = 1000
 """Layouts judged at most until one holds."""
+PATIENCE = 5
+"""Layouts of one size that are judged before one more reflector is spent to have one that holds soon."""
 REPAIRING, SHRINKING = 40, 250
 """Exchanges tried to fulfil new rows: with room to grow, and with one reflector less."""
 ROWS_AT_FIRST, ROWS_LATER = 2000, 48
@@ -171,12 +173,17 @@ class LayoutSearch:
 
     def _repaired(self, taken: BoolArray) -> tuple[bool, BoolArray]:
         """Exchange, add and take out reflectors until a layout holds, or nothing more can be asked for."""
+        patience = PATIENCE
         for number in range(FIRST_ROUNDS):
             self._report(0.1 + (UNTIL_ONE_HOLDS - 0.1) * number / (number + 20.0), "choosing reflectors")
             if self._holds(taken, ROWS_AT_FIRST):
                 return True, taken
             next_one = exchanged(self._system, self._choice, taken, REPAIRING, self._step)
             next_one = pruned(self._system, self._choice, grown(self._system, self._choice, next_one))
+            # As few as the rows allow are often too few, and to find that out takes many rows.
+            patience = patience - 1 if next_one.sum() <= taken.sum() else PATIENCE
+            if patience == 0:
+                next_one, patience = with_one(self._system, self._choice, next_one, taken), PATIENCE
             if np.array_equal(next_one, taken):
                 break
             taken = next_one

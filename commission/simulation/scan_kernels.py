@@ -154,7 +154,7 @@ def cast_sweep(hall: Hall, beams: ScannerBeams, moment: Moment, ranges: NDArray[
 
     Notes
     -----
-    Each beam is a scan of one beam from its own pose: nothing is approximated.
+    range[i] = cast from poses[i]: each beam is a scan of one beam from its own pose, by definition.
     """
     for i in range(len(ranges)):
         beam = ScannerBeams(

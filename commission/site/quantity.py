@@ -146,7 +146,13 @@ class Shown:
         return written.replace("-", "") if float(written) == 0.0 and "+" not in form else written
 
     def against(self, value: float, limit: float, forms: tuple[str, str] = (".1f", ".0f")) -> str:
-        """Return a value and its limit, `12.3 / 60 mm`; `forms` are those of the two."""
+        """Return a value and its limit, `12.3 / 60 mm`.
+
+        Parameters
+        ----------
+        value, limit : in the unit of code and files.
+        forms : how Python formats the one and the other.
+        """
         return f"{self.number(value, forms[0])} / {self.text(limit, forms[1])}"
 
 
