@@ -277,7 +277,7 @@ def same_size(work: FloatArray | None) -> FloatArray | None:
 
     Notes
     -----
-    No formula.
+    shape = (3, columns), by definition.
     """
     if work is None:
         return None
@@ -290,7 +290,7 @@ def remember(work: FloatArray | None, kept: FloatArray | None) -> None:
 
     Notes
     -----
-    No formula.
+    kept = work, by definition.
     """
     if work is None or kept is None:
         return
