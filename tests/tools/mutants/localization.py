@@ -100,9 +100,9 @@ LOCALIZATION = (
     ),
     Mutant(
         name="drawn gate of the gate's square",
-        file=FOLDER + "setup.py",
-        find="self.filter.gate.d2**0.5",
-        replace="self.filter.gate.d2",
+        file="commission/localization/validation.py",
+        find="setup.filter.gate.d2**0.5",
+        replace="setup.filter.gate.d2",
         tests=(TESTS + OUTLINE,),
     ),
     Mutant(
@@ -143,15 +143,15 @@ LOCALIZATION = (
     Mutant(
         name="every correction starts from the prediction, as Algorithm 1 is printed",
         file=FOLDER + "cycle.py",
-        find="                posterior,\n                detections[i, 0]",
-        replace="                prior,\n                detections[i, 0]",
+        find="            belief = correct(\n                belief,",
+        replace="            belief = correct(\n                prior,",
         tests=(PLAIN,),
     ),
     Mutant(
         name="supervisor fails on one sigma of y",
         file=FOLDER + "supervisor.py",
-        find="2.0 * math.sqrt(belief.yy)",
-        replace="1.0 * math.sqrt(belief.yy)",
+        find="position, heading = 2.0 * math.sqrt(variance)",
+        replace="position, heading = 1.0 * math.sqrt(variance)",
         tests=(TESTS + "test_supervisor.py::test_each_two_sigma_above_its_limit_fails",),
     ),
     Mutant(
@@ -230,8 +230,8 @@ LOCALIZATION = (
     Mutant(
         name="reflector handed out by its row in the cells instead of in the map",
         file=FOLDER + "cycle.py",
-        find="reflectors[i] = int(places[entry, 3])",
-        replace="reflectors[i] = entry",
+        find="reflectors[i] = int(places[reflectors[i], 3])",
+        replace="reflectors[i] = int(reflectors[i])",
         tests=(PLAIN,),
     ),
     Mutant(

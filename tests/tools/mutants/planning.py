@@ -97,16 +97,16 @@ PLANNING = (
     ),
     Mutant(
         name="accuracy that a station requires is not asked",
-        file=FOLDER + "layout_search.py",
+        file="commission/planning/layout_limits.py",
         find="np.minimum(limits[scans, :2], station.required_accuracy)",
         replace="np.maximum(limits[scans, :2], station.required_accuracy)",
         tests=(TESTS + "test_placement.py::test_a_station_gets_the_accuracy_that_it_requires",),
     ),
     Mutant(
         name="limits hold only while nothing is broken",
-        file=FOLDER + "layout_search.py",
-        find="left[[gone] if gone >= 0 else []] = False",
-        replace="left[[]] = False",
+        file="commission/planning/layout_limits.py",
+        find="    if gone != NOTHING:\n        left[gone] = False",
+        replace="    if gone == NOTHING:\n        left[gone] = False",
         tests=(TESTS + "test_placement.py::test_limits_hold_without_any_single_reflector_where_that_is_demanded",),
     ),
     Mutant(
