@@ -89,7 +89,7 @@ SCANNED = replace(DRIVE, scans=(scan_log(np.full((20, 601), 5000.0)),))
 START = start_of(SITE, DRIVE, (2.0, 2.0, 0.0))
 GIVEN = CoverageOptions(heading=Heading.GIVEN, measurement=Measurement.RANGE_BEARING_PRIOR, spacing=0.5)
 FEW = PlacementOptions(
-    demands=Demands(visible=2, survive_failure=False), candidates=CandidateOptions(spacing=2.0), checks=5, exchanges=5
+    demands=Demands(visible=2, survive_failure=False), candidates=CandidateOptions(spacing=2.0), checks=5
 )
 
 
