@@ -246,7 +246,7 @@ class SupervisorParameters:
     rejection_limit: Annotated[
         float,
         Quantity(label="Rejected at all", shown=PERCENT, bounds=Bounds.inside(0.0, 1.0), step=1.0, slider=(5.0, 95.0)),
-    ] = 0.62
+    ] = 0.7
     """Share of all rejected detections, false ones among people and shiny things too, beyond which it is lost."""
     doubt_ratio: Annotated[
         float, Quantity(label="Doubt from", bounds=Bounds.at_least(1.0), step=0.1, slider=(1.0, 10.0))
