@@ -292,12 +292,17 @@ XY, HEADING = slice(0, 2), slice(2, 3)
 def test_the_numbers_along_a_route_are_those_of_its_prediction(expected_route: RouteView, site: Project) -> None:
     route, prediction = expected_route, expected_route.prediction
     shown = dict(re.findall(r"<tr><td>(.*?)</td><td>(.*?)</td></tr>", chart(route, None)))
+    contributed = predicted(PredictionInput.of(site, site.routes[0].name)).errors.parts
     table = {
         "Length": (prediction.drive.metres[-1],),
         "Largest 2σ x, y / limit": (1000.0 * sigma_along(route, XY).max(), 87.0),
         "Largest 2σ heading / limit": (DEGREES * sigma_along(route, HEADING).max(), DEGREES * 0.061),
         "True error, 2σ x, y": (1000.0 * error_along(site, XY).max(),),
         "True error, 2σ heading": (DEGREES * error_along(site, HEADING).max(),),
+        **{
+            f"… of {source}": (2000.0 * np.sqrt(contributed[:, number, :2].max()),)
+            for number, source in enumerate(("noise", "map", "mounting", "range", "clock"))
+        },
         "Fewest reflectors seen": (float(prediction.seen.min()),),
         "Longest on odometry": (prediction.on_odometry.max(),),
         "Supervisor stops": (),

@@ -234,7 +234,7 @@ def test_a_number_too_large_to_calculate_with_is_refused(file, text, words, refu
     ("file", "text", "words"),
     [
         ("drive/odometry.csv", "stamp_ns,dx,dy,dtheta\n0,0,0,0\n100,1e9,-1e9,1e9\n200,1e9,1e9,-1e9\n", []),
-        ("drive/detections.csv", "stamp_ns,range,bearing\n0,1e9,1e9\n100000000,0,0\n", []),
+        ("drive/detections.csv", "stamp_ns,range,bearing\n0,1e9,1e9\n100000000,1e-9,0\n", []),
         ("hall/reflectors.csv", "id,x,y,radius\n", []),
         ("hall/reflectors.csv", "id,x,y,radius\nA,1e7,1e7,0.1\nB,-1e7,0,0.1\nC,0,0,0.1\n", []),
         (None, "", ["--set", "observation.range_sigma=1e-300", "--set", "observation.bearing_sigma=1e-300"]),
