@@ -219,7 +219,8 @@ class ProjectFolder(Service):
                 self._look_after_journal(state)
         elif hold is Hold.THEIRS:
             self._follow_holder(state)
-        elif hold is not Hold.TAKING_OVER:
+        elif hold is Hold.OURS or (hold is Hold.NOBODYS and self._folder.is_dir()):
+            # Where the folder is gone, whoever edited it goes on elsewhere, and here it stays read-only.
             self._begin_to_edit()
 
     def _look_after_journal(self, state: AppState) -> None:

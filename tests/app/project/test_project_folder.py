@@ -296,6 +296,30 @@ def test_an_edit_before_the_next_look_after_a_take_over_is_told_to_be_on_its_pag
     assert second.now == shared
 
 
+def test_one_who_reads_a_project_stays_read_only_while_its_folder_is_gone(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first one goes on editing elsewhere: were the second one to edit as well, there would be two projects."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+    first, second = Kept(folder), Kept(folder)
+    second.start()
+    first.place(4.0, 3.0)
+    shutil.rmtree(folder)
+    for _ in range(2):
+        second.look()
+        first.look()
+        assert second.runtime.state.read_only
+        assert not first.runtime.state.read_only
+    first.place(5.0, 3.0)
+    first.do(Save(overwrite=True))
+    first.look()
+    second.look()
+    assert second.runtime.state.read_only
+    assert load_project(folder) == first.now == second.now
+    first.files.close()
+    second.files.close()
+
+
 @pytest.mark.parametrize("how", ["killed", "closed"])
 def test_a_project_whose_holder_is_gone_is_edited_by_the_one_who_waited(folder: Path, how: str) -> None:
     first, second = Kept(folder), Kept(folder)
