@@ -19,7 +19,7 @@ from commission.planning import vehicle_fixes
 from commission.planning.dilution import Fixes, FixOptions, as_fixes
 from commission.planning.dilution_kernels import FIGURES
 from commission.planning.shadow_kernels import BitMask, Targets, see_points
-from commission.planning.vehicle_fixes import Seen, views_of
+from commission.planning.vehicle_fixes import FloorSight, views_of
 from commission.planning.vehicle_visibility import VehicleVisibility, vehicle_visibility
 from commission.planning.view_kernels import ViewMask
 from commission.planning.visibility import build_visibility, copied, mask_words, replace_target
@@ -158,7 +158,7 @@ def coverage(
         progress(tile.start / len(lattice), "coverage")
         places = views.places(points[tile])
         sight[:, tile] = views.sight(visible.models, places)
-        seen = Seen(points[tile], np.ascontiguousarray(sight[:, tile]), views.stands(places, visible.caster))
+        seen = FloorSight(points[tile], np.ascontiguousarray(sight[:, tile]), views.stands(places, visible.caster))
         every = np.arange(len(seen.points))
         views.fill(visible.reflectors, seen, every, counts=counts[tile], figures=figures[tile])
     progress(1.0, "coverage")
@@ -191,7 +191,7 @@ class LiveCoverage:
         self._views = views_of(visible.scanners, found.options)
         points = lattice.points()
         self._places = self._views.places(points)
-        self._seen = Seen(points, found.sight.copy(), self._views.stands(self._places, visible.caster))
+        self._seen = FloorSight(points, found.sight.copy(), self._views.stands(self._places, visible.caster))
         self._counts, self._figures = fixes.visible.copy(), np.stack(fixes[1:], axis=-1)
         self._changed = np.empty(len(lattice), dtype=np.int64)
         self._coverage = replace(found, fixes=as_fixes(self._counts, self._figures), sight=self._seen.mask)

@@ -72,7 +72,7 @@ class Needs:
 
 
 @dataclass(frozen=True, slots=True)
-class Choice:
+class AllowedSets:
     """Which sets of columns are allowed."""
 
     fixed: BoolArray
@@ -88,7 +88,7 @@ class Choice:
         return free
 
 
-def grown(system: Needs, choice: Choice, taken: BoolArray) -> BoolArray:
+def grown(system: Needs, choice: AllowedSets, taken: BoolArray) -> BoolArray:
     """Add the column that brings most of what is lacking, again and again, until nothing is or none brings any.
 
     Parameters
@@ -108,7 +108,7 @@ def grown(system: Needs, choice: Choice, taken: BoolArray) -> BoolArray:
         taken[best] = True
 
 
-def pruned(system: Needs, choice: Choice, taken: BoolArray) -> BoolArray:
+def pruned(system: Needs, choice: AllowedSets, taken: BoolArray) -> BoolArray:
     """Take out columns without which no row lacks more, those that are missed least first.
 
     Parameters
@@ -126,7 +126,7 @@ def pruned(system: Needs, choice: Choice, taken: BoolArray) -> BoolArray:
     return taken
 
 
-def with_one(system: Needs, choice: Choice, taken: BoolArray, lacked: BoolArray) -> BoolArray:
+def with_one(system: Needs, choice: AllowedSets, taken: BoolArray, lacked: BoolArray) -> BoolArray:
     """Add the column that brings most of what another set lacks.
 
     Parameters
@@ -144,7 +144,7 @@ def with_one(system: Needs, choice: Choice, taken: BoolArray, lacked: BoolArray)
     return taken
 
 
-def without_one(system: Needs, choice: Choice, taken: BoolArray) -> BoolArray:
+def without_one(system: Needs, choice: AllowedSets, taken: BoolArray) -> BoolArray:
     """Take out the column that is missed least.
 
     Parameters
@@ -164,7 +164,7 @@ def without_one(system: Needs, choice: Choice, taken: BoolArray) -> BoolArray:
 
 def exchanged(
     system: Needs,
-    choice: Choice,
+    choice: AllowedSets,
     taken: BoolArray,
     steps: int,
     step: Callable[[], None] | None = None,
@@ -204,7 +204,7 @@ def exchanged(
 
 
 def _best_swap(
-    system: Needs, choice: Choice, taken: BoolArray, weights: Gains, is_barred: BoolArray
+    system: Needs, choice: AllowedSets, taken: BoolArray, weights: Gains, is_barred: BoolArray
 ) -> tuple[int, int] | None:
     """The column out and the column in after which the weighted lack is least; None when none may be exchanged."""
     movable = np.flatnonzero(taken & ~choice.fixed & ~is_barred)

@@ -20,7 +20,7 @@ from commission.errors import JobCancelled
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.planning.ambiguity import AmbiguityOptions
 from commission.planning.cover import CoverProblem, cover, lower_bound, merged
-from commission.planning.fulfilling import Choice, Needs, exchanged, grown, pruned, with_one, without_one
+from commission.planning.fulfilling import AllowedSets, Needs, exchanged, grown, pruned, with_one, without_one
 from commission.planning.layout_limits import Excess, LayoutLimits
 from commission.planning.route_prediction import PlannedRoute, PredictionOptions
 from commission.planning.telling_apart import ChosenPlace, Distinction, chosen_places, nearest_on_routes
@@ -101,7 +101,7 @@ class LayoutSearch:
         demands = options.demands
         self._covers = [route.sees() for route in planned]
         self._base = demands.visible + int(demands.survive_failure)
-        self._choice = Choice(
+        self._choice = AllowedSets(
             np.arange(len(visible.reflectors)) < kept, _conflicts(visible.reflectors.centers, demands.spacing)
         )
         self._places = chosen_places(demands, planned, site.stations, site.scanners, options.ambiguity)

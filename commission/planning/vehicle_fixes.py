@@ -68,7 +68,7 @@ class Views:
     def fill(
         self,
         reflectors: ReflectorMap,
-        seen: Seen,
+        seen: FloorSight,
         rows: IntArray,
         *,
         counts: Counts,
@@ -94,7 +94,7 @@ class Views:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class FloorSight:
     """What the views of a vehicle see from N points."""
 
     points: FloatArray
@@ -179,7 +179,7 @@ def fixes(visible: VehicleVisibility, points: ArrayLike, options: FixOptions) ->
     xy = np.ascontiguousarray(np.asarray(points, dtype=np.float64).reshape(-1, 2))
     views = views_of(visible.scanners, options)
     places = views.places(xy)
-    seen = Seen(xy, views.sight(visible.models, places), views.stands(places, visible.caster))
+    seen = FloorSight(xy, views.sight(visible.models, places), views.stands(places, visible.caster))
     counts, figures = np.empty(len(xy), dtype=np.int32), np.empty((len(xy), dilution_kernels.FIGURES))
     views.fill(visible.reflectors, seen, np.arange(len(xy)), counts=counts, figures=figures)
     return as_fixes(counts, figures)

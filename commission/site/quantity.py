@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from decimal import Decimal
-from typing import TypeAlias, overload
+from typing import TYPE_CHECKING, TypeAlias, overload
 
-from commission.geometry.arrays import FloatArray
+if TYPE_CHECKING:  # commands read units from here, and their help does not wait for numpy
+    from commission.geometry.arrays import FloatArray
 
 LARGEST = 1e9
 """No length, angle, speed or sigma that anybody means is larger; squares and products of much larger ones overflow."""

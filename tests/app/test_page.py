@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 import viser
 
-from commission.app.base.actions import Action
+from commission.app.base.actions import Action, Sender, Undo
 from commission.app.base.field_widget import held, meant
 from commission.app.base.jobs import Job
 from commission.app.base.panel import clock, escaped, posting
+from commission.app.base.reducer import reduce
 from commission.app.base.server import start_server
 from commission.app.base.state import AppState, LastEdit
 from commission.app.base.view import view_of
@@ -29,10 +30,11 @@ from commission.app.run.vehicle_layer import VehicleLayer
 from commission.app.run.view import RunView
 from commission.app.tune.tune_panel import TunePanel
 from commission.localization.estimate import Mode, Status
-from commission.site.fields import field_info, get_field, walk_fields, with_field
+from commission.site.fields import field_info, fields_of, get_field, walk_fields, with_field
 from commission.site.parameters import Parameters
 from commission.site.presets import SCANNERS, ScannerPreset
 from commission.site.project import Project
+from commission.site.uncertainty import Uncertainty
 from commission.studies.run import RunResult
 from tests.app.asking import FEATURES, taking
 
@@ -96,11 +98,35 @@ def test_every_parameter_has_exactly_one_widget_with_its_label_its_unit_and_its_
     panel = TunePanel(server.gui, lambda _action: None, AppState(project=project, saved=project))
     described = dict(walk_fields(Parameters))
     assert sorted(panel._widgets) == sorted(described)
-    assert {id(widget) for widget in added} == {id(widget) for widget in panel._widgets.values()}
+    parameters = {id(widget) for widget in panel._widgets.values()}
+    constants = [widget for widget in added if id(widget) not in parameters]
+    assert len(added) == len(parameters) + len(constants)
+    for widget, (name, info) in zip(constants, fields_of(Uncertainty).items(), strict=True):
+        assert widget.hint == f"{info.hint} (uncertainty.{name})"
+        assert info.quantity is not None
+        assert widget.label == info.quantity.title
     for key, info in described.items():
         widget = panel._widgets[key]
         assert widget.hint == f"{info.hint} ({key})"
         assert widget.label == (info.quantity.title if info.quantity else info.label)
+
+
+def test_every_constant_is_posted_in_si_and_set_as_one_undo_step(server: viser.ViserServer, project: Project) -> None:
+    posted: list[Any] = []
+    state = AppState(project=project, saved=project)
+    panel = TunePanel(server.gui, taking(posted), state)
+    for (widget, _), name, shown, value in zip(
+        panel._constants._widgets,
+        ("survey", "mounting_position", "mounting_heading", "range_bias", "clock"),
+        (4.0, 7.0, 0.5, 8.0, 12.0),
+        (0.004, 0.007, math.radians(0.5), 0.008, 0.012),
+        strict=True,
+    ):
+        change(widget, shown, client=SimpleNamespace(client_id=1))
+        assert (posted[-1].name, posted[-1].value) == (name, pytest.approx(value, rel=1e-9))
+        changed = reduce(posted[-1], state, Sender(1, 0.0)).state
+        assert getattr(changed.project.uncertainty, name) == pytest.approx(value, rel=1e-9)
+        assert reduce(Undo(), changed, Sender(1, 1.0)).state.project == project
 
 
 def test_every_slider_posts_its_parameter_in_si(server: viser.ViserServer, project: Project) -> None:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from commission.planning.cover import CoverProblem
-from commission.planning.fulfilling import Choice, Needs, exchanged, grown, pruned, without_one
+from commission.planning.fulfilling import AllowedSets, Needs, exchanged, grown, pruned, without_one
 
 COLUMNS = 9
 
 
-def system_of(seed: int) -> tuple[Needs, Choice]:
+def system_of(seed: int) -> tuple[Needs, AllowedSets]:
     """Rows of a cover, and rows with any gains."""
     rng = np.random.default_rng(seed)
     covers = (rng.random((6, COLUMNS)) < 0.5).astype(np.float32)
@@ -26,10 +26,10 @@ def system_of(seed: int) -> tuple[Needs, Choice]:
     system = Needs(problem)
     gains = rng.uniform(0.0, 1.0, (8, COLUMNS))
     system.add(gains, rng.uniform(0.5, 1.5, 8))
-    return system, Choice(fixed, problem.conflicts)
+    return system, AllowedSets(fixed, problem.conflicts)
 
 
-def allowed(choice: Choice, size: int) -> list[np.ndarray]:
+def allowed(choice: AllowedSets, size: int) -> list[np.ndarray]:
     sets = [np.isin(np.arange(COLUMNS), chosen) for chosen in itertools.combinations(range(COLUMNS), size)]
     return [
         each
@@ -39,7 +39,7 @@ def allowed(choice: Choice, size: int) -> list[np.ndarray]:
     ]
 
 
-def fewest(system: Needs, choice: Choice) -> int:
+def fewest(system: Needs, choice: AllowedSets) -> int:
     return next(
         size
         for size in range(COLUMNS + 1)
@@ -83,7 +83,7 @@ def test_the_column_that_is_missed_least_goes_first() -> None:
         np.zeros(3, np.bool_),
         (np.empty(0, np.int64),) * 3,
     )
-    system, choice = Needs(problem), Choice(problem.fixed, problem.conflicts)
+    system, choice = Needs(problem), AllowedSets(problem.fixed, problem.conflicts)
     system.add(np.array([[0.0, 0.4, 1.0]]), np.array([1.2]))
     assert np.flatnonzero(without_one(system, choice, np.ones(3, np.bool_))).tolist() == [1, 2]
 

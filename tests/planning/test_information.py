@@ -9,7 +9,7 @@ import pytest
 
 from commission.planning.information import tangent_at
 from commission.planning.route_prediction import PlannedRoute, plan_route, predict_route, restricted
-from commission.site.parameters import AssociationParameters, DetectorParameters, Parameters
+from commission.site.parameters import AssociationParameters, DetectorParameters, FilterParameters, Parameters
 from commission.site.project import Project
 from commission.site.routes import Route, Segment
 from commission.site.scanner import Scanner
@@ -42,7 +42,11 @@ def some(rng: np.random.Generator) -> np.ndarray:
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_a_tangent_touches_at_its_layout_where_every_detection_is_certain(axis: int) -> None:
     """All information comes from reflectors, odometry and start; a beam may be lost at 9 m even so, hence the hair."""
-    planned = hall(association=AssociationParameters(enabled=False), detector=DetectorParameters(enabled=False))
+    planned = hall(
+        association=AssociationParameters(enabled=False),
+        detector=DetectorParameters(enabled=False),
+        filter=FilterParameters(consider=False),
+    )
     layout = some(np.random.default_rng(axis))
     tangent = tangent_at(planned, predict_route(restricted(planned, layout)), SCAN, axis)
     assert tangent.gains[layout].sum() + tangent.rest == pytest.approx(1.0, abs=1e-4)
