@@ -19,7 +19,7 @@ from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering,
 from commission.localization.estimate import Status
 from commission.localization.kalman import squared_distance
 from commission.localization.observation import SMALLEST_RANGE, ObservationModel, expect, scanner_offset
-from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.pose_gaussian import PoseGaussian, larger_eigenvalue
 from commission.localization.reflector_index import Cells, cell_range
 from commission.site.parameters import AssociationParameters
 
@@ -57,16 +57,15 @@ def viewpoint(belief: PoseGaussian, model: ObservationModel) -> Viewpoint:
 
     Notes
     -----
-    sigma^2 = (a + c) / 2 + sqrt(((a - c) / 2)^2 + b^2) of J P J^T = [[a, b], [b, c]], J = [[1, 0, -oy], [0, 1, ox]]:
-    the larger eigenvalue of the scanner's position covariance, derived from the lever (ox, oy) of the scanner.
+    sigma^2 = `larger_eigenvalue` of J P J^T, J = [[1, 0, -oy], [0, 1, ox]]: derived from the lever (ox, oy) of the
+    scanner.
     """
     offset_x, offset_y = scanner_offset(belief.theta, model)
     # The scanner moves by (-offset_y, offset_x) per radian of heading.
     xx = belief.xx - 2.0 * offset_y * belief.xt + offset_y * offset_y * belief.tt
     xy = belief.xy + offset_x * belief.xt - offset_y * belief.yt - offset_x * offset_y * belief.tt
     yy = belief.yy + 2.0 * offset_x * belief.yt + offset_x * offset_x * belief.tt
-    half_difference = 0.5 * (xx - yy)
-    largest = 0.5 * (xx + yy) + math.sqrt(half_difference * half_difference + xy * xy)
+    largest = larger_eigenvalue(xx, xy, yy)
     return Viewpoint(offset_x, offset_y, math.sqrt(max(largest, 0.0)), math.sqrt(max(belief.tt, 0.0)))
 
 

@@ -19,13 +19,12 @@ from commission.localization.consider import (
     PER_REFLECTOR,
     Considering,
     considering,
-    correct_with,
+    correct_given,
     put_back,
     put_block,
     take_out,
     working_array,
 )
-from commission.localization.kalman import correct
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
@@ -132,16 +131,10 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         reflectors,
         d2,
     )
-    if cross is None or given is None or work is None:
-        posterior, pivot = (
-            corrected(prior, first, last, detections, observation, places, status, reflectors),
-            state.pivot,
-        )
-    else:
-        posterior = corrected_with(
-            prior, first, last, detections, observation, places, cross, given, work, scanner, status, reflectors
-        )
-        pivot = (posterior.x, posterior.y)
+    posterior = corrected(
+        prior, first, last, detections, observation, places, cross, given, work, scanner, status, reflectors
+    )
+    pivot = state.pivot if cross is None else (posterior.x, posterior.y)
     for i in range(first, last):
         if reflectors[i] != NOBODY:
             reflectors[i] = int(places[reflectors[i], 3])
@@ -194,52 +187,9 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
     detections: FloatArray,
     observation: ObservationModel,
     places: FloatArray,
-    status: NDArray[np.int8],
-    entries: IntArray,
-) -> PoseGaussian:
-    """Correct a belief by all accepted detections of a scan.
-
-    Parameters
-    ----------
-    prior : after *predict*.
-    first, last : rows of the scan's detections, the last one excluded.
-    detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
-    observation : mounting and noise of the scanner.
-    places : the map, see `ReflectorIndex`.
-    status : (n,) a `Status` each.
-    entries : (n,) row of `places` of each, or NOBODY.
-
-    Notes
-    -----
-    No formula: `correct` for each in turn, from the freshest state.
-    """
-    belief = prior
-    for i in range(first, last):
-        if status[i] == INLIER:
-            entry = entries[i]
-            belief = correct(
-                belief,
-                detections[i, 0] - observation.range_bias,
-                detections[i, 1],
-                places[entry, 0],
-                places[entry, 1],
-                places[entry, 2],
-                observation,
-            )
-    return belief
-
-
-@compiled_inline
-def corrected_with(  # noqa: PLR0917 - the scan's detections and the map, array by array
-    prior: PoseGaussian,
-    first: int,
-    last: int,
-    detections: FloatArray,
-    observation: ObservationModel,
-    places: FloatArray,
-    cross: FloatArray,
-    given: Considering,
-    work: FloatArray,
+    cross: FloatArray | None,
+    given: Considering | None,
+    work: FloatArray | None,
     scanner: int,
     status: NDArray[np.int8],
     entries: IntArray,
@@ -248,23 +198,33 @@ def corrected_with(  # noqa: PLR0917 - the scan's detections and the map, array 
 
     Parameters
     ----------
-    prior, first, last, detections, observation, places, status, entries : as in `corrected`.
-    cross : covariance of the pose with the constants, written in place.
-    given, work : of the scan.
+    prior : after *predict*.
+    first, last : rows of the scan's detections, the last one excluded.
+    detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
+    observation : mounting and noise of the scanner.
+    places : the map, see `ReflectorIndex`.
+    cross : covariance of the pose with the constants, written in place; None: none is considered.
+    given, work : of the scan, where constants are considered, else None.
     scanner : index of the scanner.
+    status : (n,) a `Status` each.
+    entries : (n,) row of `places` of each, or NOBODY.
 
     Notes
     -----
-    No formula: `correct_with` for each in turn; what the scan does not see is carried over it at the end, in one go.
+    No formula: `correct_given` for each in turn, from the freshest state; constants that the scan does not see are
+    carried over it at the end, in one go.
     """
-    for i in range(first, last):
-        if status[i] == INLIER and _block(i, first, status, entries) == i:
-            take_out(work, BLOCKS + PER_REFLECTOR * (i - first), cross, entries[i], given)
-    belief = prior
+    if cross is not None and given is not None and work is not None:
+        for i in range(first, last):
+            if status[i] == INLIER and _block(i, first, status, entries) == i:
+                take_out(work, BLOCKS + PER_REFLECTOR * (i - first), cross, entries[i], given)
+    belief, at = prior, 0
     for i in range(first, last):
         if status[i] == INLIER:
             entry = entries[i]
-            belief = correct_with(
+            if work is not None:
+                at = BLOCKS + PER_REFLECTOR * (_block(i, first, status, entries) - first)
+            belief = correct_given(
                 belief,
                 detections[i, 0] - observation.range_bias,
                 detections[i, 1],
@@ -274,12 +234,13 @@ def corrected_with(  # noqa: PLR0917 - the scan's detections and the map, array 
                 observation,
                 given,
                 work,
-                BLOCKS + PER_REFLECTOR * (_block(i, first, status, entries) - first),
+                at,
             )
-    put_back(cross, work, len(places), scanner)
-    for i in range(first, last):
-        if status[i] == INLIER and _block(i, first, status, entries) == i:
-            put_block(cross, work, BLOCKS + PER_REFLECTOR * (i - first), entries[i])
+    if cross is not None and work is not None:
+        put_back(cross, work, len(places), scanner)
+        for i in range(first, last):
+            if status[i] == INLIER and _block(i, first, status, entries) == i:
+                put_block(cross, work, BLOCKS + PER_REFLECTOR * (i - first), entries[i])
     return belief
 
 

@@ -39,11 +39,25 @@ def position_variance(pose: PoseGaussian) -> float:
 
     Notes
     -----
-    (P_xx + P_yy) / 2 + sqrt(((P_xx - P_yy) / 2)^2 + P_xy^2): the larger eigenvalue of a symmetric 2 x 2 matrix, by
-    definition.
+    No formula: `larger_eigenvalue` of the position's covariance.
     """
-    half_difference = 0.5 * (pose.xx - pose.yy)
-    return 0.5 * (pose.xx + pose.yy) + math.sqrt(half_difference * half_difference + pose.xy * pose.xy)
+    return larger_eigenvalue(pose.xx, pose.xy, pose.yy)
+
+
+@compiled_inline
+def larger_eigenvalue(xx: float, xy: float, yy: float) -> float:
+    """Larger eigenvalue of [[xx, xy], [xy, yy]].
+
+    Parameters
+    ----------
+    xx, xy, yy : elements of a symmetric matrix.
+
+    Notes
+    -----
+    (xx + yy) / 2 + sqrt(((xx - yy) / 2)^2 + xy^2), by definition.
+    """
+    half_difference = 0.5 * (xx - yy)
+    return 0.5 * (xx + yy) + math.sqrt(half_difference * half_difference + xy * xy)
 
 
 def from_belief(belief: Belief) -> PoseGaussian:

@@ -8,7 +8,6 @@ local search for set covering).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
@@ -34,6 +33,8 @@ class Needs:
     """
 
     def __init__(self, problem: CoverProblem) -> None:
+        self.problem = problem
+        """Which columns are fixed, and which exclude each other."""
         # What one column adds lies together: sets are a small part of the columns.
         self._gains, self._needs = np.ascontiguousarray(problem.covers.T), problem.attainable().astype(np.float32)
         self._count = len(self._needs)
@@ -71,54 +72,35 @@ class Needs:
         return np.maximum(self.missing(taken), 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class AllowedSets:
-    """Which sets of columns are allowed."""
-
-    fixed: BoolArray
-    """(C,) columns that are in every set."""
-    conflicts: tuple[IntArray, ...]
-    """For each column those that must not be taken beside it."""
-
-    def addable(self, taken: BoolArray) -> BoolArray:
-        """(C,) columns that may be added to a set."""
-        free = ~taken
-        for column in np.flatnonzero(taken):
-            free[self.conflicts[column]] = False
-        return free
-
-
-def grown(system: Needs, choice: AllowedSets, taken: BoolArray) -> BoolArray:
+def grown(system: Needs, taken: BoolArray) -> BoolArray:
     """Add the column that brings most of what is lacking, again and again, until nothing is or none brings any.
 
     Parameters
     ----------
-    system : the rows.
-    choice : which sets are allowed.
+    system : the rows, and which columns are fixed or exclude each other.
     taken : (C,) the set at the start.
     """
     taken = taken.copy()
     while True:
         lacking = system.lacking(taken)
         rows = np.flatnonzero(lacking)
-        worth = np.minimum(system.gains[:, rows], lacking[rows]).sum(axis=1) * choice.addable(taken)
+        worth = np.minimum(system.gains[:, rows], lacking[rows]).sum(axis=1) * system.problem.allowed(taken)
         best = int(worth.argmax()) if len(worth) else 0
         if len(rows) == 0 or len(worth) == 0 or worth[best] <= 0.0:
             return taken
         taken[best] = True
 
 
-def pruned(system: Needs, choice: AllowedSets, taken: BoolArray) -> BoolArray:
+def pruned(system: Needs, taken: BoolArray) -> BoolArray:
     """Take out columns without which no row lacks more, those that are missed least first.
 
     Parameters
     ----------
-    system : the rows.
-    choice : which sets are allowed.
+    system : the rows, and which columns are fixed or exclude each other.
     taken : (C,) the set at the start.
     """
     taken, missing = taken.copy(), system.missing(taken)
-    movable = np.flatnonzero(taken & ~choice.fixed)
+    movable = np.flatnonzero(taken & ~system.problem.fixed)
     for column in movable[np.argsort(_missed(system, missing, movable, np.ones_like(missing)), kind="stable")]:
         left = missing + system.gains[column]
         if np.all((left <= 0.0) | (system.gains[column] == 0.0)):
@@ -126,34 +108,32 @@ def pruned(system: Needs, choice: AllowedSets, taken: BoolArray) -> BoolArray:
     return taken
 
 
-def with_one(system: Needs, choice: AllowedSets, taken: BoolArray, lacked: BoolArray) -> BoolArray:
+def with_one(system: Needs, taken: BoolArray, lacked: BoolArray) -> BoolArray:
     """Add the column that brings most of what another set lacks.
 
     Parameters
     ----------
-    system : the rows.
-    choice : which sets are allowed.
+    system : the rows, and which columns are fixed or exclude each other.
     taken : (C,) the set that gets one more, where one may be added.
     lacked : (C,) the other set.
     """
     lacking = system.lacking(lacked)
-    worth = np.minimum(system.gains, lacking).sum(axis=1) * choice.addable(taken)
+    worth = np.minimum(system.gains, lacking).sum(axis=1) * system.problem.allowed(taken)
     taken = taken.copy()
     if worth.max(initial=0.0) > 0.0:
         taken[worth.argmax()] = True
     return taken
 
 
-def without_one(system: Needs, choice: AllowedSets, taken: BoolArray) -> BoolArray:
+def without_one(system: Needs, taken: BoolArray) -> BoolArray:
     """Take out the column that is missed least.
 
     Parameters
     ----------
-    system : the rows.
-    choice : which sets are allowed.
+    system : the rows, and which columns are fixed or exclude each other.
     taken : (C,) the set at the start.
     """
-    movable = np.flatnonzero(taken & ~choice.fixed)
+    movable = np.flatnonzero(taken & ~system.problem.fixed)
     if len(movable) == 0:
         return taken
     missing = system.missing(taken)
@@ -164,7 +144,6 @@ def without_one(system: Needs, choice: AllowedSets, taken: BoolArray) -> BoolArr
 
 def exchanged(
     system: Needs,
-    choice: AllowedSets,
     taken: BoolArray,
     steps: int,
     step: Callable[[], None] | None = None,
@@ -173,8 +152,7 @@ def exchanged(
 
     Parameters
     ----------
-    system : the rows.
-    choice : which sets are allowed.
+    system : the rows, and which columns are fixed or exclude each other.
     taken : (C,) the set at the start; the result has as many columns.
     steps : exchanges at most.
     step : called with each; may raise to cancel.
@@ -182,7 +160,7 @@ def exchanged(
     taken, weights = taken.copy(), np.ones(len(system.needs), np.float32)
     barred = np.zeros(len(taken), np.int64)
     """Step until which a column stays where it is: in or out."""
-    tenure = 2 + int(np.count_nonzero(taken & ~choice.fixed)) // 4
+    tenure = 2 + int(np.count_nonzero(taken & ~system.problem.fixed)) // 4
     lacking = system.lacking(taken)
     best, least = taken.copy(), float(lacking.sum())
     for number in range(1, steps + 1):
@@ -190,7 +168,7 @@ def exchanged(
             return taken
         if step is not None:
             step()
-        swap = _best_swap(system, choice, taken, weights, barred >= number)
+        swap = _best_swap(system, taken, weights, barred >= number)
         if swap is None:
             break
         out, into = swap
@@ -203,11 +181,9 @@ def exchanged(
     return best
 
 
-def _best_swap(
-    system: Needs, choice: AllowedSets, taken: BoolArray, weights: Gains, is_barred: BoolArray
-) -> tuple[int, int] | None:
+def _best_swap(system: Needs, taken: BoolArray, weights: Gains, is_barred: BoolArray) -> tuple[int, int] | None:
     """The column out and the column in after which the weighted lack is least; None when none may be exchanged."""
-    movable = np.flatnonzero(taken & ~choice.fixed & ~is_barred)
+    movable = np.flatnonzero(taken & ~system.problem.fixed & ~is_barred)
     if len(movable) == 0:
         return None
     missing = system.missing(taken)
@@ -223,7 +199,7 @@ def _best_swap(
         left[out] = False
         without = missing + system.gains[out]
         rows = np.flatnonzero(without > 0.0)
-        columns = ins[choice.addable(left)[ins]]
+        columns = ins[system.problem.allowed(left)[ins]]
         if len(columns) == 0:
             continue
         still = np.maximum(without[rows] - system.gains[np.ix_(columns, rows)], 0.0)

@@ -18,7 +18,7 @@ from commission.planning.route_prediction import (
     restricted,
     station_scans,
 )
-from commission.planning.true_error import predict_errors
+from commission.planning.true_error import larger_variances, predict_errors
 from commission.site.layout_brief import Demands
 from commission.site.parts import Equipped
 
@@ -130,9 +130,7 @@ class LayoutLimits:
         def predicted(key: tuple[int, int]) -> tuple[tuple[int, int], RoutePrediction, FloatArray]:
             route = restricted(routes[key[0]], _without(taken, key[1]))
             prediction = predict_route(route)
-            error = predict_errors(route, prediction).squares
-            said, true = (np.diagonal(each, axis1=1, axis2=2) for each in (prediction.covariances, error))
-            return key, prediction, np.maximum(said, true)
+            return key, prediction, larger_variances(prediction, predict_errors(route, prediction))
 
         # Some at a time: the kernels run side by side, and whoever has seen enough asks for no more of them.
         with ThreadPoolExecutor(CORES) as pool:

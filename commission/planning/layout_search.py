@@ -20,7 +20,7 @@ from commission.errors import JobCancelled
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.planning.ambiguity import AmbiguityOptions
 from commission.planning.cover import CoverProblem, cover, lower_bound, merged
-from commission.planning.fulfilling import AllowedSets, Needs, exchanged, grown, pruned, with_one, without_one
+from commission.planning.fulfilling import Needs, exchanged, grown, pruned, with_one, without_one
 from commission.planning.layout_limits import Excess, LayoutLimits
 from commission.planning.route_prediction import PlannedRoute, PredictionOptions
 from commission.planning.telling_apart import ChosenPlace, Distinction, chosen_places, nearest_on_routes
@@ -101,14 +101,13 @@ class LayoutSearch:
         demands = options.demands
         self._covers = [route.sees() for route in planned]
         self._base = demands.visible + int(demands.survive_failure)
-        self._choice = AllowedSets(
-            np.arange(len(visible.reflectors)) < kept, _conflicts(visible.reflectors.centers, demands.spacing)
-        )
         self._places = chosen_places(demands, planned, site.stations, site.scanners, options.ambiguity)
         self._distinction = Distinction(visible, self._places, demands.survive_failure, options.ambiguity)
         self._apart: dict[bytes, BoolArray] = {}
         self._limits = LayoutLimits(planned, site, demands, lambda: self._report(None, "predicting"))
-        self._cover = self._cover_problem()
+        self._cover = self._cover_problem(
+            np.arange(len(visible.reflectors)) < kept, _conflicts(visible.reflectors.centers, demands.spacing)
+        )
         self._system = Needs(self._cover)
         self._rivals_left: IntArray = np.zeros(len(self._places), np.int64)
         self.was_stopped = False
@@ -150,19 +149,19 @@ class LayoutSearch:
         route, metres = nearest_on_routes(place.poses[0, :2], self._planned)
         return Unmet(route, metres, "ambiguous", place.name)
 
-    def _cover_problem(self) -> CoverProblem:
+    def _cover_problem(self, fixed: BoolArray, conflicts: tuple[IntArray, ...]) -> CoverProblem:
         """What must be visible whatever the predictions come to: covering of the routes' scans, and of the places."""
         places = self._distinction
         covers = [*self._covers, places.sees]
         counts = [np.full(len(each), self._base) for each in self._covers] + [np.full(len(places.sees), places.need)]
         rows, greatest = merged(np.concatenate(covers), np.concatenate(counts))
-        return CoverProblem(rows.astype(np.float32), greatest, self._choice.fixed, self._choice.conflicts)
+        return CoverProblem(rows.astype(np.float32), greatest, fixed, conflicts)
 
     def _first(self, rng: np.random.Generator) -> BoolArray:
         """Return a layout that holds, as far as any does."""
         self._report(0.0, "choosing reflectors")
         taken = cover(self._cover, rng, FIRST_EXCHANGES, lambda done: self._report(0.1 * done, "choosing reflectors"))
-        self._limits.allow_what_nothing_keeps(self._choice.fixed)
+        self._limits.allow_what_nothing_keeps(self._cover.fixed)
         found, taken = self._repaired(taken)
         if found:
             return taken
@@ -178,12 +177,12 @@ class LayoutSearch:
             self._report(0.1 + (UNTIL_ONE_HOLDS - 0.1) * number / (number + 20.0), "choosing reflectors")
             if self._holds(taken, ROWS_AT_FIRST):
                 return True, taken
-            next_one = exchanged(self._system, self._choice, taken, REPAIRING, self._step)
-            next_one = pruned(self._system, self._choice, grown(self._system, self._choice, next_one))
+            next_one = exchanged(self._system, taken, REPAIRING, self._step)
+            next_one = pruned(self._system, grown(self._system, next_one))
             # As few as the rows allow are often too few, and to find that out takes many rows.
             patience = patience - 1 if next_one.sum() <= taken.sum() else PATIENCE
             if patience == 0:
-                next_one, patience = with_one(self._system, self._choice, next_one, taken), PATIENCE
+                next_one, patience = with_one(self._system, next_one, taken), PATIENCE
             if np.array_equal(next_one, taken):
                 break
             taken = next_one
@@ -210,7 +209,7 @@ class LayoutSearch:
     def _ever_fewer(self, best: BoolArray, rng: np.random.Generator) -> Iterator[BoolArray]:
         """Yield layouts that hold, each smaller than the one before; the first is the given one."""
         yield best
-        fewest, left = self.bound() + int(self._choice.fixed.sum()), self._options.checks
+        fewest, left = self.bound() + int(self._cover.fixed.sum()), self._options.checks
         # The rows know more by now than when the first layouts were chosen: many reflectors at once may be saved.
         while left > 0 and best.sum() > fewest:
             found, taken = self._repaired(self._reduced(best))
@@ -229,18 +228,18 @@ class LayoutSearch:
     def _reduced(self, taken: BoolArray) -> BoolArray:
         """Take out one reflector after the other as long as the others can be exchanged to fulfil all rows."""
         while True:
-            tried = without_one(self._system, self._choice, taken)
-            tried = exchanged(self._system, self._choice, tried, REPAIRING, self._step)
-            if self._system.lacking(tried).any() or not np.any(tried & ~self._choice.fixed):
+            tried = without_one(self._system, taken)
+            tried = exchanged(self._system, tried, REPAIRING, self._step)
+            if self._system.lacking(tried).any() or not np.any(tried & ~self._cover.fixed):
                 return taken
             taken = tried
 
     def _one_fewer(self, best: BoolArray, left: int, rng: np.random.Generator) -> tuple[BoolArray | None, int]:
         """Look for a layout of one reflector less that holds, judging `left` of them at most; return those left."""
-        taken, restarts = without_one(self._system, self._choice, best), 0
+        taken, restarts = without_one(self._system, best), 0
         while left > 0:
             self._report(1.0 - (1.0 - UNTIL_ONE_HOLDS) * left / self._options.checks, "doing with fewer")
-            tried = exchanged(self._system, self._choice, taken, SHRINKING, self._step)
+            tried = exchanged(self._system, taken, SHRINKING, self._step)
             if self._system.lacking(tried).any():
                 restarts += 1
                 if restarts > RESTARTS:
@@ -257,10 +256,10 @@ class LayoutSearch:
     def _elsewhere(self, taken: BoolArray, rng: np.random.Generator) -> BoolArray:
         """Replace every third reflector by any other one."""
         taken = taken.copy()
-        movable = np.flatnonzero(taken & ~self._choice.fixed)
+        movable = np.flatnonzero(taken & ~self._cover.fixed)
         for out in rng.choice(movable, size=min(len(movable), max(1, len(movable) // 3)), replace=False).tolist():
             taken[out] = False
-            taken[rng.choice(np.flatnonzero(self._choice.addable(taken)))] = True
+            taken[rng.choice(np.flatnonzero(self._cover.allowed(taken)))] = True
         return taken
 
     def _cleared(self, taken: BoolArray) -> BoolArray:
@@ -287,11 +286,11 @@ class LayoutSearch:
         wanted = np.logical_or.reduce(self._distinction.rows(taken) or [np.zeros_like(taken)])
         for column in np.flatnonzero(wanted & ~taken):
             tried = taken.copy()
-            tried[self._choice.conflicts[column]] = False
+            tried[self._cover.conflicts[column]] = False
             tried[column] = True
-            if not np.any(self._choice.fixed & ~tried):
+            if not np.any(self._cover.fixed & ~tried):
                 yield tried
-        movable = np.flatnonzero(taken & ~self._choice.fixed)
+        movable = np.flatnonzero(taken & ~self._cover.fixed)
         pairs = itertools.islice(itertools.combinations(movable, 2), MOST_PAIRS)
         for out in itertools.chain(((each,) for each in movable), pairs):
             tried = taken.copy()

@@ -106,10 +106,15 @@ def predict_errors(planned: PlannedRoute, prediction: RoutePrediction) -> Predic
     return PredictedErrors(read_only(squares), read_only(inliers), read_only(parts))
 
 
+def larger_variances(prediction: RoutePrediction, errors: PredictedErrors) -> FloatArray:
+    """(K, 3) variances of x [m^2], y [m^2] and heading [rad^2]: the larger of the filter's own and of its error."""
+    return np.maximum(*(np.diagonal(each, axis1=1, axis2=2) for each in (prediction.covariances, errors.squares)))
+
+
 def two_sigma_of(planned: PlannedRoute) -> FloatArray:
     """(K, 3) 2-sigma of x [m], y [m] and heading [rad]: the larger of the filter's own and of its error."""
     prediction = predict_route(planned)
-    return np.maximum(prediction.two_sigma, predict_errors(planned, prediction).two_sigma)
+    return 2.0 * np.sqrt(larger_variances(prediction, predict_errors(planned, prediction)))
 
 
 def warm_up() -> None:

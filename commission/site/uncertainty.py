@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from commission.site.checks import check_fields
-from commission.site.quantity import DEGREES, MILLIMETRES, Bounds, Quantity, Shown
+from commission.site.quantity import DEGREES, MILLIMETRES, MILLISECONDS, Bounds, Quantity
 
 _SHORT = Bounds.between(0.0, 1.0)
 
@@ -57,7 +57,7 @@ class Uncertainty:
         Quantity(
             label="Clock 1σ",
             unit="s",
-            shown=Shown("ms", 1000.0),
+            shown=MILLISECONDS,
             bounds=_SHORT,
             step=0.5,
             slider=(0.0, 50.0),

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from commission.planning.cover import CoverProblem
-from commission.planning.fulfilling import AllowedSets, Needs, exchanged, grown, pruned, without_one
+from commission.planning.fulfilling import Needs, exchanged, grown, pruned, without_one
 
 COLUMNS = 9
 
 
-def system_of(seed: int) -> tuple[Needs, AllowedSets]:
+def system_of(seed: int) -> tuple[Needs, CoverProblem]:
     """Rows of a cover, and rows with any gains."""
     rng = np.random.default_rng(seed)
     covers = (rng.random((6, COLUMNS)) < 0.5).astype(np.float32)
@@ -26,10 +26,10 @@ def system_of(seed: int) -> tuple[Needs, AllowedSets]:
     system = Needs(problem)
     gains = rng.uniform(0.0, 1.0, (8, COLUMNS))
     system.add(gains, rng.uniform(0.5, 1.5, 8))
-    return system, AllowedSets(fixed, problem.conflicts)
+    return system, problem
 
 
-def allowed(choice: AllowedSets, size: int) -> list[np.ndarray]:
+def allowed(choice: CoverProblem, size: int) -> list[np.ndarray]:
     sets = [np.isin(np.arange(COLUMNS), chosen) for chosen in itertools.combinations(range(COLUMNS), size)]
     return [
         each
@@ -39,7 +39,7 @@ def allowed(choice: AllowedSets, size: int) -> list[np.ndarray]:
     ]
 
 
-def fewest(system: Needs, choice: AllowedSets) -> int:
+def fewest(system: Needs, choice: CoverProblem) -> int:
     return next(
         size
         for size in range(COLUMNS + 1)
@@ -54,7 +54,7 @@ def test_a_set_of_the_fewest_columns_is_found_by_exchanges_from_any_other_of_tha
         system, choice = system_of(seed)
         size = fewest(system, choice)
         for start in allowed(choice, size)[:: max(1, len(allowed(choice, size)) // 5)]:
-            result = exchanged(system, choice, start, 60)
+            result = exchanged(system, start, 60)
             assert any(np.array_equal(result, each) for each in allowed(choice, size))
             found.append(bool(np.all(system.gains[result].sum(axis=0) >= system.needs - 1e-5)))
     assert np.mean(found) >= 0.9
@@ -63,9 +63,9 @@ def test_a_set_of_the_fewest_columns_is_found_by_exchanges_from_any_other_of_tha
 def test_what_is_lacking_is_grown_and_what_is_not_needed_is_pruned() -> None:
     for seed in range(0, 30, 2):
         system, choice = system_of(seed)
-        full = grown(system, choice, choice.fixed)
+        full = grown(system, choice.fixed)
         assert not system.lacking(full).any()
-        few = pruned(system, choice, full)
+        few = pruned(system, full)
         assert np.all(full[few])
         assert np.all(few[choice.fixed])
         assert not system.lacking(few).any()
@@ -83,15 +83,15 @@ def test_the_column_that_is_missed_least_goes_first() -> None:
         np.zeros(3, np.bool_),
         (np.empty(0, np.int64),) * 3,
     )
-    system, choice = Needs(problem), AllowedSets(problem.fixed, problem.conflicts)
+    system = Needs(problem)
     system.add(np.array([[0.0, 0.4, 1.0]]), np.array([1.2]))
-    assert np.flatnonzero(without_one(system, choice, np.ones(3, np.bool_))).tolist() == [1, 2]
+    assert np.flatnonzero(without_one(system, np.ones(3, np.bool_))).tolist() == [1, 2]
 
 
 def test_needs_that_no_set_meets_are_asked_for_as_far_as_all_columns_reach() -> None:
     system, choice = system_of(2)
     system.add(np.full((1, COLUMNS), 0.1), np.array([5.0]))
     assert system.needs[-1] == pytest.approx(0.1 * COLUMNS, rel=2e-3)
-    everything = grown(system, choice, choice.fixed)
+    everything = grown(system, choice.fixed)
     assert everything.all()
     assert not system.lacking(everything).any()

@@ -72,7 +72,7 @@ LOCALIZATION = (
     ),
     Mutant(
         name="longest axis of the scanner's place from the whole difference of its variances",
-        file=FOLDER + "association.py",
+        file=FOLDER + "pose_gaussian.py",
         find="half_difference = 0.5 *",
         replace="half_difference = 1.0 *",
         tests=(TESTS + VIEWPOINT,),
@@ -143,8 +143,8 @@ LOCALIZATION = (
     Mutant(
         name="every correction starts from the prediction, as Algorithm 1 is printed",
         file=FOLDER + "cycle.py",
-        find="            belief = correct(\n                belief,",
-        replace="            belief = correct(\n                prior,",
+        find="            belief = correct_given(\n                belief,",
+        replace="            belief = correct_given(\n                prior,",
         tests=(PLAIN,),
     ),
     Mutant(
