@@ -13,12 +13,12 @@ from commission.errors import UsageError
 from commission.site.quantity import MILLIMETRES, PLAIN_DEGREES
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     from commission.planning.dependence import Dependence
+    from commission.planning.error_budget import PredictedErrors
     from commission.planning.route_prediction import PredictionOptions, RoutePrediction
     from commission.planning.station_accuracy import StationAccuracy
-    from commission.planning.true_error import PredictedErrors
     from commission.site.project import Project
     from commission.site.reflectors import ReflectorMap
     from commission.studies.drives import PlannedDrives
@@ -29,7 +29,7 @@ MOST_NEEDED = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Predict:
-    """Predict what the localizer will say of itself along a route, and its true error.
+    """Predict what the localizer will say of itself along a route, and its error, with what each source contributes.
 
     Writes prediction.csv and summary.json.
     """
@@ -113,11 +113,14 @@ def _report(name: str, prediction: RoutePrediction, errors: PredictedErrors) -> 
     return [
         f"Route        {name!r}, {prediction.drive.length:.1f} m in "
         f"{prediction.drive.stamps_ns[-1] * 1e-9:.1f} s, {len(prediction.drive)} scans",
-        f"2-sigma      x {MILLIMETRES.text(x, '.1f')}, y {MILLIMETRES.text(y, '.1f')} "
-        f"(limit {MILLIMETRES.number(limits.position_limit)}), heading {PLAIN_DEGREES.text(heading, '.2f')} "
+        f"2-sigma      position {MILLIMETRES.text(prediction.position_two_sigma.max(), '.1f')} "
+        f"(limit {MILLIMETRES.number(limits.position_limit)}), x {MILLIMETRES.text(x, '.1f')}, "
+        f"y {MILLIMETRES.text(y, '.1f')}, heading {PLAIN_DEGREES.text(heading, '.2f')} "
         f"(limit {PLAIN_DEGREES.number(limits.heading_limit, '.2f')}) at most",
-        f"True error   2-sigma x {MILLIMETRES.text(error_x, '.1f')}, y {MILLIMETRES.text(error_y, '.1f')}, "
+        f"Error        2-sigma position {MILLIMETRES.text(errors.position_two_sigma.max(), '.1f')}, "
+        f"x {MILLIMETRES.text(error_x, '.1f')}, y {MILLIMETRES.text(error_y, '.1f')}, "
         f"heading {PLAIN_DEGREES.text(error_heading, '.2f')} at most",
+        f"Budget       2-sigma of the position by each alone: {budget_told(errors.part_two_sigma.max(axis=0))}",
         f"Reflectors   {prediction.seen.min()} seen at least, {prediction.seen.mean():.1f} on average; "
         f"at most {prediction.on_odometry.max():.1f} m on odometry alone",
         f"Supervisor   stops at: {stops or 'none'}{f'; drives on at: {starts}' if starts else ''}; "
@@ -130,12 +133,21 @@ def _at_stations(stations: Sequence[StationAccuracy]) -> list[str]:
     if not stations:
         return []
     missed = [
-        f"{each.station} {MILLIMETRES.text(each.expected, '.1f')} (allowed {MILLIMETRES.number(each.required)})"
+        f"{each.station} {MILLIMETRES.text(each.expected, '.1f')} (allowed {MILLIMETRES.number(each.required)}; "
+        f"{budget_told(each.parts)})"
         for each in stations
         if not each.is_met
     ]
     verdict = f"too uncertain at {', '.join(missed)}" if missed else "each is reached as accurately as it requires"
     return [f"Stations     {len(stations)} on the route; {verdict}"]
+
+
+def budget_told(parts: Iterable[float]) -> str:
+    """Name what each source of error contributes; millimetres as is the habit."""
+    from commission.planning.error_budget import CONTRIBUTIONS
+
+    named = zip(CONTRIBUTIONS, parts, strict=True)
+    return ", ".join(f"{name} {MILLIMETRES.number(part, '.1f')}" for name, part in named) + " mm"
 
 
 def _most_needed(ranked: Sequence[Dependence], reflectors: ReflectorMap) -> list[str]:

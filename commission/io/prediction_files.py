@@ -11,9 +11,9 @@ import numpy as np
 from commission.io.atomic import write_text
 from commission.io.table_writer import angle, figure, place, write_table
 from commission.planning.dependence import Dependence, RouteDependence
+from commission.planning.error_budget import CONTRIBUTIONS, PredictedErrors
 from commission.planning.route_prediction import RoutePrediction
 from commission.planning.station_accuracy import StationAccuracy
-from commission.planning.true_error import CONTRIBUTIONS, PredictedErrors
 from commission.site.reflectors import ReflectorMap
 
 PREDICTION = "prediction.csv"
@@ -27,6 +27,8 @@ COLUMNS = (
     *("visible", "on_odometry", "over_limit", "mode"),
     *("error_two_sigma_x", "error_two_sigma_y", "error_two_sigma_theta"),
     *(f"{part}_two_sigma_position" for part in CONTRIBUTIONS),
+    *("two_sigma_position", "error_two_sigma_position"),
+    *(f"{part}_share" for part in CONTRIBUTIONS),
 )
 # `load` is the share of the limit: files keep the column that others read, whatever the page calls it.
 FAILURE_COLUMNS = ("blocked", "reflector_id", "route", "failing_metres", "load", "metres")
@@ -55,6 +57,7 @@ def write_prediction(
         a file cannot be written.
     """
     metres = prediction.per_metre()
+    error, shares = errors.position_per_metre(metres)
     x, y, theta = prediction.drive.poses[metres.first].T.tolist()
     columns = [
         metres.metre.tolist(),
@@ -66,6 +69,8 @@ def write_prediction(
         np.where(metres.fails, "fail", "operational").tolist(),
         *(map(figure, column) for column in errors.per_metre(metres).T.tolist()),
         *(map(figure, column) for column in errors.parts_per_metre(metres).T.tolist()),
+        *(map(figure, column.tolist()) for column in (metres.position, error)),
+        *(map(figure, column) for column in shares.T.tolist()),
     ]
     write_table(folder / PREDICTION, COLUMNS, zip(*columns, strict=True))
     entries = {**summary(route, prediction, errors), "stations": [_station_entry(station) for station in stations]}
@@ -96,6 +101,12 @@ def summary(
         "error_two_sigma_x_max_m": error_x,
         "error_two_sigma_y_max_m": error_y,
         "error_two_sigma_theta_max_rad": error_theta,
+        "two_sigma_position_max_m": float(prediction.position_two_sigma.max()),
+        "error_two_sigma_position_max_m": float(errors.position_two_sigma.max()),
+        **{
+            f"{part}_two_sigma_position_max_m": float(largest)
+            for part, largest in zip(CONTRIBUTIONS, errors.part_two_sigma.max(axis=0), strict=True)
+        },
         "position_limit_m": prediction.limits.position_limit,
         "heading_limit_rad": prediction.limits.heading_limit,
         "metres_over_limit": len(prediction.failing_metres()),
@@ -113,6 +124,7 @@ def _station_entry(station: StationAccuracy) -> dict[str, str | float | bool]:
         "metre": station.metre,
         "two_sigma_m": station.two_sigma,
         "error_two_sigma_m": station.error,
+        **{f"{part}_two_sigma_m": share for part, share in zip(CONTRIBUTIONS, station.parts, strict=True)},
         "required_m": station.required,
         "met": station.is_met,
     }

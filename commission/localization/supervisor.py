@@ -9,7 +9,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from commission.compiled import compiled_inline
+from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Mode
 from commission.localization.pose_gaussian import PoseGaussian, position_variance
 from commission.site.parameters import SupervisorParameters
@@ -69,3 +72,44 @@ def supervise(mode: int, belief: PoseGaussian, limits: SupervisorLimits) -> int:
         return OPERATIONAL if position <= limits.position and heading <= limits.heading else FAIL
     limit_p, limit_o = limits.position / limits.recovery_ratio, limits.heading / limits.recovery_ratio
     return OPERATIONAL if position < limit_p and heading < limit_o else FAIL
+
+
+def position_directions(covariances: FloatArray, parameters: SupervisorParameters) -> FloatArray:
+    """Directions whose 2-sigma the supervisor holds against its limit of the position.
+
+    Parameters
+    ----------
+    covariances : (K, 3, 3) of x [m], y [m] and heading [rad].
+    parameters : say whether the largest in any direction counts, or the larger one of x and y.
+
+    Returns
+    -------
+    directions : (K, 2) unit vectors, map frame; along x where all directions are alike.
+    """
+    xx, xy, yy = covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]
+    if parameters.position_sigma == "axes":
+        return np.stack((xx >= yy, xx < yy), axis=1).astype(np.float64)
+    angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
+    return np.stack((np.cos(angle), np.sin(angle)), axis=1)
+
+
+def position_variances(covariances: FloatArray, directions: FloatArray) -> FloatArray:
+    """Variance of the position along a direction each: (K,) array [m^2].
+
+    Parameters
+    ----------
+    covariances : (K, 3, 3) of x [m], y [m] and heading [rad]; or with further axes before the last two.
+    directions : (K, 2) unit vectors, map frame.
+    """
+    return np.maximum(np.einsum("ki,k...ij,kj->k...", directions, covariances[..., :2, :2], directions), 0.0)
+
+
+def position_two_sigma(covariances: FloatArray, parameters: SupervisorParameters) -> FloatArray:
+    """2-sigma of the position that the supervisor holds against its limit: (K,) array [m].
+
+    Parameters
+    ----------
+    covariances : (K, 3, 3) of x [m], y [m] and heading [rad].
+    parameters : say which one counts.
+    """
+    return 2.0 * np.sqrt(position_variances(covariances, position_directions(covariances, parameters)))

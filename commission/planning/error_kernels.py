@@ -1,4 +1,4 @@
-"""Compiled recursion of the true error along a planned drive; its kinds are told in `true_error`."""
+"""Compiled recursion of the error along a planned drive; its kinds are told in `error_budget`."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
     model : what the filter believes of its detections, and what they are truly worth.
     squares : (K, 3, 3) output.
     inliers : (K,) output: expected number of inliers of each scan.
-    parts : (K, 5, 3) output: of each diagonal, what each of `PARTS` contributes.
+    parts : (K, 5, 3, 3) output: what each of `PARTS` contributes; they add up to `squares`.
 
     Notes
     -----
@@ -382,7 +382,7 @@ def _gather(  # noqa: PLR0917 - all kinds of error
     square: FloatArray,
     part: FloatArray,
 ) -> None:
-    """Add up what is not the scanner's into a (3, 3) second moment, and of its diagonal each part."""
+    """Add up what is not the scanner's into a (3, 3) second moment, and into each of its (5, 3, 3) parts."""
     square[0, 0], square[0, 1], square[0, 2] = error.xx, error.xy, error.xt
     square[1, 0], square[1, 1], square[1, 2] = error.xy, error.yy, error.yt
     square[2, 0], square[2, 1], square[2, 2] = error.xt, error.yt, error.tt
@@ -395,9 +395,8 @@ def _gather(  # noqa: PLR0917 - all kinds of error
                 square[i, j] += b[i, 0] * b[j, 0] + b[i, 1] * b[j, 1]
                 surveyed = places[m % len(places), 3] * (b[i, 2] * b[j, 2] + b[i, 3] * b[j, 3])
                 square[i, j] += surveyed
-                if i == j:
-                    part[MAP, i] += surveyed
-        part[NOISE, i] = square[i, i] - part[MAP, i]
+                part[MAP, i, j] += surveyed
+            part[NOISE, i, j] = square[i, j] - part[MAP, i, j]
 
 
 @compiled
@@ -411,5 +410,6 @@ def _gather_scanners(askew: FloatArray, variances: ConsiderModel, square: FloatA
         for column in range(PER_SCANNER):
             for i in range(3):
                 for j in range(3):
-                    square[i, j] += each[column] * b[i, column] * b[j, column]
-                part[kinds[column], i] += each[column] * b[i, column] * b[i, column]
+                    more = each[column] * b[i, column] * b[j, column]
+                    square[i, j] += more
+                    part[kinds[column], i, j] += more

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import BoolArray, FloatArray
+from commission.planning.error_budget import larger_variances, predict_errors
 from commission.planning.information import tangent_at
 from commission.planning.route_prediction import (
     PlannedRoute,
@@ -18,7 +19,6 @@ from commission.planning.route_prediction import (
     restricted,
     station_scans,
 )
-from commission.planning.true_error import larger_variances, predict_errors
 from commission.site.layout_brief import Demands
 from commission.site.parts import Equipped
 

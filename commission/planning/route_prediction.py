@@ -24,7 +24,7 @@ from commission.localization.observation import observation_model, observation_r
 from commission.localization.odometry import odometry_noise
 from commission.localization.pose_gaussian import from_belief
 from commission.localization.setup import consider_model
-from commission.localization.supervisor import supervisor_limits
+from commission.localization.supervisor import position_two_sigma, supervisor_limits
 from commission.planning.detection_noise import DetectionQuality, detection_quality
 from commission.planning.nominal_drive import DrivePlan, NominalDrive, nominal_drive
 from commission.planning.prediction_kernels import PredictionColumns, PredictionModel, predict_covariances
@@ -167,6 +167,8 @@ class PerMetre(NamedTuple):
     """(B,) longest way driven on odometry alone [m]."""
     fails: BoolArray
     """(B,) whether the supervisor is in fail mode anywhere in it."""
+    position: FloatArray
+    """(B,) largest 2-sigma of the position, as the supervisor takes it [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -182,8 +184,8 @@ class RoutePrediction:
     means: FloatArray
     """(K, 3) expected `T_map_base` [m, m, rad]: the drive's own pose unless a reflector has moved."""
     covariances: FloatArray
-    """(K, 3, 3) of x [m], y [m] and heading [rad]: what the filter will say. Its true error is in
-    `true_error`."""
+    """(K, 3, 3) of x [m], y [m] and heading [rad]: what the filter will say. How far off it will be is in
+    `error_budget`."""
     modes: NDArray[np.int8]
     """(K,) a `Mode` each."""
     seen: IntArray
@@ -197,6 +199,11 @@ class RoutePrediction:
         return 2.0 * np.sqrt(np.diagonal(self.covariances, axis1=1, axis2=2))
 
     @property
+    def position_two_sigma(self) -> FloatArray:
+        """(K,) 2-sigma of the position that the supervisor holds against its limit [m]."""
+        return position_two_sigma(self.covariances, self.limits)
+
+    @property
     def bias(self) -> FloatArray:
         """(K, 3) expected error of x [m], y [m] and heading [rad]."""
         deviations = self.means - self.drive.poses
@@ -205,9 +212,16 @@ class RoutePrediction:
 
     @property
     def limit_share(self) -> FloatArray:
-        """(K,) bias and 2-sigma together as a share of the supervisor's limit, of the axis where it is largest [1]."""
-        limits = (self.limits.position_limit, self.limits.position_limit, self.limits.heading_limit)
-        return ((np.abs(self.bias) + self.two_sigma) / limits).max(axis=1)
+        """(K,) bias and 2-sigma together as a share of the supervisor's limit, where that is largest [1].
+
+        Of the position by axes: along the worse axis. By the largest in any direction: as if the bias lay along it.
+        """
+        bias, two_sigma = np.abs(self.bias), self.two_sigma
+        by_axes = self.limits.position_sigma == "axes"
+        together = (bias + two_sigma)[:, :2].max(axis=1)
+        position = together if by_axes else np.hypot(bias[:, 0], bias[:, 1]) + self.position_two_sigma
+        heading = bias[:, 2] + two_sigma[:, 2]
+        return np.maximum(position / self.limits.position_limit, heading / self.limits.heading_limit)
 
     def over_limit(self) -> BoolArray:
         """(K,) whether the share of the limit is above 1, or the supervisor is in fail mode."""
@@ -237,6 +251,7 @@ class RoutePrediction:
             np.minimum.reduceat(self.seen, first),
             largest(self.on_odometry, first),
             largest(self.modes == Mode.FAIL, first),
+            largest(self.position_two_sigma, first),
         )
 
     def _changes_to(self, mode: Mode) -> FloatArray:

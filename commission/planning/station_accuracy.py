@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from commission.planning.error_budget import PredictedErrors
 from commission.planning.route_prediction import RoutePrediction, station_scans
-from commission.planning.true_error import PredictedErrors
 from commission.site.stations import Station
 
 
@@ -21,7 +23,9 @@ class StationAccuracy:
     two_sigma: float
     """Largest 2-sigma of x or y that the filter says while there [m]."""
     error: float
-    """Largest 2-sigma of the true error of x or y while there [m]."""
+    """Largest 2-sigma of the error of x or y to be expected while there [m]."""
+    parts: tuple[float, ...]
+    """2-sigma that each of `CONTRIBUTIONS` has in it [m]: their squares add up to that of `error`."""
     required: float
     """Largest 2-sigma that the station allows [m]."""
 
@@ -46,14 +50,18 @@ def station_accuracies(
     prediction, errors : along a route.
     stations : of the project; those beside the route are left out.
     """
-    said, true = (values[:, :2].max(axis=1) for values in (prediction.two_sigma, errors.two_sigma))
-    return tuple(
-        StationAccuracy(
-            station=station.name,
-            metre=float(prediction.drive.metres[scans[0]]),
-            two_sigma=float(said[scans].max()),
-            error=float(true[scans].max()),
-            required=station.required_accuracy,
+    found: list[StationAccuracy] = []
+    for station, scans in station_scans(prediction.drive, stations):
+        error = errors.two_sigma[scans, :2]
+        worst, axis = np.unravel_index(int(error.argmax()), error.shape)
+        found.append(
+            StationAccuracy(
+                station=station.name,
+                metre=float(prediction.drive.metres[scans[0]]),
+                two_sigma=float(prediction.two_sigma[scans, :2].max()),
+                error=float(error[worst, axis]),
+                parts=tuple((2.0 * np.sqrt(errors.parts[scans[worst], :, axis, axis])).tolist()),
+                required=station.required_accuracy,
+            )
         )
-        for station, scans in station_scans(prediction.drive, stations)
-    )
+    return tuple(found)

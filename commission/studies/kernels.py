@@ -6,14 +6,14 @@ A study warms up what it needs as its first part, so that progress does not stan
 from __future__ import annotations
 
 from commission.geometry import spline_kernels
-from commission.planning import information, route_check, route_prediction, true_error, vehicle_fixes, visibility
+from commission.planning import error_budget, information, route_check, route_prediction, vehicle_fixes, visibility
 
 SIGHT = ("lines of sight", visibility.warm_up)
 DILUTION = ("dilution", vehicle_fixes.warm_up)
 SEVERAL_SCANNERS = ("dilution of several scanners", vehicle_fixes.warm_up_several)
 CURVES = ("curves", spline_kernels.warm_up)
 PREDICTION = ("prediction", route_prediction.warm_up)
-ERRORS = ("true error", true_error.warm_up)
+ERRORS = ("error budget", error_budget.warm_up)
 INFORMATION = ("information about the pose", information.warm_up)
 ROOM = ("room along routes", route_check.warm_up)
 

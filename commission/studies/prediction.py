@@ -9,9 +9,9 @@ from dataclasses import dataclass
 
 from commission.compiled import warm_up
 from commission.planning.association_risk import NeighborRisk, neighbor_risks
+from commission.planning.error_budget import PredictedErrors, predict_errors
 from commission.planning.route_prediction import PlannedRoute, PredictionOptions, RoutePrediction, predict_route
 from commission.planning.station_accuracy import StationAccuracy, station_accuracies
-from commission.planning.true_error import PredictedErrors, predict_errors
 from commission.planning.visibility import VisibilityOptions
 from commission.progress import Progress, part, silent
 from commission.site.project import Project
@@ -102,7 +102,7 @@ def prediction(inputs: PredictionInput, progress: Progress = silent) -> Predicti
     (planned,) = drives.planned
     progress(PLANNING, "prediction")
     said = predict_route(planned)
-    progress(PREDICTING, "true error")
+    progress(PREDICTING, "error budget")
     errors = predict_errors(planned, said)
     progress(ERRING, "neighbors")
     stations = station_accuracies(said, errors, inputs.stations)

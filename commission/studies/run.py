@@ -19,6 +19,7 @@ from commission.localization.detection_log import cycle_stamps
 from commission.localization.estimate import Mode, Status
 from commission.localization.run_columns import RunColumns, RunSegment
 from commission.localization.setup import LocalizerSetup
+from commission.localization.supervisor import position_two_sigma
 from commission.localization.whole_run import run_segments
 from commission.progress import Progress, part, silent
 from commission.site.project import Project
@@ -121,6 +122,8 @@ class RunResult:
     """(K,) distance to the reference [m]; NaN where there is none."""
     two_sigma: FloatArray
     """(K, 3) 2-sigma of x [m], y [m] and heading [rad] after each cycle."""
+    position_two_sigma: FloatArray
+    """(K,) 2-sigma of the position that the supervisor holds against its limit [m]."""
     counts: IntArray
     """(K, 3) detections of each `Status` in each cycle."""
     nis: FloatArray
@@ -194,13 +197,6 @@ class RunResult:
     def without_reference(self) -> tuple[int, int]:
         """Cycles outside of the time of the reference, and in its gaps."""
         return without_reference(self.columns.stamps_ns, self.inputs.log.reference_stamps_ns, self.references)
-
-    def position_two_sigma(self, cycle: int) -> float:
-        """2-sigma of the position after a cycle that the supervisor holds against its limit [m]."""
-        covariance = self.columns.covariances[cycle, :2, :2]
-        by_axes = self.inputs.segment(cycle).setup.parameters.supervisor.position_sigma == "axes"
-        variance = float((np.diagonal(covariance) if by_axes else np.linalg.eigvalsh(covariance)).max())
-        return 2.0 * math.sqrt(max(variance, 0.0))
 
     def count(self, status: Status) -> int:
         """Return the number of detections of one status."""
@@ -278,6 +274,7 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
         errors=read_only(errors),
         position_errors=read_only(np.hypot(errors[:, 0], errors[:, 1])),
         two_sigma=read_only(two_sigma_of(columns.covariances)),
+        position_two_sigma=read_only(supervised_two_sigma(columns)),
         counts=read_only(np.stack([columns.counts(status) for status in Status], axis=1)),
         nis=read_only(largest_nis(columns)),
         statistics=statistics,
@@ -290,6 +287,16 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
 def two_sigma_of(covariances: FloatArray) -> FloatArray:
     """(K, 3) 2-sigma of x [m], y [m] and heading [rad] of (K, 3, 3) covariances."""
     return 2.0 * np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
+
+
+def supervised_two_sigma(columns: RunColumns) -> FloatArray:
+    """(K,) 2-sigma of the position [m], in each cycle the one that its supervisor holds against the limit."""
+    ends = (*columns.firsts[1:].tolist(), len(columns))
+    stretches = [
+        position_two_sigma(columns.covariances[segment.first : end], segment.setup.parameters.supervisor)
+        for segment, end in zip(columns.segments, ends, strict=True)
+    ]
+    return np.concatenate(stretches)
 
 
 def limits_along(columns: RunColumns) -> FloatArray:

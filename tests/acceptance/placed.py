@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commission.localization.estimate import Mode
+from commission.planning.error_budget import two_sigma_of
 from commission.planning.placement import Demands, Placement, PlacementOptions, place
 from commission.planning.route_prediction import plan_route, restricted
-from commission.planning.true_error import two_sigma_of
 from commission.planning.vehicle_visibility import vehicle_visibility
 from commission.simulation.drive import DriveOptions
 from commission.simulation.scenario import virtual_drive
@@ -26,7 +26,7 @@ from tests.acceptance.judged import judge
 def demands_met_by(project: Project) -> Demands:
     """The hardest demands that a project's own reflectors meet on all routes, whichever single one is blocked.
 
-    Limits are those of 2-sigma, of the filter and of the true error, rounded up to tenths of a millimetre and to
+    Limits are those of 2-sigma, of the filter and of the error, rounded up to tenths of a millimetre and to
     thousandths of a degree.
     """
     models = vehicle_visibility(project).models
@@ -111,7 +111,7 @@ class RouteVerdict:
 
 
 def verdict(project: Project, demands: Demands, drives: Sequence[BlockedDrive]) -> RouteVerdict:
-    """Hold the true errors of drives along one route against the demands.
+    """Hold the errors of drives along one route against the demands.
 
     A limit of 2-sigma is kept when twice the RMS of the error is below it at every metre, and the error itself is below
     it in the 95.4 % of the cycles that 2-sigma promises.

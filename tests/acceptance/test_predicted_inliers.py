@@ -10,8 +10,8 @@ from dataclasses import replace
 import pytest
 
 from commission.localization.estimate import Status
+from commission.planning.error_budget import predict_errors
 from commission.planning.route_prediction import plan_route, predict_route
-from commission.planning.true_error import predict_errors
 from commission.simulation.scenario import virtual_drive
 from commission.site.project import Project
 from commission.studies.run import RunInput, judged_run

@@ -43,6 +43,7 @@ from commission.localization.estimate import Mode
 from commission.planning.coverage import Lattice
 from commission.planning.dependence import Dependence, Failure, RouteDependence
 from commission.planning.dilution import Measurement
+from commission.planning.error_budget import PredictedErrors
 from commission.planning.route_prediction import PerMetre
 from commission.site.disturbances import ScannerError
 from commission.site.fields import with_field
@@ -131,6 +132,10 @@ def two_sigma(at: At, axis: int) -> float:
     return 2.0 * math.sqrt(at.covariance[axis, axis])
 
 
+def largest_two_sigma(at: At) -> float:
+    return 2.0 * math.sqrt(np.linalg.svd(at.covariance[:2, :2])[1].max())
+
+
 def error(at: At) -> float:
     return math.hypot(at.mean[0] - at.truth[0], at.mean[1] - at.truth[1])
 
@@ -140,8 +145,8 @@ NOW: dict[str, Callable[[At], tuple[float, ...]]] = {
     "Fail episodes so far": lambda at: (0.0,),
     "Position x, y": lambda at: (at.mean[0], at.mean[1]),
     "Heading": lambda at: (DEGREES * at.mean[2],),
-    "2σ x / limit": lambda at: (1000.0 * two_sigma(at, 0), 87.0),
-    "2σ y / limit": lambda at: (1000.0 * two_sigma(at, 1), 87.0),
+    "2σ position / limit": lambda at: (1000.0 * largest_two_sigma(at), 87.0),
+    "2σ along x, along y": lambda at: (1000.0 * two_sigma(at, 0), 1000.0 * two_sigma(at, 1)),
     "2σ heading / limit": lambda at: (DEGREES * two_sigma(at, 2), DEGREES * 0.061),
     "Inliers": lambda at: (float(np.sum(at.status == 0)),),
     "Outliers by beams, gate": lambda at: (float(np.sum(at.status == 1)), float(np.sum(at.status == 2))),
@@ -151,7 +156,8 @@ NOW: dict[str, Callable[[At], tuple[float, ...]]] = {
 }
 """Numbers of each row of the newest cycle."""
 UNITS_NOW = {
-    **{"Position x, y": "m", "Heading": "°", "2σ x / limit": "mm", "2σ y / limit": "mm", "2σ heading / limit": "°"},
+    **{"Position x, y": "m", "Heading": "°", "2σ position / limit": "mm", "2σ along x, along y": "mm"},
+    "2σ heading / limit": "°",
     **{"Cycle time": "µs, mean of the drive", "Position error": "mm"},
 }
 
@@ -209,8 +215,9 @@ def test_outliers_are_those_of_the_detector_and_those_of_the_gate(at: At) -> Non
 def test_the_badge_shows_the_largest_sigma_in_any_direction_and_both_limits(at: At, site: Project) -> None:
     word, beside, _ = badge_text(view_of(AppState(project=site, saved=site), at.run))
     assert word == "OPERATIONAL"
-    position = 2000.0 * math.sqrt(np.linalg.svd(at.covariance[:2, :2])[1].max())
-    assert_reads(beside.replace("&nbsp;", " "), position, 87.0, DEGREES * two_sigma(at, 2), DEGREES * 0.061)
+    assert_reads(
+        beside.replace("&nbsp;", " "), 1000.0 * largest_two_sigma(at), 87.0, DEGREES * two_sigma(at, 2), DEGREES * 0.061
+    )
     assert re.search(r"/ 87 mm .*°$", beside)
 
 
@@ -277,30 +284,43 @@ def worst_of(route: RouteView, values: np.ndarray) -> np.ndarray:
     return np.array([values[metre == m].max() for m in range(metre[-1] + 1)])
 
 
+def along_axes(squares: np.ndarray, axes: slice) -> np.ndarray:
+    return 2.0 * np.sqrt(np.diagonal(squares, axis1=-2, axis2=-1)[..., axes].max(axis=-1))
+
+
+def in_any_direction(squares: np.ndarray, axes: slice) -> np.ndarray:
+    return 2.0 * np.sqrt(np.linalg.norm(squares[..., axes, axes], 2, axis=(-2, -1)))
+
+
 def sigma_along(route: RouteView, axes: slice) -> np.ndarray:
-    return 2.0 * np.sqrt(np.diagonal(route.prediction.covariances, axis1=1, axis2=2)[:, axes].max(axis=1))
+    return in_any_direction(route.prediction.covariances, axes)
 
 
 def error_along(site: Project, axes: slice) -> np.ndarray:
-    squares = predicted(PredictionInput.of(site, site.routes[0].name)).errors.squares
-    return 2.0 * np.sqrt(np.diagonal(squares, axis1=1, axis2=2)[:, axes].max(axis=1))
+    return in_any_direction(errors_of(site).squares, axes)
+
+
+def errors_of(site: Project) -> PredictedErrors:
+    return predicted(PredictionInput.of(site, site.routes[0].name)).errors
 
 
 XY, HEADING = slice(0, 2), slice(2, 3)
+SAID = ("2σ of position, as the filter says [mm]", "2σ of heading, as the filter says [°]")
+COME_FROM = ("Error of position, 2σ by source [mm]", "Error of heading, 2σ by source [°]")
 
 
 def test_the_numbers_along_a_route_are_those_of_its_prediction(expected_route: RouteView, site: Project) -> None:
     route, prediction = expected_route, expected_route.prediction
     shown = dict(re.findall(r"<tr><td>(.*?)</td><td>(.*?)</td></tr>", chart(route, None)))
-    contributed = predicted(PredictionInput.of(site, site.routes[0].name)).errors.parts
+    contributed = in_any_direction(errors_of(site).parts, XY)
     table = {
         "Length": (prediction.drive.metres[-1],),
-        "Largest 2σ x, y / limit": (1000.0 * sigma_along(route, XY).max(), 87.0),
+        "Largest 2σ position / limit": (1000.0 * sigma_along(route, XY).max(), 87.0),
         "Largest 2σ heading / limit": (DEGREES * sigma_along(route, HEADING).max(), DEGREES * 0.061),
-        "True error, 2σ x, y": (1000.0 * error_along(site, XY).max(),),
-        "True error, 2σ heading": (DEGREES * error_along(site, HEADING).max(),),
+        "Error, 2σ position": (1000.0 * error_along(site, XY).max(),),
+        "Error, 2σ heading": (DEGREES * error_along(site, HEADING).max(),),
         **{
-            f"… of {source}": (2000.0 * np.sqrt(contributed[:, number, :2].max()),)
+            f"… by {source} alone": (1000.0 * contributed[:, number].max(),)
             for number, source in enumerate(("noise", "map", "mounting", "range", "clock"))
         },
         "Fewest reflectors seen": (float(prediction.seen.min()),),
@@ -312,8 +332,12 @@ def test_the_numbers_along_a_route_are_those_of_its_prediction(expected_route: R
     for label, expected in table.items():
         assert_reads(shown[label], *expected)
     there = np.hypot(*(prediction.drive.poses[:, :2] - (2.3, 2.0)).T) <= 0.2
-    both = np.maximum(sigma_along(route, XY), error_along(site, XY))
-    assert_reads(shown[dock], 1000.0 * both[there].max(), 43.0)
+    own, squares = along_axes(prediction.covariances, XY), errors_of(site).squares
+    both = np.maximum(own, along_axes(squares, XY))
+    scan = np.flatnonzero(there)[along_axes(squares, XY)[there].argmax()]
+    axis = int(np.argmax(np.diagonal(squares[scan, :2, :2])))
+    by_source = 2000.0 * np.sqrt(errors_of(site).parts[scan, :, axis, axis])
+    assert_reads(shown[dock], 1000.0 * both[there].max(), 43.0, *by_source)
     assert_reads(dock, prediction.drive.metres[np.flatnonzero(there)[0]])
 
 
@@ -321,11 +345,11 @@ def test_the_tracks_along_a_route_are_those_of_its_prediction(
     expected_route: RouteView, site: Project, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: dict[str, Any] = {}
-    for name in ("limited", "plain"):
+    for name in ("limited", "plain", "stacked"):
         monkeypatch.setattr(chart_module, name, lambda track, _axis: drawn.setdefault(track.title, track) and "")
     route, prediction = expected_route, expected_route.prediction
     chart(route, None)
-    position, heading = drawn["2σ of position [mm]"], drawn["2σ of heading [°]"]
+    position, heading = drawn[SAID[0]], drawn[SAID[1]]
     np.testing.assert_allclose(position.levels, 1000.0 * worst_of(route, sigma_along(route, XY)))
     np.testing.assert_allclose(heading.levels, DEGREES * worst_of(route, sigma_along(route, HEADING)))
     np.testing.assert_allclose(position.errors, 1000.0 * worst_of(route, error_along(site, XY)))
@@ -336,31 +360,49 @@ def test_the_tracks_along_a_route_are_those_of_its_prediction(
     np.testing.assert_allclose(
         drawn["On odometry alone [m]"].levels, worst_of(route, prediction.on_odometry), atol=1e-12
     )
-    assert set(drawn) == {position.title, heading.title, "Fewest reflectors seen", "On odometry alone [m]"}
+    for title, axes, unit, limit in zip(COME_FROM, (XY, HEADING), (1000.0, DEGREES), (0.087, 0.061), strict=True):
+        np.testing.assert_allclose(drawn[title].levels, unit * worst_of(route, error_along(site, axes)))
+        assert drawn[title].limit == pytest.approx(unit * limit)
+        np.testing.assert_allclose(drawn[title].shares.sum(axis=1), 1.0)
+    assert set(drawn) == {*SAID, *COME_FROM, "Fewest reflectors seen", "On odometry alone [m]"}
 
 
 def test_a_bar_of_several_metres_shows_the_worst_of_them(
     expected_route: RouteView, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: dict[str, Any] = {}
-    for name in ("limited", "plain"):
+    for name in ("limited", "plain", "stacked"):
         monkeypatch.setattr(chart_module, name, lambda track, _axis: drawn.setdefault(track.title, track) and "")
     # 300 metres in at most 120 bars: three to a bar.
     rng = np.random.default_rng(3)
-    sigmas, errors, alone = rng.uniform(0.01, 0.1, (300, 3)), rng.uniform(0.01, 0.1, (300, 3)), rng.uniform(0, 9, 300)
+    sigmas, errors, alone = rng.uniform(0.01, 0.1, (300, 3)), rng.uniform(0.01, 0.1, (300, 2)), rng.uniform(0, 9, 300)
+    position, shares = rng.uniform(0.1, 0.2, 300), rng.dirichlet(np.ones(5), 300)
     seen = rng.integers(2, 9, 300)
-    metres = PerMetre(np.arange(300), np.arange(300), sigmas, np.zeros((300, 3)), seen, alone, np.zeros(300, bool))
+    metres = PerMetre(
+        np.arange(300), np.arange(300), sigmas, np.zeros((300, 3)), seen, alone, np.zeros(300, bool), position
+    )
     chances = rng.uniform(0.0, 0.5, 300)
     risk = RiskView(reflector="A", neighbor="B", chance=0.5, metres=(3,), points=np.zeros((1, 2)), worst=(1.0, 2.0))
     chart(
-        replace(expected_route, metres=metres, errors=errors, limit_shares=alone, risk=chances, risks=(risk,)),
+        replace(
+            expected_route,
+            **{"metres": metres, "errors": errors, "limit_shares": alone, "risk": chances, "risks": (risk,)},
+            position_shares=shares,
+            heading_shares=shares[::-1],
+        ),
         None,
     )
-    bars = {title: track.levels.tolist() for title, track in drawn.items()}
     groups = [slice(first, first + 3) for first in range(0, 300, 3)]
+    # A bar is divided as the metre is that it has its height from.
+    for title, which, given, unit in zip(COME_FROM, (0, 1), (shares, shares[::-1]), (1000.0, DEGREES), strict=True):
+        track = drawn.pop(title)
+        assert track.levels == pytest.approx([unit * errors[g, which].max() for g in groups])
+        worst = [given[g][errors[g, which].argmax()] for g in groups]
+        np.testing.assert_array_equal(track.shares, worst)
+    bars = {title: track.levels.tolist() for title, track in drawn.items()}
     assert bars == {
-        "2σ of position [mm]": pytest.approx([1000.0 * sigmas[g, :2].max() for g in groups]),
-        "2σ of heading [°]": pytest.approx([DEGREES * sigmas[g, 2].max() for g in groups]),
+        SAID[0]: pytest.approx([1000.0 * position[g].max() for g in groups]),
+        SAID[1]: pytest.approx([DEGREES * sigmas[g, 2].max() for g in groups]),
         "Fewest reflectors seen": [seen[g].min() for g in groups],
         "On odometry alone [m]": pytest.approx([alone[g].max() for g in groups]),
         "Chance of a wrong association [%]": pytest.approx([100.0 * chances[g].max() for g in groups]),

@@ -22,8 +22,8 @@ from functools import partial
 
 import numpy as np
 
+from commission.planning.error_budget import predict_errors
 from commission.planning.route_prediction import predict_route
-from commission.planning.true_error import predict_errors
 from tests.planning.driven import (
     SITES,
     Comparison,
@@ -90,7 +90,7 @@ def speed() -> str:
         times.append(time.perf_counter() - start)
     return (
         f"warehouse, {route}: a drive {times[2]:.2f} s; what the filter will say {times[2] / times[0]:.0f} times "
-        f"faster, its true error {times[2] / times[1]:.0f} times"
+        f"faster, its error {times[2] / times[1]:.0f} times"
     )
 
 

@@ -19,11 +19,18 @@ def test_a_route_is_predicted_metre_by_metre(commission, project, tmp_path):
     # At first the fifth is 15.3 m away, where it may lie between two beams.
     assert summary["visible_min"] == 4
     assert summary["trips_m"] == []
+    # What each source of error contributes: alone, and as a share of the square.
+    for row in rows:
+        shares = [float(row[f"{source}_share"]) for source in ("noise", "map", "mounting", "range", "clock")]
+        assert sum(shares) == pytest.approx(1.0, abs=1e-5)
+    clock = max(float(row["clock_two_sigma_position"]) for row in rows)
+    assert clock == pytest.approx(summary["clock_two_sigma_position_max_m"], rel=5.001e-6, abs=0.0)
+    assert f"clock {1e3 * clock:.1f} mm" in told
     # Six digits in the table.
     two_sigma_x, error_y = (max(float(row[name]) for row in rows) for name in ("two_sigma_x", "error_two_sigma_y"))
     assert two_sigma_x == pytest.approx(summary["two_sigma_x_max_m"], rel=5.001e-6, abs=0.0)
     assert error_y == pytest.approx(summary["error_two_sigma_y_max_m"], rel=5.001e-6, abs=0.0)
-    assert f"True error   2-sigma x {1e3 * summary['error_two_sigma_x_max_m']:.1f} mm" in told
+    assert f"Error        2-sigma position {1e3 * summary['error_two_sigma_position_max_m']:.1f} mm" in told
 
 
 def test_an_unknown_route_and_an_impossible_crowd_are_refused(refused, project, tmp_path):
@@ -63,6 +70,8 @@ def test_a_station_is_reached_when_both_the_filter_and_its_error_keep_to_what_it
     vain = at_the_dock(1.0, said)
     assert vain["two_sigma_m"] < 0.8 * vain["error_two_sigma_m"]
     assert vain["met"]
+    squares = (vain[f"{source}_two_sigma_m"] ** 2 for source in ("noise", "map", "mounting", "range", "clock"))
+    assert sum(squares) == pytest.approx(vain["error_two_sigma_m"] ** 2, rel=1e-9)
     between = 0.5 * (vain["two_sigma_m"] + vain["error_two_sigma_m"])
     assert not at_the_dock(between, said)["met"]
 

@@ -12,8 +12,8 @@ from commission.io.project_file import load_project
 from commission.localization import whole_run
 from commission.localization.estimate import Belief, Mode
 from commission.localization.setup import LocalizerSetup
+from commission.planning.error_budget import predict_errors
 from commission.planning.route_prediction import PlannedRoute, PredictionOptions, plan_route, predict_route
-from commission.planning.true_error import predict_errors
 from commission.simulation.drive import DriveOptions
 from commission.simulation.scenario import start_of, virtual_drive
 from commission.site.project import Project
@@ -97,10 +97,13 @@ def driven_along(project: Project, route: str, length: float, seed: int) -> PerM
     log = virtual_drive(project, route, seed, options=QUICK)
     run = whole_run.run(log, LocalizerSetup.of(project), Belief(0, start.pose, np.diag(start.sigmas**2)))
     truth = reference_at(run.stamps_ns, log.reference_stamps_ns, log.reference_poses)
+    # Scans of a clock that is off are stamped before the first or after the last pose that is known.
+    known = np.isfinite(truth[:, 0])
+    truth, means, modes = truth[known], run.means[known], run.modes[known]
     steps = np.hypot(*np.diff(truth[:, :2], axis=0, prepend=truth[:1, :2]).T)
     # The follower's way is not exactly the planned one: by its share, so that both end together.
     metre = (np.cumsum(steps) / steps.sum() * (length - 1e-6)).astype(int)
-    return _gather(metre, pose_errors(run.means, truth) ** 2, run.modes)
+    return _gather(metre, pose_errors(means, truth) ** 2, modes)
 
 
 def compare(planned: PlannedRoute, drives: Iterable[PerMetre]) -> Comparison:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from commission.planning.ambiguity import ambiguous_poses
+from commission.planning.error_budget import predict_errors
 from commission.planning.placement import Placement, PlacementOptions, choose
 from commission.planning.route_prediction import PlannedRoute, plan_route, predict_route
-from commission.planning.true_error import predict_errors
 from commission.planning.vehicle_visibility import vehicle_visibility
 from commission.planning.visibility import VisibleReflectors
 from commission.site.layout_brief import Demands

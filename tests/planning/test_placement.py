@@ -7,9 +7,9 @@ import pytest
 
 from commission.errors import JobCancelled, UsageError
 from commission.planning.ambiguity import ambiguous_poses
+from commission.planning.error_budget import predict_errors
 from commission.planning.placement import Demands, PlacementOptions, place
 from commission.planning.route_prediction import PredictionOptions, plan_route, predict_route
-from commission.planning.true_error import predict_errors
 from commission.planning.vehicle_visibility import vehicle_visibility
 from commission.site.layout_brief import CandidateOptions
 from commission.site.parameters import OdometryParameters, Parameters

@@ -1,4 +1,4 @@
-"""Prediction along a route: the filter's own numbers. What virtual drives come to is in `test_true_error`."""
+"""Prediction along a route: the filter's own numbers. What virtual drives come to is in `test_error_budget`."""
 
 import math
 from dataclasses import replace
@@ -11,6 +11,7 @@ from commission.geometry.gaussian import chi_square_gate
 from commission.localization import whole_run
 from commission.localization.estimate import Belief
 from commission.localization.setup import LocalizerSetup
+from commission.planning.error_budget import predict_errors
 from commission.planning.nominal_drive import DrivePlan, NominalDrive, nominal_drive
 from commission.planning.route_prediction import (
     Damage,
@@ -21,7 +22,6 @@ from commission.planning.route_prediction import (
     restricted,
     station_scans,
 )
-from commission.planning.true_error import predict_errors
 from commission.site.parameters import (
     AssociationParameters,
     DetectorParameters,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from commission.planning.error_budget import PredictedErrors
 from commission.planning.nominal_drive import NominalDrive
 from commission.planning.route_prediction import RoutePrediction
 from commission.planning.station_accuracy import StationAccuracy, station_accuracies
-from commission.planning.true_error import PredictedErrors
 from commission.site.parameters import SupervisorParameters
 from commission.site.stations import Station
 
@@ -33,7 +33,9 @@ def accuracies(said: list[tuple[float, float]], true: list[tuple[float, float]])
         on_odometry=np.zeros(count),
     )
     stations = (Station(name="Dock", x=1.0, y=0.0, required_accuracy=0.02), Station(name="Far", x=9.0, y=9.0))
-    errors = PredictedErrors(squares, np.zeros(len(squares)), np.zeros((len(squares), 5, 3)))
+    # Three quarters of the square of each error are noise, a quarter is the clock's.
+    parts = np.array([0.75, 0.0, 0.0, 0.0, 0.25])[:, np.newaxis, np.newaxis] * squares[:, np.newaxis]
+    errors = PredictedErrors(squares, np.zeros(len(squares)), parts)
     return station_accuracies(prediction, errors, stations)
 
 
@@ -44,6 +46,7 @@ def test_the_worst_moment_at_a_station_and_the_worse_axis_count() -> None:
     (dock,) = accuracies(said, true)
     assert (dock.station, dock.metre, dock.required) == ("Dock", pytest.approx(4.1), 0.02)
     assert (dock.two_sigma, dock.error) == pytest.approx((0.010, 0.006))
+    assert dock.parts == pytest.approx((0.006 * np.sqrt(0.75), 0.0, 0.0, 0.0, 0.003))
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from viser import uplot
 from commission.app.base import theme
 
 TURQUOISE, ORANGE = "#4dc4ff", "#ffb454"
+INK = "#e8eaee"
 LIMIT = theme.css(theme.POSE)
 HEIGHT_PX = 150
 ROOM_PX = 44

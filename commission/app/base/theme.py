@@ -49,6 +49,12 @@ FIRST_TWIN: Color = (120, 220, 255)
 SECOND_TWIN: Color = (255, 120, 220)
 KEEP_OUT: Color = (222, 150, 70)
 TOO_LITTLE: Color = (240, 132, 52)
+# What an error comes from: apart from each other, and from the ramp of the share of a limit.
+FROM_NOISE: Color = (138, 148, 164)
+FROM_MAP: Color = (74, 134, 255)
+FROM_MOUNTING: Color = (222, 110, 206)
+FROM_RANGE: Color = (255, 190, 70)
+FROM_CLOCK: Color = (60, 200, 180)
 
 OPERATIONAL_COLOR = "#1c7c3c"
 FAIL_COLOR = "#c5221f"

@@ -26,6 +26,8 @@ class LivedPath:
     """(K, 3) `T_map_base` [m, m, rad]."""
     two_sigma: FloatArray
     """(K, 3) 2-sigma of x [m], y [m] and heading [rad]."""
+    position_two_sigma: FloatArray
+    """(K,) 2-sigma of the position that the supervisor holds against its limit [m]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

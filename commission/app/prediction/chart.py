@@ -8,10 +8,11 @@ from commission.app.base import theme
 from commission.app.base.panel import escaped, table
 from commission.app.prediction.driven import DrivenMetres
 from commission.app.prediction.limit_colors import limit_classes, palette
+from commission.app.prediction.stacks import Stacked, stack_legend, stacked
 from commission.app.prediction.tracks import Limited, Plain, TrackAxis, limited, plain, round_up
 from commission.app.prediction.view import RouteView
+from commission.planning.error_budget import CONTRIBUTIONS
 from commission.planning.station_accuracy import StationAccuracy
-from commission.planning.true_error import CONTRIBUTIONS
 from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
 
 MOST_BARS = 120
@@ -29,20 +30,21 @@ def chart(route: RouteView, run: DrivenMetres | None) -> str:
     metres, limits = route.metres, route.prediction.limits
     starts = np.arange(0, len(metres.metre), max(1, -(-len(metres.metre) // MOST_BARS)))
     axis = _axis(route, starts)
-    worst, errors = (np.maximum.reduceat(values, starts, axis=0) for values in (metres.two_sigma, route.errors))
+    worst = np.maximum.reduceat(np.column_stack((metres.position, metres.two_sigma[:, 2])), starts, axis=0)
+    errors = np.maximum.reduceat(route.errors, starts, axis=0)
     position = Limited(
-        title="2σ of position [mm]",
-        levels=MILLIMETRES.of(worst[:, :2].max(axis=1)),
+        title="2σ of position, as the filter says [mm]",
+        levels=MILLIMETRES.of(worst[:, 0]),
         limit=MILLIMETRES.of(limits.position_limit),
-        errors=MILLIMETRES.of(errors[:, :2].max(axis=1)),
-        driven=None if run is None else (run.metres, MILLIMETRES.of(run.two_sigma[:, :2].max(axis=1))),
+        errors=MILLIMETRES.of(errors[:, 0]),
+        driven=None if run is None else (run.metres, MILLIMETRES.of(run.two_sigma[:, 0])),
     )
     heading = Limited(
-        title="2σ of heading [°]",
-        levels=DEGREES.of(worst[:, 2]),
+        title="2σ of heading, as the filter says [°]",
+        levels=DEGREES.of(worst[:, 1]),
         limit=DEGREES.of(limits.heading_limit),
-        errors=DEGREES.of(errors[:, 2]),
-        driven=None if run is None else (run.metres, DEGREES.of(run.two_sigma[:, 2])),
+        errors=DEGREES.of(errors[:, 1]),
+        driven=None if run is None else (run.metres, DEGREES.of(run.two_sigma[:, 1])),
     )
     seen = np.minimum.reduceat(metres.seen, starts)
     alone = np.maximum.reduceat(metres.on_odometry, starts)
@@ -50,6 +52,7 @@ def chart(route: RouteView, run: DrivenMetres | None) -> str:
     drawn = [
         limited(position, axis),
         limited(heading, axis),
+        *_stacks(route, axis, starts),
         plain(Plain("Fewest reflectors seen", seen, (2.0, float(max(4, seen.max())))), axis),
         plain(Plain("On odometry alone [m]", alone, (round_up(max(0.5, float(alone.max()))),)), axis),
     ]
@@ -79,7 +82,7 @@ def _axis(route: RouteView, starts: np.ndarray) -> TrackAxis:
 def _note(route: RouteView, run: DrivenMetres | None) -> str:
     if route.outdated:
         return "predicting anew …"
-    lines = ["color: share of the limit", "violet: 2σ of the true error"]
+    lines = ["color: share of the limit", "violet: 2σ of the error that noise and uncertainty make"]
     if len(route.prediction.trips()):
         lines.append("red line: stops, green line: may drive again")
     lines.append("white line: the run that is loaded" if run is not None else "a run along this route is laid over it")
@@ -89,13 +92,13 @@ def _note(route: RouteView, run: DrivenMetres | None) -> str:
 def _numbers(route: RouteView) -> list[tuple[str, str]]:
     """What matters most, in numbers."""
     prediction, metres, limits = route.prediction, route.metres, route.prediction.limits
-    largest, error = metres.two_sigma.max(axis=0), route.errors.max(axis=0)
+    largest, error = metres.two_sigma[:, 2].max(), route.errors.max(axis=0)
     rows = [
         ("Length", f"{prediction.drive.length:.1f} m"),
-        ("Largest 2σ x, y / limit", MILLIMETRES.against(largest[:2].max(), limits.position_limit)),
-        ("Largest 2σ heading / limit", DEGREES.against(largest[2], limits.heading_limit, (".2f", ".1f"))),
-        ("True error, 2σ x, y", MILLIMETRES.text(error[:2].max(), ".1f")),
-        ("True error, 2σ heading", DEGREES.text(error[2], ".2f")),
+        ("Largest 2σ position / limit", MILLIMETRES.against(metres.position.max(), limits.position_limit)),
+        ("Largest 2σ heading / limit", DEGREES.against(largest, limits.heading_limit, (".2f", ".1f"))),
+        ("Error, 2σ position", MILLIMETRES.text(error[0], ".1f")),
+        ("Error, 2σ heading", DEGREES.text(error[1], ".2f")),
         *_budget(route),
         ("Fewest reflectors seen", str(int(metres.seen.min()))),
         ("Longest on odometry", f"{metres.on_odometry.max():.1f} m"),
@@ -107,9 +110,36 @@ def _numbers(route: RouteView) -> list[tuple[str, str]]:
 
 
 def _budget(route: RouteView) -> list[tuple[str, str]]:
-    """What each source of error contributes alone, at most."""
-    largest = route.parts.max(axis=0)
-    return [(f"… of {name}", MILLIMETRES.text(part, ".1f")) for name, part in zip(CONTRIBUTIONS, largest, strict=True)]
+    """What each source of error contributes alone, at most: squares add up, these do not."""
+    alone = zip(CONTRIBUTIONS, route.alone.max(axis=0), strict=True)
+    return [(f"… by {name} alone", MILLIMETRES.text(part, ".1f")) for name, part in alone]
+
+
+def _stacks(route: RouteView, axis: TrackAxis, starts: np.ndarray) -> list[str]:
+    """What the errors of position and heading come from, one above the other, and the colors of that."""
+    supervisor = route.prediction.limits
+    worst = [_worst_bins(route.errors[:, which], starts) for which in (0, 1)]
+    position = Stacked(
+        title="Error of position, 2σ by source [mm]",
+        levels=MILLIMETRES.of(route.errors[worst[0], 0]),
+        shares=route.position_shares[worst[0]],
+        limit=MILLIMETRES.of(supervisor.position_limit),
+        limit_text=MILLIMETRES.text(supervisor.position_limit),
+    )
+    heading = Stacked(
+        title="Error of heading, 2σ by source [°]",
+        levels=DEGREES.of(route.errors[worst[1], 1]),
+        shares=route.heading_shares[worst[1]],
+        limit=DEGREES.of(supervisor.heading_limit),
+        limit_text=DEGREES.text(supervisor.heading_limit, ".1f"),
+    )
+    return [stacked(position, axis), stacked(heading, axis), stack_legend(CONTRIBUTIONS)]
+
+
+def _worst_bins(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """(N,) the metre with the largest value of each stretch."""
+    ends = (*starts[1:].tolist(), len(values))
+    return np.array([first + values[first:end].argmax() for first, end in zip(starts.tolist(), ends, strict=True)])
 
 
 def _places(metres: np.ndarray) -> str:
@@ -127,9 +157,16 @@ def _stations(stations: tuple[StationAccuracy, ...]) -> str:
         (
             f"{escaped(each.station)}, {each.metre:.0f} m",
             f"{MILLIMETRES.against(each.expected, each.required)} "
-            f"<span style='color:{good if each.is_met else bad}'>{'met' if each.is_met else 'not met'}</span>",
+            f"<span style='color:{good if each.is_met else bad}'>{'met' if each.is_met else 'not met'}</span>"
+            f"<div class='c-note'>{_station_parts(each)}</div>",
         )
         for each in stations
     ]
-    title = "<div style='font-size:11px;opacity:.75;padding-top:5px'>Stations: 2σ x, y / required</div>"
+    title = "<div style='font-size:11px;opacity:.75;padding-top:5px'>Stations: 2σ x, y / required, and by source</div>"
     return f"<div class='c-stations'>{title}{table(rows)}</div>"
+
+
+def _station_parts(station: StationAccuracy) -> str:
+    """What the error at a station comes from."""
+    named = zip(CONTRIBUTIONS, station.parts, strict=True)
+    return ", ".join(f"{name} {MILLIMETRES.number(part, '.1f')}" for name, part in named) + " mm"

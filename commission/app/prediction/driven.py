@@ -25,7 +25,8 @@ class DrivenMetres:
     metres: FloatArray
     """(N,) metre of the way, never falling [m]."""
     two_sigma: FloatArray
-    """(N, 3) 2-sigma of x [m], y [m] and heading [rad], the largest since the row before."""
+    """(N, 2) 2-sigma of the position [m], as the supervisor takes it, and of the heading [rad], the largest since the
+    row before."""
 
 
 def driven(lived: LivedPath, prediction: RoutePrediction) -> DrivenMetres | None:
@@ -43,8 +44,9 @@ def driven(lived: LivedPath, prediction: RoutePrediction) -> DrivenMetres | None
     cycles = len(lived.poses)
     if not cycles:
         return None
+    supervised = np.column_stack((lived.position_two_sigma, lived.two_sigma[:, 2]))
     starts = np.arange(0, cycles, max(1, -(-cycles // MOST_CYCLES)))
-    places, two_sigma = lived.poses[starts, :2], np.maximum.reduceat(lived.two_sigma, starts, axis=0)
+    places, two_sigma = lived.poses[starts, :2], np.maximum.reduceat(supervised, starts, axis=0)
     drive = prediction.drive
     metres, reached = np.empty(len(starts)), 0
     for number, place in enumerate(places):

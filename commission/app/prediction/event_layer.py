@@ -49,7 +49,7 @@ def events(route: RouteView) -> tuple[Event, ...]:
     going_on = [(f"may go on at {m:.0f} m", float(m), theme.RECOVERY) for m in prediction.recoveries()]
     stations = [
         (
-            f"{each.station}: {MILLIMETRES.number(each.two_sigma, '.1f')} of {MILLIMETRES.text(each.required)}"
+            f"{each.station}: {MILLIMETRES.number(each.expected, '.1f')} of {MILLIMETRES.text(each.required)}"
             f"{'' if each.is_met else ', not met'}",
             each.metre,
             theme.RECOVERY if each.is_met else theme.OVER_LIMIT,

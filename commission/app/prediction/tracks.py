@@ -59,7 +59,7 @@ class Limited:
     limit: float
     """The limit, in the page's unit."""
     errors: FloatArray
-    """(B,) the same of the true error."""
+    """(B,) the same of the error to be expected."""
     driven: tuple[FloatArray, FloatArray] | None = None
     """(N,) metres of a run and (N,) the same quantity of it."""
 
@@ -77,7 +77,7 @@ class Plain:
 
 
 def limited(track: Limited, axis: TrackAxis) -> str:
-    """Draw bars up to a logarithmic level, the limit, the true error, and a run."""
+    """Draw bars up to a logarithmic level, the limit, the error to be expected, and a run."""
     low, high = math.log10(track.limit / BELOW), math.log10(track.limit * ABOVE)
 
     def y(values: FloatArray) -> FloatArray:
@@ -85,23 +85,23 @@ def limited(track: Limited, axis: TrackAxis) -> str:
         return TALL * (1.0 - np.clip(share, 0.0, 1.0))
 
     ticks = [10.0**power for power in range(math.ceil(low), math.floor(high) + 1)]
-    parts = [part for tick in ticks for part in _tick(float(y(np.array(tick))), f"{tick:g}")]
+    parts = [part for level in ticks for part in tick(float(y(np.array(level))), f"{level:g}")]
     parts += _bars(axis, y(track.levels), TALL)
-    parts.append(_line(float(y(np.array(track.limit))), theme.css(theme.POSE), "5 4"))
+    parts.append(line(float(y(np.array(track.limit))), theme.css(theme.POSE), "5 4"))
     parts.append(_steps(axis, y(track.errors), theme.css(theme.REFERENCE)))
     if track.driven is not None:
         metres, values = track.driven
         points = " ".join(f"{px:.1f},{py:.1f}" for px, py in zip(axis.x(metres), y(values), strict=True))
         parts.append(f"<polyline points='{points}' fill='none' stroke='#fff' stroke-width='1.2'/>")
-    return _svg(track.title, TALL, axis, parts)
+    return svg(track.title, TALL, axis, parts)
 
 
 def plain(track: Plain, axis: TrackAxis) -> str:
     """Draw bars from zero."""
     most = max(*track.ticks, 1e-9)
-    parts = [part for tick in track.ticks for part in _tick(LOW * (1.0 - tick / most), number_text(tick))]
+    parts = [part for level in track.ticks for part in tick(LOW * (1.0 - level / most), number_text(level))]
     parts += _bars(axis, LOW * (1.0 - np.clip(track.levels / most, 0.0, 1.0)), LOW)
-    return _svg(track.title, LOW, axis, parts)
+    return svg(track.title, LOW, axis, parts)
 
 
 def round_up(value: float) -> float:
@@ -110,7 +110,8 @@ def round_up(value: float) -> float:
     return next(nice * power for nice in (1.0, 2.0, 5.0, 10.0) if nice * power >= value * (1.0 - 1e-9))
 
 
-def _svg(title: str, bottom: float, axis: TrackAxis, parts: list[str]) -> str:
+def svg(title: str, bottom: float, axis: TrackAxis, parts: list[str]) -> str:
+    """Put parts of a drawing below a title, with the events of the route and its metres."""
     height = bottom + LABELS_PX
     content = "".join([*parts, *_events(axis, bottom), *_metre_labels(axis, height)])
     head = f"<div style='font-size:11px;opacity:.75;padding-top:5px'>{escaped(title)}</div>"
@@ -118,15 +119,18 @@ def _svg(title: str, bottom: float, axis: TrackAxis, parts: list[str]) -> str:
     return f"{head}<svg {box}>{content}</svg>"
 
 
-def _tick(y: float, text: str) -> list[str]:
-    return [_line(y, GRID), _text(LEFT - 4, min(max(y + 3.0, 7.0), 1e3), text)]
+def tick(y: float, text: str) -> list[str]:
+    """Draw a level line and what it means."""
+    return [line(y, GRID), write(LEFT - 4, min(max(y + 3.0, 7.0), 1e3), text)]
 
 
-def _text(x: float, y: float, text: str, anchor: str = "end") -> str:
-    return f"<text x='{x:.1f}' y='{y:.1f}' fill='{INK}' text-anchor='{anchor}'>{text}</text>"
+def write(x: float, y: float, text: str, anchor: str = "end", *, fill: str = INK) -> str:
+    """Write a text that is escaped already."""
+    return f"<text x='{x:.1f}' y='{y:.1f}' fill='{fill}' text-anchor='{anchor}'>{text}</text>"
 
 
-def _line(y: float, color: str, dash: str = "none") -> str:
+def line(y: float, color: str, dash: str = "none") -> str:
+    """Draw a level line."""
     return f"<line x1='{LEFT}' x2='{WIDTH}' y1='{y:.1f}' y2='{y:.1f}' stroke='{color}' stroke-dasharray='{dash}'/>"
 
 
@@ -161,5 +165,5 @@ def _metre_labels(axis: TrackAxis, height: float) -> list[str]:
     """Write the metres at the ends and in the middle."""
     places = ((0.0, "start"), (0.5 * axis.length, "middle"), (axis.length, "end"))
     return [
-        _text(float(axis.x(np.array(metre))), height - 2, f"{number_text(metre)} m", anchor) for metre, anchor in places
+        write(float(axis.x(np.array(metre))), height - 2, f"{number_text(metre)} m", anchor) for metre, anchor in places
     ]

@@ -46,8 +46,12 @@ class RouteView:
     metres: PerMetre
     """The worst of each metre."""
     errors: FloatArray
-    """(B, 3) largest 2-sigma of the true error of x [m], y [m] and heading [rad] in each metre."""
-    parts: FloatArray
+    """(B, 2) largest 2-sigma of the error to be expected of position [m] and heading [rad] in each metre."""
+    position_shares: FloatArray
+    """(B, 5) share of each of `CONTRIBUTIONS` in the square of that of the position [0..1]."""
+    heading_shares: FloatArray
+    """(B, 5) the same of the heading."""
+    alone: FloatArray
     """(B, 5) largest 2-sigma of the position that each of `CONTRIBUTIONS` alone has in each metre [m]."""
     limit_shares: FloatArray
     """(B,) largest share of the supervisor's limit in each metre [1]."""
@@ -74,12 +78,18 @@ def route_view(predicted: PredictionResult, *, outdated: bool) -> RouteView:
     chances = np.zeros(len(prediction.drive))
     for risk in predicted.risks:
         chances[risk.scans] = np.maximum(chances[risk.scans], risk.probability)
+    (position, position_shares), (heading, heading_shares) = (
+        predicted.errors.position_per_metre(metres),
+        predicted.errors.heading_per_metre(metres),
+    )
     return RouteView(
         name=predicted.name,
         prediction=prediction,
         metres=metres,
-        errors=predicted.errors.per_metre(metres),
-        parts=predicted.errors.parts_per_metre(metres),
+        errors=np.column_stack((position, heading)),
+        position_shares=position_shares,
+        heading_shares=heading_shares,
+        alone=predicted.errors.parts_per_metre(metres),
         limit_shares=np.maximum.reduceat(prediction.limit_share, metres.first),
         risk=np.maximum.reduceat(chances, metres.first),
         risks=tuple(_risk_view(predicted, risk) for risk in predicted.risks),

@@ -19,7 +19,7 @@ def badge_text(view: PageView) -> tuple[str, str, str]:
         under_way = [escaped(job.line) for job in view.jobs]
         return ("PREPARING" if under_way else "NO RUN"), "; ".join(under_way), theme.IDLE_COLOR
     limits = run.segment.setup.parameters.supervisor
-    position, heading = run.result.position_two_sigma(run.newest), run.result.two_sigma[run.newest, 2]
+    position, heading = run.result.position_two_sigma[run.newest], run.result.two_sigma[run.newest, 2]
     beside = (
         f"2σ {MILLIMETRES.against(position, limits.position_limit, ('.0f', '.0f'))}"
         f" &nbsp; {DEGREES.against(heading, limits.heading_limit, ('.2f', '.1f'))}"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.app.base import theme
-from commission.app.base.plot_style import LIMIT, ORANGE, TURQUOISE
+from commission.app.base.plot_style import INK, LIMIT, ORANGE, TURQUOISE
 from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
 from commission.localization.estimate import Status
@@ -78,8 +78,9 @@ def _heading_errors(run: RunResult) -> FloatArray:
 
 CHARTS = (
     Chart(
-        title="2σ of x, y [mm]",
+        title="2σ of position [mm]",
         lines=(
+            Line("against the limit [mm]", INK, lambda run: MILLIMETRES.of(run.position_two_sigma)),
             Line("x [mm]", TURQUOISE, lambda run: MILLIMETRES.of(run.two_sigma[:, 0])),
             Line("y [mm]", ORANGE, lambda run: MILLIMETRES.of(run.two_sigma[:, 1])),
         ),

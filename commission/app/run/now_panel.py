@@ -39,12 +39,13 @@ def rows(run: RunView) -> list[tuple[str, str]]:
     result, newest = run.result, run.newest
     limits = run.segment.setup.parameters.supervisor
     sigma_x, sigma_y, sigma_heading = result.two_sigma[newest]
+    largest = result.position_two_sigma[newest]
     estimate = run.estimate
     nis = f"{result.nis[newest]:.2f}" if math.isfinite(result.nis[newest]) else "none seen"
     error = result.position_errors[newest]
     shown += [
-        ("2σ x / limit", MILLIMETRES.against(sigma_x, limits.position_limit)),
-        ("2σ y / limit", MILLIMETRES.against(sigma_y, limits.position_limit)),
+        ("2σ position / limit", MILLIMETRES.against(largest, limits.position_limit)),
+        ("2σ along x, along y", f"{MILLIMETRES.number(sigma_x, '.1f')}, {MILLIMETRES.text(sigma_y, '.1f')}"),
         ("2σ heading / limit", DEGREES.against(sigma_heading, limits.heading_limit, (".2f", ".1f"))),
         ("Inliers", str(estimate.count(Status.INLIER))),
         (

@@ -222,5 +222,6 @@ class RunService(Service):
         view = self.view(whole=slowly)
         if view is None:
             return ()
-        lived = LivedPath(view.result.columns.means[: view.lived], view.result.two_sigma[: view.lived])
+        result, here = view.result, slice(view.lived)
+        lived = LivedPath(result.columns.means[here], result.two_sigma[here], result.position_two_sigma[here])
         return view, Followed((float(view.pose[0]), float(view.pose[1]))), lived

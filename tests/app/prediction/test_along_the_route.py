@@ -1,5 +1,6 @@
 """What is drawn along a route: the ribbon's pieces, stretches that fail, a run beside the prediction, the chart."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +12,11 @@ from commission.app.prediction.driven import driven
 from commission.app.prediction.event_layer import events, place_at
 from commission.app.prediction.limit_colors import BOUNDS, limit_classes, palette
 from commission.app.prediction.ribbon_layer import pieces
-from commission.app.prediction.tracks import round_up
+from commission.app.prediction.stacks import Stacked, stacked
+from commission.app.prediction.tracks import TrackAxis, round_up
 from commission.app.prediction.view import RouteView, route_view
+from commission.planning.error_budget import CONTRIBUTIONS, predict_errors
 from commission.planning.route_prediction import RoutePrediction, plan_route, predict_route
-from commission.planning.true_error import predict_errors
 from commission.site.parameters import FilterParameters
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -31,7 +33,7 @@ def prediction(project: Project) -> RoutePrediction:
 
 @pytest.fixture
 def lived(result: RunResult) -> LivedPath:
-    return LivedPath(result.columns.means, result.two_sigma)
+    return LivedPath(result.columns.means, result.two_sigma, result.position_two_sigma)
 
 
 def test_thinning_a_ribbon_keeps_its_worst_spot_and_both_ends() -> None:
@@ -85,20 +87,45 @@ def test_the_chart_says_where_the_supervisor_stops_and_draws_it(project: Project
     route = expected(strict(project))
     drawn = chart(route, None)
     assert "nowhere" not in drawn
-    # One line in each of the four drawings.
-    assert drawn.count("class='c-stop'") == 4 * len(route.prediction.trips()) > 0
-    assert drawn.count("class='c-recovery'") == 4 * len(route.prediction.recoveries()) > 0
+    # One line in each of the six drawings.
+    assert drawn.count("class='c-stop'") == 6 * len(route.prediction.trips()) > 0
+    assert drawn.count("class='c-recovery'") == 6 * len(route.prediction.recoveries()) > 0
 
 
-def test_the_chart_draws_the_true_error_that_the_command_writes(project: Project) -> None:
+def test_the_chart_draws_the_error_that_the_command_writes_and_what_it_comes_from(project: Project) -> None:
     route = expected(project)
     planned = plan_route(project, project.routes[0].name)
-    errors = predict_errors(planned, predict_route(planned)).two_sigma
-    np.testing.assert_array_equal(route.errors.max(axis=0), errors.max(axis=0))
+    errors = predict_errors(planned, predict_route(planned))
+    largest = np.array([errors.position_two_sigma.max(), errors.two_sigma[:, 2].max()])
+    np.testing.assert_array_equal(route.errors.max(axis=0), largest)
     drawn = chart(route, None)
     assert drawn.count("class='c-error'") == 2
-    assert f">{1000 * errors[:, :2].max():.1f} mm<" in drawn
-    assert f">{np.degrees(errors[:, 2].max()):.2f}°<" in drawn
+    assert f">{1000 * largest[0]:.1f} mm<" in drawn
+    assert f">{np.degrees(largest[1]):.2f}°<" in drawn
+    # Each source has its name below the bars; what shows least here, the range, is too low to be drawn.
+    assert all(f"</span>{name}</span>" in drawn for name in CONTRIBUTIONS)
+    assert {name for n, name in enumerate(CONTRIBUTIONS) if f"c-source-{n}'" in drawn} >= {"noise", "map", "mounting"}
+
+
+def test_bars_of_sources_end_at_the_level_and_have_the_heights_of_their_shares() -> None:
+    axis = TrackAxis(
+        length=2.0, metres=np.array([0.0, 1.0]), fills=("red", "red"), stops=np.empty(0), recoveries=np.empty(0)
+    )
+    shares = np.array([[0.5, 0.25, 0.25, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0]])
+    track = Stacked(title="2σ [mm]", levels=np.array([10.0, 5.0]), shares=shares, limit=20.0, limit_text="20 mm")
+    drawn = stacked(track, axis)
+    # The axis ends a twentieth above the limit of 20 mm, which is drawn 20 / 21 of 60 pixels above the bottom.
+    bars = re.findall(r"c-source-(\d)' x='[\d.]+' y='([\d.]+)' width='[\d.]+' height='([\d.]+)'", drawn)
+    heights = {(int(source), float(height)) for source, _, height in bars}
+    unit = 60.0 / 21.0
+    expected = {(0, 5.0), (1, 2.5), (2, 2.5), (4, 5.0)}
+    assert heights == {(source, round(level * unit, 2)) for source, level in expected}
+    assert min(float(y) for _, y, _ in bars) == round(60.0 - 10.0 * unit, 2)
+    assert f"y1='{60.0 / 21.0:.1f}'" in drawn
+    # A limit that is far above the bars is told.
+    far = stacked(replace(track, limit=100.0, limit_text="100 mm"), axis)
+    assert "↑ limit 100 mm" in far
+    assert "↑ limit" not in drawn
 
 
 def test_the_floor_is_marked_where_the_supervisor_stops_and_lets_go_on(project: Project) -> None:

@@ -73,8 +73,8 @@ def test_every_figure_is_the_same(shown: RunView, written: Path) -> None:
     assert curves["Inliers, outliers per scan", "inliers"].tolist() == [float(row["inliers"]) for row in table]
     assert curves["Inliers, outliers per scan", "outliers"].tolist() == [float(row["outliers"]) for row in table]
     for title, label, variance in (
-        ("2σ of x, y [mm]", "x [mm]", "var_x"),
-        ("2σ of x, y [mm]", "y [mm]", "var_y"),
+        ("2σ of position [mm]", "x [mm]", "var_x"),
+        ("2σ of position [mm]", "y [mm]", "var_y"),
     ):
         sigmas = [2000.0 * math.sqrt(float(row[variance])) for row in table]
         np.testing.assert_allclose(curves[title, label], sigmas, rtol=1e-12)

@@ -48,7 +48,7 @@ CLI = (
         tests=(TESTS + "test_predict_tells_millimetres_and_degrees",),
     ),
     Mutant(
-        name="true error of the heading told in radians",
+        name="error of the heading told in radians",
         file=FOLDER + "predict.py",
         find="{PLAIN_DEGREES.text(error_heading, '.2f')}",
         replace="{error_heading:.2f} deg",

@@ -40,17 +40,17 @@ PAGE = (
         tests=(NUMBERS + "test_the_badge_counts_the_seconds_since_the_vehicle_failed",),
     ),
     Mutant(
-        name="one sigma of x shown as two",
+        name="one sigma of the position shown as two",
         file=FOLDER + "run/now_panel.py",
-        find="MILLIMETRES.against(sigma_x,",
-        replace="MILLIMETRES.against(0.5 * sigma_x,",
+        find="MILLIMETRES.against(largest,",
+        replace="MILLIMETRES.against(0.5 * largest,",
         tests=(NUMBERS + "test_a_number_of_the_newest_cycle_is_that_of_its_study",),
     ),
     Mutant(
         name="sigma of x in the row of y",
         file=FOLDER + "run/now_panel.py",
-        find="MILLIMETRES.against(sigma_y,",
-        replace="MILLIMETRES.against(sigma_x,",
+        find="MILLIMETRES.text(sigma_y,",
+        replace="MILLIMETRES.text(sigma_x,",
         tests=(NUMBERS + "test_a_number_of_the_newest_cycle_is_that_of_its_study",),
     ),
     Mutant(
@@ -206,15 +206,15 @@ PAGE = (
     Mutant(
         name="route's largest sigma is one",
         file=FOLDER + "prediction/chart.py",
-        find="against(largest[:2].max(),",
-        replace="against(0.5 * largest[:2].max(),",
+        find="against(metres.position.max(),",
+        replace="against(0.5 * metres.position.max(),",
         tests=(NUMBERS + "test_the_numbers_along_a_route_are_those_of_its_prediction",),
     ),
     Mutant(
-        name="route's true error of x alone",
+        name="route's error is half of it",
         file=FOLDER + "prediction/chart.py",
-        find="MILLIMETRES.text(error[:2].max(),",
-        replace="MILLIMETRES.text(error[0],",
+        find="MILLIMETRES.text(error[0],",
+        replace="MILLIMETRES.text(0.5 * error[0],",
         tests=(NUMBERS + "test_the_numbers_along_a_route_are_those_of_its_prediction",),
     ),
     Mutant(
@@ -234,8 +234,8 @@ PAGE = (
     Mutant(
         name="heading along a route in radians",
         file=FOLDER + "prediction/chart.py",
-        find="DEGREES.of(worst[:, 2]),",
-        replace="worst[:, 2],",
+        find="DEGREES.of(worst[:, 1]),",
+        replace="worst[:, 1],",
         tests=(NUMBERS + "test_the_tracks_along_a_route_are_those_of_its_prediction",),
     ),
     Mutant(

@@ -17,8 +17,8 @@ PLANNING = (
     Mutant(
         name="share of the limit without the bias",
         file=FOLDER + "route_prediction.py",
-        find="np.abs(self.bias) + self.two_sigma",
-        replace="self.two_sigma",
+        find="np.hypot(bias[:, 0], bias[:, 1]) + self.position_two_sigma",
+        replace="self.position_two_sigma",
         tests=(
             TESTS
             + "test_route_prediction.py::test_load_is_bias_and_two_sigma_as_a_share_of_the_limit_of_the_worst_axis",
@@ -27,8 +27,8 @@ PLANNING = (
     Mutant(
         name="share of the limit of one sigma",
         file=FOLDER + "route_prediction.py",
-        find="(np.abs(self.bias) + self.two_sigma) / limits",
-        replace="(np.abs(self.bias) + 0.5 * self.two_sigma) / limits",
+        find="bias[:, 1]) + self.position_two_sigma",
+        replace="bias[:, 1]) + 0.5 * self.position_two_sigma",
         tests=(
             TESTS
             + "test_route_prediction.py::test_load_is_bias_and_two_sigma_as_a_share_of_the_limit_of_the_worst_axis",
@@ -119,8 +119,8 @@ PLANNING = (
     Mutant(
         name="best moment at a station stands for all",
         file=FOLDER + "station_accuracy.py",
-        find="float(said[scans].max())",
-        replace="float(said[scans].min())",
+        find="float(prediction.two_sigma[scans, :2].max())",
+        replace="float(prediction.two_sigma[scans, :2].min())",
         tests=(TESTS + "test_station_accuracy.py::test_the_worst_moment_at_a_station_and_the_worse_axis_count",),
     ),
     Mutant(

@@ -1,4 +1,4 @@
-"""The true error along a route: the filter's own covariance where nothing else happens, and drives where it does."""
+"""The error along a route and what it comes from: the filter's own covariance where it fits, and drives elsewhere."""
 
 from dataclasses import replace
 
@@ -10,12 +10,18 @@ from commission.localization import whole_run
 from commission.localization.estimate import Belief
 from commission.localization.setup import LocalizerSetup
 from commission.planning.detection_noise import DetectionNoise
+from commission.planning.error_budget import CONTRIBUTIONS, PredictedErrors, predict_errors
 from commission.planning.error_kernels import ErrorModel, propagate_errors
 from commission.planning.route_prediction import PredictionOptions, plan_route, predict_route
-from commission.planning.true_error import CONTRIBUTIONS, predict_errors
 from commission.simulation.scenario import start_of, virtual_drive
 from commission.site.disturbances import ConstantErrors, Disturbances
-from commission.site.parameters import AssociationParameters, FilterParameters, ObservationParameters, Parameters
+from commission.site.parameters import (
+    AssociationParameters,
+    FilterParameters,
+    ObservationParameters,
+    Parameters,
+    SupervisorParameters,
+)
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.uncertainty import Uncertainty
 from commission.studies.metrics import pose_errors, reference_at
@@ -29,7 +35,7 @@ FITTING = ObservationParameters(range_sigma=0.008, bearing_sigma=0.0025)
 
 def squares_with(planned, prediction, worth: tuple[float, ...], start: tuple[float, float, float]) -> np.ndarray:
     """(K, 3, 3) errors when every detection is worth the same."""
-    squares, parts = np.empty((len(planned.drive), 3, 3)), np.empty((len(planned.drive), 5, 3))
+    squares, parts = np.empty((len(planned.drive), 3, 3)), np.empty((len(planned.drive), 5, 3, 3))
     model, constants = planned.model(), planned.constants()
     noise = DetectionNoise(read_only(np.broadcast_to(np.array(worth), (1, 2, 6)).copy()), 0.2)
     propagate_errors(
@@ -52,7 +58,7 @@ def squares_with(planned, prediction, worth: tuple[float, ...], start: tuple[flo
         np.empty(len(squares)),
         parts,
     )
-    np.testing.assert_allclose(parts.sum(axis=1), np.diagonal(squares, axis1=1, axis2=2), rtol=1e-9)
+    np.testing.assert_allclose(parts.sum(axis=1), squares, rtol=1e-9, atol=1e-18)
     return squares
 
 
@@ -140,9 +146,9 @@ def test_every_constant_has_its_own_part_of_the_error_and_none_that_is_exact():
     for name, known in alone.items():
         planned = plan_route(replace(field, uncertainty=replace(EXACT, **known)), "Line")
         errors = predict_errors(planned, predict_route(planned))
-        share = errors.parts[-1].sum(axis=1)
+        share = np.abs(errors.parts[-1]).sum(axis=(1, 2))
         assert {CONTRIBUTIONS[i] for i in np.flatnonzero(share)} == {"noise", name}
-        np.testing.assert_allclose(errors.parts.sum(axis=1), np.diagonal(errors.squares, axis1=1, axis2=2), rtol=1e-9)
+        np.testing.assert_allclose(errors.parts.sum(axis=1), errors.squares, rtol=1e-9, atol=1e-18)
 
 
 @pytest.mark.parametrize("consider", [True, False], ids=["considered", "taken for noise"])
@@ -169,3 +175,25 @@ def test_predicted_error_is_that_of_drives_with_all_constants_drawn(consider: bo
     ratio = np.sqrt(predicted[100:450] / np.mean(squares, axis=0))
     # A drive is one draw of its constants: 40 of them know an RMS of one axis to 11 %.
     assert (np.abs(np.median(ratio, axis=0) - 1.0) < 0.25).all(), np.median(ratio, axis=0)
+
+
+@pytest.mark.parametrize("rule", ["axes", "largest"])
+def test_shares_are_those_along_the_direction_that_the_supervisor_looks_at(rule: str):
+    # Noise of 2 mm along x, a map that is off by 6 mm along a diagonal: 4 + 18, 18 and 18 mm^2.
+    parts = np.zeros((1, 5, 3, 3))
+    parts[0, 0, 0, 0] = 4e-6
+    parts[0, 1, :2, :2] = 18e-6
+    parts[0, 4, 2, 2] = 9e-6
+    errors = PredictedErrors(parts.sum(axis=1), np.ones(1), parts, SupervisorParameters(position_sigma=rule))
+    # By hand: along x 22 mm^2, of which 4 are noise; in any direction 20 + sqrt(2^2 + 18^2).
+    if rule == "axes":
+        largest, noise = 22e-6, 4.0 / 22.0
+    else:
+        largest = (20.0 + np.sqrt(328.0)) * 1e-6
+        angle = 0.5 * np.arctan2(36.0, 4.0)
+        noise = 4e-6 * np.cos(angle) ** 2 / largest
+    assert errors.position_two_sigma == pytest.approx([2.0 * np.sqrt(largest)], rel=1e-12)
+    assert errors.position_shares[0] == pytest.approx([noise, 1.0 - noise, 0.0, 0.0, 0.0], rel=1e-9)
+    assert errors.heading_shares[0].tolist() == [0.0, 0.0, 0.0, 0.0, 1.0]
+    alone = {"axes": np.sqrt(18e-6), "largest": 6e-3}[rule]
+    assert errors.part_two_sigma[0] == pytest.approx([4e-3, 2.0 * alone, 0.0, 0.0, 0.0])
