@@ -77,7 +77,6 @@ def test_the_predicted_error_is_that_of_halls_with_all_constants_drawn(site: str
     halls = [hall(project, route, planned.drive.length, seed) for seed in seeds(FEW_HALLS, HALLS)]
     for of in AXES:
         found = ratio(predicted, halls, of)
-        print(f"{site}, {route}: {of} {found.value:.3f} ± {found.margin:.3f}, plain {found.plain:.3f}")
         margin = 0.0 if seeds.all else found.margin
         # A budget that is off by half would be seen even by few.
         assert found.margin < (0.1 if seeds.all else 0.5)

@@ -150,6 +150,12 @@ def predicted(page: OpenPage, runtime: Runtime) -> None:
     until(lambda: runtime.service(PredictionService).view is not None)
 
 
+def budget(page: OpenPage, runtime: Runtime) -> None:
+    """What the error along a route comes from."""
+    predicted(page, runtime)
+    page.page.locator(".c-sources").scroll_into_view_if_needed()
+
+
 def suggested(page: OpenPage, runtime: Runtime) -> None:
     """A layout from nothing, before it is accepted."""
     page.open_tab("Plan")
@@ -255,6 +261,7 @@ PICTURES = (
     Picture("measured", "laboratory", measured),
     Picture("page_plan", "shop_floor", heatmap),
     Picture("plan_route", "warehouse", predicted),
+    Picture("budget", "warehouse", budget),
     Picture("page_suggested", "shop_floor", suggested),
     Picture("ambiguous", "laboratory", ambiguous),
     Picture("along", "shop_floor", along),
