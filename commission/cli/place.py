@@ -51,6 +51,9 @@ class Place:
     """Largest 2-sigma of x and y on the routes [m]. None: the project's, or else the supervisor's."""
     heading_limit: float | None = None
     """Largest 2-sigma of the heading on the routes [deg]. None: the project's, or else the supervisor's."""
+    leeway: float | None = None
+    """Where reflectors at all places together hardly keep a limit, or do not: how much more than what they give is good
+    enough, as a share: 0.1 is 10 %; 0 takes nearly all of them. None: as in the project (0.1 unless changed)."""
     min_spacing: float | None = None
     """Smallest distance between two reflectors [m]. None: as in the project (0.5 unless changed)."""
     unambiguous: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="stations|starts|X,Y|X,Y,HEADING")] = ()
@@ -126,6 +129,7 @@ class Place:
                 visible=self.visible,
                 position_limit=self.position_limit,
                 heading_limit=None if self.heading_limit is None else math.radians(self.heading_limit),
+                leeway=self.leeway,
                 spacing=self.min_spacing,
             ),
         )
@@ -202,4 +206,6 @@ def _told(unmet: Unmet) -> str:
         nearest = f" (nearest: metre {unmet.metres[0]} of route {unmet.route!r})" if unmet.metres else ""
         return f"{unmet.place}: another pose sees the same, or fewer than two reflectors are visible{nearest}"
     what = "too few visible" if unmet.reason == "visible" else "uncertainty over its limit"
-    return f"route {unmet.route!r}: {what} on {len(unmet.metres)} m, from {unmet.metres[0]} m"
+    stretches = ", ".join(f"{first} to {last}" for first, last in unmet.stretches())
+    where = f"route {unmet.route!r}: {what} on {len(unmet.metres)} m ({stretches} m)"
+    return where if unmet.beyond is None else f"{where}: {unmet.beyond.told()}"

@@ -19,6 +19,7 @@ from commission.planning.route_prediction import (
     restricted,
     station_scans,
 )
+from commission.planning.unmet import Beyond, beyond
 from commission.site.layout_brief import Demands
 from commission.site.parts import Equipped
 
@@ -32,6 +33,10 @@ LEAST_MORE = 1e-3
 """What is asked for more at least, of the information that there is: more than rounding hides."""
 NECESSARY = 600
 """Rows that the bound rests on, at most."""
+NEARLY = 0.9
+"""Share of a limit from which, with all places, it is looked at which failing ones cost most."""
+DEAREST = 2
+"""Reflectors at one place of a route whose failing is predicted with all others standing."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +65,9 @@ class LayoutLimits:
         self._count = len(planned[0].reflectors) if planned else 0
         self._demanded = [_limits(route, site, demands) for route in planned]
         self._allowed = [limits.copy() for limits in self._demanded]
+        self._leeway = 1.0 + demands.leeway
+        self._best: list[FloatArray] = []
+        """Per route, (K, 3) 2-sigma with all M reflectors, whichever single one fails; empty until asked for."""
         self._hard: dict[tuple[int, int], None] = {}
         """Route and reflector failing that were too much of late, the latest last."""
         self._necessary: list[tuple[FloatArray, float]] = []
@@ -70,24 +78,52 @@ class LayoutLimits:
         gains = np.array([gains for gains, _ in self._necessary]).reshape(len(self._necessary), self._count)
         return gains, np.array([need for _, need in self._necessary])
 
-    def over(self, taken: BoolArray) -> list[BoolArray]:
-        """Per route, which scans pass a limit, with nothing broken or with any single reflector failing."""
-        result = [np.zeros(len(route.drive), dtype=np.bool_) for route in self._planned]
+    def kept(self, taken: BoolArray) -> list[FloatArray]:
+        """Per route, (K, 3) largest 2-sigma with nothing broken or with any single reflector failing."""
+        result = [np.zeros_like(limits) for limits in self._demanded]
         for (index, _), _, variances in self._predicted(taken, self._damages(taken)):
-            result[index] |= np.any(2.0 * np.sqrt(variances) > self._demanded[index], axis=1)
+            result[index] = np.maximum(result[index], 2.0 * np.sqrt(variances))
         return result
 
-    def allow(self, over: list[BoolArray]) -> None:
-        """Ask no more of scans: nothing that could be put up keeps their limits."""
-        for allowed, mask in zip(self._allowed, over, strict=True):
-            allowed[mask] = np.inf
+    def beyond(self, taken: BoolArray) -> list[Beyond | None]:
+        """Per route, the metres on which a limit is passed, and how near to it all M reflectors would come."""
+        best = self._best or self._attainable()
+        return [
+            beyond(route, kept, limits, there)
+            for route, kept, limits, there in zip(self._planned, self.kept(taken), self._demanded, best, strict=True)
+        ]
 
-    def allow_what_nothing_keeps(self, fixed: BoolArray) -> None:
-        """Ask nothing of scans that pass a limit even with all M reflectors, those that stay (M,) among them."""
-        everything = np.ones_like(fixed)
-        damages = [(index, NOTHING) for index in range(len(self._planned))]
+    def allow(self, kept: list[FloatArray]) -> None:
+        """Ask no more of scans than what a layout keeps there: nothing that could be put up has kept their limits."""
+        for allowed, there in zip(self._allowed, kept, strict=True):
+            np.copyto(allowed, np.inf, where=np.any(there > allowed, axis=1, keepdims=True))
+
+    def allow_what_little_keeps(self) -> None:
+        """Ask of each scan no more than what all M reflectors give there, and the leeway of the demands."""
+        self._best = self._attainable()
+        for allowed, best in zip(self._allowed, self._best, strict=True):
+            np.maximum(allowed, self._leeway * best, out=allowed)
+
+    def _attainable(self) -> list[FloatArray]:
+        """Per route, (K, 3) 2-sigma with all M reflectors; near a limit, without those that cost most there as well."""
+        everything, result = np.ones(self._count, np.bool_), [np.zeros_like(limits) for limits in self._demanded]
+        damages: list[tuple[int, int]] = []
+        for key, prediction, variances in self._predicted(everything, [(i, NOTHING) for i in range(len(result))]):
+            result[key[0]] = 2.0 * np.sqrt(variances)
+            if self._survives:
+                damages += [(key[0], gone) for gone in self._dearest(key[0], prediction, result[key[0]])]
         for (index, _), _, variances in self._predicted(everything, damages):
-            self._allowed[index][np.any(2.0 * np.sqrt(variances) > self._allowed[index], axis=1)] = np.inf
+            result[index] = np.maximum(result[index], 2.0 * np.sqrt(variances))
+        return result
+
+    def _dearest(self, index: int, prediction: RoutePrediction, two_sigma: FloatArray) -> list[int]:
+        """Reflectors that have the largest part in the information wherever even all together are near a limit."""
+        route, shares = self._planned[index], two_sigma / self._demanded[index]
+        found: set[int] = set()
+        for scan, axis in _worst_apart(route, shares, NEARLY, len(shares)):
+            gains = tangent_at(route, prediction, scan, axis).gains
+            found.update(np.argsort(-gains, kind="stable")[:DEAREST].tolist())
+        return sorted(found)
 
     def excess(self, taken: BoolArray, enough: int = 1) -> list[Excess]:
         """Return rows that a layout does not fulfil: none when it keeps all limits.
@@ -145,20 +181,25 @@ class LayoutLimits:
         index, gone = key
         route, limits, left = self._planned[index], self._allowed[index], _without(taken, gone)
         shares = 4.0 * variances / limits**2
-        axes, worst = shares.argmax(axis=1), shares.max(axis=1)
-        for _ in range(PER_DAMAGE):
-            scan = int(worst.argmax())
-            if worst[scan] <= 1.0:
-                return
-            axis, share = int(axes[scan]), float(worst[scan])
+        for scan, axis in _worst_apart(route, shares, 1.0, PER_DAMAGE):
+            share = float(shares[scan, axis])
             tangent = tangent_at(route, prediction, scan, axis)
             gains = np.where(np.arange(len(left)) == gone, 0.0, tangent.gains)
             # The tangent knows neither the error beyond what the filter says nor chance: it is held against itself.
             yield Excess(gains, float(gains[left].sum()) + max(1.0 - 1.0 / share, LEAST_MORE))
             if len(self._necessary) < NECESSARY:
                 self._necessary.append((gains, tangent.need(0.25 * limits[scan, axis] ** 2)))
-            metres = route.drive.metres
-            worst[np.abs(metres - metres[scan]) < APART_M] = 0.0
+
+
+def _worst_apart(route: PlannedRoute, shares: FloatArray, least: float, most: int) -> Iterator[tuple[int, int]]:
+    """Scan and axis of the largest (K, 3) shares of a limit above a least one, some way apart from each other."""
+    axes, worst, metres = shares.argmax(axis=1), shares.max(axis=1), route.drive.metres
+    for _ in range(most):
+        scan = int(worst.argmax())
+        if worst[scan] <= least:
+            return
+        yield scan, int(axes[scan])
+        worst[np.abs(metres - metres[scan]) < APART_M] = 0.0
 
 
 def _without(taken: BoolArray, gone: int) -> BoolArray:

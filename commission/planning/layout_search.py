@@ -134,12 +134,13 @@ class LayoutSearch:
     def unmet(self, taken: BoolArray) -> tuple[Unmet, ...]:
         """Metres of the routes and places where a demand does not hold with a layout (M,)."""
         found: list[Unmet] = []
-        for route, covers, over in zip(self._planned, self._covers, self._limits.over(taken), strict=True):
+        for route, covers, over in zip(self._planned, self._covers, self._limits.beyond(taken), strict=True):
             unseen = covers[:, taken].sum(axis=1) < self._base
-            for mask, reason in ((unseen, "visible"), (over, "uncertainty")):
-                metres = np.unique(route.drive.metres[mask].astype(np.int64))
-                if len(metres):
-                    found.append(Unmet(route.name, tuple(metres.tolist()), reason))
+            metres = np.unique(route.drive.metres[unseen].astype(np.int64))
+            if len(metres):
+                found.append(Unmet(route.name, tuple(metres.tolist()), "visible"))
+            if over is not None:
+                found.append(Unmet(route.name, over.metres, "uncertainty", beyond=over))
         for place, rivals in zip(self._places, self._distinction.rivals(taken).tolist(), strict=True):
             if rivals:
                 found.append(self._ambiguous_at(place))
@@ -161,12 +162,12 @@ class LayoutSearch:
         """Return a layout that holds, as far as any does."""
         self._report(0.0, "choosing reflectors")
         taken = cover(self._cover, rng, FIRST_EXCHANGES, lambda done: self._report(0.1 * done, "choosing reflectors"))
-        self._limits.allow_what_nothing_keeps(self._cover.fixed)
+        self._limits.allow_what_little_keeps()
         found, taken = self._repaired(taken)
         if found:
             return taken
         # What is not met now stays so: it only must not become more.
-        self._limits.allow(self._limits.over(taken))
+        self._limits.allow(self._limits.kept(taken))
         self._rivals_left = self._distinction.rivals(taken)
         return self._cleared(taken)
 

@@ -15,6 +15,7 @@ from commission.site.quantity import (
     DEGREES,
     MILLIMETRES,
     NOT_NEGATIVE,
+    PERCENT,
     POSITIVE,
     Bounds,
     Group,
@@ -113,6 +114,11 @@ class Demands:
         Quantity(label="2σ heading", unit="rad", shown=DEGREES, bounds=POSITIVE, step=0.01, entry=(0.01, 90.0)),
     ] = None
     """Largest 2-sigma of the heading on the routes. None: the supervisor's."""
+    leeway: Annotated[
+        float, Quantity(label="Leeway", shown=PERCENT, bounds=Bounds.between(0.0, 1.0), step=1.0, entry=(0.0, 100.0))
+    ] = 0.1
+    """Where reflectors at all places together hardly keep a limit, or do not: how much more than what they give is
+    good enough. Otherwise such a stretch takes nearly all of them for very little."""
     spacing: Annotated[
         float, Quantity(label="Apart", unit="m", bounds=NOT_NEGATIVE, step=0.05, entry=(0.0, 100.0), decimals=4)
     ] = 0.5

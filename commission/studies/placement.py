@@ -15,6 +15,7 @@ from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
 from commission.planning.nominal_drive import nominal_drive
 from commission.planning.placement import Placement, PlacementOptions, Unmet, place
+from commission.planning.unmet import Beyond
 from commission.progress import Progress, part, silent
 from commission.site.floor_map import FloorMap
 from commission.site.parameters import Parameters
@@ -107,6 +108,8 @@ class UnmetStretch:
     """Metre at which the stretch ends."""
     points: FloatArray
     """(N, 2) the way there [m], map frame."""
+    beyond: Beyond | None = None
+    """Of an uncertainty, by how much it passes its limit there."""
 
     @property
     def place(self) -> tuple[float, float]:
@@ -124,6 +127,12 @@ class PlacementResult:
     """What was found."""
     unmet: tuple[UnmetStretch, ...]
     """Where it does not do."""
+
+    @property
+    def farthest(self) -> Beyond | None:
+        """Of the stretches on which a limit is passed, the one where it is passed most; None without any."""
+        over = [each.beyond for each in self.unmet if each.beyond is not None]
+        return max(over, key=lambda each: each.kept[each.worst()] / each.limits[each.worst()], default=None)
 
     @property
     def added(self) -> FloatArray:
@@ -159,10 +168,11 @@ def _stretches(inputs: PlacementInput, unmet: tuple[Unmet, ...]) -> list[UnmetSt
     found: list[UnmetStretch] = []
     for each in unmet:
         drive = nominal_drive(inputs.route(each.route), inputs.vehicle, inputs.scanners)
-        metres = np.array(each.metres)
-        for stretch in np.split(metres, np.flatnonzero(np.diff(metres) > 1) + 1):
-            first, last = int(stretch[0]), int(stretch[-1]) + 1
+        for first, last in each.stretches():
             on_it = (drive.metres >= first) & (drive.metres < last)
             points = drive.poses[on_it, :2]
-            found.append(UnmetStretch(route=each.route, reason=each.reason, first=first, last=last, points=points))
+            by = None if each.beyond is None else each.beyond.between(first, last)
+            found.append(
+                UnmetStretch(route=each.route, reason=each.reason, first=first, last=last, points=points, beyond=by)
+            )
     return found

@@ -29,11 +29,12 @@ from commission.app.placement.view import LayoutView
 from commission.app.placement.wish import LayoutWish
 from commission.site.fields import get_field
 from commission.site.layout_brief import Demands, LayoutBrief
-from commission.studies.placement import PlacementResult
+from commission.site.quantity import DEGREES, MILLIMETRES
+from commission.studies.placement import PlacementResult, UnmetStretch
 
 POSITION, HEADING = "demands.position_limit", "demands.heading_limit"
 DEMANDS = (
-    *("visible", "survive_failure", "position_limit", "heading_limit"),
+    *("visible", "survive_failure", "position_limit", "heading_limit", "leeway"),
     *("unambiguous_starts", "unambiguous_stations"),
 )
 CANDIDATES = (
@@ -174,6 +175,8 @@ def found_text(found: LayoutView) -> str:
         shown = min(len(suggestion.unmet), MOST_UNMET)
         more = f", the first {shown} listed" if shown < len(suggestion.unmet) else ""
         notes.append(f"Not met on {len(suggestion.unmet)} stretches{more}; a click goes there.")
+    if suggestion.farthest is not None:
+        notes.append(f"Worst: {suggestion.farthest.told()}.")
     if found.outdated:
         notes.append("The site has changed since: suggest again.")
     elif found.wished_otherwise:
@@ -184,9 +187,20 @@ def found_text(found: LayoutView) -> str:
 
 def _unmet_lines(suggestion: PlacementResult) -> list[tuple[str, theme.Color]]:
     return [
-        (f"{each.route}, {each.first} to {each.last} m: {REASONS.get(each.reason, each.reason)}", theme.WARNING_LINE)
+        (f"{each.route}, {each.first} to {each.last} m: {_reason(each)}", theme.WARNING_LINE)
         for each in suggestion.unmet[:MOST_UNMET]
     ]
+
+
+def _reason(stretch: UnmetStretch) -> str:
+    """Say what is not met; of a limit, what is kept, and with a reflector at every place."""
+    by = stretch.beyond
+    if by is None:
+        return REASONS.get(stretch.reason, stretch.reason)
+    worst = by.worst()
+    shown, form = (DEGREES, ".2f") if by.is_heading[worst] else (MILLIMETRES, ".1f")
+    kept = shown.against(float(by.kept[worst]), float(by.limits[worst]), (form, form))
+    return f"2σ {kept}, all places {shown.number(float(by.best[worst]), form)}"
 
 
 def _areas_text(count: int) -> str:
