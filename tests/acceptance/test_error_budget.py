@@ -41,12 +41,15 @@ class Ratio:
 
 
 def draws(truth: Truth) -> list[float]:
-    """Mean squares, over the scanners, of what was drawn of each kind, in units of their variances, less 1."""
+    """Squares of what was drawn of each kind, in units of their variances, less 1: of the scanners together.
+
+    What they have in common moves the pose most: the sum of n standard normal numbers over the root of n is another.
+    """
     known = Uncertainty(survey=SURVEY)
     own = (known.mounting_position, known.mounting_position, known.mounting_heading)
     units = np.array([*own, known.range_bias, known.clock])
     of_scanners = [np.array([*each.mounting, each.range_bias, each.clock_offset]) / units for each in truth.scanners]
-    squares = np.mean(np.square(of_scanners), axis=0)
+    squares = np.square(np.sum(of_scanners, axis=0)) / len(of_scanners)
     return [float(each) - 1.0 for each in (squares[:2].mean(), *squares[2:])]
 
 

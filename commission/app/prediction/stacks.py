@@ -39,9 +39,10 @@ def stacked(track: Stacked, axis: TrackAxis) -> str:
     """Draw bars whose sources lie one above the other, and the limit."""
     largest = max(float(track.levels.max(initial=0.0)), 1e-9)
     is_near = track.limit <= FAR_LIMIT * largest
-    top = max(round_up(largest), 1.05 * track.limit) if is_near else round_up(1.25 * largest)
-    steps = (0.5 * round_up(largest), round_up(largest)) if is_near else (0.5 * top, top)
-    parts = [each for level in steps for each in tick(TALL * (1.0 - level / top), number_text(level))]
+    top = max(1.3 * largest, 1.05 * track.limit if is_near else 0.0)
+    step = round_up(0.5 * largest)
+    levels = [level for level in (0.0, step, 2.0 * step) if level <= top]
+    parts = [each for level in levels for each in tick(TALL * (1.0 - level / top), number_text(level))]
     parts += _bars(axis, track, TALL / top)
     red = theme.css(theme.POSE)
     if is_near:
