@@ -15,7 +15,10 @@ from commission.cli.parsing import initial_pose
 from commission.site.quantity import MILLIMETRES, PERCENT, PLAIN_DEGREES
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from commission.studies.run import RunResult
+    from commission.studies.sections import Section
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +57,7 @@ class Localize:
         from commission.studies.run import RunInput, judged_run, summary
         from commission.studies.run_findings import run_findings
         from commission.studies.scanner_figures import figures_entries
+        from commission.studies.sections import section_entries, sections
         from commission.studies.start import start_of
 
         names, sources = (ESTIMATES, DETECTIONS, SUMMARY), (self.recording, self.project)
@@ -68,21 +72,27 @@ class Localize:
 
         whole_run.warm_up()
         result = judged_run(RunInput.of(project, log, start))
+        cut = sections(result.columns, project.stations)
         findings = [str(finding) for finding in run_findings(result)]
 
-        more = {"scanners": figures_entries(result.scanners), "findings": findings}
+        more = {
+            "scanners": figures_entries(result.scanners),
+            "sections": section_entries(cut),
+            "findings": findings,
+        }
         with out.writing() as folder:
             write_results(folder, result.columns, summary(result) | more)
         true = [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
         notes = [f"Note         {finding}" for finding in findings]
-        sys.stdout.write("\n".join([*_report(result), *true, *notes, f"Written to   {self.out}"]) + "\n")
+        sys.stdout.write("\n".join([*_report(result, cut), *true, *notes, f"Written to   {self.out}"]) + "\n")
 
 
-def _report(result: RunResult) -> list[str]:
+def _report(result: RunResult, cut: Sequence[Section]) -> list[str]:
     """Lines that tell a person how the run went; millimetres and degrees as is the habit."""
     from commission.localization.estimate import Status
 
     start = result.inputs.start
+    fits = result.consistency
     limit = result.inputs.segments[0].setup.parameters.supervisor.position_limit
     x, y, theta = start.belief.mean
     lines = [
@@ -91,11 +101,12 @@ def _report(result: RunResult) -> list[str]:
         f"Detections   {result.count(Status.INLIER)} inliers, "
         f"{result.count(Status.OUTLIER_DETECTOR)} outliers of the detector, "
         f"{result.count(Status.OUTLIER_ASSOCIATION)} of the association",
-        f"NIS          mean {_known(result.nis_mean)} of the accepted ({result.nis_expected:.2f} is consistent), "
-        f"{_known(result.nis_before_gate_mean)} of all near a reflector; "
-        f"{_known(PERCENT.of(result.rejected_fraction), 1)} % rejected",
-        f"Unseen       {_known(PERCENT.of(result.unseen_fraction), 1)} % of the cycles without an accepted detection, "
-        f"{result.longest_unseen:.1f} s at most",
+        f"NIS          mean {_known(fits.nis_mean)} of the accepted ({fits.nis_expected:.2f} is consistent), "
+        f"{_known(fits.nis_before_gate_mean)} of all near a reflector; "
+        f"{_known(PERCENT.of(fits.rejected_fraction), 1)} % rejected",
+        f"Unseen       {_known(PERCENT.of(fits.unseen_fraction), 1)} % of the cycles without an accepted detection, "
+        f"{fits.longest_unseen:.1f} s at most",
+        *_by_section(cut),
         *_by_scanner(result),
         f"Supervisor   operational {PERCENT.text(result.operational_fraction, '.1f')}, lost "
         f"{PERCENT.text(result.lost_fraction, '.1f')}; fail episodes: {len(result.episodes)}"
@@ -127,6 +138,20 @@ def _report(result: RunResult) -> list[str]:
 def _known(figure: float, digits: int = 2) -> str:
     """A figure of detections, of which there may be none."""
     return "unknown" if math.isnan(figure) else f"{figure:.{digits}f}"
+
+
+def _by_section(cut: Sequence[Section]) -> list[str]:
+    """A line for each section between stations, where any is passed."""
+    if len(cut) == 1:
+        return []
+    return [
+        f"Section      {each.begin} to {each.end}, {each.from_s:.1f} to {each.to_s:.1f} s: NIS "
+        f"{_known(each.figures.nis_before_gate_mean)} of all near a reflector, "
+        f"{_known(PERCENT.of(each.figures.rejected_fraction), 1)} % rejected; unseen "
+        f"{PERCENT.text(each.figures.unseen_fraction, '.1f')} of the cycles, "
+        f"{each.figures.longest_unseen:.1f} s at most"
+        for each in cut
+    ]
 
 
 def _by_scanner(result: RunResult) -> list[str]:

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import gammaincinv  # pyright: ignore[reportMissingTypeStubs]
+from scipy.special import gammainc, gammaincinv  # pyright: ignore[reportMissingTypeStubs]
 
 from commission.geometry.angles import wrap
 from commission.geometry.arrays import FloatArray
@@ -33,6 +33,30 @@ def chi_square_gate(probability: float, dof: int) -> float:
     if dof < 1:
         raise ValueError(f"degrees of freedom is {dof}; expected at least 1")
     return 2.0 * float(gammaincinv(0.5 * dof, probability))
+
+
+def truncated_chi_square_mean(gate: float, dof: int) -> float:
+    """Mean of a squared Mahalanobis distance of those Gaussian vectors that lie inside a gate.
+
+    Parameters
+    ----------
+    gate : largest squared Mahalanobis distance that passes, more than 0; infinite without a gate.
+    dof : degrees of freedom, at least 1.
+
+    Returns
+    -------
+    mean : 1.685 for two degrees of freedom and the gate of 95 %; `dof` without a gate.
+
+    Notes
+    -----
+    With F_n the chi-square distribution, x f_n(x) = n f_n+2(x), so that E[x | x < g] = n F_n+2(g) / F_n(g). For n = 2:
+    2 - g e^(-g/2) / (1 - e^(-g/2)).
+    """
+    if not gate > 0.0:
+        raise ValueError(f"gate is {gate}; expected more than 0")
+    if math.isinf(gate):
+        return float(dof)
+    return dof * float(gammainc(0.5 * dof + 1.0, 0.5 * gate)) / float(gammainc(0.5 * dof, 0.5 * gate))
 
 
 def mahalanobis_squared(deviations: ArrayLike, covariances: ArrayLike) -> FloatArray:

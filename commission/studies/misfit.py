@@ -17,7 +17,7 @@ from commission.geometry.angles import wrap
 from commission.geometry.arrays import FloatArray, read_only
 from commission.localization import whole_run
 from commission.localization.detection_log import DetectionLog
-from commission.localization.estimate import Belief, Mode, Status
+from commission.localization.estimate import Belief, Status
 from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress, silent
@@ -25,6 +25,7 @@ from commission.site.disturbances import WheelNoise
 from commission.site.quantity import DEGREES, MILLIMETRES, MILLISECONDS, PERCENT
 from commission.site.record_log import RecordLog
 from commission.site.scanner import Scanner
+from commission.studies.consistency_findings import lost_findings
 from commission.studies.inputs import StudyInput
 from commission.studies.plausibility import Finding
 from commission.studies.scanner_figures import scanner_figures
@@ -39,11 +40,6 @@ BETTER = 0.94
 """A suspicion must lower the misfit to this share of what it was."""
 SURE = 40.0
 """It must lower the sum of the squared Mahalanobis distances by this much: 6 sigma of one parameter (chi-square)."""
-LOST_FOR_S = 1.0
-"""Shortest time of being lost that is told: no shorter one stops a drive for long."""
-LOST_WINDOW_S = 5.0
-LOST_SHARE = 0.4
-"""Accepted share over a window of 5 s below which the vehicle is probably lost [0..1]."""
 DISAGREEMENT = math.radians(0.25)
 """Difference between the mean bearings of two scanners from which their mountings are suspected [rad]. A smaller error
 is shared out by the filter, which gives way to both: it is the business of a calibration."""
@@ -110,7 +106,7 @@ def misfit(inputs: MisfitInput, progress: Progress = silent) -> tuple[Finding, .
     -------
     findings : none where the setup fits, or where nothing fits better.
     """
-    lost = tuple(_lost(inputs.run))
+    lost = lost_findings(inputs.run)
     detected = inputs.run.detected.part(0, min(JUDGED_CYCLES, len(inputs.run)))
     if not len(detected.range_bearing):
         return lost
@@ -127,45 +123,6 @@ def misfit(inputs: MisfitInput, progress: Progress = silent) -> tuple[Finding, .
     lags = tuple(_lag(replace(inputs, setup=trusting(inputs.setup)), detected))
     progress(1.0, "")
     return (*lost, *apart, *biases, *lags)
-
-
-def _lost(run: RunColumns) -> Iterator[Finding]:
-    """Say from when on most detections fit no reflector, to the end of the drive."""
-    judged = run.counts(Status.INLIER) + run.counts(Status.OUTLIER_ASSOCIATION)
-    accepted = run.counts(Status.INLIER)
-    if not judged.sum():
-        return
-    times = (run.stamps_ns - run.stamps_ns[0]) * 1e-9
-    first = np.searchsorted(times, times - LOST_WINDOW_S)
-    sums = [np.concatenate(([0], np.cumsum(counts))) for counts in (accepted, judged)]
-    good, all_ = (total[1:] - total[first] for total in sums)
-    fits = np.flatnonzero((all_ == 0) | (good >= LOST_SHARE * all_))
-    since = int(fits[-1]) + 1 if len(fits) else 0
-    if since == len(run):
-        yield from _lost_and_found(run, times)
-        return
-    rejected = 1.0 - accepted[since:].sum() / max(1, judged[since:].sum())
-    yield Finding(
-        found=f"{PERCENT.text(rejected)} of the detections are rejected from {times[since]:.1f} s on",
-        probably="the vehicle is lost there, whatever its covariance says, or most of what it detects is no reflector",
-        remedy="look at what happens just before, and at the other notes",
-    )
-
-
-def _lost_and_found(run: RunColumns, times: FloatArray) -> Iterator[Finding]:
-    """Say for how long the supervisor called the vehicle lost, where it was found again and it was no moment."""
-    lost = np.concatenate(([False], run.modes == Mode.LOST, [False]))
-    begins, ends = np.flatnonzero(lost[1:] & ~lost[:-1]), np.flatnonzero(~lost[1:] & lost[:-1]) - 1
-    lengths = times[ends] - times[begins]
-    if not len(lengths) or lengths.max() < LOST_FOR_S:
-        return
-    longest = int(np.argmax(lengths))
-    yield Finding(
-        found=f"the vehicle is lost for {lengths.sum():.1f} s in all, the longest time "
-        f"from {times[begins[longest]]:.1f} to {times[ends[longest]]:.1f} s",
-        probably="it takes one reflector for another there, or much of what it detects is no reflector",
-        remedy="look at what happens just before; odometry or detections may be noisier than the parameters say",
-    )
 
 
 def _mounting(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iterator[Finding]:

@@ -24,6 +24,7 @@ from commission.localization.whole_run import run_segments
 from commission.progress import Progress, part, silent
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
+from commission.studies.consistency import Consistency, Recent, consistency, recent
 from commission.studies.inputs import StudyInput
 from commission.studies.metrics import (
     ErrorStatistics,
@@ -124,6 +125,10 @@ class RunResult:
     """(K, 3) 2-sigma of x [m], y [m] and heading [rad] after each cycle."""
     position_two_sigma: FloatArray
     """(K,) 2-sigma of the position that the supervisor holds against its limit [m]."""
+    consistency: Consistency
+    """How well the detections of the whole drive fit."""
+    recent: Recent
+    """The same over the last second before each cycle."""
     counts: IntArray
     """(K, 3) detections of each `Status` in each cycle."""
     nis: FloatArray
@@ -148,50 +153,9 @@ class RunResult:
         return float(np.mean(self.columns.modes == Mode.OPERATIONAL))
 
     @property
-    def nis_mean(self) -> float:
-        """Mean squared Mahalanobis distance of the inliers (2 degrees of freedom); NaN without inliers.
-
-        The gate cuts off the tail: for a consistent filter and a gate of 95 % it is 1.68, not 2.
-        """
-        inlier = self.columns.status == Status.INLIER
-        return float(np.mean(self.columns.d2[inlier])) if inlier.any() else math.nan
-
-    @property
-    def nis_expected(self) -> float:
-        """Mean that a consistent filter has behind the gate: 2 - g e^(-g/2) / (1 - e^(-g/2)), chi-square cut at g."""
-        gate = self.columns.segments[0].setup.filter.gate
-        if not gate.enabled:
-            return 2.0
-        beyond = math.exp(-0.5 * gate.d2)
-        return 2.0 - gate.d2 * beyond / (1.0 - beyond)
-
-    @property
-    def nis_before_gate_mean(self) -> float:
-        """Mean squared Mahalanobis distance of all detections that have a reflector near, accepted or not."""
-        known = np.isfinite(self.columns.d2) & (self.columns.status != Status.OUTLIER_DETECTOR)
-        return float(np.mean(self.columns.d2[known])) if known.any() else math.nan
-
-    @property
     def lost_fraction(self) -> float:
         """Share of the cycles in which the supervisor says that the vehicle is lost [0..1]."""
         return float(np.mean(self.columns.modes == Mode.LOST))
-
-    @property
-    def rejected_fraction(self) -> float:
-        """Share of the detections that the association filter rejects [0..1]; NaN without detections."""
-        accepted, rejected = self.count(Status.INLIER), self.count(Status.OUTLIER_ASSOCIATION)
-        return rejected / (accepted + rejected) if accepted + rejected else math.nan
-
-    @property
-    def unseen_fraction(self) -> float:
-        """Share of the cycles without any accepted detection [0..1]."""
-        return float(np.mean(self.counts[:, Status.INLIER] == 0))
-
-    @property
-    def longest_unseen(self) -> float:
-        """Longest time between two accepted detections, or to either end of the run [s]."""
-        seen = self.times[self.counts[:, Status.INLIER] > 0]
-        return float(np.diff(np.concatenate((self.times[:1], seen, self.times[-1:]))).max())
 
     @property
     def without_reference(self) -> tuple[int, int]:
@@ -275,6 +239,8 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
         position_errors=read_only(np.hypot(errors[:, 0], errors[:, 1])),
         two_sigma=read_only(two_sigma_of(columns.covariances)),
         position_two_sigma=read_only(supervised_two_sigma(columns)),
+        consistency=consistency(columns),
+        recent=recent(columns),
         counts=read_only(np.stack([columns.counts(status) for status in Status], axis=1)),
         nis=read_only(largest_nis(columns)),
         statistics=statistics,
@@ -340,12 +306,12 @@ def summary(result: RunResult) -> dict[str, Number]:
         "operational_fraction": result.operational_fraction,
         "lost_fraction": result.lost_fraction,
         "fail_episodes": len(result.episodes),
-        "nis_mean": result.nis_mean,
-        "nis_expected": result.nis_expected,
-        "nis_before_gate_mean": result.nis_before_gate_mean,
-        "rejected_fraction": result.rejected_fraction,
-        "unseen_fraction": result.unseen_fraction,
-        "longest_unseen_s": result.longest_unseen,
+        "nis_mean": result.consistency.nis_mean,
+        "nis_expected": result.consistency.nis_expected,
+        "nis_before_gate_mean": result.consistency.nis_before_gate_mean,
+        "rejected_fraction": result.consistency.rejected_fraction,
+        "unseen_fraction": result.consistency.unseen_fraction,
+        "longest_unseen_s": result.consistency.longest_unseen,
         "microseconds_per_cycle": result.microseconds_per_cycle,
     }
     if result.statistics is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from commission.progress import Progress, part, silent
+from commission.studies.consistency_findings import noise_findings
 from commission.studies.misfit import MisfitInput, misfit
 from commission.studies.plausibility import Finding, PlausibilityInput, plausibility
 from commission.studies.run import RunResult
@@ -40,4 +41,6 @@ def run_findings(result: RunResult, progress: Progress = silent) -> tuple[Findin
         run=result.columns,
     )
     before = plausibility(recording_input(result), part(progress, 0.0, JUDGED_BEFORE))
-    return (*before, *misfit(inputs, part(progress, JUDGED_BEFORE, 1.0)))
+    found = misfit(inputs, part(progress, JUDGED_BEFORE, 1.0))
+    # A factor of the noise says little where the setup itself is another one.
+    return (*before, *found, *(noise_findings(result.columns) if not found else ()))

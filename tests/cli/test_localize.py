@@ -36,7 +36,7 @@ def test_the_results_are_those_of_the_recording(commission, project, recording, 
     code, told, err = commission("localize", project, recording, "--out", out)
     assert (code, err) == (0, "")
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    assert list(summary) == [*KEYS, *KEYS_WITH_REFERENCE, "scanners", "findings"]
+    assert list(summary) == [*KEYS, *KEYS_WITH_REFERENCE, "scanners", "sections", "findings"]
     assert summary["cycles"] == 61
     assert summary["duration_s"] == pytest.approx(12.0)
     assert summary["inliers"] + summary["outliers_association"] == 61 * 5
@@ -74,6 +74,7 @@ def test_without_a_reference_the_errors_are_left_out_and_the_route_says_where_it
     assert list(json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))) == [
         *KEYS,
         "scanners",
+        "sections",
         "findings",
     ]
 

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.stats import chi2
 
 from commission.geometry import gaussian
 
@@ -25,6 +27,23 @@ def test_gate_matches_the_printed_chi_square_table(probability: float, dof: int,
 def test_gate_refuses_a_probability_outside_the_open_interval(probability: float) -> None:
     with pytest.raises(ValueError, match="gate probability is"):
         gaussian.chi_square_gate(probability, 2)
+
+
+@pytest.mark.parametrize("probability", [0.05, 0.5, 0.95, 0.999])
+@pytest.mark.parametrize("dof", [1, 2, 3, 7])
+def test_the_mean_behind_a_gate_is_the_integral_up_to_it(probability: float, dof: int) -> None:
+    gate = float(chi2.ppf(probability, dof))
+    integral, _ = quad(lambda x: x * chi2.pdf(x, dof), 0.0, gate)
+    assert gaussian.truncated_chi_square_mean(gate, dof) == pytest.approx(integral / probability, rel=1e-6)
+
+
+def test_the_mean_behind_a_gate_of_two_degrees_of_freedom_has_a_formula_and_without_a_gate_is_their_number() -> None:
+    beyond = math.exp(-0.5 * 5.991464547)
+    expected = 2.0 - 5.991464547 * beyond / (1.0 - beyond)
+    assert gaussian.truncated_chi_square_mean(5.991464547, 2) == pytest.approx(expected, rel=1e-12)
+    assert gaussian.truncated_chi_square_mean(math.inf, 3) == 3.0
+    with pytest.raises(ValueError, match="gate is 0"):
+        gaussian.truncated_chi_square_mean(0.0, 2)
 
 
 def covariance(major: float, minor: float, angle: float) -> np.ndarray:

@@ -146,5 +146,5 @@ def test_from_when_on_a_vehicle_is_lost_is_said() -> None:
     )
     finding = judged(moved)[0]
     since = float(finding.found.split(" from ")[1].removesuffix(" s on"))
-    # The window of 5 s holds 40 % of good scans until 3 s after the change.
-    assert since == pytest.approx(33.0, abs=0.3)
+    # The supervisor calls it lost within half a second; by the share over 5 s alone it would be after 3 s.
+    assert 30.0 < since < 30.5

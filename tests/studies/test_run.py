@@ -108,23 +108,23 @@ def test_a_standing_vehicle_that_sees_well_is_consistent_and_operational():
     assert result.operational_fraction == 1.0
     assert result.episodes == ()
     # Of a gate of 95 %: mean of a chi-square (2 degrees of freedom) cut off at 5.99. 6 sigma of 9,500 values is 0.1.
-    assert result.nis_mean == pytest.approx(1.685, abs=0.1)
+    assert result.consistency.nis_mean == pytest.approx(1.685, abs=0.1)
 
 
 @pytest.mark.parametrize(("probability", "expected"), [(0.95, 1.6847), (0.99, 1.9070), (0.5, 0.6137)])
 def test_expected_nis_is_the_mean_of_a_chi_square_cut_off_at_the_gate(probability, expected):
     # By integration of x e^(-x/2) / 2 over 0 ... gate (5.991, 9.210, 1.386), over the gate's probability.
     project = hall(association=AssociationParameters(gate_probability=probability))
-    assert replayed(project, standing_still(3)).nis_expected == pytest.approx(expected, abs=1e-4)
+    assert replayed(project, standing_still(3)).consistency.nis_expected == pytest.approx(expected, abs=1e-4)
 
 
 def test_shares_are_those_of_the_detections_and_cycles():
     result = replayed(hall(), standing_still(400, blind=range(100, 150)))
     inliers, outliers = result.count(Status.INLIER), result.count(Status.OUTLIER_ASSOCIATION)
-    assert result.rejected_fraction == pytest.approx(outliers / (inliers + outliers))
-    assert result.unseen_fraction == pytest.approx(50 / 400)
+    assert result.consistency.rejected_fraction == pytest.approx(outliers / (inliers + outliers))
+    assert result.consistency.unseen_fraction == pytest.approx(50 / 400)
     # From the last scan that saw something to the first one that does again.
-    assert result.longest_unseen == pytest.approx(51 * PERIOD_NS * 1e-9)
+    assert result.consistency.longest_unseen == pytest.approx(51 * PERIOD_NS * 1e-9)
     assert result.lost_fraction == 0.0
 
 

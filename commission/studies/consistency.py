@@ -1,0 +1,133 @@
+"""Whether detections fit what the filter says of them: over a drive, a stretch of it, or the last second of it.
+
+What the gate accepts looks consistent whatever the filter believes. So every figure of the accepted comes with that of
+all, with the share that was rejected, and with how long nothing was accepted.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
+from commission.geometry.gaussian import truncated_chi_square_mean
+from commission.localization.estimate import Status
+from commission.localization.run_columns import RunColumns
+
+DOF = 2
+"""Degrees of freedom of a detection: range and bearing."""
+RECENT_S = 1.0
+"""Time over which the figures of a moment are taken [s]: a single scan has too few detections to say anything."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Consistency:
+    """Figures of a stretch of cycles; NaN where there is nothing to take them of."""
+
+    cycles: int
+    """Number of cycles."""
+    accepted: int
+    """Detections that corrected the estimate."""
+    rejected: int
+    """Detections that the association filter rejected."""
+    nis_mean: float
+    """Mean squared Mahalanobis distance of the accepted (2 degrees of freedom)."""
+    nis_expected: float
+    """What that is for a consistent filter: less than 2, as the gate cuts off the tail."""
+    nis_before_gate_mean: float
+    """Mean squared Mahalanobis distance of all detections that have a reflector near, accepted or not: 2 is consistent,
+    as far as what is seen are reflectors of the map."""
+    rejected_fraction: float
+    """Share of the rejected [0..1]."""
+    unseen_fraction: float
+    """Share of the cycles without any accepted detection [0..1]."""
+    longest_unseen: float
+    """Longest time between two accepted detections, or to either end of the stretch [s]."""
+
+
+def has_distance(columns: RunColumns) -> BoolArray:
+    """(n,) whether each detection passed the detector and has a reflector whose distance is known."""
+    return np.isfinite(columns.d2) & (columns.status != Status.OUTLIER_DETECTOR)
+
+
+def consistency(columns: RunColumns, first: int = 0, after: int | None = None) -> Consistency:
+    """Figures of the cycles from `first` to the one before `after`; to the last one when None.
+
+    Parameters
+    ----------
+    columns : the run.
+    first, after : bounds of at least one cycle.
+    """
+    after = len(columns) if after is None else after
+    rows = slice(int(columns.offsets[first]), int(columns.offsets[after]))
+    status, d2 = columns.status[rows], columns.d2[rows]
+    inlier, outlier = status == Status.INLIER, status == Status.OUTLIER_ASSOCIATION
+    accepted, rejected = int(np.count_nonzero(inlier)), int(np.count_nonzero(outlier))
+    per_cycle = columns.counts(Status.INLIER)[first:after]
+    times = np.asarray((columns.stamps_ns[first:after] - columns.stamps_ns[first]) * 1e-9, dtype=np.float64)
+    seen = times[per_cycle > 0]
+    return Consistency(
+        cycles=after - first,
+        accepted=accepted,
+        rejected=rejected,
+        nis_mean=_mean(d2[inlier]),
+        nis_expected=_expected(columns, first, after),
+        nis_before_gate_mean=_mean(d2[has_distance(columns)[rows]]),
+        rejected_fraction=rejected / (accepted + rejected) if accepted + rejected else math.nan,
+        unseen_fraction=float(np.mean(per_cycle == 0)),
+        longest_unseen=float(np.diff(np.concatenate((times[:1], seen, times[-1:]))).max()),
+    )
+
+
+def _expected(columns: RunColumns, first: int, after: int) -> float:
+    """Mean NIS of a consistent filter behind its gate; of several gates as often as each is used."""
+    ends = np.append(columns.firsts[1:], len(columns))
+    cycles = np.clip(ends, first, after) - np.clip(columns.firsts, first, after)
+    means = [
+        truncated_chi_square_mean(gate.d2 if gate.enabled else math.inf, DOF)
+        for gate in (segment.setup.filter.gate for segment in columns.segments)
+    ]
+    return float(np.average(means, weights=cycles))
+
+
+class Recent(NamedTuple):
+    """Figures over the last second before each of K cycles, that cycle included; NaN where nothing is seen."""
+
+    nis: FloatArray
+    """(K,) mean squared Mahalanobis distance of all detections that have a reflector near."""
+    rejected: FloatArray
+    """(K,) share of the detections that are rejected [0..1]."""
+
+
+def recent(columns: RunColumns) -> Recent:
+    """Figures of each moment of a run.
+
+    Parameters
+    ----------
+    columns : the run.
+    """
+    firsts = np.searchsorted(columns.stamps_ns, columns.stamps_ns - round(RECENT_S * 1e9), side="right")
+    known = has_distance(columns)
+    sums = _between(np.where(known, columns.d2, 0.0), columns, firsts)
+    count = _between(known.astype(np.float64), columns, firsts)
+    outliers = _between((columns.status == Status.OUTLIER_ASSOCIATION).astype(np.float64), columns, firsts)
+    inliers = _between((columns.status == Status.INLIER).astype(np.float64), columns, firsts)
+    return Recent(read_only(_ratio(sums, count)), read_only(_ratio(outliers, inliers + outliers)))
+
+
+def _between(values: FloatArray, columns: RunColumns, firsts: IntArray) -> FloatArray:
+    """(K,) sum of a value of each detection from a cycle on, up to and with each of the cycles."""
+    totals = np.concatenate(([0.0], np.cumsum(values)))
+    return totals[columns.offsets[1:]] - totals[columns.offsets[firsts]]
+
+
+def _ratio(values: FloatArray, counts: FloatArray) -> FloatArray:
+    """Values by their counts; NaN where nothing is counted."""
+    return np.where(counts > 0.0, values / np.maximum(counts, 1.0), math.nan)
+
+
+def _mean(values: FloatArray) -> float:
+    return float(values.mean()) if len(values) else math.nan
