@@ -65,7 +65,7 @@ class VisibleReflectors(NamedTuple):
     offsets: IntArray
     """(N + 1,) the reflectors of pose n are `indices[offsets[n]:offsets[n + 1]]`."""
     indices: IntArray
-    """(total,) indices into the reflector map, ascending for each pose."""
+    """(total,) indices into the reflector map, ascending for each pose unless said otherwise."""
 
     def of(self, pose: int) -> IntArray:
         """Indices of the reflectors that one pose sees."""
