@@ -219,8 +219,23 @@ def _judge(  # noqa: PLR0917 - a scan and a cluster in it
 
 @compiled_inline
 def _window(distance: float, tilt: Tilt, step: float, kind: int, model: DetectorModel) -> BeamWindow:
-    """Beams that a class of reflectors shows at a distance; a plate as its ranges say that it stands."""
-    radius, flat = model.radii[kind], model.flat[kind]
+    """Beams that a class of reflectors shows at a distance; a plate as its ranges say that it stands.
+
+    Of an unknown radius the window reaches from the smallest to the largest that it may be.
+    """
+    window = _window_of(distance, model.radii[kind], tilt, step, model.flat[kind], model)
+    if model.smallest[kind] == model.largest[kind]:
+        return window
+    narrow = _window_of(distance, model.smallest[kind], tilt, step, model.flat[kind], model)
+    wide = _window_of(distance, model.largest[kind], tilt, step, model.flat[kind], model)
+    return BeamWindow(narrow.fewest, wide.most, window.likely)
+
+
+@compiled_inline
+def _window_of(  # noqa: PLR0917 - one size of a reflector
+    distance: float, radius: float, tilt: Tilt, step: float, flat: bool, model: DetectorModel
+) -> BeamWindow:
+    """Beams that a reflector of one size shows."""
     if not model.by_width:
         return window_of_equation_3(distance, radius, flat, step)
     if flat:

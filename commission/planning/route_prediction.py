@@ -286,7 +286,7 @@ def plan_route(
     reflectors = model.reflectors
     seen = seen_in_turn(models, drive.poses, drive.scanners)
     surveyed = np.array([survey_variance(each, site.uncertainty) for each in reflectors.reflectors])
-    own = np.array([each.sigma**2 for each in reflectors.reflectors])
+    own = np.array([each.sigma**2 + each.radius_sigma**2 for each in reflectors.reflectors])
     believed = surveyed if site.parameters.filter.consider else own
     places = np.column_stack((reflectors.centers, believed, surveyed))
     return PlannedRoute(

@@ -12,7 +12,7 @@ from commission.app.base.field_widget import add_widget, held, meant, write_held
 from commission.app.base.panel import Post, escaped, posting, write
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.site.fields import field_info, get_field
+from commission.site.fields import FieldInfo, field_info, get_field
 from commission.site.quantity import PERCENT
 
 Setting: TypeAlias = bool | int | float | str | None
@@ -79,9 +79,15 @@ class Inputs:
             name,
             widget,
             lambda content: meant(info, content),
-            lambda state: None if (value := self._read(state, name)) is None else held(info, value),
+            lambda state: self._shown(info, self._read(state, name)),
         )
         return widget
+
+    @staticmethod
+    def _shown(info: FieldInfo, value: Any) -> Any:
+        """Return what a widget shows for a value; None: nothing, unless there is a word for it."""
+        has_word = info.quantity is not None and bool(info.quantity.none)
+        return None if value is None and not has_word else held(info, value)
 
     def choice(self, name: str, of: object, names: Mapping[Any, str]) -> GuiInputHandle[Any]:
         """Add a list of what a field may be, each called by a name.

@@ -99,10 +99,12 @@ def _bodies(scene: SceneApi, project: Project) -> tuple[SceneNodeHandle, ...]:
             continue
         round_one = kind is ReflectorKind.CYLINDER
         sizes = [
-            (r.radius, r.radius, SHOWN_HEIGHT) if round_one else (PLATE_THICKNESS, 2 * r.radius, SHOWN_HEIGHT)
+            (r.reckoned_radius, r.reckoned_radius, SHOWN_HEIGHT)
+            if round_one
+            else (PLATE_THICKNESS, 2 * r.reckoned_radius, SHOWN_HEIGHT)
             for r in chosen
         ]
-        headings = np.array([0.0 if round_one else r.heading for r in chosen])
+        headings = np.array([0.0 if round_one else r.heading or 0.0 for r in chosen])
         wxyzs = np.zeros((len(chosen), 4))
         wxyzs[:, 0], wxyzs[:, 3] = np.cos(0.5 * headings), np.sin(0.5 * headings)
         nodes.append(

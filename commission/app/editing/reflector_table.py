@@ -25,7 +25,7 @@ ORDERS: dict[str, Callable[[Reflector], Any]] = {
     "name": lambda r: (len(r.id), r.id),
     "x": lambda r: r.x,
     "y": lambda r: r.y,
-    "radius": lambda r: r.radius,
+    "radius": lambda r: (r.radius is None, r.radius or 0.0),
     "kind": lambda r: (r.kind.value, r.id),
     "layer": lambda r: (r.layer, r.id),
 }
@@ -41,9 +41,9 @@ class TableView:
 
 def row_text(reflector: Reflector) -> str:
     """Return a reflector on one line."""
-    kind = "" if reflector.kind.value == "cylinder" else "  flat"
+    kind = "" if reflector.kind.value == "cylinder" else "  flat, faces ?" if reflector.lacks_direction else "  flat"
     rest = "  ".join(text for text in (reflector.layer, "locked" if reflector.locked else "") if text)
-    radius = MILLIMETRES.text(reflector.radius)
+    radius = "?" if reflector.radius is None else MILLIMETRES.text(reflector.radius)
     return f"{reflector.id}   {reflector.x:.3f}  {reflector.y:.3f} m   r {radius}{kind}  {rest}"
 
 
