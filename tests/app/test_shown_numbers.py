@@ -151,6 +151,8 @@ NOW: dict[str, Callable[[At], tuple[float, ...]]] = {
     "Inliers": lambda at: (float(np.sum(at.status == 0)),),
     "Outliers by beams, gate": lambda at: (float(np.sum(at.status == 1)), float(np.sum(at.status == 2))),
     "Largest NIS / gate": lambda at: (max(at.d2[at.status == 0]), GATE),
+    "NIS of all / expected, 1 s": lambda at: (at.run.result.recent.nis[40], 2.0),
+    "Rejected, 1 s": lambda at: (100.0 * at.run.result.recent.rejected[40],),
     "Cycle time": lambda at: (at.run.result.microseconds_per_cycle,),
     "Position error": lambda at: (1000.0 * error(at),),
 }

@@ -10,6 +10,7 @@ from commission.app.base.inputs import show
 from commission.app.base.panel import BasePanel, table
 from commission.app.base.view import PageView
 from commission.app.editing.editor import editor_of
+from commission.app.run.summary_panel import known, share
 from commission.app.run.view import RunView
 from commission.localization.estimate import Mode, Status
 from commission.site.quantity import DEGREES, MILLIMETRES
@@ -53,6 +54,8 @@ def rows(run: RunView) -> list[tuple[str, str]]:
             f"{estimate.count(Status.OUTLIER_DETECTOR)}, {estimate.count(Status.OUTLIER_ASSOCIATION)}",
         ),
         ("Largest NIS / gate", f"{nis} / {estimate.gate:.2f}"),
+        ("NIS of all / expected, 1 s", f"{known(result.recent.nis[newest])} / 2"),
+        ("Rejected, 1 s", share(result.recent.rejected[newest])),
         *_of_scanners(result),
         ("Cycle time", f"{result.microseconds_per_cycle:.1f} µs, mean of the drive"),
         ("Position error", MILLIMETRES.text(error, ".1f") if math.isfinite(error) else "no reference"),
