@@ -194,9 +194,15 @@ def problems(
         *_missed_stations(inputs, passed),
         *(problem for route in by_route for problem in route_problems(route.violations)),
     ]
+    return ProblemsResult(
+        problems=errors_first(found), inputs=inputs, floor=floor, by_route=tuple(by_route), passed=passed
+    )
+
+
+def errors_first(found: Iterable[Problem]) -> tuple[Problem, ...]:
+    """Sort problems by how bad they are; equally bad ones stay in their order."""
     order = list(Severity)
-    found.sort(key=lambda problem: order.index(problem.severity))
-    return ProblemsResult(problems=tuple(found), inputs=inputs, floor=floor, by_route=tuple(by_route), passed=passed)
+    return tuple(sorted(found, key=lambda problem: order.index(problem.severity)))
 
 
 def _floor_of(inputs: ProblemsInput, before: ProblemsResult | None) -> FloorDistances | None:
