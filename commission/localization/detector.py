@@ -161,6 +161,25 @@ def detect_clusters(  # noqa: PLR0917 - outputs are written into the arrays of t
     return row
 
 
+@compiled
+def passing_widths(distance: float, step: float, kind: int, model: DetectorModel) -> tuple[int, int]:
+    """Fewest and most beams with which a cluster passes as one class of reflectors; a plate however it stands.
+
+    Parameters
+    ----------
+    distance : to its center [m].
+    step : between beams [rad].
+    kind : row of the model's classes.
+    model : classes of reflectors and tolerances.
+
+    Notes
+    -----
+    fewest - min_model_error and most + max_model_error: Sobreira et al. 2016, Algorithm 2, line 7.
+    """
+    window = _window(distance, Tilt(0.0, 0.0), step, kind, model)
+    return max(window.fewest - model.fewer, 1), window.most + model.more
+
+
 @compiled_inline
 def _judge(  # noqa: PLR0917 - a scan and a cluster in it
     ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, first: int, last: int, model: DetectorModel

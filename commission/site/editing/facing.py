@@ -54,7 +54,9 @@ def faced_from_walls(reflectors: ReflectorMap, floor_map: FloorMap, near: float 
         if reflector.lacks_direction:
             if not reflector.locked:
                 found = [nearest_wall(grid, place, near) for place in _places(reflector, floor_map)]
-                heading = _agreed([wall for wall in found if wall is not None and _looks_free(wall, floor_map, grid)])
+                heading = _agreed(
+                    [wall for wall in found if wall is not None and _is_free_ahead(wall, floor_map, grid)]
+                )
             (left if heading is None else turned).append(reflector.id)
         changed.append(reflector if heading is None else replace(reflector, heading=heading))
     return Faced(ReflectorMap(tuple(changed)), tuple(turned), tuple(left))
@@ -66,7 +68,7 @@ def _places(reflector: Reflector, floor_map: FloorMap) -> list[tuple[float, floa
     return [(x, y), (x + off, y), (x - off, y), (x, y + off), (x, y - off)]
 
 
-def _looks_free(wall: WallPoint, floor_map: FloorMap, grid: OccupancyGrid) -> bool:
+def _is_free_ahead(wall: WallPoint, floor_map: FloorMap, grid: OccupancyGrid) -> bool:
     """Whether floor lies in front of a wall's surface, and not what nobody has seen; of a map of walls alone always."""
     if not (floor_map.cells == FREE).any():
         return True
