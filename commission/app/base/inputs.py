@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 
 from viser import GuiApi, GuiInputHandle
 
+from commission.app.base import theme
 from commission.app.base.actions import Action
 from commission.app.base.field_widget import add_widget, held, meant, write_held
 from commission.app.base.panel import Post, escaped, posting, write
@@ -115,6 +116,18 @@ class Inputs:
     def forget(self) -> None:
         """Write every widget anew when it follows next, whatever stands in it: it is another thing's from now on."""
         self._followed.clear()
+
+
+def add_find(gui: GuiApi, hint: str) -> GuiInputHandle[str]:
+    """Add a text that is sought in a list with every key.
+
+    Parameters
+    ----------
+    gui : where it is made.
+    hint : what it is part of.
+    """
+    gui.add_html(theme.LIVE)
+    return gui.add_text("Find", "", hint=hint)
 
 
 class WorkBar:

@@ -10,7 +10,7 @@ from viser import GuiApi, GuiTabHandle
 
 from commission.app.base import theme
 from commission.app.base.field_widget import Entry
-from commission.app.base.inputs import show
+from commission.app.base.inputs import add_find, show
 from commission.app.base.panel import BasePanel, Post
 from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
@@ -53,7 +53,7 @@ class ReflectorTable(BasePanel):
     def __init__(self, gui: GuiApi, post: Post, browser: int, tab: GuiTabHandle) -> None:
         self._browser = browser
         self._order = gui.add_dropdown("Sort by", tuple(ORDERS))
-        self._find = gui.add_text("Find", "", hint="Part of a name, layer or note.")
+        self._find = add_find(gui, "Part of a name, layer or note.")
         self._page = Entry(gui, "page", TableView())
         show(self._page.widget, visible=False)
         self._count = gui.add_html("")
