@@ -1,4 +1,4 @@
-"""An entry is finished when the engineer says so: drafts, Enter, Escape, refusals; each number of the page, key by key."""
+"""An entry is finished when the engineer says so: drafts, Enter, Escape, refusals; each number, key by key."""
 
 from __future__ import annotations
 

@@ -10,6 +10,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from commission.localization.beam_echo import BeamModel
+from commission.localization.beam_window import window_of_cylinder
 from commission.localization.detector import detect
 from commission.localization.detector_model import detector_model
 from commission.localization.estimate import Status
@@ -147,6 +149,19 @@ def test_equation_3_as_printed_rejects_what_wide_beams_see(
     assert passed < 0.5 * shown
     assert passing(beams, target) == (shown, shown)
     assert passing(beams, target, center="central_beam") == (shown, shown)
+
+
+@pytest.mark.parametrize(
+    ("aperture", "most"),
+    # 0.04 m of post at 4 m, beams 4 mm apart: 10 of them; 5 more on either side touch it with 20 mm of their width.
+    [(0.0, 10), (0.04, 20)],
+)
+def test_most_beams_of_a_post_are_those_that_touch_it(aperture: float, most: int) -> None:
+    scanner = Scanner(beam_width_deg=0.0, beam_aperture=aperture, bearing_sigma_deg=0.0)
+    known = detector_model(ReflectorMap((Reflector(id="R", x=0.0, y=0.0),)), scanner, DetectorParameters())
+    beam = BeamModel(known.half_divergence, known.half_aperture, known.bearing_sigma, known.range_sigma)
+    window = window_of_cylinder(4.0, 0.02, 0.001, beam)
+    assert abs(window.most - most) <= 1
 
 
 def test_what_is_twice_as_wide_is_no_reflector() -> None:
