@@ -24,6 +24,7 @@ REFLECTOR: Color = (48, 108, 255)
 GATE: Color = (96, 176, 255)
 POSE: Color = (255, 82, 82)
 INLIER: Color = (255, 214, 10)
+OFFSET: Color = (150, 132, 52)
 OUTLIER_ASSOCIATION: Color = (255, 59, 48)
 OUTLIER_DETECTOR: Color = (196, 74, 60)
 SCAN: Color = (190, 197, 206)
@@ -209,6 +210,8 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 [data-refused] :is(input,textarea){{border-color:{css(REFUSED)}!important}}
 [data-refused]::after{{content:attr(data-refused);flex-basis:100%;color:{css(REFUSED)};font-size:11.5px;
  line-height:1.3;padding-top:2px;overflow-wrap:anywhere}}
+.c-scale{{position:fixed;left:{LEFT_PX + 16}px;top:calc(var(--c-top) + 10px);padding:1px 8px;border-radius:3px;
+ background:rgba(16,18,21,.8);color:{css(INLIER)};font-size:12px;pointer-events:none;white-space:nowrap}}
 .c-stale .c-badge{{background:{IDLE_COLOR}!important;font-size:0!important;letter-spacing:0!important}}
 .c-stale .c-badge::after{{content:var(--c-stale);font-size:13px}}
 .c-stale .c-beside{{visibility:hidden}}
