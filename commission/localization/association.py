@@ -15,10 +15,21 @@ from numpy.typing import NDArray
 from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.gaussian import chi_square_gate
-from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering, innovation_given, take_out
+from commission.localization.consider import BLOCKS, Considering, innovation_with, seen_with
+from commission.localization.consider_columns import take_out
 from commission.localization.estimate import Status
-from commission.localization.kalman import squared_distance
-from commission.localization.observation import SMALLEST_RANGE, ObservationModel, expect, scanner_offset
+from commission.localization.kalman import innovation, squared_distance
+from commission.localization.observation import (
+    SMALLEST_RANGE,
+    Direction,
+    ObservationModel,
+    composed,
+    direction_of,
+    expect,
+    expect_at,
+    scanner_offset,
+    turn_to,
+)
 from commission.localization.pose_gaussian import PoseGaussian, larger_eigenvalue
 from commission.localization.reflector_index import Cells, cell_range
 from commission.site.parameters import AssociationParameters
@@ -26,6 +37,8 @@ from commission.site.parameters import AssociationParameters
 INLIER = int(Status.INLIER)
 OUTLIER_ASSOCIATION = int(Status.OUTLIER_ASSOCIATION)
 NOBODY = -1
+USUAL_RADIUS = 0.25
+"""A search around a detection that is mostly wide enough [m]."""
 
 
 class Gate(NamedTuple):
@@ -146,7 +159,7 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     model: ObservationModel,
     given: Considering | None,
     work: FloatArray | None,
-    at: int,
+    aim: Direction | None,
 ) -> tuple[float, float]:
     """Squared Mahalanobis distance to one reflector, and -2 ln(likelihood) up to a constant.
 
@@ -157,18 +170,44 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     x, y : the reflector's center [m], map frame.
     surveyed_variance : of the reflector's place, each axis [m^2].
     view, model : scanner's place, and model of the observation.
-    given, work : of the scan, where constants are considered, else None.
-    at : first column of the reflector in `work`.
+    given, work : of the scan, where constants are considered, else None; the reflector's columns are the first free.
+    aim : the bearing as a direction of the map, where constants are considered, else None.
 
     Notes
     -----
     d2 = v^T S^-1 v, and d2 + ln(det S / det R): Sobreira et al. 2016, Algorithm 3, line 4, with the power -1/2 that its
     likelihood lacks.
     """
-    expected = expect(belief.x, belief.y, belief.theta, view.offset_x, view.offset_y, x, y, model.mount_theta)
-    v = innovation_given(belief, expected, measured_range, measured_bearing, surveyed_variance, model, given, work, at)
+    if given is None or work is None or aim is None:
+        e = expect(belief.x, belief.y, belief.theta, view.offset_x, view.offset_y, x, y, model.mount_theta)
+        v = innovation(belief, e, measured_range, measured_bearing, surveyed_variance, model)
+    else:
+        dx, dy = x - (belief.x + view.offset_x), y - (belief.y + view.offset_y)
+        e = expect_at(dx, dy, math.nan, view.offset_x, view.offset_y)
+        seen = seen_with(given.facing, e, surveyed_variance, given, work, BLOCKS)
+        v = innovation_with(belief, e, measured_range, turn_to(-e.range_x, -e.range_y, aim), model, seen)
     d2 = squared_distance(v)
     return d2, d2 + math.log(v.s_rr * v.schur / (model.range_variance * model.bearing_variance))
+
+
+@compiled_inline
+def aimed_at(belief: PoseGaussian, bearing: float, model: ObservationModel, aim: Direction | None) -> Direction:
+    """Direction of a detection on the map.
+
+    Parameters
+    ----------
+    belief : pose of base.
+    bearing : measured [rad].
+    model : mounting of the scanner.
+    aim : the direction, where it is known already, else None.
+
+    Notes
+    -----
+    theta + mount + bearing, by definition.
+    """
+    if aim is None:
+        return direction_of(belief.theta + model.mount_theta + bearing)
+    return aim
 
 
 @compiled_inline
@@ -177,6 +216,7 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     measured_range: float,
     measured_bearing: float,
     view: Viewpoint,
+    reach: Viewpoint,
     model: ObservationModel,
     gate: Gate,
     cells: Cells,
@@ -185,7 +225,7 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     cross: FloatArray | None,
     given: Considering | None,
     work: FloatArray | None,
-    at: int,
+    aim: Direction | None,
 ) -> tuple[int, float]:
     """Most likely reflector of the whole map, found near the detection: its row in `places`, and d2.
 
@@ -209,17 +249,19 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     -----
     argmin over reflectors of d2 + ln(det S), see `score`: Sobreira et al. 2016, Algorithm 3, line 4.
     """
-    direction = belief.theta + model.mount_theta + measured_bearing
-    px = belief.x + view.offset_x + measured_range * math.cos(direction) - cells.origin_x
-    py = belief.y + view.offset_y + measured_range * math.sin(direction) - cells.origin_y
+    direction = aimed_at(belief, measured_bearing, model, aim)
+    px = belief.x + view.offset_x + measured_range * direction.cos - cells.origin_x
+    py = belief.y + view.offset_y + measured_range * direction.sin - cells.origin_y
     best, best_d2, best_cost = NOBODY, math.nan, math.inf
-    bound, reach, spread = gate.d2, view, cells.largest_variance
-    if given is not None:
-        reach, spread = widened(view, cells.largest_variance, given), 0.0
+    bound, spread = gate.d2, cells.largest_variance if given is None else 0.0
     while True:
         radius = search_radius(bound, measured_range, reach, model, spread)
-        first_row, last_row = cell_range(py - radius, py + radius, cells.size, cells.rows)
-        first_column, last_column = cell_range(px - radius, px + radius, cells.size, cells.columns)
+        # Nearly always the usual cells hold it: they are known before the radius is.
+        first_row, last_row = cell_range(py - USUAL_RADIUS, py + USUAL_RADIUS, cells.per_metre, cells.rows)
+        first_column, last_column = cell_range(px - USUAL_RADIUS, px + USUAL_RADIUS, cells.per_metre, cells.columns)
+        if radius > USUAL_RADIUS:
+            first_row, last_row = cell_range(py - radius, py + radius, cells.per_metre, cells.rows)
+            first_column, last_column = cell_range(px - radius, px + radius, cells.per_metre, cells.columns)
         for row in range(first_row, last_row + 1 if last_column >= first_column else first_row):
             start = cell_offsets[row * cells.columns + first_column]
             for entry in range(start, cell_offsets[row * cells.columns + last_column + 1]):
@@ -228,9 +270,11 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
                 if dx * dx + dy * dy > radius * radius:
                     continue
                 if cross is not None and given is not None and work is not None:
-                    take_out(work, at, cross, entry, given)
+                    take_out(work, BLOCKS, cross, entry, given)
                 variance = places[entry, 2]
-                d2, cost = score(belief, measured_range, measured_bearing, x, y, variance, view, model, given, work, at)
+                d2, cost = score(
+                    belief, measured_range, measured_bearing, x, y, variance, view, model, given, work, aim
+                )
                 if cost < best_cost or (cost == best_cost and places[entry, 3] < places[best, 3]):
                     best, best_d2, best_cost = entry, d2, cost
         if best != NOBODY:
@@ -241,6 +285,43 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
             return best, best_d2
         else:
             bound *= 16.0
+
+
+@compiled_inline
+def reach_of(view: Viewpoint, largest_variance: float, given: Considering | None) -> Viewpoint:
+    """Bounds by which reflectors are searched.
+
+    Parameters
+    ----------
+    view, largest_variance, given : as in `widened`; None: no constants are considered.
+
+    Notes
+    -----
+    No formula: `widened`, where constants are considered.
+    """
+    if given is None:
+        return view
+    return widened(view, largest_variance, given)
+
+
+@compiled_inline
+def aim_of(given: Considering | None, aims: FloatArray | None, detection: int) -> Direction | None:
+    """Direction of a detection of the scan on the map; None where no constants are considered.
+
+    Parameters
+    ----------
+    given, aims : of the scan, or None.
+    detection : number of it in the scan.
+
+    Notes
+    -----
+    theta + (mount + bearing), by definition.
+    """
+    if given is None:
+        return None
+    if aims is None:
+        return None
+    return composed(given.facing, Direction(aims[detection, 0], aims[detection, 1]))
 
 
 @compiled_inline
@@ -257,6 +338,7 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
     cross: FloatArray | None,
     given: Considering | None,
     work: FloatArray | None,
+    aims: FloatArray | None,
     status: NDArray[np.int8],
     entries: IntArray,
     d2: FloatArray,
@@ -271,7 +353,7 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
     model : of the observation.
     gate : of the association filter.
     cells, places, cell_offsets : the map, see `ReflectorIndex`.
-    cross, given, work : of the scan, where constants are considered, else None.
+    cross, given, work, aims : of the scan, where constants are considered, else None.
     status : (n,) in: INLIER or OUTLIER_DETECTOR, the latter is left alone; out: a `Status`.
     entries : (n,) out: row of `places`, or NOBODY.
     d2 : (n,) out: squared Mahalanobis distance, NaN for nobody.
@@ -285,6 +367,7 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
     is a false reflector beside the true one. With the filter disabled both stay, as in the paper.
     """
     view = viewpoint(belief, model)
+    reach = reach_of(view, cells.largest_variance, given)
     for i in range(first, last):
         entries[i] = NOBODY
         d2[i] = math.nan
@@ -296,6 +379,7 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
             measured,
             detections[i, 1],
             view,
+            reach,
             model,
             gate,
             cells,
@@ -304,7 +388,7 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
             cross,
             given,
             work,
-            BLOCKS + PER_REFLECTOR * (i - first),
+            aim_of(given, aims, i - first),
         )
         entries[i] = best
         d2[i] = best_d2

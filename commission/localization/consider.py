@@ -9,13 +9,23 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from commission.compiled import compiled_inline
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray
 from commission.localization.kalman import Gain, Innovation, correct, corrected_covariance, gain, innovation
-from commission.localization.observation import Expected, ObservationModel, expect, scanner_offset
+from commission.localization.observation import (
+    Direction,
+    Expected,
+    ObservationModel,
+    composed,
+    direction_of,
+    expect,
+    expect_at,
+    offset_facing,
+    scanner_offset,
+    turn_to,
+    turned_by,
+)
 from commission.localization.odometry import Motion, NextOdometry, velocity
 from commission.localization.pose_gaussian import PoseGaussian
 
@@ -25,8 +35,6 @@ PER_SCANNER = 5
 """Of a scanner: x, y and heading of its mounting, range bias, clock."""
 MOUNT_X, MOUNT_Y, MOUNT_HEADING, RANGE_BIAS, CLOCK, BLOCKS = range(3, 9)
 """Columns of a scan's working array: three of the transition, those of the scanner, then two for each detection."""
-NOTHING = 1e-60
-"""What is smaller is 0 [m^2]: numbers that fade away take a processor a hundred times as long before they vanish."""
 
 
 class ConsiderModel(NamedTuple):
@@ -50,6 +58,8 @@ class Considering(NamedTuple):
     """Velocity of base at the scan [m/s], in base."""
     speed_y: float
     turn_rate: float
+    facing: Direction
+    """Heading of the belief at the scan."""
 
 
 class Seen(NamedTuple):
@@ -124,71 +134,8 @@ def considering_at(
     """
     if cross is None:
         return None
-    return Considering(variances, belief.x - pivot[0], belief.y - pivot[1], twist[0], twist[1], twist[2])
-
-
-@compiled_inline
-def working_array(
-    cross: FloatArray | None, given: Considering | None, reflectors: int, scanner: int, detections: int
-) -> FloatArray | None:
-    """Array in which a scan is worked out: (3, 8 + 2 detections), its first eight columns written.
-
-    Parameters
-    ----------
-    cross : covariance of the pose with the constants; None gives None.
-    given : of the scan.
-    reflectors : N of the map.
-    scanner : index of the scanner.
-    detections : of the scan.
-
-    Notes
-    -----
-    F = [[1, 0, -my], [0, 1, mx], [0, 0, 1]] of all motion since `cross` was written, and F C of the scanner: Sobreira
-    et al. 2016, Algorithm 1, line 3. Every correction multiplies all columns alike, so the first three become the
-    transition of those constants that the scan says nothing of.
-    """
-    if given is None:
-        return None
-    if cross is None:
-        return None
-    work = np.zeros((3, BLOCKS + PER_REFLECTOR * detections))
-    for row in range(3):
-        for column in range(3):
-            work[row, column] = 1.0 if row == column else 0.0
-    work[0, 2], work[1, 2] = -given.moved_y, given.moved_x
-    start = PER_REFLECTOR * reflectors + PER_SCANNER * scanner
-    for i in range(PER_SCANNER):
-        _move(work, 3 + i, cross, start + i, given)
-    return work
-
-
-@compiled_inline
-def take_out(work: FloatArray, at: int, cross: FloatArray, entry: int, given: Considering) -> None:
-    """Write the columns of a reflector, carried to the scan.
-
-    Parameters
-    ----------
-    work : working array of the scan.
-    at : first of the two columns to write.
-    cross : covariance of the pose with the constants.
-    entry : row of the reflector in `places`.
-    given : of the scan.
-
-    Notes
-    -----
-    C = F C: Sobreira et al. 2016, Algorithm 1, line 3, of a state augmented by a constant.
-    """
-    _move(work, at, cross, PER_REFLECTOR * entry, given)
-    _move(work, at + 1, cross, PER_REFLECTOR * entry + 1, given)
-
-
-@compiled_inline
-def _move(work: FloatArray, at: int, cross: FloatArray, column: int, given: Considering) -> None:
-    """Carry one column to the scan."""
-    heading = cross[2, column]
-    work[0, at] = cross[0, column] - given.moved_y * heading
-    work[1, at] = cross[1, column] + given.moved_x * heading
-    work[2, at] = heading
+    facing = direction_of(belief.theta)
+    return Considering(variances, belief.x - pivot[0], belief.y - pivot[1], twist[0], twist[1], twist[2], facing)
 
 
 class ScannerJacobian(NamedTuple):
@@ -203,12 +150,14 @@ class ScannerJacobian(NamedTuple):
 
 
 @compiled_inline
-def scanner_jacobian(theta: float, e: Expected, speed_x: float, speed_y: float, turn_rate: float) -> ScannerJacobian:
+def scanner_jacobian(
+    facing: Direction, e: Expected, speed_x: float, speed_y: float, turn_rate: float
+) -> ScannerJacobian:
     """How mounting and clock of the scanner change what it sees.
 
     Parameters
     ----------
-    theta : heading of base [rad].
+    facing : heading of base.
     e : what is expected of a reflector.
     speed_x, speed_y, turn_rate : velocity of base [m/s, m/s, rad/s], in base.
 
@@ -217,7 +166,7 @@ def scanner_jacobian(theta: float, e: Expected, speed_x: float, speed_y: float, 
     H_xy R(theta) of the mounting; -H xdot of a clock that is late by one second. Derived from equation 2 of Sobreira et
     al. 2016.
     """
-    c, s = math.cos(theta), math.sin(theta)
+    c, s = facing
     mount_xr, mount_yr = c * e.range_x + s * e.range_y, c * e.range_y - s * e.range_x
     mount_xb, mount_yb = c * e.bearing_x + s * e.bearing_y, c * e.bearing_y - s * e.bearing_x
     # In base axes, H of the place is that of the mounting.
@@ -233,13 +182,13 @@ def scanner_jacobian(theta: float, e: Expected, speed_x: float, speed_y: float, 
 
 @compiled_inline
 def seen_with(  # noqa: PLR0917 - a detection and the constants, number by number
-    theta: float, e: Expected, surveyed_variance: float, given: Considering, work: FloatArray, at: int
+    facing: Direction, e: Expected, surveyed_variance: float, given: Considering, work: FloatArray, at: int
 ) -> Seen:
     """What the constants have to do with a detection.
 
     Parameters
     ----------
-    theta : heading of base [rad].
+    facing : heading of base.
     e : what is expected of the reflector.
     surveyed_variance : of its place, each axis [m^2].
     given : of the scan.
@@ -252,7 +201,7 @@ def seen_with(  # noqa: PLR0917 - a detection and the constants, number by numbe
     rest is `scanner_jacobian`. C J^T and J P_p J^T: derived from equation 2 of Sobreira et al. 2016.
     """
     mount_xr, mount_xb, mount_yr, mount_yb, clock_r, clock_b = scanner_jacobian(
-        theta, e, given.speed_x, given.speed_y, given.turn_rate
+        facing, e, given.speed_x, given.speed_y, given.turn_rate
     )
     p = given.variances
     places = surveyed_variance
@@ -295,7 +244,7 @@ def innovation_with(  # noqa: PLR0917 - a measurement, number by number
     belief: PoseGaussian,
     e: Expected,
     measured_range: float,
-    measured_bearing: float,
+    turn: float,
     model: ObservationModel,
     seen: Seen,
 ) -> Innovation:
@@ -304,8 +253,9 @@ def innovation_with(  # noqa: PLR0917 - a measurement, number by number
     Parameters
     ----------
     belief : before the correction.
-    e : observation expected from its mean.
-    measured_range, measured_bearing : range bias already taken off [m], [rad].
+    e : observation expected from its mean; its bearing is not read.
+    measured_range : range bias already taken off [m].
+    turn : from the expected bearing to the measured one [rad].
     model : of the observation.
     seen : what the constants have to do with it.
 
@@ -330,7 +280,7 @@ def innovation_with(  # noqa: PLR0917 - a measurement, number by number
     w = s_rb / s_rr
     return Innovation(
         measured_range - e.range,
-        wrap_scalar(measured_bearing - e.bearing),
+        turn,
         s_rr,
         w,
         max(s_bb - w * s_rb, model.bearing_variance),
@@ -343,6 +293,13 @@ def innovation_with(  # noqa: PLR0917 - a measurement, number by number
         bearing_py,
         bearing_pt,
     )
+
+
+class Corrected(NamedTuple):
+    """A belief after a detection, and the direction of its heading."""
+
+    belief: PoseGaussian
+    facing: Direction
 
 
 @compiled_inline
@@ -373,13 +330,86 @@ def correct_with(  # noqa: PLR0917 - a measurement and a reflector, number by nu
 
     Notes
     -----
-    x = x + K v, P = A P A^T + K N K^T - D K^T - K D^T with D = C J^T and N = R + J P_p J^T + H D + (H D)^T, which is
-    Joseph's form of the whole state, and C = A C - K J P_p: Schmidt 1966; A = I - K H.
+    No formula: `corrected_with`, of a bearing.
     """
     offset_x, offset_y = scanner_offset(belief.theta, model)
     e = expect(belief.x, belief.y, belief.theta, offset_x, offset_y, reflector_x, reflector_y, model.mount_theta)
-    d = seen_with(belief.theta, e, surveyed_variance, given, work, at)
-    v = innovation_with(belief, e, measured_range, measured_bearing, model, d)
+    turn, facing = wrap_scalar(measured_bearing - e.bearing), direction_of(belief.theta)
+    width = work.shape[1]
+    return corrected_with(
+        belief, facing, e, measured_range, turn, surveyed_variance, model, given, work, width, at
+    ).belief
+
+
+@compiled_inline
+def correct_aimed(  # noqa: PLR0917 - a measurement and a reflector, number by number
+    belief: PoseGaussian,
+    facing: Direction,
+    measured_range: float,
+    aim: Direction,
+    reflector_x: float,
+    reflector_y: float,
+    surveyed_variance: float,
+    model: ObservationModel,
+    given: Considering,
+    work: FloatArray,
+    width: int,
+    at: int,
+) -> Corrected:
+    """Correct a belief like `correct_with`, by directions instead of angles: without any arctangent, sine and cosine.
+
+    Parameters
+    ----------
+    belief : before the correction; it is linearized there.
+    facing : its heading.
+    measured_range : range bias already taken off [m].
+    aim : measured bearing, in base.
+    reflector_x, reflector_y, surveyed_variance, model, given, work, at : as in `correct_with`.
+    width : columns of `work` that are in use.
+
+    Notes
+    -----
+    No formula: `corrected_with`, of a direction.
+    """
+    offset_x, offset_y = offset_facing(facing, model)
+    dx, dy = reflector_x - (belief.x + offset_x), reflector_y - (belief.y + offset_y)
+    e = expect_at(dx, dy, math.nan, offset_x, offset_y)
+    turn = turn_to(-e.range_x, -e.range_y, composed(facing, aim))
+    return corrected_with(belief, facing, e, measured_range, turn, surveyed_variance, model, given, work, width, at)
+
+
+@compiled_inline
+def corrected_with(  # noqa: PLR0917 - a measurement and a reflector, number by number
+    belief: PoseGaussian,
+    facing: Direction,
+    e: Expected,
+    measured_range: float,
+    turn: float,
+    surveyed_variance: float,
+    model: ObservationModel,
+    given: Considering,
+    work: FloatArray,
+    width: int,
+    at: int,
+) -> Corrected:
+    """Belief, and its covariance with the constants, after one detection of one reflector.
+
+    Parameters
+    ----------
+    belief, facing : before the correction, and the direction of its heading.
+    e : observation expected from its mean; its bearing is not read.
+    measured_range : range bias already taken off [m].
+    turn : from the expected bearing to the measured one [rad].
+    surveyed_variance, model, given, work, at : as in `correct_with`.
+    width : columns of `work` that are in use.
+
+    Notes
+    -----
+    x = x + K v, P = A P A^T + K N K^T - D K^T - K D^T with D = C J^T and N = R + J P_p J^T + H D + (H D)^T, which is
+    Joseph's form of the whole state, and C = A C - K J P_p: Schmidt 1966; A = I - K H.
+    """
+    d = seen_with(facing, e, surveyed_variance, given, work, at)
+    v = innovation_with(belief, e, measured_range, turn, model, d)
     k = gain(v)
     hd_rr = e.range_x * d.xr + e.range_y * d.yr + e.range_theta * d.tr
     hd_rb = e.range_x * d.xb + e.range_y * d.yb + e.range_theta * d.tb
@@ -389,12 +419,13 @@ def correct_with(  # noqa: PLR0917 - a measurement and a reflector, number by nu
     xx, xy, xt, yy, yt, tt = corrected_covariance(
         belief, e, k, v.range_noise + d.rr + 2.0 * hd_rr, v.bearing_noise + d.bb + 2.0 * hd_bb
     )
-    _correct_cross(work, e, k)
+    _correct_cross(work, width, e, k)
     _add_constants(work, at, e, k, d, surveyed_variance, given.variances)
-    return PoseGaussian(
+    heading = k.tr * v.range + k.tb * v.bearing
+    after = PoseGaussian(
         belief.x + k.xr * v.range + k.xb * v.bearing,
         belief.y + k.yr * v.range + k.yb * v.bearing,
-        wrap_scalar(belief.theta + k.tr * v.range + k.tb * v.bearing),
+        wrap_scalar(belief.theta + heading),
         xx + 2.0 * (n_rb * k.xr * k.xb - d.xr * k.xr - d.xb * k.xb),
         xy + n_rb * (k.xr * k.yb + k.xb * k.yr) - d.xr * k.yr - d.xb * k.yb - k.xr * d.yr - k.xb * d.yb,
         xt + n_rb * (k.xr * k.tb + k.xb * k.tr) - d.xr * k.tr - d.xb * k.tb - k.xr * d.tr - k.xb * d.tb,
@@ -402,12 +433,13 @@ def correct_with(  # noqa: PLR0917 - a measurement and a reflector, number by nu
         yt + n_rb * (k.yr * k.tb + k.yb * k.tr) - d.yr * k.tr - d.yb * k.tb - k.yr * d.tr - k.yb * d.tb,
         tt + 2.0 * (n_rb * k.tr * k.tb - d.tr * k.tr - d.tb * k.tb),
     )
+    return Corrected(after, turned_by(facing, heading))
 
 
 @compiled_inline
-def _correct_cross(work: FloatArray, e: Expected, k: Gain) -> None:
-    """A C of every column."""
-    for j in range(work.shape[1]):
+def _correct_cross(work: FloatArray, width: int, e: Expected, k: Gain) -> None:
+    """A C of every column in use."""
+    for j in range(width):
         x, y, theta = work[0, j], work[1, j], work[2, j]
         r = e.range_x * x + e.range_y * y + e.range_theta * theta
         b = e.bearing_x * x + e.bearing_y * y + e.bearing_theta * theta
@@ -439,61 +471,6 @@ def _add(work: FloatArray, column: int, k: Gain, r: float, b: float) -> None:
 
 
 @compiled_inline
-def put_back(cross: FloatArray, work: FloatArray, reflectors: int, scanner: int) -> None:
-    """Carry the covariance with all constants over a scan, those of the scanner from the working array.
-
-    Parameters
-    ----------
-    cross : covariance of the pose with the constants, written in place; reflectors of the scan follow by `put_block`.
-    work : working array of the scan.
-    reflectors : N of the map.
-    scanner : index of the scanner.
-
-    Notes
-    -----
-    C = A_n ... A_1 F C of what no detection has to do with: Schmidt 1966.
-    """
-    xx, xy, xt = work[0, 0], work[0, 1], work[0, 2]
-    yx, yy, yt = work[1, 0], work[1, 1], work[1, 2]
-    tx, ty, tt = work[2, 0], work[2, 1], work[2, 2]
-    for j in range(cross.shape[1]):
-        x, y, theta = cross[0, j], cross[1, j], cross[2, j]
-        cross[0, j] = _or_nothing(xx * x + xy * y + xt * theta)
-        cross[1, j] = _or_nothing(yx * x + yy * y + yt * theta)
-        cross[2, j] = _or_nothing(tx * x + ty * y + tt * theta)
-    start = PER_REFLECTOR * reflectors + PER_SCANNER * scanner
-    for row in range(3):
-        for i in range(PER_SCANNER):
-            cross[row, start + i] = work[row, 3 + i]
-
-
-@compiled_inline
-def _or_nothing(value: float) -> float:
-    """0 for what has faded away."""
-    return value if abs(value) > NOTHING else 0.0
-
-
-@compiled_inline
-def put_block(cross: FloatArray, work: FloatArray, at: int, entry: int) -> None:
-    """Write the columns of a reflector of the scan back.
-
-    Parameters
-    ----------
-    cross : covariance of the pose with the constants, after `put_back`.
-    work : working array of the scan.
-    at : first of the two columns of the reflector.
-    entry : row of the reflector in `places`.
-
-    Notes
-    -----
-    C[:, i] = its column of the working array, by definition.
-    """
-    for row in range(3):
-        cross[row, PER_REFLECTOR * entry] = work[row, at]
-        cross[row, PER_REFLECTOR * entry + 1] = work[row, at + 1]
-
-
-@compiled_inline
 def innovation_given(  # noqa: PLR0917 - a measurement, number by number
     belief: PoseGaussian,
     e: Expected,
@@ -518,8 +495,8 @@ def innovation_given(  # noqa: PLR0917 - a measurement, number by number
     """
     if given is None or work is None:
         return innovation(belief, e, measured_range, measured_bearing, surveyed_variance, model)
-    seen = seen_with(belief.theta, e, surveyed_variance, given, work, at)
-    return innovation_with(belief, e, measured_range, measured_bearing, model, seen)
+    seen = seen_with(direction_of(belief.theta), e, surveyed_variance, given, work, at)
+    return innovation_with(belief, e, measured_range, wrap_scalar(measured_bearing - e.bearing), model, seen)
 
 
 @compiled_inline

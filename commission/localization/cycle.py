@@ -19,13 +19,11 @@ from commission.localization.consider import (
     PER_REFLECTOR,
     Considering,
     considering,
-    correct_given,
-    put_back,
-    put_block,
-    take_out,
-    working_array,
+    correct_aimed,
 )
-from commission.localization.observation import ObservationModel
+from commission.localization.consider_columns import begin, busy_chunks, put_back, put_block, take_along
+from commission.localization.kalman import correct
+from commission.localization.observation import Direction, ObservationModel, direction_of
 from commission.localization.odometry import NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.rejection import rejects_the_world, weigh
@@ -82,6 +80,9 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     places: FloatArray,
     cell_offsets: IntArray,
     cross: FloatArray | None,
+    work: FloatArray | None,
+    aims: FloatArray | None,
+    busy: IntArray | None,
     scanner: int,
     status: NDArray[np.int8],
     reflectors: IntArray,
@@ -100,6 +101,8 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     observation : mounting and noise of the scan's scanner.
     places, cell_offsets : the map, see `ReflectorIndex`.
     cross : (3, 2 N + 5 S) in and out: covariance of the pose with the considered constants; None: none is considered.
+    work, aims : (3, 8 + 2 n), (n, 3) room for the largest scan, see `room_for_scans`; None: as `cross`.
+    busy : see `busy_chunks`; None: as `cross`.
     scanner : index of the scan's scanner.
     status : (n,) in: INLIER or OUTLIER_DETECTOR; out: a `Status`.
     reflectors : (n,) out: index into the reflector map, or -1.
@@ -113,7 +116,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     """
     prior, motion = reach(state.belief, state.motion, stamp_ns, following, model.odometry)
     given = considering(cross, prior, state.pivot, state.motion, following, model.consider)
-    work = working_array(cross, given, len(places), scanner, last - first)
+    prepare(cross, given, work, aims, first, last, detections, observation, len(places), scanner)
     associate(
         prior,
         first,
@@ -127,12 +130,13 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         cross,
         given,
         work,
+        aims,
         status,
         reflectors,
         d2,
     )
     posterior = corrected(
-        prior, first, last, detections, observation, places, cross, given, work, scanner, status, reflectors
+        prior, first, last, detections, observation, places, cross, given, work, aims, busy, scanner, status, reflectors
     )
     pivot = state.pivot if cross is None else (posterior.x, posterior.y)
     for i in range(first, last):
@@ -179,6 +183,57 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     )
 
 
+class Room(NamedTuple):
+    """What `process_scan` writes to and reads from while constants are considered."""
+
+    work: FloatArray | None
+    aims: FloatArray | None
+    busy: IntArray | None
+
+
+def room_for_scans(cross: FloatArray | None, detections: int) -> Room:
+    """Return the room for scans of up to as many detections; None where no constants are considered."""
+    if cross is None:
+        return Room(None, None, None)
+    work = np.empty((3, BLOCKS + PER_REFLECTOR * max(detections, 1)))
+    return Room(work, np.empty((detections, 3)), busy_chunks(cross))
+
+
+@compiled_inline
+def prepare(  # noqa: PLR0917 - the scan's detections, array by array
+    cross: FloatArray | None,
+    given: Considering | None,
+    work: FloatArray | None,
+    aims: FloatArray | None,
+    first: int,
+    last: int,
+    detections: FloatArray,
+    observation: ObservationModel,
+    reflectors: int,
+    scanner: int,
+) -> None:
+    """Write what a scan is worked out from; nothing where no constants are considered.
+
+    Parameters
+    ----------
+    cross, given : covariance with the constants, and what the detections of the scan have in common, or None.
+    work, aims : written; or None.
+    first, last, detections, observation, scanner : as in `corrected`.
+    reflectors : N of the map.
+
+    Notes
+    -----
+    aim = direction of mount + bearing, in base: all sines and cosines of a scan but those of the heading. The third
+    column of `aims` is for where in `work` the reflector of a detection is.
+    """
+    if cross is None or given is None or work is None or aims is None:
+        return
+    begin(work, cross, given, reflectors, scanner)
+    for i in range(first, last):
+        aim = direction_of(observation.mount_theta + detections[i, 1])
+        aims[i - first, 0], aims[i - first, 1] = aim
+
+
 @compiled_inline
 def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by array
     prior: PoseGaussian,
@@ -190,6 +245,8 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
     cross: FloatArray | None,
     given: Considering | None,
     work: FloatArray | None,
+    aims: FloatArray | None,
+    busy: IntArray | None,
     scanner: int,
     status: NDArray[np.int8],
     entries: IntArray,
@@ -204,50 +261,55 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
     observation : mounting and noise of the scanner.
     places : the map, see `ReflectorIndex`.
     cross : covariance of the pose with the constants, written in place; None: none is considered.
-    given, work : of the scan, where constants are considered, else None.
+    given, work, aims, busy : of the scan, where constants are considered, else None.
     scanner : index of the scanner.
     status : (n,) a `Status` each.
     entries : (n,) row of `places` of each, or NOBODY.
 
     Notes
     -----
-    No formula: `correct_given` for each in turn, from the freshest state; constants that the scan does not see are
-    carried over it at the end, in one go.
+    No formula: `correct` or `correct_aimed` for each in turn, from the freshest state; constants that the scan does not
+    see are carried over it at the end, in one go.
     """
-    if cross is not None and given is not None and work is not None:
+    belief = prior
+    if cross is None or given is None or work is None or aims is None or busy is None:
         for i in range(first, last):
-            if status[i] == INLIER and _block(i, first, status, entries) == i:
-                take_out(work, BLOCKS + PER_REFLECTOR * (i - first), cross, entries[i], given)
-    belief, at = prior, 0
+            if status[i] == INLIER:
+                entry, distance = entries[i], detections[i, 0] - observation.range_bias
+                x, y, variance = places[entry, 0], places[entry, 1], places[entry, 2]
+                belief = correct(belief, distance, detections[i, 1], x, y, variance, observation)
+        return belief
+    facing, width = given.facing, BLOCKS
+    for i in range(first, last):
+        if status[i] != INLIER:
+            continue
+        entry, distance = entries[i], detections[i, 0] - observation.range_bias
+        earlier = _earlier(i, first, status, entries)
+        if earlier == i:
+            aims[i - first, 2] = width
+            take_along(work, width, cross, entry)
+            width += PER_REFLECTOR
+        at = int(aims[earlier - first, 2])
+        aim = Direction(aims[i - first, 0], aims[i - first, 1])
+        x, y, variance = places[entry, 0], places[entry, 1], places[entry, 2]
+        belief, facing = correct_aimed(
+            belief, facing, distance, aim, x, y, variance, observation, given, work, width, at
+        )
+    put_back(cross, work, len(places), scanner, busy)
     for i in range(first, last):
         if status[i] == INLIER:
-            entry = entries[i]
-            if work is not None:
-                at = BLOCKS + PER_REFLECTOR * (_block(i, first, status, entries) - first)
-            belief = correct_given(
-                belief,
-                detections[i, 0] - observation.range_bias,
-                detections[i, 1],
-                places[entry, 0],
-                places[entry, 1],
-                places[entry, 2],
-                observation,
-                given,
-                work,
-                at,
-            )
-    if cross is not None and work is not None:
-        put_back(cross, work, len(places), scanner)
-        for i in range(first, last):
-            if status[i] == INLIER and _block(i, first, status, entries) == i:
-                put_block(cross, work, BLOCKS + PER_REFLECTOR * (i - first), entries[i])
+            put_block(cross, work, int(aims[_earlier(i, first, status, entries) - first, 2]), entries[i], busy)
     return belief
 
 
 @compiled_inline
-def _block(i: int, first: int, status: NDArray[np.int8], entries: IntArray) -> int:
-    """First accepted detection of the scan of that reflector: without the association filter there may be several."""
-    for other in range(first, i):
+def _earlier(i: int, first: int, status: NDArray[np.int8], entries: IntArray) -> int:
+    """First accepted detection of the scan of that reflector: without the association filter there may be several.
+
+    Backwards, without a way out of the middle of the loop: that would cost two atomic operations for each array.
+    """
+    found = i
+    for other in range(i - 1, first - 1, -1):
         if status[other] == INLIER and entries[other] == entries[i]:
-            return other
-    return i
+            found = other
+    return found

@@ -13,7 +13,7 @@ import numpy as np
 from commission.errors import SourceError
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.cross_covariance import columns_of, cross_covariance
-from commission.localization.cycle import process_odometry, process_scan
+from commission.localization.cycle import process_odometry, process_scan, room_for_scans
 from commission.localization.detector import DetectedReflectors, detect
 from commission.localization.estimate import Belief, Estimate, Mode, Status
 from commission.localization.observation import project_detections
@@ -216,6 +216,7 @@ class Localizer:
         d2 = np.empty(count)
         constants = self._setup.constants
         cross = columns_of(self._state.cross, constants)
+        room = room_for_scans(cross, count)
         cycle = process_scan(
             self._state._replace(cross=None),
             stamp_ns,
@@ -227,6 +228,9 @@ class Localizer:
             self._setup.index.places,
             self._setup.index.offsets,
             cross,
+            room.work,
+            room.aims,
+            room.busy,
             scan.scanner,
             status,
             reflector,

@@ -24,6 +24,10 @@ SMALLEST_RANGE = 1e-3
 """Ranges are not linearized below this [m]: a reflector's center is never nearer than its radius."""
 
 
+SMALL_TURN = 0.01
+"""Turns up to this are made by series [rad]."""
+
+
 class ObservationModel(NamedTuple):
     """Scanner mounting and R of equation 2, for kernels."""
 
@@ -46,6 +50,13 @@ class Expected(NamedTuple):
     bearing_x: float
     bearing_y: float
     bearing_theta: float
+
+
+class Direction(NamedTuple):
+    """A direction as a unit vector: its cosine and sine."""
+
+    cos: float
+    sin: float
 
 
 def observation_model(scanner: Scanner, parameters: ObservationParameters) -> ObservationModel:
@@ -82,8 +93,33 @@ def scanner_offset(theta: float, model: ObservationModel) -> tuple[float, float]
     -----
     R(theta) m with m the mounting, by definition.
     """
-    c, s = math.cos(theta), math.sin(theta)
+    return offset_facing(direction_of(theta), model)
+
+
+@compiled_inline
+def offset_facing(facing: Direction, model: ObservationModel) -> tuple[float, float]:
+    """`scanner_offset` of a heading that is given as a direction.
+
+    Notes
+    -----
+    R m with m the mounting, by definition.
+    """
+    c, s = facing
     return c * model.mount_x - s * model.mount_y, s * model.mount_x + c * model.mount_y
+
+
+@compiled_inline
+def composed(first: Direction, second: Direction) -> Direction:
+    """Direction of the sum of two angles.
+
+    Notes
+    -----
+    (cos a cos b - sin a sin b, sin a cos b + cos a sin b), by definition.
+    """
+    return Direction(
+        first.cos * second.cos - first.sin * second.sin,
+        first.sin * second.cos + first.cos * second.sin,
+    )
 
 
 @compiled_inline
@@ -105,8 +141,24 @@ def expect(  # noqa: PLR0917 - a pose and a point, number by number
     (Algorithm 1, line 7).
     """
     dx, dy = target_x - (x + offset_x), target_y - (y + offset_y)
+    return expect_at(dx, dy, wrap_scalar(math.atan2(dy, dx) - theta - mount), offset_x, offset_y)
+
+
+@compiled_inline
+def expect_at(dx: float, dy: float, bearing: float, offset_x: float, offset_y: float) -> Expected:
+    """Expected observation of a point that lies somewhere from the scanner: for whoever has no use for its bearing.
+
+    Parameters
+    ----------
+    dx, dy : point, seen from the scanner, map axes [m].
+    bearing : of it, handed through [rad].
+    offset_x, offset_y : `scanner_offset` [m].
+
+    Notes
+    -----
+    H of `expect`.
+    """
     distance = math.sqrt(dx * dx + dy * dy)
-    bearing = wrap_scalar(math.atan2(dy, dx) - theta - mount)
     inverse = 1.0 / max(distance, SMALLEST_RANGE)
     ux, uy = dx * inverse, dy * inverse
     # The scanner moves by (-offset_y, offset_x) per radian.
@@ -120,6 +172,58 @@ def expect(  # noqa: PLR0917 - a pose and a point, number by number
         -ux * inverse,
         -(uy * offset_y + ux * offset_x) * inverse - 1.0,
     )
+
+
+@compiled_inline
+def direction_of(angle: float) -> Direction:
+    """Unit vector of an angle [rad].
+
+    Notes
+    -----
+    (cos, sin), by definition.
+    """
+    return Direction(math.cos(angle), math.sin(angle))
+
+
+@compiled_inline
+def turned_by(direction: Direction, angle: float) -> Direction:
+    """Unit vector turned by an angle, which is mostly small [rad].
+
+    Notes
+    -----
+    R(angle) direction, by definition; up to `SMALL_TURN` the series of both, whose first terms left out are
+    angle^7 / 5040 and angle^8 / 40320.
+    """
+    if -SMALL_TURN < angle < SMALL_TURN:
+        a2 = angle * angle
+        c = 1.0 - a2 * (0.5 - a2 * (1.0 / 24.0 - a2 / 720.0))
+        s = angle * (1.0 - a2 * (1.0 / 6.0 - a2 / 120.0))
+    else:
+        c, s = math.cos(angle), math.sin(angle)
+    return composed(direction, Direction(c, s))
+
+
+@compiled_inline
+def turn_to(ux: float, uy: float, direction: Direction) -> float:
+    """Angle from a unit vector to a direction, mostly a small one [rad].
+
+    Parameters
+    ----------
+    ux, uy : what is turned from; shorter than 1 where there is nothing to be told.
+    direction : what is turned to.
+
+    Notes
+    -----
+    atan2(u x d, u . d), by definition; near 0 the series of the arcsine, whose first term left out is
+    (10395 / 599040) s^13.
+    """
+    s = ux * direction.sin - uy * direction.cos
+    c = ux * direction.cos + uy * direction.sin
+    if c > 0.998 and -0.05 < s < 0.05:
+        s2 = s * s
+        rest = 15.0 / 336.0 + s2 * (105.0 / 3456.0 + s2 * (945.0 / 42240.0))
+        return s + s * s2 * (1.0 / 6.0 + s2 * (3.0 / 40.0 + s2 * rest))
+    return math.atan2(s, c)
 
 
 def range_bearing(T_map_base: ArrayLike, mounting: ArrayLike, points_map: ArrayLike) -> FloatArray:

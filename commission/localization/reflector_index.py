@@ -29,6 +29,8 @@ class Cells(NamedTuple):
     columns: int
     largest_variance: float
     """Of all surveyed places, each axis [m^2]."""
+    per_metre: float
+    """Cells in a metre: dividing takes longer."""
 
 
 class ReflectorIndex(NamedTuple):
@@ -52,7 +54,7 @@ def build_index(reflectors: ReflectorMap, survey_sigmas: FloatArray | None = Non
     """
     centers = np.asarray(reflectors.centers)
     if survey_sigmas is None:
-        survey_sigmas = np.array([reflector.own_sigma for reflector in reflectors.reflectors], dtype=np.float64)
+        survey_sigmas = np.array([reflector.sigma for reflector in reflectors.reflectors], dtype=np.float64)
     sigmas = survey_sigmas
     low = centers.min(axis=0) if len(centers) else np.zeros(2)
     extent = centers.max(axis=0) - low if len(centers) else np.zeros(2)
@@ -66,25 +68,27 @@ def build_index(reflectors: ReflectorMap, survey_sigmas: FloatArray | None = Non
     places = np.column_stack((centers, np.square(sigmas), np.arange(len(centers), dtype=np.float64)))[order]
     largest = float(np.square(sigmas).max(initial=0.0))
     return ReflectorIndex(
-        Cells(float(low[0]), float(low[1]), cell, rows, columns, largest), read_only(places), read_only(offsets)
+        Cells(float(low[0]), float(low[1]), cell, rows, columns, largest, 1.0 / cell),
+        read_only(places),
+        read_only(offsets),
     )
 
 
 @compiled_inline
-def cell_range(low: float, high: float, cell: float, count: int) -> tuple[int, int]:
+def cell_range(low: float, high: float, per_metre: float, count: int) -> tuple[int, int]:
     """First and last cell that an interval touches; last < first when none.
 
     Parameters
     ----------
     low, high : ends of the interval, from the first cell's edge [m].
-    cell : edge of a cell [m].
+    per_metre : cells in a metre; rounded, so that an interval must be wider than what it is to hold by as much.
     count : of cells.
 
     Notes
     -----
-    floor(low / cell) to floor(high / cell), clipped to 0 ... count - 1, by definition.
+    floor(low per_metre) to floor(high per_metre), clipped to 0 ... count - 1, by definition.
     """
-    first, last = low / cell, high / cell
+    first, last = low * per_metre, high * per_metre
     if first >= count or last < 0.0:
         return 0, -1
     # Compared as floats before the conversion: infinity has no integer. NaN takes every cell.

@@ -190,8 +190,8 @@ def nearest(  # noqa: PLR0917 - a place and the map, array by array
     d = min |place - reflector|, by definition.
     """
     px, py = x - cells.origin_x, y - cells.origin_y
-    first_row, last_row = cell_range(py - reach, py + reach, cells.size, cells.rows)
-    first_column, last_column = cell_range(px - reach, px + reach, cells.size, cells.columns)
+    first_row, last_row = cell_range(py - reach, py + reach, cells.per_metre, cells.rows)
+    first_column, last_column = cell_range(px - reach, px + reach, cells.per_metre, cells.columns)
     least = math.inf
     for row in range(first_row, last_row + 1 if last_column >= first_column else first_row):
         start = cell_offsets[row * cells.columns + first_column]

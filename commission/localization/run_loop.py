@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.cross_covariance import columns_of, cross_covariance
-from commission.localization.cycle import process_odometry, process_scan
+from commission.localization.cycle import process_odometry, process_scan, room_for_scans
 from commission.localization.detection_log import DetectionLog
 from commission.localization.observation import observation_at
 from commission.localization.odometry import NextOdometry, waits_until
@@ -133,6 +133,7 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
     rows = slice(first, last + 1)
     cross = columns_of(state.cross, setup.constants)
     settled = stretch.columns.settled
+    room = room_for_scans(cross, int(np.diff(detected.offsets).max(initial=0)))
     after = _run(
         read_only(log.odometry_stamps_ns[rows]),
         read_only(log.displacements[rows]),
@@ -148,6 +149,9 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
         setup.index.places,
         setup.index.offsets,
         cross,
+        room.work,
+        room.aims,
+        room.busy,
         state._replace(cross=None),
         stretch.columns,
     )
@@ -174,6 +178,9 @@ def _run(  # noqa: PLR0917 - the columns of the log
     places: FloatArray,
     cell_offsets: IntArray,
     cross: FloatArray | None,
+    work: FloatArray | None,
+    aims: FloatArray | None,
+    busy: IntArray | None,
     state: FilterState,
     columns: Columns,
 ) -> FilterState:
@@ -208,6 +215,9 @@ def _run(  # noqa: PLR0917 - the columns of the log
             places,
             cell_offsets,
             cross,
+            work,
+            aims,
+            busy,
             scanners[k],
             status,
             reflectors,

@@ -21,10 +21,17 @@ from commission.localization.consider import (
     correct_given,
     innovation_given,
     scanner_jacobian,
-    working_array,
 )
+from commission.localization.consider_columns import working_array
 from commission.localization.kalman import Gain, Innovation, corrected_covariance, gain, innovation
-from commission.localization.observation import Expected, ObservationModel, expect, observation_at, scanner_offset
+from commission.localization.observation import (
+    Expected,
+    ObservationModel,
+    direction_of,
+    expect,
+    observation_at,
+    scanner_offset,
+)
 from commission.localization.odometry import OdometryNoise, predict
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.planning.detection_noise import DetectionNoise, Worth, worth
@@ -164,7 +171,7 @@ def propagate_errors(  # noqa: PLR0917 - the columns of a drive
             inliers[k] += share
             _respond(responses, followed[:count], bias, askew, e, gain(says), share)
             _disturb(responses, row, m, bias, e, gain(says), share, true, model.beams[scanner])
-            j = scanner_jacobian(theta, e, twist[0], twist[1], twist[2])
+            j = scanner_jacobian(direction_of(theta), e, twist[0], twist[1], twist[2])
             _disturb_all(askew[scanner], j, gain(says), share)
             remember(work, kept)
             probability = seen * model.inside_gate

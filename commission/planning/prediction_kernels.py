@@ -20,11 +20,8 @@ from commission.localization.consider import (
     considering_at,
     correct_given,
     innovation_given,
-    put_back,
-    put_block,
-    take_out,
-    working_array,
 )
+from commission.localization.consider_columns import put_back, put_block, take_out, working_array
 from commission.localization.kalman import innovation, squared_distance
 from commission.localization.observation import ObservationModel, expect, observation_at, scanner_offset
 from commission.localization.odometry import OdometryNoise, predict
@@ -266,9 +263,9 @@ def put_all_back(  # noqa: PLR0917 - the columns of a drive
     """
     if cross is None or work is None:
         return
-    put_back(cross, work, reflectors, scanner)
+    put_back(cross, work, reflectors, scanner, None)
     for i in range(first, last):
-        put_block(cross, work, BLOCKS + PER_REFLECTOR * (i - first), int(blocks[indices[i]]))
+        put_block(cross, work, BLOCKS + PER_REFLECTOR * (i - first), int(blocks[indices[i]]), None)
 
 
 @compiled_inline

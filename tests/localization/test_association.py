@@ -23,14 +23,14 @@ from commission.localization.association import (
 from commission.localization.consider import Considering, ConsiderModel, innovation_with, seen_with
 from commission.localization.estimate import Status
 from commission.localization.kalman import correct
-from commission.localization.observation import ObservationModel, expect
+from commission.localization.observation import ObservationModel, direction_of, expect
 from commission.localization.pose_gaussian import PoseGaussian, covariance_of, mean_of
 from commission.localization.reflector_index import ReflectorIndex, build_index
 from commission.site.parameters import AssociationParameters
 from commission.site.reflectors import Reflector, ReflectorMap
 from tests.localization.plain_observation import innovation_covariances, innovations, log_likelihoods, matrix
 
-NOTHING_CONSIDERED = (None, None, None)
+NOTHING_CONSIDERED = (None, None, None, None)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -88,13 +88,13 @@ def test_nearby_search_equals_a_plain_search_over_all_reflectors(seed: int, enab
             float(z[0]),
             float(z[1]),
             view,
+            view,
             model,
             gate,
             index.cells,
             index.places,
             index.offsets,
             *NOTHING_CONSIDERED,
-            0,
         )
         scored = over_all(belief, z, model, index)
         if not scored:
@@ -171,15 +171,17 @@ def test_bounds_that_hold_the_constants_hold_any_correlation_of_theirs_with_the_
     model = random_model(rng)
     bias, clock = np.exp(rng.uniform(-8.0, -3.0, 2))
     speed = rng.uniform(-1.0, 1.0, 3)
-    given = Considering(ConsiderModel(joint[5, 5], joint[7, 7], bias**2, clock**2), 0.0, 0.0, *speed)
+    given = Considering(
+        ConsiderModel(joint[5, 5], joint[7, 7], bias**2, clock**2), 0.0, 0.0, *speed, direction_of(belief.theta)
+    )
     view = viewpoint(belief, model)
     wide = widened(view, joint[3, 3], given)
     place = np.array([belief.x, belief.y]) + rng.uniform(-9, 9, 2)
     e = expect(belief.x, belief.y, belief.theta, view.offset_x, view.offset_y, *place, model.mount_theta)
     work = np.zeros((3, 10))
     work[:, 8:10], work[:, 3:6] = joint[:3, 3:5], joint[:3, 5:8]
-    seen = seen_with(belief.theta, e, joint[3, 3], given, work, 8)
-    v = innovation_with(belief, e, e.range, e.bearing, model, seen)
+    seen = seen_with(direction_of(belief.theta), e, joint[3, 3], given, work, 8)
+    v = innovation_with(belief, e, e.range, 0.0, model, seen)
     assert v.s_rr <= wide.position_sigma**2 + model.range_variance * (1.0 + 1e-9)
     bearing = (wide.position_sigma / e.range + wide.heading_sigma) ** 2 + model.bearing_variance
     assert v.schur + v.w * v.w * v.s_rr <= bearing * (1.0 + 1e-9)
