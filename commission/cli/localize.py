@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
 
-from commission.cli.parsing import initial_pose
+from commission.cli.parsing import initial_pose, reference_antenna
+from commission.errors import UsageError
 from commission.site.quantity import MILLIMETRES, PERCENT, PLAIN_DEGREES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from commission.site.record_log import RecordLog
     from commission.studies.run import RunResult
     from commission.studies.sections import Section
 
@@ -34,6 +36,11 @@ class Localize:
     initial_pose: Annotated[str | None, arg(metavar="X,Y,THETA[,SX,SY,STHETA]")] = None
     """Pose of base at the first record and its 1-sigma, map frame [m, m, rad]. None: the first reference pose, else the
     start of the project's first route, with 1-sigma 0.02 m and 0.01 rad."""
+    reference_antenna: Annotated[str | None, arg(metavar="X,Y[,Z]")] = None
+    """Point of the vehicle whose place the reference measures, base frame [m]. None: as the recording's reference.json
+    says, else base."""
+    reference_clock: Annotated[float | None, arg(metavar="S")] = None
+    """How much later than they were measured the reference's poses are stamped [s]. None: as reference.json says."""
     set: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="GROUP.KEY=VALUE")] = ()
     """A parameter of the localizer in place of the project's, in SI units and radians."""
     force: bool = False
@@ -64,7 +71,7 @@ class Localize:
         out = result_folder(self.out, "localize", names, force=self.force, sources=sources)
         project = load_project(self.project)
         project = dataclasses.replace(project, parameters=apply_settings(project.parameters, self.set))
-        log = load_log(self.recording)
+        log = self._with_reference(load_log(self.recording))
         start = start_of(project, log, given and given.pose, given and given.sigmas)
         if self.strict:
             for finding in plausibility(PlausibilityInput.of(project, log)):
@@ -85,6 +92,18 @@ class Localize:
         true = [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
         notes = [f"Note         {finding}" for finding in findings]
         sys.stdout.write("\n".join([*_report(result, cut), *true, *notes, f"Written to   {self.out}"]) + "\n")
+
+    def _with_reference(self, log: RecordLog) -> RecordLog:
+        """Return the log with a reference that measures where the options say."""
+        mount = log.reference_mount
+        try:
+            if self.reference_antenna is not None:
+                mount = dataclasses.replace(mount, antenna=reference_antenna(self.reference_antenna))
+            if self.reference_clock is not None:
+                mount = dataclasses.replace(mount, clock_offset=self.reference_clock)
+        except ValueError as error:
+            raise UsageError(f"--reference-…: {error}") from None
+        return dataclasses.replace(log, reference_mount=mount)
 
 
 def _report(result: RunResult, cut: Sequence[Section]) -> list[str]:
@@ -127,7 +146,7 @@ def _report(result: RunResult, cut: Sequence[Section]) -> list[str]:
     return [
         *lines,
         f"Reference    for {errors.compared} of {result.cycles} cycles; {outside} are outside of its time, {in_gap} in "
-        "its gaps",
+        f"its gaps{_mounted(result)}",
         f"Error        position {rms} mm RMS, {median} median, {p95} at 95 %, {most} at most{heading}",
         f"Consistency  ANEES {consistency}position {errors.anees_position:.2f} (1 is consistent, more is too sure)",
         f"Danger       {errors.wrong_while_operational} of {errors.compared} cycles operational with an error "
@@ -138,6 +157,14 @@ def _report(result: RunResult, cut: Sequence[Section]) -> list[str]:
 def _known(figure: float, digits: int = 2) -> str:
     """A figure of detections, of which there may be none."""
     return "unknown" if math.isnan(figure) else f"{figure:.{digits}f}"
+
+
+def _mounted(result: RunResult) -> str:
+    """Where the reference measures, if not at base by the recording's clock."""
+    from commission.site.reference_mount import BASE
+
+    mount = result.inputs.log.reference_mount
+    return "" if mount == BASE else f"; {mount.told()}"
 
 
 def _by_section(cut: Sequence[Section]) -> list[str]:

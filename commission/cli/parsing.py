@@ -91,6 +91,18 @@ class InitialPose:
     """1-sigma uncertainty of x [m], y [m] and theta [rad]; None when none were given."""
 
 
+def reference_antenna(text: str) -> tuple[float, ...]:
+    """Read `X,Y` or `X,Y,Z`; raises UsageError that shows the text and the form expected."""
+    form = "X,Y or X,Y,Z (metres, base frame)"
+    try:
+        numbers = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        raise UsageError(f"--reference-antenna is {text!r}; expected numbers {form}") from None
+    if len(numbers) not in (2, 3):
+        raise UsageError(f"--reference-antenna {text!r} has {len(numbers)} numbers; expected {form}")
+    return numbers
+
+
 def initial_pose(text: str) -> InitialPose:
     """Read `X,Y,THETA` or `X,Y,THETA,SX,SY,STHETA`; raises UsageError that shows the text and the form expected."""
     try:

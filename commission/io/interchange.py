@@ -282,7 +282,13 @@ def _from_model(source: Path, target: Path, wanted: Kind, options: ConvertOption
 
 def _from_recording(source: Path, target: Path, _: Kind, __: ConvertOptions) -> tuple[str, ...]:
     recording = open_recording(source)
-    write_recording(target, recording.records(), recording.truth(), scanners=recording.scanners)
+    write_recording(
+        target,
+        recording.records(),
+        recording.truth(),
+        scanners=recording.scanners,
+        reference_mount=recording.reference_mount(),
+    )
     return ()
 
 

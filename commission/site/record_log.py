@@ -18,6 +18,7 @@ from commission.site.records import (
     ReferencePose,
     Scan,
 )
+from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import ONLY_NAME
 from commission.site.truth import Truth
 
@@ -49,7 +50,9 @@ class RecordLog:
     reference_stamps_ns: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     """(R,) [ns]."""
     reference_poses: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
-    """(R, 3) `T_map_base` [m, m, rad]."""
+    """(R, 3) `T_map_base` [m, m, rad], as recorded: of another point and clock where `reference_mount` says so."""
+    reference_mount: ReferenceMount = BASE
+    """Where on the vehicle the reference measures, and how late its clock is."""
     truth: Truth | None = None
     """The constants that were drawn for a virtual drive; None of a real vehicle."""
     order: NDArray[np.int32] = field(init=False, repr=False)
@@ -123,6 +126,11 @@ class RecordLog:
             reference_stamps_ns=_stamps(kinds[ReferencePose]),
             reference_poses=np.array([r.pose for r in references]).reshape(-1, 3),
         )
+
+    @property
+    def reference_times_ns(self) -> IntArray:
+        """(R,) when the reference poses were measured, by the clock of the recording [ns]."""
+        return self.reference_mount.true_stamps(self.reference_stamps_ns)
 
     def __len__(self) -> int:
         """Return the number of records."""

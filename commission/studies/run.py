@@ -160,7 +160,7 @@ class RunResult:
     @property
     def without_reference(self) -> tuple[int, int]:
         """Cycles outside of the time of the reference, and in its gaps."""
-        return without_reference(self.columns.stamps_ns, self.inputs.log.reference_stamps_ns, self.references)
+        return without_reference(self.columns.stamps_ns, self.inputs.log.reference_times_ns, self.references)
 
     def count(self, status: Status) -> int:
         """Return the number of detections of one status."""
@@ -222,11 +222,18 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
     microseconds_per_cycle : time that the localizer took [us].
     """
     log = inputs.log
-    references = reference_at(columns.stamps_ns, log.reference_stamps_ns, log.reference_poses)
+    references = references_of(log, columns)
     errors = pose_errors(columns.means, references)
-    statistics = error_statistics(
-        errors, columns.covariances, columns.modes == Mode.OPERATIONAL, limits_along(columns)[:, 0]
-    )
+    # Where only the antenna's place is known, the error is that of its place: so must be the covariance.
+    at_antenna = np.isnan(references[:, 2]) & np.isfinite(references[:, 0])
+    covariances = columns.covariances
+    if at_antenna.any() and not log.reference_mount.is_at_base:
+        covariances = np.where(
+            at_antenna[:, np.newaxis, np.newaxis],
+            log.reference_mount.at_antenna(covariances, columns.means[:, 2]),
+            covariances,
+        )
+    statistics = error_statistics(errors, covariances, columns.modes == Mode.OPERATIONAL, limits_along(columns)[:, 0])
     first_ns, last_ns = (int(stamp) for stamp in log.stamps_ns[[0, -1]])
     times = np.asarray((columns.stamps_ns - first_ns) * 1e-9, dtype=np.float64)
     return RunResult(
@@ -248,6 +255,17 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
         scanners=scanner_figures(columns, references),
         microseconds_per_cycle=microseconds_per_cycle,
     )
+
+
+def references_of(log: RecordLog, columns: RunColumns) -> FloatArray:
+    """(K, 3) pose of base at each cycle by the reference [m, m, rad], map frame; NaN where there is none.
+
+    Where the reference measures the place of an antenna and no heading, the estimate's takes it to base: the difference
+    to the estimate is then that of the antenna's places.
+    """
+    mount = log.reference_mount
+    found = reference_at(columns.stamps_ns, log.reference_times_ns, log.reference_poses)
+    return mount.at_base(found, columns.means[:, 2])
 
 
 def two_sigma_of(covariances: FloatArray) -> FloatArray:

@@ -72,10 +72,13 @@ def start_of(
     if pose is not None:
         return Start(belief_at(first_ns, pose, sigmas), StartOrigin.GIVEN)
     known = np.flatnonzero(
-        np.isfinite(log.reference_poses).all(axis=1) & (log.reference_stamps_ns - first_ns <= NEAR_THE_START_NS)
+        np.isfinite(log.reference_poses).all(axis=1) & (log.reference_times_ns - first_ns <= NEAR_THE_START_NS)
     )
     if len(known) > 0:
-        return Start(belief_at(first_ns, log.reference_poses[known[0]], sigmas), StartOrigin.REFERENCE)
+        return Start(
+            belief_at(first_ns, log.reference_mount.at_base(log.reference_poses[known[:1]])[0], sigmas),
+            StartOrigin.REFERENCE,
+        )
     if project.routes:
         return Start(belief_at(first_ns, route_start(project.routes[0]), sigmas), StartOrigin.ROUTE)
     raise UsageError(

@@ -267,3 +267,31 @@ def test_figures_of_detections_are_unknown_where_there_are_none(commission, proj
     summary = json.loads((tmp_path / "result" / "summary.json").read_text(encoding="utf-8"))
     assert summary["nis_mean"] is None
     assert summary["unseen_fraction"] == 1.0
+
+
+def test_a_reference_of_an_antenna_is_told_by_the_recording_or_by_options(
+    commission, refused, project, recording, tmp_path
+):
+    def errors(*words):
+        code, told, _ = commission("localize", project, recording, "--out", tmp_path / "out", "--force", *words)
+        assert code == 0
+        return json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))["position_rmse_m"], told
+
+    at_base, told = errors()
+    assert "antenna at" not in told
+    # The vehicle drives along x at a heading of 0: what lies 2 m to the left of base is at y = 2.
+    (recording / "reference.json").write_text('{"antenna": [0.0, 2.0]}', encoding="utf-8")
+    text = (recording / "reference.csv").read_text(encoding="utf-8")
+    (recording / "reference.csv").write_text(text.replace(",0,0\n", ",2.0,0\n"), encoding="utf-8")
+    described, told = errors()
+    # The last row ends without a line break.
+    assert described == pytest.approx(at_base, rel=0.05)
+    assert "antenna at 0, 2 m in the base frame, clock 0 s late" in told
+    assert errors("--reference-antenna", "0,0")[0] == pytest.approx(2.0, rel=0.05)
+    (recording / "reference.json").unlink()
+    assert errors("--reference-antenna", "0,2,1.5")[0] == pytest.approx(described)
+    late, _ = errors("--reference-antenna", "0,2", "--reference-clock", "0.5")
+    assert late > described
+    line = ("localize", project, recording, "--out", tmp_path / "out")
+    assert "--reference-antenna '1' has 1 numbers" in refused(*line, "--reference-antenna", "1")
+    assert "reference.clock_offset is 1e+06" in refused(*line, "--reference-clock", "1e6")

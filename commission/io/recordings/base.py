@@ -11,6 +11,7 @@ from commission.io.reading import cannot_read
 from commission.io.recordings.csv_folder import CsvFolder
 from commission.site.record_log import RecordLog
 from commission.site.records import Record
+from commission.site.reference_mount import ReferenceMount
 from commission.site.truth import Truth
 
 
@@ -36,6 +37,10 @@ class Recording(Protocol):
 
     def truth(self) -> Truth | None:
         """Read the constants of a virtual drive; None of a real vehicle. Raises FileFormatError."""
+        ...
+
+    def reference_mount(self) -> ReferenceMount:
+        """Read where on the vehicle the reference measures; base where nothing is said. Raises FileFormatError."""
         ...
 
     def load(self) -> RecordLog:

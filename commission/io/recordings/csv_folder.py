@@ -1,7 +1,8 @@
 """A recording as a folder of tables: what an engineer can make from any log. The reading side.
 
 `odometry.csv`, and where they exist `detections.csv`, `scans.npz` (of several scanners `scans_NAME.npz`),
-`reference.csv` and `truth.json`. A pause in any of them is no error: vehicles stand still, scanners are unplugged.
+`reference.csv`, `reference.json` and `truth.json`. A pause in any of them is no error: vehicles stand still, scanners
+are unplugged.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import numpy as np
 from commission.errors import FileFormatError
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.io.csv_table import Block, read_table
+from commission.io.recordings.reference_file import REFERENCE_MOUNT, read_reference_mount
 from commission.io.recordings.scan_archive import ScanArchive
 from commission.io.recordings.truth_file import TRUTH, read_truth
 from commission.site.record_log import RecordLog
@@ -28,6 +30,7 @@ from commission.site.records import (
     ReferencePose,
     Scan,
 )
+from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import ONLY_NAME, is_name
 from commission.site.truth import Truth
 
@@ -145,11 +148,17 @@ class CsvFolder:
             reference_stamps_ns=reference.stamps_ns,
             reference_poses=reference.values,
             truth=self.truth(),
+            reference_mount=self.reference_mount(),
         )
 
     def truth(self) -> Truth | None:
         """Read the constants of a virtual drive; None of a real vehicle. Raises FileFormatError."""
         return read_truth(self.path / TRUTH) if (self.path / TRUTH).exists() else None
+
+    def reference_mount(self) -> ReferenceMount:
+        """Read where on the vehicle the reference measures; base where nothing is said. Raises FileFormatError."""
+        path = self.path / REFERENCE_MOUNT
+        return read_reference_mount(path) if path.exists() else BASE
 
     def _odometry(self) -> Iterator[Record]:
         for rows in self._odometry_rows(_STREAMED):

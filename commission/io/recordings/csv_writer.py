@@ -30,8 +30,10 @@ from commission.io.recordings.csv_folder import (
     SCANS,
     scans_file,
 )
+from commission.io.recordings.reference_file import REFERENCE_MOUNT, write_reference_mount
 from commission.io.recordings.truth_file import TRUTH, write_truth
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import ONLY_NAME
 from commission.site.truth import Truth
 
@@ -42,6 +44,7 @@ def write_recording(
     truth: Truth | None = None,
     *,
     scanners: tuple[str, ...] = (ONLY_NAME,),
+    reference_mount: ReferenceMount = BASE,
 ) -> None:
     """Write a recording as a CSV folder.
 
@@ -51,6 +54,7 @@ def write_recording(
     records : in the order of their stamps; a source's error passes through and leaves the folder as it was.
     truth : the constants of a virtual drive, for its `truth.json`.
     scanners : names of the scanners that records have indices of; of a single one the files do not say the name.
+    reference_mount : where the reference measures, for its `reference.json`; base needs no file.
 
     Raises
     ------
@@ -63,10 +67,20 @@ def write_recording(
             if truth is not None:
                 write_truth(scratch / TRUTH, truth)
                 names.add(TRUTH)
+            if reference_mount != BASE:
+                write_reference_mount(scratch / REFERENCE_MOUNT, reference_mount)
+                names.add(REFERENCE_MOUNT)
             for path in scratch.iterdir():
                 if path.name not in names:
                     path.unlink()
-        for name in (DETECTIONS, SCANS, REFERENCE, TRUTH, *(path.name for path in folder.glob(NAMED_SCANS))):
+        for name in (
+            DETECTIONS,
+            SCANS,
+            REFERENCE,
+            REFERENCE_MOUNT,
+            TRUTH,
+            *(path.name for path in folder.glob(NAMED_SCANS)),
+        ):
             if name not in names:
                 (folder / name).unlink(missing_ok=True)
     except OSError as error:

@@ -18,6 +18,7 @@ from commission.io.recordings.base import load_log, open_recording
 from commission.io.recordings.csv_writer import write_recording
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+from commission.site.reference_mount import ReferenceMount
 
 START = 1_700_000_000_000_000_000
 """A stamp of today: floating point does not hold such numbers of nanoseconds exactly."""
@@ -430,4 +431,33 @@ def test_scans_with_and_without_a_name_are_refused(tmp_path: Path) -> None:
     assert load_log(tmp_path).scanners == ("a",)
     write_scans(tmp_path)
     with pytest.raises(FileFormatError, match=r"is there besides scans_a\.npz"):
+        load_log(tmp_path)
+
+
+def test_a_reference_says_where_it_measures_and_is_read_back_as_it_was_written(tmp_path: Path) -> None:
+    mount = ReferenceMount(antenna=(0.7, -0.125, 1.9), clock_offset=0.0125)
+    write_recording(tmp_path, drive(3), reference_mount=mount)
+    assert load_log(tmp_path).reference_mount == mount
+    # Written anew without one, nothing of it is left.
+    write_recording(tmp_path, drive(3))
+    assert not (tmp_path / "reference.json").exists()
+    assert load_log(tmp_path).reference_mount == ReferenceMount()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("{", "is no JSON"),
+        ("[1]", "an object with antenna"),
+        ('{"antenna": [1.0]}', "has 1 numbers; expected x, y"),
+        ('{"antenna": "left"}', "antenna"),
+        ('{"lever": [1, 2]}', "lever"),
+        ('{"schema": 2}', "schema: is 2"),
+        ('{"clock_offset": 1e9}', "clock_offset is 1e"),
+    ],
+)
+def test_a_description_of_a_reference_that_is_none_is_refused(tmp_path: Path, text: str, message: str) -> None:
+    write_recording(tmp_path, drive(3))
+    (tmp_path / "reference.json").write_text(text, encoding="utf-8")
+    with pytest.raises(FileFormatError, match=message):
         load_log(tmp_path)

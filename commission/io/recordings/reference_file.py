@@ -1,0 +1,65 @@
+"""The file `reference.json` of a recording: where on the vehicle its reference measures, and how late its clock is."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from commission.errors import FileFormatError
+from commission.io.atomic import write_text
+from commission.io.conversion import convert
+from commission.io.reading import read_text
+from commission.io.yaml_document import YamlDocument
+from commission.site.reference_mount import ReferenceMount
+
+REFERENCE_MOUNT = "reference.json"
+SCHEMA = 1
+"""Version of the file."""
+SIZE_LIMIT = 10_000
+"""Bytes of the file."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReferenceDocument:
+    """Keys of `reference.json`, in SI units."""
+
+    schema: int = SCHEMA
+    """Version of the file."""
+    antenna: tuple[float, ...] = (0.0, 0.0)
+    """Point whose position the reference measures: x, y and maybe z in the base frame [m]."""
+    clock_offset: float = 0.0
+    """How much later than they were measured its poses are stamped [s]."""
+
+
+def write_reference_mount(path: Path, mount: ReferenceMount) -> None:
+    """Write where a reference measures; raises FileFormatError when the file cannot be written."""
+    values = {"schema": SCHEMA, **msgspec.to_builtins(mount)}
+    write_text(path, json.dumps(values) + "\n")
+
+
+def read_reference_mount(path: Path) -> ReferenceMount:
+    """Read where a reference measures.
+
+    Raises
+    ------
+    FileFormatError
+        the file is damaged, of another version, or holds something that is not expected; names the key.
+    """
+    try:
+        values = msgspec.json.decode(read_text(path, SIZE_LIMIT))
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise FileFormatError(path, "", f"is no JSON ({error})", '{"antenna": [x, y], "clock_offset": s}') from error
+    document = YamlDocument(path, values)
+    if not isinstance(values, dict):
+        raise document.error((), f"is {values!r}", "an object with antenna and clock_offset")
+    if values.get("schema", SCHEMA) != SCHEMA or isinstance(values.get("schema"), bool):
+        raise document.error(("schema",), f"is {values['schema']!r}", f"{SCHEMA}, the version this program knows")
+    keys = convert(document, ReferenceDocument)
+    try:
+        return ReferenceMount(antenna=keys.antenna, clock_offset=keys.clock_offset)
+    except ValueError as error:
+        found, _, expected = str(error).partition("; expected ")
+        raise FileFormatError(path, "", found, expected) from error
