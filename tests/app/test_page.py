@@ -82,9 +82,10 @@ def test_the_page_stands_before_any_run_exists(server: viser.ViserServer) -> Non
 def test_a_person_posts_and_the_server_itself_does_not() -> None:
     posted: list[Action] = []
     callback: Any = posting(taking(posted), lambda event: Seek(event.target.value))
-    callback(SimpleNamespace(client=None, target=SimpleNamespace(value=1.0)))
+    widget = SimpleNamespace(uuid="seek")
+    callback(SimpleNamespace(client=None, target=SimpleNamespace(value=1.0, _impl=widget)))
     assert posted == []
-    callback(SimpleNamespace(client=SimpleNamespace(client_id=1), target=SimpleNamespace(value=2.0)))
+    callback(SimpleNamespace(client=SimpleNamespace(client_id=1), target=SimpleNamespace(value=2.0, _impl=widget)))
     assert posted == [Seek(2.0)]
 
 

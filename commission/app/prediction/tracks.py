@@ -111,7 +111,15 @@ def round_up(value: float) -> float:
 
 
 def svg(title: str, bottom: float, axis: TrackAxis, parts: list[str]) -> str:
-    """Put parts of a drawing below a title, with the events of the route and its metres."""
+    """Put parts of a drawing below a title, with the events of the route and its metres.
+
+    Parameters
+    ----------
+    title : name and unit; plain text.
+    bottom : height of the bars [pixels].
+    axis : metres and events of the route.
+    parts : svg elements.
+    """
     height = bottom + LABELS_PX
     content = "".join([*parts, *_events(axis, bottom), *_metre_labels(axis, height)])
     head = f"<div style='font-size:11px;opacity:.75;padding-top:5px'>{escaped(title)}</div>"
@@ -125,12 +133,27 @@ def tick(y: float, text: str) -> list[str]:
 
 
 def write(x: float, y: float, text: str, anchor: str = "end", *, fill: str = INK) -> str:
-    """Write a text that is escaped already."""
+    """Write a text.
+
+    Parameters
+    ----------
+    x, y : where it is anchored, from the upper left corner [pixels].
+    text : escaped already.
+    anchor : svg's: start, middle or end.
+    fill : CSS color.
+    """
     return f"<text x='{x:.1f}' y='{y:.1f}' fill='{fill}' text-anchor='{anchor}'>{text}</text>"
 
 
 def line(y: float, color: str, dash: str = "none") -> str:
-    """Draw a level line."""
+    """Draw a level line.
+
+    Parameters
+    ----------
+    y : from the upper edge [pixels].
+    color : CSS color.
+    dash : svg's pattern of dashes.
+    """
     return f"<line x1='{LEFT}' x2='{WIDTH}' y1='{y:.1f}' y2='{y:.1f}' stroke='{color}' stroke-dasharray='{dash}'/>"
 
 

@@ -59,7 +59,7 @@ SITE = (
     Mutant(
         name="cylinder stands in the wall",
         file=FOLDER + "editing/snapping.py",
-        find="depth = PLATE_DEPTH if is_flat else reflector.radius",
+        find="depth = PLATE_DEPTH if is_flat else reflector.reckoned_radius",
         replace="depth = PLATE_DEPTH",
         tests=(
             TESTS
