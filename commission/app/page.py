@@ -74,8 +74,8 @@ class Page:
         self._browsers: dict[int, BrowserPage] = {}
         docked = sorted((panel for feature in features for panel in feature.panels), key=lambda panel: panel.rank)
         self._own = tuple(panel for panel in docked if panel.own)
-        script = (bundled_folder("web_assets") / "page.js").read_text(encoding="utf-8")
-        viser_private.run_on_pages(server, script)
+        for script in sorted(bundled_folder("web_assets").glob("*.js")):
+            viser_private.run_on_pages(server, script.read_text(encoding="utf-8"))
         with server.atomic():
             server.gui.configure_theme(
                 dark_mode=True, show_logo=False, show_share_button=False, brand_color=theme.BRAND
@@ -181,6 +181,8 @@ class Page:
         match effect:
             case Tell(text, failed, everywhere):
                 self._tell(text, None if everywhere else sender.browser, failed=failed)
+                if failed and sender.browser is not None and sender.widget:
+                    viser_private.say_at_field(self._server, sender.browser, sender.widget, text)
             case PlaceCamera(camera, everywhere):
                 for number in self._browsers if everywhere else own:
                     with self._if_there(number), suppress(ValueError):  # it may look from where it looks at

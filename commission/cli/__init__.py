@@ -22,6 +22,7 @@ from commission.cli.localize import Localize
 from commission.cli.parsing import Command, parse
 from commission.cli.place import Place
 from commission.cli.predict import Predict
+from commission.cli.problems import Problems
 from commission.cli.serve import Demo, Serve
 from commission.cli.simulate import Simulate
 from commission.cli.versions import Version
@@ -40,6 +41,7 @@ COMMANDS: dict[str, type[Command]] = {
     "predict": Predict,
     "ambiguity": Ambiguity,
     "place": Place,
+    "problems": Problems,
     "convert": Convert,
     "version": Version,
 }

@@ -103,8 +103,10 @@ def write_imk(reflectors: ReflectorMap, path: Path) -> tuple[str, ...]:
     for reflector in reflectors.reflectors:
         x, y = (_millimetres(path, reflector, axis, found) for axis in ("x", "y"))
         # A size of 0 would be no reflector; what is smaller than half a millimetre is written as 1.
-        size = max(1, round(2000.0 * reflector.radius))
-        if abs(size - 2000.0 * reflector.radius) > 1e-6:
+        size = max(1, round(2000.0 * reflector.reckoned_radius))
+        if reflector.radius is None:
+            found.add(f"reflector {shown(reflector.id)}", f"the radius is unknown; a size of {size} mm is written")
+        elif abs(size - 2000.0 * reflector.radius) > 1e-6:
             found.add("", "sizes are rounded to whole millimetres")
         subtype = next(code for code, kind in _SUBTYPES.items() if kind is reflector.kind)
         cells = (numbers[reflector.id], x, y, _LANDMARK, subtype, size, *layers[reflector.id])
@@ -129,7 +131,7 @@ def _reflector(path: Path, line: int, cells: list[str], found: Findings) -> Refl
         found.add(f"line {line}", f"type {kind}, subtype {subtype} is unknown; taken for a cylinder")
         subtype = 2
     if _SUBTYPES[subtype] is ReflectorKind.FLAT:
-        found.add(f"line {line}", "the format does not say which way a flat reflector faces; heading is set to 0 rad")
+        found.add(f"line {line}", "the format does not say which way a flat reflector faces; its direction is unknown")
     layer = "" if layers == [0] else "+".join(str(layer) for layer in layers)
     return Reflector(
         id=str(ident), x=x / 1000.0, y=y / 1000.0, radius=size / 2000.0, kind=_SUBTYPES[subtype], layer=layer

@@ -18,7 +18,6 @@ from commission.io.reflector_tables import OPTIONAL, REQUIRED, reflectors_of
 
 TEXT_LIMIT = 8_000_000
 """Characters of a pasted table: more than a clipboard of 100,000 reflectors."""
-USUAL_RADIUS = 0.04
 FAR = 1000.0
 """A coordinate beyond this is doubted when the table names no unit [m]: halls are smaller, millimetres are not."""
 
@@ -165,8 +164,8 @@ def _fill_in(block: Block, units: dict[str, str], found: Findings) -> None:
         block.columns["id"] = [f"R{i}" for i in range(1, len(block) + 1)]
         found.add("", "the table has no ids; the reflectors are called R1, R2, ...")
     if "radius" not in block.columns:
-        block.columns["radius"] = [repr(USUAL_RADIUS)] * len(block)
-        found.add("", f"the table has no radius; {1000.0 * USUAL_RADIUS:g} mm is assumed")
+        block.columns["radius"] = [""] * len(block)
+        found.add("", "the table has no radius; that of its reflectors is unknown")
     for axis in "xy":
         farthest = max((abs(float(value)) for value in block.numbers(axis, "m")), default=0.0)
         if farthest > FAR and not units.get(axis):

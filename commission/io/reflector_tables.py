@@ -23,8 +23,10 @@ SIZE_LIMIT = 64_000_000
 
 _UNITS = {"x": "m", "y": "m", "radius": "m", "heading": "rad", "height": "m", "sigma": "m"}
 _TEXTS = ("kind", "layer", "note", "locked")
+_UNKNOWN = {"radius", "heading"}
 _YES, _NO = ("yes", "true", "1"), ("", "no", "false", "0")
-_DEFAULTS: Mapping[str, float] = {"heading": 0.0, "height": 0.2, "sigma": 0.0}
+_DEFAULTS: Mapping[str, float] = {"radius": math.nan, "heading": math.nan, "height": 0.2, "sigma": 0.0}
+"""What an empty cell means; NaN: nobody knows."""
 
 
 def read_reflectors(path: Path, found: Findings | None = None) -> ReflectorMap:
@@ -33,7 +35,7 @@ def read_reflectors(path: Path, found: Findings | None = None) -> ReflectorMap:
     Parameters
     ----------
     path : CSV file with the columns id, x, y, radius and, if wanted, kind, heading, height, sigma, layer, note,
-        locked [m, rad, map frame], in any order.
+        locked [m, rad, map frame], in any order. An empty radius or heading, or no heading at all, is unknown.
     found : takes what was doubted; with it, text that is not UTF-8 and headings in degrees are read as what they are.
 
     Returns
@@ -58,6 +60,10 @@ def reflectors_of(blocks: Iterable[Block], found: Findings | None = None) -> Ref
             for name, unit in _UNITS.items()
             if name in block.columns
         }
+        unknown = {
+            name: [None if math.isnan(each) else each for each in numbers[name]] for name in _UNKNOWN & numbers.keys()
+        }
+        numbers |= unknown
         texts = {name: block.texts(name) for name in ("id", *_TEXTS) if name in block.columns}
         for row in range(len(block)):
             cells = {name: values[row] for name, values in texts.items()}
@@ -72,11 +78,13 @@ def reflectors_of(blocks: Iterable[Block], found: Findings | None = None) -> Ref
 
 def _with_radians(reflectors: list[Reflector], found: Findings | None) -> tuple[Reflector, ...]:
     """Take headings for degrees where one is more than a turn: nobody writes 270 for an angle in radians."""
-    farthest = max((abs(r.heading) for r in reflectors), default=0.0)
+    farthest = max((abs(r.heading) for r in reflectors if r.heading is not None), default=0.0)
     if found is None or farthest <= 2.0 * math.pi + 1e-3:
         return tuple(reflectors)
     found.add("column heading", f"reaches {farthest:g}; the headings are taken for degrees, expected are radians")
-    return tuple(dataclasses.replace(r, heading=math.radians(r.heading)) for r in reflectors)
+    return tuple(
+        r if r.heading is None else dataclasses.replace(r, heading=math.radians(r.heading)) for r in reflectors
+    )
 
 
 def write_reflectors(reflectors: ReflectorMap, path: Path) -> None:
@@ -96,6 +104,8 @@ def write_reflectors(reflectors: ReflectorMap, path: Path) -> None:
 def _written(path: Path, reflector: Reflector, name: str) -> str:
     """Cell that reads back as the value."""
     value = getattr(reflector, name)
+    if value is None:
+        return ""
     if isinstance(value, bool):
         return _YES[0] if value else _NO[0]
     if isinstance(value, float | int):
@@ -108,7 +118,7 @@ def _written(path: Path, reflector: Reflector, name: str) -> str:
     return text
 
 
-def _reflector(block: Block, row: int, texts: dict[str, str], numbers: Mapping[str, float]) -> Reflector:
+def _reflector(block: Block, row: int, texts: dict[str, str], numbers: Mapping[str, float | None]) -> Reflector:
     kind = texts.pop("kind", "") or ReflectorKind.CYLINDER
     if kind not in list(ReflectorKind):
         raise block.error(row, "kind", f"is {shortened(kind)}", f"one of: {', '.join(ReflectorKind)}")

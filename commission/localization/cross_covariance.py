@@ -40,8 +40,11 @@ class CrossCovariance:
 
 
 def survey_variance(reflector: Reflector, uncertainty: Uncertainty) -> float:
-    """Variance of a reflector's place, each axis [m^2]: its own, or where it has none that of the project."""
-    return (reflector.sigma if reflector.sigma > 0.0 else uncertainty.survey) ** 2
+    """Variance of a reflector's place, each axis [m^2]: its own, or where it has none that of the project.
+
+    What an unknown radius does to its detections comes on top.
+    """
+    return (reflector.sigma if reflector.sigma > 0.0 else uncertainty.survey) ** 2 + reflector.radius_sigma**2
 
 
 def constants_of(

@@ -161,6 +161,25 @@ def detect_clusters(  # noqa: PLR0917 - outputs are written into the arrays of t
     return row
 
 
+@compiled
+def passing_widths(distance: float, step: float, kind: int, model: DetectorModel) -> tuple[int, int]:
+    """Fewest and most beams with which a cluster passes as one class of reflectors; a plate however it stands.
+
+    Parameters
+    ----------
+    distance : to its center [m].
+    step : between beams [rad].
+    kind : row of the model's classes.
+    model : classes of reflectors and tolerances.
+
+    Notes
+    -----
+    fewest - min_model_error and most + max_model_error: Sobreira et al. 2016, Algorithm 2, line 7.
+    """
+    window = _window(distance, Tilt(0.0, 0.0), step, kind, model)
+    return max(window.fewest - model.fewer, 1), window.most + model.more
+
+
 @compiled_inline
 def _judge(  # noqa: PLR0917 - a scan and a cluster in it
     ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, first: int, last: int, model: DetectorModel
@@ -219,8 +238,23 @@ def _judge(  # noqa: PLR0917 - a scan and a cluster in it
 
 @compiled_inline
 def _window(distance: float, tilt: Tilt, step: float, kind: int, model: DetectorModel) -> BeamWindow:
-    """Beams that a class of reflectors shows at a distance; a plate as its ranges say that it stands."""
-    radius, flat = model.radii[kind], model.flat[kind]
+    """Beams that a class of reflectors shows at a distance; a plate as its ranges say that it stands.
+
+    Of an unknown radius the window reaches from the smallest to the largest that it may be.
+    """
+    window = _window_of(distance, model.radii[kind], tilt, step, model.flat[kind], model)
+    if model.smallest[kind] == model.largest[kind]:
+        return window
+    narrow = _window_of(distance, model.smallest[kind], tilt, step, model.flat[kind], model)
+    wide = _window_of(distance, model.largest[kind], tilt, step, model.flat[kind], model)
+    return BeamWindow(narrow.fewest, wide.most, window.likely)
+
+
+@compiled_inline
+def _window_of(  # noqa: PLR0917 - one size of a reflector
+    distance: float, radius: float, tilt: Tilt, step: float, flat: bool, model: DetectorModel
+) -> BeamWindow:
+    """Beams that a reflector of one size shows."""
     if not model.by_width:
         return window_of_equation_3(distance, radius, flat, step)
     if flat:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -11,8 +11,11 @@ from commission.compiled import compiled_inline
 from commission.geometry.angles import TURN
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.site.parameters import DetectorParameters
-from commission.site.reflectors import ReflectorMap
+from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
 from commission.site.scanner import Scanner
+
+ReflectorClass: TypeAlias = tuple[float, bool, float, float]
+"""Radius that is reckoned with, whether it is a plate, smallest and largest radius that it may have [m]."""
 
 
 class DetectorModel(NamedTuple):
@@ -22,6 +25,10 @@ class DetectorModel(NamedTuple):
     """(C,) radius of each class of reflectors in the map [m]; half the width of a plate."""
     flat: BoolArray
     """(C,) whether the class is of flat plates."""
+    smallest: FloatArray
+    """(C,) smallest radius that one of the class may have [m]: another one than `radii` where theirs is unknown."""
+    largest: FloatArray
+    """(C,) largest radius that one of the class may have [m]."""
     enabled: bool
     fewer: int
     """MinModelError: beams that may be missing. It bounds a signed error, so the window is [-fewer, more]."""
@@ -75,18 +82,19 @@ def detector_model(reflectors: ReflectorMap, scanner: Scanner, parameters: Detec
     scanner : width and noise of its beams.
     parameters : window of the detector filter and rule for the center.
     """
-    flat_of = reflectors.is_flat
-    classes = sorted({(float(radius), bool(flat)) for radius, flat in zip(reflectors.radii, flat_of, strict=True)})
-    radii = np.array([radius for radius, _ in classes], dtype=np.float64)
-    flat = np.array([is_flat for _, is_flat in classes], dtype=np.bool_)
+    classes = sorted({class_of(reflector) for reflector in reflectors.reflectors})
+    radii, smallest, largest = (np.array([each[i] for each in classes], dtype=np.float64) for i in (0, 2, 3))
+    flat = np.array([each[1] for each in classes], dtype=np.bool_)
     return DetectorModel(
         read_only(radii),
         read_only(flat),
+        read_only(smallest),
+        read_only(largest),
         bool(parameters.enabled),
         int(parameters.min_model_error),
         int(parameters.max_model_error),
         float(parameters.range_jump),
-        2.0 * float(radii.max(initial=0.0)) if parameters.expected_beams == "beam_width" else 0.0,
+        2.0 * float(largest.max(initial=0.0)) if parameters.expected_beams == "beam_width" else 0.0,
         bool(flat.any() and not flat.all()) and parameters.expected_beams == "beam_width",
         parameters.center == "circle",
         parameters.expected_beams == "beam_width",
@@ -95,6 +103,11 @@ def detector_model(reflectors: ReflectorMap, scanner: Scanner, parameters: Detec
         math.radians(scanner.bearing_sigma_deg),
         max(float(scanner.range_sigma), 1e-3),
     )
+
+
+def class_of(reflector: Reflector) -> ReflectorClass:
+    """What the detector tells reflectors apart by."""
+    return (reflector.reckoned_radius, reflector.kind is ReflectorKind.FLAT, *reflector.radii)
 
 
 def beams_of(counts: IntArray, angle_min: FloatArray, increments: FloatArray) -> BeamColumns:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled_inline
 from commission.localization.beam_echo import LIT_SHARE, BeamModel, cylinder_echo, flagged_span, half_width_at, lit_part
+from commission.site.reflectors import RANGE_PER_RADIUS
 
 GRAZING = 0.9
 """Beams whose lit part passes the axis at more than this share of the radius do not shape the fit: there the surface
@@ -22,7 +23,7 @@ MISSING = 0.5
 """Beams that may be missing in a cluster before one asks why."""
 NEARER = 3.0
 """Sigmas of a beam's range by which something beside the cluster is nearer than the reflector."""
-MEAN_DEPTH = math.pi / 4.0
+MEAN_DEPTH = RANGE_PER_RADIUS
 """Mean distance, in radii, from the lit half of a circle to the line through its center across the beam."""
 STEEPEST_SHARE = 0.5
 """Largest product of slope and half width of a plate that shapes its center: a plate at 63 degrees, 28 degrees wide."""

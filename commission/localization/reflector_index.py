@@ -54,7 +54,7 @@ def build_index(reflectors: ReflectorMap, survey_sigmas: FloatArray | None = Non
     """
     centers = np.asarray(reflectors.centers)
     if survey_sigmas is None:
-        survey_sigmas = np.array([reflector.sigma for reflector in reflectors.reflectors], dtype=np.float64)
+        survey_sigmas = np.array([reflector.own_sigma for reflector in reflectors.reflectors], dtype=np.float64)
     sigmas = survey_sigmas
     low = centers.min(axis=0) if len(centers) else np.zeros(2)
     extent = centers.max(axis=0) - low if len(centers) else np.zeros(2)

@@ -105,7 +105,7 @@ class LocalizerSetup:
         """(N,) 1-sigma of each reflector's place, each axis [m]: without considering, of those that have one alone."""
         each = self.reflectors.reflectors
         if not self.parameters.filter.consider:
-            return np.array([reflector.sigma for reflector in each], dtype=np.float64)
+            return np.array([reflector.own_sigma for reflector in each], dtype=np.float64)
         return np.sqrt([survey_variance(reflector, self.uncertainty) for reflector in each])
 
     def detects_like(self, other: LocalizerSetup) -> bool:

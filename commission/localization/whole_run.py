@@ -19,6 +19,7 @@ from commission.localization.detection_log import (
     joined,
     nothing_detected,
 )
+from commission.localization.detector import passing_widths
 from commission.localization.estimate import Belief
 from commission.localization.run_columns import Checkpoint, RunColumns, RunSegment, firsts_of
 from commission.localization.run_loop import CycleStretch, continued, cut, empty_columns, take_over
@@ -256,3 +257,5 @@ def warm_up() -> None:
     scans = ScanLog.even(np.array([2]), ranges, (-0.02, 0.01), reflector=flags)
     log = RecordLog(odometry_stamps_ns=np.array([0, 1]), displacements=np.zeros((2, 3)), scans=(scans,))
     run(log, setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3))).points_map()
+    # What the page says of a rejected cluster.
+    passing_widths(2.0, 0.01, 0, setup.detectors[0])

@@ -17,11 +17,13 @@ from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.beam_echo import BeamModel, cylinder_echo, half_width_at, is_flagged, lit_part
 from commission.localization.detector import INLIER, detect_clusters
-from commission.localization.detector_model import Beams, DetectorModel, detector_model
+from commission.localization.detector_model import Beams, DetectorModel, ReflectorClass, class_of, detector_model
 from commission.site.parameters import DetectorParameters
 from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
 
+CLASS_COLUMNS = 4
+"""Fields of a `DetectorModel` that have a row for each class, in the order of a `ReflectorClass`."""
 LIKELY = 0.5
 """Probability of detection from which on a reflector counts as visible."""
 NEAREST = 0.3
@@ -140,8 +142,10 @@ def detection_table(
         ),
         farthest or _reach(scanner),
     )
-    radii, flat, *rest = detector_model(reflectors, scanner, parameters)
-    return _experiment(tuple(radii.tolist()), tuple(flat.tolist()), tuple(rest), optics)
+    model = detector_model(reflectors, scanner, parameters)
+    columns = model[:CLASS_COLUMNS]
+    classes = tuple(zip(*(column.tolist() for column in columns), strict=True))
+    return _experiment(classes, tuple(model[CLASS_COLUMNS:]), optics)
 
 
 def _reach(scanner: Scanner) -> float:
@@ -161,9 +165,9 @@ def classes_of(reflectors: ReflectorMap, scanner: Scanner, parameters: DetectorP
     rows : (M,) array.
     """
     model = detector_model(reflectors, scanner, parameters)
-    rows = {pair: row for row, pair in enumerate(zip(model.radii.tolist(), model.flat.tolist(), strict=True))}
-    pairs = zip(reflectors.radii.tolist(), reflectors.is_flat.tolist(), strict=True)
-    return np.array([rows[pair] for pair in pairs], dtype=np.int64)
+    columns = model[:CLASS_COLUMNS]
+    rows = {each: row for row, each in enumerate(zip(*(column.tolist() for column in columns), strict=True))}
+    return np.array([rows[class_of(each)] for each in reflectors.reflectors], dtype=np.int64)
 
 
 class DetectionQuality(NamedTuple):
@@ -226,11 +230,14 @@ def worth(noise: DetectionNoise, kind: int, distance: float) -> Worth:
 
 # The same site is predicted again and again while the engineer drags a reflector.
 @functools.lru_cache(maxsize=64)
-def _experiment(
-    radii: tuple[float, ...], flat: tuple[bool, ...], rest: tuple[float, ...], optics: _Optics
-) -> DetectionTable:
+def _experiment(classes: tuple[ReflectorClass, ...], rest: tuple[float, ...], optics: _Optics) -> DetectionTable:
     """Detect each class of reflectors at each distance; `rest` are the other fields of a `DetectorModel`."""
-    model = DetectorModel(read_only(np.array(radii, np.float64)), read_only(np.array(flat, np.bool_)), *rest)  # type: ignore[arg-type]
+    radii, flat = tuple(each[0] for each in classes), tuple(each[1] for each in classes)
+    kinds = (np.float64, np.bool_, np.float64, np.float64)
+    model = DetectorModel(
+        *(read_only(np.array([each[i] for each in classes], kind)) for i, kind in enumerate(kinds)),  # type: ignore[arg-type]
+        *rest,  # type: ignore[arg-type]
+    )
     columns = np.zeros((len(radii), DISTANCES, len(Worth._fields)))
     shown, beams = np.zeros((len(radii), DISTANCES)), np.full((len(radii), DISTANCES), np.nan)
     distances = np.geomspace(NEAREST, optics.farthest, DISTANCES)

@@ -162,7 +162,7 @@ def fix_model(scanner: Scanner, options: FixOptions) -> FixModel:
 
 def survey_sigmas(reflectors: ReflectorMap) -> FloatArray:
     """1-sigma uncertainty of each reflector's place: (M,) array [m]."""
-    return np.array([reflector.sigma for reflector in reflectors.reflectors], dtype=np.float64)
+    return np.array([reflector.own_sigma for reflector in reflectors.reflectors], dtype=np.float64)
 
 
 def as_fixes(counts: dilution_kernels.Counts, figures: FloatArray) -> Fixes:

@@ -26,6 +26,7 @@ from commission.localization.pose_gaussian import from_belief
 from commission.localization.setup import consider_model
 from commission.localization.supervisor import position_two_sigma, supervisor_limits
 from commission.planning.detection_noise import DetectionQuality, detection_quality
+from commission.planning.detection_order import farthest_first
 from commission.planning.nominal_drive import DrivePlan, NominalDrive, nominal_drive
 from commission.planning.prediction_kernels import PredictionColumns, PredictionModel, predict_covariances
 from commission.planning.visibility import VisibilityModel, VisibleReflectors, seen_in_turn, visibility_models
@@ -89,7 +90,7 @@ class PlannedRoute:
     drive: NominalDrive
     """The K scans."""
     visible: VisibleReflectors
-    """Reflectors visible at each scan."""
+    """Reflectors visible at each scan, the farthest first."""
     places: FloatArray
     """(M, 4) x, y [m], map frame, of each reflector; variance of its place as the filter has it, and as it is [m^2]."""
     farthest: FloatArray
@@ -283,14 +284,15 @@ def plan_route(
     models = models or visibility_models(site)
     drive, model = nominal_drive(site.route(route_name), site.vehicle, site.scanners, options.plan), models[0]
     reflectors = model.reflectors
+    seen = seen_in_turn(models, drive.poses, drive.scanners)
     surveyed = np.array([survey_variance(each, site.uncertainty) for each in reflectors.reflectors])
-    own = np.array([each.sigma**2 for each in reflectors.reflectors])
+    own = np.array([each.sigma**2 + each.radius_sigma**2 for each in reflectors.reflectors])
     believed = surveyed if site.parameters.filter.consider else own
     places = np.column_stack((reflectors.centers, believed, surveyed))
     return PlannedRoute(
         name=route_name,
         drive=drive,
-        visible=seen_in_turn(models, drive.poses, drive.scanners),
+        visible=farthest_first(seen, reflectors.centers, drive.poses, (site.scanners, drive.scanners)),
         places=read_only(places),
         farthest=read_only(np.max([each.targets.farthest for each in models], axis=0)),
         reflectors=model.reflectors,
@@ -328,7 +330,8 @@ def predict_route(planned: PlannedRoute, damage: Damage = NO_DAMAGE) -> RoutePre
     """Predict the localizer's belief along a planned drive.
 
     A visible reflector is detected inside the gate with the probability P_G (and with that of a free ray among
-    people); the covariance after it is the mean of that with and without it (Sinopoli et al. 2004, equation 13).
+    people); the covariance after it is the mean of that with and without it (Sinopoli et al. 2004, equation 13), of
+    one reflector after the other, the farthest first: whatever order they have in the map.
 
     Parameters
     ----------

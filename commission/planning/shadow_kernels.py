@@ -48,7 +48,7 @@ class Targets(NamedTuple):
     radii: FloatArray
     """(M,) a ray that comes this close to the center has arrived [m]."""
     normals: FloatArray
-    """(M, 2) direction a plate faces; 0, 0 for a cylinder."""
+    """(M, 2) direction a plate faces; 0, 0 for a cylinder, and for a plate that may face any."""
     nearest: FloatArray
     """(M,) smallest distance from scanner to center [m]."""
     farthest: FloatArray

@@ -65,7 +65,7 @@ class VisibleReflectors(NamedTuple):
     offsets: IntArray
     """(N + 1,) the reflectors of pose n are `indices[offsets[n]:offsets[n + 1]]`."""
     indices: IntArray
-    """(total,) indices into the reflector map, ascending for each pose."""
+    """(total,) indices into the reflector map, ascending for each pose unless said otherwise."""
 
     def of(self, pose: int) -> IntArray:
         """Indices of the reflectors that one pose sees."""
@@ -266,7 +266,7 @@ def build_visibility(
     targets = Targets(
         centers=np.array(reflectors.centers),
         radii=_arrival(reflectors, caster.grid, options),
-        normals=np.where(reflectors.is_flat[:, np.newaxis], normals, 0.0),
+        normals=np.where(reflectors.is_directed[:, np.newaxis], normals, 0.0),
         nearest=np.ascontiguousarray(limits[:, 0]),
         farthest=np.ascontiguousarray(limits[:, 1]),
         promised=np.ascontiguousarray(limits[:, 2]),
@@ -302,10 +302,10 @@ def replace_target(targets: Targets, index: int, reflector: Reflector, model: Vi
     model : scanner, walls and options.
     """
     nearest, farthest, promised = _limits(reflector, model.scanner, model.options)
-    is_flat = reflector.kind == "flat"
+    heading = reflector.heading if reflector.kind == "flat" else None
     targets.centers[index] = reflector.x, reflector.y
     targets.radii[index] = _arrival(ReflectorMap((reflector,)), model.caster.grid, model.options)[0]
-    targets.normals[index] = (math.cos(reflector.heading), math.sin(reflector.heading)) if is_flat else (0.0, 0.0)
+    targets.normals[index] = (0.0, 0.0) if heading is None else (math.cos(heading), math.sin(heading))
     targets.nearest[index], targets.farthest[index], targets.promised[index] = nearest, farthest, promised
     shadow_kernels.cast_shadow(model.caster.tables, targets, index)
 
@@ -342,9 +342,9 @@ def _limits(reflector: Reflector, scanner: Scanner, options: VisibilityOptions) 
     """Nearest, farthest and promised distance between scanner and center [m]."""
     # A scanner measures to the surface, which a cylinder has one radius before its center and a plate at its center.
     is_flat = reflector.kind == "flat"
-    depth = 0.0 if is_flat else reflector.radius
+    depth = 0.0 if is_flat else reflector.reckoned_radius
     promised = promised_range(
-        reflector.radius,
+        reflector.radii[0],
         scanner.angle_increment,
         options.min_beams,
         math.radians(scanner.beam_width_deg),

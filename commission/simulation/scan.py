@@ -132,11 +132,12 @@ def _beams(scanner: Scanner) -> ScannerBeams:
 def _hall(caster: RayCaster, reflectors: ReflectorMap, disturbances: Disturbances, wall_depths: FloatArray) -> Hall:
     """Walls, then reflectors and shiny objects as the kernel's columns."""
     shiny = disturbances.shiny_objects
+    facing = np.where(reflectors.is_flat & ~reflectors.is_directed, math.nan, reflectors.headings)
     return Hall(
         caster.tables,
         np.concatenate([reflectors.centers, np.array([(s.x, s.y) for s in shiny]).reshape(-1, 2)]),
         np.concatenate([reflectors.radii, np.array([s.radius for s in shiny])]),
-        np.concatenate([reflectors.headings, np.zeros(len(shiny))]),
+        np.concatenate([facing, np.zeros(len(shiny))]),
         np.concatenate([reflectors.is_flat, np.zeros(len(shiny), np.bool_)]),
         wall_depths,
     )

@@ -243,6 +243,8 @@ def _meet_reflective(hall: Hall, beams: ScannerBeams, moment: Moment, index: int
     half_width = half_width_at(distance, beams.half_divergence, beams.half_aperture)
     if last >= first and hall.flat[index]:
         facing = wrap_scalar(hall.headings[index] - bearing - moment.pose[2])
+        if math.isnan(facing):
+            facing = math.pi
         if -math.cos(facing) < FLAT_COSINE:
             return
         low, high = _plate_edges(distance, hall.radii[index], facing)

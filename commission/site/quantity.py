@@ -189,6 +189,8 @@ class Quantity:
     """What may be typed on the page, in its unit; none: what the bounds allow."""
     decimals: int | None = None
     """Decimals in files that people read; none: six significant digits."""
+    none: str = ""
+    """Word on the page for a value that is None; empty: the page has no way to enter that."""
 
     @property
     def shown_unit(self) -> str:

@@ -20,9 +20,9 @@ LOST_FOR_S = 1.0
 LOST_WINDOW_S = 5.0
 LOST_SHARE = 0.4
 """Accepted share over a window of 5 s below which the vehicle is probably lost [0..1]."""
-TOO_SMALL, TOO_LARGE = 1.25, 0.45
+TOO_SMALL, TOO_LARGE = 1.25, 0.25
 """How much larger, or smaller, innovations are than the filter says before it is told. A drive is one draw of constants
-that the filter considers: right setups of the bundled sites have 0.52 to 0.95."""
+that the filter considers: the bundled sites have 0.52 to 0.95, a vehicle far better than the defaults 0.3."""
 LARGEST = 2.5
 """Beyond that factor half of all detections are rejected: what is wrong then is not the noise."""
 SAME_SHAPE = 0.05

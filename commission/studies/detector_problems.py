@@ -13,7 +13,7 @@ from commission.localization.detector_model import detector_model
 from commission.planning.detection_noise import DetectionTable, detection_table
 from commission.site.parameters import DetectorParameters
 from commission.site.quantity import MILLIMETRES, PERCENT
-from commission.site.reflectors import ReflectorMap
+from commission.site.reflectors import UNKNOWN, ReflectorMap
 from commission.site.scanner import Scanner
 
 NOTABLE = 0.05
@@ -50,7 +50,8 @@ def detector_findings(
     model = detector_model(reflectors, scanner, parameters)
     rejected, here = table.rejected(), table.distances <= farthest
     for row, (radius, flat) in enumerate(zip(model.radii.tolist(), model.flat.tolist(), strict=True)):
-        size = MILLIMETRES.text(radius, ".3g")
+        is_known = model.smallest[row] == model.largest[row]
+        size = MILLIMETRES.text(radius, ".3g") if is_known else UNKNOWN
         kind = f"plates of half width {size}" if flat else f"reflectors of radius {size}"
         yield from _losses(kind, table, np.where(here, rejected[row], 0.0), np.where(here, table.shown[row], 1.0))
         few = np.flatnonzero(here & ~(table.beams[row] >= FEW_BEAMS))

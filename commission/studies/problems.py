@@ -26,7 +26,13 @@ from commission.site.parameters import Parameters
 from commission.site.parts import Told
 from commission.site.project import Project
 from commission.site.quantity import MILLIMETRES, PLAIN_DEGREES
-from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.reflectors import (
+    RANGE_PER_RADIUS,
+    UNKNOWN_RADII,
+    UNKNOWN_RADIUS_SIGMA,
+    Reflector,
+    ReflectorMap,
+)
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
@@ -40,6 +46,8 @@ from commission.studies.violations import CheckedRoute, Violation, ViolationKind
 
 MOST_OF_A_KIND = 50
 """Problems of one kind that are listed; the rest is counted."""
+MOST_NAMED = 10
+"""Reflectors that one line names."""
 PREPARING = 0.3
 """Share of the time until which the floor map is prepared."""
 SAME_PLACE = 0.001
@@ -179,15 +187,22 @@ def problems(
         *_scanner_problems(inputs),
         *_detector_problems(inputs),
         *_exact_constants(inputs),
+        *_unknown_values(inputs),
         *_close_reflectors(inputs),
         *_reflectors_and_walls(inputs, floor),
         *_station_problems(inputs, floor),
         *_missed_stations(inputs, passed),
         *(problem for route in by_route for problem in route_problems(route.violations)),
     ]
+    return ProblemsResult(
+        problems=errors_first(found), inputs=inputs, floor=floor, by_route=tuple(by_route), passed=passed
+    )
+
+
+def errors_first(found: Iterable[Problem]) -> tuple[Problem, ...]:
+    """Sort problems by how bad they are; equally bad ones stay in their order."""
     order = list(Severity)
-    found.sort(key=lambda problem: order.index(problem.severity))
-    return ProblemsResult(problems=tuple(found), inputs=inputs, floor=floor, by_route=tuple(by_route), passed=passed)
+    return tuple(sorted(found, key=lambda problem: order.index(problem.severity)))
 
 
 def _floor_of(inputs: ProblemsInput, before: ProblemsResult | None) -> FloorDistances | None:
@@ -268,6 +283,39 @@ def _exact_constants(site: ProblemsInput) -> Iterable[Problem]:
     """What is taken for exact: a budget that leaves something out says so."""
     for text in site.uncertainty.taken_for_exact():
         yield Problem(severity=Severity.NOTE, text=text, subject=Subject.SCANNER)
+
+
+def _unknown_values(site: ProblemsInput) -> Iterable[Problem]:
+    """Reflectors of which nobody knows how large they are, or which way they face."""
+    every = site.reflectors.reflectors
+    undirected = tuple(r for r in every if r.lacks_direction)
+    sizeless = tuple(r for r in every if r.radius is None)
+    low, high = (MILLIMETRES.number(radius) for radius in UNKNOWN_RADII)
+    for found, text in (
+        (
+            undirected,
+            "are plates of unknown direction and count as seen from every free side; expected it, or the wall's",
+        ),
+        (
+            sizeless,
+            f"have an unknown radius: what {low} to {high} mm show passes the detector, and each counts as off by "
+            f"{MILLIMETRES.text(RANGE_PER_RADIUS * UNKNOWN_RADIUS_SIGMA)} more; expected it",
+        ),
+    ):
+        if found:
+            yield Problem(
+                severity=Severity.WARNING,
+                text=f"{len(found)} of {len(every)} reflectors {text} ({_named(found)})",
+                subject=Subject.REFLECTOR,
+                ids=tuple(r.id for r in found),
+                place=(found[0].x, found[0].y),
+            )
+
+
+def _named(reflectors: tuple[Reflector, ...]) -> str:
+    """The first ids, and how many more there are."""
+    ids = ", ".join(r.id for r in reflectors[:MOST_NAMED])
+    return ids if len(reflectors) <= MOST_NAMED else f"{ids} and {len(reflectors) - MOST_NAMED} more"
 
 
 def _scanner_problems(site: ProblemsInput) -> Iterable[Problem]:
@@ -364,7 +412,7 @@ def _pair_problem(first: Reflector, second: Reflector, distance: float, needed: 
     if distance <= SAME_PLACE:
         text = f"Reflectors {names} are at the same place; expected one of them"
         return Problem(severity=Severity.ERROR, text=text, subject=Subject.REFLECTOR, ids=ids, place=place)
-    touch = first.radius + second.radius
+    touch = first.reckoned_radius + second.reckoned_radius
     is_one = distance < touch
     expected = f"expected {needed:.2f} m or more to tell them apart at any range"
     text = f"Reflectors {names} are {MILLIMETRES.text(distance)} apart{' and overlap' if is_one else ''}; {expected}"
@@ -386,9 +434,9 @@ def _reflectors_and_walls(site: ProblemsInput, floor: FloorDistances | None) -> 
     angles = np.linspace(0.0, 2.0 * math.pi, _RIM_POINTS, endpoint=False)
     reach = 1.001 * reflectors.radii[:, np.newaxis, np.newaxis]
     rims = reflectors.centers[:, np.newaxis] + reach * np.stack((np.cos(angles), np.sin(angles)), axis=-1)
-    # A plate is seen from the side that it faces.
+    # A plate is seen from the side that it faces, if that is known.
     turns = np.cos(angles - reflectors.headings[:, np.newaxis])
-    seen = ~reflectors.is_flat[:, np.newaxis] | (turns > 0.0)
+    seen = ~reflectors.is_directed[:, np.newaxis] | (turns > 0.0)
     # A plate up to a cell behind the surface of a wall is glued to it.
     walled = (grid.is_occupied(rims) | ~seen).all(axis=1) & (depths_in_walls(reflectors, grid) == 0.0)
     outside = ~grid.contains(reflectors.centers)

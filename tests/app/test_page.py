@@ -191,18 +191,23 @@ def test_every_number_of_the_newest_cycle_is_shown(run: RunView, project: Projec
     assert (run.lived, result.times[newest]) == (31, pytest.approx(3.0))
     estimate = result.columns.estimate(newest)
     sigmas = 2.0 * np.sqrt(np.diag(estimate.posterior.covariance))
+    largest = 2.0 * math.sqrt(np.linalg.svd(estimate.posterior.covariance[:2, :2])[1].max())
+    # Ten scans of the last second, this one included.
+    recent = [result.columns.estimate(cycle) for cycle in range(newest - 9, newest + 1)]
     x, y, heading = estimate.posterior.mean
     assert dict(rows(run)) == {
         "Mode": "operational",
         "Fail episodes so far": "0",
         "Position x, y": f"{x:.3f}, {y:.3f} m",
         "Heading": f"{math.degrees(heading):.2f}°",
-        "2σ x / limit": f"{1000.0 * sigmas[0]:.1f} / 100 mm",
-        "2σ y / limit": f"{1000.0 * sigmas[1]:.1f} / 100 mm",
+        "2σ position / limit": f"{1000.0 * largest:.1f} / 100 mm",
+        "2σ along x, along y": f"{1000.0 * sigmas[0]:.1f}, {1000.0 * sigmas[1]:.1f} mm",
         "2σ heading / limit": f"{math.degrees(sigmas[2]):.2f} / 3.0°",
         "Inliers": str(estimate.count(Status.INLIER)),
         "Outliers by beams, gate": "0, 0",
         "Largest NIS / gate": f"{estimate.d2.max():.2f} / 5.99",
+        "NIS of all / expected, 1 s": f"{np.concatenate([each.d2 for each in recent]).mean():.2f} / 2",
+        "Rejected, 1 s": "0.0 %",
         "Cycle time": f"{result.microseconds_per_cycle:.1f} µs, mean of the drive",
         "Position error": f"{1000.0 * math.hypot(*result.errors[newest, :2]):.1f} mm",
         "True wheels": "along 10.0 mm/√m, across 3.0 mm/√m, heading 0.34 °/√m, heading, turning 0.57 °/√rad, "

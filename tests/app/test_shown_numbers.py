@@ -35,11 +35,12 @@ from commission.app.prediction.route_panel import RoutePanel
 from commission.app.prediction.view import RiskView, RouteView, route_view
 from commission.app.run.badge import badge_text
 from commission.app.run.charts import CHARTS
+from commission.app.run.now_panel import MOST_REJECTED, rejected_by_beams
 from commission.app.run.now_panel import rows as now_rows
 from commission.app.run.playback import Playback
 from commission.app.run.time_line import TimeLine, strip
 from commission.app.run.view import RunView
-from commission.localization.estimate import Mode
+from commission.localization.estimate import Mode, Status
 from commission.planning.coverage import Lattice
 from commission.planning.dependence import Dependence, Failure, RouteDependence
 from commission.planning.dilution import Measurement
@@ -151,6 +152,8 @@ NOW: dict[str, Callable[[At], tuple[float, ...]]] = {
     "Inliers": lambda at: (float(np.sum(at.status == 0)),),
     "Outliers by beams, gate": lambda at: (float(np.sum(at.status == 1)), float(np.sum(at.status == 2))),
     "Largest NIS / gate": lambda at: (max(at.d2[at.status == 0]), GATE),
+    "NIS of all / expected, 1 s": lambda at: (at.run.result.recent.nis[40], 2.0),
+    "Rejected, 1 s": lambda at: (100.0 * at.run.result.recent.rejected[40],),
     "Cycle time": lambda at: (at.run.result.microseconds_per_cycle,),
     "Position error": lambda at: (1000.0 * error(at),),
 }
@@ -210,6 +213,50 @@ def test_outliers_are_those_of_the_detector_and_those_of_the_gate(at: At) -> Non
     (inliers, outliers) = next(chart.lines for chart in CHARTS if chart.title == "Inliers, outliers per scan")
     assert inliers.values(counted).tolist() == [2.0, 5.0]
     assert outliers.values(counted).tolist() == [4.0, 4.0]
+
+
+def test_a_rejected_cluster_is_explained_by_its_beams_and_those_with_which_it_would_pass(at: At) -> None:
+    assert at.run.estimate is not None
+    one = Status.OUTLIER_DETECTOR
+    estimate = replace(
+        at.run.estimate,
+        status=np.array([0, one, one, one], dtype=np.int8),
+        measured=np.array([[1.0, 0.0], [4.0, -0.5], [2.31, math.radians(14.0)], [3.0, 0.0]]),
+        beams=np.array([4, 1, 9, 0]),
+        expected_beams=np.array([4.0, 2.3, 4.2, math.nan]),
+    )
+    detector = at.run.segment.setup.parameters.detector
+    # Steps of 0.5 degrees, beams 0.25 degrees wide with a noise of 0.05: a post of 40 mm takes up 1.984 degrees at
+    # 2.31 m, 1.146 at 4 m. Those whose middle meets it for certain, and those that may touch it.
+    low, high = 3 - detector.min_model_error, 4 + detector.max_model_error
+    assert rejected_by_beams(replace(at.run, estimate=estimate))[0] == (
+        "Cluster at 2.31 m, 14°",
+        f"9 beams, expected {max(low, 1)} to {high}: rejected",
+    )
+    # One beam may be too few or not, as the tolerances say; the sensor's own detections have no beams to explain.
+    assert [where for where, _ in rejected_by_beams(replace(at.run, estimate=estimate))] == [
+        "Cluster at 2.31 m, 14°",
+        "Cluster at 4.00 m, -29°",
+    ]
+
+
+def test_of_many_rejected_clusters_the_nearest_are_explained_and_the_rest_is_counted(at: At) -> None:
+    assert at.run.estimate is not None
+    count = MOST_REJECTED + 3
+    estimate = replace(
+        at.run.estimate,
+        status=np.full(count, Status.OUTLIER_DETECTOR, dtype=np.int8),
+        measured=np.column_stack((np.arange(count, 0, -1.0), np.zeros(count))),
+        beams=np.full(count, 40),
+        expected_beams=np.full(count, 2.0),
+    )
+    shown = rejected_by_beams(replace(at.run, estimate=estimate))
+    assert [where for where, _ in shown] == [
+        *(f"Cluster at {k}.00 m, 0°" for k in range(1, MOST_REJECTED + 1)),
+        "Rejected by beams",
+    ]
+    assert shown[-1][1] == "and 3 more"
+    assert rejected_by_beams(replace(at.run, estimate=None)) == []
 
 
 def test_the_badge_shows_the_largest_sigma_in_any_direction_and_both_limits(at: At, site: Project) -> None:

@@ -54,7 +54,9 @@ def test_a_text_that_is_too_long_is_refused_in_words_and_the_connection_lives_on
         """(field, letters) => {
           const write = Object.getOwnPropertyDescriptor(HTMLTextAreaElement.prototype, 'value').set;
           write.call(field, 'ä'.repeat(letters));  // two bytes each
+          field.focus();
           field.dispatchEvent(new Event('input', {bubbles: true}));
+          field.blur();
         }""",
         letters,
     )

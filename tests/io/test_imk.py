@@ -92,6 +92,7 @@ def test_what_the_format_cannot_carry_is_said(tmp_path: Path) -> None:
         assert said in losses
     again = read_imk(tmp_path / "hall.imk")
     assert [r.id for r in again.reflectors.reflectors] == ["1", "2"]
+    assert again.reflectors.reflectors[0].lacks_direction
     assert any("which way a flat reflector faces" in warning for warning in again.warnings)
 
 

@@ -36,14 +36,14 @@ def test_flat_reflectors_are_read_with_their_heading_in_degrees() -> None:
     assert read == Reflector(id="A", x=0.0, y=0.0, radius=0.1, kind=ReflectorKind.FLAT, heading=math.pi / 2)
 
 
-def test_names_and_sizes_that_are_missing_are_filled_in_and_said() -> None:
+def test_names_that_are_missing_are_filled_in_sizes_are_unknown_and_both_is_said() -> None:
     imported = parse_table("1\t2\n3\t4")
     assert [(r.id, r.x, r.y, r.radius) for r in imported.reflectors.reflectors] == [
-        ("R1", 1.0, 2.0, 0.04),
-        ("R2", 3.0, 4.0, 0.04),
+        ("R1", 1.0, 2.0, None),
+        ("R2", 3.0, 4.0, None),
     ]
     assert "no ids" in imported.warnings[0]
-    assert "40 mm is assumed" in imported.warnings[1]
+    assert "is unknown" in imported.warnings[1]
 
 
 def test_coordinates_that_look_like_millimetres_are_doubted() -> None:

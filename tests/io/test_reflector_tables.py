@@ -21,9 +21,9 @@ def reflectors() -> st.SearchStrategy[ReflectorMap]:
         id=ID,
         x=COORDINATE,
         y=COORDINATE,
-        radius=st.floats(0.001, 1.0),
+        radius=st.none() | st.floats(0.001, 1.0),
         kind=st.sampled_from(ReflectorKind),
-        heading=st.floats(-4.0, 4.0),
+        heading=st.none() | st.floats(-4.0, 4.0),
         height=st.floats(0.0, 3.0),
         sigma=st.floats(0.0, 0.1),
         layer=TEXT,
@@ -43,13 +43,36 @@ def test_table_that_is_written_and_read_again_is_equal_to_a_tenth_of_a_millimetr
     for new, old in zip(read.reflectors, table.reflectors, strict=True):
         for name in ("id", "kind", "layer", "note", "locked"):
             assert getattr(new, name) == getattr(old, name)
-        lengths = [abs(getattr(new, name) - getattr(old, name)) for name in ("x", "y", "radius", "height")]
+        lengths = [abs(getattr(new, name) - getattr(old, name)) for name in ("x", "y", "height")]
         assert max(lengths) <= 0.5001e-4
-        assert abs(new.heading - old.heading) <= 0.5001e-6
+        for after, before, digit in ((new.radius, old.radius, 1e-4), (new.heading, old.heading, 1e-6)):
+            assert (after is None) == (before is None)
+            assert after is None or before is None or abs(after - before) <= 0.5001 * digit
         assert abs(new.sigma - old.sigma) <= 5.001e-6 * old.sigma
     text = path.read_text(encoding="utf-8")
     write_reflectors(read, path)
     assert path.read_text(encoding="utf-8") == text
+
+
+@pytest.mark.parametrize(
+    ("text", "radius", "heading"),
+    [
+        ("id,x,y,radius,kind,heading\nA,1,2,,flat,\n", None, None),
+        ("id,x,y,radius,kind,heading\nA,1,2,0.1,flat,0\n", 0.1, 0.0),
+        ("id;x;y;radius;kind;heading\nA;1;2; ;flat;-1,5\n", None, -1.5),
+        ("id,x,y,radius,kind\nA,1,2,0.1,flat\n", 0.1, None),
+    ],
+    ids=["both empty", "zero is a direction", "radius blank", "no column heading"],
+)
+def test_what_a_table_leaves_empty_is_unknown_and_stays_so(
+    tmp_path: Path, text: str, radius: float | None, heading: float | None
+) -> None:
+    path = tmp_path / "reflectors.csv"
+    path.write_text(text, encoding="utf-8")
+    expected = Reflector(id="A", x=1.0, y=2.0, radius=radius, kind=ReflectorKind.FLAT, heading=heading)
+    assert read_reflectors(path) == ReflectorMap((expected,))
+    write_reflectors(read_reflectors(path), path)
+    assert read_reflectors(path) == ReflectorMap((expected,))
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from commission.localization.beam_echo import BeamModel
+from commission.localization.beam_window import window_of_cylinder
 from commission.localization.detector import detect
 from commission.localization.detector_model import detector_model
 from commission.localization.estimate import Status
@@ -29,9 +31,15 @@ DISTANCES = [0.5, 1.0, 2.0, 4.0, 8.0, 14.0, 20.0]
 
 
 def passing(
-    beams: ThickBeams, target: Target, model: str = "beam_width", center: str = "circle", seed: int = 0
+    beams: ThickBeams,
+    target: Target,
+    model: str = "beam_width",
+    center: str = "circle",
+    seed: int = 0,
+    claimed: float | None = math.nan,
 ) -> tuple[int, int]:
-    """Scans that show a cluster, and those of them in which one passes the detector filter."""
+    """Scans that show a cluster, and those of them in which one passes as a reflector of a radius (NaN: its own)."""
+    claimed = target.radius if claimed is not None and math.isnan(claimed) else claimed
     rng = np.random.default_rng(seed)
     ranges, flags, angle_min, _ = scans_of(beams, target, SCANS, rng)
     scanner = Scanner(
@@ -43,7 +51,7 @@ def passing(
     )
     parameters = DetectorParameters(expected_beams=model, center=center)
     kind = ReflectorKind.CYLINDER if target.incidence is None else ReflectorKind.FLAT
-    only = ReflectorMap((Reflector(id="R", x=0.0, y=0.0, radius=target.radius, kind=kind),))
+    only = ReflectorMap((Reflector(id="R", x=0.0, y=0.0, radius=claimed, kind=kind),))
     known = detector_model(only, scanner, parameters)
     shown = passed = 0
     for row, seen in zip(ranges, flags, strict=True):
@@ -88,6 +96,20 @@ def test_nearly_all_true_clusters_pass_however_wide_the_beams(divergence: float,
     assert not few
 
 
+@pytest.mark.parametrize(("radius", "passes"), [(0.02, True), (0.04, True), (0.08, True), (0.25, False)])
+@pytest.mark.parametrize("kind", list(ReflectorKind))
+def test_reflectors_of_unknown_radius_pass_within_the_radii_that_are_stated(
+    kind: ReflectorKind, radius: float, passes: bool
+) -> None:
+    beams, incidence = beams_of(0.25, 0.0, 0.25, 0.2), None if kind is ReflectorKind.CYLINDER else 0.0
+    target = target_of(radius, incidence, 3.0)
+    shown, passed = passing(beams, target, claimed=None)
+    assert passed >= 0.95 * shown if passes else passed <= 0.05 * shown
+    # Said to be 40 mm, neither the smallest nor the largest passes; but a plate seen obliquely looks smaller.
+    shown, passed = passing(beams, target, claimed=0.04)
+    assert (passed >= 0.95 * shown) == (radius == 0.04 or (radius == 0.02 and kind is ReflectorKind.FLAT))
+
+
 @settings(deadline=None)
 @given(
     divergence=st.floats(0.1, 1.0),
@@ -127,6 +149,19 @@ def test_equation_3_as_printed_rejects_what_wide_beams_see(
     assert passed < 0.5 * shown
     assert passing(beams, target) == (shown, shown)
     assert passing(beams, target, center="central_beam") == (shown, shown)
+
+
+@pytest.mark.parametrize(
+    ("aperture", "most"),
+    # 0.04 m of post at 4 m, beams 4 mm apart: 10 of them; 5 more on either side touch it with 20 mm of their width.
+    [(0.0, 10), (0.04, 20)],
+)
+def test_most_beams_of_a_post_are_those_that_touch_it(aperture: float, most: int) -> None:
+    scanner = Scanner(beam_width_deg=0.0, beam_aperture=aperture, bearing_sigma_deg=0.0)
+    known = detector_model(ReflectorMap((Reflector(id="R", x=0.0, y=0.0),)), scanner, DetectorParameters())
+    beam = BeamModel(known.half_divergence, known.half_aperture, known.bearing_sigma, known.range_sigma)
+    window = window_of_cylinder(4.0, 0.02, 0.001, beam)
+    assert abs(window.most - most) <= 1
 
 
 def test_what_is_twice_as_wide_is_no_reflector() -> None:

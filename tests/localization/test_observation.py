@@ -30,7 +30,7 @@ from commission.localization.observation import (
 )
 from commission.localization.setup import LocalizerSetup
 from commission.localization.validation import validation_outlines
-from commission.site.parameters import AssociationParameters, ObservationParameters, Parameters
+from commission.site.parameters import AssociationParameters, FilterParameters, ObservationParameters, Parameters
 from commission.site.records import Detections, Odometry
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
@@ -156,10 +156,15 @@ def test_innovation_covariances_are_those_of_plain_matrices(seed: int) -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-9)
 
 
+@pytest.mark.parametrize("consider", [False, True], ids=["white", "considered"])
 @pytest.mark.parametrize("probability", [0.5, 0.95])
-def test_drawn_outline_of_the_gate_parts_what_the_localizer_takes_from_what_it_leaves(probability: float) -> None:
+def test_drawn_outline_of_the_gate_parts_what_the_localizer_takes_from_what_it_leaves(
+    probability: float, consider: bool
+) -> None:
     reflectors = ReflectorMap((Reflector(id="near", x=4.0, y=1.0, sigma=0.02), Reflector(id="far", x=-3.0, y=11.0)))
-    parameters = Parameters(association=AssociationParameters(gate_probability=probability))
+    parameters = Parameters(
+        association=AssociationParameters(gate_probability=probability), filter=FilterParameters(consider=consider)
+    )
     setup = LocalizerSetup(reflectors, (Scanner(mounting=MOUNTING),), parameters)
     covariance = np.array([[4e-4, 1e-4, 1e-5], [1e-4, 9e-4, -2e-5], [1e-5, -2e-5, 1e-5]])
     belief = Belief(0, np.array([0.5, -0.5, 0.3]), covariance)

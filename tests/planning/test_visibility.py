@@ -104,7 +104,7 @@ def test_range_is_measured_to_the_surface_of_a_cylinder_and_to_the_middle_of_a_p
     assert sees(open_field(Reflector(id="c", x=0, y=0, radius=0.1), scanner=scanner), *points) == [
         *(False, False, True, True, False)
     ]
-    plate = Reflector(id="p", x=0, y=0, radius=0.1, kind=ReflectorKind.FLAT)
+    plate = Reflector(id="p", x=0, y=0, radius=0.1, kind=ReflectorKind.FLAT, heading=0.0)
     assert sees(open_field(plate, scanner=scanner), *points) == [False, True, True, False, False]
 
 
@@ -141,9 +141,32 @@ def test_a_plate_is_seen_from_its_front_up_to_the_cosine_limit():
     assert sees(open_field(plate, max_incidence_deg=45.0), *points) == [True, True, True, False, False, False]
 
 
+def test_a_plate_of_unknown_direction_is_seen_from_every_free_side():
+    angles = np.radians([0, 60, 90, 180, 270])
+    points = [(3 * math.cos(a), 3 * math.sin(a)) for a in angles]
+    plate = Reflector(id="p", x=0, y=0, radius=0.2, kind=ReflectorKind.FLAT)
+    assert sees(open_field(plate), *points) == [True] * 5
+    # Made known, it is seen from its front alone; made unknown again, from everywhere again.
+    known = open_field(plate).with_reflector(0, replace(plate, heading=0.0))
+    assert sees(known, *points) == [True, True, False, False, False]
+    assert sees(known.with_reflector(0, plate), *points) == [True] * 5
+    occupied = np.zeros((40, 40), dtype=bool)
+    occupied[:, :4] = True
+    walls = RayCaster(OccupancyGrid(occupied, 0.05))
+    on_wall = ReflectorMap((replace(plate, x=0.21, y=1.0),))
+    assert sees(build_visibility(on_wall, SHARP, walls, VisibilityOptions()), (1.5, 1.0), (-1.0, 1.0)) == [True, False]
+
+
+def test_a_reflector_of_unknown_radius_gets_its_beams_up_to_the_range_of_the_smallest_it_may_be():
+    scanner = Scanner(resolution_deg=0.5, beam_width_deg=0.0)
+    limit = promised_range(0.02, math.radians(0.5), 2)
+    model = open_field(Reflector(id="c", x=0, y=0, radius=None), scanner=scanner, min_beams=2)
+    assert sees(model, (limit - 1e-6, 0), (limit + 1e-6, 0)) == [True, False]
+
+
 def test_a_plate_gets_its_beams_up_to_a_range_that_shrinks_with_the_cosine_of_incidence():
     scanner = Scanner(resolution_deg=1.0, beam_width_deg=0.0, range=(0.05, 40.0))
-    model = open_field(Reflector(id="p", x=0, y=0, radius=0.1, kind=ReflectorKind.FLAT), scanner=scanner)
+    model = open_field(Reflector(id="p", x=0, y=0, radius=0.1, kind=ReflectorKind.FLAT, heading=0.0), scanner=scanner)
     limit = promised_range(0.1, math.radians(1.0), 1) * 0.5
     direction = np.array([math.cos(math.radians(60 - 1e-6)), math.sin(math.radians(60 - 1e-6))])
     assert sees(model, tuple(direction * limit * 0.999), tuple(direction * limit * 1.001)) == [True, False]

@@ -138,6 +138,19 @@ def test_flat_plate_is_flagged_only_where_it_faces_the_scanner(facing_deg: float
         assert np.ptp(np.imag((lit - 4.0) * np.conj(normal))) == pytest.approx(0.3, abs=0.07)
 
 
+@pytest.mark.parametrize("bearing_deg", [0.0, 77.0, -110.0])
+def test_plate_of_unknown_direction_faces_the_scanner_wherever_that_is(bearing_deg: float) -> None:
+    place = 4.0 * np.exp(1j * math.radians(bearing_deg))
+    plate = Reflector(id="P", x=place.real, y=place.imag, radius=0.15, kind=ReflectorKind.FLAT)
+    facing = replace(plate, heading=math.radians(bearing_deg + 180.0))
+    seen, expected = (
+        scan(Project(reflectors=ReflectorMap((each,)), scanners=(QUIET,)), (0.0, 0.0, 0.0)) for each in (plate, facing)
+    )
+    assert expected[1].any()
+    assert np.array_equal(seen[1], expected[1])
+    np.testing.assert_allclose(seen[0], expected[0], atol=1e-6)
+
+
 def test_shiny_object_passes_for_a_reflector() -> None:
     project = Project(scanners=(QUIET,), disturbances=Disturbances(shiny_objects=(ShinyObject(3.0, 1.0),)))
     _, flags = scan(project, (0.0, 0.0, 0.0))

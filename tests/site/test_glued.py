@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,6 +30,15 @@ def hall() -> FloorMap:
 def plate(depth: float, kind: ReflectorKind = ReflectorKind.FLAT) -> ReflectorMap:
     """A plate on the south wall, whose surface is at 0.3 m, drawn so far behind it."""
     return ReflectorMap((Reflector(id="P", x=5.03, y=0.3 - depth, radius=0.05, kind=kind, heading=math.pi / 2),))
+
+
+@pytest.mark.parametrize(("depth", "expected"), [(-0.01, 0.0), (0.05, 0.05), (0.09, 0.09), (0.12, 0.0)])
+def test_depth_of_a_plate_of_unknown_direction_is_that_behind_the_nearest_surface(
+    depth: float, expected: float
+) -> None:
+    (known,) = plate(depth).reflectors
+    unknown = ReflectorMap((replace(known, id="U", heading=None), known))
+    assert depths_in_walls(unknown, hall().occupancy()).tolist() == pytest.approx([expected, expected], abs=0.0021)
 
 
 @pytest.mark.parametrize(("depth", "expected"), [(-0.01, 0.0), (0.05, 0.05), (0.09, 0.09), (0.12, 0.0)])

@@ -136,7 +136,7 @@ def test_noise_that_is_stated_too_small_is_told_with_its_factor(factor: float) -
 
 
 def test_noise_that_is_stated_too_large_is_told_and_right_noise_is_not() -> None:
-    (finding,) = noise_findings(run_with(1.0 / 4.0).columns)
+    (finding,) = noise_findings(run_with(1.0 / 6.0).columns)
     assert "too large" in finding.probably
     assert noise_findings(run_with(1.0).columns) == ()
 

@@ -239,3 +239,34 @@ def test_reflectors_must_be_told_apart_by_the_coarsest_scanner():
     # Two bridged beams and the width of one, at the 20 m up to which reflectors are told.
     assert gaps["coarse"] == pytest.approx(20.0 * math.radians(2.0 * 1.0 + 0.25), rel=1e-12)
     assert gaps["both"] == gaps["coarse"] > gaps["fine"]
+
+
+def test_plates_without_direction_and_reflectors_without_radius_are_told_with_their_number_and_names():
+    mixed = (
+        *(Reflector(id=f"P{k}", x=1.0 + k, y=7.0, radius=0.12, kind=ReflectorKind.FLAT) for k in range(3)),
+        Reflector(id="K", x=5.0, y=7.0, radius=0.12, kind=ReflectorKind.FLAT, heading=-1.5),
+        Reflector(id="S", x=8.0, y=7.0, radius=None),
+        Reflector(id="C", x=10.0, y=7.0, radius=0.12),
+    )
+    found = checked(replace(SITE, reflectors=ReflectorMap(mixed))).problems
+    undirected, sizeless = (
+        [each for each in found if word in each.text] for word in ("unknown direction", "unknown radius")
+    )
+    assert [each.ids for each in undirected] == [("P0", "P1", "P2")]
+    assert undirected[0].text.startswith("3 of 6 reflectors are plates of unknown direction")
+    assert "(P0, P1, P2)" in undirected[0].text
+    assert [each.ids for each in sizeless] == [("S",)]
+    assert "1 of 6" in sizeless[0].text
+    # pi / 4 of 20 mm.
+    assert "20 to 80 mm" in sizeless[0].text
+    assert "16 mm" in sizeless[0].text
+    assert {each.severity for each in (*undirected, *sizeless)} == {Severity.WARNING}
+
+
+def test_a_plate_of_unknown_direction_is_not_taken_for_one_inside_a_wall():
+    on_wall = Reflector(id="P", x=3.0, y=0.31, radius=0.12, kind=ReflectorKind.FLAT)
+    buried = replace(on_wall, id="B", y=0.14, radius=0.05)
+    found = texts(replace(SITE, reflectors=ReflectorMap((on_wall, buried))))
+    assert [text for text in found if "inside a wall" in text] == [
+        "Reflector 'B' is inside a wall; expected where a ray can reach it"
+    ]

@@ -36,6 +36,7 @@ from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
 from commission.site.disturbances import ConstantErrors, Disturbances, ScannerError
 from commission.site.project import Project
+from commission.site.stations import Station
 from tests.browser.page import CHROMIUM, FLAGS, SMALL, WIDE, OpenPage
 from tests.browser.serving import Served
 
@@ -156,6 +157,27 @@ def budget(page: OpenPage, runtime: Runtime) -> None:
     page.page.locator(".c-sources").scroll_into_view_if_needed()
 
 
+def rejecting(page: OpenPage, runtime: Runtime) -> None:
+    """A drive whose filter believes in too little noise: what the Run panel, numbers and trail say of it."""
+    page.open_tab("Run")
+    page.open_tab("Legend")
+    page.choose("Trail shows", "share rejected")
+    page.page.locator(".c-summary").scroll_into_view_if_needed()
+
+
+def vain(project: Project) -> Project:
+    """A filter that believes in a quarter of the noise, on a site with two stations along its route."""
+    observation = replace(project.parameters.observation, range_sigma=0.003, bearing_sigma=0.0004)
+    filtered = replace(project.parameters.filter, consider=False)
+    points = project.routes[0].segments[0].control_points
+    stations = tuple(
+        Station(name=name, x=float(x), y=float(y), heading=heading)
+        for name, (x, y), heading in (("Dock", points[0], 0.0), ("Press", points[-1], 0.0))
+    )
+    parameters = replace(project.parameters, observation=observation, filter=filtered)
+    return replace(project, parameters=parameters, stations=stations)
+
+
 def suggested(page: OpenPage, runtime: Runtime) -> None:
     """A layout from nothing, before it is accepted."""
     page.open_tab("Plan")
@@ -262,6 +284,7 @@ PICTURES = (
     Picture("page_plan", "shop_floor", heatmap),
     Picture("plan_route", "warehouse", predicted),
     Picture("budget", "warehouse", budget),
+    Picture("rejecting", "shop_floor", rejecting, world=vain),
     Picture("page_suggested", "shop_floor", suggested),
     Picture("ambiguous", "laboratory", ambiguous),
     Picture("along", "shop_floor", along),

@@ -33,6 +33,8 @@ class Sender:
     """Number of the browser's connection; none: the program itself."""
     at: float = 0.0
     """When [s, any monotonic clock]: edits of one thing that follow quickly are one undo step."""
+    widget: str = ""
+    """Identifier of the field in which it was entered: there a refusal is said. Empty: in none."""
 
 
 PROGRAM = Sender()

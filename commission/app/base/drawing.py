@@ -23,10 +23,11 @@ def lift(points: FloatArray, height: float) -> Points:
     return lifted
 
 
-def rings(centers: FloatArray, radius: float) -> FloatArray:
-    """Return the (N, RING_POINTS, 2) outlines of circles [m]."""
+def rings(centers: FloatArray, radius: float | FloatArray) -> FloatArray:
+    """Return the (N, RING_POINTS, 2) outlines of circles of one radius, or of (N,) radii [m]."""
     angles = np.linspace(0.0, 2.0 * np.pi, RING_POINTS, endpoint=False)
-    return centers[:, np.newaxis, :] + radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    unit = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    return centers[:, np.newaxis, :] + np.reshape(radius, (-1, 1, 1)) * unit
 
 
 def outline_segments(outlines: FloatArray, height: float) -> Points:

@@ -26,6 +26,8 @@ def add_widget(gui: GuiApi, info: FieldInfo, value: Any, note: str = "") -> GuiI
     """
     hint = f"{info.hint} {note}".rstrip()
     match info.descriptions[0]:
+        case Quantity() as quantity if quantity.none:
+            return gui.add_text(quantity.title, held(info, value), hint=f"{hint} Empty: {quantity.none}.")
         case Quantity() as quantity:
             return _number(gui, quantity, held(info, value), hint)
         case Switch(label):
@@ -45,6 +47,8 @@ def held(info: FieldInfo, value: Any) -> Any:
     """Return what the widget of a field holds while the field has this value."""
     if info.quantity is None:
         return str(value) if info.options else value
+    if info.quantity.none:
+        return info.quantity.none if value is None else f"{info.quantity.on_page(value):g}"
     if isinstance(value, tuple | list | np.ndarray):
         return tuple(float(info.quantity.on_page(float(each))) for each in typing.cast("Iterable[Any]", value))
     number = info.quantity.on_page(value)
@@ -61,6 +65,8 @@ def meant(info: FieldInfo, content: Any) -> Any:
     """
     if info.quantity is None:
         return content.strip() if info.kind is str else info.kind(content)
+    if info.quantity.none:
+        return _number_or_none(info.quantity, str(content).strip())
     if isinstance(content, tuple | list):
         return tuple(_allowed(info.quantity, float(each)) for each in typing.cast("Iterable[Any]", content))
     number = _allowed(info.quantity, content)
@@ -104,6 +110,17 @@ def _allowed(quantity: Quantity, content: float) -> float:
     if refusal:
         raise ValueError(refusal)
     return number
+
+
+def _number_or_none(quantity: Quantity, text: str) -> float | None:
+    """Return what a line of text means: a number, with a point or a comma, or nothing that is known."""
+    if text.lower() in {"", quantity.none}:
+        return None
+    try:
+        number = float(text.replace(",", "."))
+    except ValueError:
+        raise ValueError(f"{quantity.title} is {text!r}; expected a number, or {quantity.none}") from None
+    return _allowed(quantity, number)
 
 
 def _number(gui: GuiApi, quantity: Quantity, number: Any, hint: str) -> GuiInputHandle[Any]:

@@ -7,12 +7,13 @@ from typing import Any, TypeAlias
 
 from viser import GuiApi, GuiInputHandle
 
+from commission.app.base import theme
 from commission.app.base.actions import Action
 from commission.app.base.field_widget import add_widget, held, meant, write_held
 from commission.app.base.panel import Post, escaped, posting, write
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.site.fields import field_info, get_field
+from commission.site.fields import FieldInfo, field_info, get_field
 from commission.site.quantity import PERCENT
 
 Setting: TypeAlias = bool | int | float | str | None
@@ -79,9 +80,15 @@ class Inputs:
             name,
             widget,
             lambda content: meant(info, content),
-            lambda state: None if (value := self._read(state, name)) is None else held(info, value),
+            lambda state: self._shown(info, self._read(state, name)),
         )
         return widget
+
+    @staticmethod
+    def _shown(info: FieldInfo, value: Any) -> Any:
+        """Return what a widget shows for a value; None: nothing, unless there is a word for it."""
+        has_word = info.quantity is not None and bool(info.quantity.none)
+        return None if value is None and not has_word else held(info, value)
 
     def choice(self, name: str, of: object, names: Mapping[Any, str]) -> GuiInputHandle[Any]:
         """Add a list of what a field may be, each called by a name.
@@ -109,6 +116,18 @@ class Inputs:
     def forget(self) -> None:
         """Write every widget anew when it follows next, whatever stands in it: it is another thing's from now on."""
         self._followed.clear()
+
+
+def add_find(gui: GuiApi, hint: str) -> GuiInputHandle[str]:
+    """Add a text that is sought in a list with every key.
+
+    Parameters
+    ----------
+    gui : where it is made.
+    hint : what it is part of.
+    """
+    gui.add_html(theme.LIVE)
+    return gui.add_text("Find", "", hint=hint)
 
 
 class WorkBar:

@@ -18,6 +18,7 @@ SHAPES = {
     theme.Mark.RING: "<ellipse cx='9' cy='7' rx='8' ry='5' fill='none' stroke='{c}' stroke-width='1.6'/>",
     theme.Mark.SQUARE: "<rect x='5' y='3' width='8' height='8' fill='{c}'/>",
     theme.Mark.DIAMOND: "<path d='M9 2L14 7L9 12L4 7Z' fill='{c}'/>",
+    theme.Mark.CROSS: "<path d='M9 1V13M3 7H15' stroke='{c}' stroke-width='1.8'/>",
 }
 
 

@@ -55,6 +55,29 @@ def add_points(
     )
 
 
+def add_marks(
+    scene: SceneApi,
+    name: str,
+    color: theme.Color,
+    pixels: int,
+    *,
+    points: Points = NO_POINTS,
+    shape: Literal["circle", "square", "diamond", "sparkle"] = "circle",
+) -> PointCloudHandle:
+    """Add points that are as large on the screen from near and far.
+
+    Parameters
+    ----------
+    scene : where.
+    name : of the node; its size is added, for the page's script `marks.js`, which holds it.
+    color : of all marks.
+    pixels : diameter of each on the screen.
+    points : (N, 3) places [m], frame of the parent node.
+    shape : of each mark; "sparkle" is a cross.
+    """
+    return add_points(scene, f"{name}/{pixels}px", color, 0.05, points=points, shape=shape)
+
+
 def add_floor_picture(
     scene: SceneApi, name: str, picture: NDArray[np.uint8], lattice: Lattice, *, visible: bool
 ) -> ImageHandle:

@@ -9,6 +9,7 @@ from typing import Any, Protocol, TypeAlias
 
 from viser import CommandEvent, GuiButtonHandle, GuiEvent
 
+from commission.app.base import viser_private
 from commission.app.base.actions import Action, Envelope, Report, Sender
 from commission.app.base.view import PageView
 from commission.errors import CommissionError
@@ -59,7 +60,8 @@ def posting(post: Post, make: Callable[[Any], Action]) -> Callable[[Any], None]:
             action = make(event)
         except (CommissionError, ValueError) as error:
             action = Report(str(error))
-        post(from_browser(action, event.client.client_id))
+        widget = "" if isinstance(event, CommandEvent) else viser_private.identifier(event.target)
+        post(Envelope(action, Sender(event.client.client_id, time.monotonic(), widget)))
 
     return callback
 

@@ -6,7 +6,6 @@ to the browser that said it, and its field shows again what holds. All of it run
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import math
 from collections.abc import Iterable
@@ -17,13 +16,11 @@ from typing import Any
 from viser import GuiApi, GuiButtonHandle, GuiUploadButtonHandle, SceneApi, ViserServer
 
 from commission.app.base import viser_private, wire
-from commission.app.base.widget_values import is_out_of_bounds, problem_with
+from commission.app.base.widget_values import problem_with
 from commission.app.base.wire import AnyMessage, FromBrowser, Refusal
 
 log = logging.getLogger(__name__)
 
-SHOWN_AGAIN_AFTER_S = 1.5
-"""Time after which a field shows again what holds, and after which a half typed number counts as typed [s]."""
 TOLD_EVERY_S = 0.5
 """Shortest time between two notes to one browser [s]: a flood of refusals is one note with their number."""
 TOLD_FOR_S = 8.0
@@ -48,8 +45,6 @@ class Seam:
         self._server = server
         self._loop = viser_private.event_loop(server)
         self._notes: dict[int, _Note] = {}
-        self._waiting: dict[tuple[int, str], asyncio.TimerHandle] = {}
-        self._half_typed: dict[tuple[int, str], tuple[str, int]] = {}
 
     def admit(self, number: int, raw: bytes | str) -> bytes | None:
         """Return a message as viser may read it, or None after its refusal has been told.
@@ -66,7 +61,6 @@ class Seam:
         if refusal is not None:
             return self._refuse(number, refusal)
         if isinstance(message, wire.GuiUpdateMessage):
-            self._forget(number, message.uuid)
             viser_private.carry_out(message.uuid, message.updates["value"])
         return wire.encoded(message)
 
@@ -101,9 +95,7 @@ class Seam:
             return Refusal(f"{name} cannot be used at the moment; nothing was done", message.uuid)
         value = message.updates["value"]
         problem = problem_with(widget, value)
-        if problem is None:
-            return None
-        return Refusal(f"{name}: {problem}", message.uuid, may_be_typing=is_out_of_bounds(widget, value))
+        return None if problem is None else Refusal(f"{name}: {problem}", message.uuid)
 
     @_check.register
     def _check_hold(self, message: wire.GuiButtonHoldMessage, number: int) -> Refusal | None:
@@ -174,42 +166,21 @@ class Seam:
         return next((scene for scene in scenes if viser_private.owner_of(scene) == owner), None)
 
     def _refuse(self, number: int, refusal: Refusal) -> None:
-        """Tell a refusal: at once, or when it turns out that nothing better is being typed."""
+        """Tell a refusal, and let the browser show what holds instead of what was refused."""
         log.debug("browser %d: %s", number, refusal.text)
-        key = (number, refusal.widget)
-        count = 1
-        if refusal.widget:
-            count += self._forget(number, refusal.widget)
-            self._waiting[key] = self._loop.call_later(SHOWN_AGAIN_AFTER_S, self._show_again, number, refusal.widget)
-        if refusal.may_be_typing:
-            self._half_typed[key] = (refusal.text, count)
-        else:
-            self._tell(number, refusal.text, count)
-
-    def _forget(self, number: int, uuid: str) -> int:
-        """Give up showing a field's value again, since it has got another one; return how many refusals are untold."""
-        waiting = self._waiting.pop((number, uuid), None)
-        if waiting is not None:
-            waiting.cancel()
-        return self._half_typed.pop((number, uuid), ("", 0))[1]
-
-    def _show_again(self, number: int, uuid: str) -> None:
-        """Let a browser show what holds instead of what was refused."""
-        del self._waiting[number, uuid]
-        half_typed = self._half_typed.pop((number, uuid), None)
-        if half_typed is not None:
-            self._tell(number, *half_typed)
-        widget = self._widget(number, uuid)
+        self._tell(number, refusal.text)
+        widget = self._widget(number, refusal.widget) if refusal.widget else None
         if widget is not None and not isinstance(widget, GuiButtonHandle | GuiUploadButtonHandle):
             viser_private.show_value(self._server, number, widget)
+            viser_private.say_at_field(self._server, number, refusal.widget, refusal.text)
 
-    def _tell(self, number: int, text: str, count: int = 1) -> None:
+    def _tell(self, number: int, text: str) -> None:
         """Tell a browser that something was refused, together with what else is refused until then."""
         note = self._notes.get(number)
         if note is not None:
-            note.text, note.more = text, note.more + count
+            note.text, note.more = text, note.more + 1
             return
-        self._notes[number] = _Note(text, count - 1)
+        self._notes[number] = _Note(text)
         self._loop.call_later(0.0, self._send_note, number)
 
     def _send_note(self, number: int) -> None:

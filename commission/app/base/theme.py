@@ -24,6 +24,7 @@ REFLECTOR: Color = (48, 108, 255)
 GATE: Color = (96, 176, 255)
 POSE: Color = (255, 82, 82)
 INLIER: Color = (255, 214, 10)
+OFFSET: Color = (150, 132, 52)
 OUTLIER_ASSOCIATION: Color = (255, 59, 48)
 OUTLIER_DETECTOR: Color = (196, 74, 60)
 SCAN: Color = (190, 197, 206)
@@ -49,6 +50,7 @@ FIRST_TWIN: Color = (120, 220, 255)
 SECOND_TWIN: Color = (255, 120, 220)
 KEEP_OUT: Color = (222, 150, 70)
 TOO_LITTLE: Color = (240, 132, 52)
+REFUSED: Color = (255, 122, 110)
 # What an error comes from: apart from each other, and from the ramp of the share of a limit.
 FROM_NOISE: Color = (138, 148, 164)
 FROM_MAP: Color = (74, 134, 255)
@@ -94,6 +96,7 @@ class Mark(StrEnum):
     RING = "ring"
     SQUARE = "square"
     DIAMOND = "diamond"
+    CROSS = "cross"
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,6 +128,9 @@ RIGHT_PX = 290
 
 WIDE = "<div class='c-wide'></div>"
 """An html element that lets the widget behind it, which has no label, take the label's room, too."""
+
+LIVE = "<div class='c-live'></div>"
+"""An html element that lets the text field behind it tell of every key: one that seeks, and changes nothing."""
 
 # viser docks panels to the left and right only. The rules below turn its main panel into a bar at the top and the
 # floating panel of the time line into a strip at the bottom, and take their space from the floor. Where a rule does not
@@ -178,7 +184,7 @@ div:has(>div>.c-bottom)>:nth-child(5) [style*="7.25em"]{{display:none}}
 div:has(>div>.c-route){{display:grid;grid-template-columns:repeat(3,minmax(0,1fr));padding-top:2px!important}}
 div:has(>div>.c-route)>:nth-child(1){{grid-column:span 3;padding-left:var(--c-tabs)}}
 .c-route{{font-size:12px;height:44px;display:flex;align-items:center;white-space:nowrap;overflow:hidden}}
-div:has(>.c-wide){{display:none}}
+div:has(>:is(.c-wide,.c-live)){{display:none}}
 div:has(>.c-wide)+*>.mantine-Flex-root>[style*="flex-shrink: 0"]{{display:none}}
 div:has(>.c-tools)+* .mantine-Button-root{{padding:0 4px!important;font-size:11px!important;min-width:0!important;
  flex:1 1 auto!important}}
@@ -199,6 +205,13 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 @media (max-height:800px){{:root{{--c-bottom:{LOW_BOTTOM_PX}px}}
  div:has(>div>.c-bottom)>:nth-child(n+7),div:has(>div>.c-route)>:nth-child(n+2){{zoom:.78}}}}
 .c-note{{font-size:11.5px;opacity:.7;line-height:1.35}}
+[data-draft] :is(input,textarea):focus{{border-color:{css(SELECTED)}!important;box-shadow:0 0 0 1px {css(SELECTED)}}}
+[data-refused]{{flex-wrap:wrap}}
+[data-refused] :is(input,textarea){{border-color:{css(REFUSED)}!important}}
+[data-refused]::after{{content:attr(data-refused);flex-basis:100%;color:{css(REFUSED)};font-size:11.5px;
+ line-height:1.3;padding-top:2px;overflow-wrap:anywhere}}
+.c-scale{{position:fixed;left:{LEFT_PX + 16}px;top:calc(var(--c-top) + 10px);padding:1px 8px;border-radius:3px;
+ background:rgba(16,18,21,.8);color:{css(INLIER)};font-size:12px;pointer-events:none;white-space:nowrap}}
 .c-stale .c-badge{{background:{IDLE_COLOR}!important;font-size:0!important;letter-spacing:0!important}}
 .c-stale .c-badge::after{{content:var(--c-stale);font-size:13px}}
 .c-stale .c-beside{{visibility:hidden}}

@@ -6,6 +6,7 @@ Nothing else in this project touches a name of viser's that begins with an under
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import uuid
 from collections.abc import Callable
@@ -231,6 +232,20 @@ def show_value(server: ViserServer, number: int, widget: Any) -> None:
     widget : a handle that has a value.
     """
     send(server, number, _messages.GuiUpdateMessage(identifier(widget), {"value": widget.value}))
+
+
+def say_at_field(server: ViserServer, number: int, widget: str, text: str) -> None:
+    """Let one browser say below a field why its entry was refused; nothing where it does not show that field.
+
+    Parameters
+    ----------
+    server : of the page.
+    number : of the connection.
+    widget : its identifier.
+    text : plain text.
+    """
+    script = f"window.commissionRefuse?.({json.dumps(widget)}, {json.dumps(text)})"
+    send(server, number, _messages.RunJavascriptMessage(script))
 
 
 def run_on_pages(server: ViserServer, script: str) -> None:

@@ -33,13 +33,6 @@ def problem_with(widget: object, value: object) -> str | None:
     return f"found {shown(value)}; expected nothing: it cannot be changed"
 
 
-def is_out_of_bounds(widget: object, value: object) -> bool:
-    """Whether a value is of the right kind and only beyond the widget's bounds, as when it is half typed."""
-    if not isinstance(widget, viser.GuiNumberHandle | viser.GuiSliderHandle):
-        return False
-    return _number_problem(value, widget.value) is None and problem_with(widget, value) is not None
-
-
 def _number_problem(value: object, like: object) -> str | None:
     """Say why something is no number of the kind that stands in the widget."""
     if isinstance(value, bool) or not isinstance(value, int | float):

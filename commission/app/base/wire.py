@@ -192,8 +192,6 @@ class Refusal:
     """Where, what was found, what is expected: one line for whoever sits at that browser."""
     widget: str = ""
     """Identifier of the field that now shows what was refused; empty when there is none."""
-    may_be_typing: bool = False
-    """Whether a person may be on the way to a value that is taken: the 5 of 50 in a field from 10 on."""
 
 
 def parsed(raw: bytes | str) -> AnyMessage | Refusal:

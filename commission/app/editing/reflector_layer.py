@@ -6,12 +6,13 @@ import numpy as np
 from viser import LabelHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import lift
+from commission.app.base.drawing import lift, outline_segments, rings, stroke_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
-from commission.app.base.marks import add_points
+from commission.app.base.marks import add_lines, add_marks
+from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
-from commission.site.reflectors import ReflectorKind
+from commission.site.reflectors import ReflectorKind, ReflectorMap
 
 MOST_LABELS = 60
 SHOWN_HEIGHT = 0.4
@@ -29,23 +30,28 @@ class ReflectorLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._project = Project()
-        self._marks = add_points(scene, "/reflectors/marks", theme.REFLECTOR, 0.1)
+        self._marks = add_marks(scene, "/reflectors/marks", theme.REFLECTOR, 6)
+        self._shapes = add_lines(scene, "/reflectors/shapes", theme.REFLECTOR, 1.5)
 
     def show_site(self, project: Project) -> None:
-        """Draw a mark at each reflector's center."""
+        """Draw a dot at each reflector's center, and around it the reflector as large as it is."""
         self._project = project
         reflectors = project.reflectors
-        smallest = 1.2 * extent_of(project).mark_size()
-        self._marks.point_size = max(smallest, 2.0 * float(reflectors.radii.max(initial=0.0)))
         self._marks.points = lift(reflectors.centers, theme.Height.REFLECTOR)
+        round_ones, plates = rings(reflectors.centers, reflectors.radii)[~reflectors.is_flat], _plates(reflectors)
+        segments = (
+            outline_segments(round_ones, theme.Height.REFLECTOR),
+            stroke_segments(plates, theme.Height.REFLECTOR),
+        )
+        self._shapes.points = np.concatenate(segments)
 
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:
         """Add bodies in 3D; they would hide the marks' surroundings in the plan."""
         return _bodies(scene, self._project) if three_d else ()
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
-        """Return the marks."""
-        return (self._marks,)
+        """Return the dots and the shapes."""
+        return self._marks, self._shapes
 
 
 class ReflectorNameLayer(BaseLayer):
@@ -85,6 +91,14 @@ class ReflectorNameLayer(BaseLayer):
         return tuple(self._labels.values())
 
 
+def _plates(reflectors: ReflectorMap) -> FloatArray:
+    """(N, 2, 2) both ends of each plate [m]."""
+    flat = reflectors.is_flat
+    along = reflectors.headings[flat] + 0.5 * np.pi
+    half = reflectors.radii[flat, np.newaxis] * np.stack([np.cos(along), np.sin(along)], axis=1)
+    return np.stack([reflectors.centers[flat] - half, reflectors.centers[flat] + half], axis=1)
+
+
 def _bodies(scene: SceneApi, project: Project) -> tuple[SceneNodeHandle, ...]:
     """Add all cylinders as one batch and all plates as another."""
     import trimesh
@@ -99,10 +113,12 @@ def _bodies(scene: SceneApi, project: Project) -> tuple[SceneNodeHandle, ...]:
             continue
         round_one = kind is ReflectorKind.CYLINDER
         sizes = [
-            (r.radius, r.radius, SHOWN_HEIGHT) if round_one else (PLATE_THICKNESS, 2 * r.radius, SHOWN_HEIGHT)
+            (r.reckoned_radius, r.reckoned_radius, SHOWN_HEIGHT)
+            if round_one
+            else (PLATE_THICKNESS, 2 * r.reckoned_radius, SHOWN_HEIGHT)
             for r in chosen
         ]
-        headings = np.array([0.0 if round_one else r.heading for r in chosen])
+        headings = np.array([0.0 if round_one else r.heading or 0.0 for r in chosen])
         wxyzs = np.zeros((len(chosen), 4))
         wxyzs[:, 0], wxyzs[:, 3] = np.cos(0.5 * headings), np.sin(0.5 * headings)
         nodes.append(

@@ -9,6 +9,7 @@ from viser import GuiApi, GuiTabHandle
 
 from commission.app.base import actions as page_actions
 from commission.app.base import theme
+from commission.app.base.inputs import add_find
 from commission.app.base.panel import BasePanel, Post
 from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
@@ -73,7 +74,7 @@ class RouteTable(BasePanel):
 
     def __init__(self, gui: GuiApi, post: Post, browser: int, tab: GuiTabHandle) -> None:
         self._browser = browser
-        self._find = gui.add_text("Find", "", hint="Part of the name of a route or a station.")
+        self._find = add_find(gui, "Part of the name of a route or a station.")
         self._count = gui.add_html("")
         self._shown: list[Row] = []
         self._rows = Rows(gui, tab, post, self._selecting)

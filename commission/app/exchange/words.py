@@ -12,7 +12,7 @@ from commission.site.fields import field_info, get_field
 from commission.site.network_diff import course_shift, length_of
 from commission.site.quantity import DEGREES, MILLIMETRES
 from commission.site.reflector_diff import ReflectorChange
-from commission.site.reflectors import Reflector
+from commission.site.reflectors import UNKNOWN, Reflector
 from commission.site.routes import Route
 from commission.site.stations import Station
 
@@ -28,7 +28,8 @@ T = TypeVar("T")
 
 def reflector_line(reflector: Reflector) -> str:
     """Return a reflector as one line of a list."""
-    return f"{reflector.id}: {reflector.x:.3f}, {reflector.y:.3f} m, r {MILLIMETRES.text(reflector.radius)}"
+    radius = UNKNOWN if reflector.radius is None else MILLIMETRES.text(reflector.radius)
+    return f"{reflector.id}: {reflector.x:.3f}, {reflector.y:.3f} m, r {radius}"
 
 
 def reflector_changes(change: ReflectorChange) -> str:
@@ -42,7 +43,11 @@ def reflector_changes(change: ReflectorChange) -> str:
 def _number_change(name: str, before: object, after: object) -> str:
     """Say how a number changes, with the unit and digits of its field."""
     quantity = field_info(before, name).quantity
-    text = "" if quantity is None else quantity.change_text(get_field(before, name), get_field(after, name))
+    old, new = get_field(before, name), get_field(after, name)
+    if quantity is not None and (old is None or new is None):
+        old, new = (quantity.none if value is None else quantity.text(value) for value in (old, new))
+        return f"{name} {old} → {new}"
+    text = "" if quantity is None else quantity.change_text(old, new)
     return f"{name} {text or 'by less than the last digit'}"
 
 

@@ -13,7 +13,7 @@ from viser import GuiApi, GuiEvent
 from commission.app.base import actions as page_actions
 from commission.app.base import theme
 from commission.app.base.field_widget import add_widget, held, meant, write_held
-from commission.app.base.inputs import write_html
+from commission.app.base.inputs import add_find, write_html
 from commission.app.base.panel import Post, escaped, posting, table
 from commission.app.base.rows import Rows
 from commission.app.floor_map import actions
@@ -161,7 +161,7 @@ class MapDraftFields:
         with self._layers:
             gui.add_html(theme.WIDE)
             every = gui.add_button_group("", ("All", "None", "Visible"))
-            self._find = gui.add_text("Find", "", hint="Part of a layer's name.")
+            self._find = add_find(gui, "Part of a layer's name.")
             self._rest = gui.add_html("", visible=False)
             self._rows = Rows(gui, self._layers, self._post, self._toggled)
         self._listed: tuple[DrawingLayer, ...] = ()

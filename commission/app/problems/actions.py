@@ -9,6 +9,11 @@ from commission.studies.problems import Problem
 
 
 @dataclass(frozen=True, slots=True)
+class FaceFromWalls(Action):
+    """Turn every plate of unknown direction away from the wall that it hangs on."""
+
+
+@dataclass(frozen=True, slots=True)
 class ShowProblem(Action):
     """Select what a problem is about and go to its place."""
 

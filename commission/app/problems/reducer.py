@@ -5,13 +5,26 @@ from __future__ import annotations
 from dataclasses import replace
 
 from commission.app.base.actions import Sender
-from commission.app.base.effects import FlyTo
+from commission.app.base.effects import FlyTo, Tell
 from commission.app.base.reducer import Outcome, reduce
-from commission.app.base.state import AppState
+from commission.app.base.state import AppState, Edit
 from commission.app.editing.editor import editor_of
+from commission.app.editing.reducer import with_reflectors
 from commission.app.editing.route_gestures import control_point_at
-from commission.app.problems.actions import ShowProblem
+from commission.app.problems.actions import FaceFromWalls, ShowProblem
+from commission.errors import UsageError
+from commission.site.editing.facing import faced_from_walls, said_of
 from commission.studies.problems import Subject
+
+
+@reduce.register
+def face_from_walls(_action: FaceFromWalls, state: AppState, sender: Sender) -> Outcome:
+    floor_map = state.project.floor_map
+    if floor_map is None:
+        raise UsageError("the project has no floor map to take directions from; expected one")
+    faced = faced_from_walls(state.project.reflectors, floor_map)
+    outcome = with_reflectors(state, faced.reflectors, Edit(f"face {len(faced.turned)} plates from walls", sender))
+    return replace(outcome, effects=(*outcome.effects, Tell(said_of(faced), failed=not faced.turned)))
 
 
 @reduce.register

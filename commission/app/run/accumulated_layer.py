@@ -6,12 +6,10 @@ from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import lift
-from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
-from commission.app.base.marks import add_points
+from commission.app.base.marks import add_marks
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
-from commission.site.project import Project
 
 
 class AccumulatedLayer(BaseLayer):
@@ -23,14 +21,9 @@ class AccumulatedLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._inliers, self._outliers = (
-            add_points(scene, f"/run/accumulated/{name}", color, 0.03)
+            add_marks(scene, f"/run/accumulated/{name}", color, 3)
             for name, color in (("inliers", theme.INLIER), ("outliers", theme.OUTLIER_ASSOCIATION))
         )
-
-    def show_site(self, project: Project) -> None:
-        """Adapt the size of points to the site's."""
-        for cloud in (self._inliers, self._outliers):
-            cloud.point_size = 0.4 * extent_of(project).mark_size()
 
     def draw_slowly(self, view: PageView) -> None:
         """Draw every detection so far, unless the layer is off: it is the largest of all."""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, TypeAlias
 
 from commission.app.base.actions import Action
+from commission.app.run.trail_colors import TrailBy
 from commission.site.disturbances import PEOPLE
 from commission.site.quantity import Bounds, Quantity
 
@@ -94,6 +95,14 @@ class Repeat(Action):
 
     repeat: bool
     """Start again."""
+
+
+@dataclass(frozen=True, slots=True)
+class ColorTrail(Action):
+    """Color the trail on the floor by another quantity."""
+
+    by: TrailBy
+    """Which one."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from viser import GuiApi
 
 from commission.app.base import theme
+from commission.app.base.inputs import write_html
 from commission.app.base.panel import BasePanel, escaped
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
@@ -36,6 +37,7 @@ class Badge(BasePanel):
 
     def __init__(self, gui: GuiApi) -> None:
         self._badge = gui.add_html("")
+        self._scale = gui.add_html("", visible=False)
         self._shown = ("", "")
 
     def draw(self, view: PageView) -> None:
@@ -45,6 +47,14 @@ class Badge(BasePanel):
             return
         self._shown = (word, color)
         self._show_badge(word, beside, color)
+        self._show_scale(view.state.magnify)
+
+    def _show_scale(self, magnify: float) -> None:
+        """Say on the floor by how much gates and offsets are drawn larger than they are."""
+        write_html(
+            self._scale,
+            "" if magnify == 1.0 else f"<div class='c-scale'>gates, 2σ and offsets ×{magnify:g}</div>",
+        )
 
     def _show_badge(self, word: str, beside: str, color: str) -> None:
         """Write the badge: in the row with the buttons, because above them it would cover them on a small screen."""
@@ -60,3 +70,4 @@ class Badge(BasePanel):
     def draw_slowly(self, view: PageView) -> None:
         """Show the numbers beside the badge."""
         self._show_badge(*badge_text(view))
+        self._show_scale(view.state.magnify)

@@ -103,8 +103,11 @@ CHARTS = (
     ),
     Chart(
         title="NIS against gate",
-        lines=(Line("largest NIS of a scan's inliers", TURQUOISE, lambda run: run.nis, has_gaps=True),),
-        limits=(Limit("gate", _gate),),
+        lines=(
+            Line("largest NIS of a scan's inliers", TURQUOISE, lambda run: run.nis, has_gaps=True),
+            Line("mean of all detections in 1 s", ORANGE, lambda run: run.recent.nis, has_gaps=True),
+        ),
+        limits=(Limit("gate", _gate), Limit("consistent mean of all", lambda _: 2.0, color=ORANGE)),
         span=lambda p: (0.0, 1.4 * _gate(p)),
     ),
     Chart(

@@ -1,33 +1,34 @@
-"""Detections of the newest scan: inliers yellow, outliers red, with one shape for each of the two filters."""
+"""Detections of the newest scan where the gates judge them: inliers yellow, outliers red, one shape for each filter."""
 
 from __future__ import annotations
 
 from typing import Literal, TypeAlias
 
+import numpy as np
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_POINTS, lift
-from commission.app.base.extent import extent_of
+from commission.app.base.drawing import NO_POINTS, lift, stroke_segments
 from commission.app.base.layer import BaseLayer
-from commission.app.base.marks import add_points
+from commission.app.base.marks import add_lines, add_marks
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
+from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Status
-from commission.site.project import Project
 
-Shape: TypeAlias = Literal["circle", "square", "diamond"]
+Shape: TypeAlias = Literal["sparkle", "diamond"]
 
 STYLES: dict[Status, tuple[theme.Color, Shape, str]] = {
-    Status.INLIER: (theme.INLIER, "circle", "inlier"),
-    Status.OUTLIER_ASSOCIATION: (theme.OUTLIER_ASSOCIATION, "square", "outlier: outside every gate"),
+    Status.INLIER: (theme.INLIER, "sparkle", "inlier"),
+    Status.OUTLIER_ASSOCIATION: (theme.OUTLIER_ASSOCIATION, "sparkle", "outlier: outside every gate"),
     Status.OUTLIER_DETECTOR: (theme.OUTLIER_DETECTOR, "diamond", "outlier: too few or many beams"),
 }
-MARKS: dict[Shape, theme.Mark] = {"circle": theme.Mark.DOT, "square": theme.Mark.SQUARE, "diamond": theme.Mark.DIAMOND}
+MARKS: dict[Shape, theme.Mark] = {"sparkle": theme.Mark.CROSS, "diamond": theme.Mark.DIAMOND}
+PIXELS: dict[Shape, int] = {"sparkle": 13, "diamond": 9}
 
 
 class DetectionLayer(BaseLayer):
-    """Detections of the newest scan."""
+    """Detections of the newest scan, each with its offset from the reflector it is taken for."""
 
     name = "Detections"
     rank = 170
@@ -35,29 +36,51 @@ class DetectionLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
+        self._offsets = add_lines(scene, "/run/offsets", theme.OFFSET, 1.0)
         self._clouds = {
-            status: add_points(scene, f"/run/detections/{status.name.lower()}", color, 0.08, shape=shape)
+            status: add_marks(scene, f"/run/detections/{status.name.lower()}", color, PIXELS[shape], shape=shape)
             for status, (color, shape, _) in STYLES.items()
         }
 
-    def show_site(self, project: Project) -> None:
-        """Adapt the size of marks to the site's."""
-        for cloud in self._clouds.values():
-            cloud.point_size = 0.9 * extent_of(project).mark_size()
-
     def draw(self, view: PageView) -> None:
-        """Draw every detection where it is seen from the estimated pose."""
+        """Draw every detection; its offset is magnified as the gates are."""
         run = view.part(RunView)
         if run is None:
             return
+        places, offsets = drawn_detections(run, view.state.magnify)
         for status, cloud in self._clouds.items():
             chosen = NO_POINTS
             if run.estimate is not None:
-                of_status = run.estimate.points_map[run.estimate.status == status]
-                chosen = lift(of_status, theme.Height.DETECTION)
+                chosen = lift(places[run.estimate.status == status], theme.Height.DETECTION)
             if len(chosen) or len(cloud.points):
                 cloud.points = chosen
+        self._offsets.points = stroke_segments(offsets, theme.Height.DETECTION)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
-        """Return the marks of every status."""
-        return tuple(self._clouds.values())
+        """Return the marks of every status and the lines of their offsets."""
+        return (*self._clouds.values(), self._offsets)
+
+
+def drawn_detections(run: RunView, magnify: float) -> tuple[FloatArray, FloatArray]:
+    """Return where the detections of the newest cycle are drawn, and the lines from their reflectors to them.
+
+    A detection inside a gate is drawn inside it at any magnification, and one outside, outside.
+
+    Parameters
+    ----------
+    run : at its cursor.
+    magnify : how much larger than they are gates are drawn.
+
+    Returns
+    -------
+    places : (N, 2) [m], map frame.
+    offsets : (M, 2, 2) lines from a reflector to its detection [m].
+    """
+    places, estimate = run.judged_map.copy(), run.estimate
+    if estimate is None:
+        return places, np.empty((0, 2, 2))
+    # Outside the gate as it is drawn a detection stays where it is, and has no line across the floor.
+    near = (estimate.reflector >= 0) & (estimate.d2 <= magnify**2 * estimate.gate)
+    centers = run.segment.setup.reflectors.centers[estimate.reflector[near]]
+    places[near] = centers + magnify * (places[near] - centers)
+    return places, np.stack([centers, places[near]], axis=1)

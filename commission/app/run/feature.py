@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from commission.app.base.feature import RUN, SELECTION, TIME, TUNE, Docked, Feature
+from commission.app.base.feature import LEGEND, RUN, SELECTION, TIME, TUNE, Docked, Feature
 from commission.app.run import reducer
 from commission.app.run.accumulated_layer import AccumulatedLayer
 from commission.app.run.badge import Badge
@@ -15,8 +15,10 @@ from commission.app.run.run_panel import RunPanel
 from commission.app.run.scan_layer import ScanLayer
 from commission.app.run.service import RunService
 from commission.app.run.state import RunState
+from commission.app.run.summary_panel import SummaryPanel
 from commission.app.run.time_line import TimeLine
-from commission.app.run.trail_layers import ReferenceLayer, TrailLayer
+from commission.app.run.trail_layers import ConsistencyLayer, ReferenceLayer, TrailLayer
+from commission.app.run.trail_legend import TrailLegend
 from commission.app.run.uncertainty_layer import UncertaintyLayer
 from commission.app.run.vehicle_layer import VehicleLayer
 from commission.app.run.world_panel import WorldPanel
@@ -33,15 +35,18 @@ FEATURE = Feature(
         VehicleLayer,
         UncertaintyLayer,
         TrailLayer,
+        ConsistencyLayer,
         ReferenceLayer,
     ),
     panels=(
         Docked(make=lambda at: Badge(at.gui), tab=None, rank=10),
         Docked(make=lambda at: NowPanel(at.gui, at.browser), tab=SELECTION, rank=60, own=True),
         Docked(make=lambda at: RunPanel(at.gui, at.post, at.state), tab=RUN),
+        Docked(make=lambda at: SummaryPanel(at.gui), tab=RUN, rank=5),
         Docked(make=lambda at: EditsPanel(at.gui, at.post, at.state), tab=RUN, rank=10),
         Docked(make=lambda at: WorldPanel(at.gui, at.post, at.state), tab=RUN, rank=20, folder="Virtual world"),
         Docked(make=lambda at: EditsPanel(at.gui, at.post, at.state), tab=TUNE, rank=-10),
+        Docked(make=lambda at: TrailLegend(at.gui), tab=LEGEND, rank=16),
         Docked(make=lambda at: TimeLine(at.gui, at.post, at.state.part(RunState).speed), tab=TIME, rank=10),
         Docked(make=lambda at: Plots(at.gui), tab=TIME, rank=20),
     ),

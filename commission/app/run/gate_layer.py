@@ -11,6 +11,7 @@ from commission.app.base.layer import BaseLayer
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
+from commission.geometry.arrays import FloatArray
 
 
 class GateLayer(BaseLayer):
@@ -29,13 +30,14 @@ class GateLayer(BaseLayer):
         run = view.part(RunView)
         if run is None:
             return
-        state = view.state
-        outlines = run.gates
-        if state.magnify != 1.0 and len(outlines):
-            middle = np.mean(outlines, axis=1, keepdims=True)
-            outlines = middle + state.magnify * (outlines - middle)
-        self._lines.points = outline_segments(outlines, theme.Height.GATE)
+        self._lines.points = outline_segments(drawn_gates(run, view.state.magnify), theme.Height.GATE)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the lines."""
         return (self._lines,)
+
+
+def drawn_gates(run: RunView, magnify: float) -> FloatArray:
+    """(R, n, 2) outlines of the gates [m], map frame, so many times as large as they are."""
+    middle = np.mean(run.gates, axis=1, keepdims=True)
+    return middle + magnify * (run.gates - middle)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from viser import GuiApi
 
 from commission.app.base.inputs import show
 from commission.app.base.panel import BasePanel, table
 from commission.app.base.view import PageView
 from commission.app.editing.editor import editor_of
+from commission.app.run.summary_panel import known, share
 from commission.app.run.view import RunView
-from commission.localization.estimate import Mode, Status
+from commission.localization.detector import passing_widths
+from commission.localization.estimate import Estimate, Mode, Status
 from commission.site.quantity import DEGREES, MILLIMETRES
 from commission.site.truth import truth_told
 from commission.studies.run import RunResult
@@ -23,6 +26,8 @@ MODES = {
     Mode.LOST: "lost: rejects what it sees, output withheld",
 }
 """What the page says of each."""
+MOST_REJECTED = 4
+"""Rejected clusters of a scan that are explained."""
 
 
 def rows(run: RunView) -> list[tuple[str, str]]:
@@ -53,12 +58,44 @@ def rows(run: RunView) -> list[tuple[str, str]]:
             f"{estimate.count(Status.OUTLIER_DETECTOR)}, {estimate.count(Status.OUTLIER_ASSOCIATION)}",
         ),
         ("Largest NIS / gate", f"{nis} / {estimate.gate:.2f}"),
+        ("NIS of all / expected, 1 s", f"{known(result.recent.nis[newest])} / 2"),
+        ("Rejected, 1 s", share(result.recent.rejected[newest])),
         *_of_scanners(result),
         ("Cycle time", f"{result.microseconds_per_cycle:.1f} µs, mean of the drive"),
         ("Position error", MILLIMETRES.text(error, ".1f") if math.isfinite(error) else "no reference"),
     ]
     truth = result.inputs.log.truth
     return shown if truth is None else [*shown, *((f"True {what}", text) for what, text in truth_told(truth))]
+
+
+def rejected_by_beams(run: RunView) -> list[tuple[str, str]]:
+    """Say why each cluster was rejected that failed the detector filter, the nearest first: beams against expected."""
+    estimate = run.estimate
+    if estimate is None:
+        return []
+    found = np.flatnonzero((estimate.status == Status.OUTLIER_DETECTOR) & (estimate.beams > 0))
+    nearest = found[np.argsort(estimate.measured[found, 0], kind="stable")]
+    shown = [_rejection(run, estimate, int(row)) for row in nearest[:MOST_REJECTED]]
+    left = len(nearest) - MOST_REJECTED
+    return shown if left <= 0 else [*shown, ("Rejected by beams", f"and {left} more")]
+
+
+def _rejection(run: RunView, estimate: Estimate, row: int) -> tuple[str, str]:
+    """Where a rejected cluster is, and its beams against those with which it would pass."""
+    setup = run.segment.setup
+    model, step = setup.detectors[estimate.scanner], setup.scanners[estimate.scanner].angle_increment
+    distance, bearing = (float(value) for value in estimate.measured[row])
+    beams = int(estimate.beams[row])
+    passing = sorted({passing_widths(distance, step, kind, model) for kind in range(len(model.radii))})
+    if not passing:
+        expected = "no reflector is in the map"
+    elif any(low <= beams <= high for low, high in passing):
+        # A plate, as its ranges say that it stands.
+        expected = f"expected about {estimate.expected_beams[row]:.1f} for how its ranges lie"
+    else:
+        expected = "expected " + " or ".join(f"{low} to {high}" for low, high in passing)
+    where = f"{distance:.2f} m, {DEGREES.text(bearing)}"
+    return f"Cluster at {where}", f"{beams} beam{'s' if beams > 1 else ''}, {expected}: rejected"
 
 
 def _of_scanners(result: RunResult) -> list[tuple[str, str]]:
@@ -85,5 +122,5 @@ class NowPanel(BasePanel):
         show(self._html, visible=is_shown)
         run = view.part(RunView)
         if run is not None and is_shown:
-            shown = table(rows(run))
+            shown = table([*rows(run), *rejected_by_beams(run)])
             self._html.content = f"<div class='c-now' style='padding:2px 14px 2px 6px'>{shown}</div>"

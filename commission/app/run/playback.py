@@ -119,6 +119,7 @@ class Playback:
             covered=covered,
             scan_map=np.concatenate(scans),
             first_scan=len(scans[0]),
+            judged_map=_judged(estimate, segment.setup),
             gates=self._gates(lived, estimate, segment.setup),
             accumulated=self._accumulated(lived) if whole else None,
         )
@@ -168,6 +169,19 @@ class Playback:
                 ends = _end_points(scans.scan(newest), setup.scanners[scanner])
                 points[scanner] = se2.transform_points(T_map_scanner, ends)
         return points
+
+
+def _judged(estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
+    """(N, 2) detections of a cycle seen from the belief before it [m], map frame."""
+    if estimate is None:
+        return np.empty((0, 2))
+    return project_detections(
+        estimate.prior.mean[np.newaxis],
+        np.array([0, len(estimate.detections)]),
+        estimate.detections,
+        setup.observation_rows,
+        scanners=np.array([estimate.scanner]),
+    )
 
 
 def _end_points(scan: Scan, scanner: Scanner) -> FloatArray:

@@ -77,6 +77,12 @@ def cover(action: actions.Cover, state: AppState, _sender: Sender) -> Outcome:
 
 
 @reduce.register
+def color_trail(action: actions.ColorTrail, state: AppState, _sender: Sender) -> Outcome:
+    """Choose what the trail shows."""
+    return Outcome(_with(state, trail_by=action.by))
+
+
+@reduce.register
 def edit_from_here_on(action: actions.EditFromHereOn, state: AppState, _sender: Sender) -> Outcome:
     """Choose what edits act on."""
     return Outcome(_with(state, from_here_on=action.from_here_on))

@@ -12,8 +12,9 @@ from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.reach import typed_path
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.run.actions import ChooseSource, Cover, RecordedDrive, Repeat, Restart, VirtualDrive
+from commission.app.run.actions import ChooseSource, ColorTrail, Cover, RecordedDrive, Repeat, Restart, VirtualDrive
 from commission.app.run.state import RunState
+from commission.app.run.trail_colors import TrailBy
 from commission.app.run.view import RunView
 from commission.site.quantity import PERCENT
 
@@ -41,6 +42,13 @@ class RunPanel(BasePanel):
                 "Repeat at the end", state.part(RunState).repeat, hint="The drive starts again at its initial pose."
             )
             self._repeat.on_update(posting(post, lambda event: Repeat(bool(event.target.value))))
+            self._trail = gui.add_dropdown(
+                "Trail shows",
+                tuple(TrailBy),
+                initial_value=state.part(RunState).trail_by,
+                hint="What the trail on the floor is colored by: how well the detections of the last second fit.",
+            )
+            self._trail.on_update(posting(post, lambda event: ColorTrail(TrailBy(event.target.value))))
             restart = gui.add_button(
                 "Restart",
                 hint="Back to the start: the whole drive with the setup of now, nothing covered on the way.",
@@ -111,6 +119,8 @@ class RunPanel(BasePanel):
             self._cover.value = run.covered
         if self._repeat.value is not view.state.part(RunState).repeat:
             self._repeat.value = view.state.part(RunState).repeat
+        if self._trail.value != view.state.part(RunState).trail_by:
+            self._trail.value = view.state.part(RunState).trail_by
 
 
 def _routes(state: AppState) -> tuple[str, ...]:

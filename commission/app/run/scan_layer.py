@@ -6,12 +6,10 @@ from viser import PointCloudHandle, SceneApi
 
 from commission.app.base import theme
 from commission.app.base.drawing import lift
-from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
-from commission.app.base.marks import add_points
+from commission.app.base.marks import add_marks
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
-from commission.site.project import Project
 
 
 class ScanLayer(BaseLayer):
@@ -26,13 +24,8 @@ class ScanLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._points = add_points(scene, "/run/scan", theme.SCAN, 0.04)
-        self._further = add_points(scene, "/run/further_scan", theme.FURTHER_SCAN, 0.04)
-
-    def show_site(self, project: Project) -> None:
-        """Adapt the size of points to the site's."""
-        for points in self.nodes():
-            points.point_size = 0.4 * extent_of(project).mark_size()
+        self._points = add_marks(scene, "/run/scan", theme.SCAN, 3)
+        self._further = add_marks(scene, "/run/further_scan", theme.FURTHER_SCAN, 3)
 
     def draw(self, view: PageView) -> None:
         """Draw the newest scans."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from commission.app.run.actions import Source
+from commission.app.run.trail_colors import TrailBy
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
 """Factors that the play clock offers."""
@@ -24,5 +25,7 @@ class RunState:
     """Whether it runs backward."""
     repeat: bool = False
     """Whether the drive starts again at its end."""
+    trail_by: TrailBy = TrailBy.NOTHING
+    """What the trail on the floor is colored by."""
     from_here_on: bool = False
     """Whether an edit acts from the cursor on, and not on the whole drive."""

@@ -1,4 +1,4 @@
-"""Where the vehicle has been: as estimated, and as the reference says."""
+"""Where the vehicle has been: as estimated, in colors of how well detections fit, and as the reference says."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ import numpy as np
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import polyline_segments, thinned
+from commission.app.base.drawing import polyline_segments, stroke_segments, thinned
 from commission.app.base.layer import BaseLayer
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
+from commission.app.run.state import RunState
+from commission.app.run.trail_colors import COLORINGS, TrailBy, palette, pieces, values_of
 from commission.app.run.view import RunView
 
 MOST_POINTS = 800
@@ -38,6 +40,45 @@ class TrailLayer(BaseLayer):
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the line."""
         return (self._line,)
+
+
+class ConsistencyLayer(BaseLayer):
+    """Trail in the colors of how well detections fit, where that is asked for."""
+
+    name = "Trail by consistency"
+    rank = 215
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._lines = tuple(
+            add_lines(scene, f"/run/consistency/{index}", color, 5.0) for index, color in enumerate(palette())
+        )
+        self._shown: object = None
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Draw the trail up to now, in pieces of one color each."""
+        run, by = view.part(RunView), view.state.part(RunState).trail_by
+        lived = 0 if run is None or by is TrailBy.NOTHING else run.lived
+        shown = (None if run is None else id(run.result), by, lived)
+        if shown == self._shown:
+            return
+        self._shown = shown
+        lines, classes = np.empty((0, 2, 2)), np.empty(0, np.int64)
+        if run is not None and lived:
+            found = COLORINGS[by].classes(values_of(by, run.result.recent)[:lived])
+            lines, classes = pieces(run.result.columns.means[:lived, :2], found, MOST_POINTS)
+        for index, node in enumerate(self._lines):
+            chosen = lines[classes == index]
+            if len(chosen) or len(node.points) > 1:
+                node.points = stroke_segments(chosen, theme.Height.TRAIL)
+
+    def is_used(self, view: PageView) -> bool:
+        """Whether it is asked for."""
+        return view.state.part(RunState).trail_by is not TrailBy.NOTHING
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the lines, one for each color."""
+        return self._lines
 
 
 class ReferenceLayer(BaseLayer):

@@ -50,6 +50,8 @@ class RunView:
     """(B, 2) end points of the beams of each scanner's newest scan [m], map frame; those of the first come first."""
     first_scan: int
     """How many of these points are the first scanner's."""
+    judged_map: FloatArray
+    """(N, 2) detections of the newest cycle as the gates judge them: seen from the belief before it [m], map frame."""
     gates: FloatArray
     """(R, n, 2) outlines of the validation areas of the reflectors in view [m], map frame."""
     accumulated: Accumulated | None

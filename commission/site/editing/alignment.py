@@ -130,8 +130,8 @@ def aligned(project: Project, alignment: Alignment, *, everything: bool) -> Proj
 
 
 def _reflector(reflector: Reflector, T: FloatArray) -> Reflector:
-    x, y, heading = se2.compose(T, np.array([reflector.x, reflector.y, reflector.heading]))
-    return replace(reflector, x=float(x), y=float(y), heading=float(heading))
+    x, y, heading = se2.compose(T, np.array([reflector.x, reflector.y, reflector.heading or 0.0]))
+    return replace(reflector, x=float(x), y=float(y), heading=None if reflector.heading is None else float(heading))
 
 
 def _station(station: Station, T: FloatArray) -> Station:

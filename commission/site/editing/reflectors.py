@@ -106,7 +106,7 @@ def turn(reflectors: ReflectorMap, ids: Collection[str], pivot: tuple[float, flo
     def turned(r: Reflector) -> Reflector:
         dx, dy = r.x - pivot[0], r.y - pivot[1]
         turned_to = replace(r, x=pivot[0] + c * dx - s * dy, y=pivot[1] + s * dx + c * dy)
-        return _facing(turned_to, r.heading + angle)
+        return _facing(turned_to, None if r.heading is None else r.heading + angle)
 
     return _change(reflectors, ids, turned)
 
@@ -243,12 +243,14 @@ def _mirrored(reflector: Reflector, axis: Axis) -> Reflector:
     c, s = math.cos(2.0 * axis.angle), math.sin(2.0 * axis.angle)
     dx, dy = reflector.x - axis.x, reflector.y - axis.y
     image = replace(reflector, x=axis.x + c * dx + s * dy, y=axis.y + s * dx - c * dy)
-    return _facing(image, 2.0 * axis.angle - reflector.heading)
+    return _facing(image, None if reflector.heading is None else 2.0 * axis.angle - reflector.heading)
 
 
-def _facing(reflector: Reflector, heading: float) -> Reflector:
-    """Turn a flat plate; a cylinder faces everywhere and keeps its value, so that its row of the table stays short."""
-    return replace(reflector, heading=wrap_scalar(heading)) if reflector.kind is ReflectorKind.FLAT else reflector
+def _facing(reflector: Reflector, heading: float | None) -> Reflector:
+    """Turn a flat plate of known direction; a cylinder keeps its value, so that its row of the table stays short."""
+    if heading is None or reflector.kind is not ReflectorKind.FLAT:
+        return reflector
+    return replace(reflector, heading=wrap_scalar(heading))
 
 
 def _known(reflectors: ReflectorMap, ids: Collection[str]) -> frozenset[str]:

@@ -101,7 +101,7 @@ def nearest_wall(grid: OccupancyGrid, point: tuple[float, float], reach: float =
 def on_wall(reflector: Reflector, wall: WallPoint) -> Reflector:
     """Put a reflector against a wall: a cylinder touches it, a flat plate lies on it and faces away from it."""
     is_flat = reflector.kind is ReflectorKind.FLAT
-    depth = PLATE_DEPTH if is_flat else reflector.radius
+    depth = PLATE_DEPTH if is_flat else reflector.reckoned_radius
     x, y = wall.x + depth * math.cos(wall.heading), wall.y + depth * math.sin(wall.heading)
     return replace(reflector, x=x, y=y, heading=wall.heading if is_flat else reflector.heading)
 

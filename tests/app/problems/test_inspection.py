@@ -83,3 +83,16 @@ def test_another_vehicle_is_asked_whether_it_can_drive_the_curves(watch: Watch) 
     watch.do(actions.SetVehicle(TricycleVehicle(wheelbase=4.0, max_steering_deg=30.0)))
     assert watch.inspection.profiles[NAME].largest_curvature == pytest.approx(np.tan(np.radians(30.0)) / 4.0)
     assert {v.kind for v in watch.inspection.violations} >= {ViolationKind.CURVE}
+
+
+def test_too_few_reflectors_in_sight_become_problems_with_their_place_and_go_with_the_undo(watch: Watch) -> None:
+    def told() -> list[str]:
+        return [each.text for each in watch.inspection.problems if "in sight" in each.text and each.place is not None]
+
+    before = told()
+    every = tuple(each.id for each in watch.state.project.reflectors.reflectors)
+    watch.do(by(OTHER, actions.SelectReflectors(every[1:])), by(OTHER, actions.DeleteSelected()))
+    assert any(f"Route {NAME!r}: 1 reflector in sight" in text or "no reflectors in sight" in text for text in told())
+    watch.state = replace(watch.state, project=watch.state.undo[-1].project)
+    watch.do()
+    assert told() == before

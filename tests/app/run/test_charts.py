@@ -44,6 +44,7 @@ EXPECTED = {
     ("2σ of position [mm]", "y [mm]"): lambda e, t: 1000.0 * sigma(1)(e, t),
     ("2σ of heading [°]", "heading [°]"): lambda e, t: DEGREES * sigma(2)(e, t),
     ("NIS against gate", "largest NIS of a scan's inliers"): lambda e, _t: max(e.d2[e.status == 0], default=math.nan),
+    ("NIS against gate", "mean of all detections in 1 s"): None,
     ("Inliers, outliers per scan", "inliers"): inliers,
     ("Inliers, outliers per scan", "outliers"): lambda e, t: len(e.status) - inliers(e, t),
     ("Position error [mm]", "error against reference [mm]"): lambda e, t: (
@@ -66,7 +67,21 @@ def test_every_curve_has_its_expectation() -> None:
     assert set(EXPECTED) == set(LINES)
 
 
-@pytest.mark.parametrize("name", EXPECTED, ids=" ".join)
+def test_the_nis_of_all_is_the_mean_over_a_second_whatever_the_gate_says(strict: RunResult) -> None:
+    values = LINES["NIS against gate", "mean of all detections in 1 s"].values(strict)
+    estimates = [strict.columns.estimate(cycle) for cycle in range(strict.cycles)]
+    expected = []
+    for newest in estimates:
+        last = [e for e in estimates if newest.stamp_ns - 10**9 < e.stamp_ns <= newest.stamp_ns]
+        distances = np.concatenate([e.d2[e.status != Status.OUTLIER_DETECTOR] for e in last])
+        distances = distances[np.isfinite(distances)]
+        expected.append(distances.mean() if len(distances) else math.nan)
+    np.testing.assert_allclose(values, expected, rtol=1e-9)
+    # What the gate rejects counts, too: there is some.
+    assert (strict.columns.status == Status.OUTLIER_ASSOCIATION).any()
+
+
+@pytest.mark.parametrize("name", [name for name, expected in EXPECTED.items() if expected], ids=" ".join)
 def test_a_curve_is_its_quantity_in_its_unit_cycle_by_cycle(strict: RunResult, drive: Drive, name) -> None:
     truth = dict(zip(drive.log.reference_stamps_ns.tolist(), drive.log.reference_poses, strict=True))
     values = LINES[name].values(strict)

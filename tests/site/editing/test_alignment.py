@@ -16,6 +16,7 @@ from commission.site.disturbances import Disturbances, ShinyObject, TiltedStretc
 from commission.site.editing.alignment import WRONG, KnownPoint, align, aligned
 from commission.site.layout_brief import AllowedHeights, CandidateOptions, Demands, LayoutBrief
 from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
 from commission.site.stations import Station
 from tests.app.sites import room
 
@@ -84,10 +85,13 @@ def test_a_map_whose_origin_is_turned_already_is_turned_on_from_there() -> None:
 
 def test_everything_that_was_placed_on_the_map_goes_with_it() -> None:
     before = site()
+    facing = tuple(replace(each, heading=0.3 * k) for k, each in enumerate(before.reflectors.reflectors))
+    before = replace(before, reflectors=ReflectorMap(facing))
     after = aligned(before, TURNED, everything=True)
     # A quarter turn: x becomes y, y becomes -x.
     for old, new in zip(before.reflectors.reflectors, after.reflectors.reflectors, strict=True):
         assert (new.x, new.y) == pytest.approx((100.0 - old.y, 50.0 + old.x))
+        assert new.heading is not None and old.heading is not None
         assert math.remainder(new.heading - old.heading - math.pi / 2, 2 * math.pi) == pytest.approx(0.0, abs=1e-12)
     for old, new in zip(before.routes[0].segments, after.routes[0].segments, strict=True):
         expected = np.column_stack((100.0 - old.control_points[:, 1], 50.0 + old.control_points[:, 0]))

@@ -194,7 +194,7 @@ LOCALIZATION = (
         file=FOLDER + "detector_model.py",
         find="0.5 * scanner.beam_aperture",
         replace="scanner.beam_aperture",
-        tests=(TESTS + "test_beam_window.py::test_nearly_all_true_clusters_pass_however_wide_the_beams",),
+        tests=(TESTS + "test_beam_window.py::test_most_beams_of_a_post_are_those_that_touch_it",),
     ),
     Mutant(
         name="most beams are those of half a beam",

@@ -61,6 +61,24 @@ PAGE = (
         tests=(NUMBERS + "test_a_number_of_the_newest_cycle_is_that_of_its_study",),
     ),
     Mutant(
+        name="detection of a magnified gate drawn where it is",
+        file=FOLDER + "run/detection_layer.py",
+        find="centers + magnify * (places[near] - centers)",
+        replace="centers + (places[near] - centers)",
+        tests=(
+            "tests/app/run/test_drawn_detections.py::test_an_inlier_is_drawn_inside_its_gate_and_an_outlier_outside",
+        ),
+    ),
+    Mutant(
+        name="detections drawn from the belief after the scan, which the gates have not judged",
+        file=FOLDER + "run/playback.py",
+        find="estimate.prior.mean[np.newaxis],",
+        replace="estimate.posterior.mean[np.newaxis],",
+        tests=(
+            "tests/app/run/test_drawn_detections.py::test_an_inlier_is_drawn_inside_its_gate_and_an_outlier_outside",
+        ),
+    ),
+    Mutant(
         name="sigmas of the cycle before",
         file=FOLDER + "run/now_panel.py",
         find="result.two_sigma[newest]",

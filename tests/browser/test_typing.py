@@ -1,0 +1,218 @@
+"""An entry is finished when the engineer says so: drafts, Enter, Escape, refusals; each number, key by key."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import pytest
+from playwright.sync_api import Locator
+
+from commission.app.base.actions import Envelope
+from commission.app.base.viser_private import widget_of
+from commission.app.runtime import Message, Runtime
+from tests.app.sites import room
+from tests.browser.page import OpenPage
+from tests.browser.serving import Served
+
+_NUMBERS = """() => [...document.querySelectorAll('.mantine-NumberInput-input')].filter(e => e.offsetParent).map(e => {
+  let field = e.parentElement;
+  while (!field.querySelector('label[for]')) field = field.parentElement;
+  const inputs = [...field.querySelectorAll('.mantine-NumberInput-input')];
+  return [field.querySelector('label[for]').htmlFor, inputs.indexOf(e)];
+})"""
+"""Identifier of the widget of each number that can be seen, and which of the widget's numbers it is."""
+
+_FOLDED = """() => [...document.querySelectorAll('.mantine-Paper-root[data-with-border]')].filter(
+  e => e.offsetParent && e.innerText && !e.innerText.includes('\\n')).map(e => e.innerText)"""
+"""Names of the folders that are closed."""
+
+
+@dataclass
+class Heard:
+    """What browsers asked for, in its order."""
+
+    envelopes: list[Envelope] = field(default_factory=list)
+
+    def fields(self) -> list[str]:
+        """Widgets in which something was entered."""
+        return [envelope.sender.widget for envelope in self.envelopes if envelope.sender.widget]
+
+
+@pytest.fixture
+def heard(monkeypatch: pytest.MonkeyPatch) -> Heard:
+    """Listens to the owner thread."""
+    said, handle = Heard(), Runtime.handle
+
+    def listening(runtime: Runtime, message: Message) -> None:
+        if isinstance(message, Envelope) and message.sender.browser is not None:
+            said.envelopes.append(message)
+        handle(runtime, message)
+
+    monkeypatch.setattr(Runtime, "handle", listening)
+    return said
+
+
+@pytest.fixture
+def served(heard: Heard) -> Iterator[Served]:
+    assert heard.envelopes == []
+    opened = Served(room())
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def page(served: Served, window: Callable[..., OpenPage]) -> OpenPage:
+    opened = window(served.server)
+    opened.open()
+    return opened
+
+
+def gate(served: Served) -> float:
+    return served.state.project.parameters.association.gate_probability
+
+
+def typed_into(page: OpenPage, label: str, text: str) -> Locator:
+    """Type over what stands in a field, key by key, and stay in it."""
+    entry = page.row(label).locator("input").last
+    entry.click()
+    page.page.keyboard.press("Control+A")
+    page.page.keyboard.type(text, delay=20)
+    return entry
+
+
+def test_a_number_acts_when_it_is_finished_and_not_with_its_first_digit(
+    page: OpenPage, served: Served, heard: Heard
+) -> None:
+    page.open_tab("Tune")
+    entry = typed_into(page, "Gate", "97.5")
+    page.page.wait_for_timeout(300)
+    assert heard.fields() == []
+    assert page.row("Gate").get_attribute("data-draft") == ""
+    entry.press("Enter")
+    served.until(lambda: gate(served) == pytest.approx(0.975), 10.0)
+    page.page.wait_for_timeout(300)
+    assert len(heard.fields()) == 1
+    assert len(served.state.undo) == 1
+    assert page.row("Gate").get_attribute("data-draft") is None
+    assert page.errors == []
+
+
+def test_escape_shows_again_what_held_and_nothing_has_happened(page: OpenPage, served: Served, heard: Heard) -> None:
+    page.open_tab("Tune")
+    for text in ("97.5", "9", "-", ""):
+        entry = typed_into(page, "Gate", text)
+        if not text:
+            page.page.keyboard.press("Delete")
+        entry.press("Escape")
+        page.page.wait_for_timeout(250)
+        assert entry.input_value() == "95"
+        assert page.row("Gate").get_attribute("data-draft") is None
+    entry.press("Tab")
+    page.page.wait_for_timeout(250)
+    assert heard.fields() == []
+    assert served.state.undo == ()
+
+
+@pytest.mark.parametrize("text", ["120", "1", "0.5"])
+def test_a_number_beyond_its_bounds_is_refused_at_the_field_and_never_clamped(
+    page: OpenPage, served: Served, text: str
+) -> None:
+    page.open_tab("Tune")
+    entry = typed_into(page, "Gate", text)
+    entry.press("Tab")
+    page.page.wait_for_function(
+        "text => [...document.querySelectorAll('[data-refused]')].some(e => e.dataset.refused.includes(text))",
+        arg=f"{text}",
+    )
+    page.page.wait_for_function("field => field.value === '95'", arg=entry.element_handle())
+    assert gate(served) == pytest.approx(0.95)
+    assert served.state.undo == ()
+    assert served.state.faults == ()
+
+
+def test_what_is_no_number_is_refused_at_the_field(page: OpenPage, served: Served, heard: Heard) -> None:
+    page.open_tab("Tune")
+    entry = typed_into(page, "Gate", "-")
+    entry.press("Enter")
+    assert page.row("Gate").get_attribute("data-refused") == 'found "-"; expected a number'
+    assert entry.input_value() == "95"
+    assert heard.fields() == []
+    assert served.state.faults == ()
+
+
+def test_a_click_elsewhere_finishes_the_entry_before_it_does_anything(
+    page: OpenPage, served: Served, heard: Heard
+) -> None:
+    page.open_tab("Tune")
+    page.fill("Gate", "99")
+    served.until(lambda: len(served.state.undo) == 1, 10.0)
+    page.page.wait_for_timeout(1_100)  # what follows at once would be the same step
+    typed_into(page, "Gate", "97.5")
+    heard.envelopes.clear()
+    page.page.get_by_role("button", name="Undo").first.click()
+    served.until(lambda: len(served.state.redo) == 1, 10.0)
+    assert [type(envelope.action).__name__ for envelope in heard.envelopes] == ["SetParameter", "Undo"]
+    assert gate(served) == pytest.approx(0.99)
+
+
+def test_nothing_is_written_into_a_field_that_is_typed_into(
+    page: OpenPage, served: Served, window: Callable[..., OpenPage]
+) -> None:
+    other = window(served.server)
+    other.open()
+    for one in (page, other):
+        one.open_tab("Tune")
+    entry = typed_into(page, "Gate", "97")
+    other.fill("Gate", "99")
+    served.until(lambda: gate(served) == pytest.approx(0.99), 10.0)
+    page.page.wait_for_timeout(400)
+    assert entry.input_value() == "97"
+    page.page.keyboard.type(".5")
+    assert entry.input_value() == "97.5"
+    entry.press("Escape")
+    page.page.wait_for_function("field => field.value === '99'", arg=entry.element_handle())
+    assert gate(served) == pytest.approx(0.99)
+
+
+@pytest.mark.parametrize("tab", ["Site", "Plan", "Run", "Tune"])
+def test_each_number_typed_key_by_key_is_one_entry(page: OpenPage, served: Served, heard: Heard, tab: str) -> None:
+    page.open_tab(tab)
+    for _ in range(3):  # a folder may hold others
+        for name in page.page.evaluate(_FOLDED):
+            page.fold(name)
+    numbers = page.page.evaluate(_NUMBERS)
+    seen = 0
+    for widget, index in numbers:
+        handle = widget_of(served.server.gui, widget)
+        if handle is None or handle.disabled or not handle.label:
+            continue
+        seen += _is_one_entry(page, served, heard, (handle, widget, index))
+    assert seen > 3
+    assert page.errors == []
+
+
+def _is_one_entry(page: OpenPage, served: Served, heard: Heard, number: tuple[object, str, int]) -> bool:
+    """Type another value and check what was heard; return whether the widget tells anything at all."""
+    handle, widget, index = number
+    before = handle.value if not isinstance(handle.value, tuple) else handle.value[index]
+    step, low, high = handle.step, getattr(handle, "min", None), getattr(handle, "max", None)
+    low, high = (bound[index] if isinstance(bound, tuple) else bound for bound in (low, high))
+    after = before + 3 * step if high is None or before + 3 * step <= high else before - 3 * step
+    assert low is None or after >= low
+    row = page.page.locator(f'label[for="{widget}"]').locator("xpath=ancestor::*[contains(@class,'Flex-root')][1]")
+    entry = row.locator(".mantine-NumberInput-input").nth(index)
+    entry.click()
+    page.page.keyboard.press("Control+A")
+    heard.envelopes.clear()
+    page.page.keyboard.type(f"{after:.10g}", delay=5)
+    page.page.wait_for_timeout(80)
+    assert heard.envelopes == [], f"{handle.label} tells of keys"
+    steps = len(served.state.undo)
+    page.page.keyboard.press("Enter")
+    page.page.wait_for_timeout(250)
+    assert heard.fields() in ([widget], []), handle.label
+    assert len(served.state.undo) <= steps + 1, handle.label
+    entered = handle.value if not isinstance(handle.value, tuple) else handle.value[index]
+    assert entered == pytest.approx(after, rel=1e-6), handle.label
+    return True

@@ -1,0 +1,168 @@
+// An entry is finished when the engineer says so.
+//
+// viser's page tells the program of every key, so that 97.5 is 9 for a moment. Here a field that is typed into keeps
+// its draft: Enter, Tab or a click elsewhere sends what stands in it, once and as it was typed; Escape shows again what
+// held. Meanwhile nothing is written into the field. The program judges each entry; what it refuses is said below the
+// field (`commissionRefuse`; style: commission/app/base/theme.py).
+(() => {
+  if (window.commissionEntries) return; // the server sends this script again after each reconnection
+  window.commissionEntries = true;
+  const FIELDS = ".mantine-NumberInput-input, .mantine-TextInput-input, .mantine-Textarea-input";
+  // What viser makes of an entry (a number between its bounds, the last key's change 50 ms later) is no other entry.
+  const ECHO_MS = 150;
+  // A message of over 4 MB would end the connection without a word. Of a longer text goes so much that the server
+  // refuses it, says so, and shows in the field again what holds (LONGEST_TEXT in commission/app/base/widget_values.py).
+  const ENOUGH_LETTERS = 1_000_001;
+  const post = Worker.prototype.postMessage;
+  let worker = null; // viser's, which speaks with the program
+  let draft = null; // of the field that has the focus: {input, field, uuid, before, said, held}
+  let isRestoring = false;
+  const before = new WeakMap(); // what stood in each input before it was typed into
+  const echoUntil = new Map(); // by widget [ms]
+
+  // The widget of an input: the nearest element around it that has a label, which names the widget.
+  function placeOf(input) {
+    for (let field = input.parentElement; field; field = field.parentElement) {
+      const labels = field.querySelectorAll("label[for]");
+      if (labels.length) return labels.length === 1 ? { field, uuid: labels[0].htmlFor } : null;
+    }
+    return null;
+  }
+
+  const isNumber = (input) => input.classList.contains("mantine-NumberInput-input");
+  const numberIn = (text) => (text.trim() === "" ? NaN : Number(text));
+  const isSame = (input, one, other) => one === other || (isNumber(input) && numberIn(one) === numberIn(other));
+
+  // A text that seeks in a list tells of every key; it changes nothing.
+  const isLive = ({ field }) => field.parentElement.previousElementSibling?.querySelector(".c-live");
+
+  function begin(input) {
+    const place = placeOf(input);
+    if (!place || isLive(place)) return;
+    echoUntil.delete(place.uuid);
+    delete place.field.dataset.refused;
+    place.field.dataset.draft = "";
+    draft = { ...place, input, before: before.get(input) ?? "", said: null, held: undefined };
+  }
+
+  function end() {
+    const ended = draft;
+    draft = null;
+    if (!ended) return null;
+    delete ended.field.dataset.draft;
+    echoUntil.set(ended.uuid, performance.now() + ECHO_MS);
+    before.set(ended.input, ended.input.value);
+    return ended;
+  }
+
+  // What the widget is to hold: of several numbers the one that was typed in is exchanged.
+  function meantBy({ input, field, said }) {
+    if (!isNumber(input)) return input.value.slice(0, ENOUGH_LETTERS);
+    const inputs = [...field.querySelectorAll(FIELDS)];
+    if (inputs.length === 1) return numberIn(input.value);
+    const numbers = [...(said ?? inputs.map((each) => numberIn(each.value)))];
+    numbers[inputs.indexOf(input)] = numberIn(input.value);
+    return numbers;
+  }
+
+  function finish() {
+    const ended = end();
+    if (!ended) return;
+    if (isSame(ended.input, ended.input.value, ended.before)) return restore(ended);
+    const value = meantBy(ended);
+    if ([value].flat().some(Number.isNaN)) {
+      refuse(ended.field, `found "${ended.input.value}"; expected a number`);
+      return restore(ended);
+    }
+    tell(ended.uuid, value);
+  }
+
+  function tell(uuid, value) {
+    if (worker) post.call(worker, { type: "send", message: { type: "GuiUpdateMessage", uuid, updates: { value } } });
+  }
+
+  // Show what held before, or what was written into the field while it was typed into.
+  function restore({ input, uuid, before: text, held }) {
+    if (input.value !== text) {
+      const kind = input instanceof HTMLTextAreaElement ? HTMLTextAreaElement : HTMLInputElement;
+      isRestoring = true;
+      lookAnew(input);
+      Object.getOwnPropertyDescriptor(kind.prototype, "value").set.call(input, text);
+      input.dispatchEvent(new Event("input", { bubbles: true }));
+      isRestoring = false;
+    }
+    if (held === undefined) return;
+    const messages = [{ type: "GuiUpdateMessage", uuid, updates: { value: held } }];
+    worker.onmessage({ data: { type: "message_batch", messages } });
+  }
+
+  function refuse(field, text) {
+    field.dataset.refused = text;
+  }
+  window.commissionRefuse = (uuid, text) => {
+    const field = document.querySelector(`label[for="${CSS.escape(uuid)}"]`)?.closest(".mantine-Flex-root");
+    if (field) refuse(field, text);
+  };
+
+  // A number that comes without a key or a click (dropped, dictated, filled in by a helper of the browser) is compared
+  // by viser's input with where the caret stood when it was left last, and thrown away as if nothing had changed. A
+  // released mouse button lets it look anew.
+  let caretIsKnown = false;
+  const lookAnew = (input) => input.dispatchEvent(new MouseEvent("mouseup", { bubbles: true }));
+  const on = (kind, act) => addEventListener(kind, act, true);
+  on("focusin", () => { caretIsKnown = false; });
+  on("mouseup", () => { caretIsKnown = true; });
+
+  on("beforeinput", ({ target }) => {
+    if (!target.matches?.(FIELDS)) return;
+    if (draft?.input !== target) before.set(target, target.value);
+    if (!caretIsKnown && isNumber(target)) lookAnew(target);
+  });
+  on("input", ({ target }) => {
+    if (isRestoring || draft?.input === target || !target.matches?.(FIELDS)) return;
+    finish();
+    begin(target);
+  });
+  on("keydown", (event) => {
+    caretIsKnown = true;
+    const isOneLine = !(event.target instanceof HTMLTextAreaElement);
+    if (event.key === "Enter" && (isOneLine || event.ctrlKey)) finish();
+    if (event.key !== "Escape" || !draft) return;
+    event.stopImmediatePropagation(); // it takes back the entry and nothing else
+    event.preventDefault();
+    restore(end());
+  });
+  on("focusout", finish);
+  on("pointerdown", ({ target }) => { if (draft && !draft.field.contains(target)) finish(); });
+
+  Worker.prototype.postMessage = function (data, ...others) {
+    if (data?.type !== "send") return post.call(this, data, ...others);
+    attend(this);
+    const { type, uuid, updates } = data.message;
+    if (type === "GuiUpdateMessage" && updates && "value" in updates) {
+      if (draft?.uuid === uuid) {
+        draft.said = updates.value;
+        return;
+      }
+      if (performance.now() < (echoUntil.get(uuid) ?? 0)) return;
+    }
+    if (type !== "ViewerCameraMessage") finish(); // what is done now, is done with what stands in the field
+    return post.call(this, data, ...others);
+  };
+
+  // Nothing is written into a field that is typed into.
+  function attend(speaker) {
+    if (worker === speaker) return;
+    worker = speaker;
+    const hear = speaker.onmessage;
+    speaker.onmessage = (event) => {
+      for (const message of (draft && event.data.messages) || []) {
+        if (message.type !== "GuiUpdateMessage" || message.uuid !== draft.uuid) continue;
+        const { value, ...others } = message.updates;
+        if (value !== undefined) draft.held = value;
+        message.updates = others;
+      }
+      hear.call(speaker, event);
+    };
+  }
+})();
