@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import fields
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +23,33 @@ def read_only(array: NDArray[Scalar]) -> NDArray[Scalar]:
     view = np.ascontiguousarray(array).view()
     view.setflags(write=False)
     return view
+
+
+class Growing(Generic[Scalar]):
+    """Rows that come in blocks, gathered where they will stay.
+
+    `numpy.concatenate` needs every row twice while it runs, and leaves the blocks as holes in the memory.
+
+    Parameters
+    ----------
+    dtype : of the numbers.
+    width : numbers in a row; 0: a row is one number.
+    """
+
+    def __init__(self, dtype: type[Scalar], width: int = 0) -> None:
+        self._dtype, self._shape = np.dtype(dtype), (-1, width) if width else (-1,)
+        # It grows by an eighth in place: the system moves its pages, not their contents.
+        self._bytes = bytearray()
+
+    def append(self, rows: NDArray[Scalar]) -> None:
+        """Append some rows; numbers of another type are converted."""
+        self._bytes += np.ascontiguousarray(rows, dtype=self._dtype).tobytes()
+
+    def array(self) -> NDArray[Scalar]:
+        """Return all rows, read-only and without a copy; nothing may be appended any more."""
+        array: NDArray[Scalar] = np.frombuffer(self._bytes, self._dtype).reshape(self._shape)
+        array.setflags(write=False)
+        return array
 
 
 def frozen(values: ArrayLike, shape: Sequence[int | None], name: str, *, finite: bool = True) -> FloatArray:

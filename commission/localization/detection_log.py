@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from commission.compiled import compiled, compiled_parallel, parallel_range
-from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
+from commission.geometry.arrays import BoolArray, FloatArray, Growing, IntArray, read_only
 from commission.localization.clusters import count_clusters
 from commission.localization.detector import INLIER, detect_clusters, reflective_beams, room_for
 from commission.localization.detector_model import BeamColumns, DetectorModel, beams_at, beams_of
@@ -17,8 +18,8 @@ from commission.localization.setup import LocalizerSetup
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanLog
 
-SCANS_AT_ONCE = 4096
-"""Scans that are in memory at once: 9 MB of ranges of 541 beams."""
+SCANS_AT_ONCE = 512
+"""Scans that are in memory at once: 1 MB of ranges of 541 beams."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -157,7 +158,8 @@ def _in_scans(log: RecordLog, setup: LocalizerSetup, cycles: tuple[int, int], *,
             blocks = (
                 scans.block(begin, min(begin + SCANS_AT_ONCE, last)) for begin in range(first, last, SCANS_AT_ONCE)
             )
-            parts.append(joined([detect_log(each, setup, scanner=scanner, parallel=parallel) for each in blocks]))
+            found = (detect_log(each, setup, scanner=scanner, parallel=parallel) for each in blocks)
+            parts.append(joined(found))
             places.append(where)
         start += len(scans)
     return _interleaved(parts, places)
@@ -201,19 +203,38 @@ def _scans_used(log: RecordLog, sensor_detects: bool) -> int:
     return int(np.searchsorted(log.scan_stamps_ns, log.detection_stamps_ns[0], side="left"))
 
 
-def joined(logs: Sequence[DetectionLog]) -> DetectionLog:
-    """Return one log after the other; of a single one itself, without a copy."""
-    if len(logs) == 1:
-        return logs[0]
-    starts = np.cumsum([0, *(int(log.offsets[-1]) for log in logs)])
+def joined(logs: Iterable[DetectionLog]) -> DetectionLog:
+    """Return one log after the other; of a single one itself, without a copy.
+
+    Parameters
+    ----------
+    logs : one at least; each is asked for when the one before has been taken in.
+    """
+    rest = iter(logs)
+    first, second = next(rest), next(rest, None)
+    if second is None:
+        return first
+    stamps, scanners, offsets, beams = (Growing(np.int64) for _ in range(4))
+    range_bearing, expected, status = Growing(np.float64, 2), Growing(np.float64), Growing(np.int8)
+    offsets.append(first.offsets[:1])
+    begin = 0
+    for log in itertools.chain((first, second), rest):
+        stamps.append(log.stamps_ns)
+        scanners.append(log.scanners)
+        offsets.append(log.offsets[1:] + begin)
+        begin += int(log.offsets[-1])
+        range_bearing.append(log.range_bearing)
+        beams.append(log.beams)
+        expected.append(log.expected)
+        status.append(log.status)
     return _log(
-        np.concatenate([log.stamps_ns for log in logs]),
-        np.concatenate([log.scanners for log in logs]),
-        np.concatenate(([0], *(log.offsets[1:] + start for log, start in zip(logs, starts, strict=False)))),
-        np.concatenate([log.range_bearing for log in logs]),
-        np.concatenate([log.beams for log in logs]),
-        np.concatenate([log.expected for log in logs]),
-        np.concatenate([log.status for log in logs]),
+        stamps.array(),
+        scanners.array(),
+        offsets.array(),
+        range_bearing.array(),
+        beams.array(),
+        expected.array(),
+        status.array(),
     )
 
 

@@ -12,6 +12,7 @@ from commission.localization.detection_log import DetectionLog
 from commission.localization.detector import INLIER
 from commission.localization.estimate import Belief, Estimate, Status
 from commission.localization.localizer import Localizer
+from commission.localization.priors import KeptPriors, PriorRows
 from commission.localization.run_columns import Checkpoint, RunColumns, RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState
@@ -147,8 +148,7 @@ class GrowingRun:
             checkpoints=tuple(self._checkpoints),
             detected=detected,
             range_bearing=rows.range_bearing,
-            prior_means=cycles.prior_means,
-            prior_covariances=cycles.prior_covariances,
+            priors=KeptPriors(PriorRows(cycles.prior_means, cycles.prior_covariances)),
             means=cycles.means,
             covariances=cycles.covariances,
             modes=cycles.modes,

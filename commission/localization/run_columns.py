@@ -16,6 +16,7 @@ from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.detection_log import DetectionLog
 from commission.localization.estimate import Belief, Estimate, Mode, Status
 from commission.localization.observation import project_detections
+from commission.localization.priors import Priors
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, belief_of, output_of
 
@@ -63,10 +64,8 @@ class RunColumns:
     """Stamps of the cycles, rows of their detections, and the detections as measured."""
     range_bearing: FloatArray
     """(n, 2) range [m] and bearing [rad] of each detection at the stamp of its scan, scanner frame, upright."""
-    prior_means: FloatArray
-    """(K, 3) `T_map_base` after *predict* [m, m, rad]."""
-    prior_covariances: FloatArray
-    """(K, 3, 3) after *predict*."""
+    priors: Priors
+    """Beliefs after *predict*."""
     means: FloatArray
     """(K, 3) `T_map_base` after *correct*: the filter's own state [m, m, rad]."""
     covariances: FloatArray
@@ -122,7 +121,8 @@ class RunColumns:
 
     def counts(self, status: Status) -> IntArray:
         """(K,) detections of one status in each cycle."""
-        totals = np.concatenate(([0], np.cumsum(self.status == status, dtype=np.int64)))
+        totals = np.zeros(len(self.status) + 1, dtype=np.int64)
+        np.cumsum(self.status == status, out=totals[1:])
         return totals[self.offsets[1:]] - totals[self.offsets[:-1]]
 
     def points_map(self) -> FloatArray:
@@ -156,7 +156,7 @@ class RunColumns:
         )
         return Estimate(
             stamp_ns=stamp_ns,
-            prior=Belief(stamp_ns, self.prior_means[cycle], self.prior_covariances[cycle]),
+            prior=Belief(stamp_ns, *self.priors.at(cycle)),
             posterior=self._posterior(cycle),
             output=self._output(cycle),
             mode=Mode(int(self.modes[cycle])),

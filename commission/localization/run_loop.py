@@ -18,6 +18,7 @@ from commission.localization.detection_log import DetectionLog
 from commission.localization.observation import observation_at
 from commission.localization.odometry import NextOdometry, waits_until
 from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.priors import PriorRows
 from commission.localization.run_columns import RunColumns
 from commission.localization.setup import FilterModel, LocalizerSetup
 from commission.localization.state import FilterState
@@ -28,8 +29,6 @@ from commission.site.record_log import RecordLog
 class Columns(NamedTuple):
     """Where the loop writes: a row per cycle, then a row per detection."""
 
-    prior_means: FloatArray
-    prior_covariances: FloatArray
     means: FloatArray
     covariances: FloatArray
     modes: NDArray[np.int8]
@@ -52,8 +51,6 @@ def empty_columns(detected: DetectionLog, *, sweeping: bool) -> Columns:
     return Columns(
         np.empty((cycles, 3)),
         np.empty((cycles, 3, 3)),
-        np.empty((cycles, 3)),
-        np.empty((cycles, 3, 3)),
         np.empty(cycles, dtype=np.int8),
         detected.status.copy(),
         np.empty(total, dtype=np.int64),
@@ -73,8 +70,6 @@ def cut(columns: Columns, detected: DetectionLog, first: int, last: int) -> Colu
     """
     rows = slice(int(detected.offsets[first]), int(detected.offsets[last]))
     return Columns(
-        columns.prior_means[first:last],
-        columns.prior_covariances[first:last],
         columns.means[first:last],
         columns.covariances[first:last],
         columns.modes[first:last],
@@ -94,8 +89,6 @@ def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: in
     columns : what is written to.
     cycles, detections : how many rows of each kind.
     """
-    columns.prior_means[:cycles] = earlier.prior_means[:cycles]
-    columns.prior_covariances[:cycles] = earlier.prior_covariances[:cycles]
     columns.means[:cycles] = earlier.means[:cycles]
     columns.covariances[:cycles] = earlier.covariances[:cycles]
     columns.modes[:cycles] = earlier.modes[:cycles]
@@ -104,6 +97,22 @@ def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: in
     columns.d2[:detections] = earlier.d2[:detections]
     if len(columns.settled):
         columns.settled[:detections] = earlier.range_bearing[:detections]
+
+
+def odometry_rows(log: RecordLog, stamps_ns: IntArray, first: int, last: int) -> tuple[int, int]:
+    """Rows of odometry that are delivered between the cycle before `first` and the last cycle before `last`.
+
+    Parameters
+    ----------
+    log : all records of the drive.
+    stamps_ns : (K,) stamp of each cycle [ns].
+    first, last : cycles.
+    """
+    row, end = (
+        int(np.searchsorted(log.odometry_stamps_ns, stamps_ns[cycle - 1], side="right")) if cycle else 0
+        for cycle in (first, last)
+    )
+    return row, end
 
 
 class CycleStretch(NamedTuple):
@@ -115,6 +124,8 @@ class CycleStretch(NamedTuple):
     """Detections of its scans."""
     columns: Columns
     """Rows of its cycles and detections."""
+    priors: PriorRows
+    """Where its priors are written."""
 
 
 def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch: CycleStretch) -> FilterState:
@@ -154,6 +165,7 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
         room.busy,
         state._replace(cross=None),
         stretch.columns,
+        stretch.priors,
     )
     # Odometry alone changes nothing of it, nor does another setup before its first scan.
     state = after._replace(cross=cross_covariance(cross, setup.constants) if len(detected) else state.cross)
@@ -183,13 +195,14 @@ def _run(  # noqa: PLR0917 - the columns of the log
     busy: IntArray | None,
     state: FilterState,
     columns: Columns,
+    priors: PriorRows,
 ) -> FilterState:
     """Deliver odometry and scans in the order of their stamps, odometry first; return the state after the last.
 
     Of the odometry the rows up to `delivered`; the one behind them only tells the motion of scans before it. Where
     there are sweeps, `detections` is a view of the column `settled`, which is written before it is read.
     """
-    prior_means, prior_covariances, means, covariances, modes, status, reflectors, d2, settled = columns
+    means, covariances, modes, status, reflectors, d2, settled = columns
     rows = 0
     for k in range(len(scan_stamps)):
         while rows < delivered and odometry_stamps[rows] <= scan_stamps[k]:
@@ -225,7 +238,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
             following,
         )
         state = cycle.state
-        _write_belief(cycle.prior, k, prior_means, prior_covariances)
+        _write_belief(cycle.prior, k, priors.means, priors.covariances)
         _write_belief(state.belief, k, means, covariances)
         modes[k] = state.mode
     while rows < delivered:

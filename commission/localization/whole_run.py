@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from commission.geometry.arrays import IntArray
+from commission.geometry.arrays import IntArray, read_only
 from commission.localization.detection_log import (
     DetectionLog,
     cycle_stamps,
@@ -21,8 +21,9 @@ from commission.localization.detection_log import (
 )
 from commission.localization.detector import passing_widths
 from commission.localization.estimate import Belief
+from commission.localization.priors import PriorRows, ReplayedPriors, prior_rows
 from commission.localization.run_columns import Checkpoint, RunColumns, RunSegment, firsts_of
-from commission.localization.run_loop import CycleStretch, continued, cut, empty_columns, take_over
+from commission.localization.run_loop import CycleStretch, continued, cut, empty_columns, odometry_rows, take_over
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, state_at_start
 from commission.progress import Progress, part, silent
@@ -123,7 +124,8 @@ def state_before(run: RunColumns, log: RecordLog, cycle: int) -> FilterState:
     for segment, first, last in _chunks(run.segments, checkpoint.cycle, cycle):
         detected = run.detected.part(first, last)
         columns = empty_columns(detected, sweeping=len(segment.setup.sweep_rows) > 0)
-        stretch = CycleStretch(_odometry_rows(log, run.stamps_ns, first, last), detected, columns)
+        rows = odometry_rows(log, run.stamps_ns, first, last)
+        stretch = CycleStretch(rows, detected, columns, prior_rows(last - first))
         state = continued(log, segment.setup, state, stretch)
     return state
 
@@ -156,21 +158,21 @@ def _detected(
     bounds = (*sorted(start for start in starts if start < len(stamps_ns)), len(stamps_ns))
     # In pieces, so that it can be stopped; what the sensor has detected is only cut out of its columns.
     step = max(len(stamps_ns), 1) if not log.scans else CHECKPOINT_CYCLES
-    parts: list[DetectionLog] = []
-    for first, last in itertools.pairwise(bounds):
-        segment = _segment(segments, first)
-        if segment.covered:
-            parts.append(nothing_detected(stamps_ns[first:last]))
-        elif earlier is not None and _detects_like(segment, earlier.segment(first)):
-            parts.append(earlier.detected.part(first, last))
-        else:
-            for piece in range(first, last, step):
-                progress(piece / len(stamps_ns), "detecting reflectors")
-                end = min(piece + step, last)
-                parts.append(
-                    extract_detections(log, segment.setup, first=piece, last=end, sensor_detects=sensor_detects)
-                )
-    return joined(parts) if parts else nothing_detected(stamps_ns)
+
+    def parts() -> Iterator[DetectionLog]:
+        for first, last in itertools.pairwise(bounds):
+            segment = _segment(segments, first)
+            if segment.covered:
+                yield nothing_detected(stamps_ns[first:last])
+            elif earlier is not None and _detects_like(segment, earlier.segment(first)):
+                yield earlier.detected.part(first, last)
+            else:
+                for piece in range(first, last, step):
+                    progress(piece / len(stamps_ns), "detecting reflectors")
+                    end = min(piece + step, last)
+                    yield extract_detections(log, segment.setup, first=piece, last=end, sensor_detects=sensor_detects)
+
+    return joined(parts()) if len(stamps_ns) else nothing_detected(stamps_ns)
 
 
 def _detects_like(segment: RunSegment, earlier: RunSegment) -> bool:
@@ -195,8 +197,9 @@ def _filtered(
     checkpoints = list(known)
     for segment, first, last in _chunks(segments, begin, cycles):
         progress((first - begin) / (cycles - begin), "localizing")
-        rows = _odometry_rows(log, detected.stamps_ns, first, last)
-        stretch = CycleStretch(rows, detected.part(first, last), cut(columns, detected, first, last))
+        rows = odometry_rows(log, detected.stamps_ns, first, last)
+        part_of = cut(columns, detected, first, last)
+        stretch = CycleStretch(rows, detected.part(first, last), part_of, prior_rows(last - first))
         state = continued(log, segment.setup, state, stretch)
         checkpoints.append(Checkpoint(last, state))
     for column in columns:
@@ -205,8 +208,7 @@ def _filtered(
         segments=segments,
         checkpoints=tuple(checkpoints),
         detected=detected,
-        prior_means=columns.prior_means,
-        prior_covariances=columns.prior_covariances,
+        priors=_replayed(log, segments, detected, checkpoints),
         means=columns.means,
         covariances=columns.covariances,
         modes=columns.modes,
@@ -218,17 +220,37 @@ def _filtered(
     )
 
 
+def _replayed(
+    log: RecordLog, segments: tuple[RunSegment, ...], detected: DetectionLog, checkpoints: Sequence[Checkpoint]
+) -> ReplayedPriors:
+    """Return the priors of a run, to be found again from its checkpoints."""
+    states = {checkpoint.cycle: checkpoint.state for checkpoint in checkpoints}
+
+    def replay(begin: int, end: int) -> PriorRows:
+        state, written = states[begin], prior_rows(end - begin)
+        for segment, first, last in _chunks(segments, begin, end):
+            found, here = detected.part(first, last), slice(first - begin, last - begin)
+            columns = empty_columns(found, sweeping=len(segment.setup.sweep_rows) > 0)
+            priors = PriorRows(written.means[here], written.covariances[here])
+            stretch = CycleStretch(odometry_rows(log, detected.stamps_ns, first, last), found, columns, priors)
+            state = continued(log, segment.setup, state, stretch)
+        return PriorRows(read_only(written.means), read_only(written.covariances))
+
+    return ReplayedPriors(tuple(states), len(detected), replay)
+
+
 def _final(
     log: RecordLog, setup: LocalizerSetup, nothing: DetectionLog, last: Checkpoint, stamps_ns: IntArray
 ) -> FilterState:
     """State after the last record: motion after the last scan is taken in, what is no cycle counts as a record."""
-    begin, _ = _odometry_rows(log, stamps_ns, last.cycle, last.cycle)
+    begin, _ = odometry_rows(log, stamps_ns, last.cycle, last.cycle)
     rows = (begin, len(log.odometry_stamps_ns))
-    final = continued(log, setup, last.state, CycleStretch(rows, nothing, empty_columns(nothing, sweeping=False)))
+    stretch = CycleStretch(rows, nothing, empty_columns(nothing, sweeping=False), prior_rows(0))
+    final = continued(log, setup, last.state, stretch)
     if len(log) == 0:
         return final
     own = final.sensor_detects or len(log.detection_stamps_ns) > 0
-    return final._replace(newest_ns=int(log.stamps_ns[-1]), sensor_detects=own)
+    return final._replace(newest_ns=log.last_ns, sensor_detects=own)
 
 
 def _chunks(segments: Sequence[RunSegment], begin: int, end: int) -> Iterator[tuple[RunSegment, int, int]]:
@@ -238,15 +260,6 @@ def _chunks(segments: Sequence[RunSegment], begin: int, end: int) -> Iterator[tu
         stop = min(last, end)
         for first in range(max(segment.first, begin), stop, CHECKPOINT_CYCLES):
             yield segment, first, min(first + CHECKPOINT_CYCLES, stop)
-
-
-def _odometry_rows(log: RecordLog, stamps_ns: IntArray, first: int, last: int) -> tuple[int, int]:
-    """Rows of odometry that are delivered between the cycle before `first` and the last cycle before `last`."""
-    row, end = (
-        int(np.searchsorted(log.odometry_stamps_ns, stamps_ns[cycle - 1], side="right")) if cycle else 0
-        for cycle in (first, last)
-    )
-    return row, end
 
 
 def warm_up() -> None:

@@ -55,11 +55,7 @@ class RecordLog:
     """Where on the vehicle the reference measures, and how late its clock is."""
     truth: Truth | None = None
     """The constants that were drawn for a virtual drive; None of a real vehicle."""
-    order: NDArray[np.int32] = field(init=False, repr=False)
-    """(E, 2) every record in order of delivery: rank of its kind in ORDER_WITHIN_A_STAMP, index within its kind."""
-    stamps_ns: IntArray = field(init=False, repr=False)
-    """(E,) stamp of every record in order of delivery [ns]."""
-    scan_order: IntArray = field(init=False, repr=False)
+    scan_order: NDArray[np.int32] = field(init=False, repr=False)
     """(S,) every scan in order of delivery: number among all scans, those of the first scanner first."""
     scan_stamps_ns: IntArray = field(init=False, repr=False)
     """(S,) stamp of every scan in order of delivery [ns]."""
@@ -68,25 +64,17 @@ class RecordLog:
         if len(self.detection_scanners) != len(self.detection_stamps_ns):
             object.__setattr__(self, "detection_scanners", np.zeros(len(self.detection_stamps_ns), np.int64))
         self._check_scanners()
-        scan_stamps = np.concatenate([np.empty(0, np.int64), *(scans.stamps_ns for scans in self.scans)])
-        columns = (
-            self.odometry_stamps_ns,
-            self.reference_stamps_ns,
-            self.detection_stamps_ns,
-            scan_stamps,
-        )
-        stamps = np.concatenate(columns)
-        order = np.empty((len(stamps), 2), dtype=np.int32)
-        order[:, 0] = np.repeat(np.arange(len(columns)), [len(column) for column in columns])
-        order[:, 1] = np.concatenate([np.arange(len(column), dtype=np.int32) for column in columns])
-        # Stable: within a stamp kinds stay in their order, and within a kind records do.
-        by_stamp = np.argsort(stamps, kind="stable")
-        order = order[by_stamp]
-        object.__setattr__(self, "order", order)
-        object.__setattr__(self, "stamps_ns", stamps[by_stamp])
-        scan_order = order[order[:, 0] == ORDER_WITHIN_A_STAMP[Scan], 1].astype(np.int64)
+        if len(self.scans) == 1:
+            # Of a single scanner, the order is that of its stamps: hours of them are not kept twice.
+            stamps = self.scans[0].stamps_ns
+            scan_order = np.arange(len(stamps), dtype=np.int32)
+        else:
+            stamps = np.concatenate([np.empty(0, np.int64), *(scans.stamps_ns for scans in self.scans)])
+            # Stable: of equal stamps, the first scanner comes first.
+            scan_order = np.argsort(stamps, kind="stable").astype(np.int32)
+            stamps = stamps[scan_order]
         object.__setattr__(self, "scan_order", scan_order)
-        object.__setattr__(self, "scan_stamps_ns", scan_stamps[scan_order])
+        object.__setattr__(self, "scan_stamps_ns", stamps)
 
     def _check_scanners(self) -> None:
         """Raise ValueError where a record is of a scanner without a name, or scans are out of order."""
@@ -134,28 +122,61 @@ class RecordLog:
 
     def __len__(self) -> int:
         """Return the number of records."""
-        return len(self.order)
+        return sum(map(len, self._stamps_by_kind))
 
-    def record(self, position: int) -> Record:
-        """Return the record at a position of the order of delivery."""
-        kind, index = self.order[position]
-        stamp = int(self.stamps_ns[position])
+    @property
+    def order(self) -> NDArray[np.int32]:
+        """(E, 2) every record in order of delivery: rank of its kind in ORDER_WITHIN_A_STAMP, index within its kind.
+
+        It is found anew each time: hours of it are not kept.
+        """
+        columns = self._stamps_by_kind
+        order = np.empty((len(self), 2), dtype=np.int32)
+        order[:, 0] = np.repeat(np.arange(len(columns)), [len(column) for column in columns])
+        places = [np.arange(len(column), dtype=np.int32) for column in columns[:-1]]
+        order[:, 1] = np.concatenate([*places, self.scan_order])
+        # Stable: within a stamp kinds stay in their order, and within a kind records do.
+        return order[np.argsort(np.concatenate(columns), kind="stable")]
+
+    @property
+    def stamps_ns(self) -> IntArray:
+        """(E,) stamp of every record in order of delivery [ns]; sorted anew each time."""
+        return np.sort(np.concatenate(self._stamps_by_kind))
+
+    @property
+    def first_ns(self) -> int:
+        """Stamp of the first record [ns]; there is one at least."""
+        return min(int(stamps[0]) for stamps in self._stamps_by_kind if len(stamps))
+
+    @property
+    def last_ns(self) -> int:
+        """Stamp of the last record [ns]; there is one at least."""
+        return max(int(stamps[-1]) for stamps in self._stamps_by_kind if len(stamps))
+
+    @property
+    def _stamps_by_kind(self) -> tuple[IntArray, ...]:
+        """Stamps of each kind in its own order [ns], by the rank of the kind."""
+        return self.odometry_stamps_ns, self.reference_stamps_ns, self.detection_stamps_ns, self.scan_stamps_ns
+
+    def _record(self, kind: int, index: int) -> Record:
+        """Return a record by the rank of its kind, and its index there."""
         if kind == ORDER_WITHIN_A_STAMP[Odometry]:
-            return Odometry(stamp, self.displacements[index])
+            return Odometry(int(self.odometry_stamps_ns[index]), self.displacements[index])
         if kind == ORDER_WITHIN_A_STAMP[ReferencePose]:
-            return ReferencePose(stamp, self.reference_poses[index])
+            return ReferencePose(int(self.reference_stamps_ns[index]), self.reference_poses[index])
         if kind == ORDER_WITHIN_A_STAMP[Detections]:
             rows = slice(self.detection_offsets[index], self.detection_offsets[index + 1])
-            return Detections(stamp, self.range_bearing[rows], int(self.detection_scanners[index]))
+            scanner = int(self.detection_scanners[index])
+            return Detections(int(self.detection_stamps_ns[index]), self.range_bearing[rows], scanner)
         for scans in self.scans:
             if index < len(scans):
                 return scans.scan(int(index))
             index -= len(scans)
-        raise IndexError(f"record {position} is a scan of a log without scans")
+        raise IndexError("a scan of a log without scans")
 
     def records(self) -> Iterator[Record]:
         """Deliver every record in order of stamps; within a stamp motion comes first."""
-        return (self.record(position) for position in range(len(self)))
+        return (self._record(int(kind), int(index)) for kind, index in self.order)
 
 
 def _scan_logs(scans: list[Scan]) -> tuple[ScanLog, ...]:

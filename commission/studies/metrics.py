@@ -19,6 +19,8 @@ from commission.localization.estimate import Mode
 
 LONGEST_GAP_NS = 1_000_000_000
 """Reference poses farther apart than this are never joined by a line [ns]."""
+ROWS_AT_ONCE = 16_384
+"""Rows whose NEES is computed at once: a part of every covariance is copied for it."""
 SINGULAR = 1e-12
 """Determinant of a correlation matrix below which the covariance claims to know something exactly."""
 
@@ -83,21 +85,21 @@ def reference_at(
     return poses
 
 
-def without_reference(stamps_ns: IntArray, reference_stamps_ns: IntArray, references: FloatArray) -> tuple[int, int]:
+def without_reference(stamps_ns: IntArray, reference_stamps_ns: IntArray, errors: FloatArray) -> tuple[int, int]:
     """Count the cycles that nothing can be compared with, by the reason.
 
     Parameters
     ----------
     stamps_ns : (K,) array [ns].
     reference_stamps_ns : (R,) array [ns], ascending.
-    references : (K, 3) what `reference_at` found for them.
+    errors : (K, 3) what `pose_errors` found for them; NaN without a reference.
 
     Returns
     -------
     outside, in_gap : cycles before the first or after the last reference pose, and cycles between two of them that are
         too far apart to be joined by a line.
     """
-    missing = np.isnan(references[:, 0])
+    missing = np.isnan(errors[:, 0])
     if len(reference_stamps_ns) == 0:
         return int(missing.sum()), 0
     outside = (stamps_ns < reference_stamps_ns[0]) | (stamps_ns > reference_stamps_ns[-1])
@@ -134,7 +136,10 @@ def nees(errors: FloatArray, covariances: FloatArray) -> FloatArray:
     nees : (K,) array; NaN where the error is unknown, infinite where the covariance is singular: the filter claims to
         know exactly what it does not.
     """
-    return _nees(read_only(errors), read_only(covariances))
+    result = np.empty(len(errors))
+    for rows in (slice(first, first + ROWS_AT_ONCE) for first in range(0, len(errors), ROWS_AT_ONCE)):
+        result[rows] = _nees(read_only(errors[rows]), read_only(covariances[rows]))
+    return result
 
 
 @compiled

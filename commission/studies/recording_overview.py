@@ -68,7 +68,7 @@ def _called(log: RecordLog, kind: str, scanner: str) -> str:
 
 
 def _channel(log: RecordLog, name: str, stamps_ns: IntArray, values: str) -> Channel:
-    zero = int(log.stamps_ns[0])
+    zero = log.first_ns
     steps = np.diff(stamps_ns) * 1e-9
     positive = steps[steps > 0.0]
     return Channel(

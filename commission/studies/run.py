@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray, IntArray, read_only
@@ -115,8 +116,6 @@ class RunResult:
     """Time from the first to the last record [s]."""
     times: FloatArray
     """(K,) time of each cycle after the first record [s]."""
-    references: FloatArray
-    """(K, 3) reference pose at each cycle [m, m, rad], map frame; NaN where there is none."""
     errors: FloatArray
     """(K, 3) estimate minus reference [m, m, rad], map frame; NaN where there is none."""
     position_errors: FloatArray
@@ -129,7 +128,7 @@ class RunResult:
     """How well the detections of the whole drive fit."""
     recent: Recent
     """The same over the last second before each cycle."""
-    counts: IntArray
+    counts: NDArray[np.int32]
     """(K, 3) detections of each `Status` in each cycle."""
     nis: FloatArray
     """(K,) largest squared Mahalanobis distance of an inlier of the cycle (2 degrees of freedom); NaN without one."""
@@ -160,7 +159,11 @@ class RunResult:
     @property
     def without_reference(self) -> tuple[int, int]:
         """Cycles outside of the time of the reference, and in its gaps."""
-        return without_reference(self.columns.stamps_ns, self.inputs.log.reference_times_ns, self.references)
+        return without_reference(self.columns.stamps_ns, self.inputs.log.reference_times_ns, self.errors)
+
+    def reference_places(self, cycles: IntArray) -> FloatArray:
+        """(N, 2) places of base at some cycles by the reference [m], map frame; NaN where there is none."""
+        return self.columns.means[cycles, :2] - self.errors[cycles, :2]
 
     def count(self, status: Status) -> int:
         """Return the number of detections of one status."""
@@ -234,25 +237,27 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
             covariances,
         )
     statistics = error_statistics(errors, covariances, columns.modes == Mode.OPERATIONAL, limits_along(columns)[:, 0])
-    first_ns, last_ns = (int(stamp) for stamp in log.stamps_ns[[0, -1]])
+    scanners = scanner_figures(columns, references)
+    # Each is a column of the whole run: it goes before the others come.
+    del references, covariances, at_antenna
+    first_ns = log.first_ns
     times = np.asarray((columns.stamps_ns - first_ns) * 1e-9, dtype=np.float64)
     return RunResult(
         inputs=inputs,
         columns=columns,
-        duration=(last_ns - first_ns) / 1e9,
+        duration=(log.last_ns - first_ns) / 1e9,
         times=read_only(times),
-        references=read_only(references),
         errors=read_only(errors),
         position_errors=read_only(np.hypot(errors[:, 0], errors[:, 1])),
         two_sigma=read_only(two_sigma_of(columns.covariances)),
         position_two_sigma=read_only(supervised_two_sigma(columns)),
         consistency=consistency(columns),
         recent=recent(columns),
-        counts=read_only(np.stack([columns.counts(status) for status in Status], axis=1)),
+        counts=read_only(_counts(columns)),
         nis=read_only(largest_nis(columns)),
         statistics=statistics,
         episodes=fail_episodes(columns.stamps_ns, columns.modes),
-        scanners=scanner_figures(columns, references),
+        scanners=scanners,
         microseconds_per_cycle=microseconds_per_cycle,
     )
 
@@ -270,7 +275,20 @@ def references_of(log: RecordLog, columns: RunColumns) -> FloatArray:
 
 def two_sigma_of(covariances: FloatArray) -> FloatArray:
     """(K, 3) 2-sigma of x [m], y [m] and heading [rad] of (K, 3, 3) covariances."""
-    return 2.0 * np.sqrt(np.maximum(np.diagonal(covariances, axis1=1, axis2=2), 0.0))
+    sigmas = np.diagonal(covariances, axis1=1, axis2=2).copy()
+    # In place: of a drive of hours each copy is as large as a column of the run.
+    np.maximum(sigmas, 0.0, out=sigmas)
+    np.sqrt(sigmas, out=sigmas)
+    sigmas *= 2.0
+    return sigmas
+
+
+def _counts(columns: RunColumns) -> NDArray[np.int32]:
+    """(K, 3) detections of each `Status` in each cycle."""
+    counts = np.empty((len(columns), len(Status)), dtype=np.int32)
+    for status in Status:
+        counts[:, status] = columns.counts(status)
+    return counts
 
 
 def supervised_two_sigma(columns: RunColumns) -> FloatArray:

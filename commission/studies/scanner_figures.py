@@ -7,19 +7,22 @@ the scanners differ, and do not say which one is right. Against a reference only
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from commission.geometry import se2
 from commission.geometry.angles import wrap
-from commission.geometry.arrays import BoolArray, FloatArray
+from commission.geometry.arrays import BoolArray, FloatArray, Growing
 from commission.localization.estimate import Status
-from commission.localization.run_columns import RunColumns
+from commission.localization.run_columns import RunColumns, RunSegment
 from commission.site.quantity import DEGREES, MILLIMETRES
 
 BELONGS = 1.0
 """A detection that lies farther from its reflector [m], seen from reference or estimate, is of something else."""
+CYCLES_AT_ONCE = 4096
+"""Cycles whose residuals are computed at once: hours of what leads to them need no memory."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,79 +59,92 @@ def scanner_figures(columns: RunColumns, references: FloatArray) -> tuple[Scanne
     references : (K, 3) reference pose at each cycle [m, m, rad], map frame; NaN where there is none.
     """
     names = [scanner.name for scanner in columns.segments[-1].setup.scanners]
-    cycle_names = _names(columns)
-    cycles = np.repeat(np.arange(len(columns)), np.diff(columns.offsets))
-    own, known = (_of_near(columns, residuals(columns, poses)) for poses in (columns.means, references))
-    return tuple(_figures(name, columns, cycle_names == name, (cycles, own, known)) for name in names)
+    own, known = (_means_of_near(columns, poses, names) for poses in (columns.means, references))
+    return tuple(_figures(name, columns, (own[index], known[index])) for index, name in enumerate(names))
 
 
-def _of_near(columns: RunColumns, found: FloatArray) -> FloatArray:
-    """Residuals (n, 2) of the detections near their reflector; NaN for the others."""
-    expected = columns.range_bearing[:, 0] - found[:, 0]
-    with np.errstate(invalid="ignore"):
-        near = np.hypot(found[:, 0], expected * found[:, 1]) < BELONGS
-    return np.where(near[:, np.newaxis], found, math.nan)
+def _means_of_near(columns: RunColumns, poses: FloatArray, names: list[str]) -> list[tuple[float, float]]:
+    """Mean residuals [m, rad] of the detections of each scanner that are near their reflector."""
+    near = [(Growing(np.float64), Growing(np.float64)) for _ in names]
+    for segment, first, last in _stretches(columns):
+        found, ranges = _residuals(columns, poses, (segment, first, last))
+        with np.errstate(invalid="ignore"):
+            belongs = np.hypot(found[:, 0], (ranges - found[:, 0]) * found[:, 1]) < BELONGS
+        counts = np.diff(columns.offsets[first : last + 1])
+        of = np.repeat(columns.detected.scanners[first:last], counts)
+        for index, scanner in enumerate(segment.setup.scanners):
+            if scanner.name in names:
+                chosen = found[belongs & (of == index)]
+                for kept, values in zip(near[names.index(scanner.name)], chosen.T, strict=True):
+                    kept.append(values)
+    return [(_mean(ranges.array()), _mean(bearings.array())) for ranges, bearings in near]
 
 
-def residuals(columns: RunColumns, poses: FloatArray) -> FloatArray:
-    """Measured range and bearing minus those expected of the associated reflector.
+def _residuals(
+    columns: RunColumns, poses: FloatArray, stretch: tuple[RunSegment, int, int]
+) -> tuple[FloatArray, FloatArray]:
+    """Measured range and bearing minus those expected of the associated reflector, and the measured ranges.
 
     Parameters
     ----------
     columns : the run.
     poses : (K, 3) pose of base in each cycle [m, m, rad], map frame.
+    stretch : segment, first cycle and the one behind the last.
 
     Returns
     -------
     residuals : (n, 2) array [m, rad]; the range bias that the localizer knows is taken off; NaN for nobody.
+    ranges : (n,) array [m].
     """
-    found = np.full(columns.range_bearing.shape, math.nan)
+    segment, first, last = stretch
+    setup, cycles = segment.setup, slice(first, last)
+    rows = slice(int(columns.offsets[first]), int(columns.offsets[last]))
+    measured, reflectors = columns.range_bearing[rows], columns.reflector[rows]
+    if not len(setup.reflectors) or not len(reflectors):
+        return np.full(measured.shape, math.nan), measured[:, 0]
+    mountings = np.array([scanner.mounting for scanner in setup.scanners])[columns.detected.scanners[cycles]]
+    counts = np.diff(columns.offsets[first : last + 1])
+    sensors = np.repeat(se2.compose(poses[cycles], mountings), counts, axis=0)
+    delta = setup.reflectors.centers[reflectors] - sensors[:, :2]
+    bias = setup.parameters.observation.range_bias
+    ranges = measured[:, 0] - bias - np.hypot(delta[:, 0], delta[:, 1])
+    bearings = wrap(measured[:, 1] - np.arctan2(delta[:, 1], delta[:, 0]) + sensors[:, 2])
+    found = np.where((reflectors >= 0)[:, np.newaxis], np.stack((ranges, bearings), axis=1), math.nan)
+    return found, measured[:, 0]
+
+
+def _stretches(columns: RunColumns) -> Iterator[tuple[RunSegment, int, int]]:
+    """Stretches of a few cycles of one segment: first cycle, and the one behind the last."""
     ends = (*columns.firsts[1:].tolist(), len(columns))
     for segment, end in zip(columns.segments, ends, strict=True):
-        setup, cycles = segment.setup, slice(segment.first, end)
-        rows = slice(int(columns.offsets[segment.first]), int(columns.offsets[end]))
-        mountings = np.array([scanner.mounting for scanner in setup.scanners])[columns.detected.scanners[cycles]]
-        counts = np.diff(columns.offsets[segment.first : end + 1])
-        sensors = np.repeat(se2.compose(poses[cycles], mountings), counts, axis=0)
-        reflectors = columns.reflector[rows]
-        if not len(setup.reflectors) or not len(reflectors):
-            continue
-        delta = setup.reflectors.centers[reflectors] - sensors[:, :2]
-        measured = columns.range_bearing[rows]
-        bias = setup.parameters.observation.range_bias
-        ranges = measured[:, 0] - bias - np.hypot(delta[:, 0], delta[:, 1])
-        bearings = wrap(measured[:, 1] - np.arctan2(delta[:, 1], delta[:, 0]) + sensors[:, 2])
-        found[rows] = np.where((reflectors >= 0)[:, np.newaxis], np.stack((ranges, bearings), axis=1), math.nan)
-    return found
+        for first in range(segment.first, end, CYCLES_AT_ONCE):
+            yield segment, first, min(first + CYCLES_AT_ONCE, end)
 
 
-def _names(columns: RunColumns) -> np.ndarray:
-    """(K,) name of the scanner of each cycle."""
-    names = np.empty(len(columns), dtype=object)
-    ends = (*columns.firsts[1:].tolist(), len(columns))
-    for segment, end in zip(columns.segments, ends, strict=True):
-        known = np.array([scanner.name for scanner in segment.setup.scanners], dtype=object)
-        names[segment.first : end] = known[columns.detected.scanners[segment.first : end]]
-    return names
+def _cycles_of(columns: RunColumns, name: str) -> BoolArray:
+    """(K,) whether each cycle is of the scanner of a name."""
+    its = np.zeros(len(columns), dtype=np.bool_)
+    for segment, first, last in _stretches(columns):
+        known = np.array([scanner.name == name for scanner in segment.setup.scanners])
+        its[first:last] = known[columns.detected.scanners[first:last]]
+    return its
 
 
-def _figures(
-    name: str, columns: RunColumns, is_its: BoolArray, found: tuple[np.ndarray, FloatArray, FloatArray]
-) -> ScannerFigures:
-    """Figures of the cycles of one scanner; `found` is the cycle of each detection and both kinds of residuals."""
-    cycles, own, known = found
-    its = is_its[cycles]
+def _figures(name: str, columns: RunColumns, means: tuple[tuple[float, float], tuple[float, float]]) -> ScannerFigures:
+    """Figures of one scanner; `means` are its residuals against the estimate and against the reference."""
+    cycles = _cycles_of(columns, name)
+    its = np.repeat(cycles, np.diff(columns.offsets))
     accepted = its & (columns.status == Status.INLIER)
     return ScannerFigures(
         name=name,
-        scans=int(np.count_nonzero(is_its)),
+        scans=int(np.count_nonzero(cycles)),
         seen=int(np.count_nonzero(its & (columns.status != Status.OUTLIER_DETECTOR))),
         accepted=int(np.count_nonzero(accepted)),
         nis_mean=_mean(columns.d2[accepted]),
-        range_residual=_mean(own[its, 0]),
-        bearing_residual=_mean(own[its, 1]),
-        reference_range_residual=_mean(known[its, 0]),
-        reference_bearing_residual=_mean(known[its, 1]),
+        range_residual=means[0][0],
+        bearing_residual=means[0][1],
+        reference_range_residual=means[1][0],
+        reference_bearing_residual=means[1][1],
     )
 
 

@@ -68,7 +68,7 @@ def start_of(
     """
     if len(log) == 0:
         raise UsageError("the recording holds no record; expected odometry and scans or detections")
-    first_ns = int(log.stamps_ns[0])
+    first_ns = log.first_ns
     if pose is not None:
         return Start(belief_at(first_ns, pose, sigmas), StartOrigin.GIVEN)
     known = np.flatnonzero(

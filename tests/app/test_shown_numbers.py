@@ -291,14 +291,14 @@ def test_the_badge_counts_the_seconds_since_the_vehicle_failed(failing: RunResul
 def test_the_time_line_draws_each_episode_where_it_lies(failing: RunResult) -> None:
     modes, stamps = failing.columns.modes, failing.columns.stamps_ns
     failed = np.flatnonzero(np.diff(np.concatenate(([False], modes != Mode.OPERATIONAL, [False]))))
-    first_ns = int(failing.inputs.log.stamps_ns[0])
+    first_ns = failing.inputs.log.first_ns
     playback = Playback(failing)
     playback.seek(1e9)
     run = playback.view(covered=False)
     rects = re.findall(r"<rect x='([\d.]+)' y='0' width='([\d.]+)' height='8' fill='[^']+' opacity='1.0'/>", strip(run))
     starts, ends = failed[::2], np.minimum(failed[1::2], len(stamps) - 1)
     assert len(rects) == len(starts) > 0
-    duration_ns = int(failing.inputs.log.stamps_ns[-1]) - first_ns
+    duration_ns = failing.inputs.log.last_ns - first_ns
     for (x, width), start, end in zip(rects, starts, ends, strict=True):
         assert float(x) == pytest.approx(100.0 * (stamps[start] - first_ns) / duration_ns, abs=0.006)
         expected = max(0.3, 100.0 * (stamps[end] - stamps[start]) / duration_ns)
@@ -312,7 +312,7 @@ def test_the_clock_and_the_slider_show_the_cursor_and_the_length_of_the_drive(ju
         playback.seek(4.27)
         line.draw_slowly(view_of(AppState(project=site, saved=site), playback.view(covered=False)))
         log = judged.inputs.log
-        duration = (int(log.stamps_ns[-1]) - int(log.stamps_ns[0])) / 1e9
+        duration = (log.last_ns - log.first_ns) / 1e9
         assert line._slider.max == pytest.approx(duration)
         assert line._slider.value == pytest.approx(4.27)
         assert f"<b>00:04</b> / 00:{math.floor(duration):02d} " in line._clock.content

@@ -37,7 +37,7 @@ def converted(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> tu
 def position_errors(project: Project, log: RecordLog, settings: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Position error where motion capture saw the robot [m], and the mode of every cycle."""
     project = dataclasses.replace(project, parameters=apply_settings(project.parameters, (*WHEELS, *settings)))
-    initial = Belief(int(log.stamps_ns[0]), log.reference_poses[0], np.diag([0.01, 0.01, 0.01]) ** 2)
+    initial = Belief(log.first_ns, log.reference_poses[0], np.diag([0.01, 0.01, 0.01]) ** 2)
     arrays = run(log, LocalizerSetup.of(project), initial)
     cycles = np.searchsorted(arrays.stamps_ns, log.reference_stamps_ns)
     return np.hypot(*(arrays.means[cycles, :2] - log.reference_poses[:, :2]).T), arrays.modes

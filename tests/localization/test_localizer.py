@@ -79,8 +79,10 @@ def test_localizer_agrees_with_the_plain_one(plan: Plan, parameters: Parameters)
     # The plain one differentiates numerically: 1e-10 of relative error, which the gain passes on.
     assert_close(arrays.means, np.array([cycle["mean"] for cycle in plain]), 1e-8)
     np.testing.assert_allclose(arrays.covariances, [cycle["cov"] for cycle in plain], rtol=1e-6, atol=1e-12)
-    assert_close(arrays.prior_means, np.array([cycle["prior_mean"] for cycle in plain]), 1e-8)
-    np.testing.assert_allclose(arrays.prior_covariances, [cycle["prior_cov"] for cycle in plain], rtol=1e-6, atol=1e-12)
+    assert_close(arrays.priors.rows().means, np.array([cycle["prior_mean"] for cycle in plain]), 1e-8)
+    np.testing.assert_allclose(
+        arrays.priors.rows().covariances, [cycle["prior_cov"] for cycle in plain], rtol=1e-6, atol=1e-12
+    )
     assert [Mode(mode).name.lower() for mode in arrays.modes] == [cycle["mode"] for cycle in plain]
     kept = [status == "inlier" for cycle in plain for status in cycle["status"]]
     inlier = arrays.status == Status.INLIER
@@ -264,7 +266,7 @@ def test_odometry_too_late_for_a_live_scan_is_not_used_for_it_afterwards_either(
     rest = STEP * (stamp - 100) / 100.0
     records = [Odometry(0, np.zeros(3)), Odometry(100, 2.0 * STEP), Detections(150, NOTHING), Odometry(stamp, rest)]
     columns = run(RecordLog.collect(records), one_reflector(), INITIAL)
-    assert columns.prior_means[0, 0] == pytest.approx(met), (
+    assert columns.priors.rows().means[0, 0] == pytest.approx(met), (
         "0.1 m per 100 ns by the later record, 0.2 m by the one before"
     )
 

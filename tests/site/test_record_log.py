@@ -58,3 +58,8 @@ def test_an_empty_log_has_no_records():
 
 def test_bearings_follow_angle_min_and_increment():
     np.testing.assert_allclose(scan(0).bearings, [-1.0, -0.5, 0.0, 0.5, 1.0])
+
+
+def test_first_and_last_stamp_are_those_of_all_kinds():
+    log = RecordLog.collect([Odometry(10, [0.0, 0.0, 0.0]), scan(7), Detections(25, [[3.0, 0.1]])])
+    assert (log.first_ns, log.last_ns, len(log)) == (7, 25, 3)

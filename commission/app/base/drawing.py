@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.geometry.arrays import FloatArray
+from commission.geometry.arrays import FloatArray, Scalar
 
 Points = NDArray[np.float32]
 
@@ -64,7 +64,7 @@ def heading_mark(outline: FloatArray) -> FloatArray:
     return np.array([[(0, 0), (tip, 0)], [(tip, 0), (tip - wing, wing)], [(tip, 0), (tip - wing, -wing)]])
 
 
-def thinned(points: FloatArray, at_most: int) -> FloatArray:
+def thinned(points: NDArray[Scalar], at_most: int) -> NDArray[Scalar]:
     """Return about every k-th of (N, ...) points so that at most `at_most` remain; the last one always does."""
     if len(points) <= at_most:
         return points

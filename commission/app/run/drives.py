@@ -51,7 +51,7 @@ def _simulated(project: Project, source: VirtualDrive, progress: Progress) -> Dr
         project = replace(project, disturbances=replace(project.disturbances, people=source.people))
     start = scenario.start_of(project, source.route)
     log = scenario.virtual_drive(project, source.route, source.seed, progress=progress)
-    return Drive(log, Start(belief_at(int(log.stamps_ns[0]), start.pose, start.sigmas.tolist()), StartOrigin.DRIVE))
+    return Drive(log, Start(belief_at(log.first_ns, start.pose, start.sigmas.tolist()), StartOrigin.DRIVE))
 
 
 def _recorded(project: Project, source: RecordedDrive, progress: Progress) -> Drive:

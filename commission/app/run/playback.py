@@ -39,8 +39,8 @@ class Playback:
     """
 
     def __init__(self, result: RunResult) -> None:
-        stamps = result.inputs.log.stamps_ns
-        self.start_ns, self.end_ns = int(stamps[0]), int(stamps[-1])
+        log = result.inputs.log
+        self.start_ns, self.end_ns = log.first_ns, log.last_ns
         self._at_ns = self.start_ns
         self.replace(result)
 

@@ -97,9 +97,9 @@ class ReferenceLayer(BaseLayer):
         run = view.part(RunView)
         if run is None:
             return
-        lived = run.result.references[: run.lived, :2]
-        known = lived[np.isfinite(lived[:, 0])]
-        self._line.points = polyline_segments(thinned(known, MOST_POINTS), theme.Height.REFERENCE)
+        known = np.flatnonzero(np.isfinite(run.result.errors[: run.lived, 0]))
+        shown = run.result.reference_places(thinned(known, MOST_POINTS))
+        self._line.points = polyline_segments(shown, theme.Height.REFERENCE)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the line."""

@@ -93,7 +93,7 @@ class RunView:
 
     def _episodes(self) -> tuple[Stretch, ...]:
         """All fail episodes of the drive."""
-        first_ns = int(self.result.inputs.log.stamps_ns[0])
+        first_ns = self.result.inputs.log.first_ns
         return tuple(
             ((episode.start_ns - first_ns) * 1e-9, (episode.end_ns - first_ns) * 1e-9)
             for episode in self.result.episodes

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from commission.errors import FileFormatError
-from commission.geometry.arrays import FloatArray, IntArray
+from commission.geometry.arrays import FloatArray, Growing, IntArray
 from commission.io.csv_table import Block, read_table
 from commission.io.recordings.reference_file import REFERENCE_MOUNT, read_reference_mount
 from commission.io.recordings.scan_archive import ScanArchive
@@ -47,7 +47,7 @@ SCANNER_COLUMN = "scanner"
 REFERENCE_COLUMNS = ("stamp_ns", "x", "y", "theta")
 
 _STREAMED = 100_000
-_LOADED = 8_000_000
+_LOADED = 1_000_000
 """Bytes of a table read at once."""
 
 
@@ -310,9 +310,9 @@ def _check_detections(block: Block, values: FloatArray, empty: np.ndarray) -> No
 
 
 def _joined(blocks: Iterator[_Rows], width: int) -> _Rows:
-    parts = list(blocks)
-    return _Rows(
-        np.concatenate([np.empty(0, np.int64), *(part.stamps_ns for part in parts)]),
-        np.concatenate([np.empty((0, width)), *(part.values for part in parts)]),
-        np.concatenate([np.empty(0, np.int64), *(part.scanners for part in parts)]),
-    )
+    stamps, values, scanners = Growing(np.int64), Growing(np.float64, width), Growing(np.int64)
+    for block in blocks:
+        stamps.append(block.stamps_ns)
+        values.append(block.values)
+        scanners.append(block.scanners)
+    return _Rows(stamps.array(), values.array(), scanners.array())

@@ -20,7 +20,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from commission.errors import FileFormatError
-from commission.geometry.arrays import FloatArray, IntArray
+from commission.geometry.arrays import FloatArray, Growing, IntArray
 from commission.io.reading import cannot_read, check_size
 from commission.io.recordings.scan_file import ScanFile, array_place, joined_scans
 from commission.site.quantity import STAMP_LIMIT
@@ -139,13 +139,15 @@ class ScanArchive:
             return None
         if sum(len(self) * column.row_bytes for column in self.columns.values()) <= IN_MEMORY:
             return replace(joined_scans(list(self.blocks())), scanner=scanner)
-        stamps = np.concatenate([block.stamps_ns for block in self.blocks()])
+        stamps = Growing(np.int64)
+        for block in self.blocks():
+            stamps.append(block.stamps_ns)
         with self._open() as archive:
             places = {name: array_place(self, archive, name) for name in _ROWS if name in self.columns}
         return ScanFile(
             archive=self,
             places=places,
-            stamps_ns=stamps,
+            stamps_ns=stamps.array(),
             angle_min=self.angle_min,
             angle_increment=self.angle_increment,
             beams=self.beams,

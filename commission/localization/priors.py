@@ -1,0 +1,94 @@
+"""What the filter believed before each scan of a run: kept while it is driven, else found again by going over it.
+
+The validation areas of one cycle at the cursor are all that wants it: hours of it need no memory.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from commission.geometry.arrays import FloatArray, read_only
+
+
+class PriorRows(NamedTuple):
+    """Beliefs after *predict* of some cycles that follow each other."""
+
+    means: FloatArray
+    """(K, 3) `T_map_base` [m, m, rad]."""
+    covariances: FloatArray
+    """(K, 3, 3) of x [m], y [m], theta [rad]."""
+
+
+def prior_rows(cycles: int) -> PriorRows:
+    """Return rows for so many cycles, to be written."""
+    return PriorRows(np.empty((cycles, 3)), np.empty((cycles, 3, 3)))
+
+
+class Priors(Protocol):
+    """Beliefs after *predict* of all cycles of a run."""
+
+    def at(self, cycle: int) -> tuple[FloatArray, FloatArray]:
+        """Return mean (3,) and covariance (3, 3) before the detections of a cycle."""
+        ...
+
+    def rows(self) -> PriorRows:
+        """Return those of all cycles, in memory."""
+        ...
+
+
+class KeptPriors:
+    """Priors that are in memory.
+
+    Parameters
+    ----------
+    rows : of all cycles, read-only.
+    """
+
+    def __init__(self, rows: PriorRows) -> None:
+        self._rows = rows
+
+    def at(self, cycle: int) -> tuple[FloatArray, FloatArray]:
+        """Return mean (3,) and covariance (3, 3) before the detections of a cycle."""
+        return self._rows.means[cycle], self._rows.covariances[cycle]
+
+    def rows(self) -> PriorRows:
+        """Return those of all cycles."""
+        return self._rows
+
+
+class ReplayedPriors:
+    """Priors that are computed again, to the last bit, from the checkpoint before them.
+
+    Parameters
+    ----------
+    bounds : (C,) cycles of the checkpoints, ascending; cycle 0 first.
+    cycles : number of cycles.
+    replay : returns the priors of the cycles from a checkpoint to before the next.
+    """
+
+    def __init__(self, bounds: Sequence[int], cycles: int, replay: Callable[[int, int], PriorRows]) -> None:
+        self._bounds = np.unique((*bounds, cycles))
+        self._replay = replay
+        self._newest: tuple[int, PriorRows] | None = None
+        """Of one checkpoint, with its cycle: a cursor that moves on needs them again."""
+
+    def at(self, cycle: int) -> tuple[FloatArray, FloatArray]:
+        """Return mean (3,) and covariance (3, 3) before the detections of a cycle."""
+        index = int(np.searchsorted(self._bounds, cycle, side="right")) - 1
+        first, last = self._bounds[index : index + 2].tolist()
+        newest = self._newest
+        if newest is None or newest[0] != first:
+            newest = first, self._replay(first, last)
+            self._newest = newest
+        return newest[1].means[cycle - first], newest[1].covariances[cycle - first]
+
+    def rows(self) -> PriorRows:
+        """Return those of all cycles."""
+        bounds = self._bounds.tolist()
+        parts = [self._replay(first, last) for first, last in itertools.pairwise(bounds)]
+        whole = PriorRows(*map(np.concatenate, zip(*parts, strict=True))) if parts else prior_rows(0)
+        return PriorRows(read_only(whole.means), read_only(whole.covariances))
