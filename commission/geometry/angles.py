@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from commission.compiled import compiled
-from commission.geometry.arrays import FloatArray
+from commission.geometry.arrays import BoolArray, FloatArray
 
 TURN = 2.0 * math.pi
 
@@ -46,6 +46,23 @@ def difference(angle: ArrayLike, reference: ArrayLike) -> FloatArray:
     turn : (...) array [rad] in [-pi, pi).
     """
     return wrap(np.subtract(angle, reference))
+
+
+def within(angles: ArrayLike, sectors: FloatArray) -> BoolArray:
+    """Whether angles lie in any of some sectors.
+
+    Parameters
+    ----------
+    angles : (...) array [rad], of any turn.
+    sectors : (B, 2) first angle and width of each, counter-clockwise [rad]; of none, no angle does.
+
+    Returns
+    -------
+    inside : (...) array.
+    """
+    offset = np.asarray(angles, dtype=np.float64)[..., np.newaxis] - sectors[:, 0]
+    inside: BoolArray = np.any(offset - TURN * np.floor(offset / TURN) <= sectors[:, 1], axis=-1)
+    return inside
 
 
 @compiled

@@ -12,7 +12,14 @@ from numpy.typing import NDArray
 from commission.compiled import compiled, compiled_parallel, parallel_range
 from commission.geometry.arrays import BoolArray, FloatArray, Growing, IntArray, read_only
 from commission.localization.clusters import count_clusters
-from commission.localization.detector import INLIER, detect_clusters, reflective_beams, room_for
+from commission.localization.detector import (
+    INLIER,
+    detect_clusters,
+    reflective_beams,
+    room_for,
+    status_of_reported,
+    without_blind,
+)
 from commission.localization.detector_model import BeamColumns, DetectorModel, beams_at, beams_of
 from commission.localization.setup import LocalizerSetup
 from commission.site.record_log import RecordLog
@@ -133,6 +140,8 @@ def detect_log(scans: ScanLog, setup: LocalizerSetup, *, scanner: int = 0, paral
     ranges = read_only(np.asarray(scans.ranges, dtype=np.float32))
     threshold = setup.parameters.detector.intensity_threshold
     flags = reflective_beams(ranges, scans.intensities, scans.reflector, threshold)
+    blind = setup.scanners[scanner].reported_blind_sectors
+    ranges, flags = without_blind(ranges, flags, (scans.angle_min, scans.angle_increment), blind)
     beams = beams_of(scans.beams, scans.angle_min, scans.angle_increment)
     count, fill = (_count_parallel, _fill_parallel) if parallel else (_count, _fill)
     offsets = np.concatenate(([0], np.cumsum(count(ranges, flags, beams, model))))
@@ -187,6 +196,10 @@ def _sensor_detections(log: RecordLog, setup: LocalizerSetup) -> DetectionLog:
     """Return the detections that the sensor itself reported."""
     count = len(log.range_bearing)
     status = np.full(count, INLIER, dtype=np.int8)
+    of = np.repeat(setup.indices_of(log.scanners)[log.detection_scanners], np.diff(log.detection_offsets))
+    for index, scanner in enumerate(setup.scanners):
+        its = of == index
+        status[its] = status_of_reported(log.range_bearing[its], scanner.reported_blind_sectors)
     beams = np.zeros(count, dtype=np.int64)
     scanners = setup.indices_of(log.scanners)[log.detection_scanners]
     expected = np.full(count, np.nan)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commission.compiled import compiled, compiled_inline
-from commission.geometry.angles import wrap_scalar
+from commission.geometry.angles import within, wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.beam_echo import BeamModel, half_width_at
 from commission.localization.beam_window import (
@@ -32,6 +32,8 @@ from commission.site.records import Scan
 
 INLIER = int(Status.INLIER)
 OUTLIER_DETECTOR = int(Status.OUTLIER_DETECTOR)
+NO_SECTORS: FloatArray = np.empty((0, 2))
+"""Of a scanner without blind sectors."""
 
 
 class Clusters(NamedTuple):
@@ -86,7 +88,41 @@ def reflective_beams(
     return read_only(np.zeros(ranges.shape, dtype=np.bool_))
 
 
-def detect(scan: Scan, model: DetectorModel, parameters: DetectorParameters) -> DetectedReflectors:
+def without_blind(
+    ranges: NDArray[np.float32], flags: NDArray[np.bool_], bearings: tuple[FloatArray, FloatArray], blind: FloatArray
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Beams in blind sectors as if nothing came back from there.
+
+    A reflector that reaches into one shows the beams that are left, as at the ends of the field of view.
+
+    Parameters
+    ----------
+    ranges, flags : (..., B) arrays: [m], and whether each beam met something reflective.
+    bearings : (...) bearing of the first beam of each scan, and step from beam to beam [rad].
+    blind : (S, 2) first bearing and width of each sector, as the scanner reports bearings [rad].
+    """
+    if not len(blind):
+        return ranges, flags
+    first, step = (np.asarray(angles)[..., np.newaxis] for angles in bearings)
+    hidden = within(first + step * np.arange(ranges.shape[-1]), blind)
+    kept = np.where(hidden, np.float32(np.nan), ranges)
+    return read_only(kept), read_only(flags & ~hidden)
+
+
+def status_of_reported(range_bearing: FloatArray, blind: FloatArray) -> NDArray[np.int8]:
+    """(N,) what the detector says of reflectors that the sensor itself detected: those in blind sectors are none.
+
+    Parameters
+    ----------
+    range_bearing : (N, 2) array [m, rad], as the scanner reports them.
+    blind : as in `without_blind`.
+    """
+    return np.where(within(range_bearing[:, 1], blind), OUTLIER_DETECTOR, INLIER).astype(np.int8)
+
+
+def detect(
+    scan: Scan, model: DetectorModel, parameters: DetectorParameters, blind: FloatArray = NO_SECTORS
+) -> DetectedReflectors:
     """Detect the reflectors in one scan.
 
     Parameters
@@ -94,6 +130,7 @@ def detect(scan: Scan, model: DetectorModel, parameters: DetectorParameters) -> 
     scan : with reflector flags, else intensities; with neither, nothing is detected.
     model : of the reflector map, by `detector_model`.
     parameters : the same as in `model`; its intensity threshold is used here.
+    blind : (S, 2) first bearing and width of each blind sector of the scanner [rad].
 
     Returns
     -------
@@ -101,6 +138,8 @@ def detect(scan: Scan, model: DetectorModel, parameters: DetectorParameters) -> 
     """
     ranges = read_only(np.asarray(scan.ranges, dtype=np.float32))
     flags = reflective_beams(ranges, scan.intensities, scan.reflector, parameters.intensity_threshold)
+    angles = np.array(scan.angle_min), np.array(scan.angle_increment)
+    ranges, flags = without_blind(ranges, flags, angles, blind)
     columns = beams_of(np.array([len(ranges)]), np.array([scan.angle_min]), np.array([scan.angle_increment]))
     beams = Beams(int(columns.used[0]), scan.angle_min, scan.angle_increment, bool(columns.full_turn[0]))
     count = count_clusters(ranges, flags, beams, model)

@@ -14,8 +14,8 @@ from commission.errors import SourceError
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.cross_covariance import columns_of, cross_covariance
 from commission.localization.cycle import process_odometry, process_scan, room_for_scans
-from commission.localization.detector import DetectedReflectors, detect
-from commission.localization.estimate import Belief, Estimate, Mode, Status
+from commission.localization.detector import DetectedReflectors, detect, status_of_reported
+from commission.localization.estimate import Belief, Estimate, Mode
 from commission.localization.observation import project_detections
 from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import to_belief
@@ -178,14 +178,16 @@ class Localizer:
             case Detections():
                 self._state = self._state._replace(sensor_detects=True)
                 count = len(record.range_bearing)
-                status, unknown = np.full(count, Status.INLIER, dtype=np.int8), np.full(count, np.nan)
+                blind = self._setup.scanners[record.scanner].reported_blind_sectors
+                status, unknown = status_of_reported(record.range_bearing, blind), np.full(count, np.nan)
                 seen = DetectedReflectors(record.range_bearing, np.zeros(count, dtype=np.int64), unknown, status)
                 return self._process(record, seen, following)
             case Scan():
                 if self._state.sensor_detects:
                     return None
                 model = self._setup.detectors[record.scanner]
-                detected = detect(record, model, self._setup.parameters.detector)
+                blind = self._setup.scanners[record.scanner].reported_blind_sectors
+                detected = detect(record, model, self._setup.parameters.detector, blind)
                 return self._process(record, detected, following)
 
     def _advance(self, record: Odometry) -> None:

@@ -114,6 +114,8 @@ class LocalizerSetup:
             return False
         if [each.name for each in self.scanners] != [each.name for each in other.scanners]:
             return False
+        if [each.blind_sectors_deg for each in self.scanners] != [each.blind_sectors_deg for each in other.scanners]:
+            return False
         pairs = zip(self.detectors, other.detectors, strict=True)
         return all(np.array_equal(a, b) for pair in pairs for a, b in zip(*pair, strict=True))
 

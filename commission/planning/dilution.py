@@ -140,6 +140,7 @@ def fix_model(scanner: Scanner, options: FixOptions) -> FixModel:
     elif options.heading in (Heading.WORST, Heading.BEST):
         headings = np.arange(options.headings, dtype=np.float64) * (2.0 * math.pi / options.headings) + mounted
         combine = dilution_kernels.WORST if options.heading is Heading.WORST else dilution_kernels.BEST
+    blind = np.empty((0, 2)) if options.heading is Heading.ALL_ROUND else scanner.blind_sectors
     triangulates = options.measurement is Measurement.BEARING_ONLY
     has_prior = options.measurement is Measurement.RANGE_BEARING_PRIOR
     return FixModel(
@@ -155,6 +156,7 @@ def fix_model(scanner: Scanner, options: FixOptions) -> FixModel:
         headings=headings,
         first=first,
         width=width,
+        blind=blind,
         combine=combine,
         free_per_m=1.0 - options.blocked_per_m,
     )

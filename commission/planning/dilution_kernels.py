@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from commission.compiled import compiled
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.planning.shadow_kernels import BitMask
-from commission.planning.visibility import in_field_of_view
+from commission.planning.visibility import in_field_of_view, is_blind
 
 # Below this share of all information the worst direction has none: the 1-sigma ellipse is a million times longer than
 # it would be for the best direction. Sums of double precision are off by some 1e-15.
@@ -65,6 +65,8 @@ class FixModel(NamedTuple):
     """First bearing of the field of view [rad]."""
     width: float
     """Width of the field of view [rad]."""
+    blind: FloatArray
+    """(S, 2) first bearing and width of each blind sector [rad]."""
     combine: int
     """SINGLE, WORST or BEST."""
     free_per_m: float
@@ -224,6 +226,8 @@ def fix_at_heading(  # noqa: PLR0917 - one point and heading
     for k in range(seen):
         if is_narrow and not in_field_of_view(turns[k] - heading, first, width):
             continue
+        if len(model.blind) and is_blind(turns[k] - heading, model.blind):
+            continue
         count += 1
         i_xx += parts[k, 0]
         i_xy += parts[k, 1]
@@ -333,7 +337,8 @@ def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
     many = max(1, len(centers))
     parts, turns, free = np.empty((many, 6)), np.zeros(many), np.ones(many)
     one, best = np.empty(FIGURES), np.empty(FIGURES)
-    headings, free_per_m, narrow = model.headings, model.free_per_m, model.width < FULL_TURN
+    headings, free_per_m = model.headings, model.free_per_m
+    narrow = model.width < FULL_TURN or len(model.blind) > 0
     lever_x, lever_y = model.lever_x, model.lever_y
     # Divisions are the slow part, and most maps know no survey error.
     sure_range_weight, sure_bearing_weight = weights_of(1.0, 0.0, 0.0, model)

@@ -149,10 +149,21 @@ def _tables(
         view_of=np.arange(headings.size).reshape(headings.shape),
         facing=_facing(headings, fields),
         cosine=np.array([-2.0 if width >= FULL_TURN else math.cos(0.5 * width) for _, width in fields]),
+        blind=_blind(() if all_round else scanners),
         once=all_round,
         range_weight=1.0 / model.range_variance,
         bearing_weight=1.0 / model.bearing_variance,
     )
+
+
+def _blind(scanners: Sequence[Scanner]) -> FloatArray:
+    """(S, B, 2) blind sectors from the middle of each field of view, filled up with such as hold nothing."""
+    sectors = [scanner.blind_sectors for scanner in scanners]
+    table = np.full((len(sectors), max(map(len, sectors), default=0), 2), -1.0)
+    for row, scanner, own in zip(table, scanners, sectors, strict=True):
+        first, width = field_of_view(scanner)
+        row[: len(own)] = own - (first + 0.5 * width, 0.0)
+    return table
 
 
 def _facing(headings: FloatArray, fields: Sequence[tuple[float, float]]) -> FloatArray:

@@ -27,6 +27,7 @@ from commission.planning.dilution_kernels import (
     reflector_information,
     weights_of,
 )
+from commission.planning.visibility import is_blind
 
 ViewMask = NDArray[np.uint64]
 """(V, N, ceil(M / 64)) array: which of M reflectors each of V views sees from N points, all around."""
@@ -43,6 +44,8 @@ class ViewTables(NamedTuple):
     """(H, S, 2) unit vector to the middle of each scanner's field of view then, map axes."""
     cosine: FloatArray
     """(S,) cosine of half of each field of view; -2 for a full turn."""
+    blind: FloatArray
+    """(S, B, 2) first bearing of each blind sector from that middle, and its width [rad]; none has a negative width."""
     once: bool
     """Whether each reflector counts once, by the first scanner that sees it."""
     range_weight: float
@@ -112,7 +115,8 @@ def information_of_scanners(  # noqa: PLR0917 - one reflector and several scanne
     -----
     sum of `reflector_information` over the scanners, their noises being independent (Bar-Shalom, Li, Kirubarajan 2001,
     section 2.7); `without_place` where more than one measures a place that is uncertain. In the field of view is what
-    has d . facing >= |d| cos(width / 2), by definition of the angle between two vectors.
+    has d . facing >= |d| cos(width / 2), by definition of the angle between two vectors; the bearing from its middle is
+    atan2(facing x d, facing . d).
     """
     parts[:] = 0.0
     nearest, only, count = math.inf, -1, 0
@@ -121,7 +125,10 @@ def information_of_scanners(  # noqa: PLR0917 - one reflector and several scanne
             continue
         dx, dy = center[0] - places[s, 0], center[1] - places[s, 1]
         distance = math.sqrt(dx * dx + dy * dy)
-        if dx * facing[s, 0] + dy * facing[s, 1] < views.cosine[s] * distance:
+        along = dx * facing[s, 0] + dy * facing[s, 1]
+        if along < views.cosine[s] * distance:
+            continue
+        if views.blind.shape[1] and is_blind(math.atan2(facing[s, 0] * dy - facing[s, 1] * dx, along), views.blind[s]):
             continue
         count += 1
         only = s

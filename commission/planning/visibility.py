@@ -160,7 +160,7 @@ class VisibilityModel:
         return mask
 
     def visible_from_poses(self, poses: ArrayLike, *, all_round: bool = False) -> VisibleReflectors:
-        """Reflectors inside the field of view from poses of the vehicle.
+        """Reflectors inside the field of view from poses of the vehicle, with their centers in no blind sector.
 
         Parameters
         ----------
@@ -174,12 +174,14 @@ class VisibilityModel:
         T_map_scanner = compose(np.asarray(poses, dtype=np.float64).reshape(-1, 3), self.scanner.mounting)
         mask = self.visible(T_map_scanner[:, :2])
         first, width = (-math.pi, 2.0 * math.pi) if all_round else field_of_view(self.scanner)
+        blind = np.empty((0, 2)) if all_round else self.scanner.blind_sectors
         offsets = np.zeros(len(mask) + 1, dtype=np.int64)
         # Two passes over the bits: the first counts, so that the second writes into an array of the right size.
-        _list_visible(mask, T_map_scanner, self.targets.centers, first, width, offsets, np.empty(0, dtype=np.int64))
+        nothing = np.empty(0, dtype=np.int64)
+        _list_visible(mask, T_map_scanner, self.targets.centers, first, width, blind, offsets, nothing)
         np.cumsum(offsets, out=offsets)
         indices = np.empty(offsets[-1], dtype=np.int64)
-        _list_visible(mask, T_map_scanner, self.targets.centers, first, width, offsets, indices)
+        _list_visible(mask, T_map_scanner, self.targets.centers, first, width, blind, offsets, indices)
         return VisibleReflectors(offsets, indices)
 
     def with_reflector(self, index: int, reflector: Reflector) -> VisibilityModel:
@@ -391,8 +393,34 @@ def in_field_of_view(bearing: float, first: float, width: float) -> bool:
 
 
 @compiled
+def is_blind(bearing: float, blind: FloatArray) -> bool:
+    """Whether a bearing lies in a blind sector.
+
+    Parameters
+    ----------
+    bearing : of any turn [rad].
+    blind : (S, 2) first bearing and width of each sector [rad].
+
+    Notes
+    -----
+    In any of them, each as in `in_field_of_view`, by definition.
+    """
+    for s in range(len(blind)):
+        if in_field_of_view(bearing, blind[s, 0], blind[s, 1]):
+            return True
+    return False
+
+
+@compiled
 def _list_visible(  # noqa: PLR0917 - two passes share one loop
-    mask: BitMask, poses: FloatArray, centers: FloatArray, first: float, width: float, offsets: IntArray, out: IntArray
+    mask: BitMask,
+    poses: FloatArray,
+    centers: FloatArray,
+    first: float,
+    width: float,
+    blind: FloatArray,
+    offsets: IntArray,
+    out: IntArray,
 ) -> None:
     """Count into `offsets` when `out` is empty, otherwise write the indices that fit between the offsets."""
     counting = len(out) == 0
@@ -402,7 +430,7 @@ def _list_visible(  # noqa: PLR0917 - two passes share one loop
             if (mask[n, m >> 6] >> np.uint64(m & 63)) & np.uint64(1) == 0:
                 continue
             bearing = math.atan2(centers[m, 1] - poses[n, 1], centers[m, 0] - poses[n, 0]) - poses[n, 2]
-            if in_field_of_view(bearing, first, width):
+            if in_field_of_view(bearing, first, width) and not is_blind(bearing, blind):
                 if not counting:
                     out[offsets[n] + found] = m
                 found += 1

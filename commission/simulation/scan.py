@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from commission.geometry.angles import within
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
@@ -97,6 +98,10 @@ class VirtualScanner:
         if self.scanner.upside_down:
             ranges, flags = ranges[::-1].copy(), flags[::-1].copy()
         self._glint(ranges, flags, rng)
+        blind = self.scanner.reported_blind_sectors
+        if len(blind):
+            hidden = within(self.scanner.angle_min + self.scanner.angle_increment * np.arange(count), blind)
+            ranges[hidden], flags[hidden] = np.nan, False
         return ranges, flags
 
     def range_limit(self, T_map_base: FloatArray) -> float:

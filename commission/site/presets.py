@@ -192,10 +192,16 @@ SCANNERS: tuple[ScannerPreset, ...] = (
 
 
 def with_preset(scanner: Scanner, name: str) -> Scanner:
-    """Scanner with the figures of a preset, built in like the given one; raises UsageError that lists the presets."""
+    """Scanner with the figures of a preset, built in like the given one; raises UsageError that lists the presets.
+
+    Of blind sectors, what lies outside of the other field of view goes.
+    """
     for preset in SCANNERS:
         if preset.name == name:
             figures: dict[str, Any] = {name: getattr(preset.scanner, name) for name in FIGURES}
+            first, last = figures["field_of_view_deg"]
+            inside = ((max(low, first), min(high, last)) for low, high in scanner.blind_sectors_deg)
+            figures["blind_sectors_deg"] = tuple((low, high) for low, high in inside if low < high)
             return replace(scanner, **figures)
     known = ", ".join(preset.name for preset in SCANNERS)
     raise UsageError(f"no scanner preset is called {name!r}; expected one of: {known}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Sequence
@@ -34,6 +35,8 @@ ONLY_NAME = "scanner"
 _NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_ -]{0,38}[A-Za-z0-9_-]|[A-Za-z0-9_-]")
 _SLACK = 1e-6
 """Share of a period by which a sweep may be longer: both are rounded in files."""
+_EDGE = 1e-9
+"""Angle by which a blind sector is widened on each side [rad]: the beam on its edge is rounded, too."""
 
 
 def is_name(text: str) -> bool:
@@ -74,7 +77,8 @@ class Scanner:
         tuple[tuple[float, float], ...],
         Quantity(label="Blind sectors", unit="deg", shown=AS_DEGREES, bounds=Bounds.between(-360.0, 360.0), decimals=6),
     ] = ()
-    """First and last bearing of each sector in which the vehicle itself is in the way, scanner frame."""
+    """First and last bearing of each sector in which the vehicle itself is in the way, scanner frame; nothing comes
+    back from there, and what does is ignored."""
     # The last of thousands of beams is at thousands of steps: one step in a file needs all its digits.
     resolution_deg: Annotated[
         float,
@@ -165,6 +169,13 @@ class Scanner:
             if not 0.0 < high - low <= 360.0:
                 found = f"scanner.blind_sectors_deg holds [{low:g}, {high:g}]"
                 raise ValueError(f"{found}; expected first < last, at most 360 deg apart")
+            if not (first <= low and high <= last):
+                found = f"scanner.blind_sectors_deg holds [{low:g}, {high:g}]"
+                raise ValueError(f"{found}; expected sectors inside of the field of view, {first:g} to {last:g} deg")
+        for (low, high), (begin, end) in itertools.pairwise(sorted(self.blind_sectors_deg)):
+            if begin < high:
+                found = f"scanner.blind_sectors_deg holds [{low:g}, {high:g}] and [{begin:g}, {end:g}]"
+                raise ValueError(f"{found}; expected sectors that do not overlap")
         nearest, farthest = self.range
         if not nearest < farthest:
             raise ValueError(f"scanner.range is [{nearest:g}, {farthest:g}]; expected smallest < largest range [m]")
@@ -207,6 +218,24 @@ class Scanner:
         return first, last
 
     @property
+    def blind_sectors(self) -> FloatArray:
+        """(B, 2) first bearing and width of each blind sector [rad], scanner frame, upright; edges are blind."""
+        return _sectors(np.sort(self.upright(np.radians(np.reshape(self.blind_sectors_deg, (-1, 2)))), axis=1))
+
+    @property
+    def reported_blind_sectors(self) -> FloatArray:
+        """(B, 2) the same as the scanner reports bearings: mirrored where it hangs upside down."""
+        return _sectors(np.radians(np.reshape(self.blind_sectors_deg, (-1, 2))))
+
+    @property
+    def views(self) -> FloatArray:
+        """(V, 2) first and last bearing of each stretch of the field of view that is not blind [rad], upright."""
+        blind = np.sort(self.upright(np.radians(np.reshape(self.blind_sectors_deg, (-1, 2)))), axis=1)
+        edges = np.concatenate((self.field_of_view[:1], np.sort(blind, axis=0).ravel(), self.field_of_view[1:]))
+        stretches = edges.reshape(-1, 2)
+        return stretches[stretches[:, 1] > stretches[:, 0]]
+
+    @property
     def beam_times(self) -> FloatArray:
         """When each beam is measured after the stamp of its scan: (B,) array [s], negative before it."""
         share = np.arange(self.beam_count) / max(self.beam_count - 1, 1)
@@ -219,6 +248,11 @@ class Scanner:
     def period_ns(self) -> int:
         """Time between scans [ns]."""
         return round(1e9 / self.rate)
+
+
+def _sectors(ends: FloatArray) -> FloatArray:
+    """(B, 2) first bearing and width of sectors given by both ends [rad]."""
+    return np.stack((ends[:, 0] - _EDGE, ends[:, 1] - ends[:, 0] + 2.0 * _EDGE), axis=1)
 
 
 def scan_moments(scanners: Sequence[Scanner], duration_ns: int) -> tuple[IntArray, IntArray]:

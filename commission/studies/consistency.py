@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.geometry.gaussian import truncated_chi_square_mean
@@ -111,20 +112,22 @@ def recent(columns: RunColumns) -> Recent:
     """
     firsts = np.searchsorted(columns.stamps_ns, columns.stamps_ns - round(RECENT_S * 1e9), side="right")
     known = has_distance(columns)
-    sums = _between(np.where(known, columns.d2, 0.0), columns, firsts)
-    count = _between(known.astype(np.float64), columns, firsts)
-    outliers = _between((columns.status == Status.OUTLIER_ASSOCIATION).astype(np.float64), columns, firsts)
-    inliers = _between((columns.status == Status.INLIER).astype(np.float64), columns, firsts)
-    return Recent(read_only(_ratio(sums, count)), read_only(_ratio(outliers, inliers + outliers)))
+    count = _between(known, columns, firsts)
+    nis = _ratio(_between(np.where(known, columns.d2, 0.0), columns, firsts), count)
+    outliers = _between(columns.status == Status.OUTLIER_ASSOCIATION, columns, firsts)
+    inliers = _between(columns.status == Status.INLIER, columns, firsts)
+    return Recent(read_only(nis), read_only(_ratio(outliers, inliers + outliers)))
 
 
-def _between(values: FloatArray, columns: RunColumns, firsts: IntArray) -> FloatArray:
+def _between(values: FloatArray | BoolArray, columns: RunColumns, firsts: IntArray) -> NDArray[Any]:
     """(K,) sum of a value of each detection from a cycle on, up to and with each of the cycles."""
-    totals = np.concatenate(([0.0], np.cumsum(values)))
+    # Of hours, each column of the detections is 10 MB: one is filled, and none is copied.
+    totals = np.zeros(len(values) + 1, np.int64 if values.dtype == np.bool_ else np.float64)
+    np.cumsum(values, out=totals[1:])
     return totals[columns.offsets[1:]] - totals[columns.offsets[firsts]]
 
 
-def _ratio(values: FloatArray, counts: FloatArray) -> FloatArray:
+def _ratio(values: NDArray[Any], counts: NDArray[Any]) -> FloatArray:
     """Values by their counts; NaN where nothing is counted."""
     return np.where(counts > 0.0, values / np.maximum(counts, 1.0), math.nan)
 

@@ -226,20 +226,14 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
     """
     log = inputs.log
     references = references_of(log, columns)
-    errors = pose_errors(columns.means, references)
-    # Where only the antenna's place is known, the error is that of its place: so must be the covariance.
-    at_antenna = np.isnan(references[:, 2]) & np.isfinite(references[:, 0])
-    covariances = columns.covariances
-    if at_antenna.any() and not log.reference_mount.is_at_base:
-        covariances = np.where(
-            at_antenna[:, np.newaxis, np.newaxis],
-            log.reference_mount.at_antenna(covariances, columns.means[:, 2]),
-            covariances,
-        )
-    statistics = error_statistics(errors, covariances, columns.modes == Mode.OPERATIONAL, limits_along(columns)[:, 0])
     scanners = scanner_figures(columns, references)
+    errors = pose_errors(columns.means, references)
+    covariances = _of_places_known(columns, log, references)
     # Each is a column of the whole run: it goes before the others come.
-    del references, covariances, at_antenna
+    del references
+    statistics = error_statistics(errors, covariances, columns.modes == Mode.OPERATIONAL, limits_along(columns)[:, 0])
+    del covariances
+    whole, newest = consistency(columns), recent(columns)
     first_ns = log.first_ns
     times = np.asarray((columns.stamps_ns - first_ns) * 1e-9, dtype=np.float64)
     return RunResult(
@@ -251,14 +245,26 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
         position_errors=read_only(np.hypot(errors[:, 0], errors[:, 1])),
         two_sigma=read_only(two_sigma_of(columns.covariances)),
         position_two_sigma=read_only(supervised_two_sigma(columns)),
-        consistency=consistency(columns),
-        recent=recent(columns),
+        consistency=whole,
+        recent=newest,
         counts=read_only(_counts(columns)),
         nis=read_only(largest_nis(columns)),
         statistics=statistics,
         episodes=fail_episodes(columns.stamps_ns, columns.modes),
         scanners=scanners,
         microseconds_per_cycle=microseconds_per_cycle,
+    )
+
+
+def _of_places_known(columns: RunColumns, log: RecordLog, references: FloatArray) -> FloatArray:
+    """(K, 3, 3) covariances of what errors are of: where only an antenna's place is known, of its place."""
+    at_antenna = np.isnan(references[:, 2]) & np.isfinite(references[:, 0])
+    if not at_antenna.any() or log.reference_mount.is_at_base:
+        return columns.covariances
+    return np.where(
+        at_antenna[:, np.newaxis, np.newaxis],
+        log.reference_mount.at_antenna(columns.covariances, columns.means[:, 2]),
+        columns.covariances,
     )
 
 

@@ -37,7 +37,6 @@ from commission.app.editing.actions import (
     SetSelected,
 )
 from commission.app.editing.editor import ControlPoint, editor_of
-from commission.app.editing.scanner_fields import UNSEEN as NOT_YET
 from commission.app.editing.selection_panel import SelectionPanel
 from commission.app.editing.station_actions import SelectStation, SetStation
 from commission.app.editing.tool_panel import SnappingPanel
@@ -165,7 +164,7 @@ VEHICLES: dict[str, tuple[Vehicle, Row]] = {
         Row(label="Height [m]", read=vehicle("height"), allowed=(0.25, 2.5), refused=(2e9,)),
     ),
 }
-UNSEEN: frozenset[str] = NOT_YET | {"name"}
+UNSEEN: frozenset[str] = frozenset({"name"})
 """Numbers of a scanner that stand in the project's file alone."""
 ROWS: dict[str, Row] = {f"scanners[0].{name}": row for name, row in SCANNER.items() if name not in UNSEEN} | {
     "given_heading": Row(

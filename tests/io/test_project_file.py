@@ -106,6 +106,10 @@ def test_the_only_scanner_of_an_older_project_is_a_list_of_one(tmp_path: Path) -
             "schema: 2\nscanners:\n  - {rate: 25, sweep_duration: 0.041}\n",
             "scanners[0].sweep_duration: is 0.041 s at 25 scans/s; expected no more than from one scan to the next",
         ),
+        (
+            "schema: 2\nscanners:\n  - {field_of_view_deg: [-90, 90], blind_sectors_deg: [[80, 100]]}\n",
+            "holds [80, 100]; expected sectors inside of the field of view, -90 to 90 deg",
+        ),
         ("schema: 2\nscanners:\n  - blind_sectors_deg: [[10, 5]]\n", "scanner.blind_sectors_deg holds [10, 5]"),
     ],
 )

@@ -210,3 +210,25 @@ def test_echoes_nearer_than_the_scanner_measures_are_missing() -> None:
     ranges, _ = scan(Project(floor_map=room(), scanners=(blind,)), (0.5, 4.0, math.pi))
     assert np.isnan(ranges[np.argmin(np.abs(bearings(blind)))])
     assert np.nanmin(ranges) >= 1.0
+
+
+@pytest.mark.parametrize("upside_down", [False, True])
+def test_nothing_comes_back_from_blind_sectors_and_all_else_to_the_last_bit(upside_down: bool) -> None:
+    scanner = replace(FULL_TURN, upside_down=upside_down, range_sigma=0.01)
+    reflectors = ReflectorMap(tuple(Reflector(id=str(i), x=4.0 + i, y=3.0 + i) for i in (-2, 2)))
+    sectors = ((-160.0, -20.0), (30.0, 31.0))
+    disturbances = Disturbances(glints_per_scan=20.0)
+    seeing, blind = (
+        scan(
+            Project(floor_map=room(), reflectors=reflectors, scanners=(each,), disturbances=disturbances),
+            (4.0, 3.0, 0.4),
+        )
+        for each in (scanner, replace(scanner, blind_sectors_deg=sectors))
+    )
+    reported = np.degrees(bearings(scanner))
+    hidden = np.array([any(low - 1e-6 <= beam <= high + 1e-6 for low, high in sectors) for beam in reported])
+    assert seeing[1][hidden].any()
+    assert np.isnan(blind[0][hidden]).all()
+    assert not blind[1][hidden].any()
+    for one, other in zip(seeing, blind, strict=True):
+        assert one[~hidden].tobytes() == other[~hidden].tobytes()

@@ -13,35 +13,14 @@ from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing import actions
 from commission.app.editing.scanner_fields import ScannerFields
-from commission.site.fields import field_info, get_field, names_of
+from commission.app.editing.typed_lists import LIKE, add_list
+from commission.site.fields import get_field, names_of
 from commission.site.project import Project
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
 
 KINDS: dict[str, type[Vehicle]] = {
     kind.kind: kind for kind in (DifferentialVehicle, TricycleVehicle, OmnidirectionalVehicle)
 }
-LIKE = {"outline": "corners like 0.5 0.3, -0.5 0.3, -0.5 -0.3", "wheel_angles_deg": "angles like 0 120 240"}
-"""How the lists of a vehicle are typed: numbers with blanks between, corners with commas between."""
-
-
-def list_text(value: tuple[Any, ...]) -> str:
-    """Return corners or angles as they are typed."""
-    if value and isinstance(value[0], tuple):
-        return ", ".join(f"{x:g} {y:g}" for x, y in value)
-    return " ".join(f"{angle:g}" for angle in value)
-
-
-def list_value(name: str, text: str) -> tuple[Any, ...]:
-    """Return what was typed; raises ValueError that says what is expected."""
-    try:
-        if name != "outline":
-            return tuple(float(word) for word in text.split())
-        corners = [tuple(float(word) for word in corner.split()) for corner in text.split(",")]
-        if any(len(corner) != 2 for corner in corners):
-            raise ValueError(text)
-        return tuple(corners)
-    except ValueError as error:
-        raise ValueError(f"{name} is {text!r}; expected {LIKE[name]}") from error
 
 
 def of_kind(vehicle: Vehicle, kind: str) -> Vehicle:
@@ -72,20 +51,12 @@ class EquipmentFields(BasePanel):
         parts: dict[str, GuiInputHandle[Any]] = {}
         for name in sorted(kinds, key=lambda name: name in LIKE):
             project = replace(self._project, vehicle=kinds[name]())
-            parts[name] = (self._add_list if name in LIKE else self._inputs.field)(f"vehicle.{name}", project)
+            dotted = f"vehicle.{name}"
+            if name in LIKE:
+                parts[name] = add_list(self._gui, self._inputs, dotted, (project, value_of))
+            else:
+                parts[name] = self._inputs.field(dotted, project)
         return parts
-
-    def _add_list(self, name: str, project: Project) -> GuiInputHandle[Any]:
-        """Add a line of text for several numbers."""
-        info = field_info(project, name)
-        widget = self._gui.add_text(info.quantity.title if info.quantity else info.label, "", hint=info.hint)
-
-        def shown(state: AppState) -> str | None:
-            value = value_of(state, name)
-            return None if value is None else list_text(value)
-
-        self._inputs.connect(name, widget, lambda text: list_value(info.name, str(text)), shown)
-        return widget
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow the project."""

@@ -12,6 +12,7 @@ from commission.app.base.inputs import Inputs, write_html
 from commission.app.base.panel import Post, escaped, posting, write
 from commission.app.base.state import AppState
 from commission.app.editing import actions
+from commission.app.editing.typed_lists import add_list
 from commission.site.fields import get_field, names_of
 from commission.site.presets import SCANNERS, Origin, ScannerPreset, with_preset
 from commission.site.project import Project
@@ -19,8 +20,6 @@ from commission.site.scanner import Scanner
 
 OWN = "as entered"
 NAMES = (OWN, *(preset.name for preset in SCANNERS))
-UNSEEN = frozenset({"blind_sectors_deg"})
-"""Fields of a scanner that stand in the project's file alone."""
 DIRECTIONS = {1: "counter-clockwise", -1: "clockwise"}
 """What the ways of a sweep are called."""
 FIGURES = {
@@ -116,7 +115,7 @@ class ScannerFields:
         source = self._gui.add_html("")
         for field in names_of(Scanner):
             # What the only scanner is called matters to nobody.
-            if field not in UNSEEN and (several or field != "name"):
+            if several or field != "name":
                 made.append(self._add_field(f"scanners[{index}].{field}", project))
         if several:
             remove = self._gui.add_button(f"Remove {name}", color="gray")
@@ -129,6 +128,8 @@ class ScannerFields:
         """Add the input of one field."""
         if name.endswith(".sweep_direction"):
             return self._inputs.choice(name, project, DIRECTIONS)
+        if name.endswith(".blind_sectors_deg"):
+            return add_list(self._gui, self._inputs, name, (project, value_of))
         return self._inputs.field(name, project)
 
     def follow(self, state: AppState) -> None:

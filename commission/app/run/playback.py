@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from commission.app.run.view import Accumulated, RunView
 from commission.geometry import se2
+from commission.geometry.angles import within
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.estimate import Belief, Estimate, Mode, Status
 from commission.localization.observation import project_detections, range_bearing
@@ -131,7 +132,9 @@ class Playback:
         scanner, before, twist = setup.scanners[estimate.scanner], None, np.zeros(3)
         seen = range_bearing(estimate.prior.mean, scanner.mounting, setup.reflectors.centers)
         first, last = scanner.field_of_view
-        inside = np.mod(seen[:, 1] - first, 2.0 * math.pi) <= last - first
+        inside = (np.mod(seen[:, 1] - first, 2.0 * math.pi) <= last - first) & ~within(
+            seen[:, 1], scanner.blind_sectors
+        )
         in_view = inside & (seen[:, 0] <= min(scanner.reflector_range, scanner.range[1]))
         if setup.constants is not None and lived > 1:
             before, columns = self._state_before(lived - 1), self._result.columns

@@ -39,14 +39,18 @@ def reach_of(scanner: Scanner) -> float:
 
 
 def fan(scanner: Scanner, radius: float) -> np.ndarray:
-    """Return the (N, 2, 2) strokes of a field of view [m], base frame: an arc, and its two edges if there are any."""
-    first, last = scanner.field_of_view
-    count = max(2, int(np.degrees(last - first) / ARC_STEP_DEG) + 1)
-    bearings = np.linspace(first, last, count)
-    arc = radius * np.stack((np.cos(bearings), np.sin(bearings)), axis=1)
-    line = arc if scanner.is_full_turn else np.concatenate((np.zeros((1, 2)), arc, np.zeros((1, 2))))
-    points = se2.transform_points(scanner.mounting, line)
-    return np.stack((points[:-1], points[1:]), axis=1)
+    """Return the (N, 2, 2) strokes of a field of view [m], base frame: arcs, a gap for each blind sector, and edges."""
+    strokes = []
+    for first, last in scanner.views.tolist():
+        count = max(2, int(np.degrees(last - first) / ARC_STEP_DEG) + 1)
+        bearings = np.linspace(first, last, count)
+        arc = radius * np.stack((np.cos(bearings), np.sin(bearings)), axis=1)
+        # Where a full turn ends, it begins again: that is no edge.
+        is_edge = [not scanner.is_full_turn or end not in scanner.field_of_view for end in (first, last)]
+        edges = [np.zeros((int(is_there), 2)) for is_there in is_edge]
+        points = se2.transform_points(scanner.mounting, np.concatenate((edges[0], arc, edges[1])))
+        strokes.append(np.stack((points[:-1], points[1:]), axis=1))
+    return np.concatenate(strokes)
 
 
 def body(vehicle: Vehicle) -> trimesh.Trimesh:

@@ -8,7 +8,10 @@ import pytest
 from commission.app.base import actions as page
 from commission.app.base.state import AppState
 from commission.app.editing import actions
+from commission.app.editing.typed_lists import list_text, list_value
+from commission.app.run.vehicle_layer import fan
 from commission.errors import ProjectError, UsageError
+from commission.site.scanner import Scanner
 from tests.app.asking import ME, after, by, joined
 from tests.app.sites import room
 
@@ -46,3 +49,36 @@ def test_a_scanner_is_removed_but_never_the_last(state: AppState) -> None:
     assert names(one) == ["scanner 2"]
     with pytest.raises(UsageError, match="'scanner 2' is the only scanner"):
         after(one, by(ME, actions.RemoveScanner("scanner 2")))
+
+
+def test_blind_sectors_are_typed_in_degrees_and_an_empty_line_removes_them(state: AppState) -> None:
+    name = "scanners[0].blind_sectors_deg"
+    typed = list_value("blind_sectors_deg", "-120 -90.5, 60 75")
+    blind = after(state, by(ME, actions.SetEquipment(name, typed))).state
+    assert blind.project.scanners[0].blind_sectors_deg == ((-120.0, -90.5), (60.0, 75.0))
+    assert list_text(typed) == "-120 -90.5, 60 75"
+    cleared = after(blind, by(ME, actions.SetEquipment(name, list_value("blind_sectors_deg", "  ")))).state
+    assert cleared.project.scanners[0].blind_sectors_deg == ()
+    assert list_text(()) == ""
+    with pytest.raises(ValueError, match=r"expected sectors that do not overlap"):
+        after(state, by(ME, actions.SetEquipment(name, ((0.0, 20.0), (10.0, 30.0)))))
+
+
+@pytest.mark.parametrize("text", ["10", "10 20 30", "a b", "10 20,"])
+def test_what_is_no_sector_is_refused_with_an_example(text: str) -> None:
+    with pytest.raises(ValueError, match="expected first and last bearing of each sector like -135 -120, 60 75"):
+        list_value("blind_sectors_deg", text)
+
+
+def test_the_field_of_view_is_drawn_with_a_gap_for_each_blind_sector() -> None:
+    scanner = Scanner(field_of_view_deg=(-100.0, 100.0), blind_sectors_deg=((20.0, 40.0),))
+    strokes = fan(scanner, 2.0)
+    middles = strokes.mean(axis=1)
+    bearings = np.degrees(np.arctan2(middles[:, 1], middles[:, 0]))
+    on_arc = np.hypot(middles[:, 0], middles[:, 1]) > 1.9
+    assert not ((bearings[on_arc] > 20.0) & (bearings[on_arc] < 40.0)).any()
+    assert sorted(bearings[~on_arc].round(6).tolist()) == [-100.0, 20.0, 40.0, 100.0]
+    turn = Scanner(field_of_view_deg=(-180.0, 180.0), blind_sectors_deg=((20.0, 40.0),))
+    ends = fan(turn, 2.0).mean(axis=1)
+    edges = ends[np.hypot(ends[:, 0], ends[:, 1]) < 1.5]
+    assert sorted(np.degrees(np.arctan2(edges[:, 1], edges[:, 0])).round(6).tolist()) == [20.0, 40.0]
