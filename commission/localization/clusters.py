@@ -10,6 +10,7 @@ With equation 3 as printed, single missing beams alone are bridged.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,26 @@ DARK_AT_START = 32
 """Dark beams before the one with which a full turn begins, where there are so many: bodies have dark beams inside."""
 
 
+class ClusterRule(NamedTuple):
+    """What makes beams a cluster: of `DetectorModel`, without its arrays, which cost atomic operations at each call."""
+
+    range_jump: float
+    widest: float
+    half_divergence: float
+    half_aperture: float
+
+
+@compiled_inline
+def cluster_rule(model: DetectorModel) -> ClusterRule:
+    """Return what the steps of this module read.
+
+    Notes
+    -----
+    No formula: fields of the model.
+    """
+    return ClusterRule(model.range_jump, model.widest, model.half_divergence, model.half_aperture)
+
+
 @compiled_inline
 def _lit(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beam: int) -> bool:
     """Whether a beam is reflective and has a range."""
@@ -30,7 +51,7 @@ def _lit(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beam: int) -> bo
 
 @compiled_inline
 def next_cluster(  # noqa: PLR0917 - a scan and a position in it
-    ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, position: int, end: int, model: DetectorModel
+    ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, position: int, end: int, rule: ClusterRule
 ) -> tuple[int, int]:
     """First and last beam of the cluster at or after a position; first = end when none. Beams count on past a turn.
 
@@ -39,7 +60,7 @@ def next_cluster(  # noqa: PLR0917 - a scan and a position in it
     ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
     beams : bearings of the scan.
     position, end : first beam to look at, and the one before which to end.
-    model : the largest jump of the range within a cluster, and the width of the largest reflector.
+    rule : the largest jump of the range within a cluster, and the width of the largest reflector.
 
     Notes
     -----
@@ -57,11 +78,11 @@ def next_cluster(  # noqa: PLR0917 - a scan and a position in it
     while last + 1 < end:
         k = last + 1 if last + 1 < count else last + 1 - count
         if _lit(ranges, flags, k):
-            if not abs(ranges[k] - ranges[last if last < count else last - count]) <= model.range_jump:
+            if not abs(ranges[k] - ranges[last if last < count else last - count]) <= rule.range_jump:
                 break
             last += 1
             continue
-        after = _next_of_body(ranges, flags, beams, first, last, end, model)
+        after = _next_of_body(ranges, flags, beams, first, last, end, rule)
         if after == last:
             break
         last = after
@@ -76,50 +97,54 @@ def _next_of_body(  # noqa: PLR0917 - a scan and a cluster in it
     first: int,
     last: int,
     end: int,
-    model: DetectorModel,
+    rule: ClusterRule,
 ) -> int:
     """Next reflective beam of the body of a cluster; its last one where there is none."""
     count, step = beams.used, abs(beams.increment)
     here = ranges[last if last < count else last - count]
     missed, beyond = 0, 0
-    beam = last + 1
-    while beam < end:
+    beam, found, searching = last + 1, last, True
+    # One way out: from the middle of a loop, each array would cost two atomic operations.
+    while searching and beam < end:
         k = beam if beam < count else beam - count
         if _lit(ranges, flags, k):
-            fits = abs(ranges[k] - here) <= model.range_jump
+            fits = abs(ranges[k] - here) <= rule.range_jump
             # One beam may be missing whatever the width; more only within that of the largest reflector.
             dark = beam - last - 1
             one = dark == 0 or (dark == 1 and beyond == 0)
-            return beam if fits and (one or (beam - first) * step <= _widest(float(here), step, model)) else last
-        if ranges[k] < here - model.range_jump:
-            return last
-        missed += not ranges[k] <= here + model.range_jump
-        beyond += ranges[k] > here + model.range_jump
-        if missed > 1 or (beam > last + 1 and (beam - first) * step > _widest(float(here), step, model)):
-            return last
+            if fits and (one or (beam - first) * step <= _widest(float(here), step, rule)):
+                found = beam
+            searching = False
+        elif ranges[k] < here - rule.range_jump:
+            searching = False
+        else:
+            missed += not ranges[k] <= here + rule.range_jump
+            beyond += ranges[k] > here + rule.range_jump
+            if missed > 1 or (beam > last + 1 and (beam - first) * step > _widest(float(here), step, rule)):
+                searching = False
         beam += 1
-    return last
+    return found
 
 
 @compiled_inline
-def _widest(distance: float, step: float, model: DetectorModel) -> float:
+def _widest(distance: float, step: float, rule: ClusterRule) -> float:
     """Angle between the first and the last beam of the largest reflector [rad]; 0 where bodies do not count."""
-    if model.widest == 0.0:
+    if rule.widest == 0.0:
         return 0.0
     # A beam more: bearings have noise.
-    half_width = half_width_at(distance, model.half_divergence, model.half_aperture)
-    return model.widest / distance + 2.0 * half_width + step
+    half_width = half_width_at(distance, rule.half_divergence, rule.half_aperture)
+    return rule.widest / distance + 2.0 * half_width + step
 
 
 @compiled_inline
-def start_of_turn(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, model: DetectorModel) -> int:
+def start_of_turn(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, rule: ClusterRule) -> int:
     """First beam after some dark ones, so that no cluster lies across the start of a full turn.
 
     Parameters
     ----------
     ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
     beams : bearings of the scan.
-    model : whether dark beams belong to a body.
+    rule : whether dark beams belong to a body.
 
     Notes
     -----
@@ -127,7 +152,7 @@ def start_of_turn(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: 
     """
     if not beams.full_turn:
         return 0
-    needed = 2 if model.widest == 0.0 else DARK_AT_START
+    needed = 2 if rule.widest == 0.0 else DARK_AT_START
     while True:
         dark = 0
         for position in range(max(beams.used - needed, 0), 2 * beams.used):
@@ -154,11 +179,12 @@ def count_clusters(ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams:
     -----
     No formula: what a cluster is, is said at the top of the module (Sobreira et al. 2016, Algorithm 2, lines 2 and 3).
     """
-    position = start_of_turn(ranges, flags, beams, model)
+    rule = cluster_rule(model)
+    position = start_of_turn(ranges, flags, beams, rule)
     end = position + beams.used if beams.full_turn else beams.used
     found = 0
     while position < end:
-        first, last = next_cluster(ranges, flags, beams, position, end, model)
+        first, last = next_cluster(ranges, flags, beams, position, end, rule)
         if first < end:
             found += 1
         position = last + 1

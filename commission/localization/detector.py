@@ -23,7 +23,7 @@ from commission.localization.beam_window import (
     window_of_equation_3,
     window_of_plate,
 )
-from commission.localization.clusters import count_clusters, next_cluster, start_of_turn
+from commission.localization.clusters import cluster_rule, count_clusters, next_cluster, start_of_turn
 from commission.localization.detector_model import Beams, DetectorModel, beams_of
 from commission.localization.estimate import Status
 from commission.localization.reflector_center import central_beam, circle_fit, plate, rest_of_cylinder
@@ -185,10 +185,11 @@ def detect_clusters(  # noqa: PLR0917 - outputs are written into the arrays of t
     Inlier if fewest - min_model_error <= counted beams <= most + max_model_error: Sobreira et al. 2016, Algorithm 2,
     line 7, where fewest = most, and whose lower bound is printed without its sign.
     """
-    position = start_of_turn(ranges, flags, beams, model)
+    rule = cluster_rule(model)
+    position = start_of_turn(ranges, flags, beams, rule)
     end = position + beams.used if beams.full_turn else beams.used
     while position < end:
-        first, last = next_cluster(ranges, flags, beams, position, end, model)
+        first, last = next_cluster(ranges, flags, beams, position, end, rule)
         if first < end:
             distance, bearing, likely, passed = _judge(ranges, flags, beams, first, last, model)
             range_bearing[row, 0] = distance
