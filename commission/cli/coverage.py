@@ -14,6 +14,7 @@ from commission.errors import UsageError
 from commission.site.quantity import MILLIMETRES, PERCENT, PLAIN_DEGREES, Shown
 
 if TYPE_CHECKING:
+    from commission.planning.dilution import FixOptions
     from commission.studies.coverage import CoverageOptions
 
 
@@ -27,9 +28,10 @@ class CoverageCommand:
     """Folder for the results; made when it does not exist."""
     spacing: float = 0.25
     """Distance between neighboring points of the floor [m]."""
-    heading: Literal["all-round", "worst", "best"] | float = "all-round"
-    """Heading of the vehicle [deg]; or the worst or best of 16; or all-round, as if the scanner saw a full turn. Points
-    are positions of base for a heading, of the scanner otherwise."""
+    heading: Literal["by-scanner", "all-round", "worst", "best"] | float = "by-scanner"
+    """Heading of the vehicle [deg]; or the worst or best of 16; or all-round, as if the scanner saw a full turn; or
+    by-scanner: the worst where no scanner sees all around, otherwise all-round. Points are positions of base for a
+    heading, of the scanner otherwise."""
     measurement: Literal["range-bearing", "bearing-only", "range-bearing-prior"] = "range-bearing"
     """What is measured of a reflector; bearing-only is triangulation, prior adds what odometry says."""
     odometry: float = 1.0
@@ -66,7 +68,7 @@ class CoverageCommand:
             write_coverage(folder, result.coverage, result.drivable, entries)
             if ellipses is not None:
                 write_ellipses(folder, ellipses)
-        sys.stdout.write("\n".join([*_report(entries), f"Written to   {self.out}"]) + "\n")
+        sys.stdout.write("\n".join([*_report(entries, result.coverage.options), f"Written to   {self.out}"]) + "\n")
 
     def _options(self) -> CoverageOptions:
         """What is asked of every point; raises ValueError for a number out of range."""
@@ -85,7 +87,19 @@ class CoverageCommand:
         )
 
 
-def _report(entries: dict[str, int | float | None]) -> list[str]:
+def _heading(options: FixOptions) -> str:
+    """Say for which headings of the vehicle the figures hold."""
+    from commission.planning.dilution import Heading
+
+    names = {
+        Heading.WORST: f"worst of {options.headings}",
+        Heading.BEST: f"best of {options.headings}",
+        Heading.GIVEN: PLAIN_DEGREES.text(options.given_heading, ".1f"),
+    }
+    return names.get(options.heading, "all round, as if the scanner saw a full turn")
+
+
+def _report(entries: dict[str, int | float | None], options: FixOptions) -> list[str]:
     """Lines for a person; millimetres and degrees as is the habit."""
 
     def share(key: str) -> str:
@@ -98,6 +112,7 @@ def _report(entries: dict[str, int | float | None]) -> list[str]:
 
     return [
         f"Floor        {entries['area_m2']:.0f} m2 in {entries['points']} points; {entries['reflectors']} reflectors",
+        f"Heading      {_heading(options)}",
         f"Visible      1 or more on {share('share_1_visible')}, 2 on {share('share_2_visible')}, "
         f"3 on {share('share_3_visible')}",
         f"One fix      possible on {share('share_with_fix')}; two sigma within the supervisor's limits on "

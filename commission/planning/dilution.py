@@ -7,6 +7,7 @@ reflectors. A singular geometry is a result, infinite in every figure. The figur
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
@@ -39,6 +40,8 @@ class Measurement(StrEnum):
 class Heading(StrEnum):
     """Which headings of the vehicle a figure speaks of."""
 
+    BY_SCANNER = "by-scanner"
+    """The worst where no scanner sees all around, otherwise all round."""
     GIVEN = "given"
     WORST = "worst"
     """The worst over evenly spaced headings, of each figure on its own."""
@@ -46,6 +49,13 @@ class Heading(StrEnum):
     ALL_ROUND = "all-round"
     """As if the scanner saw a full turn. Of several scanners, as if they stood at the point and shared the turn: each
     reflector counts once."""
+
+    def seen_by(self, scanners: Sequence[Scanner]) -> Heading:
+        """Return what `by-scanner` means for some scanners; the others mean what they say."""
+        if self is not Heading.BY_SCANNER:
+            return self
+        turns = any(each.is_full_turn and not each.blind_sectors_deg for each in scanners)
+        return Heading.ALL_ROUND if turns else Heading.WORST
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,6 +82,8 @@ class FixOptions:
     """Probability per metre of ray that a person blocks it [1/m]."""
 
     def __post_init__(self) -> None:
+        if self.heading is Heading.BY_SCANNER:
+            raise ValueError("fix.heading is by-scanner; expected what it means for the scanners of the vehicle")
         above(self.range_sigma, 0.0, "fix.range_sigma", "m")
         above(self.bearing_sigma, 0.0, "fix.bearing_sigma", "rad")
         above(self.prior_position_sigma, 0.0, "fix.prior_position_sigma", "m")

@@ -22,7 +22,7 @@ from commission.planning.vehicle_visibility import VehicleVisibility, vehicle_vi
 from commission.planning.visibility import VisibilityOptions
 from commission.progress import Progress, part, silent
 from commission.site.floor_map import FREE, FloorMap
-from commission.site.parameters import ObservationParameters, OdometryParameters, SupervisorParameters
+from commission.site.parameters import Parameters, SupervisorParameters
 from commission.site.parts import HasFloorMap
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -53,8 +53,8 @@ class CoverageOptions:
 
     measurement: Measurement = Measurement.RANGE_BEARING
     """What one scan measures of each reflector."""
-    heading: Heading = Heading.ALL_ROUND
-    """Heading of the vehicle at each point."""
+    heading: Heading = Heading.BY_SCANNER
+    """Heading of the vehicle at each point: the worst, unless a scanner sees all around."""
     given_heading: float = 0.0
     """Heading of the vehicle where it is given [rad], map frame."""
     on_odometry: float = 1.0
@@ -66,20 +66,20 @@ class CoverageOptions:
     spacing: float | None = None
     """Distance between neighboring points [m]. None: a round one that keeps the picture small."""
 
-    def fix(self, observation: ObservationParameters, odometry: OdometryParameters, speed: float) -> FixOptions:
+    def fix(self, parameters: Parameters, scanners: tuple[Scanner, ...], speed: float) -> FixOptions:
         """What is asked of a fix, with the noise that the localizer assumes.
 
         Parameters
         ----------
-        observation : noise of a measurement.
-        odometry : growth of odometry's uncertainty.
+        parameters : noise of a measurement, growth of odometry's uncertainty.
+        scanners : of the vehicle.
         speed : of the vehicle [m/s].
         """
-        position, heading = odometry_prior(odometry, self.on_odometry, speed)
+        position, heading = odometry_prior(parameters.odometry, self.on_odometry, speed)
         return fix_options(
-            observation,
+            parameters.observation,
             measurement=self.measurement,
-            heading=self.heading,
+            heading=self.heading.seen_by(scanners),
             given_heading=self.given_heading,
             blocked_per_m=self.blocked_per_m,
             prior_position_sigma=max(position, LEAST_PRIOR),
@@ -122,7 +122,7 @@ class CoverageInput(StudyInput):
             floor_map=project.floor_map,
             scanners=project.scanners,
             routes=project.routes if project.floor_map is None else (),
-            fix=options.fix(project.parameters.observation, project.parameters.odometry, speed),
+            fix=options.fix(project.parameters, project.scanners, speed),
             visibility=replace(options.visibility, detector=project.parameters.detector),
             spacing=options.spacing,
         )

@@ -2,7 +2,8 @@
 
 `schema_1/` and the figures below are those of the program before it had several scanners, and on the machine on which
 they were made every bit is the same. Mathematical libraries round differently on other processors: 1e-9 is held here.
-Then, the beams expected of a reflector were those of equation 3 as printed: the project here asks for them.
+Then, the beams expected of a reflector were those of equation 3 as printed: the project here asks for them. Predictions
+took in the reflectors of a scan in the order of their file; by distance, as now, figures are smaller by 0.1 to 0.35 %.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ OLD = Path(__file__).parent / "schema_1"
 RECORDED = [134.81466144352345, 0.0002315825108422165, 0.0, 4.0, 156.0, 152.457674396603]
 DRIVEN = [19658.033423725436, 0.013008487322992701, 0.0, 250.0, 11105.0, 10150.085651027053]
 COVERED = [6336.0, 10.829276178546635, 1.6341856456243617]
-PREDICTED = [0.019923824726842045, 19589.293457280775, 0.013345129740379838, 0.0, 7352.0, 0.0]
-ERRORS = [0.010807362688393224]
+PREDICTED = [0.019903036853950003, 19589.29345728077, 0.013324419529806956, 0.0, 7352.0, 0.0]
+ERRORS = [0.010769507924139781]
 
 
 @pytest.fixture(scope="module")

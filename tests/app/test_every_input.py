@@ -225,6 +225,13 @@ ROWS: dict[str, Row] = {f"scanners[0].{name}": row for name, row in SCANNER.item
         allowed=(0.01, 90.0),
         refused=(0.005, 90.5),
     ),
+    "demands.leeway": Row(
+        label="Leeway [%]",
+        read=lambda s: s.project.layout.demands.leeway,
+        factor=100.0,
+        allowed=(0.0, 100.0),
+        refused=(-0.5, 100.5),
+    ),
     "demands.spacing": Row(
         label="Apart [m]", read=lambda s: s.project.layout.demands.spacing, allowed=(0.0, 100.0), refused=(-0.05, 100.1)
     ),

@@ -1,6 +1,7 @@
 """The command `coverage`."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -72,3 +73,17 @@ def test_what_cannot_be_computed_is_one_line_and_exit_code_2(commission, project
     assert said in err
     assert err.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("view", "heading"), [("[-180.0, 180.0]", "all-round"), ("[-135.0, 135.0]", "worst")])
+def test_unasked_it_is_the_worst_heading_where_the_scanner_does_not_see_all_around(
+    commission, project, tmp_path, view, heading
+):
+    text = (project / "project.yaml").read_text(encoding="utf-8")
+    changed = re.sub(r"field_of_view_deg: \[[^\]]*\]", f"field_of_view_deg: {view}", text)
+    assert "field_of_view_deg" in changed
+    (project / "project.yaml").write_text(changed, encoding="utf-8")
+    _, told, _ = commission("coverage", project, "--out", tmp_path / "out", "--spacing", "0.5")
+    assert ("Heading      worst of 16" in told) is (heading == "worst")
+    commission("coverage", project, "--out", tmp_path / "said", "--spacing", "0.5", "--heading", heading)
+    assert summary(tmp_path / "out") == summary(tmp_path / "said")

@@ -273,3 +273,20 @@ def test_impossible_options_are_refused(bad):
         FixOptions(**bad)
     with pytest.raises(ValueError, match="given_heading"):
         FixOptions(given_heading=math.nan)
+
+
+@pytest.mark.parametrize(
+    ("view", "blind", "meant"),
+    [
+        ((-180.0, 180.0), (), Heading.ALL_ROUND),
+        ((-180.0, 179.5), (), Heading.ALL_ROUND),
+        ((-180.0, 179.0), (), Heading.WORST),
+        ((-180.0, 180.0), ((-10.0, 10.0),), Heading.WORST),
+    ],
+)
+def test_by_scanner_is_all_round_where_a_scanner_sees_all_around_and_the_worst_heading_elsewhere(view, blind, meant):
+    scanner = Scanner(field_of_view_deg=view, resolution_deg=0.5, blind_sectors_deg=blind)
+    assert Heading.BY_SCANNER.seen_by((scanner,)) is meant
+    assert Heading.BEST.seen_by((scanner,)) is Heading.BEST
+    with pytest.raises(ValueError, match=r"fix\.heading is by-scanner"):
+        FixOptions(heading=Heading.BY_SCANNER)

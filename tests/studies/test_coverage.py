@@ -25,12 +25,15 @@ CORNERS = ReflectorMap(
 )
 
 
+TURNING = Scanner(resolution_deg=0.1, field_of_view_deg=(-180.0, 180.0))
+
+
 def hall() -> Project:
     """A 10 m x 6 m hall; its left fifth is unknown, a wall of one cell crosses it at x = 6 m."""
     cells = np.full((60, 100), FREE, dtype=np.int8)
     cells[:, :20] = UNKNOWN
     cells[:, 60] = OCCUPIED
-    return Project(floor_map=FloorMap(cells, 0.1), reflectors=CORNERS, scanners=(Scanner(resolution_deg=0.1),))
+    return Project(floor_map=FloorMap(cells, 0.1), reflectors=CORNERS, scanners=(TURNING,))
 
 
 def covered(project: Project, spacing: float, blocked_per_m: float = 0.0) -> CoverageResult:

@@ -89,7 +89,7 @@ def reading_table(reading: FloorReading, state: AppState) -> str:
 def _conditions(state: AppState, figure: Figure) -> str:
     """Say under which conditions the heatmap holds."""
     settings, blocked_per_m = state.part(CoverageSettings), state.part(Conditions).blocked_per_m
-    parts = [HEADING_NAMES[settings.heading], MEASUREMENT_NAMES[settings.measurement]]
+    parts = [HEADING_NAMES[settings.heading.seen_by(state.project.scanners)], MEASUREMENT_NAMES[settings.measurement]]
     if blocked_per_m > 0.0:
         parts.append(f"people {PERCENT.number(blocked_per_m, '.1f')} %/m")
     elif figure in AMONG_PEOPLE:

@@ -40,8 +40,8 @@ class CoverageSettings:
 
     figure: Annotated[Figure, Choice("Show")] = Figure.NONE
     """What the floor is colored by; off: there is no heatmap."""
-    heading: Annotated[Heading, Choice("Heading")] = Heading.ALL_ROUND
-    """Heading of the vehicle, where the scanner does not see all around."""
+    heading: Annotated[Heading, Choice("Heading")] = Heading.BY_SCANNER
+    """Heading of the vehicle. By scanner: the worst where no scanner sees all around, otherwise all round."""
     given_heading: Annotated[
         float, Quantity(label="Given", unit="rad", shown=DEGREES, step=1.0, entry=(-360.0, 360.0))
     ] = 0.0

@@ -12,6 +12,7 @@ from commission.site.quantity import PERCENT, joined
 
 FIGURE_NAMES: dict[Figure, str] = {Figure.NONE: "Off"} | {figure: each.label for figure, each in QUANTITIES.items()}
 HEADING_NAMES: dict[Heading, str] = {
+    Heading.BY_SCANNER: "by scanner",
     Heading.ALL_ROUND: "all round",
     Heading.WORST: "worst heading",
     Heading.BEST: "best heading",
