@@ -88,6 +88,7 @@ class Place:
         """Search, write, and tell what was found."""
         from commission.io.project_copy import refuse_to_replace, save_copy
         from commission.io.project_file import load_project
+        from commission.planning.layout_figures import compared
         from commission.studies.placement import PlacementInput, placement
 
         if self.out.resolve() == self.project.resolve():
@@ -98,10 +99,14 @@ class Place:
             options = self._options(project)
         except ValueError as error:
             raise UsageError(str(error)) from None
-        found = placement(PlacementInput.of(project, options, self.route or None)).placement
+        result = placement(PlacementInput.of(project, options, self.route or None))
+        found = result.placement
         kept = save_copy(dataclasses.replace(project, reflectors=found.reflectors), self.out, force=self.force)
         notes = [] if kept is None else [f"Note         unsaved edits of the project that was there are kept in {kept}"]
-        sys.stdout.write("\n".join([*_report(found), *notes, f"Written to   {self.out}"]) + "\n")
+        changes = [f"{name[:20]:<20} {change}" for name, change in compared(result.before, result.after)]
+        sys.stdout.write(
+            "\n".join([*_report(found), "Before and after", *changes, *notes, f"Written to   {self.out}"]) + "\n"
+        )
 
     def _options(self, project: Project) -> PlacementOptions:
         """Options of the search; raises ValueError for a number out of range."""

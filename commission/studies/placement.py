@@ -13,6 +13,7 @@ import numpy as np
 from commission.compiled import warm_up
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
+from commission.planning.layout_figures import LayoutFigures, layout_figures
 from commission.planning.nominal_drive import nominal_drive
 from commission.planning.placement import Placement, PlacementOptions, Unmet, place
 from commission.planning.unmet import Beyond
@@ -29,8 +30,8 @@ from commission.site.vehicle import Vehicle
 from commission.studies.inputs import StudyInput
 from commission.studies.kernels import DRIVES, ERRORS, INFORMATION
 
-COMPILING = 0.1
-"""Share of the time until which kernels are compiled."""
+COMPILING, COMPARED = 0.1, 0.15
+"""Shares of the time until which kernels are compiled, and it is found out what the present reflectors come to."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -127,6 +128,10 @@ class PlacementResult:
     """What was found."""
     unmet: tuple[UnmetStretch, ...]
     """Where it does not do."""
+    before: LayoutFigures
+    """What the reflectors that are there come to."""
+    after: LayoutFigures
+    """What the suggested layout comes to."""
 
     @property
     def farthest(self) -> Beyond | None:
@@ -159,8 +164,12 @@ def placement(inputs: PlacementInput, progress: Progress = silent) -> PlacementR
     """
     warm_up((*DRIVES, ERRORS, INFORMATION), part(progress, 0.0, COMPILING))
     names = tuple(route.name for route in inputs.routes)
-    found = place(inputs, names, inputs.options, part(progress, COMPILING, 1.0))
-    return PlacementResult(inputs, found, tuple(_stretches(inputs, found.unmet)))
+    given = inputs.options.prediction
+    before = layout_figures(inputs, inputs.reflectors, names, given, part(progress, COMPILING, COMPARED))
+    found = place(inputs, names, inputs.options, part(progress, COMPARED, 1.0))
+    # Whoever ended the search with what there is wants to see what that comes to.
+    after = layout_figures(inputs, found.reflectors, names, given)
+    return PlacementResult(inputs, found, tuple(_stretches(inputs, found.unmet)), before, after)
 
 
 def _stretches(inputs: PlacementInput, unmet: tuple[Unmet, ...]) -> list[UnmetStretch]:

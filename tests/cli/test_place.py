@@ -116,3 +116,16 @@ def test_a_bad_option_is_refused_by_name(words, said, refused, project, tmp_path
 
 def test_the_project_itself_is_never_overwritten(refused, project):
     assert "another folder" in refused("place", project, "--out", project)
+
+
+def test_before_and_after_are_told_side_by_side(commission, walled, tmp_path):
+    code, told, _ = commission("place", walled, "--out", tmp_path / "placed", "--no-extend", "--visible", 2)
+    assert code == 0
+    before, after = (len(load_project(each).reflectors) for each in (walled, tmp_path / "placed"))
+    lines = told.split("Before and after\n")[1].splitlines()
+    assert lines[0].split(None, 1) == ["Reflectors", f"{before} -> {after}"]
+    assert lines[1].startswith("Straight ")
+    assert "in sight" in lines[1]
+    assert lines[2].startswith("... any one failing")
+    assert any(line.startswith("Stop if failing") for line in lines)
+    assert any(line.startswith("Ambiguous") for line in lines)

@@ -27,6 +27,7 @@ from commission.app.placement.keep_out_tool import KeepOutTool
 from commission.app.placement.service import LAYOUT
 from commission.app.placement.view import LayoutView
 from commission.app.placement.wish import LayoutWish
+from commission.planning.layout_figures import compared
 from commission.site.fields import get_field
 from commission.site.layout_brief import Demands, LayoutBrief
 from commission.site.quantity import DEGREES, MILLIMETRES
@@ -182,6 +183,8 @@ def found_text(found: LayoutView) -> str:
     elif found.wished_otherwise:
         notes.append("The demands have changed since: suggest again.")
     notes_html = "".join(f"<div class='c-note'>{escaped(note)}</div>" for note in notes)
+    changes = compared(suggestion.before, suggestion.after)
+    notes_html += table([(escaped(name), escaped(change.replace("->", "→"))) for name, change in changes])
     return f"<div class='c-layout' style='padding:2px 10px 4px 6px'>{table(rows)}{notes_html}</div>"
 
 
