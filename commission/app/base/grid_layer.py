@@ -1,4 +1,4 @@
-"""A metric grid over the site with a scale bar: how large everything is."""
+"""A metric grid over the site: how large everything is. The scale bar is the page's (`web_assets/floor_view.js`)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def grid_lines(extent: Extent, step: float) -> np.ndarray:
 
 
 class GridLayer(BaseLayer):
-    """Grid and scale bar."""
+    """The grid."""
 
     name = "Grid"
     rank = 40
@@ -54,25 +54,9 @@ class GridLayer(BaseLayer):
             node.remove()
         step = grid_step(extent)
         lines = grid_lines(extent, step)
-        x, y, height = extent.low[0] + 0.1 * step, extent.low[1] + 0.35 * step, theme.Height.GRID
-        bar = np.array([[(x, y), (x + step, y)], [(x, y - 0.12 * step), (x, y + 0.12 * step)]])
-        bar = np.concatenate([bar, bar[1:] + np.array([step, 0.0])])
-        self._nodes = (
-            self._segments("/grid/lines", lines, theme.GRID_METER, 1.0),
-            self._segments("/grid/scale", bar, theme.VEHICLE, 2.0),
-            self.scene.add_label(
-                "/grid/text",
-                f"{step:g} m",
-                position=(x + 0.5 * step, y + 0.05 * step, height),
-                anchor="bottom-center",
-                font_screen_scale=0.8,
-            ),
-        )
-
-    def _segments(self, name: str, lines: np.ndarray, color: theme.Color, thickness: float) -> SceneNodeHandle:
         points = lift(lines.reshape(-1, 2), theme.Height.GRID).reshape(-1, 2, 3)
-        return add_lines(self.scene, name, color, thickness, lines=points)
+        self._nodes = (add_lines(self.scene, "/grid/lines", theme.GRID_METER, 1.0, lines=points),)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
-        """Return grid and scale bar."""
+        """Return the lines."""
         return self._nodes

@@ -1,0 +1,121 @@
+"""The floor as a map, and keys: where the pointer is, how long things are, zoom to it, moving, playing, all keys."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from commission.app.run.actions import ChooseSource, Play, VirtualDrive
+from commission.app.run.state import RunState
+from tests.app.sites import room
+from tests.browser.page import OpenPage
+from tests.browser.serving import Served
+
+PLACE = (3.0, 2.0)
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    opened = Served(room())
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def page(served: Served, window: Callable[..., OpenPage]) -> OpenPage:
+    opened = window(served.server)
+    opened.open(nodes=["/grid/lines"])
+    return opened
+
+
+def settle(page: OpenPage) -> None:
+    """Let the camera come to rest; where the processor draws, that takes some pictures."""
+    before = None
+    for _ in range(100):
+        page.page.wait_for_timeout(150)
+        now = (page.pixel_of((0.0, 0.0)), page.pixel_of((1.0, 0.0)))
+        if now == before:
+            return
+        before = now
+    raise TimeoutError("the camera does not come to rest")
+
+
+def metre(page: OpenPage) -> float:
+    """Length of a metre of the floor on the screen [pixels]."""
+    return float(np.hypot(*(np.array(page.pixel_of((1.0, 0.0))) - page.pixel_of((0.0, 0.0)))))
+
+
+def ruler(page: OpenPage) -> tuple[float, float]:
+    """What the scale bar says [m], and how long it is [pixels]."""
+    number, unit = page.page.locator(".c-length").inner_text().split()
+    return float(number) * {"m": 1.0, "cm": 0.01, "mm": 0.001}[unit], page.page.evaluate(
+        "document.querySelector('.c-ruler').getBoundingClientRect().width"
+    )
+
+
+def test_the_edge_says_where_the_pointer_is_and_how_long_things_are(page: OpenPage) -> None:
+    page.page.mouse.move(*page.pixel_of(PLACE))
+    page.page.wait_for_function("document.querySelector('.c-place').textContent !== ''")
+    found = re.findall(r"-?\d+\.\d+", page.page.locator(".c-place").inner_text())
+    # The pointer stands on whole pixels.
+    assert [float(number) for number in found] == pytest.approx(PLACE, abs=1.0 / metre(page))
+    length, pixels = ruler(page)
+    assert pixels == pytest.approx(length * metre(page), abs=3.5)  # with its border
+    page.page.mouse.move(5, 5)
+    page.page.wait_for_function("document.querySelector('.c-place').textContent === ''")
+
+
+def test_the_wheel_zooms_to_the_pointer(page: OpenPage) -> None:
+    at, before = np.array(page.pixel_of(PLACE)), metre(page)
+    page.page.mouse.move(*at)
+    for _ in range(4):
+        page.page.mouse.wheel(0, -200)
+        page.page.wait_for_timeout(50)
+    settle(page)
+    assert metre(page) > 1.3 * before
+    assert np.hypot(*(np.array(page.pixel_of(PLACE)) - at)) < 6.0
+    length, pixels = ruler(page)
+    assert pixels == pytest.approx(length * metre(page), abs=3.5)
+
+
+def test_the_middle_button_moves_the_floor(page: OpenPage) -> None:
+    at, before = np.array(page.pixel_of(PLACE)), metre(page)
+    page.page.mouse.move(*at)
+    page.page.mouse.down(button="middle")
+    page.page.mouse.move(at[0] + 90.0, at[1] + 40.0, steps=6)
+    page.page.mouse.up(button="middle")
+    settle(page)
+    assert metre(page) == pytest.approx(before, rel=1e-3)
+    np.testing.assert_allclose(np.array(page.pixel_of(PLACE)) - at, (90.0, 40.0), atol=6.0)
+    assert page.errors == []
+
+
+def test_space_plays_and_pauses_wherever_nothing_is_typed(served: Served, page: OpenPage) -> None:
+    served.runtime.post(ChooseSource(VirtualDrive(served.state.project.routes[0].name)))
+    served.until(lambda: served.view is not None)
+    served.runtime.post(Play(playing=False))
+    served.until(lambda: not served.state.part(RunState).playing)
+    page.press("Step")  # the focus is on a button
+    page.page.keyboard.press("Space")
+    served.until(lambda: served.state.part(RunState).playing, 10.0)
+    page.page.keyboard.press("Space")
+    served.until(lambda: not served.state.part(RunState).playing, 10.0)
+    page.open_tab("Site")
+    page.fold("Project")
+    name = page.row("Name").locator("input")
+    name.click()
+    page.page.keyboard.press("End")
+    page.page.keyboard.type(" two")
+    assert name.input_value().endswith(" two")
+    assert not served.state.part(RunState).playing
+    name.press("Escape")
+
+
+def test_a_question_mark_shows_all_keys(page: OpenPage) -> None:
+    page.page.mouse.click(*page.pixel_of(PLACE))
+    page.page.keyboard.press("?")
+    page.wait_for_text("Play or pause")
+    assert page.errors == []

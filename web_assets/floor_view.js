@@ -1,0 +1,72 @@
+// The floor as a map: the wheel zooms to the pointer, the middle button moves it, and its edge says where the pointer is
+// and how long things are.
+(() => {
+  if (window.commissionFloor) return; // the server sends this script again after each reconnection
+  window.commissionFloor = true;
+  const TRUCK = 2; // what the camera's controls call moving along the picture
+  const LONGEST_BAR_PX = 150;
+  const FLAT_DEGREES = 5; // opening of the plan's camera is far below, that of 3D far above
+  const viewer = () => window.__viserMutable;
+
+  const status = document.createElement("div");
+  status.className = "c-status";
+  status.innerHTML = "<i class='c-ruler'></i><b class='c-length'></b><span class='c-place'></span>";
+  const [ruler, length, place] = status.children;
+  document.body.append(status);
+
+  // Where a point of the window lies on the floor [m]; null beside the floor and where there is none.
+  function onFloor(x, y) {
+    const { camera, canvas, nodeRefFromName } = viewer();
+    const box = canvas.getBoundingClientRect(), root = nodeRefFromName[""];
+    const from = camera.position.clone();
+    const through = from.clone().set(2 * (x - box.left) / box.width - 1, 1 - 2 * (y - box.top) / box.height, 0.5);
+    root.worldToLocal(through.unproject(camera));
+    root.worldToLocal(from);
+    const share = from.z / (from.z - through.z);
+    if (!(share > 0) || !isFinite(share)) return null;
+    return [from.x + share * (through.x - from.x), from.y + share * (through.y - from.y)];
+  }
+
+  // The longest of 1, 2 or 5 times a power of ten that is no longer than so many metres.
+  function rounded(metres) {
+    const power = 10 ** Math.floor(Math.log10(metres));
+    return [5, 2, 1].map((nice) => nice * power).find((nice) => nice <= metres);
+  }
+
+  function written(metres) {
+    if (metres >= 1) return `${metres.toFixed(0)} m`;
+    return metres >= 0.01 ? `${(metres * 100).toFixed(0)} cm` : `${(metres * 1000).toFixed(metres < 0.001 ? 1 : 0)} mm`;
+  }
+
+  let shown = "", pointer = null;
+  function draw() {
+    requestAnimationFrame(draw);
+    const { camera, canvas, nodeRefFromName, cameraControl } = viewer() ?? {};
+    if (!canvas || !camera || !nodeRefFromName?.[""] || !cameraControl) return;
+    if (!cameraControl.dollyToCursor) cameraControl.dollyToCursor = true;
+    if (cameraControl.mouseButtons.middle !== TRUCK) cameraControl.mouseButtons.middle = TRUCK;
+    const box = canvas.getBoundingClientRect();
+    const now = [box.left, box.bottom, box.width, camera.fov, ...camera.position.toArray(), pointer].join();
+    if (now === shown) return;
+    shown = now;
+    status.style.left = `${box.left + 12}px`;
+    status.style.top = `${box.bottom - 30}px`;
+    const isPlan = camera.fov < FLAT_DEGREES;
+    ruler.hidden = length.hidden = !isPlan;
+    if (isPlan) {
+      const x = box.left + box.width / 2, y = box.top + box.height / 2;
+      const [here, there] = [onFloor(x, y), onFloor(x + 100, y)];
+      if (!here || !there) return;
+      const perPixel = Math.hypot(there[0] - here[0], there[1] - here[1]) / 100;
+      const metres = rounded(LONGEST_BAR_PX * perPixel);
+      ruler.style.width = `${metres / perPixel}px`;
+      length.textContent = written(metres);
+    }
+    const at = pointer && onFloor(...pointer);
+    place.textContent = at ? `x ${at[0].toFixed(3)}   y ${at[1].toFixed(3)} m` : "";
+  }
+  addEventListener("pointermove", (event) => {
+    pointer = event.target === viewer()?.canvas ? [event.clientX, event.clientY] : null;
+  }, true);
+  draw();
+})();
