@@ -5,19 +5,28 @@ The figures of all drives are in the README's table, printed by `tests.benchmark
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from commission.io.project_file import load_project
+from commission.localization.estimate import Belief
+from commission.simulation.scenario import start_of, virtual_drive
+from commission.site.parameters import FilterParameters
 from commission.site.project import Project
-from tests.acceptance.swept import fields_of, swept
+from commission.studies.metrics import reference_at
+from tests.acceptance.in_order import InOrder
+from tests.acceptance.judged import judge
+from tests.acceptance.swept import fields_of, swept, with_fields
 from tests.conftest import Seeds
+from tests.planning.driven import QUICK
 
 COST = 5e-4
 """What a sweep may cost [m]."""
 # The detections of a sweep of 125 ms that is stamped with its last beam are 62 ms old on average, half of them more:
-# the odometry since then has noise that nothing corrects before the next scan.
+# the odometry since then has noise that nothing corrects before the next scan. An exact filter pays as much, see below.
 COST_OF_OLD_BEAMS = 1.2e-3
 
 pytestmark = pytest.mark.slow
@@ -46,3 +55,26 @@ def test_a_sweep_of_40_ms_at_25_scans_per_second_costs_less_than_half_a_millimet
     found = swept(warehouse, cases["first beam, clockwise"], seeds(1, 2))
     assert found.corrected < once + COST
     assert found.neglected > 2.0 * found.corrected
+
+
+@pytest.mark.parametrize("way", ["counter-clockwise", "clockwise"])
+def test_an_exact_filter_pays_as_much_for_sweeps_that_are_stamped_with_their_last_beam(
+    warehouse: Project, way: str, seeds: Seeds
+) -> None:
+    """Nothing is left to be gained: every detection at the time of its own beam gives no smaller error."""
+    plain = replace(warehouse, parameters=replace(warehouse.parameters, filter=FilterParameters(consider=False)))
+    made = with_fields(plain, fields_of(0.125)[f"last beam, {way}"])
+    route, (scanner,) = made.routes[0].name, made.scanners
+    squares = []
+    for seed in seeds(1, 8):
+        log = virtual_drive(made, route, seed, options=QUICK)
+        judged, start = judge(made, route, log), start_of(made, route)
+        exact = InOrder(
+            made.reflectors, scanner, made.parameters, Belief(0, start.pose, np.diag(np.square(start.sigmas)))
+        )
+        means = exact.means_of(log, judged.run)
+        references = reference_at(judged.run.stamps_ns, log.reference_stamps_ns, log.reference_poses)
+        squares.append((np.mean(judged.distances**2), np.mean(np.sum((means - references)[:, :2] ** 2, axis=1))))
+    found, optimum = np.sqrt(np.mean(squares, axis=0))
+    assert found < optimum + 1e-4
+    assert optimum > swept(plain, fields_of(0.125)["one instant"], seeds(1, 8), neglect=False).corrected + COST
