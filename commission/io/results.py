@@ -67,7 +67,10 @@ def _estimate_rows(run: RunColumns) -> Iterator[Iterable[Any]]:
 
 
 def _detection_rows(run: RunColumns) -> Iterator[Iterable[Any]]:
-    """Columns of some detections at a time; empty where there is no reflector, and so no distance to it."""
+    """Columns of some detections at a time; empty where there is no reflector, and so no distance to it.
+
+    Range and bearing are those at the stamp of the scan, upright: corrected for the time of the beam in its sweep.
+    """
     points = run.points_map()
     distances = run.d2.astype(object)
     distances[np.isnan(run.d2)] = ""

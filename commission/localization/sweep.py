@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from commission.compiled import compiled, compiled_inline
-from commission.geometry.angles import wrap_scalar
+from commission.geometry import se2
+from commission.geometry.angles import wrap, wrap_scalar
 from commission.geometry.arrays import FloatArray, read_only
 from commission.geometry.se2 import exp_scalars
 from commission.localization.observation import ObservationModel
@@ -57,6 +58,29 @@ def sweep_rows(sweeps: Sequence[Sweep]) -> FloatArray:
     """(S, 4) the sweeps of several scanners, for kernels; (0, 4) where nothing is to be done for any."""
     acting = sweeps if any(sweep != AT_ONCE for sweep in sweeps) else ()
     return read_only(np.array(acting, dtype=np.float64).reshape(-1, 4))
+
+
+def points_at_stamp(scanner: Scanner, range_bearing: FloatArray, twist: FloatArray) -> FloatArray:
+    """Where the scanner would have measured points at the stamp of their scan: as in `bring_to_stamp`, of any beams.
+
+    Parameters
+    ----------
+    scanner : whose beams they are.
+    range_bearing : (N, 2) range [m] and bearing [rad], as it reports them.
+    twist : (3,) velocity of base: forward, to the left [m/s], turning [rad/s].
+
+    Returns
+    -------
+    points_scanner : (N, 2) array [m], scanner frame, upright.
+    """
+    sweep, ranges = sweep_of(scanner), range_bearing[:, :1]
+    bearings = scanner.upright(range_bearing[:, 1])
+    points = ranges * np.stack((np.cos(bearings), np.sin(bearings)), axis=1)
+    seconds = sweep.seconds_at_middle + sweep.seconds_per_rad * wrap(range_bearing[:, 1] - sweep.middle)
+    if not seconds.any():
+        return points
+    moved = se2.compose(se2.exp(seconds[:, np.newaxis] * twist), scanner.mounting)
+    return se2.transform_points(se2.compose(se2.inverse(scanner.mounting), moved), points)
 
 
 @compiled_inline

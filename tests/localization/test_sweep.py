@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from commission.geometry import se2
+from commission.geometry.angles import wrap
+from commission.localization.estimate import Belief
 from commission.localization.localizer import Localizer
 from commission.localization.observation import range_bearing
 from commission.localization.odometry import AT_REST, NOT_YET
@@ -16,8 +18,10 @@ from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.sweep import AT_ONCE, Sweep, bring_to_stamp, sweep_of
 from commission.localization.whole_run import run, run_segments
-from commission.site.parameters import ObservationParameters, Parameters
-from commission.site.records import Odometry
+from commission.site.parameters import AssociationParameters, ObservationParameters, Parameters
+from commission.site.record_log import RecordLog
+from commission.site.records import Detections, Odometry, Record
+from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner, StampOf
 from tests.localization.drives import Plan, random_drive, random_map
 from tests.localization.test_whole_run import assert_same_estimate
@@ -142,3 +146,42 @@ def test_motion_of_a_vehicle_is_the_twist_that_odometry_tells() -> None:
         localizer.feed(Odometry(50_000_000 * index, step if index else np.zeros(3)))
     motion = localizer.state.motion
     assert (motion.trend_x, motion.trend_y, motion.trend_theta) == pytest.approx((SPEED, 0.0, TURN_RATE), abs=1e-12)
+
+
+TURNING = 0.5
+SWEEP = 0.04 * 275.0 / 360.0
+"""Time that 275 degrees take at 25 turns per second [s]: 30.6 ms, in which 0.5 rad/s turn a vehicle by 15.3 mrad."""
+WIDE = Scanner(rate=25.0, field_of_view_deg=(-137.5, 137.5), resolution_deg=0.5)
+
+
+def error_of_heading(scanner: Scanner) -> float:
+    """Mean error of the heading [rad] of a vehicle that turns on the spot and sees reflectors by its last beams."""
+    around = np.radians(np.arange(0, 360, 3))
+    places = 12.0 * np.stack([np.cos(around), np.sin(around)], axis=1)
+    reflectors = ReflectorMap(tuple(Reflector(id=str(i), x=x, y=y) for i, (x, y) in enumerate(places.tolist())))
+    setup = LocalizerSetup(reflectors, (scanner,), Parameters(association=AssociationParameters(enabled=False)))
+    records: list[Record] = [Odometry(0, np.zeros(3))]
+    for k in range(1, 201):
+        stamp_ns = k * 20_000_000
+        records.append(Odometry(stamp_ns, np.array([0.0, 0.0, TURNING * 0.02])))
+        if k % 2 == 0:
+            # The last beam, 30.6 ms after the stamp: the reflectors within 10 degrees before it.
+            heading = TURNING * stamp_ns * 1e-9
+            bearings = around - heading
+            late = wrap(bearings - TURNING * SWEEP)
+            seen = late[(late > math.radians(127.5)) & (late < math.radians(137.5))]
+            records.append(Detections(stamp_ns, np.stack([np.full(len(seen), 12.0), seen], axis=1)))
+    start = Belief(0, np.zeros(3), np.diag([1e-3, 1e-3, 1e-3]) ** 2)
+    columns = run(RecordLog.collect(records), setup, start)
+    truth = TURNING * columns.stamps_ns * 1e-9
+    return float(np.mean(wrap(columns.means[50:, 2] - truth[50:])))
+
+
+def test_a_neglected_sweep_turns_the_estimate_by_15_mrad_and_a_corrected_one_does_not() -> None:
+    """25 scans/s, 275 degrees, 0.5 rad/s: 0.5 x 30.6 ms = 15.3 mrad; the default bearing sigma is 4 mrad."""
+    swept = replace(WIDE, sweep_duration=SWEEP)
+    assert TURNING * SWEEP == pytest.approx(0.0153, abs=5e-5)
+    # What is seen later lies farther to the right: the estimate takes itself for turned to the left.
+    assert error_of_heading(WIDE) == pytest.approx(TURNING * SWEEP, abs=1e-3)
+    # The reflectors are up to 10 degrees before the last beam, a thirtieth of the sweep: 0.5 mrad at most.
+    assert abs(error_of_heading(swept)) < 6e-4

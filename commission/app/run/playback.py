@@ -20,13 +20,16 @@ from commission.localization.observation import project_detections, range_bearin
 from commission.localization.run_columns import Checkpoint, RunColumns
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState
+from commission.localization.sweep import points_at_stamp
 from commission.localization.validation import validation_outlines
 from commission.localization.whole_run import state_before
+from commission.site.record_log import RecordLog
 from commission.site.records import Scan
-from commission.site.scanner import Scanner
 from commission.studies.run import RunResult
 
 GATE_POINTS = 40
+TWIST_NS = 50_000_000
+"""Time before and after a scan over which its velocity is taken [ns]."""
 MOST_POINTS = 40_000
 """Accumulated points of each kind that are drawn: of more, every second, third, ... one over the whole drive."""
 
@@ -160,17 +163,25 @@ class Playback:
         return Accumulated(self._inliers.before(rows), self._outliers.before(rows))
 
     def _scan_points(self, belief: Belief, setup: LocalizerSetup) -> list[FloatArray]:
-        """(B, 2) end points of the beams of each scanner's newest scan [m], map frame, in the order of the setup."""
-        log = self._result.inputs.log
+        """(B, 2) end points of the beams of each scanner's newest scan [m], map frame, in the order of the setup.
+
+        Each beam is drawn from where the scanner was at the beam's own time.
+        """
+        log, columns = self._result.inputs.log, self._result.columns
         indices = setup.indices_of(log.scanners)
         points = [np.empty((0, 2)) for _ in setup.scanners]
         for scans in log.scans:
             newest = int(np.searchsorted(scans.stamps_ns, self._at_ns, side="right")) - 1
             if newest >= 0:
-                scanner = int(indices[scans.scanner])
-                T_map_scanner = se2.compose(belief.mean, setup.scanners[scanner].mounting)
-                ends = _end_points(scans.scan(newest), setup.scanners[scanner])
-                points[scanner] = se2.transform_points(T_map_scanner, ends)
+                scanner = setup.scanners[int(indices[scans.scanner])]
+                stamp_ns = int(scans.stamps_ns[newest])
+                cycle = int(np.searchsorted(columns.stamps_ns, stamp_ns, side="right")) - 1
+                # Where the sensor itself detects, a scan is no cycle.
+                is_cycle = cycle >= 0 and columns.stamps_ns[cycle] == stamp_ns
+                T_map_base = columns.means[cycle] if is_cycle else belief.mean
+                seen = points_at_stamp(scanner, _returns(scans.scan(newest)), _twist_at(log, stamp_ns))
+                T_map_scanner = se2.compose(T_map_base, scanner.mounting)
+                points[int(indices[scans.scanner])] = se2.transform_points(T_map_scanner, seen)
         return points
 
 
@@ -187,11 +198,21 @@ def _judged(estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
     )
 
 
-def _end_points(scan: Scan, scanner: Scanner) -> FloatArray:
-    """(B, 2) end points of the beams of a scan that came back [m], scanner frame."""
+def _returns(scan: Scan) -> FloatArray:
+    """(B, 2) range [m] and bearing [rad] of the beams of a scan that came back, as the scanner reports them."""
     hit = np.isfinite(scan.ranges)
-    ranges, bearings = scan.ranges[hit].astype(np.float64), scanner.upright(scan.bearings[hit])
-    return ranges[:, np.newaxis] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+    return np.stack((scan.ranges[hit].astype(np.float64), scan.bearings[hit]), axis=1)
+
+
+def _twist_at(log: RecordLog, stamp_ns: int) -> FloatArray:
+    """(3,) velocity of base by the odometry about a time [m/s, m/s, rad/s]; zeros where there is none."""
+    stamps = log.odometry_stamps_ns
+    first, last = np.searchsorted(stamps, (stamp_ns - TWIST_NS, stamp_ns + TWIST_NS), side="right").tolist()
+    first = max(first, 1)
+    moved = np.zeros(3)
+    for displacement in log.displacements[first:last]:
+        moved = se2.compose(moved, displacement)
+    return se2.log(moved) / ((stamps[last - 1] - stamps[first - 1]) * 1e-9) if last > first else moved
 
 
 class _Cloud:

@@ -10,6 +10,7 @@ from commission.app.run.drives import Drive
 from commission.app.run.playback import Playback
 from commission.app.run.time_line import strip
 from commission.app.run.view import RunView
+from commission.geometry import se2
 from commission.geometry.angles import wrap
 from commission.io.project_file import load_project
 from commission.localization.estimate import Mode, Status
@@ -220,11 +221,13 @@ def test_points_of_the_first_scanner_and_of_the_others_are_told_apart(repository
     view = playback.view(covered=False)
     assert 0 < view.first_scan < len(view.scan_map)
     # Each sees past another corner of the vehicle: none of its points lies where its field of view ends.
-    c, s = np.cos(view.pose[2]), np.sin(view.pose[2])
-    points_base = (view.scan_map - view.pose[:2]) @ np.array([[c, -s], [s, c]])
-    parts = points_base[: view.first_scan], points_base[view.first_scan :]
-    for scanner, points in zip(site.scanners, parts, strict=True):
-        offsets = points - scanner.mounting[:2]
+    parts = view.scan_map[: view.first_scan], view.scan_map[view.first_scan :]
+    columns = view.result.columns
+    for index, (scanner, points) in enumerate(zip(site.scanners, parts, strict=True)):
+        # They take turns: each saw its points from where the vehicle was at its own scan.
+        x, y, heading = columns.means[np.flatnonzero(columns.detected.scanners[: view.lived] == index)[-1]]
+        c, s = np.cos(heading), np.sin(heading)
+        offsets = (points - (x, y)) @ np.array([[c, -s], [s, c]]) - scanner.mounting[:2]
         bearings = wrap(np.arctan2(offsets[:, 1], offsets[:, 0]) - scanner.mounting[2])
         assert 130.0 < np.degrees(np.abs(bearings)).max() <= 137.5 + 1e-6
 
@@ -243,3 +246,34 @@ def test_points_of_a_scanner_upside_down_lie_on_the_walls(repository: Path) -> N
     apart = KDTree(np.concatenate((centers, site.reflectors.centers))).query(view.scan_map)[0]
     # Nothing else than walls and reflectors is met: noise of ranges, and errors of the pose.
     assert np.quantile(apart, 0.9) < 0.15
+
+
+@pytest.mark.parametrize("upside_down", [False, True])
+def test_beams_of_a_sweep_are_drawn_from_where_the_scanner_was_at_their_own_time(
+    repository: Path, upside_down: bool
+) -> None:
+    """Beams that a reflector flagged lie on it while the vehicle turns; by the pose at the stamp they would not."""
+    site = load_project(repository / "maps" / "shop_floor")
+    timed = replace(site.scanners[0], rate=8.0, sweep_duration=0.125, upside_down=upside_down, range_sigma=0.0)
+    site = replace(site, scanners=(timed,), disturbances=site.disturbances.undisturbed())
+    log = virtual_drive(site, site.routes[0].name, 1)
+    result = judged_run(RunInput.of(site, log, start_of(site, log)))
+    playback, centers = Playback(result), KDTree(site.reflectors.centers)
+    turns = np.abs(wrap(np.diff(result.columns.means[:, 2])))
+    drawn, undone = [], []
+    for cycle in np.argsort(turns)[-20:].tolist():
+        scan = log.scans[0].scan(cycle)
+        hit = np.isfinite(scan.ranges)
+        flagged = scan.reflector[hit]
+        points = at(playback, float(result.times[cycle]) + 1e-6).scan_map
+        drawn += centers.query(points[flagged])[0].tolist()
+        pose = result.columns.means[cycle]
+        bearings = scan.bearings[hit][flagged] * (-1.0 if upside_down else 1.0)
+        T_map_scanner = se2.compose(pose, timed.mounting)
+        ends = scan.ranges[hit][flagged, np.newaxis] * np.stack([np.cos(bearings), np.sin(bearings)], axis=1)
+        undone += centers.query(se2.transform_points(T_map_scanner, ends))[0].tolist()
+    radius = float(site.reflectors.radii.max())
+    assert len(drawn) > 100
+    # A radius off its center, and what a beam's width and the estimate add.
+    assert np.quantile(drawn, 0.95) < radius + 0.05
+    assert np.quantile(undone, 0.95) > radius + 0.15
