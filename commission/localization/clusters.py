@@ -4,7 +4,10 @@ A cluster is a run of neighboring reflective beams whose ranges do not jump: one
 real foils have dark beams in their middle. A dark beam at the range of the body is bridged, and one beam that misses it
 (no echo, or one from behind), as long as the body is no wider than the largest reflector; a single one in any case.
 They count as beams, because the filter's window speaks of width. A beam that sees something nearer ends a cluster.
-With equation 3 as printed, single missing beams alone are bridged.
+
+A beam half on a body and half on what is behind it is flagged, and measures something in between. Such mixed beams at
+the edges of a run belong to the body, whose width they tell, however far their ranges jump; where the body is, they do
+not say (`body_of`). With equation 3 as printed, single missing beams alone are bridged, and mixed ones split bodies.
 """
 
 from __future__ import annotations
@@ -19,6 +22,10 @@ from commission.compiled import compiled, compiled_inline
 from commission.localization.beam_echo import half_width_at
 from commission.localization.detector_model import Beams, DetectorModel
 
+MOST_MIXED = 2
+"""Mixed beams at an edge of a body whose ranges jump: beams may be wider than the step between them."""
+DEEPER = 3.0
+"""Sigmas of the difference of two ranges by which a beam is deeper than a body can be."""
 DARK_AT_START = 32
 """Dark beams before the one with which a full turn begins, where there are so many: bodies have dark beams inside."""
 
@@ -30,6 +37,8 @@ class ClusterRule(NamedTuple):
     widest: float
     half_divergence: float
     half_aperture: float
+    steepest: float
+    range_sigma: float
 
 
 @compiled_inline
@@ -40,7 +49,14 @@ def cluster_rule(model: DetectorModel) -> ClusterRule:
     -----
     No formula: fields of the model.
     """
-    return ClusterRule(model.range_jump, model.widest, model.half_divergence, model.half_aperture)
+    return ClusterRule(
+        model.range_jump,
+        model.widest,
+        model.half_divergence,
+        model.half_aperture,
+        model.steepest,
+        model.range_sigma,
+    )
 
 
 @compiled_inline
@@ -79,7 +95,12 @@ def next_cluster(  # noqa: PLR0917 - a scan and a position in it
         k = last + 1 if last + 1 < count else last + 1 - count
         if _lit(ranges, flags, k):
             if not abs(ranges[k] - ranges[last if last < count else last - count]) <= rule.range_jump:
-                break
+                mixed = _mixed_beams(ranges, flags, beams, first, last, end, rule)
+                ends = mixed != 1 or ranges[k] > ranges[first if first < count else first - count]
+                last += mixed
+                if ends:
+                    break
+                continue
             last += 1
             continue
         after = _next_of_body(ranges, flags, beams, first, last, end, rule)
@@ -87,6 +108,106 @@ def next_cluster(  # noqa: PLR0917 - a scan and a position in it
             break
         last = after
     return first, last
+
+
+@compiled_inline
+def _mixed_beams(  # noqa: PLR0917 - a scan and a cluster in it
+    ranges: NDArray[np.float32],
+    flags: NDArray[np.bool_],
+    beams: Beams,
+    first: int,
+    last: int,
+    end: int,
+    rule: ClusterRule,
+) -> int:
+    """Beams behind a cluster's last one that are of the same body although their range jumps; 0 where they are not.
+
+    Either the cluster so far is a few mixed beams before the body, or a few mixed ones follow it before it gets dark.
+    """
+    count = beams.used
+    here = ranges[last if last < count else last - count]
+    after = last + 1 if last + 1 < count else last + 1 - count
+    if rule.widest == 0.0:
+        return 0
+    if ranges[after] < here:
+        before = first - 1 if first > 0 else count - 1
+        starts = (first == 0 and not beams.full_turn) or not _lit(
+            ranges, flags, before if before < count else before - count
+        )
+        return 1 if starts and last - first < MOST_MIXED else 0
+    beam, goes_on, is_behind = last + 1, True, True
+    while goes_on and beam < end and beam - last <= MOST_MIXED + 1:
+        k = beam if beam < count else beam - count
+        goes_on = _lit(ranges, flags, k)
+        is_behind &= not goes_on or ranges[k] >= here
+        beam += goes_on
+    found = beam - last - 1
+    return found if is_behind and found <= MOST_MIXED else 0
+
+
+@compiled_inline
+def body_of(  # noqa: PLR0917 - a scan and a cluster in it
+    ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, first: int, last: int, rule: ClusterRule
+) -> tuple[int, int]:
+    """First and last beam of a cluster that measure the body: without those at its edges that are mixed.
+
+    Parameters
+    ----------
+    ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
+    beams : bearings of the scan.
+    first, last : the cluster's first and last beam, which count on past a full turn.
+    rule : size of the reflectors and noise of the ranges.
+
+    Notes
+    -----
+    range - nearest <= max(largest radius, steepest slope d |b|) + 3 sqrt(2) sigma: how much deeper
+    than its nearest beam a post or plate can be at the angle b from it, and noise. Derived.
+    """
+    if rule.widest == 0.0 or last - first < 2:
+        return first, last
+    count = beams.used
+    # Nearly always neither edge lies deeper than the middle: then nothing else is looked at.
+    half = (last - first) // 2
+    middle, low, high = first + half, first, last
+    middle, low, high = (
+        middle if middle < count else middle - count,
+        low if low < count else low - count,
+        high if high < count else high - count,
+    )
+    deepest = ranges[middle] + max(0.5 * rule.widest, rule.steepest * ranges[middle] * abs(beams.increment) * half)
+    if flags[middle] and ranges[low] <= deepest and ranges[high] <= deepest:
+        return first, last
+    return _without_mixed(ranges, flags, beams, first, last, rule)
+
+
+@compiled_inline
+def _without_mixed(  # noqa: PLR0917 - a scan and a cluster in it
+    ranges: NDArray[np.float32], flags: NDArray[np.bool_], beams: Beams, first: int, last: int, rule: ClusterRule
+) -> tuple[int, int]:
+    """First and last beam of a cluster that are no deeper than the body can be beside its nearest beam."""
+    count, nearest, at = beams.used, math.inf, first
+    for beam in range(first, last + 1):
+        k = beam if beam < count else beam - count
+        if _lit(ranges, flags, k) and ranges[k] < nearest:
+            nearest, at = float(ranges[k]), beam
+    noise = DEEPER * math.sqrt(2.0) * rule.range_sigma
+    per_beam = rule.steepest * nearest * abs(beams.increment)
+    while first < at and _is_deeper(
+        ranges, flags, count, first, nearest + noise + max(0.5 * rule.widest, per_beam * (at - first))
+    ):
+        first += 1
+    while last > at and _is_deeper(
+        ranges, flags, count, last, nearest + noise + max(0.5 * rule.widest, per_beam * (last - at))
+    ):
+        last -= 1
+    return first, last
+
+
+@compiled_inline
+def _is_deeper(ranges: NDArray[np.float32], flags: NDArray[np.bool_], count: int, beam: int, deepest: float) -> bool:
+    """Whether a beam measures nothing of a body that ends at some range."""
+    k = beam if beam < count else beam - count
+    return not _lit(ranges, flags, k) or ranges[k] > deepest
 
 
 @compiled_inline

@@ -23,7 +23,7 @@ from commission.localization.beam_window import (
     window_of_equation_3,
     window_of_plate,
 )
-from commission.localization.clusters import cluster_rule, count_clusters, next_cluster, start_of_turn
+from commission.localization.clusters import body_of, cluster_rule, count_clusters, next_cluster, start_of_turn
 from commission.localization.detector_model import Beams, DetectorModel, beams_of
 from commission.localization.estimate import Status
 from commission.localization.reflector_center import central_beam, circle_fit, plate, rest_of_cylinder
@@ -214,7 +214,7 @@ def passing_widths(distance: float, step: float, kind: int, model: DetectorModel
 
     Notes
     -----
-    fewest - min_model_error and most + max_model_error: Sobreira et al. 2016, Algorithm 2, line 7.
+    low = max(fewest - min_model_error, 1), high = most + max_model_error: Sobreira et al. 2016, Algorithm 2, line 7.
     """
     window = _window(distance, Tilt(0.0, 0.0), step, kind, model)
     return max(window.fewest - model.fewer, 1), window.most + model.more
@@ -230,10 +230,13 @@ def _judge(  # noqa: PLR0917 - a scan and a cluster in it
     """
     distance, bearing, likely, passed = math.nan, math.nan, math.nan, False
     least, width, slope, spread, rest = math.inf, last - first + 1, 0.0, 0.0, 0.0
+    body = body_of(ranges, flags, beams, first, last, cluster_rule(model))
     for kind in range(len(model.radii)):
         radius = model.radii[kind]
         if model.flat[kind]:
-            r, b, slope, spread, rest = plate(ranges, flags, beams.used, first, last, beams.angle_min, beams.increment)
+            r, b, slope, spread, rest = plate(
+                ranges, flags, beams.used, first, last, body, beams.angle_min, beams.increment
+            )
         elif model.circle:
             r, b = circle_fit(
                 ranges,
@@ -241,6 +244,7 @@ def _judge(  # noqa: PLR0917 - a scan and a cluster in it
                 beams.used,
                 first,
                 last,
+                body,
                 beams.angle_min,
                 beams.increment,
                 radius,
@@ -257,8 +261,8 @@ def _judge(  # noqa: PLR0917 - a scan and a cluster in it
                     ranges,
                     flags,
                     beams.used,
-                    first,
-                    last,
+                    body[0],
+                    body[1],
                     beams.angle_min,
                     beams.increment,
                     r,
@@ -272,7 +276,9 @@ def _judge(  # noqa: PLR0917 - a scan and a cluster in it
         if (fits and not passed) or (fits == passed and misfit < least):
             distance, bearing, likely, passed, least = r, b, window.likely, fits, misfit
     if least == math.inf:
-        distance, bearing, _, _, _ = plate(ranges, flags, beams.used, first, last, beams.angle_min, beams.increment)
+        distance, bearing, _, _, _ = plate(
+            ranges, flags, beams.used, first, last, body, beams.angle_min, beams.increment
+        )
     return distance, bearing, likely, passed
 
 

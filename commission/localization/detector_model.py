@@ -10,6 +10,7 @@ import numpy as np
 from commission.compiled import compiled_inline
 from commission.geometry.angles import TURN
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
+from commission.localization.beam_echo import LARGEST_INCIDENCE
 from commission.site.parameters import DetectorParameters
 from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
 from commission.site.scanner import Scanner
@@ -37,6 +38,8 @@ class DetectorModel(NamedTuple):
     range_jump: float
     widest: float
     """Diameter of the largest reflector, up to which dark beams at the range of a body belong to it [m]; 0: none do."""
+    steepest: float
+    """Largest slope at which a plate reflects, where there are plates; 0: there are none."""
     mixed: bool
     """Whether there are plates and cylinders, which the shape of a cluster tells apart."""
     circle: bool
@@ -95,6 +98,7 @@ def detector_model(reflectors: ReflectorMap, scanner: Scanner, parameters: Detec
         int(parameters.max_model_error),
         float(parameters.range_jump),
         2.0 * float(largest.max(initial=0.0)) if parameters.expected_beams == "beam_width" else 0.0,
+        math.tan(LARGEST_INCIDENCE) if flat.any() else 0.0,
         bool(flat.any() and not flat.all()) and parameters.expected_beams == "beam_width",
         parameters.center == "circle",
         parameters.expected_beams == "beam_width",

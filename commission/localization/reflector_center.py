@@ -21,6 +21,8 @@ GRAZING = 0.9
 falls away so steeply that the echo is a mixture, and one beam's noise moves the center by several times as much."""
 MISSING = 0.5
 """Beams that may be missing in a cluster before one asks why."""
+BEHIND = 4.0
+"""Sigmas of a beam's range by which it is too far to be an echo of the circle alone."""
 NEARER = 3.0
 """Sigmas of a beam's range by which something beside the cluster is nearer than the reflector."""
 MEAN_DEPTH = RANGE_PER_RADIUS
@@ -111,6 +113,7 @@ def plate(  # noqa: PLR0917 - a scan and a cluster in it
     count: int,
     first: int,
     last: int,
+    body: tuple[int, int],
     angle_min: float,
     increment: float,
 ) -> PlateFit:
@@ -123,7 +126,8 @@ def plate(  # noqa: PLR0917 - a scan and a cluster in it
     ----------
     ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
     count : beams of a turn, or of the scan.
-    first, last : the cluster's first and last beam, which count on past a full turn.
+    first, last : the cluster's first and last beam, which count on past a full turn: they tell its width.
+    body : first and last beam that measure it, and tell where it is.
     angle_min, increment : first bearing and step between beams [rad].
 
     Notes
@@ -134,7 +138,7 @@ def plate(  # noqa: PLR0917 - a scan and a cluster in it
     """
     middle = 0.5 * (first + last)
     n, sum_a, sum_z, sum_aa, sum_az, sum_zz = 0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for beam in range(first, last + 1):
+    for beam in range(body[0], body[1] + 1):
         distance = _range_at(ranges, flags, count, beam)
         if math.isnan(distance):
             continue
@@ -176,6 +180,7 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it, the reflector and th
     count: int,
     first: int,
     last: int,
+    body: tuple[int, int],
     angle_min: float,
     increment: float,
     radius: float,
@@ -195,7 +200,8 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it, the reflector and th
     ----------
     ranges, flags : (B,) range [m] of each beam, and whether it met something reflective.
     count : beams of a turn, or of the scan.
-    first, last : the cluster's first and last beam, which count on past a full turn.
+    first, last : the cluster's first and last beam, which count on past a full turn: they tell its width.
+    body : first and last beam that measure it, and tell where it is.
     angle_min, increment : first bearing and step between beams [rad].
     radius : of the reflector [m].
     model : width and noise of the beams.
@@ -207,7 +213,7 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it, the reflector and th
     the maximum likelihood, derived.
     """
     middle = angle_min + 0.5 * increment * (first + last)
-    mean = _mean_range(ranges, flags, count, first, last)
+    mean = _mean_range(ranges, flags, count, body[0], body[1])
     start = mean + MEAN_DEPTH * radius
     half_width = half_width_at(start, model.half_divergence, model.half_aperture)
     aside, variance = _from_edges(ranges, count, first, last, increment, start, radius, half_width, model, full_turn)
@@ -215,10 +221,21 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it, the reflector and th
     bearing_variance = model.bearing_sigma * model.bearing_sigma
     range_variance = model.range_sigma * model.range_sigma
     held = 1.0 / variance
-    for _ in range(ITERATIONS):
+    low, high = body
+    if high - low > 1:
+        # An edge beam half on what is behind is farther than the body can be there.
+        ends = angle_min + increment * low - middle - aside, angle_min + increment * high - middle - aside
+        farthest = BEHIND * model.range_sigma
+        low += (
+            _range_at(ranges, flags, count, low) > _expected_echo(start, radius, ends[0], half_width).range + farthest
+        )
+        high -= (
+            _range_at(ranges, flags, count, high) > _expected_echo(start, radius, ends[1], half_width).range + farthest
+        )
+    for iteration in range(ITERATIONS):
         n_rr, n_rt, n_tt = 0.0, 0.0, held
         g_r, g_t = 0.0, held * (aside - turned)
-        for beam in range(first, last + 1):
+        for beam in range(low, high + 1):
             measured = _range_at(ranges, flags, count, beam)
             off = angle_min + increment * beam - middle
             # Which beams count, and how much, is settled at the start: else the fit would not settle.
@@ -226,7 +243,8 @@ def circle_fit(  # noqa: PLR0917 - a scan, a cluster in it, the reflector and th
             if math.isnan(measured) or initial.grazes:
                 continue
             weight = 1.0 / (range_variance + initial.slope * initial.slope * bearing_variance)
-            echo = _expected_echo(distance, radius, off - turned, half_width)
+            # At first both are at the start.
+            echo = initial if iteration == 0 else _expected_echo(distance, radius, off - turned, half_width)
             residual = measured - echo.range
             n_rr += weight
             n_rt -= weight * echo.slope

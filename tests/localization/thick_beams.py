@@ -45,6 +45,8 @@ class Target:
     """Radius of a cylinder, half the length of a plate [m]."""
     incidence: float | None = None
     """Angle at which a plate is met [rad]; None: a cylinder."""
+    background: float | None = None
+    """Distance to a wall behind it, square to the sight, whose echo mixes into that of beams which meet both [m]."""
 
 
 def scans_of(
@@ -67,8 +69,13 @@ def scans_of(
     along, met = _met(beams, target, off)
     flags = met.any(axis=-1) if beams.share == 0.0 else met.mean(axis=-1) >= _needed(beams, target) - 1e-9
     mean = np.where(met, along, 0.0).sum(axis=-1) / np.maximum(met.sum(axis=-1), 1)
+    if target.background is not None:
+        # A mixed pixel: each ray returns what it meets, and the scanner reports their mean.
+        behind = target.background / np.cos(off[..., np.newaxis] + beams.divergence * RAYS)
+        mean = np.where(met, along, behind).mean(axis=-1)
     ranges = mean + beams.range_sigma * rng.standard_normal(off.shape)
-    return np.where(flags, ranges, np.nan).astype(np.float32), flags, float(nominal[0]), places
+    measured = ranges if target.background is not None else np.where(flags, ranges, np.nan)
+    return measured.astype(np.float32), flags, float(nominal[0]), places
 
 
 def _needed(beams: ThickBeams, target: Target) -> float:
