@@ -18,7 +18,9 @@ from commission.site.quantity import MILLIMETRES, PERCENT, PLAIN_DEGREES
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from commission.site.project import Project
     from commission.site.record_log import RecordLog
+    from commission.studies.detection_rates import DetectionRate
     from commission.studies.run import RunResult
     from commission.studies.sections import Section
 
@@ -46,6 +48,8 @@ class Localize:
     force: bool = False
     """Whether files in DIR that this command did not write are overwritten; its own earlier results always are."""
 
+    detection_rates: bool = False
+    """Tell in how many scans reflectors in free sight are seen, by their distance; also in summary.json."""
     strict: bool = False
     """Refuse a recording that cannot be what it says (units, clocks, gaps, thresholds) instead of noting it."""
 
@@ -60,6 +64,7 @@ class Localize:
         from commission.io.results import DETECTIONS, ESTIMATES, SUMMARY, write_results
         from commission.localization import whole_run
         from commission.site.truth import truth_lines
+        from commission.studies.detection_rates import rate_entries, rate_told
         from commission.studies.plausibility import PlausibilityInput, plausibility
         from commission.studies.run import RunInput, judged_run, summary
         from commission.studies.run_findings import run_findings
@@ -87,11 +92,21 @@ class Localize:
             "sections": section_entries(cut),
             "findings": findings,
         }
+        rates = self._rates(project, result)
+        more |= {"detection_rates": rate_entries(rates)} if rates else {}
         with out.writing() as folder:
             write_results(folder, result.columns, summary(result) | more)
         true = [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
         notes = [f"Note         {finding}" for finding in findings]
-        sys.stdout.write("\n".join([*_report(result, cut), *true, *notes, f"Written to   {self.out}"]) + "\n")
+        sys.stdout.write(
+            "\n".join([*_report(result, cut), *map(rate_told, rates), *true, *notes, f"Written to   {self.out}"]) + "\n"
+        )
+
+    def _rates(self, project: Project, result: RunResult) -> tuple[DetectionRate, ...]:
+        """Count how often reflectors are seen, where that is asked for."""
+        from commission.studies.detection_rates import detection_rates
+
+        return detection_rates(project, result.columns) if self.detection_rates else ()
 
     def _with_reference(self, log: RecordLog) -> RecordLog:
         """Return the log with a reference that measures where the options say."""
