@@ -20,7 +20,7 @@ from commission.planning.visibility import visibility_models
 from commission.progress import Progress, silent
 from commission.site.project import Project
 from commission.site.quantity import PERCENT
-from commission.studies.scanner_figures import BELONGS, residuals
+from commission.studies.scanner_figures import BELONGS
 
 EDGES = (0.0, 2.5, 5.0, 7.5, 10.0, 15.0, 20.0, 30.0, 40.0)
 """Distances between which one share is taken [m]."""
@@ -92,7 +92,7 @@ def detection_rates(
     """
     scanners = tuple(dataclasses.replace(each, reflector_range=each.range[1]) for each in project.scanners)
     models = visibility_models(dataclasses.replace(project, scanners=scanners))
-    seen, found = _seen(columns, len(project.reflectors)), list[DetectionRate]()
+    seen, found = _seen(columns, project.reflectors.centers), list[DetectionRate]()
     for index, model in enumerate(models):
         progress(index / len(models), f"counting what scanner {scanners[index].name} sees")
         cycles = np.flatnonzero((columns.modes == Mode.OPERATIONAL) & (columns.detected.scanners == index))
@@ -103,14 +103,13 @@ def detection_rates(
     return tuple(found)
 
 
-def _seen(columns: RunColumns, reflectors: int) -> BoolArray:
+def _seen(columns: RunColumns, centers: FloatArray) -> BoolArray:
     """(K, M) whether a cycle has a detection near each reflector that passed the detector."""
-    off = residuals(columns, columns.means)
-    with np.errstate(invalid="ignore"):
-        apart = np.hypot(off[:, 0], (columns.range_bearing[:, 0] - off[:, 0]) * off[:, 1])
-        near = (apart < BELONGS) & (columns.status != Status.OUTLIER_DETECTOR) & (columns.reflector >= 0)
+    known = np.flatnonzero((columns.status != Status.OUTLIER_DETECTOR) & (columns.reflector >= 0))
+    apart = np.hypot(*(columns.points_map()[known] - centers[columns.reflector[known]]).T)
+    near = known[apart < BELONGS]
     cycles = np.repeat(np.arange(len(columns)), np.diff(columns.offsets))
-    seen = np.zeros((len(columns), max(reflectors, 1)), dtype=np.bool_)
+    seen = np.zeros((len(columns), max(len(centers), 1)), dtype=np.bool_)
     seen[cycles[near], columns.reflector[near]] = True
     return seen
 

@@ -296,3 +296,16 @@ def test_a_reference_of_an_antenna_is_told_by_the_recording_or_by_options(
     line = ("localize", project, recording, "--out", tmp_path / "out")
     assert "--reference-antenna '1' has 1 numbers" in refused(*line, "--reference-antenna", "1")
     assert "reference.clock_offset is 1e+06" in refused(*line, "--reference-clock", "1e6")
+
+
+def test_how_often_reflectors_are_seen_is_told_where_it_is_asked_for(commission, project, recording, tmp_path):
+    code, told, _ = commission("localize", project, recording, "--out", tmp_path / "out", "--detection-rates")
+    assert code == 0
+    (near, *_) = entries = json.loads((tmp_path / "out" / "summary.json").read_text())["detection_rates"]
+    assert near["from_m"] < near["to_m"]
+    assert near["probability_low"] < near["probability"] <= near["probability_high"] <= 1.0
+    # Each reflector of that recording is seen in every scan.
+    assert all(entry["seen"] == entry["expected"] > 0 for entry in entries)
+    assert f"Seen         100 % ({100.0 * near['probability_low']:.0f} to 100) of {near['expected']} from" in told
+    assert commission("localize", project, recording, "--out", tmp_path / "plain")[0] == 0
+    assert "detection_rates" not in json.loads((tmp_path / "plain" / "summary.json").read_text())
