@@ -403,7 +403,7 @@ def is_blind(bearing: float, blind: FloatArray) -> bool:
 
     Notes
     -----
-    In any of them, each as in `in_field_of_view`, by definition.
+    (bearing - first) mod 2 pi <= width for any of them, by definition.
     """
     for s in range(len(blind)):
         if in_field_of_view(bearing, blind[s, 0], blind[s, 1]):
