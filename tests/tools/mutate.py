@@ -15,7 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import StrEnum
@@ -49,23 +49,30 @@ class Outcome:
 
 
 def checked(mutants: Sequence[Mutant]) -> None:
-    """Raise ValueError unless every mutant can be made, has a name of its own, and names tests that exist."""
+    """Raise ValueError, with all that is wrong, unless every mutant can be made, and has a name and tests that exist."""
     names = [mutant.name for mutant in mutants]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise ValueError(f"two mutants are called {twice[0]!r}; expected different names")
-    for mutant in mutants:
-        module = REPOSITORY / mutant.file
-        if not module.is_file() or mutant.find not in module.read_text(encoding="utf-8"):
-            raise ValueError(
-                f"{mutant.file} has no {mutant.find!r}; expected once, for the mutant {mutant.name!r} in "
-                f"tests/tools/mutants. {where_else(mutant.find)}"
-            )
-        mutant.applied_to(module.read_text(encoding="utf-8"))
-        for test in mutant.tests:
-            path, _, name = test.partition("::")
-            file = REPOSITORY / path
-            if not file.is_file() or f"def {name}(" not in file.read_text(encoding="utf-8"):
-                raise ValueError(f"{path} has no {name!r}; expected the test that sees {mutant.name!r}")
+    if problems := [problem for mutant in mutants for problem in problems_with(mutant)]:
+        raise ValueError("\n".join(problems))
+
+
+def problems_with(mutant: Mutant) -> Iterator[str]:
+    """Yield why a mutant cannot be made, or has no tests."""
+    module = REPOSITORY / mutant.file
+    source = module.read_text(encoding="utf-8") if module.is_file() else ""
+    if mutant.find in source:
+        mutant.applied_to(source)
+    else:
+        yield (
+            f"{mutant.file} has no {mutant.find!r}; expected once, for the mutant {mutant.name!r} in "
+            f"tests/tools/mutants. {where_else(mutant.find)}"
+        )
+    for test in mutant.tests:
+        path, _, name = test.partition("::")
+        file = REPOSITORY / path
+        if not file.is_file() or f"def {name}(" not in file.read_text(encoding="utf-8"):
+            yield f"{path} has no {name!r}; expected the test that sees {mutant.name!r}"
 
 
 def where_else(text: str) -> str:

@@ -206,8 +206,8 @@ LOCALIZATION = (
     Mutant(
         name="dark beams bridged however wide the body",
         file=FOLDER + "clusters.py",
-        find="return model.widest / distance",
-        replace="return 10.0 * model.widest / distance",
+        find="return rule.widest / distance",
+        replace="return 10.0 * rule.widest / distance",
         tests=(
             TESTS
             + "test_detector.py::test_dark_beams_at_the_range_of_a_body_are_bridged_up_to_the_width_of_a_reflector",

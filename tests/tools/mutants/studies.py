@@ -60,8 +60,8 @@ STUDIES = (
     Mutant(
         name="2-sigma of a run is one",
         file=FOLDER + "run.py",
-        find="return 2.0 * np.sqrt",
-        replace="return 1.0 * np.sqrt",
+        find="sigmas *= 2.0",
+        replace="sigmas *= 1.0",
         tests=(TESTS + "test_run.py::test_every_curve_has_the_numbers_of_its_cycles",),
     ),
     Mutant(
