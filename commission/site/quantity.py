@@ -20,6 +20,8 @@ FARTHEST = 1e7
 """Largest coordinate [m]: any national grid fits, and no square of it overflows."""
 STAMP_LIMIT = 2**62
 """Stamps [ns] are smaller, and larger than its negative: the difference of any two fits into 64 bits."""
+AS_IN_A_FILE = 5.5e-6
+"""Share by which a number in a file differs from the one that was meant: half of the last of six digits, and a bit."""
 SIGNIFICANT = 6
 """Digits in a file of what has no fixed number of decimals: a sigma, a speed, a probability."""
 
@@ -208,11 +210,15 @@ class Quantity:
         return f"{self.label} [{self.shown_unit}]" if self.shown_unit else self.label
 
     def on_page(self, value: float) -> float:
-        """Return a value in the page's unit, with the decimals of its step or six digits, whichever is closer."""
+        """Return a value in the page's unit: with the decimals of its step where that is the same, else six digits.
+
+        A file has six digits of radians, of which 3 degrees would be 3.00001.
+        """
         if isinstance(value, int) and self.scale == 1.0:
             return value
         number = float(value) * self.scale
-        return min(round(number, _decimals(self.step)), float(f"{number:.6g}"), key=lambda near: abs(near - number))
+        plain = round(number, _decimals(self.step))
+        return plain if math.isclose(plain, number, rel_tol=AS_IN_A_FILE) else float(f"{number:.6g}")
 
     def of_page(self, number: float) -> float:
         """Return what a number on the page means."""

@@ -49,7 +49,7 @@ class Outcome:
 
 
 def checked(mutants: Sequence[Mutant]) -> None:
-    """Raise ValueError, with all that is wrong, unless every mutant can be made, and has a name and tests that exist."""
+    """Raise ValueError, with all that is wrong, unless every mutant can be made and has a name and tests."""
     names = [mutant.name for mutant in mutants]
     if twice := sorted({name for name in names if names.count(name) > 1}):
         raise ValueError(f"two mutants are called {twice[0]!r}; expected different names")
