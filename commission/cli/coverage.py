@@ -14,6 +14,8 @@ from commission.errors import UsageError
 from commission.site.quantity import MILLIMETRES, PERCENT, PLAIN_DEGREES, Shown
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from commission.planning.dilution import FixOptions
     from commission.studies.coverage import CoverageOptions
 
@@ -44,6 +46,9 @@ class CoverageCommand:
     """Largest angle between a flat reflector's normal and the ray [deg]."""
     ellipses: float | None = None
     """Distance between the points whose 1-sigma ellipses are written to ellipses.csv [m]. None: no ellipses."""
+    budget: bool = False
+    """Whether it is also told what constants (survey, mounting, range bias, clock: `uncertainty` of the project) add to
+    the error of a fix, and what most of it comes from. Of many headings that takes as many times longer."""
     force: bool = False
     """Whether files in DIR that this command did not write are overwritten; its own earlier results always are."""
 
@@ -65,7 +70,7 @@ class CoverageCommand:
         entries = summary(result, project.parameters.supervisor)
         ellipses = None if self.ellipses is None else ellipses_of(result, self.ellipses)
         with out.writing() as folder:
-            write_coverage(folder, result.coverage, result.drivable, entries)
+            write_coverage(folder, result.coverage, result.drivable, entries, result.budget)
             if ellipses is not None:
                 write_ellipses(folder, ellipses)
         sys.stdout.write("\n".join([*_report(entries, result.coverage.options), f"Written to   {self.out}"]) + "\n")
@@ -84,6 +89,7 @@ class CoverageCommand:
             blocked_per_m=self.blocked_per_m,
             visibility=VisibilityOptions(self.min_beams, self.max_incidence),
             spacing=self.spacing,
+            with_constants=self.budget,
         )
 
 
@@ -121,4 +127,20 @@ def _report(entries: dict[str, int | float | None], options: FixOptions) -> list
         f"{figure('position_sigma_p95_m', MILLIMETRES, '.1f')} at 95 % of the floor; heading "
         f"{figure('heading_sigma_median_rad', PLAIN_DEGREES, '.2f')} and "
         f"{figure('heading_sigma_p95_rad', PLAIN_DEGREES, '.2f')}",
+        *_budget(entries, share, figure),
+    ]
+
+
+def _budget(
+    entries: dict[str, int | float | None], share: Callable[[str], str], figure: Callable[[str, Shown, str], str]
+) -> list[str]:
+    """Line about the error with all constants, where that was asked for."""
+    from commission.planning.error_budget import CONTRIBUTIONS
+
+    if "total_sigma_median_m" not in entries:
+        return []
+    return [
+        f"Budget       1-sigma with constants: position {figure('total_sigma_median_m', MILLIMETRES, '.1f')} median, "
+        f"{figure('total_sigma_p95_m', MILLIMETRES, '.1f')} at 95 %; most of it comes from "
+        + ", ".join(f"{part} on {share(f'share_{part}_largest')}" for part in CONTRIBUTIONS),
     ]

@@ -15,6 +15,8 @@ from commission.io.atomic import atomic_file, write_text
 from commission.io.lattice_image import NO_FLOOR, lattice_image, shades
 from commission.io.table_writer import angle, figure, place, write_table
 from commission.planning.coverage import Coverage
+from commission.planning.error_budget import CONTRIBUTIONS
+from commission.planning.floor_budget import FloorBudget
 from commission.studies.coverage import Ellipses
 
 ARRAYS = "coverage.npz"
@@ -43,7 +45,13 @@ NO_FIX = (200, 60, 60)
 ROWS_AT_ONCE = 50_000
 
 
-def write_coverage(folder: Path, found: Coverage, drivable: BoolArray, summary: Mapping[str, float | None]) -> None:
+def write_coverage(
+    folder: Path,
+    found: Coverage,
+    drivable: BoolArray,
+    summary: Mapping[str, float | None],
+    budget: FloorBudget | None = None,
+) -> None:
     """Write `coverage.npz`, `coverage.csv`, `coverage.png` and `summary.json`; each is replaced whole or not at all.
 
     Parameters
@@ -52,6 +60,7 @@ def write_coverage(folder: Path, found: Coverage, drivable: BoolArray, summary: 
     found : figures of a fix over a lattice.
     drivable : (N,) which points are floor; the table and the image leave the others out.
     summary : by key; the last file written, so that where it is the others are complete.
+    budget : the error with all constants and the share of each source in its square, for further columns.
 
     Raises
     ------
@@ -65,10 +74,12 @@ def write_coverage(folder: Path, found: Coverage, drivable: BoolArray, summary: 
         "drivable": drivable.reshape(lattice.rows, lattice.columns),
     }
     arrays |= {name + unit: found.image(name) for name, unit in UNITS.items()}
+    more = {} if budget is None else _budget_columns(budget)
+    arrays |= {name: column.reshape(lattice.rows, lattice.columns) for name, column in more.items()}
     with atomic_file(folder / ARRAYS) as file:
         np.savez_compressed(file, allow_pickle=False, **arrays)
-    header = ["x", "y", *(name + unit for name, unit in UNITS.items())]
-    write_table(folder / TABLE, header, _rows(found, drivable))
+    header = ["x", "y", *(name + unit for name, unit in UNITS.items()), *more]
+    write_table(folder / TABLE, header, _rows(found, drivable, more))
     with atomic_file(folder / IMAGE) as file:
         heat_image(found, drivable).save(file, format="PNG")
     write_text(folder / SUMMARY, json.dumps(dict(summary), indent=2, allow_nan=False) + "\n")
@@ -100,7 +111,13 @@ def heat_image(found: Coverage, drivable: BoolArray) -> Image.Image:
     return lattice_image(found.lattice, colors)
 
 
-def _rows(found: Coverage, drivable: BoolArray) -> Iterator[tuple[str, ...]]:
+def _budget_columns(budget: FloorBudget) -> dict[str, NDArray[np.float64]]:
+    """(N,) columns of the error with all constants [m], and of the share of each source in its square."""
+    shares = {f"{part}_share": budget.shares[:, index] for index, part in enumerate(CONTRIBUTIONS)}
+    return {"total_sigma_m": budget.sigma, **shares}
+
+
+def _rows(found: Coverage, drivable: BoolArray, more: Mapping[str, NDArray[np.float64]]) -> Iterator[tuple[str, ...]]:
     """One row per drivable point; a figure that is infinite is empty."""
     rows = np.flatnonzero(drivable)
     points = found.lattice.points()
@@ -108,6 +125,7 @@ def _rows(found: Coverage, drivable: BoolArray) -> Iterator[tuple[str, ...]]:
         block = rows[start : start + ROWS_AT_ONCE]
         columns = [_cells(place, points[block, axis]) for axis in range(2)]
         columns += [_cells(figure, getattr(found.fixes, name)[block]) for name in UNITS]
+        columns += [_cells(figure, column[block]) for column in more.values()]
         yield from zip(*columns, strict=True)
 
 

@@ -17,7 +17,9 @@ from commission.geometry.gaussian import ellipse_axes
 from commission.planning.coverage import Coverage, Lattice, lattice_of
 from commission.planning.coverage import coverage as over_lattice
 from commission.planning.dilution import FixOptions, Heading, Measurement, fix_options, odometry_prior
+from commission.planning.error_budget import CONTRIBUTIONS
 from commission.planning.fix_ellipses import every_nth, position_covariances
+from commission.planning.floor_budget import BudgetSite, FloorBudget, floor_budget
 from commission.planning.vehicle_visibility import VehicleVisibility, vehicle_visibility
 from commission.planning.visibility import VisibilityOptions
 from commission.progress import Progress, part, silent
@@ -28,6 +30,7 @@ from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
+from commission.site.uncertainty import Uncertainty
 from commission.studies.inputs import StudyInput
 from commission.studies.kernels import DILUTION, SEVERAL_SCANNERS, SIGHT
 
@@ -45,6 +48,10 @@ LEAST_PRIOR = 1e-6
 """1-sigma of what odometry promises where its noise is zero [m, rad]."""
 COMPILING, PREPARING = 0.3, 0.4
 """Shares of the time until which kernels are compiled, and walls and reflectors prepared."""
+
+
+ADDING = 0.7
+"""Share of the time after which constants are added, where that is asked for."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +72,8 @@ class CoverageOptions:
     """What counts as visible."""
     spacing: float | None = None
     """Distance between neighboring points [m]. None: a round one that keeps the picture small."""
+    with_constants: bool = False
+    """Whether it is told what constants that are not known exactly add to the error of a fix."""
 
     def fix(self, parameters: Parameters, scanners: tuple[Scanner, ...], speed: float) -> FixOptions:
         """What is asked of a fix, with the noise that the localizer assumes.
@@ -87,6 +96,16 @@ class CoverageOptions:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class Constants:
+    """What a budget of the error depends on besides."""
+
+    uncertainty: Uncertainty
+    """How well the constants of the site and the vehicle are known."""
+    speed: float
+    """Of the vehicle [m/s]."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CoverageInput(StudyInput):
     """What the coverage of a floor depends on."""
@@ -105,6 +124,8 @@ class CoverageInput(StudyInput):
     """What counts as visible."""
     spacing: float | None
     """Distance between neighboring points [m]. None: a round one that keeps the picture small."""
+    constants: Constants | None
+    """How well constants are known; None where they do not matter."""
 
     @staticmethod
     def of(project: Project, options: CoverageOptions | None = None) -> CoverageInput:
@@ -125,6 +146,7 @@ class CoverageInput(StudyInput):
             fix=options.fix(project.parameters, project.scanners, speed),
             visibility=replace(options.visibility, detector=project.parameters.detector),
             spacing=options.spacing,
+            constants=Constants(project.uncertainty, speed) if options.with_constants else None,
         )
 
     def lattice(self) -> Lattice:
@@ -146,6 +168,8 @@ class CoverageResult:
     """What is visible from where."""
     drivable: BoolArray
     """(N,) whether each point lies on floor that the map knows to be free; all of it without a map."""
+    budget: FloorBudget | None = None
+    """The error of a fix with all constants, and what it comes from, where that was asked for."""
 
 
 def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResult:
@@ -166,9 +190,15 @@ def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResu
     warm_up((SIGHT, DILUTION, *several), part(progress, 0.0, COMPILING))
     progress(COMPILING, "sight of each reflector")
     visible = vehicle_visibility(inputs, inputs.visibility)
-    found = over_lattice(visible, lattice, inputs.fix, part(progress, PREPARING, 1.0))
+    until = 1.0 if inputs.constants is None else ADDING
+    found = over_lattice(visible, lattice, inputs.fix, part(progress, PREPARING, until))
+    budget = None
+    if inputs.constants is not None:
+        known = inputs.constants
+        site = BudgetSite(visible=visible, uncertainty=known.uncertainty, speed=known.speed)
+        budget = floor_budget(found, site, part(progress, ADDING, 1.0))
     floor = np.array(found.floor) if inputs.floor_map is None else free_floor(inputs, lattice.points())
-    return CoverageResult(found, visible, floor)
+    return CoverageResult(found, visible, floor, budget)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -238,7 +268,17 @@ def summary(result: CoverageResult, limits: SupervisorParameters) -> dict[str, N
         for quantile, label in ((0.5, "median"), (0.95, "p95")):
             # Of the whole floor: where more than a twentieth has no fix, the 95 % quantile does not exist.
             entries[f"{name}_{label}_{unit}"] = _quantile(values[on], quantile)
-    return entries
+    return entries | ({} if result.budget is None else _budget_entries(result.budget, on))
+
+
+def _budget_entries(budget: FloorBudget, on: BoolArray) -> dict[str, Number]:
+    """Error of a fix with all constants, and on which share of the floor each source contributes most."""
+    largest = np.array(budget.largest)[on]
+    return {
+        "total_sigma_median_m": _quantile(budget.sigma[on], 0.5),
+        "total_sigma_p95_m": _quantile(budget.sigma[on], 0.95),
+        **{f"share_{part}_largest": _mean(largest == part) for part in CONTRIBUTIONS},
+    }
 
 
 def within_limits(found: Coverage, limits: SupervisorParameters) -> BoolArray:

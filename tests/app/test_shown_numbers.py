@@ -482,6 +482,7 @@ FIGURES = {
     Figure.VISIBLE: (3.0, "3"),
     Figure.POSITION_SIGMA: (0.0123, "12.3 mm"),
     Figure.HEADING_SIGMA: (0.0123, "0.705°"),
+    Figure.TOTAL_SIGMA: (0.0123, "12.3 mm"),
     Figure.POSITION_DOP: (1.23, "1.23"),
     Figure.HEADING_DOP: (0.456, "0.456"),
     Figure.EXPECTED_VISIBLE: (2.5, "2.5"),
@@ -499,6 +500,13 @@ def test_a_figure_of_the_floor_is_read_in_its_unit(figure: Figure, site: Project
     table = reading_table(FloorReading((1.234, 5.678), {figure: value}, on_floor=True), state)
     assert f"<td>{expected}</td>" in table
     assert "1.23, 5.68 m" in table
+
+
+def test_what_the_error_at_a_place_comes_from_is_read_with_the_largest_first(site: Project) -> None:
+    reading = FloorReading((1.0, 2.0), {Figure.TOTAL_SIGMA: 0.0123}, True, (0.2, 0.1, 0.05, 0.15, 0.5))
+    table = reading_table(reading, AppState(project=site, saved=site))
+    assert "clock 50 %, noise 20 %, range 15 %, map 10 %, mounting 5 %" in table
+    assert "of its square" not in reading_table(replace(reading, shares=()), AppState(project=site, saved=site))
 
 
 def test_every_figure_of_the_floor_is_expected() -> None:

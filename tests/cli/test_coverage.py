@@ -87,3 +87,18 @@ def test_unasked_it_is_the_worst_heading_where_the_scanner_does_not_see_all_arou
     assert ("Heading      worst of 16" in told) is (heading == "worst")
     commission("coverage", project, "--out", tmp_path / "said", "--spacing", "0.5", "--heading", heading)
     assert summary(tmp_path / "out") == summary(tmp_path / "said")
+
+
+def test_the_budget_of_the_floor_is_written_and_told(commission, project, tmp_path):
+    code, told, _ = commission("coverage", project, "--out", tmp_path / "out", "--spacing", "0.5", "--budget")
+    assert code == 0
+    with np.load(tmp_path / "out" / "coverage.npz") as found:
+        has_fix = np.isfinite(found["total_sigma_m"]) & found["drivable"]
+        assert (found["total_sigma_m"][has_fix] > found["position_sigma_m"][has_fix]).all()
+        shares = np.stack([found[f"{part}_share"] for part in ("noise", "map", "mounting", "range", "clock")])
+    np.testing.assert_allclose(shares.sum(axis=0)[has_fix], 1.0)
+    entries = summary(tmp_path / "out")
+    largest = [entries[f"share_{part}_largest"] for part in ("noise", "map", "mounting", "range", "clock")]
+    assert sum(largest) <= 1.0 + 1e-12
+    assert f"position {1000.0 * entries['total_sigma_median_m']:.1f} mm median" in told
+    assert f"clock on {100.0 * largest[4]:.1f} %" in told

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
-from commission.geometry.arrays import BoolArray
+import numpy as np
+
+from commission.app.coverage.settings import Figure
+from commission.geometry.arrays import BoolArray, FloatArray
 from commission.planning import coverage as coverage_kernels
 from commission.planning.coverage import LiveCoverage
+from commission.planning.floor_budget import FloorBudget
 from commission.progress import Progress, part
 from commission.site.reflectors import ReflectorMap
 from commission.studies.coverage import CoverageInput, coverage
@@ -23,6 +28,14 @@ class Covered:
     """The figures; whoever holds this result may move reflectors."""
     floor: BoolArray
     """(N,) where a vehicle could stand."""
+    budget: FloorBudget | None = None
+    """The error of a fix with all constants, where it is asked for: of the reflectors as they were at first."""
+
+    def values(self, figure: Figure) -> FloatArray:
+        """(N,) a figure of the floor, SI; infinite where it is not known."""
+        if figure is not Figure.TOTAL_SIGMA:
+            return getattr(self.live.coverage.fixes, figure.value)
+        return np.full(len(self.floor), math.inf) if self.budget is None else self.budget.sigma
 
     def follow(self, before: CoverageInput, now: CoverageInput) -> bool:
         """Move the reflectors that were moved, where nothing else is different.
@@ -36,7 +49,8 @@ class Covered:
         -------
         followed : whether they are; else they are as they were.
         """
-        if replace(now, reflectors=before.reflectors) != before:
+        if replace(now, reflectors=before.reflectors) != before or self.budget is not None:
+            # A budget does not follow reflectors: it is computed anew.
             return False
         changed = changed_reflectors(self.live.reflectors, now.reflectors)
         # Without a floor map the reflectors say how far the floor reaches.
@@ -58,7 +72,7 @@ def cover(inputs: CoverageInput, progress: Progress) -> Covered:
     found = coverage(inputs, part(progress, 0.0, 0.95))
     progress(0.95, "compiling moved reflectors")
     coverage_kernels.warm_up()
-    return Covered(LiveCoverage(found.visible, found.coverage), found.drivable)
+    return Covered(LiveCoverage(found.visible, found.coverage), found.drivable, found.budget)
 
 
 def changed_reflectors(before: ReflectorMap, after: ReflectorMap) -> list[int] | None:

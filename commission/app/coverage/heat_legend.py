@@ -16,6 +16,7 @@ from commission.app.coverage.scale import NO_FIX_COLORS
 from commission.app.coverage.settings import CoverageSettings, Figure
 from commission.app.coverage.view import EllipseView, FloorReading, HeatView, coverage_of
 from commission.app.coverage.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES, value_text
+from commission.planning.error_budget import CONTRIBUTIONS
 from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT, Shown
 
 AMONG_PEOPLE = (Figure.EXPECTED_VISIBLE, Figure.TWO_OR_MORE, Figure.THREE_OR_MORE)
@@ -83,6 +84,9 @@ def reading_table(reading: FloorReading, state: AppState) -> str:
     for figure, value in reading.values.items() if reading.on_floor else ():
         if people or figure not in AMONG_PEOPLE:
             rows.append((escaped(FIGURE_NAMES[figure].split(" [")[0]), value_text(figure, value, measurement)))
+    if reading.on_floor and any(reading.shares):
+        named = sorted(zip(reading.shares, CONTRIBUTIONS, strict=True), reverse=True)
+        rows.append(("… of its square", ", ".join(f"{name} {PERCENT.text(share)}" for share, name in named)))
     return f"<div class='c-reading' style='padding:6px 6px 0 0'>{table(rows)}</div>"
 
 
@@ -100,7 +104,7 @@ def _conditions(state: AppState, figure: Figure) -> str:
 def _limit(heat: HeatView, state: AppState) -> str:
     """Say where the supervisor's limit lies on the scale."""
     limits = state.project.parameters.supervisor
-    if heat.scale.figure is Figure.POSITION_SIGMA:
+    if heat.scale.figure in {Figure.POSITION_SIGMA, Figure.TOTAL_SIGMA}:
         return _limit_text(MILLIMETRES, limits.position_limit, (".0f", ".0f"))
     if heat.scale.figure is Figure.HEADING_SIGMA:
         return _limit_text(DEGREES, limits.heading_limit, (".1f", ".2f"))

@@ -48,6 +48,7 @@ QUANTITIES: dict[Figure, ShownFigure] = {
     Figure.VISIBLE: ShownFigure(label="Visible reflectors", bounds=COUNTS, more_is_better=True),
     Figure.POSITION_SIGMA: ShownFigure(label="Position error, 1σ [mm]", shown=MILLIMETRES),
     Figure.HEADING_SIGMA: ShownFigure(label="Heading error, 1σ [°]", shown=DEGREES),
+    Figure.TOTAL_SIGMA: ShownFigure(label="Position error with constants, 1σ [mm]", shown=MILLIMETRES),
     Figure.POSITION_DOP: ShownFigure(label="Position dilution (DOP)"),
     Figure.HEADING_DOP: ShownFigure(label="Heading dilution (DOP)"),
     Figure.EXPECTED_VISIBLE: ShownFigure(

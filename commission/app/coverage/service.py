@@ -101,5 +101,5 @@ class CoverageService(Service):
         """The scale stays while reflectors move, so that colors compare."""
         if self._scale is None or self._scale.figure is not figure or self._scaled is not covered:
             self._scaled = covered
-            self._scale = scale_for(figure, getattr(covered.live.coverage.fixes, figure.value)[covered.floor])
+            self._scale = scale_for(figure, covered.values(figure)[covered.floor])
         return self._scale

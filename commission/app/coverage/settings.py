@@ -21,12 +21,14 @@ NAME = "coverage"
 
 
 class Figure(StrEnum):
-    """What a heatmap shows; the names are those of `planning.dilution.Fixes`."""
+    """What a heatmap shows; the names are those of `planning.dilution.Fixes` where nothing else is said."""
 
     NONE = ""
     VISIBLE = "visible"
     POSITION_SIGMA = "position_sigma"
     HEADING_SIGMA = "heading_sigma"
+    TOTAL_SIGMA = "total_sigma"
+    """With constants; no figure of a fix, but of its budget."""
     POSITION_DOP = "position_dop"
     HEADING_DOP = "heading_dop"
     EXPECTED_VISIBLE = "expected_visible"
@@ -73,6 +75,7 @@ class CoverageSettings:
             on_odometry=self.on_odometry,
             blocked_per_m=conditions.blocked_per_m,
             visibility=conditions.visibility,
+            with_constants=self.figure is Figure.TOTAL_SIGMA,
         )
 
 

@@ -25,6 +25,8 @@ class FloorReading:
     """Every figure, SI."""
     on_floor: bool
     """Whether a vehicle could stand there."""
+    shares: tuple[float, ...] = ()
+    """Share of each of `CONTRIBUTIONS` in the square of the error with constants [0..1]; none where it is not shown."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -89,7 +91,7 @@ def heat_view(covered: Covered, scale: Scale, *, outdated: bool) -> HeatView:
     outdated : whether the project has changed since.
     """
     lattice = covered.live.coverage.lattice
-    classes = scale.classes(getattr(covered.live.coverage.fixes, scale.figure.value), covered.floor)
+    classes = scale.classes(covered.values(scale.figure), covered.floor)
     counts = np.bincount(classes, minlength=FIRST + len(scale.bounds) + 1)[NO_FIX:]
     return HeatView(
         lattice=lattice,
@@ -105,6 +107,7 @@ def reading_of(covered: Covered, probe: tuple[float, float]) -> FloorReading | N
     index = covered.live.coverage.lattice.index_near(*probe)
     if index is None:
         return None
-    fixes = covered.live.coverage.fixes
-    values = {figure: float(getattr(fixes, figure.value)[index]) for figure in QUANTITIES}
-    return FloorReading(probe, values, bool(covered.floor[index]))
+    shown = [figure for figure in QUANTITIES if figure is not Figure.TOTAL_SIGMA or covered.budget is not None]
+    values = {figure: float(covered.values(figure)[index]) for figure in shown}
+    shares = () if covered.budget is None else tuple(covered.budget.shares[index].tolist())
+    return FloorReading(probe, values, bool(covered.floor[index]), shares)

@@ -17,7 +17,7 @@ from commission.planning.dilution import Heading, Measurement
 from commission.progress import silent
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
-from commission.studies.coverage import CoverageInput
+from commission.studies.coverage import CoverageInput, coverage
 from tests.app.asking import ME
 from tests.app.bench import Bench
 
@@ -65,6 +65,26 @@ def test_a_moved_reflector_is_followed_at_once_and_equals_a_new_computation(benc
     afresh = cover(CoverageInput.of(bench.state.project, options), silent)
     expected = after.scale.classes(afresh.live.coverage.fixes.position_sigma, afresh.floor)
     assert np.array_equal(after.classes.ravel(), expected)
+
+
+def test_the_error_with_constants_is_that_of_its_study_and_computed_anew_when_a_reflector_moves(
+    bench: Bench[CoverageService], project: Project
+) -> None:
+    bench.ask(SetCoverage("figure", "total_sigma"), ReadFloor((2.0, 2.0), 0.01))
+    heat = bench.found().heat
+    options = replace(CoverageSettings(), figure=Figure.TOTAL_SIGMA).options(Conditions())
+    result = coverage(CoverageInput.of(project, options))
+    assert result.budget is not None
+    assert np.array_equal(heat.classes.ravel(), heat.scale.classes(result.budget.sigma, result.drivable))
+    reading = bench.view.reading
+    index = result.coverage.lattice.index_near(2.0, 2.0)
+    assert reading.values[Figure.TOTAL_SIGMA] == result.budget.sigma[index]
+    assert reading.shares == tuple(result.budget.shares[index].tolist())
+    bench.move(0, 0.7)
+    assert bench.jobs.unfinished()
+    assert bench.view.heat.outdated
+    bench.found()
+    assert not bench.view.heat.outdated
 
 
 def test_without_a_map_a_reflector_that_moves_the_floors_edge_is_computed_anew(project: Project) -> None:
