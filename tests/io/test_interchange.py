@@ -145,6 +145,6 @@ def test_table_of_a_spreadsheet_goes_into_a_project_and_leaves_alone_what_it_has
     save_project(Project(reflectors=ReflectorMap((noted, *rest))), tmp_path / "hall")
     (tmp_path / "survey.csv").write_text(f"Nr;X [mm];Y [mm]\n{first.id};9000,5;{1000 * first.y:.0f}\n")
     report = convert_file(tmp_path / "survey.csv", tmp_path / "hall", USUAL, force=True)
-    assert "the table has no radius; 40 mm is assumed" in report
+    assert "the table has no radius; that of its reflectors is unknown" in report
     (kept,) = load_project(tmp_path / "hall").reflectors.reflectors
     assert kept == replace(noted, x=9.0005)
