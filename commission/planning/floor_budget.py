@@ -71,7 +71,7 @@ class BudgetSite:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Look:
+class _Stance:
     """A heading of the vehicle, and how each scanner looks about the point then."""
 
     heading: float | None
@@ -103,7 +103,7 @@ def floor_budget(found: Coverage, site: BudgetSite, progress: Progress = silent)
     constant c with the response J of a detection, P (sum w h J) of its 1-sigma. A scanner that is displaced sees what
     a displaced vehicle would. All round, the vehicle is taken to drive in the worst direction.
     """
-    looks = tuple(_looks(found.options, site.scanners))
+    stances = tuple(_stances(found.options, site.scanners))
     points = found.lattice.points()
     sigma, shares = np.full(len(points), math.inf), np.zeros((len(points), len(CONTRIBUTIONS)))
     step = max(1, PAIRS_AT_ONCE // max(1, len(site.reflectors)))
@@ -111,9 +111,9 @@ def floor_budget(found: Coverage, site: BudgetSite, progress: Progress = silent)
         rows = slice(first, first + step)
         progress(first / len(points), "error with constants")
         none_yet = np.ones(len(points[rows]), dtype=np.bool_)
-        for look in looks:
-            one, its = _along_longest(*_parts(found, site, look, rows))
-            stands = _stands(site, look, points[rows])
+        for stance in stances:
+            one, its = _along_longest(*_parts(found, site, stance, rows))
+            stands = _stands(site, stance, points[rows])
             worse = one > sigma[rows] if found.options.heading is Heading.WORST else one < sigma[rows]
             takes = stands & (none_yet | worse)
             sigma[rows][takes], shares[rows][takes] = one[takes], its[takes]
@@ -121,12 +121,12 @@ def floor_budget(found: Coverage, site: BudgetSite, progress: Progress = silent)
     return FloorBudget(sigma=read_only(sigma), shares=read_only(shares))
 
 
-def _looks(options: FixOptions, scanners: Sequence[Scanner]) -> Iterator[_Look]:
+def _stances(options: FixOptions, scanners: Sequence[Scanner]) -> Iterator[_Stance]:
     """Headings that are looked at; the views of a coverage are heading by heading, scanner by scanner."""
     count = len(scanners)
     mounted = np.array([scanner.mounting for scanner in scanners])
     if options.heading is Heading.ALL_ROUND:
-        yield _Look(None, tuple(range(count)), np.zeros((count, 2)), np.zeros(count))
+        yield _Stance(None, tuple(range(count)), np.zeros((count, 2)), np.zeros(count))
         return
     headings = [options.given_heading]
     if options.heading is not Heading.GIVEN:
@@ -138,10 +138,10 @@ def _looks(options: FixOptions, scanners: Sequence[Scanner]) -> Iterator[_Look]:
         if count == 1 and options.heading is not Heading.GIVEN:
             levers = np.zeros((1, 2))
         views = (0,) if count == 1 else tuple(count * number + each for each in range(count))
-        yield _Look(heading, views, levers, heading + mounted[:, 2])
+        yield _Stance(heading, views, levers, heading + mounted[:, 2])
 
 
-def _parts(found: Coverage, site: BudgetSite, look: _Look, rows: slice) -> tuple[FloatArray, BoolArray]:
+def _parts(found: Coverage, site: BudgetSite, stance: _Stance, rows: slice) -> tuple[FloatArray, BoolArray]:
     """(n, 5, 2, 2) what each source contributes to the position [m^2], and (n,) whether there is a fix."""
     options, known = found.options, site.uncertainty
     places = found.lattice.points()[rows]
@@ -155,20 +155,20 @@ def _parts(found: Coverage, site: BudgetSite, look: _Look, rows: slice) -> tuple
     displaced: list[FloatArray] = []
     turned: list[FloatArray] = []
     taken = np.zeros((count, len(site.reflectors)), dtype=np.bool_)
-    for scanner in range(len(look.views)):
-        sees = _sees(found, site, look, scanner, (rows, places + look.levers[scanner]))
-        if look.heading is None:
+    for scanner in range(len(stance.views)):
+        sees = _sees(found, site, stance, scanner, (rows, places + stance.levers[scanner]))
+        if stance.heading is None:
             # All round each reflector counts once, whichever scanner sees it.
             sees &= ~taken
         taken |= sees
-        one = _sums(site, options, sees, places + look.levers[scanner], look.levers[scanner])
+        one = _sums(site, options, sees, places + stance.levers[scanner], stance.levers[scanner])
         information += one.information
         noise += one.noise
         survey += one.survey
         biases.append(one.range_gradient)
         displaced.append(one.information[:, :, :2])
         turned.append(one.bearing_gradient)
-    fewest = 0 if has_prior else 3 if options.measurement is Measurement.BEARING_ONLY and len(look.views) == 1 else 2
+    fewest = 0 if has_prior else 3 if options.measurement is Measurement.BEARING_ONLY and len(stance.views) == 1 else 2
     covariance, regular = _inverse(information, taken.sum(axis=1) >= fewest)
 
     def position(matrix: FloatArray) -> FloatArray:
@@ -180,7 +180,7 @@ def _parts(found: Coverage, site: BudgetSite, look: _Look, rows: slice) -> tuple
 
     parts = np.zeros((count, len(CONTRIBUTIONS), 2, 2))
     parts[:, NOISE], parts[:, MAP] = position(noise), position(survey)
-    direction = None if look.heading is None else np.array([math.cos(look.heading), math.sin(look.heading)])
+    direction = None if stance.heading is None else np.array([math.cos(stance.heading), math.sin(stance.heading)])
     for bias, shift, turn in zip(biases, displaced, turned, strict=True):
         parts[:, RANGE] += known.range_bias**2 * response(bias[:, :, np.newaxis])
         parts[:, MOUNTING] += known.mounting_position**2 * response(shift)
@@ -190,23 +190,23 @@ def _parts(found: Coverage, site: BudgetSite, look: _Look, rows: slice) -> tuple
     return parts, regular
 
 
-def _stands(site: BudgetSite, look: _Look, points: FloatArray) -> BoolArray:
+def _stands(site: BudgetSite, stance: _Stance, points: FloatArray) -> BoolArray:
     """(n,) whether the vehicle can stand at points (n, 2) so: of several scanners none is in a wall."""
     stands = np.ones(len(points), dtype=np.bool_)
-    for lever in look.levers if len(look.levers) > 1 else ():
+    for lever in stance.levers if len(stance.levers) > 1 else ():
         stands &= np.logical_not(site.visible.caster.grid.is_occupied(points + lever))
     return stands
 
 
-def _sees(found: Coverage, site: BudgetSite, look: _Look, scanner: int, at: tuple[slice, FloatArray]) -> BoolArray:
+def _sees(found: Coverage, site: BudgetSite, stance: _Stance, scanner: int, at: tuple[slice, FloatArray]) -> BoolArray:
     """(n, M) which reflectors a scanner sees from its places; all around where the heading is."""
     rows, places = at
-    seen = unpack(found.sight[look.views[scanner], rows], len(site.reflectors))
-    if look.heading is None:
+    seen = unpack(found.sight[stance.views[scanner], rows], len(site.reflectors))
+    if stance.heading is None:
         return seen
     first, width = field_of_view(site.scanners[scanner])
     delta = site.reflectors.centers[np.newaxis] - places[:, np.newaxis]
-    bearings = np.arctan2(delta[..., 1], delta[..., 0]) - look.headings[scanner]
+    bearings = np.arctan2(delta[..., 1], delta[..., 0]) - stance.headings[scanner]
     return seen & (np.mod(bearings - first, 2.0 * math.pi) <= width)
 
 
