@@ -31,7 +31,8 @@ class Problems:
         from commission.io.project_copy import refuse_to_replace, save_copy
         from commission.io.project_file import load_project
         from commission.site.editing.facing import faced_from_walls, said_of
-        from commission.studies.problems import ProblemsInput, problems
+        from commission.studies.problems import ProblemsInput, errors_first, problems
+        from commission.studies.sight import SightInput, sight
 
         if self.face_from_walls is (self.out is None):
             raise UsageError("expected --face-from-walls and --out PROJECT2 together, or none of them")
@@ -50,6 +51,6 @@ class Problems:
             if kept is not None:
                 lines.append(f"Note         unsaved edits of the project that was there are kept in {kept}")
             lines.append(f"Written to   {self.out}")
-        found = problems(ProblemsInput.of(project)).problems
+        found = errors_first((*problems(ProblemsInput.of(project)).problems, *sight(SightInput.of(project)).problems))
         lines += [f"{each.severity.value.capitalize():12} {each.text}" for each in found]
         sys.stdout.write("\n".join(lines or ["Problems     none"]) + "\n")

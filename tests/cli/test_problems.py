@@ -56,3 +56,12 @@ def test_out_and_face_from_walls_go_together(refused, plates: Path, tmp_path: Pa
     assert "together" in refused("problems", plates, "--face-from-walls")
     assert "together" in refused("problems", plates, "--out", tmp_path / "faced")
     assert "another folder" in refused("problems", plates, "--face-from-walls", "--out", plates)
+
+
+def test_routes_from_which_too_few_reflectors_are_seen_are_told(commission, project):
+    lines = (project / "reflectors.csv").read_text(encoding="utf-8").splitlines()
+    (project / "reflectors.csv").write_text("\n".join(lines[:2]) + "\n", encoding="utf-8")
+    code, told, _ = commission("problems", project)
+    assert code == 0
+    assert "Warning      Route 'Straight': " in told
+    assert "in sight at worst" in told
