@@ -21,8 +21,8 @@ from commission.localization.estimate import Status
 from commission.localization.kalman import innovation, squared_distance
 from commission.localization.observation import (
     SMALLEST_RANGE,
-    Direction,
     ObservationModel,
+    UnitVector,
     composed,
     direction_of,
     expect,
@@ -159,7 +159,7 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     model: ObservationModel,
     given: Considering | None,
     work: FloatArray | None,
-    aim: Direction | None,
+    aim: UnitVector | None,
 ) -> tuple[float, float]:
     """Squared Mahalanobis distance to one reflector, and -2 ln(likelihood) up to a constant.
 
@@ -191,8 +191,8 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
 
 
 @compiled_inline
-def aimed_at(belief: PoseGaussian, bearing: float, model: ObservationModel, aim: Direction | None) -> Direction:
-    """Direction of a detection on the map.
+def aimed_at(belief: PoseGaussian, bearing: float, model: ObservationModel, aim: UnitVector | None) -> UnitVector:
+    """UnitVector of a detection on the map.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def aimed_at(belief: PoseGaussian, bearing: float, model: ObservationModel, aim:
 
     Notes
     -----
-    theta + mount + bearing, by definition.
+    angle = theta + mount + bearing, by definition.
     """
     if aim is None:
         return direction_of(belief.theta + model.mount_theta + bearing)
@@ -225,7 +225,7 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     cross: FloatArray | None,
     given: Considering | None,
     work: FloatArray | None,
-    aim: Direction | None,
+    aim: UnitVector | None,
 ) -> tuple[int, float]:
     """Most likely reflector of the whole map, found near the detection: its row in `places`, and d2.
 
@@ -239,11 +239,11 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     ----------
     belief : the detection is judged at it.
     measured_range, measured_bearing : range bias already taken off [m], [rad].
-    view, model : scanner's place, and model of the observation.
+    view, reach, model : scanner's place, bounds of the search (`reach_of`), and model of the observation.
     gate : of the association filter.
     cells, places, cell_offsets : the map, see `ReflectorIndex`.
     cross, given, work : of the scan, where constants are considered, else None.
-    at : column of `work` that is free for reflectors to be tried.
+    aim : direction of the detection, where it is known already, else None.
 
     Notes
     -----
@@ -305,8 +305,8 @@ def reach_of(view: Viewpoint, largest_variance: float, given: Considering | None
 
 
 @compiled_inline
-def aim_of(given: Considering | None, aims: FloatArray | None, detection: int) -> Direction | None:
-    """Direction of a detection of the scan on the map; None where no constants are considered.
+def aim_of(given: Considering | None, aims: FloatArray | None, detection: int) -> UnitVector | None:
+    """UnitVector of a detection of the scan on the map; None where no constants are considered.
 
     Parameters
     ----------
@@ -315,13 +315,13 @@ def aim_of(given: Considering | None, aims: FloatArray | None, detection: int) -
 
     Notes
     -----
-    theta + (mount + bearing), by definition.
+    angle = theta + (mount + bearing), by definition.
     """
     if given is None:
         return None
     if aims is None:
         return None
-    return composed(given.facing, Direction(aims[detection, 0], aims[detection, 1]))
+    return composed(given.facing, UnitVector(aims[detection, 0], aims[detection, 1]))
 
 
 @compiled_inline

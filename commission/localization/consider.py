@@ -14,9 +14,9 @@ from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray
 from commission.localization.kalman import Gain, Innovation, correct, corrected_covariance, gain, innovation
 from commission.localization.observation import (
-    Direction,
     Expected,
     ObservationModel,
+    UnitVector,
     composed,
     direction_of,
     expect,
@@ -58,7 +58,7 @@ class Considering(NamedTuple):
     """Velocity of base at the scan [m/s], in base."""
     speed_y: float
     turn_rate: float
-    facing: Direction
+    facing: UnitVector
     """Heading of the belief at the scan."""
 
 
@@ -151,7 +151,7 @@ class ScannerJacobian(NamedTuple):
 
 @compiled_inline
 def scanner_jacobian(
-    facing: Direction, e: Expected, speed_x: float, speed_y: float, turn_rate: float
+    facing: UnitVector, e: Expected, speed_x: float, speed_y: float, turn_rate: float
 ) -> ScannerJacobian:
     """How mounting and clock of the scanner change what it sees.
 
@@ -182,7 +182,7 @@ def scanner_jacobian(
 
 @compiled_inline
 def seen_with(  # noqa: PLR0917 - a detection and the constants, number by number
-    facing: Direction, e: Expected, surveyed_variance: float, given: Considering, work: FloatArray, at: int
+    facing: UnitVector, e: Expected, surveyed_variance: float, given: Considering, work: FloatArray, at: int
 ) -> Seen:
     """What the constants have to do with a detection.
 
@@ -299,7 +299,7 @@ class Corrected(NamedTuple):
     """A belief after a detection, and the direction of its heading."""
 
     belief: PoseGaussian
-    facing: Direction
+    facing: UnitVector
 
 
 @compiled_inline
@@ -344,9 +344,9 @@ def correct_with(  # noqa: PLR0917 - a measurement and a reflector, number by nu
 @compiled_inline
 def correct_aimed(  # noqa: PLR0917 - a measurement and a reflector, number by number
     belief: PoseGaussian,
-    facing: Direction,
+    facing: UnitVector,
     measured_range: float,
-    aim: Direction,
+    aim: UnitVector,
     reflector_x: float,
     reflector_y: float,
     surveyed_variance: float,
@@ -381,7 +381,7 @@ def correct_aimed(  # noqa: PLR0917 - a measurement and a reflector, number by n
 @compiled_inline
 def corrected_with(  # noqa: PLR0917 - a measurement and a reflector, number by number
     belief: PoseGaussian,
-    facing: Direction,
+    facing: UnitVector,
     e: Expected,
     measured_range: float,
     turn: float,

@@ -23,7 +23,7 @@ from commission.localization.consider import (
 )
 from commission.localization.consider_columns import begin, busy_chunks, put_back, put_block, take_along
 from commission.localization.kalman import correct
-from commission.localization.observation import Direction, ObservationModel, direction_of
+from commission.localization.observation import ObservationModel, UnitVector, direction_of
 from commission.localization.odometry import NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.rejection import rejects_the_world, weigh
@@ -223,8 +223,8 @@ def prepare(  # noqa: PLR0917 - the scan's detections, array by array
 
     Notes
     -----
-    aim = direction of mount + bearing, in base: all sines and cosines of a scan but those of the heading. The third
-    column of `aims` is for where in `work` the reflector of a detection is.
+    aim = (cos, sin) of mount + bearing, by definition: all sines and cosines of a scan but those of the heading. The
+    third column of `aims` is for where in `work` the reflector of a detection is.
     """
     if cross is None or given is None or work is None or aims is None:
         return
@@ -290,7 +290,7 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
             take_along(work, width, cross, entry)
             width += PER_REFLECTOR
         at = int(aims[earlier - first, 2])
-        aim = Direction(aims[i - first, 0], aims[i - first, 1])
+        aim = UnitVector(aims[i - first, 0], aims[i - first, 1])
         x, y, variance = places[entry, 0], places[entry, 1], places[entry, 2]
         belief, facing = correct_aimed(
             belief, facing, distance, aim, x, y, variance, observation, given, work, width, at

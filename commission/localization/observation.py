@@ -52,7 +52,7 @@ class Expected(NamedTuple):
     bearing_theta: float
 
 
-class Direction(NamedTuple):
+class UnitVector(NamedTuple):
     """A direction as a unit vector: its cosine and sine."""
 
     cos: float
@@ -97,26 +97,26 @@ def scanner_offset(theta: float, model: ObservationModel) -> tuple[float, float]
 
 
 @compiled_inline
-def offset_facing(facing: Direction, model: ObservationModel) -> tuple[float, float]:
+def offset_facing(facing: UnitVector, model: ObservationModel) -> tuple[float, float]:
     """`scanner_offset` of a heading that is given as a direction.
 
     Notes
     -----
-    R m with m the mounting, by definition.
+    offset = R m, with m the mounting, by definition.
     """
     c, s = facing
     return c * model.mount_x - s * model.mount_y, s * model.mount_x + c * model.mount_y
 
 
 @compiled_inline
-def composed(first: Direction, second: Direction) -> Direction:
-    """Direction of the sum of two angles.
+def composed(first: UnitVector, second: UnitVector) -> UnitVector:
+    """Unit vector of the sum of two angles.
 
     Notes
     -----
-    (cos a cos b - sin a sin b, sin a cos b + cos a sin b), by definition.
+    cos(a + b) = cos a cos b - sin a sin b, sin(a + b) = sin a cos b + cos a sin b, by definition.
     """
-    return Direction(
+    return UnitVector(
         first.cos * second.cos - first.sin * second.sin,
         first.sin * second.cos + first.cos * second.sin,
     )
@@ -156,7 +156,7 @@ def expect_at(dx: float, dy: float, bearing: float, offset_x: float, offset_y: f
 
     Notes
     -----
-    H of `expect`.
+    No formula: that of `expect`.
     """
     distance = math.sqrt(dx * dx + dy * dy)
     inverse = 1.0 / max(distance, SMALLEST_RANGE)
@@ -175,18 +175,18 @@ def expect_at(dx: float, dy: float, bearing: float, offset_x: float, offset_y: f
 
 
 @compiled_inline
-def direction_of(angle: float) -> Direction:
+def direction_of(angle: float) -> UnitVector:
     """Unit vector of an angle [rad].
 
     Notes
     -----
-    (cos, sin), by definition.
+    (cos(angle), sin(angle)), by definition.
     """
-    return Direction(math.cos(angle), math.sin(angle))
+    return UnitVector(math.cos(angle), math.sin(angle))
 
 
 @compiled_inline
-def turned_by(direction: Direction, angle: float) -> Direction:
+def turned_by(direction: UnitVector, angle: float) -> UnitVector:
     """Unit vector turned by an angle, which is mostly small [rad].
 
     Notes
@@ -200,11 +200,11 @@ def turned_by(direction: Direction, angle: float) -> Direction:
         s = angle * (1.0 - a2 * (1.0 / 6.0 - a2 / 120.0))
     else:
         c, s = math.cos(angle), math.sin(angle)
-    return composed(direction, Direction(c, s))
+    return composed(direction, UnitVector(c, s))
 
 
 @compiled_inline
-def turn_to(ux: float, uy: float, direction: Direction) -> float:
+def turn_to(ux: float, uy: float, direction: UnitVector) -> float:
     """Angle from a unit vector to a direction, mostly a small one [rad].
 
     Parameters

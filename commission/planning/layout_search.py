@@ -138,9 +138,9 @@ class LayoutSearch:
             unseen = covers[:, taken].sum(axis=1) < self._base
             metres = np.unique(route.drive.metres[unseen].astype(np.int64))
             if len(metres):
-                found.append(Unmet(route.name, tuple(metres.tolist()), "visible"))
+                found.append(Unmet(route=route.name, metres=tuple(metres.tolist()), reason="visible"))
             if over is not None:
-                found.append(Unmet(route.name, over.metres, "uncertainty", beyond=over))
+                found.append(Unmet(route=route.name, metres=over.metres, reason="uncertainty", beyond=over))
         for place, rivals in zip(self._places, self._distinction.rivals(taken).tolist(), strict=True):
             if rivals:
                 found.append(self._ambiguous_at(place))
@@ -148,7 +148,7 @@ class LayoutSearch:
 
     def _ambiguous_at(self, place: ChosenPlace) -> Unmet:
         route, metres = nearest_on_routes(place.poses[0, :2], self._planned)
-        return Unmet(route, metres, "ambiguous", place.name)
+        return Unmet(route=route, metres=metres, reason="ambiguous", place=place.name)
 
     def _cover_problem(self, fixed: BoolArray, conflicts: tuple[IntArray, ...]) -> CoverProblem:
         """What must be visible whatever the predictions come to: covering of the routes' scans, and of the places."""

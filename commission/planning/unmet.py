@@ -21,7 +21,7 @@ REMEDIES = {
 """What each of `CONTRIBUTIONS` is, and what makes it smaller."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Beyond:
     """N metres of a route on which a layout passes a limit; each by its worst scan. Arrays are read-only."""
 
@@ -46,12 +46,12 @@ class Beyond:
         """Return the metres from `first` to before `last`."""
         inside = [index for index, metre in enumerate(self.metres) if first <= metre < last]
         return Beyond(
-            tuple(self.metres[index] for index in inside),
-            tuple(self.is_heading[index] for index in inside),
-            read_only(self.limits[inside]),
-            read_only(self.kept[inside]),
-            read_only(self.best[inside]),
-            read_only(self.parts[inside]),
+            metres=tuple(self.metres[index] for index in inside),
+            is_heading=tuple(self.is_heading[index] for index in inside),
+            limits=read_only(self.limits[inside]),
+            kept=read_only(self.kept[inside]),
+            best=read_only(self.best[inside]),
+            parts=read_only(self.parts[inside]),
         )
 
     def is_out_of_reach(self) -> bool:
@@ -76,7 +76,7 @@ class Beyond:
         return CONTRIBUTIONS[int(shares.argmax())], float(shares.max())
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Unmet:
     """Where a demand does not hold."""
 
@@ -119,10 +119,10 @@ def beyond(planned: PlannedRoute, kept: FloatArray, limits: FloatArray, best: Fl
     axes = (kept / limits)[scans].argmax(axis=1)
     parts = predict_errors(planned, predict_route(planned)).parts[scans, :, axes, axes]
     return Beyond(
-        tuple(metres.tolist()),
-        tuple((axes == 2).tolist()),
-        read_only(limits[scans, axes]),
-        read_only(kept[scans, axes]),
-        read_only(best[scans, axes]),
-        read_only(parts / np.maximum(parts.sum(axis=1, keepdims=True), 1e-30)),
+        metres=tuple(metres.tolist()),
+        is_heading=tuple((axes == 2).tolist()),
+        limits=read_only(limits[scans, axes]),
+        kept=read_only(kept[scans, axes]),
+        best=read_only(best[scans, axes]),
+        parts=read_only(parts / np.maximum(parts.sum(axis=1, keepdims=True), 1e-30)),
     )

@@ -118,7 +118,7 @@ class UnmetStretch:
         return float(self.points[0, 0]), float(self.points[0, 1])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PlacementResult:
     """A suggested layout, and what it was made from."""
 
@@ -169,7 +169,9 @@ def placement(inputs: PlacementInput, progress: Progress = silent) -> PlacementR
     found = place(inputs, names, inputs.options, part(progress, COMPARED, 1.0))
     # Whoever ended the search with what there is wants to see what that comes to.
     after = layout_figures(inputs, found.reflectors, names, given)
-    return PlacementResult(inputs, found, tuple(_stretches(inputs, found.unmet)), before, after)
+    return PlacementResult(
+        inputs=inputs, placement=found, unmet=tuple(_stretches(inputs, found.unmet)), before=before, after=after
+    )
 
 
 def _stretches(inputs: PlacementInput, unmet: tuple[Unmet, ...]) -> list[UnmetStretch]:

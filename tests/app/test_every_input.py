@@ -412,9 +412,6 @@ OWN = {
         rows={
             "x": Row(label="x [m]", read=reflector("x"), **FAR),
             "y": Row(label="y [m]", read=reflector("y"), **FAR),
-            "radius": Row(
-                label="Radius [mm]", read=reflector("radius"), factor=MM, allowed=(0.1, 1000.0), refused=(0.0, 1000.1)
-            ),
             "height": Row(label="Height [m]", read=reflector("height"), allowed=(0.0, 2.5), refused=(2e9,)),
             "sigma": Row(
                 label="Survey 1σ [mm]", read=reflector("sigma"), factor=MM, allowed=(0.0, 5.5), refused=(-0.1,)
@@ -562,6 +559,24 @@ def test_a_number_of_ones_own_is_shown_taken_and_bounded_as_its_row_says(
     # No field without its widget, and no widget without a field.
     assert set(widgets) == set(own.rows)
     holds(bench, widgets[name], own.rows[name], bench.state)
+
+
+def test_a_radius_is_typed_in_its_unit_within_its_bounds_or_unknown(
+    server: viser.ViserServer, project: Project
+) -> None:
+    bench = PanelBench(server, replace(project, reflectors=ReflectorMap((POST,))), OWN["reflector"])
+    (widget,) = [each for each in bench.widgets if getattr(each, "label", "") == "Radius [mm]"]
+    assert widget.value == "41.5"
+    for text, radius in (("0.1", 0.0001), ("1000", 1.0), (" 35.5 ", 0.0355), ("unknown", None), ("", None)):
+        (posted,) = bench.change(widget, text)
+        assert after(bench.state, posted).state.project.reflectors.reflectors[0].radius == (
+            radius and pytest.approx(radius)
+        )
+    for text in ("0", "1000.1", "wide", "nan"):
+        (posted,) = bench.change(widget, text)
+        if not isinstance(posted, Report):
+            with pytest.raises((ValueError, CommissionError)):
+                after(bench.state, posted)
 
 
 def typed(bench: PageBench, values: Mapping[str, Any]) -> None:
