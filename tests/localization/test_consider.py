@@ -69,11 +69,12 @@ def test_the_filter_agrees_with_a_dense_one_to_the_last_digits(plan: Plan, count
     )
     cycles = plain.run(drive.log)
     assert len(cycles) == len(columns) == plan.scans
-    for name in ("prior_mean", "mean"):
-        found, expected = getattr(columns, f"{name}s"), np.array([cycle[name] for cycle in cycles])
+    priors = columns.priors.rows()
+    for name, found in (("prior_mean", priors.means), ("mean", columns.means)):
+        expected = np.array([cycle[name] for cycle in cycles])
         np.testing.assert_allclose(np.sin(0.5 * (found - expected)), 0.0, rtol=0.0, atol=1e-9)
-    for name in ("prior_cov", "cov"):
-        found, expected = getattr(columns, f"{name}ariances"), np.array([cycle[name] for cycle in cycles])
+    for name, found in (("prior_cov", priors.covariances), ("cov", columns.covariances)):
+        expected = np.array([cycle[name] for cycle in cycles])
         size = np.sqrt(np.einsum("kii,kjj->kij", expected, expected))
         np.testing.assert_allclose((found - expected) / size, 0.0, rtol=0.0, atol=1e-9)
     assert (columns.status == Status.INLIER).tolist() == [s == "inlier" for cycle in cycles for s in cycle["status"]]
