@@ -216,3 +216,12 @@ def _is_one_entry(page: OpenPage, served: Served, heard: Heard, number: tuple[ob
     entered = handle.value if not isinstance(handle.value, tuple) else handle.value[index]
     assert entered == pytest.approx(after, rel=1e-6), handle.label
     return True
+
+
+def test_a_text_that_seeks_in_a_list_tells_of_every_key(page: OpenPage, served: Served) -> None:
+    page.open_tab("Reflectors")
+    count = len(served.state.project.reflectors)
+    page.wait_for_text(f"{count} of {count} reflectors")
+    typed_into(page, "Find", "no such reflector")
+    page.wait_for_text(f"0 of {count} reflectors")
+    assert page.errors == []
