@@ -168,5 +168,10 @@ class Report(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class LookAgain(Action):
+    """What a list is asked for stands in its widgets: a page at rest is drawn again."""
+
+
+@dataclass(frozen=True, slots=True)
 class ClearFaults(Action):
     """The list of what went wrong was read."""

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 from viser import GuiApi, GuiInputHandle
 
 from commission.app.base import theme
-from commission.app.base.actions import Action
+from commission.app.base.actions import Action, LookAgain
 from commission.app.base.field_widget import add_widget, held, meant, write_held
 from commission.app.base.panel import Post, escaped, posting, write
 from commission.app.base.state import AppState
@@ -118,16 +118,23 @@ class Inputs:
         self._followed.clear()
 
 
-def add_find(gui: GuiApi, hint: str) -> GuiInputHandle[str]:
+def add_find(gui: GuiApi, post: Post, hint: str) -> GuiInputHandle[str]:
     """Add a text that is sought in a list with every key.
 
     Parameters
     ----------
-    gui : where it is made.
+    gui, post : where it is made, what takes the action that draws the list again.
     hint : what it is part of.
     """
     gui.add_html(theme.LIVE)
-    return gui.add_text("Find", "", hint=hint)
+    find = gui.add_text("Find", "", hint=hint)
+    look_again_at(find, post)
+    return find
+
+
+def look_again_at(widget: GuiInputHandle[Any], post: Post) -> None:
+    """Draw the page again when a widget changes that posts nothing else and says what is listed."""
+    widget.on_update(posting(post, lambda _event: LookAgain()))
 
 
 class WorkBar:

@@ -110,6 +110,12 @@ def report(action: actions.Report, state: AppState, sender: Sender) -> Outcome:
 
 
 @reduce.register
+def look_again(_action: actions.LookAgain, state: AppState, _sender: Sender) -> Outcome:
+    """Change nothing: whatever arrives is followed by a picture."""
+    return Outcome(state)
+
+
+@reduce.register
 def clear_faults(_action: actions.ClearFaults, state: AppState, _sender: Sender) -> Outcome:
     """Empty the list of what went wrong."""
     return Outcome(replace(state, faults=()))

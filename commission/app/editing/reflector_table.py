@@ -10,7 +10,7 @@ from viser import GuiApi, GuiTabHandle
 
 from commission.app.base import theme
 from commission.app.base.field_widget import Entry
-from commission.app.base.inputs import add_find, show
+from commission.app.base.inputs import add_find, look_again_at, show
 from commission.app.base.panel import BasePanel, Post
 from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
@@ -53,9 +53,11 @@ class ReflectorTable(BasePanel):
     def __init__(self, gui: GuiApi, post: Post, browser: int, tab: GuiTabHandle) -> None:
         self._browser = browser
         self._order = gui.add_dropdown("Sort by", tuple(ORDERS))
-        self._find = add_find(gui, "Part of a name, layer or note.")
+        self._find = add_find(gui, post, "Part of a name, layer or note.")
         self._page = Entry(gui, "page", TableView())
         show(self._page.widget, visible=False)
+        for widget in (self._order, self._page.widget):
+            look_again_at(widget, post)
         self._count = gui.add_html("")
         self._ids: tuple[str, ...] = ()
         self._rows = Rows(gui, tab, post, self._selecting)

@@ -74,7 +74,7 @@ class RouteTable(BasePanel):
 
     def __init__(self, gui: GuiApi, post: Post, browser: int, tab: GuiTabHandle) -> None:
         self._browser = browser
-        self._find = add_find(gui, "Part of the name of a route or a station.")
+        self._find = add_find(gui, post, "Part of the name of a route or a station.")
         self._count = gui.add_html("")
         self._shown: list[Row] = []
         self._rows = Rows(gui, tab, post, self._selecting)

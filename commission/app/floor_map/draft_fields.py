@@ -161,7 +161,7 @@ class MapDraftFields:
         with self._layers:
             gui.add_html(theme.WIDE)
             every = gui.add_button_group("", ("All", "None", "Visible"))
-            self._find = add_find(gui, "Part of a layer's name.")
+            self._find = add_find(gui, self._post, "Part of a layer's name.")
             self._rest = gui.add_html("", visible=False)
             self._rows = Rows(gui, self._layers, self._post, self._toggled)
         self._listed: tuple[DrawingLayer, ...] = ()
