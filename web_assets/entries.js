@@ -8,8 +8,8 @@
   if (window.commissionEntries) return; // the server sends this script again after each reconnection
   window.commissionEntries = true;
   const FIELDS = ".mantine-NumberInput-input, .mantine-TextInput-input, .mantine-Textarea-input";
-  // What viser makes of an entry (a number between its bounds, the last key's change 50 ms later) is no other entry.
-  const ECHO_MS = 150;
+  const STEPS = new Set(["ArrowUp", "ArrowDown", "ArrowLeft", "ArrowRight", "PageUp", "PageDown", "Home", "End"]);
+  const SAID_FOR_MS = 20_000;
   // A message of over 4 MB would end the connection without a word. Of a longer text goes so much that the server
   // refuses it, says so, and shows in the field again what holds (LONGEST_TEXT in commission/app/base/widget_values.py).
   const ENOUGH_LETTERS = 1_000_001;
@@ -18,7 +18,10 @@
   let draft = null; // of the field that has the focus: {input, field, uuid, before, said, held}
   let isRestoring = false;
   const before = new WeakMap(); // what stood in each input before it was typed into
-  const echoUntil = new Map(); // by widget [ms]
+  // Widgets whose entry is finished: what viser makes of it (a number between its bounds when the field is left, the last
+  // key's change 50 ms later) is no other entry. A person who goes on comes with a key or the pointer.
+  const settled = new Set();
+  const sent = new Map(); // the last entry of each widget
 
   // The widget of an input: the nearest element around it that has a label, which names the widget.
   function placeOf(input) {
@@ -39,10 +42,15 @@
   function begin(input) {
     const place = placeOf(input);
     if (!place || isLive(place)) return;
-    echoUntil.delete(place.uuid);
+    settled.delete(place.uuid);
     delete place.field.dataset.refused;
     place.field.dataset.draft = "";
     draft = { ...place, input, before: before.get(input) ?? "", said: null, held: undefined };
+  }
+
+  function goOn(target) {
+    const place = settled.size ? placeOf(target) : null;
+    if (place) settled.delete(place.uuid);
   }
 
   function end() {
@@ -50,7 +58,7 @@
     draft = null;
     if (!ended) return null;
     delete ended.field.dataset.draft;
-    echoUntil.set(ended.uuid, performance.now() + ECHO_MS);
+    settled.add(ended.uuid);
     before.set(ended.input, ended.input.value);
     return ended;
   }
@@ -68,12 +76,14 @@
   function finish() {
     const ended = end();
     if (!ended) return;
-    if (isSame(ended.input, ended.input.value, ended.before)) return restore(ended);
+    // Where another value has come meanwhile, what stood there before is an entry like any other.
+    if (ended.held === undefined && isSame(ended.input, ended.input.value, ended.before)) return restore(ended);
     const value = meantBy(ended);
     if ([value].flat().some(Number.isNaN)) {
       refuse(ended.field, `found "${ended.input.value}"; expected a number`);
       return restore(ended);
     }
+    sent.set(ended.uuid, ended);
     tell(ended.uuid, value);
   }
 
@@ -83,6 +93,7 @@
 
   // Show what held before, or what was written into the field while it was typed into.
   function restore({ input, uuid, before: text, held }) {
+    settled.add(uuid);
     if (input.value !== text) {
       const kind = input instanceof HTMLTextAreaElement ? HTMLTextAreaElement : HTMLInputElement;
       isRestoring = true;
@@ -98,10 +109,15 @@
 
   function refuse(field, text) {
     field.dataset.refused = text;
+    setTimeout(() => { if (field.dataset.refused === text) delete field.dataset.refused; }, SAID_FOR_MS);
   }
   window.commissionRefuse = (uuid, text) => {
     const field = document.querySelector(`label[for="${CSS.escape(uuid)}"]`)?.closest(".mantine-Flex-root");
-    if (field) refuse(field, text);
+    if (!field) return;
+    const entry = sent.get(uuid);
+    sent.delete(uuid);
+    if (entry && draft?.uuid !== uuid) restore(entry); // what was refused does not stay
+    refuse(field, text);
   };
 
   // A number that comes without a key or a click (dropped, dictated, filled in by a helper of the browser) is compared
@@ -125,6 +141,7 @@
   });
   on("keydown", (event) => {
     caretIsKnown = true;
+    if (STEPS.has(event.key)) goOn(event.target);
     const isOneLine = !(event.target instanceof HTMLTextAreaElement);
     if (event.key === "Enter" && (isOneLine || event.ctrlKey)) finish();
     if (event.key !== "Escape" || !draft) return;
@@ -133,7 +150,10 @@
     restore(end());
   });
   on("focusout", finish);
-  on("pointerdown", ({ target }) => { if (draft && !draft.field.contains(target)) finish(); });
+  on("pointerdown", ({ target }) => {
+    if (draft && !draft.field.contains(target)) finish();
+    goOn(target);
+  });
 
   Worker.prototype.postMessage = function (data, ...others) {
     if (data?.type !== "send") return post.call(this, data, ...others);
@@ -144,7 +164,7 @@
         draft.said = updates.value;
         return;
       }
-      if (performance.now() < (echoUntil.get(uuid) ?? 0)) return;
+      if (settled.has(uuid)) return;
     }
     if (type !== "ViewerCameraMessage") finish(); // what is done now, is done with what stands in the field
     return post.call(this, data, ...others);

@@ -48,7 +48,7 @@ class Uncertainty:
             slider=(0.0, 2.0),
             decimals=6,
         ),
-    ] = 0.00174533  # 0.1 degrees, as a file has it
+    ] = 0.001745  # 0.1 degrees, as a file has it
     """1-sigma of the direction in which a scanner is mounted."""
     range_bias: Annotated[float, _length("Range bias 1σ")] = 0.005
     """1-sigma of what a scanner adds to all its ranges, beyond `observation.range_bias`."""

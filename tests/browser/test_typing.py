@@ -156,6 +156,34 @@ def test_a_click_elsewhere_finishes_the_entry_before_it_does_anything(
     assert gate(served) == pytest.approx(0.99)
 
 
+def test_a_text_that_is_refused_does_not_stay_in_its_field(page: OpenPage, served: Served, heard: Heard) -> None:
+    page.open_tab("Site")
+    page.fold("Vehicle")
+    entry = page.row("Outline").locator("input")
+    before = entry.input_value()
+    typed_into(page, "Outline", "1 2").press("Enter")
+    page.page.wait_for_function("() => document.querySelector('[data-refused]') !== null")
+    page.page.wait_for_function("([field, text]) => field.value === text", arg=[entry.element_handle(), before])
+    page.page.wait_for_timeout(300)
+    assert len(heard.fields()) == 1
+    assert served.state.undo == ()
+
+
+def test_what_held_before_can_be_entered_where_another_value_has_come(
+    page: OpenPage, served: Served, window: Callable[..., OpenPage]
+) -> None:
+    other = window(served.server)
+    other.open()
+    for one in (page, other):
+        one.open_tab("Tune")
+    typed_into(page, "Gate", "9")
+    other.fill("Gate", "92")
+    served.until(lambda: gate(served) == pytest.approx(0.92), 10.0)
+    page.page.wait_for_timeout(300)
+    typed_into(page, "Gate", "95").press("Enter")
+    served.until(lambda: gate(served) == pytest.approx(0.95), 10.0)
+
+
 def test_nothing_is_written_into_a_field_that_is_typed_into(
     page: OpenPage, served: Served, window: Callable[..., OpenPage]
 ) -> None:

@@ -100,7 +100,7 @@ def small_case(seed: int) -> SmallCase:
         # Half of them is the other half turned round in the middle of the hall, so that rivals abound.
         x[5:] = 18.0 - x[:5]
     centers = np.column_stack((x, np.repeat((0.2, 7.8), 5)))
-    demands = Demands(visible=1, survive_failure=False, spacing=0.2)
+    demands = Demands(visible=1, survive_failure=False, spacing=0.2, leeway=0.0)
     all_of_it = kind == "everything"
     if kind == "failure" or all_of_it:
         demands = replace(demands, survive_failure=True)

@@ -64,7 +64,7 @@ def test_prediction_equals_the_localizer_on_exact_records():
     run = whole_run.run(exact_records(project, planned), LocalizerSetup.of(project), start)
     # The detections of a scan are the same ones in the same order; the means differ by rounding.
     np.testing.assert_allclose(predicted.covariances, run.covariances, rtol=1e-9, atol=1e-15)
-    np.testing.assert_allclose(predicted.prior_covariances, run.prior_covariances, rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(predicted.prior_covariances, run.priors.rows().covariances, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(predicted.means, run.means, atol=1e-9)
     assert np.array_equal(predicted.modes, run.modes)
 
