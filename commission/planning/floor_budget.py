@@ -18,7 +18,7 @@ from commission.planning.coverage import Coverage
 from commission.planning.dilution import FixOptions, Heading, Measurement
 from commission.planning.error_budget import CONTRIBUTIONS
 from commission.planning.vehicle_visibility import VehicleVisibility
-from commission.planning.visibility import field_of_view, unpack
+from commission.planning.visibility import faces, unpack
 from commission.progress import Progress, silent
 from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
@@ -204,10 +204,9 @@ def _sees(found: Coverage, site: BudgetSite, stance: _Stance, scanner: int, at: 
     seen = unpack(found.sight[stance.views[scanner], rows], len(site.reflectors))
     if stance.heading is None:
         return seen
-    first, width = field_of_view(site.scanners[scanner])
     delta = site.reflectors.centers[np.newaxis] - places[:, np.newaxis]
     bearings = np.arctan2(delta[..., 1], delta[..., 0]) - stance.headings[scanner]
-    return seen & (np.mod(bearings - first, 2.0 * math.pi) <= width)
+    return seen & faces(site.scanners[scanner], bearings)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from commission.compiled import compiled
+from commission.geometry.angles import within
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
@@ -318,6 +319,11 @@ def field_of_view(scanner: Scanner) -> tuple[float, float]:
         return -math.pi, 2.0 * math.pi
     first, last = scanner.field_of_view
     return first - BEARING_TOLERANCE, last - first + 2.0 * BEARING_TOLERANCE
+
+
+def faces(scanner: Scanner, bearings: FloatArray) -> BoolArray:
+    """(...) whether a scanner looks that way: (...) bearings [rad] in its frame, in the field of view and not blind."""
+    return within(bearings, np.array([field_of_view(scanner)])) & ~within(bearings, scanner.blind_sectors)
 
 
 def mask_words(reflectors: int) -> int:

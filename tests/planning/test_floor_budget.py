@@ -22,6 +22,7 @@ LINE = ((2.0, 3.0), (6.0, -3.0), (11.0, 3.5), (15.0, -2.5))
 LEVER, HEADING = (0.6, -0.3, 0.4), 0.7
 FRONT = Scanner(mounting=LEVER, field_of_view_deg=(-180.0, 180.0))
 REAR = Scanner(name="rear", mounting=(-0.8, 0.5, 2.9), field_of_view_deg=(-135.0, 135.0))
+BLIND = Scanner(mounting=LEVER, field_of_view_deg=(-180.0, 180.0), blind_sectors_deg=((-25.0, 25.0),))
 SPEED = 0.8
 
 
@@ -40,7 +41,11 @@ def budget(result: CoverageResult, uncertainty: Uncertainty):
 
 
 @pytest.mark.parametrize("measurement", list(Measurement))
-@pytest.mark.parametrize("scanners", [(FRONT,), (FRONT, REAR)], ids=["one", "two"])
+@pytest.mark.parametrize(
+    "scanners",
+    [(FRONT,), (FRONT, REAR), (BLIND,), (BLIND, REAR)],
+    ids=["one", "two", "blind ahead", "one of two blind"],
+)
 @pytest.mark.parametrize("heading", list(Heading))
 def test_without_constants_it_is_the_position_error_of_the_coverage(heading, scanners, measurement) -> None:
     result = covered(field(*scanners), heading, measurement=measurement)

@@ -5,7 +5,6 @@ It is called by the owner thread alone and knows neither widgets, files nor jobs
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,6 @@ from numpy.typing import NDArray
 
 from commission.app.run.view import Accumulated, RunView
 from commission.geometry import se2
-from commission.geometry.angles import within
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.estimate import Belief, Estimate, Mode, Status
 from commission.localization.observation import project_detections, range_bearing
@@ -23,6 +21,7 @@ from commission.localization.state import FilterState
 from commission.localization.sweep import points_at_stamp
 from commission.localization.validation import validation_outlines
 from commission.localization.whole_run import state_before
+from commission.planning.visibility import faces
 from commission.site.record_log import RecordLog
 from commission.site.records import Scan
 from commission.studies.run import RunResult
@@ -134,11 +133,7 @@ class Playback:
             return np.empty((0, GATE_POINTS, 2))
         scanner, before, twist = setup.scanners[estimate.scanner], None, np.zeros(3)
         seen = range_bearing(estimate.prior.mean, scanner.mounting, setup.reflectors.centers)
-        first, last = scanner.field_of_view
-        inside = (np.mod(seen[:, 1] - first, 2.0 * math.pi) <= last - first) & ~within(
-            seen[:, 1], scanner.blind_sectors
-        )
-        in_view = inside & (seen[:, 0] <= min(scanner.reflector_range, scanner.range[1]))
+        in_view = faces(scanner, seen[:, 1]) & (seen[:, 0] <= min(scanner.reflector_range, scanner.range[1]))
         if setup.constants is not None and lived > 1:
             before, columns = self._state_before(lived - 1), self._result.columns
             seconds = (estimate.stamp_ns - columns.stamps_ns[lived - 2]) * 1e-9
