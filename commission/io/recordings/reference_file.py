@@ -11,8 +11,7 @@ import msgspec
 from commission.errors import FileFormatError
 from commission.io.atomic import write_text
 from commission.io.conversion import convert
-from commission.io.reading import read_text
-from commission.io.yaml_document import YamlDocument
+from commission.io.recordings.versioned_json import read_json_of, refuse_other_versions
 from commission.site.reference_mount import ReferenceMount
 
 REFERENCE_MOUNT = "reference.json"
@@ -48,15 +47,10 @@ def read_reference_mount(path: Path) -> ReferenceMount:
     FileFormatError
         the file is damaged, of another version, or holds something that is not expected; names the key.
     """
-    try:
-        values = msgspec.json.decode(read_text(path, SIZE_LIMIT))
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise FileFormatError(path, "", f"is no JSON ({error})", '{"antenna": [x, y], "clock_offset": s}') from error
-    document = YamlDocument(path, values)
+    values, document = read_json_of(path, SIZE_LIMIT, '{"antenna": [x, y], "clock_offset": s}')
     if not isinstance(values, dict):
         raise document.error((), f"is {values!r}", "an object with antenna and clock_offset")
-    if values.get("schema", SCHEMA) != SCHEMA or isinstance(values.get("schema"), bool):
-        raise document.error(("schema",), f"is {values['schema']!r}", f"{SCHEMA}, the version this program knows")
+    refuse_other_versions(document, values.get("schema", SCHEMA), SCHEMA)
     keys = convert(document, ReferenceDocument)
     try:
         return ReferenceMount(antenna=keys.antenna, clock_offset=keys.clock_offset)

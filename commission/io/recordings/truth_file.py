@@ -11,11 +11,9 @@ from pathlib import Path
 
 import msgspec
 
-from commission.errors import FileFormatError
 from commission.io.atomic import write_text
 from commission.io.conversion import convert
-from commission.io.reading import read_text
-from commission.io.yaml_document import YamlDocument
+from commission.io.recordings.versioned_json import read_json_of, refuse_other_versions
 from commission.site.disturbances import ScannerError
 from commission.site.truth import TruePlace, TrueWheels, Truth
 
@@ -58,15 +56,10 @@ def read_truth(path: Path) -> Truth:
     FileFormatError
         the file is damaged, of another version, or holds something that is not expected; names the key.
     """
-    try:
-        values = msgspec.json.decode(read_text(path, SIZE_LIMIT))
-    except (msgspec.DecodeError, RecursionError) as error:
-        raise FileFormatError(path, "", f"is no JSON ({error})", "what this program wrote") from error
-    document = YamlDocument(path, values)
+    values, document = read_json_of(path, SIZE_LIMIT, "what this program wrote")
     if not isinstance(values, dict) or "schema" not in values:
         raise document.error(("schema",), "is missing", f"an object that begins with schema {SCHEMA}")
-    if values["schema"] != SCHEMA or isinstance(values["schema"], bool):
-        raise document.error(("schema",), f"is {values['schema']!r}", f"{SCHEMA}, the version this program knows")
+    refuse_other_versions(document, values["schema"], SCHEMA)
     keys = convert(document, TruthDocument)
     return Truth(
         seed=keys.seed, route=keys.route, wheels=keys.wheels, scanners=keys.scanners, reflectors=keys.reflectors

@@ -1,0 +1,46 @@
+"""JSON beside a recording that states its version."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from commission.errors import FileFormatError
+from commission.io.reading import read_text
+from commission.io.yaml_document import YamlDocument
+
+
+def read_json_of(path: Path, limit: int, expected: str) -> tuple[Any, YamlDocument]:
+    """Read a file of JSON: its content, and the same as a document that names its keys in errors.
+
+    Parameters
+    ----------
+    path : the file.
+    limit : largest size that is read [bytes].
+    expected : said of a file that is no JSON.
+
+    Raises
+    ------
+    FileFormatError
+        the file is too large or no JSON.
+    """
+    try:
+        values = msgspec.json.decode(read_text(path, limit))
+    except (msgspec.DecodeError, RecursionError) as error:
+        raise FileFormatError(path, "", f"is no JSON ({error})", expected) from error
+    return values, YamlDocument(path, values)
+
+
+def refuse_other_versions(document: YamlDocument, stated: object, known: int) -> None:
+    """Raise FileFormatError where a file is of a version that this program does not know.
+
+    Parameters
+    ----------
+    document : the file.
+    stated : its key `schema`.
+    known : the version that this program knows.
+    """
+    if stated != known or isinstance(stated, bool):
+        raise document.error(("schema",), f"is {stated!r}", f"{known}, the version this program knows")
