@@ -227,5 +227,7 @@ def open_page(
 def seen_magnification(project: Project) -> float:
     """Return the factor at which validation areas can be seen when the whole site is in view."""
     wanted = SEEN_SHARE * min(extent_of(project).size)
-    factor = wanted / (2.45 * project.parameters.observation.range_sigma)
+    noise = project.parameters.observation
+    sigma = max(each.detection_sigmas(noise.range_sigma, noise.bearing_sigma)[0] for each in project.scanners)
+    factor = wanted / (2.45 * sigma)
     return max(m for m in MAGNIFICATIONS if m <= max(factor, MAGNIFICATIONS[0]))

@@ -60,11 +60,10 @@ class UnitVector(NamedTuple):
 
 
 def observation_model(scanner: Scanner, parameters: ObservationParameters) -> ObservationModel:
-    """Return the scalars that the kernels need."""
+    """Return the scalars that the kernels need; the noise is the scanner's own where it has one."""
     x, y, theta = (float(value) for value in scanner.mounting)
-    return ObservationModel(
-        x, y, theta, parameters.range_sigma**2, parameters.bearing_sigma**2, float(parameters.range_bias)
-    )
+    range_sigma, bearing_sigma = scanner.detection_sigmas(parameters.range_sigma, parameters.bearing_sigma)
+    return ObservationModel(x, y, theta, range_sigma**2, bearing_sigma**2, float(parameters.range_bias))
 
 
 def observation_rows(models: Sequence[ObservationModel]) -> FloatArray:

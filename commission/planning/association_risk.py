@@ -105,9 +105,13 @@ def _reach(planned: PlannedRoute, prediction: RoutePrediction, gate: float) -> f
     farthest = float(planned.farthest.max(initial=0.0)) + max(
         float(np.hypot(*scanner.mounting[:2])) for scanner in planned.scanners
     )
+    # Of several scanners, the largest noise of each kind.
+    range_sigma, bearing_sigma = np.max(
+        [scanner.detection_sigmas(noise.range_sigma, noise.bearing_sigma) for scanner in planned.scanners], axis=0
+    ).tolist()
     # Range and bearing each within sqrt(gate) of their own sigma; the bearing seen from the farthest reflector.
-    along = variances[0] + variances[1] + noise.range_sigma**2 + surveyed
-    across = variances[0] + variances[1] + surveyed + farthest**2 * (variances[2] + noise.bearing_sigma**2)
+    along = variances[0] + variances[1] + range_sigma**2 + surveyed
+    across = variances[0] + variances[1] + surveyed + farthest**2 * (variances[2] + bearing_sigma**2)
     return math.sqrt(gate * (along + across))
 
 

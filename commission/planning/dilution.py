@@ -65,9 +65,9 @@ class FixOptions:
     measurement: Measurement = Measurement.RANGE_BEARING
     """`range-bearing`, `bearing-only` (triangulation) or `range-bearing-prior` (with odometry)."""
     range_sigma: float = 0.02
-    """1-sigma noise of a reflector's range [m]."""
+    """1-sigma noise of a reflector's range [m], by a scanner that has none of its own."""
     bearing_sigma: float = 0.004
-    """1-sigma noise of a reflector's bearing [rad]."""
+    """1-sigma noise of a reflector's bearing [rad], by a scanner that has none of its own."""
     prior_position_sigma: float = 0.05
     """1-sigma of the position expected from odometry, each axis [m]; read by `range-bearing-prior` only."""
     prior_heading_sigma: float = math.radians(1.0)
@@ -104,9 +104,10 @@ class Fixes(NamedTuple):
     heading_sigma: FloatArray
     """(N,) 1-sigma of the heading [rad]."""
     position_dop: FloatArray
-    """(N,) sqrt(var_x + var_y) over the noise: of the range [1], of the bearing [m/rad] for `bearing-only`."""
+    """(N,) sqrt(var_x + var_y) over the first scanner's noise: of the range [1], of the bearing [m/rad] for
+    `bearing-only`."""
     heading_dop: FloatArray
-    """(N,) sigma of the heading over the noise of the bearing [1]."""
+    """(N,) sigma of the heading over the noise of the first scanner's bearing [1]."""
     expected_visible: FloatArray
     """(N,) expected number of visible reflectors among people."""
     two_or_more: FloatArray
@@ -155,14 +156,15 @@ def fix_model(scanner: Scanner, options: FixOptions) -> FixModel:
     blind = np.empty((0, 2)) if options.heading is Heading.ALL_ROUND else scanner.blind_sectors
     triangulates = options.measurement is Measurement.BEARING_ONLY
     has_prior = options.measurement is Measurement.RANGE_BEARING_PRIOR
+    range_sigma, bearing_sigma = scanner.detection_sigmas(options.range_sigma, options.bearing_sigma)
     return FixModel(
-        range_variance=math.inf if triangulates else options.range_sigma**2,
-        bearing_variance=options.bearing_sigma**2,
+        range_variance=math.inf if triangulates else range_sigma**2,
+        bearing_variance=bearing_sigma**2,
         prior_position=options.prior_position_sigma**-2 if has_prior else 0.0,
         prior_heading=options.prior_heading_sigma**-2 if has_prior else 0.0,
         # Two bearings leave a circle of positions, one range and bearing leaves another.
         fewest=0 if has_prior else 3 if triangulates else 2,
-        position_noise=options.bearing_sigma if triangulates else options.range_sigma,
+        position_noise=bearing_sigma if triangulates else range_sigma,
         lever_x=float(lever[0]),
         lever_y=float(lever[1]),
         headings=headings,

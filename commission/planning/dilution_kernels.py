@@ -179,14 +179,16 @@ def heading_variance(  # noqa: PLR0917 - parts of two matrices, number by number
 
 
 @compiled
-def weights_of(dx: float, dy: float, survey_sigma: float, model: FixModel) -> tuple[float, float]:
+def weights_of(
+    dx: float, dy: float, survey_sigma: float, range_variance: float, bearing_variance: float
+) -> tuple[float, float]:
     """Weights of the range and of the bearing of one reflector.
 
     Parameters
     ----------
     dx, dy : reflector from the scanner [m].
     survey_sigma : 1-sigma of the reflector's place, each axis [m].
-    model : the noise of both.
+    range_variance, bearing_variance : the scanner's noise of both [m^2, rad^2].
 
     Notes
     -----
@@ -194,7 +196,7 @@ def weights_of(dx: float, dy: float, survey_sigma: float, model: FixModel) -> tu
     range and bearing by the reflector's place.
     """
     squared, survey = max(dx * dx + dy * dy, 1e-18), survey_sigma * survey_sigma
-    return 1.0 / (model.range_variance + survey), 1.0 / (model.bearing_variance + survey / squared)
+    return 1.0 / (range_variance + survey), 1.0 / (bearing_variance + survey / squared)
 
 
 @compiled
@@ -341,7 +343,8 @@ def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
     narrow = model.width < FULL_TURN or len(model.blind) > 0
     lever_x, lever_y = model.lever_x, model.lever_y
     # Divisions are the slow part, and most maps know no survey error.
-    sure_range_weight, sure_bearing_weight = weights_of(1.0, 0.0, 0.0, model)
+    range_variance, bearing_variance = model.range_variance, model.bearing_variance
+    sure_range_weight, sure_bearing_weight = weights_of(1.0, 0.0, 0.0, range_variance, bearing_variance)
     for n in rows:
         seen = 0
         for word_index in range(mask.shape[1]):
@@ -351,7 +354,9 @@ def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
                 word &= word - np.uint64(1)
                 dx, dy = centers[m, 0] - points[n, 0], centers[m, 1] - points[n, 1]
                 if survey_sigmas[m] > 0.0:
-                    range_weight, bearing_weight = weights_of(dx, dy, survey_sigmas[m], model)
+                    range_weight, bearing_weight = weights_of(
+                        dx, dy, survey_sigmas[m], range_variance, bearing_variance
+                    )
                 else:
                     range_weight, bearing_weight = sure_range_weight, sure_bearing_weight
                 information = reflector_information(dx, dy, lever_x, lever_y, range_weight, bearing_weight)
@@ -403,7 +408,9 @@ def fill_covariances(  # noqa: PLR0917 - arrays in, arrays out
         i_yy, i_yt, i_tt = model.prior_position, 0.0, model.prior_heading
         for m in indices[offsets[n] : offsets[n + 1]]:
             dx, dy = centers[m, 0] - T_map_scanner[n, 0], centers[m, 1] - T_map_scanner[n, 1]
-            range_weight, bearing_weight = weights_of(dx, dy, float(survey_sigmas[m]), model)
+            range_weight, bearing_weight = weights_of(
+                dx, dy, float(survey_sigmas[m]), model.range_variance, model.bearing_variance
+            )
             information = reflector_information(dx, dy, levers[n, 0], levers[n, 1], range_weight, bearing_weight)
             i_xx += information[0]
             i_xy += information[1]

@@ -161,7 +161,7 @@ def _parts(found: Coverage, site: BudgetSite, stance: _Stance, rows: slice) -> t
             # All round each reflector counts once, whichever scanner sees it.
             sees &= ~taken
         taken |= sees
-        one = _sums(site, options, sees, places + stance.levers[scanner], stance.levers[scanner])
+        one = _sums(site, options, sees, places, (site.scanners[scanner], stance.levers[scanner]))
         information += one.information
         noise += one.noise
         survey += one.survey
@@ -225,9 +225,12 @@ class _Sums:
     """(n, 3) sum of w h of the bearings."""
 
 
-def _sums(site: BudgetSite, options: FixOptions, sees: BoolArray, places: FloatArray, lever: FloatArray) -> _Sums:
-    """Add up the detections of one scanner at its places (n, 2)."""
-    delta = site.reflectors.centers[np.newaxis] - places[:, np.newaxis]
+def _sums(
+    site: BudgetSite, options: FixOptions, sees: BoolArray, points: FloatArray, by: tuple[Scanner, FloatArray]
+) -> _Sums:
+    """Add up the detections by one scanner, given with its lever (2,), about points (n, 2)."""
+    scanner, lever = by
+    delta = site.reflectors.centers[np.newaxis] - (points + lever)[:, np.newaxis]
     squared = np.maximum((delta**2).sum(axis=2), 1e-18)
     r = np.sqrt(squared)
     ux, uy = delta[..., 0] / r, delta[..., 1] / r
@@ -235,7 +238,9 @@ def _sums(site: BudgetSite, options: FixOptions, sees: BoolArray, places: FloatA
     h_range = np.stack((-ux, -uy, ux * lever[1] - uy * lever[0]), axis=-1)
     h_bearing = np.stack((bx, by, -1.0 - bx * lever[1] + by * lever[0]), axis=-1)
     own = np.array([survey_variance(each, site.uncertainty) for each in site.reflectors.reflectors])
-    range_noise, bearing_noise = options.range_sigma**2, options.bearing_sigma**2
+    range_noise, bearing_noise = (
+        sigma**2 for sigma in scanner.detection_sigmas(options.range_sigma, options.bearing_sigma)
+    )
     range_survey, bearing_survey = np.broadcast_to(own, r.shape), own / squared
     has_ranges = options.measurement is not Measurement.BEARING_ONLY
     w_range = (sees / (range_noise + range_survey)) if has_ranges else np.zeros(r.shape)

@@ -40,7 +40,7 @@ class Views:
     tables: ViewTables
     """Levers, headings and fields of view."""
     model: FixModel
-    """Measurement model; of a single scanner its headings and field of view, too."""
+    """Measurement model of the first scanner; of a single one its headings and field of view, too."""
 
     def __len__(self) -> int:
         """Return the number of views."""
@@ -116,13 +116,13 @@ def views_of(scanners: Sequence[Scanner], options: FixOptions) -> Views:
     if len(scanners) == 1:
         model = fix_model(scanners[0], options)
         lever = np.array([[model.lever_x, model.lever_y]])
-        return Views(scanners=(0,), tables=_tables(scanners, model, np.zeros((1, 1)), lever), model=model)
+        return Views(scanners=(0,), tables=_tables(scanners, options, np.zeros((1, 1)), lever), model=model)
     count, model = len(scanners), fix_model(scanners[0], replace(options, heading=Heading.ALL_ROUND))
     # Bearings from two places make up for a third reflector; whether they do is seen from the sums.
     model = model._replace(fewest=min(model.fewest, 2))
     if options.heading is Heading.ALL_ROUND:
         model = fix_model(scanners[0], options)
-        tables = _tables(scanners, model, np.zeros((1, count)), np.zeros((count, 2)), all_round=True)
+        tables = _tables(scanners, options, np.zeros((1, count)), np.zeros((count, 2)), all_round=True)
         return Views(scanners=tuple(range(count)), tables=tables, model=model)
     headings, combine = np.array([options.given_heading]), SINGLE
     if options.heading is not Heading.GIVEN:
@@ -134,16 +134,23 @@ def views_of(scanners: Sequence[Scanner], options: FixOptions) -> Views:
     levers = np.ascontiguousarray(stand[..., :2].reshape(-1, 2))
     return Views(
         scanners=tuple(range(count)) * len(headings),
-        tables=_tables(scanners, model, stand[..., 2], levers),
+        tables=_tables(scanners, options, stand[..., 2], levers),
         model=model._replace(combine=combine),
     )
 
 
 def _tables(
-    scanners: Sequence[Scanner], model: FixModel, headings: FloatArray, levers: FloatArray, *, all_round: bool = False
+    scanners: Sequence[Scanner],
+    options: FixOptions,
+    headings: FloatArray,
+    levers: FloatArray,
+    *,
+    all_round: bool = False,
 ) -> ViewTables:
     """Tables of S scanners for the kernels, for headings (H, S) and levers (V, 2)."""
     fields = [(-math.pi, 2.0 * math.pi) if all_round else field_of_view(scanner) for scanner in scanners]
+    models = [fix_model(scanner, options) for scanner in scanners]
+    variances = np.array([(model.range_variance, model.bearing_variance) for model in models])
     return ViewTables(
         levers=levers,
         view_of=np.arange(headings.size).reshape(headings.shape),
@@ -151,8 +158,8 @@ def _tables(
         cosine=np.array([-2.0 if width >= FULL_TURN else math.cos(0.5 * width) for _, width in fields]),
         blind=_blind(() if all_round else scanners),
         once=all_round,
-        range_weight=1.0 / model.range_variance,
-        bearing_weight=1.0 / model.bearing_variance,
+        variances=variances,
+        weights=1.0 / variances,
     )
 
 
@@ -230,7 +237,7 @@ def fix_covariances(visible: VehicleVisibility, T_map_base: ArrayLike, options: 
         np.ascontiguousarray(stand[..., :2]),
         _facing(stand[..., 2], fields),
         np.stack(sees, axis=2),
-        _tables(visible.scanners, model, np.zeros((1, len(fields))), np.zeros((len(fields), 2)), all_round=all_round),
+        _tables(visible.scanners, options, np.zeros((1, len(fields))), np.zeros((len(fields), 2)), all_round=all_round),
         model,
         covariances,
     )

@@ -48,10 +48,10 @@ class ViewTables(NamedTuple):
     """(S, B, 2) first bearing of each blind sector from that middle, and its width [rad]; none has a negative width."""
     once: bool
     """Whether each reflector counts once, by the first scanner that sees it."""
-    range_weight: float
-    """One over the variance of a range [1/m^2]."""
-    bearing_weight: float
-    """One over the variance of a bearing [1/rad^2]."""
+    variances: FloatArray
+    """(S, 2) of a range and of a bearing of each scanner [m^2, rad^2]."""
+    weights: FloatArray
+    """(S, 2) one over each of them."""
 
 
 @compiled
@@ -90,7 +90,6 @@ def information_of_scanners(  # noqa: PLR0917 - one reflector and several scanne
     facing: FloatArray,
     sees: BoolArray,
     views: ViewTables,
-    model: FixModel,
     parts: FloatArray,
 ) -> float:
     """Sum what the scanners that see a reflector say about the pose; return its distance to the nearest one.
@@ -103,8 +102,7 @@ def information_of_scanners(  # noqa: PLR0917 - one reflector and several scanne
     levers : (S, 2) each from the point whose position is asked for [m], map axes.
     facing : (S, 2) unit vectors to the middle of each field of view, map axes.
     sees : (S,) whether each scanner sees it, all around.
-    views : fields of view and weights.
-    model : noise.
+    views : fields of view, noise and weights.
     parts : (6,) output, as of `reflector_information`.
 
     Returns
@@ -134,13 +132,15 @@ def information_of_scanners(  # noqa: PLR0917 - one reflector and several scanne
         only = s
         nearest = min(nearest, distance)
         information = reflector_information(
-            dx, dy, levers[s, 0], levers[s, 1], views.range_weight, views.bearing_weight
+            dx, dy, levers[s, 0], levers[s, 1], views.weights[s, 0], views.weights[s, 1]
         )
         for i in range(6):
             parts[i] += information[i]
     if survey_sigma > 0.0 and count == 1:
         dx, dy = center[0] - places[only, 0], center[1] - places[only, 1]
-        range_weight, bearing_weight = weights_of(dx, dy, survey_sigma, model)
+        range_weight, bearing_weight = weights_of(
+            dx, dy, survey_sigma, views.variances[only, 0], views.variances[only, 1]
+        )
         information = reflector_information(dx, dy, levers[only, 0], levers[only, 1], range_weight, bearing_weight)
         for i in range(6):
             parts[i] = information[i]
@@ -170,7 +170,7 @@ def parts_at_heading(  # noqa: PLR0917 - arrays in, arrays out
     words : (S, ceil(M / 64)) which of the M reflectors each scanner sees then, all around.
     h : which heading.
     views : scanners, headings and fields of view.
-    model : noise, and how likely people block a ray.
+    model : how likely people block a ray.
     parts : (M, 6) output, its first rows.
     free : (M,) output: probability that nobody blocks the reflector.
 
@@ -197,7 +197,7 @@ def parts_at_heading(  # noqa: PLR0917 - arrays in, arrays out
                 sees[s] = (words[s, w] >> np.uint64(bit)) & np.uint64(1) == np.uint64(1)
             m = 64 * w + bit
             distance = information_of_scanners(
-                centers[m], survey_sigmas[m], places, levers, views.facing[h], sees, views, model, parts[seen]
+                centers[m], survey_sigmas[m], places, levers, views.facing[h], sees, views, parts[seen]
             )
             if distance < math.inf:
                 if model.free_per_m < 1.0:
@@ -228,8 +228,8 @@ def fill_view_fixes(  # noqa: PLR0917 - arrays in, arrays out
     rows : points to fill, indices into the other arrays.
     mask : (V, N, ceil(M / 64)) array.
     stands : (N, H) whether the vehicle can stand so; other headings are not looked at.
-    views : scanners, headings and fields of view.
-    model : noise and prior; its own headings and field of view are not read.
+    views : scanners, their noise, headings and fields of view.
+    model : prior and divisors of the dilutions; its own headings and field of view are not read.
     counts : (N,) output: reflectors that any scanner sees.
     figures : (N, FIGURES) output.
 
@@ -283,8 +283,8 @@ def fill_view_covariances(  # noqa: PLR0917 - arrays in, arrays out
     places : (N, S, 2) places of the scanners [m].
     facing : (N, S, 2) unit vectors to the middle of each field of view, map axes.
     sees : (N, M, S) whether each scanner sees each reflector, all around.
-    views : widths of the fields of view, weights and `once`; its levers and headings are not read.
-    model : noise and prior; its headings and field of view are not read.
+    views : widths of the fields of view, noise, weights and `once`; its levers and headings are not read.
+    model : prior; its noise, headings and field of view are not read.
     covariances : (N, 3, 3) output [m, m, rad]; inf on the diagonal where singular.
 
     Notes
@@ -301,7 +301,7 @@ def fill_view_covariances(  # noqa: PLR0917 - arrays in, arrays out
         count = 0
         for m in range(len(centers)):
             distance = information_of_scanners(
-                centers[m], survey_sigmas[m], places[n], levers, facing[n], sees[n, m], views, model, parts
+                centers[m], survey_sigmas[m], places[n], levers, facing[n], sees[n, m], views, parts
             )
             if distance == math.inf:
                 continue

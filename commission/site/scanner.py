@@ -32,6 +32,8 @@ LONGEST_RANGE = 10_000.0
 """No laser scanner measures farther [m]."""
 ONLY_NAME = "scanner"
 """What the only scanner of a vehicle is called."""
+AS_THE_FILTER = "as the filter"
+"""What the noise of detections is called where a scanner has none of its own."""
 _NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_ -]{0,38}[A-Za-z0-9_-]|[A-Za-z0-9_-]")
 _SLACK = 1e-6
 """Share of a period by which a sweep may be longer: both are rounded in files."""
@@ -118,6 +120,25 @@ class Scanner:
         float, Quantity(label="Bearing 1σ", unit="deg", shown=AS_DEGREES, bounds=NOT_NEGATIVE, step=0.001)
     ] = 0.05
     """1-sigma noise of each beam's bearing."""
+    detection_range_sigma: Annotated[
+        float | None,
+        Quantity(
+            label="Detections' range 1σ", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=0.5, none=AS_THE_FILTER
+        ),
+    ] = None
+    """1-sigma noise of the range of a reflector that this scanner detects; none: `observation.range_sigma`."""
+    detection_bearing_sigma_deg: Annotated[
+        float | None,
+        Quantity(
+            label="Detections' bearing 1σ",
+            unit="deg",
+            shown=AS_DEGREES,
+            bounds=POSITIVE,
+            step=0.01,
+            none=AS_THE_FILTER,
+        ),
+    ] = None
+    """1-sigma noise of the bearing of a reflector that this scanner detects; none: `observation.bearing_sigma`."""
     beam_width_deg: Annotated[
         float, Quantity(label="Beam width", unit="deg", shown=AS_DEGREES, bounds=NOT_NEGATIVE, step=0.01)
     ] = 0.25
@@ -183,6 +204,19 @@ class Scanner:
     def __eq__(self, other: object) -> bool:
         """Equal when every field is, arrays element by element."""
         return equal_fields(self, other)
+
+    def detection_sigmas(self, range_sigma: float, bearing_sigma: float) -> tuple[float, float]:
+        """1-sigma noise of range and bearing of a reflector that this scanner detects [m, rad].
+
+        Parameters
+        ----------
+        range_sigma, bearing_sigma : those of a scanner that has none of its own [m, rad].
+        """
+        own_range, own_bearing = self.detection_range_sigma, self.detection_bearing_sigma_deg
+        return (
+            range_sigma if own_range is None else own_range,
+            bearing_sigma if own_bearing is None else math.radians(own_bearing),
+        )
 
     @property
     def angle_min(self) -> float:

@@ -118,7 +118,7 @@ def noise_findings(run: RunColumns) -> tuple[Finding, ...]:
             f"{PERCENT.text(rejected, '.1f')} are rejected",
             probably=f"noise of scanner and odometry, and constants, are stated too {which}, by about a factor of "
             f"{factor:.2f} together",
-            remedy=f"{cure} observation.range_sigma and observation.bearing_sigma, odometry or uncertainty, as data "
-            "sheets and survey say",
+            remedy=f"{cure} observation.range_sigma and observation.bearing_sigma (or the scanners' own noise of "
+            "detections), odometry or uncertainty, as data sheets and survey say",
         ),
     )

@@ -198,7 +198,10 @@ def _range_bias(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> It
         return _fit(inputs, replace(detected, range_bearing=read_only(seen)))
 
     bias, fit = _best(_BIASES_M, fit_of)
-    if abs(bias) < 0.5 * inputs.setup.parameters.observation.range_sigma or not fit.is_far_better_than(before):
+    noise = inputs.setup.parameters.observation
+    # The scanner with the least noise shows a bias of all first.
+    sigma = min(each.detection_sigmas(noise.range_sigma, noise.bearing_sigma)[0] for each in inputs.setup.scanners)
+    if abs(bias) < 0.5 * sigma or not fit.is_far_better_than(before):
         return
     yield Finding(
         found=f"ranges are {MILLIMETRES.text(bias, '+.0f')} off on average ({PERCENT.text(before.accepted)} of the "

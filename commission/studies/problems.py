@@ -395,7 +395,10 @@ def separation_needed(site: Told) -> tuple[float, float]:
     gap : between their edges, so that the detector sees two clusters up to each scanner's range for reflectors [m].
     """
     parameters = site.parameters
-    sigma = math.hypot(0.5 * parameters.supervisor.position_limit, parameters.observation.range_sigma)
+    noise = parameters.observation
+    # Wherever the vehicle is, by whichever scanner: the one with the largest noise.
+    largest = max(each.detection_sigmas(noise.range_sigma, noise.bearing_sigma)[0] for each in site.scanners)
+    sigma = math.hypot(0.5 * parameters.supervisor.position_limit, largest)
     apart = 2.0 * math.sqrt(chi_square_gate(parameters.association.gate_probability, 2)) * sigma
     return apart, max(map(_gap_needed, site.scanners))
 

@@ -267,6 +267,8 @@ ELSEWHERE = {
     # Lists, typed as a line of text, drawn on the floor, or in the project's file alone.
     *("vehicle.outline", "vehicle.wheel_angles_deg"),
     *("scanners[0].blind_sectors_deg", "scanners[0].sweep_direction"),
+    # May be that of the filter, so that they are typed as a text.
+    *("scanners[0].detection_range_sigma", "scanners[0].detection_bearing_sigma_deg"),
     *("demands.unambiguous_spots", "candidates.keep_out", "candidates.gap", "candidates.length"),
 }
 """Numbers of the same values whose widget is no number."""
@@ -330,6 +332,36 @@ def test_a_number_of_a_vehicle_is_shown_taken_and_bounded_as_its_row_says(bench:
     bench.draw(state)
     (widget,) = [widget for posted, widget in named_widgets(bench) if widget.visible and name_of(posted) == name]
     holds(bench, widget, row, state)
+
+
+@pytest.mark.parametrize(
+    ("label", "field", "factor"),
+    [
+        ("Detections' range 1σ [mm]", "detection_range_sigma", MM),
+        ("Detections' bearing 1σ [°]", "detection_bearing_sigma_deg", 1.0),
+    ],
+)
+def test_noise_of_detections_is_typed_in_its_unit_or_that_of_the_filter(
+    bench: PageBench, label: str, field: str, factor: float
+) -> None:
+    (widget,) = [each for each in bench.widgets if getattr(each, "label", "") == label]
+    assert widget.value == "as the filter"
+    read = scanner(field)
+    for text, number in (("0.25", 0.25), (" 35,5 ", 35.5)):
+        (posted,) = bench.change(widget, text)
+        changed = after(bench.state, posted).state
+        assert read(changed) == pytest.approx(number / factor)
+        bench.draw(changed)
+        assert widget.value == f"{number:g}"
+        for none in ("", "as the filter"):
+            (posted,) = bench.change(widget, none)
+            assert read(after(changed, posted).state) is None
+        bench.draw(bench.state)
+    for text in ("0", "-1", "wide", "nan"):
+        (posted,) = bench.change(widget, text)
+        if not isinstance(posted, Report):
+            with pytest.raises((ValueError, CommissionError)):
+                after(bench.state, posted)
 
 
 def test_the_way_of_a_sweep_is_chosen_by_its_name(bench: PageBench) -> None:

@@ -70,6 +70,23 @@ scanners:
 """
 
 
+def test_noise_of_detections_is_each_scanner_s_own_or_none_and_none_is_not_written(tmp_path: Path) -> None:
+    text = TWO + "    detection_range_sigma: 0.03\n    detection_bearing_sigma_deg: 0.4\n"
+    project = load_project(write_project(tmp_path, text))
+    front, rear = project.scanners
+    assert (front.detection_range_sigma, front.detection_bearing_sigma_deg) == (None, None)
+    assert (rear.detection_range_sigma, rear.detection_bearing_sigma_deg) == (0.03, 0.4)
+    save_project(project, tmp_path)
+    assert load_project(tmp_path).scanners == project.scanners
+    assert (tmp_path / "project.yaml").read_text(encoding="utf-8").count("\n    detection_") == 2
+
+
+@pytest.mark.parametrize("key", ["detection_range_sigma", "detection_bearing_sigma_deg"])
+def test_noise_of_detections_is_more_than_zero(tmp_path: Path, key: str) -> None:
+    with pytest.raises(FileFormatError, match=f"{key}: is 0; expected more than 0"):
+        load_project(write_project(tmp_path, f"{TWO}    {key}: 0\n"))
+
+
 def test_a_project_of_several_scanners_has_each_with_its_values(tmp_path: Path) -> None:
     front, rear = load_project(write_project(tmp_path, TWO)).scanners
     assert (front.name, front.stamp_of, front.sweep_direction, front.sweep_duration) == ("front left", "last", -1, 0.03)

@@ -227,6 +227,22 @@ def test_changed_parameters_act_on_the_next_scan_and_keep_the_state() -> None:
     assert estimate.gate == pytest.approx(2.0 * math.log(2.0))
 
 
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_each_scanner_is_believed_by_its_own_noise_or_else_that_of_the_filter(order: tuple[int, int]) -> None:
+    front = Scanner(name="front")
+    rear = Scanner(name="rear", detection_range_sigma=0.05, detection_bearing_sigma_deg=math.degrees(0.03))
+    parameters = Parameters(observation=ObservationParameters(range_sigma=0.02, bearing_sigma=0.004), filter=WHITE)
+    reflectors = ReflectorMap((Reflector(id="A", x=2.0, y=0.0),))
+    localizer = Localizer(LocalizerSetup(reflectors, (front, rear), parameters), INITIAL)
+    by_range, by_bearing = np.array([[-1.0, 0.0, 0.0]]), np.array([[0.0, -0.5, -1.0]])
+    expected = np.linalg.inv(INITIAL.covariance)
+    for scanner in order:
+        (estimate,) = localizer.feed(Detections(0, np.array([[2.0, 0.0]]), scanner))
+        range_sigma, bearing_sigma = ((0.02, 0.004), (0.05, 0.03))[scanner]
+        expected += by_range.T @ by_range / range_sigma**2 + by_bearing.T @ by_bearing / bearing_sigma**2
+        np.testing.assert_allclose(estimate.posterior.covariance, np.linalg.inv(expected), rtol=1e-9, atol=1e-18)
+
+
 NOTHING = np.empty((0, 2))
 STEP = np.array([0.1, 0.0, 0.0])
 

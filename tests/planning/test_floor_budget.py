@@ -23,6 +23,7 @@ LEVER, HEADING = (0.6, -0.3, 0.4), 0.7
 FRONT = Scanner(mounting=LEVER, field_of_view_deg=(-180.0, 180.0))
 REAR = Scanner(name="rear", mounting=(-0.8, 0.5, 2.9), field_of_view_deg=(-135.0, 135.0))
 BLIND = Scanner(mounting=LEVER, field_of_view_deg=(-180.0, 180.0), blind_sectors_deg=((-25.0, 25.0),))
+COARSE = replace(REAR, detection_range_sigma=0.08, detection_bearing_sigma_deg=1.0)
 SPEED = 0.8
 
 
@@ -43,8 +44,8 @@ def budget(result: CoverageResult, uncertainty: Uncertainty):
 @pytest.mark.parametrize("measurement", list(Measurement))
 @pytest.mark.parametrize(
     "scanners",
-    [(FRONT,), (FRONT, REAR), (BLIND,), (BLIND, REAR)],
-    ids=["one", "two", "blind ahead", "one of two blind"],
+    [(FRONT,), (FRONT, REAR), (BLIND,), (BLIND, REAR), (FRONT, COARSE)],
+    ids=["one", "two", "blind ahead", "one of two blind", "unequal"],
 )
 @pytest.mark.parametrize("heading", list(Heading))
 def test_without_constants_it_is_the_position_error_of_the_coverage(heading, scanners, measurement) -> None:

@@ -94,6 +94,14 @@ class Plain:
     def seen_from(self, pose) -> list[tuple[Scanner, int]]:
         return [(s, i) for s in self.scanners for i, r in enumerate(self.reflectors) if self.sees(s, pose, r)]
 
+    def noise(self, scanner: Scanner) -> list[float]:
+        """1-sigma of each number that a scanner measures of a reflector."""
+        of_range, of_bearing = scanner.detection_range_sigma, scanner.detection_bearing_sigma_deg
+        bearing = self.options.bearing_sigma if of_bearing is None else of_bearing * math.pi / 180.0
+        if self.options.measurement is Measurement.BEARING_ONLY:
+            return [bearing]
+        return [self.options.range_sigma if of_range is None else of_range, bearing]
+
     def covariance(self, pose) -> np.ndarray:
         """(3, 3) covariance of the pose, with the places of the reflectors as unknowns that the survey has measured."""
         seen, options = self.seen_from(pose), self.options
@@ -105,9 +113,7 @@ class Plain:
 
         steps = 1e-6 * np.eye(len(unknowns))
         jacobian = np.stack([(predicted(unknowns + e) - predicted(unknowns - e)) / 2e-6 for e in steps], axis=1)
-        one = [options.range_sigma, options.bearing_sigma]
-        sigmas = one[1:] if options.measurement is Measurement.BEARING_ONLY else one
-        weights = np.tile(np.array(sigmas) ** -2.0, len(seen))
+        weights = np.array([sigma**-2.0 for scanner, _ in seen for sigma in self.noise(scanner)])
         information = jacobian.T @ (weights[:, np.newaxis] * jacobian)
         # A place that is known for certain: a sigma of a micrometre, far below all others.
         survey = np.repeat([max(r.sigma, 1e-6) for r in self.reflectors], 2)
@@ -140,6 +146,8 @@ class Plain:
 
 POINTS = np.random.default_rng(5).uniform((0.3, 0.3), (9.7, 7.7), (14, 2))
 MEASUREMENTS = list(Measurement)
+HEADINGS = [heading for heading in Heading if heading is not Heading.BY_SCANNER]
+"""Those of a fix: what by-scanner means is said before."""
 
 
 def assert_close(found, expected) -> None:
@@ -148,9 +156,16 @@ def assert_close(found, expected) -> None:
     np.testing.assert_allclose(found[1:], expected[1:], rtol=1e-4)
 
 
+COARSE = replace(REAR, detection_range_sigma=0.07, detection_bearing_sigma_deg=0.9)
+"""Noisier than the rest by half an order of magnitude."""
+
+
+@pytest.mark.parametrize(
+    "scanners", [(FRONT, REAR), (FRONT, COARSE), (COARSE, FRONT)], ids=["alike", "second", "first"]
+)
 @pytest.mark.parametrize("measurement", MEASUREMENTS)
-def test_a_given_heading_of_two_scanners_is_that_of_the_plain_version(measurement):
-    project = hall(1, FRONT, REAR)
+def test_a_given_heading_of_two_scanners_is_that_of_the_plain_version(measurement, scanners):
+    project = hall(1, *scanners)
     options = FixOptions(measurement=measurement, heading=Heading.GIVEN, given_heading=0.7, blocked_per_m=0.05)
     plain, found = Plain(project, options), fixes(vehicle_visibility(project), POINTS, options)
     doubly = 0
@@ -187,8 +202,9 @@ def test_worst_and_best_heading_look_at_each_way_in_which_the_vehicle_can_stand(
     assert refused > 5
 
 
-def test_covariances_of_poses_are_those_of_the_plain_version():
-    project = hall(2, FRONT, REAR)
+@pytest.mark.parametrize("rear", [REAR, COARSE], ids=["alike", "unequal"])
+def test_covariances_of_poses_are_those_of_the_plain_version(rear):
+    project = hall(2, FRONT, rear)
     options = FixOptions(heading=Heading.GIVEN)
     plain = Plain(project, options)
     poses = np.column_stack((POINTS, np.linspace(-3.0, 3.0, len(POINTS))))
@@ -231,7 +247,7 @@ def back_to_back(**changes) -> tuple[Scanner, Scanner]:
     return replace(half, name="front"), replace(half, name="rear", mounting=(0.0, 0.0, math.pi))
 
 
-@pytest.mark.parametrize("heading", [each for each in Heading if each is not Heading.BY_SCANNER])
+@pytest.mark.parametrize("heading", HEADINGS)
 def test_two_scanners_that_share_a_full_turn_are_one_that_sees_it(heading):
     reflectors = reflectors_at(np.random.default_rng(6).uniform(-8.0, 8.0, (7, 2)))
     options = FixOptions(heading=heading, given_heading=0.3, headings=5, blocked_per_m=0.02)
@@ -260,6 +276,22 @@ def test_two_scanners_in_one_place_are_one_of_half_the_variance_but_for_the_surv
         np.testing.assert_allclose(twice.position_sigma, sharp.position_sigma, rtol=1e-9)
         np.testing.assert_allclose(twice.heading_sigma, sharp.heading_sigma, rtol=1e-9)
         assert twice.visible.tolist() == [6] * 10
+
+
+@pytest.mark.parametrize("heading", HEADINGS)
+@pytest.mark.parametrize("measurement", MEASUREMENTS)
+def test_noise_of_the_only_scanner_is_that_of_the_options_said_otherwise(measurement, heading):
+    reflectors = reflectors_at(np.random.default_rng(6).uniform(-8.0, 8.0, (7, 2)))
+    points = np.random.default_rng(7).uniform(-6.0, 6.0, (20, 2))
+    options = FixOptions(measurement=measurement, heading=heading, headings=5)
+    own = replace(FULL_TURN, detection_range_sigma=0.05, detection_bearing_sigma_deg=math.degrees(0.01))
+    told = replace(options, range_sigma=0.05, bearing_sigma=0.01)
+    by_scanner, by_options = (
+        fixes(vehicle_visibility(Project(reflectors=reflectors, scanners=(scanner,))), points, asked)
+        for scanner, asked in ((own, options), (FULL_TURN, told))
+    )
+    for name, one, other in zip(by_options._fields, by_scanner, by_options, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, err_msg=name)
 
 
 def test_one_reflector_is_no_fix_however_many_scanners_see_it():
