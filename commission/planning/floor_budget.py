@@ -226,10 +226,10 @@ class _Sums:
 
 
 def _sums(
-    site: BudgetSite, options: FixOptions, sees: BoolArray, points: FloatArray, by: tuple[Scanner, FloatArray]
+    site: BudgetSite, options: FixOptions, sees: BoolArray, points: FloatArray, mounted: tuple[Scanner, FloatArray]
 ) -> _Sums:
     """Add up the detections by one scanner, given with its lever (2,), about points (n, 2)."""
-    scanner, lever = by
+    scanner, lever = mounted
     delta = site.reflectors.centers[np.newaxis] - (points + lever)[:, np.newaxis]
     squared = np.maximum((delta**2).sum(axis=2), 1e-18)
     r = np.sqrt(squared)
