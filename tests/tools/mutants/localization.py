@@ -106,10 +106,17 @@ LOCALIZATION = (
         tests=(TESTS + OUTLINE,),
     ),
     Mutant(
+        name="a scanner's own noise forgotten by the filter",
+        file=FOLDER + "observation.py",
+        find="scanner.detection_sigmas(parameters.range_sigma, parameters.bearing_sigma)",
+        replace="(parameters.range_sigma, parameters.bearing_sigma)",
+        tests=("tests/studies/test_own_noise.py",),
+    ),
+    Mutant(
         name="bearing's sigma taken for its variance",
         file=FOLDER + "observation.py",
-        find="parameters.bearing_sigma**2",
-        replace="parameters.bearing_sigma",
+        find="bearing_sigma**2, float",
+        replace="bearing_sigma, float",
         tests=(TESTS + "test_observation.py::test_kernels_are_given_the_mounting_and_the_variances_of_the_parameters",),
     ),
     Mutant(
