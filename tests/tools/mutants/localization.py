@@ -110,7 +110,7 @@ LOCALIZATION = (
         file=FOLDER + "observation.py",
         find="scanner.detection_sigmas(parameters.range_sigma, parameters.bearing_sigma)",
         replace="(parameters.range_sigma, parameters.bearing_sigma)",
-        tests=("tests/studies/test_own_noise.py",),
+        tests=("tests/studies/test_own_noise.py::test_a_prediction_takes_each_scanners_own_noise",),
     ),
     Mutant(
         name="bearing's sigma taken for its variance",
