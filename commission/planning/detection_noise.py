@@ -18,6 +18,7 @@ from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.beam_echo import BeamModel, cylinder_echo, half_width_at, is_flagged, lit_part
 from commission.localization.detector import INLIER, detect_clusters
 from commission.localization.detector_model import Beams, DetectorModel, ReflectorClass, class_of, detector_model
+from commission.site.detection_rates import detection_rate
 from commission.site.parameters import DetectorParameters
 from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
@@ -70,14 +71,19 @@ class DetectionTable(NamedTuple):
     """(DISTANCES,) that were looked at [m]."""
     noise: DetectionNoise
     """What its detections are worth."""
+    rates: FloatArray
+    """(DISTANCES,) share of scans in which the scanner tells it from other things [0..1]; a factor of its
+    probabilities of detection."""
     shown: FloatArray
-    """(C, DISTANCES) probability that it raises a flag at all [0..1]."""
+    """(C, DISTANCES) probability that its beams raise a flag in a scan in which the scanner tells it from other things
+    [0..1]."""
     beams: FloatArray
     """(C, DISTANCES) mean width of its widest cluster where there is one [beams]; NaN where there is none."""
 
     def rejected(self) -> FloatArray:
         """(C, DISTANCES) share of the scans that show it in which nothing passes the detector filter [0..1]."""
-        return 1.0 - self.noise.columns[:, :, 0] / np.where(self.shown > 0.0, self.shown, np.inf) - (self.shown == 0.0)
+        flagged = self.shown * self.rates
+        return 1.0 - self.noise.columns[:, :, 0] / np.where(flagged > 0.0, flagged, np.inf) - (flagged == 0.0)
 
     def likely_between(self, kind: int) -> tuple[float, float]:
         """Nearest and farthest distance between which a class is detected in at least `LIKELY` of all scans [m].
@@ -145,7 +151,17 @@ def detection_table(
     model = detector_model(reflectors, scanner, parameters)
     columns = model[:CLASS_COLUMNS]
     classes = tuple(zip(*(column.tolist() for column in columns), strict=True))
-    return _experiment(classes, tuple(model[CLASS_COLUMNS:]), optics)
+    table = _experiment(classes, tuple(model[CLASS_COLUMNS:]), optics)
+    return _with_rates(table, scanner) if scanner.detection_rates else table
+
+
+def _with_rates(table: DetectionTable, scanner: Scanner) -> DetectionTable:
+    """Table of reflectors that the scanner tells from other things in some of its scans only."""
+    rates = detection_rate(scanner.detection_rates, table.distances)
+    columns = np.array(table.noise.columns)
+    columns[:, :, 0] *= rates
+    noise = table.noise._replace(columns=read_only(columns))
+    return table._replace(noise=noise, rates=read_only(rates))
 
 
 def _reach(scanner: Scanner) -> float:
@@ -249,7 +265,9 @@ def _experiment(classes: tuple[ReflectorClass, ...], rest: tuple[float, ...], op
             if seen.any():
                 beams[kind, row] = widths[seen].mean()
     noise = DetectionNoise(read_only(columns), (DISTANCES - 1) / math.log(optics.farthest / NEAREST))
-    return DetectionTable(read_only(distances), noise, read_only(shown), read_only(beams))
+    return DetectionTable(
+        read_only(distances), noise, read_only(np.ones(DISTANCES)), read_only(shown), read_only(beams)
+    )
 
 
 def _judge(  # noqa: PLR0917 - one reflector

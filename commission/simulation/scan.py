@@ -17,6 +17,7 @@ from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
 from commission.geometry.se2 import compose
 from commission.simulation.scan_kernels import FLAT_COSINE, Hall, Moment, ScannerBeams, cast_scan, cast_sweep
+from commission.site.detection_rates import detection_rate
 from commission.site.disturbances import Disturbances
 from commission.site.glued import depths_in_walls
 from commission.site.project import Project
@@ -38,7 +39,7 @@ class VirtualScanner:
     disturbances: Disturbances
     """Glints and uneven floor."""
     hall: Hall
-    """Walls, reflectors and shiny objects."""
+    """Walls, reflectors, then shiny objects."""
     beams: ScannerBeams
     """The scanner's numbers."""
 
@@ -69,7 +70,8 @@ class VirtualScanner:
         ----------
         T_map_base : (3,) true pose of the vehicle [m, m, rad].
         circles : (K, 3) x, y and radius of legs and other moving things [m], map frame.
-        rng : draws the noise of each beam, then the glints; the number of draws depends on neither pose nor hall.
+        rng : draws the noise of each beam, where there are detection rates which reflectors shine, then the glints; the
+            number of draws does not depend on the pose.
         whole : False leaves out the beams that can meet no reflector (unless there are glints): what a detector finds
             is the same to the last bit, in a third of the time. A sweep is always whole.
         beam_poses : (B, 3) `T_map_base` at the time of each beam; None takes all beams at one instant. The floor's
@@ -84,11 +86,12 @@ class VirtualScanner:
         ranges, flags = np.empty(count, np.float32), np.empty(count, np.bool_)
         noise = rng.standard_normal((count, 2))
         T_map_scanner = compose(T_map_base, self.scanner.mounting)
+        shining = self._shining(T_map_scanner, rng)
         glinting = self.disturbances.glints_per_scan > 0.0
         # Upside down, beams go clockwise: the kernel casts them from the last one on, counter-clockwise.
         if self.scanner.upside_down:
             noise = np.ascontiguousarray(noise[::-1] * (-1.0, 1.0))
-        moment = Moment(T_map_scanner, self.range_limit(T_map_base), circles, noise, whole or glinting)
+        moment = Moment(T_map_scanner, self.range_limit(T_map_base), circles, noise, whole or glinting, shining)
         if beam_poses is None:
             cast_scan(self.hall, self.beams, moment, ranges, flags)
         else:
@@ -109,6 +112,18 @@ class VirtualScanner:
         x, y = float(T_map_base[0]), float(T_map_base[1])
         here = (t for t in self.disturbances.tilted_stretches if math.hypot(x - t.x, y - t.y) <= t.radius)
         return min((stretch.range_limit for stretch in here), default=math.inf)
+
+    def _shining(self, T_map_scanner: FloatArray, rng: np.random.Generator) -> BoolArray:
+        """(N,) which reflective objects the scanner tells from other things in a scan: each by a chance of its own.
+
+        What was taken for a reflector is taken for one in every scan: the rates are those of reflectors.
+        """
+        shining = np.ones(len(self.hall.radii), np.bool_)
+        if self.scanner.detection_rates:
+            count = len(shining) - len(self.disturbances.shiny_objects)
+            distances = np.hypot(*(self.hall.centers[:count] - T_map_scanner[:2]).T)
+            shining[:count] = rng.random(count) < detection_rate(self.scanner.detection_rates, distances)
+        return shining
 
     def _glint(self, ranges: NDArray[np.float32], flags: BoolArray, rng: np.random.Generator) -> None:
         """Flag a few neighboring beams at random places, at whatever they met."""

@@ -85,6 +85,8 @@ class Moment(NamedTuple):
     """(B, 2) standard normal draws for bearing and range of each beam."""
     whole: bool
     """Whether all beams are cast, or only those that can meet a reflective object, and their neighbors."""
+    shining: BoolArray
+    """(N,) whether the scanner tells each reflective object from other things in this scan."""
 
 
 class Echoes(NamedTuple):
@@ -95,7 +97,7 @@ class Echoes(NamedTuple):
     distances: FloatArray
     """(B,) true range [m]."""
     flags: BoolArray
-    """(B,) met a reflective object."""
+    """(B,) met a reflective object that shines."""
 
 
 @compiled
@@ -168,7 +170,7 @@ def cast_sweep(hall: Hall, beams: ScannerBeams, moment: Moment, ranges: NDArray[
             beams.farthest,
             beams.reflector_range,
         )
-        here = Moment(moment.pose[i], moment.range_limit, moment.circles, moment.noise[i : i + 1], True)
+        here = Moment(moment.pose[i], moment.range_limit, moment.circles, moment.noise[i : i + 1], True, moment.shining)
         cast_scan(hall, beam, here, ranges[i : i + 1], flags[i : i + 1])
 
 
@@ -233,7 +235,7 @@ def _meet_circle(beams: ScannerBeams, moment: Moment, index: int, echoes: Echoes
 
 @compiled
 def _meet_reflective(hall: Hall, beams: ScannerBeams, moment: Moment, index: int, echoes: Echoes) -> None:
-    """Flag every beam of which a part meets a reflective object before its middle meets anything else.
+    """Flag every beam of which a part meets a shining reflective object before its middle meets anything else.
 
     Retroreflecting tape outshines what the rest of the beam meets, so the echo is that of the lit part of the object:
     its middle gives the range.
@@ -262,7 +264,7 @@ def _meet_reflective(hall: Hall, beams: ScannerBeams, moment: Moment, index: int
         else:
             echo = cylinder_echo(distance, hall.radii[index], lit)
         if echo < echoes.distances[i] + hall.wall_depths[index]:
-            echoes.distances[i], echoes.flags[i] = echo, True
+            echoes.distances[i], echoes.flags[i] = echo, moment.shining[index]
 
 
 @compiled

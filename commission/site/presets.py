@@ -64,9 +64,12 @@ FIGURES = frozenset(
         "beam_width_deg",
         "beam_aperture",
         "reflector_range",
+        "detection_rates",
     }
 )
-"""Fields of a scanner that a preset sets; the others say how it is built into the vehicle."""
+"""Fields of a scanner that a preset sets; the others say how it is built into the vehicle. No maker publishes in how
+many scans a reflector is seen: a preset leaves the table of detection rates empty, since that of another device says
+nothing."""
 _GEOMETRY = frozenset({"field_of_view_deg", "resolution_deg", "rate", "range"})
 
 SCANNERS: tuple[ScannerPreset, ...] = (

@@ -14,6 +14,7 @@ import numpy as np
 
 from commission.geometry.arrays import FloatArray, IntArray, equal_fields, frozen
 from commission.site.checks import check_fields
+from commission.site.detection_rates import DetectionRates, check_detection_rates
 from commission.site.quantity import (
     AS_DEGREES,
     BARE,
@@ -152,6 +153,14 @@ class Scanner:
         float, Quantity(label="Reflectors to", unit="m", bounds=POSITIVE, step=0.1, decimals=4)
     ] = 20.0
     """Range up to which the scanner tells reflectors from other things."""
+    detection_rates: Annotated[
+        DetectionRates,
+        Quantity(
+            label="Detection rates", unit="m, 0 to 1", bounds=Bounds.between(0.0, LONGEST_RANGE), step=0.001, decimals=4
+        ),
+    ] = ()
+    """Distances to reflectors in free sight, each with the share of scans in which the scanner tells them from other
+    things: linear in between, and the last one beyond; none: in all scans. What the detector rejects comes on top."""
     sweep_duration: Annotated[
         float, Quantity(label="Sweep takes", unit="s", bounds=NOT_NEGATIVE, step=0.001, decimals=9)
     ] = 0.0
@@ -167,6 +176,7 @@ class Scanner:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mounting", frozen(self.mounting, (3,), "scanner.mounting"))
+        check_detection_rates(self.detection_rates, "scanner.detection_rates")
         check_fields(self, "scanner.")
         if not is_name(self.name):
             expected = "1 to 40 letters, digits, blanks (inside), - and _"

@@ -1,4 +1,4 @@
-"""What the detector makes of a site's reflectors, in words: those that it rejects, and those it can hardly resolve."""
+"""What scanner and detector make of a site's reflectors, in words: the rejected, unresolved and seldom seen ones."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from commission.geometry.arrays import FloatArray
+from commission.geometry.arrays import BoolArray, FloatArray
 from commission.localization.detector_model import detector_model
-from commission.planning.detection_noise import DetectionTable, detection_table
+from commission.planning.detection_noise import LIKELY, DetectionTable, detection_table
 from commission.site.parameters import DetectorParameters
 from commission.site.quantity import MILLIMETRES, PERCENT
 from commission.site.reflectors import UNKNOWN, ReflectorMap
@@ -49,6 +49,7 @@ def detector_findings(
     table = detection_table(reflectors, scanner, parameters)
     model = detector_model(reflectors, scanner, parameters)
     rejected, here = table.rejected(), table.distances <= farthest
+    yield from _seldom_seen(table, here)
     for row, (radius, flat) in enumerate(zip(model.radii.tolist(), model.flat.tolist(), strict=True)):
         is_known = model.smallest[row] == model.largest[row]
         size = MILLIMETRES.text(radius, ".3g") if is_known else UNKNOWN
@@ -61,6 +62,18 @@ def detector_findings(
                 "on: from there a single stray echo looks like one; expected finer steps, or larger reflectors",
                 is_loss=False,
             )
+
+
+def _seldom_seen(table: DetectionTable, here: BoolArray) -> Iterator[DetectorFinding]:
+    """Where the scanner tells reflectors from other things so seldom that they do not count as visible."""
+    seldom = np.flatnonzero(here & (table.rates < LIKELY))
+    if len(seldom):
+        yield DetectorFinding(
+            f"By its detection rates the scanner sees reflectors in less than {PERCENT.text(LIKELY, '.0f')} of the "
+            f"scans from {table.distances[seldom[0]]:.1f} m on, {PERCENT.text(table.rates[seldom].min(), '.0f')} at "
+            "worst: there they do not count as visible; expected reflectors nearer to the routes",
+            is_loss=True,
+        )
 
 
 def _losses(kind: str, table: DetectionTable, rejected: FloatArray, shown: FloatArray) -> Iterator[DetectorFinding]:

@@ -1,6 +1,7 @@
 """What a prediction promises of the detector is what drives see: inliers per scan on the bundled sites.
 
-With narrow beams, with wide ones, and with those of a scanner whose beams have an aperture; without people.
+With narrow beams, with wide ones, with those of a scanner whose beams have an aperture, and where the scanner sees its
+reflectors in a part of the scans only; without people.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from tests.planning.driven import undisturbed
 SEED = 3
 SITES = ("laboratory", "shop_floor", "warehouse")
 BEAMS = {"narrow": (0.1, 0.0), "wide": (1.0, 0.0), "with an aperture": (0.286, 0.02)}
+RATES = {"of the car park": ((5.0, 0.81), (12.5, 0.17), (20.0, 0.0)), "evenly": ((10.0, 0.6),)}
+"""Those of real poles, by the middles of the distances at which they were counted; and the same at all distances."""
 
 pytestmark = pytest.mark.slow
 
@@ -53,6 +56,19 @@ def test_a_drive_has_as_many_inliers_as_were_predicted(site: str, beam: tuple[fl
     project = seen_by(site, beam)
     _, inliers = predicted(project)
     assert inliers == pytest.approx(driven(project), rel=0.05)
+
+
+@pytest.mark.parametrize("rates", RATES.values(), ids=list(RATES))
+@pytest.mark.parametrize("site", ("laboratory", "warehouse"))
+def test_a_scanner_that_seldom_sees_has_as_many_inliers_as_its_rates_say(
+    site: str, rates: tuple[tuple[float, float], ...]
+) -> None:
+    project = undisturbed(site)
+    always = predicted(project)[1]
+    project = replace(project, scanners=tuple(replace(each, detection_rates=rates) for each in project.scanners))
+    _, inliers = predicted(project)
+    assert inliers == pytest.approx(driven(project), rel=0.05)
+    assert inliers < 0.9 * always
 
 
 def test_nothing_is_promised_that_equation_3_rejects() -> None:

@@ -266,7 +266,7 @@ ELSEWHERE = {
     "ellipse_factor",
     # Lists, typed as a line of text, drawn on the floor, or in the project's file alone.
     *("vehicle.outline", "vehicle.wheel_angles_deg"),
-    *("scanners[0].blind_sectors_deg", "scanners[0].sweep_direction"),
+    *("scanners[0].blind_sectors_deg", "scanners[0].detection_rates", "scanners[0].sweep_direction"),
     # May be that of the filter, so that they are typed as a text.
     *("scanners[0].detection_range_sigma", "scanners[0].detection_bearing_sigma_deg"),
     *("demands.unambiguous_spots", "candidates.keep_out", "candidates.gap", "candidates.length"),

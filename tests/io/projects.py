@@ -68,6 +68,7 @@ def scanners() -> st.SearchStrategy[Scanner]:
         upside_down=st.booleans(),
         blind_sectors_deg=st.sampled_from([(), ((-0.75, 0.25),), ((-0.9, -0.5), (-0.5, 0.125))]),
         beam_aperture=st.floats(0.0, 0.1),
+        detection_rates=st.sampled_from([(), ((5.0, 0.8),), ((0.0, 1.0), (5.25, 0.8125), (15.0, 0.0))]),
         sweep_duration=st.floats(0.0, 0.009),
         sweep_direction=st.sampled_from([1, -1]),
         stamp_of=st.sampled_from(StampOf),

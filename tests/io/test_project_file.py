@@ -78,13 +78,24 @@ def test_noise_of_detections_is_each_scanner_s_own_or_none_and_none_is_not_writt
     assert (rear.detection_range_sigma, rear.detection_bearing_sigma_deg) == (0.03, 0.4)
     save_project(project, tmp_path)
     assert load_project(tmp_path).scanners == project.scanners
-    assert (tmp_path / "project.yaml").read_text(encoding="utf-8").count("\n    detection_") == 2
+    written = (tmp_path / "project.yaml").read_text(encoding="utf-8")
+    assert [written.count(f"\n    detection_{each}") for each in ("range_sigma", "bearing_sigma_deg")] == [1, 1]
 
 
 @pytest.mark.parametrize("key", ["detection_range_sigma", "detection_bearing_sigma_deg"])
 def test_noise_of_detections_is_more_than_zero(tmp_path: Path, key: str) -> None:
     with pytest.raises(FileFormatError, match=f"{key}: is 0; expected more than 0"):
         load_project(write_project(tmp_path, f"{TWO}    {key}: 0\n"))
+
+
+def test_detection_rates_are_kept_as_they_are_and_empty_where_they_are(tmp_path: Path) -> None:
+    project = load_project(write_project(tmp_path, TWO + "    detection_rates: [[5, 0.8], [15.5, 0.12]]\n"))
+    assert [each.detection_rates for each in project.scanners] == [(), ((5.0, 0.8), (15.5, 0.12))]
+    save_project(project, tmp_path)
+    assert load_project(tmp_path).scanners == project.scanners
+    written = (tmp_path / "project.yaml").read_text(encoding="utf-8")
+    assert written.count("detection_rates: []") == 1
+    assert "detection_rates: [[5.0, 0.8], [15.5, 0.12]]" in written
 
 
 def test_a_project_of_several_scanners_has_each_with_its_values(tmp_path: Path) -> None:
@@ -126,6 +137,10 @@ def test_the_only_scanner_of_an_older_project_is_a_list_of_one(tmp_path: Path) -
         (
             "schema: 2\nscanners:\n  - {field_of_view_deg: [-90, 90], blind_sectors_deg: [[80, 100]]}\n",
             "holds [80, 100]; expected sectors inside of the field of view, -90 to 90 deg",
+        ),
+        (
+            "schema: 2\nscanners:\n  - detection_rates: [[5, 80]]\n",
+            "scanner.detection_rates holds [5, 80]; expected a distance [m], then a share of 0 to 1",
         ),
         ("schema: 2\nscanners:\n  - blind_sectors_deg: [[10, 5]]\n", "scanner.blind_sectors_deg holds [10, 5]"),
     ],

@@ -32,6 +32,7 @@ FIGURES = {
     "beam_width_deg": "beam width",
     "beam_aperture": "beam aperture",
     "reflector_range": "reach for reflectors",
+    "detection_rates": "detection rates",
 }
 """What the fields of the scanner are called in a sentence."""
 ORIGINS = {
@@ -128,7 +129,7 @@ class ScannerFields:
         """Add the input of one field."""
         if name.endswith(".sweep_direction"):
             return self._inputs.choice(name, project, DIRECTIONS)
-        if name.endswith(".blind_sectors_deg"):
+        if name.endswith((".blind_sectors_deg", ".detection_rates")):
             return add_list(self._gui, self._inputs, name, (project, value_of))
         return self._inputs.field(name, project)
 

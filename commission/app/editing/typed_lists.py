@@ -15,9 +15,10 @@ LIKE = {
     "outline": "corners like 0.5 0.3, -0.5 0.3, -0.5 -0.3",
     "wheel_angles_deg": "angles like 0 120 240",
     "blind_sectors_deg": "first and last bearing of each sector like -135 -120, 60 75, or nothing",
+    "detection_rates": "distance [m] and share of scans like 5 0.8, 15 0.12, or nothing",
 }
 """How lists are typed: numbers with blanks between, pairs of them with commas between."""
-PAIRS = frozenset({"outline", "blind_sectors_deg"})
+PAIRS = frozenset({"outline", "blind_sectors_deg", "detection_rates"})
 """Those of pairs."""
 
 

@@ -70,6 +70,19 @@ def test_what_is_no_sector_is_refused_with_an_example(text: str) -> None:
         list_value("blind_sectors_deg", text)
 
 
+def test_detection_rates_are_typed_as_distances_with_their_shares_in_one_undo_step(state: AppState) -> None:
+    typed = list_value("detection_rates", "5 0.8, 15 0.12")
+    rated = after(state, by(ME, actions.SetEquipment("scanners[0].detection_rates", typed))).state
+    assert rated.project.scanners[0].detection_rates == ((5.0, 0.8), (15.0, 0.12))
+    assert list_text(typed) == "5 0.8, 15 0.12"
+    assert after(rated, by(ME, page.Undo())).state.project.scanners[0].detection_rates == ()
+    assert list_value("detection_rates", " ") == ()
+    with pytest.raises(ValueError, match=r"expected distance \[m\] and share of scans like 5 0.8, 15 0.12"):
+        list_value("detection_rates", "5")
+    with pytest.raises(ValueError, match="expected distances that ascend"):
+        after(state, by(ME, actions.SetEquipment("scanners[0].detection_rates", ((5.0, 0.8), (4.0, 0.9)))))
+
+
 def test_the_field_of_view_is_drawn_with_a_gap_for_each_blind_sector() -> None:
     scanner = Scanner(field_of_view_deg=(-100.0, 100.0), blind_sectors_deg=((20.0, 40.0),))
     strokes = fan(scanner, 2.0)
