@@ -50,6 +50,9 @@ class Localize:
 
     detection_rates: bool = False
     """Tell in how many scans reflectors in free sight are seen, by their distance; also in summary.json."""
+    rated_project: Annotated[Path | None, arg(metavar="PROJECT2")] = None
+    """Folder for the project with these shares as its scanners' detection_rates, and reflector_range out to where one
+    is seen; made when it does not exist."""
     strict: bool = False
     """Refuse a recording that cannot be what it says (units, clocks, gaps, thresholds) instead of noting it."""
 
@@ -74,7 +77,8 @@ class Localize:
 
         names, sources = (ESTIMATES, DETECTIONS, SUMMARY), (self.recording, self.project)
         out = result_folder(self.out, "localize", names, force=self.force, sources=sources)
-        project = load_project(self.project)
+        self._refuse_to_rate()
+        project = as_saved = load_project(self.project)
         project = dataclasses.replace(project, parameters=apply_settings(project.parameters, self.set))
         log = self._with_reference(load_log(self.recording))
         start = start_of(project, log, given and given.pose, given and given.sigmas)
@@ -94,19 +98,47 @@ class Localize:
         }
         rates = self._rates(project, result)
         more |= {"detection_rates": rate_entries(rates)} if rates else {}
+        rated = self._rate(as_saved, project, result, rates)
         with out.writing() as folder:
             write_results(folder, result.columns, summary(result) | more)
         true = [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
         notes = [f"Note         {finding}" for finding in findings]
         sys.stdout.write(
-            "\n".join([*_report(result, cut), *map(rate_told, rates), *true, *notes, f"Written to   {self.out}"]) + "\n"
+            "\n".join(
+                [*_report(result, cut), *map(rate_told, rates), *rated, *true, *notes, f"Written to   {self.out}"]
+            )
+            + "\n"
         )
 
     def _rates(self, project: Project, result: RunResult) -> tuple[DetectionRate, ...]:
         """Count how often reflectors are seen, where that is asked for."""
         from commission.studies.detection_rates import detection_rates
 
-        return detection_rates(project, result.columns) if self.detection_rates else ()
+        return detection_rates(project, result.columns) if self.detection_rates or self.rated_project else ()
+
+    def _refuse_to_rate(self) -> None:
+        """Raise UsageError where the project with the counted rates cannot be written."""
+        from commission.io.project_copy import refuse_to_replace
+
+        if self.rated_project is not None:
+            if self.rated_project.resolve() == self.project.resolve():
+                raise UsageError(f"--rated-project is the project itself, {self.project}; expected another folder")
+            refuse_to_replace(self.rated_project, force=self.force)
+
+    def _rate(
+        self, as_saved: Project, project: Project, result: RunResult, rates: Sequence[DetectionRate]
+    ) -> list[str]:
+        """Write the project with the counted rates, where that is asked for, and tell of each scanner."""
+        if self.rated_project is None:
+            return []
+        from commission.io.project_copy import save_copy
+        from commission.studies.rated_scanners import rated_scanners, rated_told
+
+        scanners = rated_scanners(project, result.columns, rates)
+        kept = save_copy(dataclasses.replace(as_saved, scanners=scanners), self.rated_project, force=self.force)
+        notes = [] if kept is None else [f"Note         unsaved edits of the project that was there are kept in {kept}"]
+        told = map(rated_told, as_saved.scanners, scanners)
+        return [*told, *notes, f"Rated        {self.rated_project}"]
 
     def _with_reference(self, log: RecordLog) -> RecordLog:
         """Return the log with a reference that measures where the options say."""

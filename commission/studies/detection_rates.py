@@ -38,6 +38,8 @@ class DetectionRate:
     """Smallest distance from scanner to reflector [m]."""
     farthest: float
     """Largest distance, itself not included [m]."""
+    distance: float = math.nan
+    """Mean distance of what is expected [m]; NaN where nothing is."""
     expected: int
     """Pairs of a scan and a reflector in its free sight."""
     seen: int
@@ -128,11 +130,13 @@ def _rates(scanner: str, edges: Sequence[float], distances: FloatArray, seen: Bo
     """Counts between each two edges."""
     expected, _ = np.histogram(distances, np.asarray(edges))
     hits, _ = np.histogram(distances[seen], np.asarray(edges))
+    way, _ = np.histogram(distances, np.asarray(edges), weights=distances)
     return [
         DetectionRate(
             scanner=scanner,
             nearest=edges[i],
             farthest=edges[i + 1],
+            distance=float(way[i] / expected[i]),
             expected=int(expected[i]),
             seen=int(hits[i]),
         )

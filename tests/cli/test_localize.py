@@ -1,8 +1,11 @@
 import csv
 import json
 import random
+from dataclasses import replace
 
 import pytest
+
+from commission.io.project_file import load_project
 
 KEYS = [
     *("cycles", "duration_s", "inliers", "outliers_detector", "outliers_association", "operational_fraction"),
@@ -309,3 +312,22 @@ def test_how_often_reflectors_are_seen_is_told_where_it_is_asked_for(commission,
     assert f"Seen         100 % ({100.0 * near['probability_low']:.0f} to 100) of {near['expected']} from" in told
     assert commission("localize", project, recording, "--out", tmp_path / "plain")[0] == 0
     assert "detection_rates" not in json.loads((tmp_path / "plain" / "summary.json").read_text())
+
+
+def test_what_a_drive_sees_goes_into_another_project_and_no_setting_of_the_command_does(
+    commission, refused, project, recording, tmp_path
+):
+    out, rated = tmp_path / "out", tmp_path / "rated"
+    line = ("localize", project, recording, "--out", out, "--rated-project")
+    code, told, _ = commission(*line, rated, "--set", "observation.range_sigma=0.05")
+    assert code == 0
+    before, after = load_project(project), load_project(rated)
+    # Each reflector of that recording is seen in every scan.
+    assert {share for _, share in after.scanners[0].detection_rates} == {1.0}
+    assert "Rates        none -> " in told
+    assert f"Rated        {rated}" in told
+    kept = replace(after.scanners[0], detection_rates=(), reflector_range=before.scanners[0].reflector_range)
+    assert replace(after, scanners=(kept,)) == before
+    assert "Seen " in told
+    assert "another folder" in refused(*line, project)
+    assert "--force to overwrite" in refused(*line, rated)
