@@ -6,7 +6,7 @@ The validation areas of one cycle at the cursor are all that wants it: hours of 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -39,6 +39,10 @@ class Priors(Protocol):
         """Return those of all cycles, in memory."""
         ...
 
+    def blocks(self) -> Iterator[PriorRows]:
+        """Return those of all cycles, some cycles at a time."""
+        ...
+
 
 class KeptPriors:
     """Priors that are in memory.
@@ -58,6 +62,10 @@ class KeptPriors:
     def rows(self) -> PriorRows:
         """Return those of all cycles."""
         return self._rows
+
+    def blocks(self) -> Iterator[PriorRows]:
+        """Return those of all cycles at once: they are there anyway."""
+        yield self._rows
 
 
 class ReplayedPriors:
@@ -88,7 +96,10 @@ class ReplayedPriors:
 
     def rows(self) -> PriorRows:
         """Return those of all cycles."""
-        bounds = self._bounds.tolist()
-        parts = [self._replay(first, last) for first, last in itertools.pairwise(bounds)]
+        parts = list(self.blocks())
         whole = PriorRows(*map(np.concatenate, zip(*parts, strict=True))) if parts else prior_rows(0)
         return PriorRows(read_only(whole.means), read_only(whole.covariances))
+
+    def blocks(self) -> Iterator[PriorRows]:
+        """Return those of all cycles, from each checkpoint to the next."""
+        return itertools.starmap(self._replay, itertools.pairwise(self._bounds.tolist()))
