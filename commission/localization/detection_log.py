@@ -138,8 +138,7 @@ def detect_log(scans: ScanLog, setup: LocalizerSetup, *, scanner: int = 0, paral
     """
     model = setup.detectors[scanner]
     ranges = read_only(np.asarray(scans.ranges, dtype=np.float32))
-    threshold = setup.parameters.detector.intensity_threshold
-    flags = reflective_beams(ranges, scans.intensities, scans.reflector, threshold)
+    flags = reflective_beams(ranges, scans.intensities, scans.reflector, setup.parameters.detector)
     blind = setup.scanners[scanner].reported_blind_sectors
     ranges, flags = without_blind(ranges, flags, (scans.angle_min, scans.angle_increment), blind)
     beams = beams_of(scans.beams, scans.angle_min, scans.angle_increment)

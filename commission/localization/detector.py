@@ -67,7 +67,7 @@ def reflective_beams(
     ranges: NDArray[np.float32],
     intensities: NDArray[np.float32] | None,
     reflector: NDArray[np.bool_] | None,
-    threshold: float,
+    parameters: DetectorParameters,
 ) -> NDArray[np.bool_]:
     """Which beams met something reflective: the scanner's flag, else echoes at least as strong as the threshold.
 
@@ -75,7 +75,7 @@ def reflective_beams(
     ----------
     ranges : (..., B) array [m].
     intensities, reflector : (..., B) arrays, or None where the scanner has none; without either no beam did.
-    threshold : smallest intensity of a reflector, in the scanner's own unit.
+    parameters : smallest intensity of a reflector, near by and far away.
 
     Returns
     -------
@@ -84,8 +84,31 @@ def reflective_beams(
     if reflector is not None:
         return read_only(np.asarray(reflector, dtype=np.bool_))
     if intensities is not None:
-        return read_only(np.asarray(intensities) >= threshold)
+        return read_only(np.asarray(intensities) >= threshold_at(ranges, parameters))
     return read_only(np.zeros(ranges.shape, dtype=np.bool_))
+
+
+def threshold_at(ranges: NDArray[np.floating], parameters: DetectorParameters) -> float | FloatArray:
+    """Smallest intensity of a reflector at some ranges, in the scanner's own unit.
+
+    Parameters
+    ----------
+    ranges : (..., B) array [m]; NaN, where nothing came back, counts as near.
+    parameters : `intensity_threshold`, `far_threshold`, `far_distance`.
+
+    Returns
+    -------
+    threshold : one for all where it does not change with the range, else a (..., B) array.
+
+    Notes
+    -----
+    t (1 + (f - 1) min(r / d, 1)): linear from the threshold t near by to f t at the distance d, by definition.
+    """
+    near = parameters.intensity_threshold
+    if parameters.far_threshold == 1.0:
+        return near
+    way = np.clip(np.nan_to_num(np.asarray(ranges, dtype=np.float64)) / parameters.far_distance, 0.0, 1.0)
+    return near * (1.0 + (parameters.far_threshold - 1.0) * way)
 
 
 def without_blind(
@@ -129,7 +152,7 @@ def detect(
     ----------
     scan : with reflector flags, else intensities; with neither, nothing is detected.
     model : of the reflector map, by `detector_model`.
-    parameters : the same as in `model`; its intensity threshold is used here.
+    parameters : the same as in `model`; its thresholds of the intensity are used here.
     blind : (S, 2) first bearing and width of each blind sector of the scanner [rad].
 
     Returns
@@ -137,7 +160,7 @@ def detect(
     detected : every cluster, in the order of its beams.
     """
     ranges = read_only(np.asarray(scan.ranges, dtype=np.float32))
-    flags = reflective_beams(ranges, scan.intensities, scan.reflector, parameters.intensity_threshold)
+    flags = reflective_beams(ranges, scan.intensities, scan.reflector, parameters)
     angles = np.array(scan.angle_min), np.array(scan.angle_increment)
     ranges, flags = without_blind(ranges, flags, angles, blind)
     columns = beams_of(np.array([len(ranges)]), np.array([scan.angle_min]), np.array([scan.angle_increment]))

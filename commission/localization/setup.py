@@ -30,6 +30,9 @@ from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
 from commission.site.uncertainty import Uncertainty
 
+_THRESHOLDS = ("intensity_threshold", "far_threshold", "far_distance")
+"""Parameters of the detector that are in no `DetectorModel`: which beams count as reflective is known before it."""
+
 
 class FilterModel(NamedTuple):
     """What the steps of the filter read, besides the arrays of the map."""
@@ -110,7 +113,8 @@ class LocalizerSetup:
 
     def detects_like(self, other: LocalizerSetup) -> bool:
         """Whether the same is detected in every scan: what the filter does with it afterwards may differ."""
-        if self.parameters.detector.intensity_threshold != other.parameters.detector.intensity_threshold:
+        mine, others = self.parameters.detector, other.parameters.detector
+        if any(getattr(mine, name) != getattr(others, name) for name in _THRESHOLDS):
             return False
         if [each.name for each in self.scanners] != [each.name for each in other.scanners]:
             return False

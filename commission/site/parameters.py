@@ -133,6 +133,18 @@ class DetectorParameters:
         Quantity(label="Intensity from", unit="sensor's unit", shown=Shown("", 1.0), step=0.01, slider=(0.0, 1.0)),
     ] = 0.5
     """Echo strength from which a beam counts as reflective, where the scanner gives no flag."""
+    far_threshold: Annotated[
+        float,
+        Quantity(
+            label="Intensity far away", shown=PERCENT, bounds=Bounds.between(0.0, 10.0), step=1.0, slider=(0.0, 200.0)
+        ),
+    ] = 1.0
+    """What of `intensity_threshold` it takes at `far_distance` and beyond; less and less on the way there: echoes of
+    reflectors fade with the distance."""
+    far_distance: Annotated[
+        float, Quantity(label="Far away is", unit="m", bounds=POSITIVE, step=0.5, slider=(1.0, 50.0))
+    ] = 10.0
+    """Range from which on `far_threshold` holds."""
     min_model_error: Annotated[
         int,
         Quantity(

@@ -13,7 +13,9 @@ import numpy as np
 
 from commission.geometry.angles import wrap
 from commission.geometry.arrays import FloatArray, IntArray
+from commission.localization.detector import threshold_at
 from commission.progress import Progress, silent
+from commission.site.parameters import DetectorParameters
 from commission.site.project import Project
 from commission.site.quantity import PERCENT, PLAIN_DEGREES
 from commission.site.record_log import RecordLog
@@ -62,14 +64,13 @@ class PlausibilityInput(StudyInput):
     """The recording."""
     scanners: tuple[Scanner, ...]
     """The laser scanners."""
-    intensity_threshold: float
-    """Echo strength from which a beam counts as reflective [sensor's unit]."""
+    detector: DetectorParameters
+    """Its thresholds: echo strength from which a beam counts as reflective."""
 
     @staticmethod
     def of(project: Project, log: RecordLog) -> PlausibilityInput:
         """Pick what the study reads from a project."""
-        threshold = project.parameters.detector.intensity_threshold
-        return PlausibilityInput(log=log, scanners=project.scanners, intensity_threshold=threshold)
+        return PlausibilityInput(log=log, scanners=project.scanners, detector=project.parameters.detector)
 
 
 def plausibility(inputs: PlausibilityInput, progress: Progress = silent) -> tuple[Finding, ...]:
@@ -315,7 +316,8 @@ def _scans_of(inputs: PlausibilityInput, scans: ScanStore, scanner: Scanner) -> 
     returned = np.isfinite(ranges)
     yield from _ranges(called, ranges[returned], scanner)
     if some.intensities is not None and some.reflector is None and returned.any():
-        yield from _intensities(np.asarray(some.intensities, dtype=np.float64)[returned], inputs.intensity_threshold)
+        strengths = np.asarray(some.intensities, dtype=np.float64)[returned]
+        yield from _intensities(strengths, ranges[returned], inputs.detector)
     step, expected = float(np.median(np.abs(scans.angle_increment))), scanner.angle_increment
     if not expected / RATE_RATIO <= step <= expected * RATE_RATIO:
         yield Finding(
@@ -332,8 +334,8 @@ def _scans_of(inputs: PlausibilityInput, scans: ScanStore, scanner: Scanner) -> 
         )
 
 
-def _intensities(values: FloatArray, threshold: float) -> Iterator[Finding]:
-    share = float(np.mean(values >= threshold))
+def _intensities(values: FloatArray, ranges: FloatArray, detector: DetectorParameters) -> Iterator[Finding]:
+    share, threshold = float(np.mean(values >= threshold_at(ranges, detector))), detector.intensity_threshold
     low, high = float(values.min()), float(values.max())
     where = f"detector.intensity_threshold {threshold:g} (intensities are {low:.4g} to {high:.4g})"
     if share > _FULL_SHARE:

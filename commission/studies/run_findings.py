@@ -18,7 +18,7 @@ def recording_input(result: RunResult) -> PlausibilityInput:
     return PlausibilityInput(
         log=result.inputs.log,
         scanners=setup.scanners,
-        intensity_threshold=setup.parameters.detector.intensity_threshold,
+        detector=setup.parameters.detector,
     )
 
 

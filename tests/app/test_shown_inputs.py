@@ -49,6 +49,8 @@ PARAMETERS = {
     "association.gate_probability": ("Gate [%]", 100.0),
     "detector.enabled": ("Detector filter", None),
     "detector.intensity_threshold": ("Intensity from", 1.0),
+    "detector.far_threshold": ("Intensity far away [%]", 100.0),
+    "detector.far_distance": ("Far away is [m]", 1.0),
     "detector.min_model_error": ("Beams too few", 1.0),
     "detector.max_model_error": ("Beams too many", 1.0),
     "detector.range_jump": ("Range jump [mm]", 1000.0),
