@@ -114,6 +114,14 @@ class EditFromHereOn(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class MoveOnlyTheMap(Action):
+    """Whether an edit of the site leaves the hall of a virtual drive as it was: a survey error, as an experiment."""
+
+    only_the_map: bool
+    """The hall stays."""
+
+
+@dataclass(frozen=True, slots=True)
 class Cover(Action):
     """Cover or uncover every reflector of the hall, from the cursor on."""
 

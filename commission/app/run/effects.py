@@ -51,3 +51,8 @@ class CoverFromHere(Effect):
 @dataclass(frozen=True, slots=True)
 class RunAfresh(Effect):
     """Run the whole drive with the setup of now, nothing covered, and go to its start."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveAgain(Effect):
+    """Simulate the virtual drive again where the hall, the vehicle or its scanners are no longer those driven."""

@@ -9,7 +9,7 @@ from commission.app.base.actions import Sender
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.run import actions
-from commission.app.run.effects import CoverFromHere, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
+from commission.app.run.effects import CoverFromHere, DriveAgain, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
 from commission.app.run.state import SPEEDS, RunState
 from commission.site.fields import with_field
 
@@ -86,6 +86,12 @@ def color_trail(action: actions.ColorTrail, state: AppState, _sender: Sender) ->
 def edit_from_here_on(action: actions.EditFromHereOn, state: AppState, _sender: Sender) -> Outcome:
     """Choose what edits act on."""
     return Outcome(_with(state, from_here_on=action.from_here_on))
+
+
+@reduce.register
+def move_only_the_map(action: actions.MoveOnlyTheMap, state: AppState, _sender: Sender) -> Outcome:
+    """Choose whether the hall follows the site."""
+    return Outcome(_with(state, only_the_map=action.only_the_map), (DriveAgain(),))
 
 
 @reduce.register

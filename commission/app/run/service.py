@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TypeAlias
+
+import numpy as np
 
 from commission import compiled
 from commission.app.base.actions import Action, Envelope, Report, Sender
@@ -15,20 +18,24 @@ from commission.app.base.view import Followed, LivedPath
 from commission.app.run import drives
 from commission.app.run.actions import ChooseSource, Play, RecordedDrive, Source
 from commission.app.run.drives import Drive
-from commission.app.run.effects import CoverFromHere, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
+from commission.app.run.effects import CoverFromHere, DriveAgain, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
 from commission.app.run.playback import Playback
 from commission.app.run.state import RunState
-from commission.app.run.view import RunView
+from commission.app.run.view import Hall, RunView
+from commission.app.run.world import World
 from commission.geometry import rasterize, se2, spline_kernels
+from commission.localization.detection_log import cycle_stamps
 from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress
 from commission.simulation import follower, scan
 from commission.site.project import Project
+from commission.site.record_log import RecordLog
 from commission.studies import run
 from commission.studies.run import RunInput, RunResult, judged_run
 
 PREPARE, COMPILE, LOCALIZE = "Preparing the drive", "Getting ready", "Localizing"
+DRIVE_AGAIN = "Driving again in the changed hall"
 PLAYING_REST_S = 0.04
 LONGEST_STEP_S = 0.25
 """Time that the play clock moves at most at once [s]: a long pause of the owner thread is not made up for."""
@@ -61,7 +68,7 @@ class RunService(Service):
     compile_all : compiles all kernels that a run needs.
     """
 
-    effects = (LoadSource, MoveTo, MoveByScans, PlayOn, CoverFromHere, RunAfresh)
+    effects = (LoadSource, MoveTo, MoveByScans, PlayOn, CoverFromHere, RunAfresh, DriveAgain)
 
     def __init__(
         self,
@@ -76,6 +83,11 @@ class RunService(Service):
         self._followed_at = context.clock()
         self._project = context.state.project
         self._wanted: RunInput | None = None
+        self._source: Source | None = None
+        # What was true in the drive that is there, and in the one that is being simulated in its place.
+        self._world: World | None = None
+        self._coming: World | None = None
+        self._again: RecordLog | None = None
 
     def start(self) -> None:
         """Compile, and load what the page begins with."""
@@ -87,11 +99,11 @@ class RunService(Service):
     def project_changed(self, action: Action, before: AppState, after: AppState) -> None:  # noqa: ARG002 - the service's
         """Run again with what is different: from the start, or from here on where that is asked for."""
         self._project = after.project
-        is_same = all(getattr(before.project, part) is getattr(after.project, part) for part in READS)
-        if self._wanted is None or is_same:
+        if self._wanted is None or self._drives_again(after):
             return
+        is_same = all(getattr(before.project, part) is getattr(after.project, part) for part in READS)
         first = self._cursor() if after.part(RunState).from_here_on else 0
-        if first == 0 or not self._is_over(first):
+        if not is_same and (first == 0 or not self._is_over(first)):
             self._localize(self._wanted.with_setup(LocalizerSetup.of(after.project), first))
 
     def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:
@@ -115,8 +127,53 @@ class RunService(Service):
                 self._localize(
                     RunInput(log=self._wanted.log, start=self._wanted.start, segments=(RunSegment(0, setup),))
                 )
+            case DriveAgain() if self._wanted is not None:
+                self._drives_again(state)
             case _:
                 pass
+
+    def _drives_again(self, state: AppState) -> bool:
+        """Simulate a virtual drive again where its world is another one now; return whether that is under way."""
+        asked = state.part(RunState)
+        keeps = asked.only_the_map or asked.from_here_on
+        world = None if keeps else World.of(state.project, self._source)
+        if world is None or world == self._world:
+            if self._coming is not None:
+                # What was changed and is as before: the localizer has not followed in between.
+                self._jobs.cancel(DRIVE_AGAIN)
+                self._coming = None
+                if self._wanted is not None:
+                    self._localize(self._wanted.with_setup(LocalizerSetup.of(state.project)))
+            return False
+        if world != self._coming:
+            self._coming = world
+            project, source, prepare = state.project, world.drive, self._prepare
+            self._jobs.start(
+                DRIVE_AGAIN,
+                lambda progress: prepare(project, source, progress),
+                then=self._begin_again,
+                failed=self._stay,
+                stopped=self._stay,
+                lane=Lane.RUN,
+            )
+        return True
+
+    def _begin_again(self, drive: Drive) -> None:
+        """Localize the drive that was simulated in place of the one that is there; what was covered is, again."""
+        self._world, self._coming, self._again = self._coming, None, drive.log
+        wanted, before = RunInput.of(self._project, drive.log, drive.start), self._wanted
+        stamps = cycle_stamps(drive.log)
+        for segment in () if before is None else before.segments:
+            began_ns = cycle_stamps(before.log)[segment.first] if before is not None and segment.first else 0
+            first = int(np.searchsorted(stamps, began_ns))
+            if first < len(stamps):
+                wanted = wanted.with_cover(first, covered=segment.covered)
+        self._localize(wanted)
+
+    def _stay(self, job: Job | None = None) -> Action | None:
+        """Stay with the drive that is there, since another one cannot be driven or was stopped; say why."""
+        self._coming = None
+        return None if job is None else Report(f"{job.name}: {job.error}; the drive shown is that of before")
 
     def _cursor(self) -> int:
         """Return the number of cycles up to the cursor; none while the drive that is wanted is not on the page yet."""
@@ -138,11 +195,11 @@ class RunService(Service):
         """Prepare a drive; why it cannot be is told to who asked."""
         if isinstance(source, RecordedDrive):
             source = RecordedDrive(state.reach.checked(source.path, sender))
-        project, prepare = state.project, self._prepare
+        project, prepare, world = state.project, self._prepare, World.of(state.project, source)
         self._jobs.start(
             PREPARE,
             lambda progress: prepare(project, source, progress),
-            then=self._begin,
+            then=lambda drive: self._begin(drive, source, world),
             failed=lambda job: Envelope(Report(f"{job.name}: {job.error}", listed=f"{job.name} failed"), sender),
         )
 
@@ -156,10 +213,11 @@ class RunService(Service):
             return
         self._localize(self._wanted.with_cover(first, covered=covered))
 
-    def _begin(self, drive: Drive) -> None:
+    def _begin(self, drive: Drive, source: Source, world: World | None) -> None:
         """Localize a new drive; the run before stays on the page until that is done."""
-        setup = LocalizerSetup.of(self._project)
-        self._localize(RunInput(log=drive.log, start=drive.start, segments=(RunSegment(0, setup),)))
+        self._jobs.cancel(DRIVE_AGAIN)
+        self._source, self._world, self._coming = source, world, None
+        self._localize(RunInput.of(self._project, drive.log, drive.start))
 
     def _localize(self, wanted: RunInput) -> None:
         """Localize the whole drive in the background, unless that is what is there, or under way."""
@@ -182,12 +240,15 @@ class RunService(Service):
         return None if job is None else Report(f"{job.name}: {job.error}")
 
     def _take(self, result: RunResult) -> Action | None:
-        """Show a run: over the same drive where the cursor is, over a new one from its start, playing."""
+        """Show a run: over the same drive, or one in its place, where the cursor is; a new one plays from its start."""
         playback = self.playback
         if playback is not None and playback.result.inputs.log is result.inputs.log:
             playback.replace(result)
             return None
         self.playback = Playback(result)
+        if playback is not None and result.inputs.log is self._again:
+            self.playback.seek(playback.time)
+            return None
         return Play(playing=True)
 
     def follow(self, state: AppState) -> Due:
@@ -215,7 +276,16 @@ class RunService(Service):
         """Return the run as it is now, `whole` with every detection so far; none before there is one."""
         if self.playback is None or self._wanted is None:
             return None
-        return self.playback.view(covered=self._wanted.segment(self._cursor()).covered, whole=whole)
+        view = self.playback.view(covered=self._wanted.segment(self._cursor()).covered, whole=whole)
+        return replace(view, hall=self._hall())
+
+    def _hall(self) -> Hall:
+        """Whether the drive is one in the hall, and with the vehicle, of the project."""
+        if self._coming is not None:
+            return Hall.DRIVING_AGAIN
+        if self._world is None:
+            return Hall.RECORDED
+        return Hall.AS_DRIVEN if World.of(self._project, self._source) == self._world else Hall.OTHER
 
     def parts(self, *, slowly: bool) -> tuple[object, ...]:
         """Return the run as it is now, the place that cameras follow, and what is driven so far."""

@@ -29,3 +29,5 @@ class RunState:
     """What the trail on the floor is colored by."""
     from_here_on: bool = False
     """Whether an edit acts from the cursor on, and not on the whole drive."""
+    only_the_map: bool = False
+    """Whether an edit of the site moves the map alone, and the hall of a virtual drive stays."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum, auto
 from typing import TypeAlias
 
 from commission.geometry.arrays import FloatArray
@@ -12,6 +13,19 @@ from commission.studies.run import RunResult
 
 Stretch: TypeAlias = tuple[float, float]
 """From when to when after the start of the drive [s]."""
+
+
+class Hall(Enum):
+    """How the hall that was driven through stands to the project's."""
+
+    RECORDED = auto()
+    """A vehicle recorded the drive: its hall is what it is."""
+    AS_DRIVEN = auto()
+    """The virtual drive was made in this hall, with this vehicle and these scanners."""
+    DRIVING_AGAIN = auto()
+    """They have changed, and the drive is being simulated again."""
+    OTHER = auto()
+    """They have changed, and the drive shown is one of before."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +70,8 @@ class RunView:
     """(R, n, 2) outlines of the validation areas of the reflectors in view [m], map frame."""
     accumulated: Accumulated | None
     """Every detection so far; none in views that are drawn at the full rate."""
+    hall: Hall = Hall.RECORDED
+    """Whether the drive is one in the project's hall."""
 
     @property
     def duration(self) -> float:

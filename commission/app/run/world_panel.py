@@ -24,7 +24,7 @@ ELSEWHERE = ("people",)
 
 
 class WorldPanel(BasePanel):
-    """A widget for each number of the disturbances, groups in folders of their own; they act on the next drive.
+    """A widget for each number of the disturbances, groups in folders of their own; the drive is made again.
 
     Parameters
     ----------
@@ -35,7 +35,9 @@ class WorldPanel(BasePanel):
     def __init__(self, gui: GuiApi, post: Post, state: AppState) -> None:
         disturbances, fields = state.project.disturbances, fields_of(Disturbances)
         self._inputs = Inputs(gui, post, SetDisturbance, value_of)
-        gui.add_html("<div class='c-note' style='padding:2px 6px'>Acts on the next virtual drive.</div>")
+        gui.add_html(
+            "<div class='c-note' style='padding:2px 6px'>Acts on the virtual drive: it is simulated again.</div>"
+        )
         for name in names_of(Disturbances):
             if name not in ELSEWHERE and not isinstance(fields[name].descriptions[0], Group):
                 self._inputs.field(name, disturbances, f"(disturbances.{name})")
