@@ -9,16 +9,16 @@ from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.run.actions import EditFromHereOn, MoveOnlyTheMap
 from commission.app.run.state import RunState
-from commission.app.run.view import Hall, RunView
+from commission.app.run.view import DrivenHall, RunView
 
 NO_RUN = "Acts on the next drive."
 WHOLE = "Acts on the whole drive: it is localized again from its start."
 FROM_HERE = "Acts from the cursor on; what lies before it stays as it was lived."
 HALLS = {
-    Hall.RECORDED: "",
-    Hall.AS_DRIVEN: "Where reflectors, walls, vehicle or scanner change, it is driven again.",
-    Hall.DRIVING_AGAIN: "The hall has changed: the drive is simulated again; the one of before is shown until then.",
-    Hall.OTHER: "The hall stays as it was driven: only the map, and what the localizer believes, has changed.",
+    DrivenHall.RECORDED: "",
+    DrivenHall.AS_DRIVEN: "Where reflectors, walls, vehicle or scanner change, it is driven again.",
+    DrivenHall.DRIVING_AGAIN: "The hall has changed: the drive is simulated again; until then the one before is shown.",
+    DrivenHall.OTHER: "The hall stays as it was driven: only the map, and what the localizer believes, has changed.",
 }
 """What is said of the hall of the drive."""
 KEEPS = "An edit of the site moves only the map; the hall of the virtual drive stays."
@@ -31,7 +31,7 @@ def note(view: PageView) -> str:
         return NO_RUN
     asked = view.state.part(RunState)
     parts = [FROM_HERE if asked.from_here_on else WHOLE]
-    keeps = run.hall is Hall.AS_DRIVEN and (asked.only_the_map or asked.from_here_on)
+    keeps = run.hall is DrivenHall.AS_DRIVEN and (asked.only_the_map or asked.from_here_on)
     parts.append(KEEPS if keeps else HALLS[run.hall])
     if run.edits:
         parts.append(f"Changed on the way at {', '.join(clock(time) for time in run.edits)}.")

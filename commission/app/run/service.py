@@ -21,7 +21,7 @@ from commission.app.run.drives import Drive
 from commission.app.run.effects import CoverFromHere, DriveAgain, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
 from commission.app.run.playback import Playback
 from commission.app.run.state import RunState
-from commission.app.run.view import Hall, RunView
+from commission.app.run.view import DrivenHall, RunView
 from commission.app.run.world import World
 from commission.geometry import rasterize, se2, spline_kernels
 from commission.localization.detection_log import cycle_stamps
@@ -279,13 +279,13 @@ class RunService(Service):
         view = self.playback.view(covered=self._wanted.segment(self._cursor()).covered, whole=whole)
         return replace(view, hall=self._hall())
 
-    def _hall(self) -> Hall:
+    def _hall(self) -> DrivenHall:
         """Whether the drive is one in the hall, and with the vehicle, of the project."""
         if self._coming is not None:
-            return Hall.DRIVING_AGAIN
+            return DrivenHall.DRIVING_AGAIN
         if self._world is None:
-            return Hall.RECORDED
-        return Hall.AS_DRIVEN if World.of(self._project, self._source) == self._world else Hall.OTHER
+            return DrivenHall.RECORDED
+        return DrivenHall.AS_DRIVEN if World.of(self._project, self._source) == self._world else DrivenHall.OTHER
 
     def parts(self, *, slowly: bool) -> tuple[object, ...]:
         """Return the run as it is now, the place that cameras follow, and what is driven so far."""

@@ -15,7 +15,7 @@ Stretch: TypeAlias = tuple[float, float]
 """From when to when after the start of the drive [s]."""
 
 
-class Hall(Enum):
+class DrivenHall(Enum):
     """How the hall that was driven through stands to the project's."""
 
     RECORDED = auto()
@@ -70,7 +70,7 @@ class RunView:
     """(R, n, 2) outlines of the validation areas of the reflectors in view [m], map frame."""
     accumulated: Accumulated | None
     """Every detection so far; none in views that are drawn at the full rate."""
-    hall: Hall = Hall.RECORDED
+    hall: DrivenHall = DrivenHall.RECORDED
     """Whether the drive is one in the project's hall."""
 
     @property

@@ -22,7 +22,7 @@ from commission.app.run.effects import CoverFromHere, DriveAgain, LoadSource, Mo
 from commission.app.run.reducer import move_only_the_map
 from commission.app.run.service import RunService
 from commission.app.run.state import RunState
-from commission.app.run.view import Hall, RunView
+from commission.app.run.view import DrivenHall, RunView
 from commission.errors import SourceError
 from commission.localization.estimate import Mode
 from commission.progress import Progress
@@ -105,7 +105,9 @@ def moved(metres: float) -> Callable[[Project], Project]:
 def longer(project: Project) -> Project:
     route = project.routes[0]
     points = np.array([[1.0, 1.0], [4.0, 1.0]])
-    return replace(project, routes=(replace(route, segments=(Segment(control_points=points, degree=1),)), *project.routes[1:]))
+    return replace(
+        project, routes=(replace(route, segments=(Segment(control_points=points, degree=1),)), *project.routes[1:])
+    )
 
 
 CHANGES: dict[str, Callable[[Project], Project]] = {
@@ -129,8 +131,8 @@ def test_where_the_hall_changes_it_is_driven_again_at_the_same_time(hearing: Hea
     assert hearing.view.result.columns.means.tobytes() == expected.columns.means.tobytes()
     assert hearing.view.time == pytest.approx(min(5.0, expected.duration))
     assert Play(playing=True) not in hearing.owner.posted
-    assert hearing.view.hall is Hall.AS_DRIVEN
-    assert HALLS[Hall.AS_DRIVEN] in hearing.said
+    assert hearing.view.hall is DrivenHall.AS_DRIVEN
+    assert HALLS[DrivenHall.AS_DRIVEN] in hearing.said
 
 
 @pytest.mark.parametrize(
@@ -154,13 +156,13 @@ def test_a_survey_error_moves_only_the_map_until_the_hall_is_to_follow(hearing: 
     assert KEEPS in hearing.said
     hearing.edit(moved(0.4))
     assert hearing.view.result.inputs.log is driven
-    assert hearing.view.hall is Hall.OTHER
-    assert HALLS[Hall.OTHER] in hearing.said
+    assert hearing.view.hall is DrivenHall.OTHER
+    assert HALLS[DrivenHall.OTHER] in hearing.said
     assert hearing.view.result.consistency.rejected_fraction > 0.05
     hearing.ask(only_the_map=False)
     hearing.do(DriveAgain())
     assert hearing.driven[1:] == [hearing.state.project]
-    assert hearing.view.hall is Hall.AS_DRIVEN
+    assert hearing.view.hall is DrivenHall.AS_DRIVEN
     assert hearing.view.result.consistency.rejected_fraction < 0.05
 
 
@@ -176,10 +178,10 @@ def test_an_edit_taken_back_while_it_is_driven_again_leaves_the_drive_that_was_t
 ) -> None:
     driven = hearing.view.result.inputs.log
     hearing.edit(moved(0.3), settle=False)
-    assert hearing.view.hall is Hall.DRIVING_AGAIN
+    assert hearing.view.hall is DrivenHall.DRIVING_AGAIN
     hearing.edit(lambda _: project)
     assert hearing.view.result.inputs.log is driven
-    assert hearing.view.hall is Hall.AS_DRIVEN
+    assert hearing.view.hall is DrivenHall.AS_DRIVEN
 
 
 def test_of_many_edits_the_newest_is_driven(hearing: Hearing) -> None:
@@ -187,7 +189,7 @@ def test_of_many_edits_the_newest_is_driven(hearing: Hearing) -> None:
         hearing.edit(moved(0.1), settle=False)
     hearing.edit(moved(0.1))
     assert hearing.driven[-1] == hearing.state.project
-    assert hearing.view.hall is Hall.AS_DRIVEN
+    assert hearing.view.hall is DrivenHall.AS_DRIVEN
 
 
 def test_where_it_cannot_be_driven_again_the_drive_of_before_stays_and_why_is_said(hearing: Hearing) -> None:
@@ -195,7 +197,7 @@ def test_where_it_cannot_be_driven_again_the_drive_of_before_stays_and_why_is_sa
     hearing.refuse = True
     hearing.edit(longer)
     assert hearing.view.result.inputs.log is driven
-    assert hearing.view.hall is Hall.OTHER
+    assert hearing.view.hall is DrivenHall.OTHER
     (told,) = (each for each in hearing.owner.posted if isinstance(each, Report))
     assert "too steep" in told.text
     assert "of before" in told.text
@@ -204,7 +206,7 @@ def test_where_it_cannot_be_driven_again_the_drive_of_before_stays_and_why_is_sa
 def test_a_route_that_is_gone_leaves_its_drive(hearing: Hearing) -> None:
     hearing.edit(lambda p: replace(p, routes=()))
     assert len(hearing.driven) == 1
-    assert hearing.view.hall is Hall.OTHER
+    assert hearing.view.hall is DrivenHall.OTHER
 
 
 def test_a_recording_stays_what_it_is(hearing: Hearing, tmp_path: Path) -> None:
@@ -213,7 +215,7 @@ def test_a_recording_stays_what_it_is(hearing: Hearing, tmp_path: Path) -> None:
     count = len(hearing.driven)
     hearing.edit(moved(0.3))
     assert len(hearing.driven) == count
-    assert hearing.view.hall is Hall.RECORDED
+    assert hearing.view.hall is DrivenHall.RECORDED
 
 
 def test_what_was_covered_is_covered_again_at_the_same_time(hearing: Hearing) -> None:
