@@ -56,7 +56,7 @@ class EventKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Event:
+class RunEvent:
     """One moment of a drive; figures that its kind does not have are NaN."""
 
     kind: EventKind
@@ -91,7 +91,7 @@ class EventsResult:
 
     inputs: EventsInput
     """Where it happened."""
-    events: tuple[Event, ...]
+    events: tuple[RunEvent, ...]
     """In the order of time."""
     left_out: int
     """Number of events that are not listed, as there are so many of their kind."""
@@ -106,7 +106,7 @@ def events(inputs: EventsInput, progress: Progress = silent) -> EventsResult:
     progress : told how far it is; may raise to cancel.
     """
     run = inputs.run
-    found: list[Event] = []
+    found: list[RunEvent] = []
     left_out = 0
     for share, some in (
         (0.0, _modes(run)),
@@ -126,7 +126,7 @@ def events(inputs: EventsInput, progress: Progress = silent) -> EventsResult:
     return EventsResult(inputs, tuple(sorted(found, key=lambda event: event.time)), left_out)
 
 
-def _modes(run: RunResult) -> Iterator[Event]:
+def _modes(run: RunResult) -> Iterator[RunEvent]:
     """Every change of the supervisor's mode; a drive that does not begin operational begins with one."""
     modes, times, limits = run.columns.modes, run.times, limits_along(run.columns)
     before = np.concatenate(([Mode.OPERATIONAL], modes[:-1]))
@@ -134,14 +134,14 @@ def _modes(run: RunResult) -> Iterator[Event]:
     for cycle in np.flatnonzero(modes != before).tolist():
         time, mode = float(times[cycle]), Mode(int(modes[cycle]))
         if mode is Mode.OPERATIONAL:
-            yield Event(kind=EventKind.RECOVERED, time=time, lasts=time - stopped_at)
+            yield RunEvent(kind=EventKind.RECOVERED, time=time, lasts=time - stopped_at)
             continue
         if before[cycle] == Mode.OPERATIONAL:
             stopped_at = time
         if mode is Mode.LOST:
-            yield Event(kind=EventKind.LOST, time=time, share=float(run.recent.rejected[cycle]))
+            yield RunEvent(kind=EventKind.LOST, time=time, share=float(run.recent.rejected[cycle]))
             continue
-        yield Event(
+        yield RunEvent(
             kind=EventKind.FAIL,
             time=time,
             position=float(run.position_two_sigma[cycle]),
@@ -150,7 +150,7 @@ def _modes(run: RunResult) -> Iterator[Event]:
         )
 
 
-def _blind(run: RunResult) -> Iterator[Event]:
+def _blind(run: RunResult) -> Iterator[RunEvent]:
     """Stretches in which nothing was accepted."""
     stamps, means = run.columns.stamps_ns, run.columns.means
     for first, after in stretches_of(run.counts[:, Status.INLIER] == 0).tolist():
@@ -160,18 +160,18 @@ def _blind(run: RunResult) -> Iterator[Event]:
         lasts = int(stamps[end] - stamps[begin]) * 1e-9
         if lasts > BLIND_S:
             way = float(np.hypot(*np.diff(means[begin : end + 1, :2], axis=0).T).sum())
-            yield Event(kind=EventKind.BLIND, time=float(run.times[first]), lasts=lasts, position=way)
+            yield RunEvent(kind=EventKind.BLIND, time=float(run.times[first]), lasts=lasts, position=way)
 
 
-def _gaps(run: RunResult) -> Iterator[Event]:
+def _gaps(run: RunResult) -> Iterator[RunEvent]:
     """Times without a scan."""
     times, longest = run.times, longest_regular(run.times)
     between = np.diff(times)
     for cycle in np.flatnonzero(between > longest).tolist():
-        yield Event(kind=EventKind.GAP, time=float(times[cycle]), lasts=float(between[cycle]))
+        yield RunEvent(kind=EventKind.GAP, time=float(times[cycle]), lasts=float(between[cycle]))
 
 
-def _corrections(run: RunResult, progress: Progress) -> Iterator[Event]:
+def _corrections(run: RunResult, progress: Progress) -> Iterator[RunEvent]:
     """Jumps, and things that were taken for another reflector: both need the belief before each scan."""
     columns, limits = run.columns, limits_along(run.columns)
     numbers, names = _numbers(columns)
@@ -185,7 +185,7 @@ def _corrections(run: RunResult, progress: Progress) -> Iterator[Event]:
         turned = np.abs(difference(columns.means[here, 2], rows.means[:, 2]))
         jumps = (moved > JUMP_SHARE * limits[here, 0]) | (turned > JUMP_SHARE * limits[here, 1])
         for index in np.flatnonzero(jumps).tolist():
-            yield Event(
+            yield RunEvent(
                 kind=EventKind.JUMP,
                 time=float(run.times[first + index]),
                 position=float(moved[index]),
@@ -193,7 +193,7 @@ def _corrections(run: RunResult, progress: Progress) -> Iterator[Event]:
                 limits=(float(limits[first + index, 0]), float(limits[first + index, 1])),
             )
         for cycle, old, new in _changes(columns, rows.means, (first, earlier), numbers).tolist():
-            yield Event(kind=EventKind.CHANGED, time=float(run.times[cycle]), names=(names[old], names[new]))
+            yield RunEvent(kind=EventKind.CHANGED, time=float(run.times[cycle]), names=(names[old], names[new]))
         first = after
 
 
@@ -297,7 +297,7 @@ def _compare(  # noqa: PLR0917 - the columns of a run
     return count
 
 
-def told(event: Event) -> str:
+def told(event: RunEvent) -> str:
     """Figures of an event in words, each with its unit."""
     match event.kind:
         case EventKind.FAIL:

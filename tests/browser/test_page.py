@@ -88,7 +88,7 @@ def test_the_page_shows_a_driving_vehicle_its_badge_and_every_panel(run: OpenRun
     assert np.hypot(*(vehicle_in(page) - before)) > 0.1
     for text in ("Largest NIS / gate", "validation area", "Position error", "Floor map"):
         page.wait_for_text(text)
-    assert page.page.locator(".uplot").count() == 6
+    page.page.wait_for_function("() => window.commissionPlots?.shown.titles.length === 6")
     assert page.errors == []
     assert run.runtime.state.faults == ()
 

@@ -14,7 +14,7 @@ from commission.localization.estimate import Mode, Status
 from commission.localization.growing_run import GrowingRun
 from commission.localization.priors import KeptPriors, PriorRows
 from commission.site.records import Detections, Odometry
-from commission.studies.events import MOST_OF_A_KIND, Event, EventKind, EventsInput, events, told
+from commission.studies.events import MOST_OF_A_KIND, EventKind, EventsInput, RunEvent, events, told
 from commission.studies.run import RunResult
 from tests.studies.test_run import CENTERS, hall, replayed, standing_still
 
@@ -28,7 +28,7 @@ def run() -> RunResult:
     return replayed(hall(), standing_still(100))
 
 
-def of(run: RunResult, kind: EventKind) -> list[Event]:
+def of(run: RunResult, kind: EventKind) -> list[RunEvent]:
     return [event for event in events(EventsInput(run)).events if event.kind is kind]
 
 

@@ -171,7 +171,22 @@ div:has(>div>.c-bottom)>:nth-child(4){{grid-column:10/span 3}}
 div:has(>div>.c-bottom)>:nth-child(5){{grid-column:14/span 11}}
 div:has(>div>.c-bottom)>:nth-child(6){{grid-column:14/span 11;margin:-9px 0 2px!important;
  padding:0 67px 0 18px!important}}
-div:has(>div>.c-bottom)>:nth-child(n+7){{grid-column:span 4}}
+div:has(>div>.c-bottom)>:nth-child(n+7){{grid-column:span 24;padding:0!important;margin:0!important}}
+div:has(>.c-carried){{display:none!important}}
+.c-instruments{{height:calc(var(--c-bottom) - 50px)}}
+.c-plots{{display:flex;flex-direction:column;height:100%;font-size:12px}}
+.c-plots-bar{{display:flex;align-items:center;gap:10px;height:24px;padding:0 8px;overflow:hidden;white-space:nowrap}}
+.c-plots-bar button{{background:none;border:1px solid transparent;border-radius:3px;color:inherit;font:inherit;
+ padding:1px 7px;cursor:pointer;opacity:.7}}
+.c-plots-bar button:hover,.c-plots-bar button:focus-visible{{opacity:1;border-color:#555}}
+.c-plots-bar button:disabled{{opacity:.3;cursor:default;border-color:transparent}}
+.c-chips{{flex:1;min-width:0;overflow:hidden;font-size:11px}}
+.c-plots-bar [aria-pressed=true]{{opacity:1;background:#2c3036}}
+.c-plots-bar [aria-pressed=false]{{opacity:.5}}
+.c-plots-end button{{border-color:#44484f;margin-left:4px;font-size:11px}}
+.c-plots-body{{flex:1;min-height:0;position:relative;overflow:hidden}}
+.c-plots-body canvas{{display:block;position:absolute;inset:0;cursor:crosshair;touch-action:none}}
+:root.c-higher{{--c-bottom:62vh!important}}
 :root:has(.c-fold input:checked){{--c-bottom:{FOLDED_PX}px}}
 [data-floating-window]:has(.c-fold input:checked){{overflow:hidden!important}}
 .c-fold{{display:block;text-align:center;font-size:11px;opacity:.7;cursor:pointer;white-space:nowrap}}
@@ -203,7 +218,7 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 .c-list{{margin:1px 0 2px;padding-left:15px;font-size:12px;line-height:1.4;overflow-wrap:anywhere;
  font-variant-numeric:tabular-nums}}
 @media (max-height:800px){{:root{{--c-bottom:{LOW_BOTTOM_PX}px}}
- div:has(>div>.c-bottom)>:nth-child(n+7),div:has(>div>.c-route)>:nth-child(n+2){{zoom:.78}}}}
+ div:has(>div>.c-route)>:nth-child(n+2){{zoom:.78}}}}
 .c-note{{font-size:11.5px;opacity:.7;line-height:1.35}}
 [data-draft] :is(input,textarea):focus{{border-color:{css(SELECTED)}!important;box-shadow:0 0 0 1px {css(SELECTED)}}}
 [data-refused]{{flex-wrap:wrap}}

@@ -137,3 +137,34 @@ class SetDisturbance(Action):
     """Its dotted name in the disturbances: `wheels.forward_per_sqrt_m`, `constants.mounting_sigma[2]`."""
     value: object
     """New value, in the unit of code and files."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShowSpan(Action):
+    """Show a stretch of the drive in this browser's plots."""
+
+    span: tuple[float, float] | None
+    """Begin and end [s]; none: the whole drive."""
+
+
+@dataclass(frozen=True, slots=True)
+class ShowCharts(Action):
+    """Choose this browser's plots."""
+
+    titles: tuple[str, ...]
+    """Their titles, one at least."""
+
+
+@dataclass(frozen=True, slots=True)
+class SaveCurves(Action):
+    """Save what this browser's plots show as a table, cycle by cycle."""
+
+
+@dataclass(frozen=True, slots=True)
+class CurvesMade(Action):
+    """Such a table is ready."""
+
+    name: str
+    """Name of its file."""
+    content: bytes
+    """The file."""

@@ -14,22 +14,28 @@ from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
 from commission.localization.estimate import Status
 from commission.site.parameters import Parameters
-from commission.site.quantity import DEGREES, MILLIMETRES
+from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
 from commission.studies.run import RunResult
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """One curve of a plot."""
+    """One curve of a plot; its unit is in the plot's title."""
 
     label: str
-    """Its name and unit."""
+    """Its name."""
+    column: str
+    """Its name in a file, with its unit where that is none of SI."""
     color: str
     """CSS color: # and six digits."""
-    values: Callable[[RunResult], FloatArray]
-    """From a run to one value per cycle, in the plot's unit; NaN where it is unknown."""
-    has_gaps: bool = False
-    """Whether it may be unknown in between: then it is drawn as dots, for a line would go on across the gap."""
+    part: Callable[[RunResult, slice], FloatArray]
+    """From a run and some of its cycles to one value for each, in the plot's unit; NaN where it is unknown."""
+    of_detections: bool = False
+    """Whether it is of detections and not of cycles: a cycle may have several or none."""
+
+    def values(self, run: RunResult, rows: slice = slice(None)) -> FloatArray:
+        """Return the values of a run, or of some rows of it; in the plot's unit."""
+        return self.part(run, rows)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +61,13 @@ class Chart:
     limits: tuple[Limit, ...] = ()
     """Its thresholds."""
     span: Callable[[Parameters], tuple[float, float]] | None = None
-    """Smallest and largest value shown, in the plot's unit; none: from 0 as far as the curves need."""
+    """Smallest value shown, and the largest where no curve goes beyond, in the plot's unit; none: from 0."""
     least: float = 1.0
-    """Where that is at least, so that a curve of zeros lies at the bottom."""
+    """Where it is from 0, the largest value shown is at least that: a curve of zeros lies at the bottom."""
     is_logarithmic: bool = False
     """Whether the vertical axis is logarithmic: a good run lies far below its limits."""
+    is_shown: bool = True
+    """Whether it is shown before somebody chooses."""
 
 
 def _gate(parameters: Parameters) -> float:
@@ -71,74 +79,128 @@ def _decade_below(value: float) -> float:
     return 10.0 ** math.floor(math.log10(value))
 
 
-def _heading_errors(run: RunResult) -> FloatArray:
+def _heading_errors(run: RunResult, at: slice) -> FloatArray:
     """(K,) amount of the heading error [deg]; NaN where it is unknown."""
-    return DEGREES.of(np.abs(run.errors[:, 2]))
+    return DEGREES.of(np.abs(run.errors[at, 2]))
+
+
+def _nis_of_detections(run: RunResult, at: slice) -> FloatArray:
+    """(n,) squared Mahalanobis distance of detections near a reflector, accepted or not; NaN of the others."""
+    return np.where(run.columns.status[at] != Status.OUTLIER_DETECTOR, run.columns.d2[at], math.nan)
 
 
 CHARTS = (
     Chart(
         title="2σ of position [mm]",
         lines=(
-            Line("against the limit [mm]", INK, lambda run: MILLIMETRES.of(run.position_two_sigma)),
-            Line("x [mm]", TURQUOISE, lambda run: MILLIMETRES.of(run.two_sigma[:, 0])),
-            Line("y [mm]", ORANGE, lambda run: MILLIMETRES.of(run.two_sigma[:, 1])),
+            Line(
+                label="largest",
+                column="position_two_sigma_mm",
+                color=INK,
+                part=lambda run, at: MILLIMETRES.of(run.position_two_sigma[at]),
+            ),
+            Line(
+                label="x",
+                column="x_two_sigma_mm",
+                color=TURQUOISE,
+                part=lambda run, at: MILLIMETRES.of(run.two_sigma[at, 0]),
+            ),
+            Line(
+                label="y",
+                column="y_two_sigma_mm",
+                color=ORANGE,
+                part=lambda run, at: MILLIMETRES.of(run.two_sigma[at, 1]),
+            ),
         ),
         limits=(Limit("limit", lambda p: MILLIMETRES.of(p.supervisor.position_limit)),),
         span=lambda p: (
-            MILLIMETRES.of(0.005 * p.supervisor.position_limit),
+            _decade_below(MILLIMETRES.of(0.02 * p.supervisor.position_limit)),
             MILLIMETRES.of(3.0 * p.supervisor.position_limit),
         ),
         is_logarithmic=True,
     ),
     Chart(
         title="2σ of heading [°]",
-        lines=(Line("heading [°]", TURQUOISE, lambda run: DEGREES.of(run.two_sigma[:, 2])),),
+        lines=(
+            Line(
+                label="heading",
+                column="heading_two_sigma_deg",
+                color=TURQUOISE,
+                part=lambda run, at: DEGREES.of(run.two_sigma[at, 2]),
+            ),
+        ),
         limits=(Limit("limit", lambda p: DEGREES.of(p.supervisor.heading_limit)),),
         span=lambda p: (
-            _decade_below(DEGREES.of(0.005 * p.supervisor.heading_limit)),
+            _decade_below(DEGREES.of(0.02 * p.supervisor.heading_limit)),
             DEGREES.of(3.0 * p.supervisor.heading_limit),
         ),
         is_logarithmic=True,
     ),
     Chart(
-        title="NIS against gate",
+        title="NIS of all detections",
         lines=(
-            Line("largest NIS of a scan's inliers", TURQUOISE, lambda run: run.nis, has_gaps=True),
-            Line("mean of all detections in 1 s", ORANGE, lambda run: run.recent.nis, has_gaps=True),
+            Line(label="each", column="nis", color=TURQUOISE, part=_nis_of_detections, of_detections=True),
+            Line(label="mean of 1 s", column="nis_mean_of_1_s", color=ORANGE, part=lambda run, at: run.recent.nis[at]),
         ),
-        limits=(Limit("gate", _gate), Limit("consistent mean of all", lambda _: 2.0, color=ORANGE)),
-        span=lambda p: (0.0, 1.4 * _gate(p)),
+        limits=(Limit("gate", _gate), Limit("expected", lambda _: 2.0, color=ORANGE)),
+        span=lambda p: (0.01, 10.0 * _gate(p)),
+        is_logarithmic=True,
     ),
     Chart(
         title="Inliers, outliers per scan",
         lines=(
-            Line("inliers", theme.css(theme.INLIER), lambda run: run.counts[:, Status.INLIER].astype(float)),
             Line(
-                "outliers",
-                theme.css(theme.OUTLIER_ASSOCIATION),
-                lambda run: run.counts[:, Status.OUTLIER_DETECTOR :].sum(axis=1).astype(float),
+                label="inliers",
+                column="inliers",
+                color=theme.css(theme.INLIER),
+                part=lambda run, at: run.counts[at, Status.INLIER].astype(float),
+            ),
+            Line(
+                label="outliers",
+                column="outliers",
+                color=theme.css(theme.OUTLIER_ASSOCIATION),
+                part=lambda run, at: run.counts[at, Status.OUTLIER_DETECTOR :].sum(axis=1).astype(float),
             ),
         ),
         least=4.0,
     ),
     Chart(
+        title="Rejected by the gate [%]",
+        lines=(
+            Line(
+                label="share of 1 s",
+                column="rejected_of_1_s_percent",
+                color=theme.css(theme.OUTLIER_ASSOCIATION),
+                part=lambda run, at: PERCENT.of(run.recent.rejected[at]),
+            ),
+        ),
+        limits=(Limit("lost beyond", lambda p: PERCENT.of(p.supervisor.rejection_limit)),),
+        span=lambda _: (0.0, 100.0),
+        is_shown=False,
+    ),
+    Chart(
         title="Position error [mm]",
         lines=(
             Line(
-                "error against reference [mm]",
-                theme.css(theme.REFERENCE),
-                lambda run: MILLIMETRES.of(run.position_errors),
-                has_gaps=True,
+                label="to reference",
+                column="position_error_mm",
+                color=theme.css(theme.REFERENCE),
+                part=lambda run, at: MILLIMETRES.of(run.position_errors[at]),
             ),
         ),
     ),
     Chart(
         title="Heading error [°]",
-        lines=(Line("error against reference [°]", theme.css(theme.REFERENCE), _heading_errors, has_gaps=True),),
+        lines=(
+            Line(
+                label="to reference", column="heading_error_deg", color=theme.css(theme.REFERENCE), part=_heading_errors
+            ),
+        ),
         least=0.01,
     ),
 )
+BY_TITLE = {chart.title: chart for chart in CHARTS}
+SHOWN_FIRST = tuple(chart.title for chart in CHARTS if chart.is_shown)
 
 
 def ceiling(value: float) -> float:

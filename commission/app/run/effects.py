@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from commission.app.base.effects import Effect
 from commission.app.run.actions import Source
+from commission.app.run.state import PlotWindow
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,3 +57,11 @@ class RunAfresh(Effect):
 @dataclass(frozen=True, slots=True)
 class DriveAgain(Effect):
     """Simulate the virtual drive again where the hall, the vehicle or its scanners are no longer those driven."""
+
+
+@dataclass(frozen=True, slots=True)
+class MakeCurves(Effect):
+    """Write what a browser's plots show into a table."""
+
+    window: PlotWindow
+    """What they show."""

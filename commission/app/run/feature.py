@@ -48,6 +48,6 @@ FEATURE = Feature(
         Docked(make=lambda at: EditsPanel(at.gui, at.post, at.state), tab=TUNE, rank=-10),
         Docked(make=lambda at: TrailLegend(at.gui), tab=LEGEND, rank=16),
         Docked(make=lambda at: TimeLine(at.gui, at.post, at.state.part(RunState).speed), tab=TIME, rank=10),
-        Docked(make=lambda at: Plots(at.gui), tab=TIME, rank=20),
+        Docked(make=lambda at: Plots(at.gui, at.post, at.browser), tab=TIME, rank=20, own=True),
     ),
 )

@@ -1,159 +1,104 @@
-"""Plots over the whole drive: uncertainty against its limits, gate, counts, errors; fail episodes as red areas.
+"""The instruments below the floor: curves over the drive, drawn by a script of the page (`web_assets/plots.js`).
 
-What is lived is drawn solid, what is computed behind the cursor pale.
+What changes with the run, the zoom or the choice of plots is sent once; with each picture only the cursor and the
+values there. What is lived is drawn solid, what is computed behind the cursor pale; that is the script's business.
 """
 
 from __future__ import annotations
 
-import itertools
-import math
-from collections.abc import Sequence
+import html
+from typing import Any
 
-import numpy as np
-from viser import GuiApi, GuiUplotHandle, uplot
+from viser import GuiApi
 
-from commission.app.base.panel import BasePanel
-from commission.app.base.plot_style import HIDDEN, plot_style, waking_series
+from commission.app.base import viser_private
+from commission.app.base.panel import BasePanel, Post, posting
 from commission.app.base.view import PageView
-from commission.app.run.charts import CHARTS, Chart, ceiling
-from commission.app.run.curves import BINS, PlotCurve
-from commission.app.run.view import RunView, Stretch
-from commission.geometry.arrays import FloatArray
-from commission.site.parameters import Parameters
-from commission.studies.run import RunResult
+from commission.app.run.asked import action_of
+from commission.app.run.charts import BY_TITLE
+from commission.app.run.drawn_curves import as_text, drawn, values_at
+from commission.app.run.state import PlotWindow
+from commission.app.run.view import RunView
 
 EDIT = "#c08bff"
 """Where an edit acts from, or reflectors are covered."""
-PALE = "59"
-"""Opacity of what lies behind the cursor, as the last two digits of a CSS color: a third."""
 
 
 class Plots(BasePanel):
-    """Six plots side by side."""
+    """One browser's plots.
 
-    def __init__(self, gui: GuiApi) -> None:
-        self._gui = gui
-        self._plots: list[GuiUplotHandle] = []
-        self._duration = 0.0
-        self._turn = 1
-        self._spans: tuple[tuple[float, float], ...] = ()
-        self._axis = np.linspace(0.0, 1.0, BINS)
-        self._result: RunResult | None = None
-        self._curves: list[list[PlotCurve]] = []
-        self._limits: list[list[FloatArray]] = []
-        for chart in CHARTS:
-            series = _series(chart)
-            empty = tuple(np.full(2, np.nan) for _ in series[1:])
-            self._plots.append(
-                gui.add_uplot(
-                    (np.array([0.0, 1.0]), *empty),
-                    series,
-                    title=chart.title,
-                    scales=_scales(1.0, (0.1, 1.0), chart),
-                    **plot_style("run"),
-                )
-            )
+    Parameters
+    ----------
+    gui, post : where the widgets are made, what takes their actions.
+    browser : number of its connection.
+    """
 
-    def draw_slowly(self, view: PageView) -> None:
-        """Draw the whole drive, cut at the cursor."""
+    def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
+        self._browser = browser
+        inbox = gui.add_text("Instruments", "", visible=False)
+        inbox.on_update(posting(post, lambda event: action_of(event.target.value)))
+        self.inbox = inbox
+        gui.add_html(f"<div class='c-instruments' data-inbox='{viser_private.identifier(inbox)}'></div>")
+        self._curves, self._cursor = Carrier(gui, "curves"), Carrier(gui, "cursor")
+        self._shown: tuple[object, ...] = ()
+
+    def draw(self, view: PageView) -> None:
+        """Move the cursor."""
         run = view.part(RunView)
         if run is None or run.duration <= 0.0:
             return
-        if run.result is not self._result:
-            self._take(run.result)
-        spans = tuple(map(_span, CHARTS, self._curves, itertools.repeat(run.segment.setup.parameters)))
-        if run.duration != self._duration or spans != self._spans:
-            # A new scale rebuilds the chart and forgets the zoom: only when it must.
-            self._duration, self._spans = run.duration, spans
-            self._axis = np.linspace(0.0, run.duration, BINS)
-            for plot, span, chart in zip(self._plots, spans, CHARTS, strict=True):
-                plot.scales = _scales(run.duration, span, chart)
-        self._turn = -self._turn
-        marks = (
-            self._areas(run.lived_episodes),
-            self._areas(run.coming_episodes),
-            self._lines((run.time,)),
-            self._lines(run.edits),
-            np.full(BINS, 2.0 + self._turn),
+        charts = [BY_TITLE[title] for title in self._window(view).titles]
+        values = values_at(run.result, charts, run.newest)
+        self._cursor.write({"time": round(run.time, 4), "values": values})
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Send the curves where they are others."""
+        run = view.part(RunView)
+        if run is None or run.duration <= 0.0:
+            return
+        window = self._window(view)
+        shown = (id(run.result), window)
+        if shown == self._shown:
+            return
+        self._shown = shown
+        span = window.span or (0.0, run.duration)
+        message = drawn(run.result, [BY_TITLE[title] for title in window.titles], span)
+        message |= {
+            "titles": list(BY_TITLE),
+            "fails": [list(stretch) for stretch in run.episodes],
+            "edits": list(run.edits),
+            "editColor": EDIT,
+        }
+        self._curves.write(message)
+
+    def _window(self, view: PageView) -> PlotWindow:
+        return view.state.of_browser(self._browser, PlotWindow)
+
+
+class Carrier:
+    """An element of the page that nobody sees, with a message for the script.
+
+    Parameters
+    ----------
+    gui : where it is made.
+    kind : how the script finds it.
+    """
+
+    def __init__(self, gui: GuiApi, kind: str) -> None:
+        self._kind = kind
+        self._html = gui.add_html(self._element("", 0))
+        self._written, self._number = "", 0
+
+    def write(self, message: dict[str, Any]) -> None:
+        """Send a message unless it is the one that is there."""
+        text = as_text(message)
+        if text != self._written:
+            self._written = text
+            self._number += 1
+            self._html.content = self._element(text, self._number)
+
+    def _element(self, text: str, number: int) -> str:
+        return (
+            f"<div class='c-carried' data-kind='{self._kind}' data-number='{number}' "
+            f"data-message='{html.escape(text, quote=True)}'></div>"
         )
-        for plot, span, curves, limits in zip(self._plots, spans, self._curves, self._limits, strict=True):
-            parts = [part for curve in curves for part in curve.cut(run.time, run.lived)] + limits
-            plot.data = (self._axis, *(np.clip(part, *span) for part in parts), *marks)
-
-    def _take(self, result: RunResult) -> None:
-        """Prepare the curves of another run."""
-        self._result = result
-        columns = result.columns
-        times = np.linspace(0.0, result.duration, BINS)
-        cycles = np.maximum(np.searchsorted(result.times, times, side="right") - 1, 0)
-        segments = np.searchsorted(columns.firsts, cycles, side="right") - 1
-        parameters = [segment.setup.parameters for segment in columns.segments]
-        self._curves = [
-            [PlotCurve(result.times, line.values(result), result.duration) for line in chart.lines] for chart in CHARTS
-        ]
-        self._limits = [
-            [np.array([limit.value(each) for each in parameters])[segments] for limit in chart.limits]
-            for chart in CHARTS
-        ]
-
-    def _areas(self, stretches: tuple[Stretch, ...]) -> FloatArray:
-        """(BINS,) 1 in each stretch, at least one of the axis's points wide, 0 elsewhere."""
-        areas = np.zeros(BINS)
-        for start, end in stretches:
-            areas[(self._axis >= start) & (self._axis <= max(end, start + self._duration / BINS))] = 1.0
-        return areas
-
-    def _lines(self, times: tuple[float, ...]) -> FloatArray:
-        """(BINS,) 1 at the axis's point nearest to each time, 0 elsewhere."""
-        lines = np.zeros(BINS)
-        for time in times:
-            lines[int(np.argmin(np.abs(self._axis - time)))] = 1.0
-        return lines
-
-
-def _span(chart: Chart, curves: Sequence[PlotCurve], parameters: Parameters) -> tuple[float, float]:
-    """Smallest and largest value shown."""
-    if chart.span is not None:
-        return chart.span(parameters)
-    return 0.0, ceiling(max([chart.least, *(curve.largest for curve in curves if math.isfinite(curve.largest))]))
-
-
-def _series(chart: Chart) -> tuple[uplot.Series, ...]:
-    lines: list[uplot.Series] = []
-    for line in chart.lines:
-        draw = _dots if line.has_gaps else _line
-        lines += [
-            draw(line.label, line.color, 1.5),
-            draw(f"{line.label}, behind the cursor", line.color + PALE, 1.0),
-        ]
-    limits = [
-        uplot.Series(label=limit.label, stroke=limit.color, width=1, points=HIDDEN, dash=(5, 4))
-        for limit in chart.limits
-    ]
-    return (
-        uplot.Series(label="time [s]"),
-        *lines,
-        *limits,
-        uplot.Series(label="fail", scale="flag", fill="rgba(220,40,40,.28)", points=HIDDEN),
-        uplot.Series(label="fail behind the cursor", scale="flag", fill="rgba(220,40,40,.10)", points=HIDDEN),
-        uplot.Series(label="now", scale="flag", stroke="#e8eaee", width=1, points=HIDDEN),
-        uplot.Series(label="edited from here on", scale="flag", stroke=EDIT, width=1, dash=(2, 2), points=HIDDEN),
-        waking_series(),
-    )
-
-
-def _line(label: str, color: str, width: float) -> uplot.Series:
-    return uplot.Series(label=label, stroke=color, width=width, points=HIDDEN)
-
-
-def _dots(label: str, color: str, width: float) -> uplot.Series:
-    """One dot per known value: uPlot takes NaN for a point, so that its line would go straight across a gap."""
-    return uplot.Series(label=label, width=0, points={"show": True, "size": 2.0 * width, "width": 0, "fill": color})
-
-
-def _scales(duration: float, span: tuple[float, float], chart: Chart) -> dict[str, uplot.Scale]:
-    value: uplot.Scale = {"range": span}
-    if chart.is_logarithmic:
-        value["distr"] = 3
-    # The flags' scale starts above zero: their zero line stays outside of the plot.
-    return {"x": {"time": False, "range": (0.0, duration)}, "y": value, "flag": {"range": (0.01, 1.0)}}

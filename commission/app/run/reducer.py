@@ -6,12 +6,27 @@ from dataclasses import replace
 from typing import Any
 
 from commission.app.base.actions import Sender
+from commission.app.base.effects import SendFile
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.run import actions
-from commission.app.run.effects import CoverFromHere, DriveAgain, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
-from commission.app.run.state import SPEEDS, RunState
+from commission.app.run.charts import BY_TITLE
+from commission.app.run.effects import (
+    CoverFromHere,
+    DriveAgain,
+    LoadSource,
+    MakeCurves,
+    MoveByScans,
+    MoveTo,
+    PlayOn,
+    RunAfresh,
+)
+from commission.app.run.state import SPEEDS, PlotWindow, RunState
 from commission.site.fields import with_field
+
+LONGEST_DRIVE_S = 1e9
+SHORTEST_SPAN_S = 0.01
+"""Shortest stretch that plots show [s]."""
 
 
 def _with(state: AppState, **changes: Any) -> AppState:
@@ -102,3 +117,45 @@ def set_disturbance(action: actions.SetDisturbance, state: AppState, sender: Sen
         return Outcome(state)
     edit = Edit("change the virtual world", sender, f"disturbances.{action.name}")
     return Outcome(edited(state, replace(state.project, disturbances=disturbances), edit))
+
+
+@reduce.register
+def show_span(action: actions.ShowSpan, state: AppState, sender: Sender) -> Outcome:
+    """Show a stretch of the drive, or all of it."""
+    span = action.span
+    if span is not None:
+        begin, end = span
+        if not 0.0 <= begin < end <= LONGEST_DRIVE_S:
+            raise ValueError(f"the plots are to show {begin:g} to {end:g} s; expected 0 s or more, and the end later")
+        middle, half = 0.5 * (begin + end), 0.5 * max(end - begin, SHORTEST_SPAN_S)
+        span = max(middle - half, 0.0), middle + half
+    return Outcome(_with_window(state, sender, span=span))
+
+
+@reduce.register
+def show_charts(action: actions.ShowCharts, state: AppState, sender: Sender) -> Outcome:
+    """Choose which plots are shown."""
+    unknown = [title for title in action.titles if title not in BY_TITLE]
+    if unknown or not action.titles:
+        found = repr(unknown[0]) if unknown else "none"
+        raise ValueError(f"the plots are to show {found}; expected one or more of {', '.join(BY_TITLE)}")
+    titles = tuple(title for title in BY_TITLE if title in action.titles)
+    return Outcome(_with_window(state, sender, titles=titles))
+
+
+@reduce.register
+def save_curves(_action: actions.SaveCurves, state: AppState, sender: Sender) -> Outcome:
+    """Begin to write a table of what is shown."""
+    return Outcome(state, (MakeCurves(state.of_browser(sender.browser, PlotWindow)),))
+
+
+@reduce.register
+def curves_made(action: actions.CurvesMade, state: AppState, _sender: Sender) -> Outcome:
+    """Let the browser save it."""
+    return Outcome(state, (SendFile(action.name, action.content),))
+
+
+def _with_window(state: AppState, sender: Sender, **changes: Any) -> AppState:
+    """Return the state in which one browser's plots show something else."""
+    window = state.of_browser(sender.browser, PlotWindow)
+    return state.with_browser(sender.browser, replace(window, **changes))

@@ -18,7 +18,17 @@ from commission.app.base.view import Followed, LivedPath
 from commission.app.run import drives
 from commission.app.run.actions import ChooseSource, Play, RecordedDrive, Source
 from commission.app.run.drives import Drive
-from commission.app.run.effects import CoverFromHere, DriveAgain, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
+from commission.app.run.effects import (
+    CoverFromHere,
+    DriveAgain,
+    LoadSource,
+    MakeCurves,
+    MoveByScans,
+    MoveTo,
+    PlayOn,
+    RunAfresh,
+)
+from commission.app.run.instruments import Instruments
 from commission.app.run.playback import Playback
 from commission.app.run.state import RunState
 from commission.app.run.view import DrivenHall, RunView
@@ -31,7 +41,7 @@ from commission.progress import Progress
 from commission.simulation import follower, scan
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
-from commission.studies import run
+from commission.studies import curves, run
 from commission.studies.run import RunInput, RunResult, judged_run
 
 PREPARE, COMPILE, LOCALIZE = "Preparing the drive", "Getting ready", "Localizing"
@@ -54,6 +64,7 @@ def compile_kernels(progress: Progress) -> None:
         ("virtual scanner", scan.warm_up),
         ("localizer", run.warm_up),
         ("drawing", rasterize.warm_up),
+        ("plots", curves.warm_up),
     )
     compiled.warm_up(steps, progress)
 
@@ -68,7 +79,7 @@ class RunService(Service):
     compile_all : compiles all kernels that a run needs.
     """
 
-    effects = (LoadSource, MoveTo, MoveByScans, PlayOn, CoverFromHere, RunAfresh, DriveAgain)
+    effects = (LoadSource, MoveTo, MoveByScans, PlayOn, CoverFromHere, RunAfresh, DriveAgain, MakeCurves)
 
     def __init__(
         self,
@@ -80,6 +91,7 @@ class RunService(Service):
         self.playback: Playback | None = None
         self._prepare, self._compile = prepare, compile_all
         self._jobs = context.jobs
+        self._instruments = Instruments(context)
         self._followed_at = context.clock()
         self._project = context.state.project
         self._wanted: RunInput | None = None
@@ -121,6 +133,8 @@ class RunService(Service):
             case PlayOn(backward) if playback is not None:
                 if playback.at_start if backward else playback.at_end:
                     playback.seek(playback.result.duration if backward else 0.0)
+            case MakeCurves(window) if playback is not None:
+                self._instruments.save(playback.result, window, sender)
             case RunAfresh() if playback is not None and self._wanted is not None:
                 playback.seek(0.0)
                 setup = LocalizerSetup.of(state.project)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from commission.app.run.actions import Source
+from commission.app.run.charts import SHOWN_FIRST
 from commission.app.run.trail_colors import TrailBy
 
 SPEEDS = (0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
@@ -31,3 +32,13 @@ class RunState:
     """Whether an edit acts from the cursor on, and not on the whole drive."""
     only_the_map: bool = False
     """Whether an edit of the site moves the map alone, and the hall of a virtual drive stays."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlotWindow:
+    """What one browser's plots show."""
+
+    span: tuple[float, float] | None = None
+    """Begin and end of the stretch of time [s]; none: the whole drive."""
+    titles: tuple[str, ...] = SHOWN_FIRST
+    """Which plots, in the order of `CHARTS`."""

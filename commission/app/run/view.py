@@ -91,14 +91,14 @@ class RunView:
     @property
     def lived_episodes(self) -> tuple[Stretch, ...]:
         """Fail episodes that have begun, up to the cursor."""
-        return tuple((start, min(end, self.time)) for start, end in self._episodes() if self._has_begun(start))
+        return tuple((start, min(end, self.time)) for start, end in self.episodes if self._has_begun(start))
 
     @property
     def coming_episodes(self) -> tuple[Stretch, ...]:
         """What is computed of fail episodes behind the cursor: of one that has begun only its rest."""
         return tuple(
             (max(start, self.time) if self._has_begun(start) else start, end)
-            for start, end in self._episodes()
+            for start, end in self.episodes
             if not self._has_begun(start) or end > self.time
         )
 
@@ -107,7 +107,8 @@ class RunView:
         """Times from which on another setup is used, or reflectors are covered or uncovered [s]."""
         return tuple(float(self.result.times[segment.first]) for segment in self.result.columns.segments[1:])
 
-    def _episodes(self) -> tuple[Stretch, ...]:
+    @property
+    def episodes(self) -> tuple[Stretch, ...]:
         """All fail episodes of the drive."""
         first_ns = self.result.inputs.log.first_ns
         return tuple(

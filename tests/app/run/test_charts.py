@@ -5,19 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import viser
 from scipy.stats import chi2
 
-from commission.app.base.server import start_server
-from commission.app.base.state import AppState
-from commission.app.base.view import view_of
 from commission.app.run.charts import CHARTS, ceiling
-from commission.app.run.curves import BINS
 from commission.app.run.drives import Drive
-from commission.app.run.playback import Playback
-from commission.app.run.plots import Plots
 from commission.localization.estimate import Status
-from commission.localization.setup import LocalizerSetup
 from commission.site.fields import with_field
 from commission.site.project import Project
 from commission.studies.run import RunInput, RunResult, judged_run
@@ -39,18 +31,19 @@ def largest_sigma(estimate, _truth):
 
 
 EXPECTED = {
-    ("2σ of position [mm]", "against the limit [mm]"): lambda e, t: 1000.0 * largest_sigma(e, t),
-    ("2σ of position [mm]", "x [mm]"): lambda e, t: 1000.0 * sigma(0)(e, t),
-    ("2σ of position [mm]", "y [mm]"): lambda e, t: 1000.0 * sigma(1)(e, t),
-    ("2σ of heading [°]", "heading [°]"): lambda e, t: DEGREES * sigma(2)(e, t),
-    ("NIS against gate", "largest NIS of a scan's inliers"): lambda e, _t: max(e.d2[e.status == 0], default=math.nan),
-    ("NIS against gate", "mean of all detections in 1 s"): None,
+    ("2σ of position [mm]", "largest"): lambda e, t: 1000.0 * largest_sigma(e, t),
+    ("2σ of position [mm]", "x"): lambda e, t: 1000.0 * sigma(0)(e, t),
+    ("2σ of position [mm]", "y"): lambda e, t: 1000.0 * sigma(1)(e, t),
+    ("2σ of heading [°]", "heading"): lambda e, t: DEGREES * sigma(2)(e, t),
+    ("NIS of all detections", "each"): None,
+    ("NIS of all detections", "mean of 1 s"): None,
     ("Inliers, outliers per scan", "inliers"): inliers,
     ("Inliers, outliers per scan", "outliers"): lambda e, t: len(e.status) - inliers(e, t),
-    ("Position error [mm]", "error against reference [mm]"): lambda e, t: (
+    ("Rejected by the gate [%]", "share of 1 s"): None,
+    ("Position error [mm]", "to reference"): lambda e, t: (
         1000.0 * math.hypot(e.posterior.mean[0] - t[0], e.posterior.mean[1] - t[1])
     ),
-    ("Heading error [°]", "error against reference [°]"): lambda e, t: (
+    ("Heading error [°]", "to reference"): lambda e, t: (
         DEGREES * abs(math.remainder(e.posterior.mean[2] - t[2], 2.0 * math.pi))
     ),
 }
@@ -68,7 +61,7 @@ def test_every_curve_has_its_expectation() -> None:
 
 
 def test_the_nis_of_all_is_the_mean_over_a_second_whatever_the_gate_says(strict: RunResult) -> None:
-    values = LINES["NIS against gate", "mean of all detections in 1 s"].values(strict)
+    values = LINES["NIS of all detections", "mean of 1 s"].values(strict)
     estimates = [strict.columns.estimate(cycle) for cycle in range(strict.cycles)]
     expected = []
     for newest in estimates:
@@ -79,6 +72,29 @@ def test_the_nis_of_all_is_the_mean_over_a_second_whatever_the_gate_says(strict:
     np.testing.assert_allclose(values, expected, rtol=1e-9)
     # What the gate rejects counts, too: there is some.
     assert (strict.columns.status == Status.OUTLIER_ASSOCIATION).any()
+
+
+def test_the_share_of_the_rejected_is_that_of_a_second_in_percent(strict: RunResult) -> None:
+    values = LINES["Rejected by the gate [%]", "share of 1 s"].values(strict)
+    newest = strict.cycles - 1
+    last = strict.columns.stamps_ns > strict.columns.stamps_ns[newest] - 10**9
+    of = np.repeat(last, np.diff(strict.columns.offsets))
+    outliers, inliers = (
+        np.count_nonzero(of & (strict.columns.status == each)) for each in (Status.OUTLIER_ASSOCIATION, Status.INLIER)
+    )
+    assert values[newest] == pytest.approx(100.0 * outliers / (outliers + inliers))
+
+
+def test_the_nis_of_each_is_that_of_all_near_a_reflector_accepted_or_not(strict: RunResult) -> None:
+    line = LINES["NIS of all detections", "each"]
+    assert line.of_detections
+    expected = [
+        d2 if status != Status.OUTLIER_DETECTOR else math.nan
+        for cycle in range(strict.cycles)
+        for d2, status in zip(strict.columns.estimate(cycle).d2, strict.columns.estimate(cycle).status, strict=True)
+    ]
+    np.testing.assert_array_equal(line.values(strict), expected)
+    np.testing.assert_array_equal(line.values(strict, slice(10, 30)), expected[10:30])
 
 
 @pytest.mark.parametrize("name", [name for name, expected in EXPECTED.items() if expected], ids=" ".join)
@@ -98,7 +114,8 @@ def test_a_curve_is_its_quantity_in_its_unit_cycle_by_cycle(strict: RunResult, d
     [
         ("2σ of position [mm]", 70.0),
         ("2σ of heading [°]", 2.5),
-        ("NIS against gate", float(chi2.ppf(0.6, 2))),
+        ("NIS of all detections", float(chi2.ppf(0.6, 2))),
+        ("Rejected by the gate [%]", 65.0),
     ],
 )
 def test_a_limit_is_its_parameter_in_the_unit_of_its_plot(project: Project, title: str, expected: float) -> None:
@@ -107,6 +124,7 @@ def test_a_limit_is_its_parameter_in_the_unit_of_its_plot(project: Project, titl
         ("supervisor.position_limit", 0.07),
         ("supervisor.heading_limit", 2.5 / DEGREES),
         ("association.gate_probability", 0.6),
+        ("supervisor.rejection_limit", 0.65),
     ):
         parameters = with_field(parameters, key, value)
     (chart,) = (chart for chart in CHARTS if chart.title == title)
@@ -121,86 +139,3 @@ def test_a_limit_is_its_parameter_in_the_unit_of_its_plot(project: Project, titl
 )
 def test_an_axis_ends_at_the_next_round_number(value: float, expected: float) -> None:
     assert ceiling(value) == pytest.approx(expected, rel=1e-12)
-
-
-@pytest.fixture
-def server():
-    server = start_server("127.0.0.1", 0)
-    yield server
-    server.stop()
-
-
-def drawn(plots: Plots, project: Project, playback: Playback) -> list[np.ndarray]:
-    """What the first plot holds: axis, x and its pale part, y and its pale part, limit, marks."""
-    plots.draw_slowly(view_of(AppState(project=project, saved=project), playback.view(covered=False)))
-    return [np.asarray(part) for part in plots._plots[0].data]
-
-
-def test_what_lies_behind_the_cursor_is_drawn_pale(
-    server: viser.ViserServer, project: Project, result: RunResult
-) -> None:
-    plots, playback = Plots(server.gui), Playback(result)
-    playback.seek(0.5 * result.duration)
-    axis, lived, coming = drawn(plots, project, playback)[:3]
-    half = BINS // 2
-    assert axis[-1] == pytest.approx(result.duration)
-    assert np.isfinite(lived[:half]).all()
-    assert np.isnan(lived[half + 1 :]).all()
-    assert np.isnan(coming[: half - 1]).all()
-    assert np.isfinite(coming[half + 1 :]).all()
-    playback.seek(1e9)
-    assert np.isfinite(drawn(plots, project, playback)[1]).all()
-
-
-@pytest.mark.parametrize("title", ["NIS against gate", "Position error [mm]", "Heading error [°]"])
-def test_what_is_unknown_for_a_while_is_a_gap_of_dots_and_not_0(
-    server: viser.ViserServer, project: Project, result: RunResult, title: str
-) -> None:
-    # From a half to three quarters of the drive no detection is accepted and no reference is there.
-    unknown = (result.times > 0.5 * result.duration) & (result.times < 0.75 * result.duration)
-    nis, errors = result.nis.copy(), result.errors.copy()
-    nis[unknown], errors[unknown] = math.nan, math.nan
-    gapped = replace(result, nis=nis, errors=errors, position_errors=np.hypot(errors[:, 0], errors[:, 1]))
-    plots, playback = Plots(server.gui), Playback(gapped)
-    number = [chart.title for chart in CHARTS].index(title)
-    for share in (0.7, 1.0):
-        playback.seek(share * result.duration)
-        plots.draw_slowly(view_of(AppState(project=project, saved=project), playback.view(covered=False)))
-        _, lived, coming = (np.asarray(part) for part in plots._plots[number].data[:3])
-        gap = slice(BINS // 2 + 1, int(0.7 * BINS) + 1)
-        assert np.isnan(lived[gap]).all()
-        assert np.isnan(coming[gap]).all()
-        assert np.isfinite(lived[: BINS // 2 - 1]).all()
-        assert (lived[: BINS // 2 - 1] > 0.0).any()
-    for series in plots._plots[number].series[1:3]:
-        # uPlot draws a line on across NaN, as a real browser shows; a dot it leaves out.
-        assert series["width"] == 0
-        assert series["points"]["show"]
-
-
-def test_a_limit_changes_where_another_segment_begins(
-    server: viser.ViserServer, project: Project, result: RunResult
-) -> None:
-    wider = replace(project, parameters=with_field(project.parameters, "supervisor.position_limit", 0.2))
-    cycle = result.cycles // 2
-    later = judged_run(result.inputs.with_setup(LocalizerSetup.of(wider), cycle), earlier=result)
-    axis, *_, limit, _fail, _coming, _now, edits, _waking = drawn(Plots(server.gui), project, Playback(later))
-    assert set(limit.tolist()) == {100.0, 200.0}
-    step = axis[np.flatnonzero(np.diff(limit))[0]]
-    began = pytest.approx(float(result.times[cycle]), abs=result.duration / BINS)
-    assert step == began
-    assert axis[np.flatnonzero(edits)].tolist() == [began]
-
-
-def test_fail_episodes_are_areas_dark_where_they_are_lived(
-    server: viser.ViserServer, project: Project, drive: Drive
-) -> None:
-    tight = replace(project, parameters=with_field(project.parameters, "supervisor.position_limit", 0.03))
-    inputs = RunInput.of(tight, drive.log, drive.start).with_cover(15, covered=True).with_cover(75, covered=False)
-    playback = Playback(judged_run(inputs))
-    (start, end) = playback.view(covered=False).coming_episodes[0]
-    plots = Plots(server.gui)
-    playback.seek(0.5 * (start + end))
-    axis, *_, lived, coming, _now, _edits, _waking = drawn(plots, project, playback)
-    assert axis[lived > 0][[0, -1]] == pytest.approx((start, playback.time), abs=2.0 * axis[1])
-    assert axis[coming > 0][[0, -1]] == pytest.approx((playback.time, end), abs=2.0 * axis[1])
