@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.compiled import compiled, compiled_inline
-from commission.geometry.arrays import FloatArray, IntArray
+from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.observation import expect, observation_at, scanner_offset
 from commission.planning.detection_noise import DetectionNoise, worth
 from commission.planning.route_prediction import PlannedRoute, RoutePrediction, predict_route, smallest_route
@@ -56,7 +56,8 @@ def tangent_at(planned: PlannedRoute, prediction: RoutePrediction, scan: int, ax
     -----
     L' <= G L G^T + P'^-1 Q P'^-1 with G = P'^-1 F P, P' = F P F^T + Q, tangent of (F L^-1 F^T + Q)^-1 at P; and
     L' <= L + p H^T R^-1 H for a detection of probability p, since the inverse is convex. Derived; followed backwards
-    from w = P e, so that a tangent costs as much as a look at the scans before it.
+    from w = P e, so that a tangent costs as much as a look at the scans before it. Constants that are considered count
+    as known: no filter that has to allow for them does better.
     """
     model = planned.model()
     gains = np.zeros(len(planned.reflectors))
@@ -68,7 +69,7 @@ def tangent_at(planned: PlannedRoute, prediction: RoutePrediction, scan: int, ax
         planned.drive.scanners,
         planned.visible.offsets,
         planned.visible.indices,
-        planned.places,
+        _places(planned),
         model.observations,
         model.noise,
         model.kinds,
@@ -78,6 +79,14 @@ def tangent_at(planned: PlannedRoute, prediction: RoutePrediction, scan: int, ax
         gains,
     )
     return Tangent(gains / variance, rest / variance, variance)
+
+
+def _places(planned: PlannedRoute) -> FloatArray:
+    """(M, 3) x, y [m], map frame; variance that is noise to the filter: none where it considers the survey [m^2]."""
+    places = planned.places[:, :3].copy()
+    if planned.parameters.filter.consider:
+        places[:, 2] = 0.0
+    return read_only(places)
 
 
 @compiled

@@ -11,6 +11,7 @@ import numpy as np
 
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.planning.error_budget import larger_variances, predict_errors
+from commission.planning.fix_shares import fix_shares
 from commission.planning.information import tangent_at
 from commission.planning.route_prediction import (
     PlannedRoute,
@@ -46,7 +47,7 @@ class Excess:
     gains: FloatArray
     """(M,) what each reflector adds."""
     need: float
-    """Sum of them at which the limit is kept, as far as a tangent says."""
+    """Sum of them at which the limit is kept, as far as shares in a fix say."""
 
 
 class LayoutLimits:
@@ -119,9 +120,10 @@ class LayoutLimits:
     def _dearest(self, index: int, prediction: RoutePrediction, two_sigma: FloatArray) -> list[int]:
         """Reflectors that have the largest part in the information wherever even all together are near a limit."""
         route, shares = self._planned[index], two_sigma / self._demanded[index]
+        everything = np.ones(self._count, np.bool_)
         found: set[int] = set()
         for scan, axis in _worst_apart(route, shares, NEARLY, len(shares)):
-            gains = tangent_at(route, prediction, scan, axis).gains
+            gains = fix_shares(route, prediction, scan, axis, everything).gains
             found.update(np.argsort(-gains, kind="stable")[:DEAREST].tolist())
         return sorted(found)
 
@@ -183,12 +185,14 @@ class LayoutLimits:
         shares = 4.0 * variances / limits**2
         for scan, axis in _worst_apart(route, shares, 1.0, PER_DAMAGE):
             share = float(shares[scan, axis])
-            tangent = tangent_at(route, prediction, scan, axis)
-            gains = np.where(np.arange(len(left)) == gone, 0.0, tangent.gains)
-            # The tangent knows neither the error beyond what the filter says nor chance: it is held against itself.
-            yield Excess(gains, float(gains[left].sum()) + max(1.0 - 1.0 / share, LEAST_MORE))
+            fix = fix_shares(route, prediction, scan, axis, left)
+            gains = np.where(np.arange(len(left)) == gone, 0.0, fix.gains)
+            # Neither what a fix leaves out nor chance is in the gains: they are held against themselves.
+            yield Excess(gains, float(gains[left].sum()) + max(share - 1.0, LEAST_MORE))
             if len(self._necessary) < NECESSARY:
-                self._necessary.append((gains, tangent.need(0.25 * limits[scan, axis] ** 2)))
+                tangent = tangent_at(route, prediction, scan, axis)
+                needed = np.where(np.arange(len(left)) == gone, 0.0, tangent.gains)
+                self._necessary.append((needed, tangent.need(0.25 * limits[scan, axis] ** 2)))
 
 
 def _worst_apart(route: PlannedRoute, shares: FloatArray, least: float, most: int) -> Iterator[tuple[int, int]]:

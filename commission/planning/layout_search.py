@@ -1,10 +1,10 @@
 """The search for few reflectors among many: a covering problem that learns what the limits of the uncertainty ask for.
 
 How often each scan must see a reflector is a covering problem (`cover`). Limits are not; but wherever a prediction over
-a layout passes one, a tangent of the information (`information`) says in a linear row what a layout must have more than
-this one. The row joins the problem, reflectors are exchanged until all rows are fulfilled (`fulfilling`), and the next
-layout is judged. Where a place has a rival, the row asks for a reflector that only one of the two sees. Of the layouts
-that hold the smallest is kept, so that more effort never gives a larger one.
+a layout passes one, the shares of reflectors in a fix (`fix_shares`) say in a linear row what a layout must have more
+than this one. The row joins the problem, reflectors are exchanged until all rows are fulfilled (`fulfilling`), and the
+next layout is judged. Where a place has a rival, the row asks for a reflector that only one of the two sees. Of the
+layouts that hold the smallest is kept, so that more effort never gives a larger one.
 """
 
 from __future__ import annotations

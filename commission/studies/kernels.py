@@ -6,7 +6,15 @@ A study warms up what it needs as its first part, so that progress does not stan
 from __future__ import annotations
 
 from commission.geometry import spline_kernels
-from commission.planning import error_budget, information, route_check, route_prediction, vehicle_fixes, visibility
+from commission.planning import (
+    error_budget,
+    fix_shares,
+    information,
+    route_check,
+    route_prediction,
+    vehicle_fixes,
+    visibility,
+)
 
 SIGHT = ("lines of sight", visibility.warm_up)
 DILUTION = ("dilution", vehicle_fixes.warm_up)
@@ -15,6 +23,7 @@ CURVES = ("curves", spline_kernels.warm_up)
 PREDICTION = ("prediction", route_prediction.warm_up)
 ERRORS = ("error budget", error_budget.warm_up)
 INFORMATION = ("information about the pose", information.warm_up)
+SHARES = ("shares in a fix", fix_shares.warm_up)
 ROOM = ("room along routes", route_check.warm_up)
 
 DRIVES = (SIGHT, CURVES, PREDICTION)

@@ -28,7 +28,7 @@ from commission.site.stations import Station
 from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import Vehicle
 from commission.studies.inputs import StudyInput
-from commission.studies.kernels import DRIVES, ERRORS, INFORMATION
+from commission.studies.kernels import DRIVES, ERRORS, INFORMATION, SHARES
 
 COMPILING, COMPARED = 0.1, 0.15
 """Shares of the time until which kernels are compiled, and it is found out what the present reflectors come to."""
@@ -162,7 +162,7 @@ def placement(inputs: PlacementInput, progress: Progress = silent) -> PlacementR
     inputs : the site, and what is asked.
     progress : told how far it is; may raise to cancel.
     """
-    warm_up((*DRIVES, ERRORS, INFORMATION), part(progress, 0.0, COMPILING))
+    warm_up((*DRIVES, ERRORS, INFORMATION, SHARES), part(progress, 0.0, COMPILING))
     names = tuple(route.name for route in inputs.routes)
     given = inputs.options.prediction
     before = layout_figures(inputs, inputs.reflectors, names, given, part(progress, COMPILING, COMPARED))
