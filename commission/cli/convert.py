@@ -16,7 +16,7 @@ class Convert:
 
     Reflectors: .csv, .tsv, .imk. Routes: VDMA LIF (.lif, .json), VDA 5050 orders (.json, read only). Floor maps: .yaml.
     Floor plans (read only): .dxf, .stl, .obj, .glb, .ply; they become a map (.yaml). A project folder gives and takes
-    all of these. A recording becomes a CSV folder.
+    all of these. A recording (CSV folder, ROS bag .mcap, .db3 or .bag) becomes a CSV folder.
     """
 
     source: Annotated[Positional[Path], arg(metavar="IN")]
@@ -41,9 +41,17 @@ class Convert:
     """Whether a file or recording that is there is replaced. A project that is there then takes what IN holds in place
     of its own, and keeps the rest."""
 
+    channel: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="KIND=TOPIC")] = ()
+    """ROS bag with several candidates: the topic of scan (or scan.NAME, for each of several scanners), odometry or
+    reference; the topic none: of no topic. Repeat it for several."""
+    wheels: Annotated[str | None, arg(metavar="LEFT,RIGHT,RADIUS,SEPARATION[,TICKS]")] = None
+    """ROS bag whose odometry is a JointState: names of the two driven wheels, their radius and distance [m], and counts
+    for one turn where they are no radians."""
+
     def run(self) -> None:
         """Convert, and tell what was made up, doubted or lost."""
         from commission.io.interchange import ConvertOptions, convert_file
+        from commission.io.recordings.channels import ChannelOptions
 
         options = ConvertOptions(
             vehicle_type=self.vehicle_type,
@@ -53,6 +61,7 @@ class Convert:
             heights=self.height or (0.2,),
             up=self.up,
             resolution=self.resolution,
+            recording=ChannelOptions.parse(self.channel, self.wheels),
         )
         for line in convert_file(self.source, self.target, options, force=self.force):
             sys.stdout.write(f"Note         {line}\n")

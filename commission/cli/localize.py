@@ -32,7 +32,7 @@ class Localize:
     project: Positional[Path]
     """Folder of the project (holds project.yaml)."""
     recording: Positional[Path]
-    """Recording: a CSV folder (odometry.csv with detections.csv or scans.npz)."""
+    """Recording: a CSV folder (odometry.csv with detections.csv or scans.npz) or a ROS bag (.mcap, .db3, .bag)."""
     out: Annotated[Path, arg(metavar="DIR")]
     """Folder for the results; made when it does not exist."""
     initial_pose: Annotated[str | None, arg(metavar="X,Y,THETA[,SX,SY,STHETA]")] = None
@@ -56,6 +56,13 @@ class Localize:
     strict: bool = False
     """Refuse a recording that cannot be what it says (units, clocks, gaps, thresholds) instead of noting it."""
 
+    channel: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="KIND=TOPIC")] = ()
+    """ROS bag with several candidates: the topic of scan (or scan.NAME, for each of several scanners), odometry or
+    reference; the topic none: of no topic. Repeat it for several."""
+    wheels: Annotated[str | None, arg(metavar="LEFT,RIGHT,RADIUS,SEPARATION[,TICKS]")] = None
+    """ROS bag whose odometry is a JointState: names of the two driven wheels, their radius and distance [m], and counts
+    for one turn where they are no radians."""
+
     def run(self) -> None:
         """Localize, write, and tell in a few lines how it went."""
         given = None if self.initial_pose is None else initial_pose(self.initial_pose)
@@ -64,6 +71,7 @@ class Localize:
         from commission.io.overwriting import result_folder
         from commission.io.project_file import apply_settings, load_project
         from commission.io.recordings.base import load_log
+        from commission.io.recordings.channels import ChannelOptions
         from commission.io.results import DETECTIONS, ESTIMATES, SUMMARY, write_results
         from commission.localization import whole_run
         from commission.site.truth import truth_lines
@@ -80,7 +88,7 @@ class Localize:
         self._refuse_to_rate()
         project = as_saved = load_project(self.project)
         project = dataclasses.replace(project, parameters=apply_settings(project.parameters, self.set))
-        log = self._with_reference(load_log(self.recording))
+        log = self._with_reference(load_log(self.recording, ChannelOptions.parse(self.channel, self.wheels)))
         start = start_of(project, log, given and given.pose, given and given.sigmas)
         if self.strict:
             for finding in plausibility(PlausibilityInput.of(project, log)):
@@ -89,7 +97,7 @@ class Localize:
         whole_run.warm_up()
         result = judged_run(RunInput.of(project, log, start))
         cut = sections(result.columns, project.stations)
-        findings = [str(finding) for finding in run_findings(result)]
+        findings = [*log.notes, *(str(finding) for finding in run_findings(result))]
 
         more = {
             "scanners": figures_entries(result.scanners),

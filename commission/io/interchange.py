@@ -24,7 +24,8 @@ from commission.io.map_server import read_floor_map, write_floor_map
 from commission.io.overwriting import refuse_files, refuse_recording
 from commission.io.project_copy import refuse_to_replace
 from commission.io.project_file import FILE_NAME, load_project, project_file, save_project
-from commission.io.recordings.base import open_recording
+from commission.io.recordings.base import is_recording, open_recording
+from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions
 from commission.io.recordings.csv_writer import write_recording
 from commission.io.reflector_tables import write_reflectors
 from commission.io.route_edges import RouteImport
@@ -84,6 +85,9 @@ _SUFFIXES = {
     ".dxf": Kind.DRAWING,
     ".yaml": Kind.MAP,
     ".yml": Kind.MAP,
+    ".bag": Kind.RECORDING,
+    ".mcap": Kind.RECORDING,
+    ".db3": Kind.RECORDING,
     **{f".{suffix}": Kind.MODEL for suffix in mesh.KINDS},
 }
 
@@ -102,9 +106,6 @@ _UNREAD = {
     ".step": _AS_MODEL,
     ".stp": _AS_MODEL,
     ".3ds": _AS_MODEL,
-    ".bag": _AS_CSV,
-    ".mcap": _AS_CSV,
-    ".db3": _AS_CSV,
     ".pcap": _AS_CSV,
     ".pcapng": _AS_CSV,
     ".log": _AS_CSV,
@@ -140,6 +141,8 @@ class ConvertOptions:
     """Model: axis that points up, `y` or `z`; y for GLB and z for the others when None."""
     resolution: float = 0.05
     """Drawing, model: edge of a cell of the map [m]."""
+    recording: ChannelOptions = NO_OPTIONS
+    """Recording: which topics are what."""
 
 
 def kind_of_source(path: Path) -> Kind:
@@ -149,6 +152,8 @@ def kind_of_source(path: Path) -> Kind:
     if path.is_dir() or path.name == FILE_NAME:
         return Kind.PROJECT if project_file(path).is_file() else Kind.RECORDING
     kind = _SUFFIXES.get(path.suffix.lower())
+    if kind is None and is_recording(path):
+        return Kind.RECORDING
     if kind is None:
         remedy = _UNREAD.get(path.suffix.lower(), f"a folder, or a file that ends in {', '.join(_SUFFIXES)}")
         raise FileFormatError(path, "", f"ends in {path.suffix!r}, which is not read", remedy)
@@ -280,16 +285,11 @@ def _from_model(source: Path, target: Path, wanted: Kind, options: ConvertOption
     return _written_map(_checked(lambda: model.floor_map(options.heights, options.resolution)), target, wanted)
 
 
-def _from_recording(source: Path, target: Path, _: Kind, __: ConvertOptions) -> tuple[str, ...]:
-    recording = open_recording(source)
-    write_recording(
-        target,
-        recording.records(),
-        recording.truth(),
-        scanners=recording.scanners,
-        reference_mount=recording.reference_mount(),
-    )
-    return ()
+def _from_recording(source: Path, target: Path, _: Kind, options: ConvertOptions) -> tuple[str, ...]:
+    recording = open_recording(source, options.recording)
+    log = recording.load()
+    write_recording(target, log.records(), log.truth, scanners=log.scanners, reference_mount=log.reference_mount)
+    return log.notes
 
 
 def _written_reflectors(

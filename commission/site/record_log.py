@@ -55,6 +55,8 @@ class RecordLog:
     """Where on the vehicle the reference measures, and how late its clock is."""
     truth: Truth | None = None
     """The constants that were drawn for a virtual drive; None of a real vehicle."""
+    notes: tuple[str, ...] = ()
+    """What a reader mended or left out, one line each; none where the recording is as it should be."""
     scan_order: NDArray[np.int32] = field(init=False, repr=False)
     """(S,) every scan in order of delivery: number among all scans, those of the first scanner first."""
     scan_stamps_ns: IntArray = field(init=False, repr=False)

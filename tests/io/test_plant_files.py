@@ -116,8 +116,7 @@ def test_tab_separated_table_becomes_a_csv(tmp_path: Path) -> None:
     ("name", "remedy"),
     [
         ("plan.dwg", "saved as DXF"),
-        ("drive.bag", "as a CSV folder"),
-        ("drive.mcap", "as a CSV folder"),
+        ("drive.log", "as a CSV folder"),
         ("hall.dae", "the model as .stl"),
         ("map.xml", "reflectors as a table"),
         ("t.xlsx", "saved as CSV"),

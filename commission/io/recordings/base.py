@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Protocol
 
-from commission.errors import FileFormatError
+from commission.errors import FileFormatError, UsageError
 from commission.io.reading import cannot_read
+from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions
 from commission.io.recordings.csv_folder import CsvFolder
+from commission.io.recordings.ros_bag import RosBag
 from commission.site.record_log import RecordLog
 from commission.site.records import Record
 from commission.site.reference_mount import ReferenceMount
@@ -48,32 +50,52 @@ class Recording(Protocol):
         ...
 
 
-_FORMATS: tuple[tuple[Callable[[Path], bool], Callable[[Path], Recording]], ...] = ((CsvFolder.recognizes, CsvFolder),)
+def _csv_folder(path: Path, options: ChannelOptions) -> Recording:
+    """Open a CSV folder, whose files say what they are."""
+    if options != ChannelOptions():
+        raise UsageError(f"{path} is a CSV folder; expected --channel and --wheels for recordings with topics only")
+    return CsvFolder(path)
 
 
-def open_recording(path: Path) -> Recording:
+_FORMATS: tuple[tuple[Callable[[Path], bool], Callable[[Path, ChannelOptions], Recording]], ...] = (
+    (CsvFolder.recognizes, _csv_folder),
+    (RosBag.recognizes, RosBag),
+)
+READ = "a folder with odometry.csv, or a ROS bag (.mcap, .db3, .bag)"
+"""What a recording can be, in words."""
+
+
+def is_recording(path: Path) -> bool:
+    """Whether an existing file or folder is a recording, by its content."""
+    return any(recognizes(path) for recognizes, _ in _FORMATS)
+
+
+def open_recording(path: Path, options: ChannelOptions = NO_OPTIONS) -> Recording:
     """Open a recording, whatever its format is.
 
     Parameters
     ----------
     path : file or folder.
+    options : which topics are what, where that is not plain.
 
     Raises
     ------
     FileFormatError
         it does not exist, is of no known format, or lacks a part that its format requires.
+    UsageError
+        there are several topics for one role: lists them.
     """
     try:
         if not path.exists():
             raise FileFormatError(path, "", "does not exist", "a recording")
         for recognizes, reader in _FORMATS:
             if recognizes(path):
-                return reader(path)
+                return reader(path, options)
     except (OSError, ValueError) as error:
         raise cannot_read(path, error) from error
-    raise FileFormatError(path, "", "is no recording", "a folder with odometry.csv")
+    raise FileFormatError(path, "", "is no recording", READ)
 
 
-def load_log(path: Path) -> RecordLog:
+def load_log(path: Path, options: ChannelOptions = NO_OPTIONS) -> RecordLog:
     """Read a whole recording into columns; see `open_recording`."""
-    return open_recording(path).load()
+    return open_recording(path, options).load()

@@ -192,8 +192,6 @@ class ScanArchive:
         for name in ("stamp_ns", "ranges", "angle_min", "angle_increment"):
             if name not in self.columns:
                 raise self._error(name, "is missing", "the arrays stamp_ns, ranges, angle_min, angle_increment")
-        if "intensities" not in self.columns and "reflector" not in self.columns:
-            raise self._error("", "has neither intensities nor reflector", "at least one of these arrays")
         stamps, ranges = self.columns["stamp_ns"], self.columns["ranges"]
         if stamps.dtype.kind not in "iu" or stamps.dtype.itemsize > 8 or len(stamps.shape) != 1:
             raise self._error("stamp_ns", f"is {stamps.dtype} {stamps.shape}", "int64 (N,) nanoseconds")

@@ -217,7 +217,6 @@ def test_wrong_table_is_one_line_with_line_and_column(
     [
         ({"ranges": None}, "array ranges: is missing"),
         ({"angle_min": None}, "array angle_min: is missing"),
-        ({"reflector": None}, "has neither intensities nor reflector"),
         ({"ranges": np.ones((2, 3))[:, :2]}, "array reflector: has shape (2, 3); expected (2, 2) like ranges"),
         ({"ranges": np.ones(6)}, "array ranges: has shape (6,)"),
         ({"ranges": np.full((2, 3), -1.0)}, "array ranges: is -1 in row 0, beam 0; expected 0 m or more"),

@@ -1,0 +1,227 @@
+"""Reading an MCAP file message by message, from its first byte to where it ends or was cut (mcap.dev/spec, version 0).
+
+It knows records, chunks and channels, no message; nothing of it is in memory but one chunk.
+"""
+
+from __future__ import annotations
+
+import struct
+from binascii import crc32
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO
+
+from commission.errors import FileFormatError
+from commission.io.reading import cannot_read
+
+MAGIC = b"\x89MCAP0\r\n"
+SCHEMA, CHANNEL, MESSAGE, CHUNK = 0x03, 0x04, 0x05, 0x06
+HEADER, FOOTER, STATISTICS, DATA_END = 0x01, 0x02, 0x0B, 0x0F
+RECORD_LIMIT = 256_000_000
+"""Bytes of one record, a chunk unpacked included; writers make chunks of 1 to 10 MB."""
+_HEADER = struct.Struct("<BQ")
+_FOOTER_BYTES = 9 + 20 + len(MAGIC)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class McapChannel:
+    """One topic of a file."""
+
+    topic: str
+    """Its name."""
+    encoding: str
+    """How its messages are encoded: `cdr` for ROS 2, `ros1`, `json`."""
+    schema: str
+    """Name of the type of its messages."""
+    schema_encoding: str
+    """Language of the definition: `ros2msg`, `ros2idl`."""
+    definition: str
+    """Text that defines the type; empty where there is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One message, still encoded."""
+
+    channel: McapChannel
+    """Its topic."""
+    log_time_ns: int
+    """When it was recorded [ns]."""
+    data: bytes
+    """Its bytes."""
+
+
+@dataclass(slots=True)
+class McapFile:
+    """An MCAP file that is read from its begin."""
+
+    path: Path
+    """Where it is."""
+    channels: dict[int, McapChannel] = field(default_factory=dict[int, McapChannel])
+    """What was announced so far, by number; all of it once `read_summary` found a summary."""
+    counts: dict[int, int] = field(default_factory=dict[int, int])
+    """Messages of each channel, where the file has a summary."""
+    is_cut: bool = False
+    """Whether the file ends inside a record: its recorder was stopped."""
+    _schemas: dict[int, tuple[str, str, str]] = field(default_factory=dict[int, tuple[str, str, str]])
+
+    def read_summary(self) -> bool:
+        """Read channels and counts from the end of the file; returns False where there is no summary.
+
+        Raises
+        ------
+        FileFormatError
+            the file cannot be read, or is no MCAP.
+        """
+        with self._open() as file:
+            size = self.path.stat().st_size
+            if size < 2 * len(MAGIC) + _FOOTER_BYTES:
+                return False
+            file.seek(size - _FOOTER_BYTES)
+            footer = file.read(_FOOTER_BYTES)
+            kind, length = _HEADER.unpack_from(footer)
+            start = struct.unpack_from("<Q", footer, 9)[0]
+            if kind != FOOTER or length != 20 or footer[-len(MAGIC) :] != MAGIC or not 0 < start < size:
+                return False
+            file.seek(start)
+            for kind, data in self._records(file):
+                self._note(kind, data)
+                if kind == FOOTER:
+                    break
+        return bool(self.channels)
+
+    def messages(self) -> Iterator[Message]:
+        """Deliver every message as it was written, up to where the file is cut.
+
+        Raises
+        ------
+        FileFormatError
+            the file cannot be read, is no MCAP, or a record is damaged: says at which byte.
+        """
+        with self._open() as file:
+            for kind, data in self._records(file):
+                if kind == CHUNK:
+                    yield from self._of_chunk(data, file.tell())
+                elif kind == MESSAGE:
+                    yield self._message(data, file.tell())
+                elif kind in (DATA_END, FOOTER):
+                    return
+                else:
+                    self._note(kind, data)
+            self.is_cut = True
+
+    def _open(self) -> IO[bytes]:
+        try:
+            file = self.path.open("rb")
+            if file.read(len(MAGIC)) != MAGIC:
+                file.close()
+                raise FileFormatError(self.path, "", "does not begin as MCAP does", "an MCAP file")
+        except OSError as error:
+            raise cannot_read(self.path, error) from error
+        return file
+
+    def _records(self, file: IO[bytes]) -> Iterator[tuple[int, bytes]]:
+        """Kind and content of each record, up to the last whole one."""
+        while len(header := file.read(_HEADER.size)) == _HEADER.size:
+            kind, length = _HEADER.unpack(header)
+            if kind == 0 or length > RECORD_LIMIT:
+                found = f"a record of {length} bytes of kind {kind}"
+                raise self._error(file.tell() - _HEADER.size, found, f"records of at most {RECORD_LIMIT} bytes")
+            data = file.read(length)
+            if len(data) < length:
+                return
+            yield kind, data
+
+    def _of_chunk(self, data: bytes, offset: int) -> Iterator[Message]:
+        """Messages of a chunk."""
+        try:
+            size, crc = struct.unpack_from("<QI", data, 16)
+            compression, place = _text(data, 28)
+            packed = struct.unpack_from("<Q", data, place)[0]
+            if size > RECORD_LIMIT or packed > len(data):
+                raise self._error(offset, f"a chunk of {size} bytes", f"at most {RECORD_LIMIT} bytes")
+            content = _unpacked(data[place + 8 : place + 8 + packed], compression, size, crc)
+        except (struct.error, ValueError, RuntimeError, EOFError) as error:
+            raise self._error(offset, f"a damaged chunk ({error})", "a whole file") from error
+        place = 0
+        while place + _HEADER.size <= len(content):
+            kind, length = _HEADER.unpack_from(content, place)
+            place += _HEADER.size
+            record = content[place : place + length]
+            if len(record) < length:
+                raise self._error(offset, "a record that is longer than its chunk", "a whole file")
+            place += length
+            if kind == MESSAGE:
+                yield self._message(record, offset)
+            else:
+                self._note(kind, record)
+
+    def _message(self, data: bytes, offset: int) -> Message:
+        if len(data) < 22:
+            raise self._error(offset, f"a message of {len(data)} bytes", "22 bytes or more")
+        number, _, log_time, _ = struct.unpack_from("<HIQQ", data)
+        channel = self.channels.get(number)
+        if channel is None:
+            raise self._error(offset, f"a message of channel {number}", "channels that are announced first")
+        return Message(channel, log_time, data[22:])
+
+    def _note(self, kind: int, data: bytes) -> None:
+        """Remember schemas, channels and counts."""
+        try:
+            if kind == SCHEMA:
+                name, place = _text(data, 2)
+                encoding, place = _text(data, place)
+                definition, _ = _text(data, place)
+                self._schemas[struct.unpack_from("<H", data)[0]] = name, encoding, definition
+            elif kind == CHANNEL:
+                number, schema = struct.unpack_from("<HH", data)
+                topic, place = _text(data, 4)
+                encoding, _ = _text(data, place)
+                name, language, definition = self._schemas.get(schema, ("", "", ""))
+                self.channels[number] = McapChannel(
+                    topic=topic, encoding=encoding, schema=name, schema_encoding=language, definition=definition
+                )
+            elif kind == STATISTICS:
+                length = struct.unpack_from("<I", data, 42)[0]
+                self.counts = dict(struct.iter_unpack("<HQ", data[46 : 46 + length]))
+        except (struct.error, UnicodeDecodeError) as error:
+            raise FileFormatError(self.path, "", f"has a damaged record ({error})", "a whole MCAP file") from error
+
+    def _error(self, offset: int, found: str, expected: str) -> FileFormatError:
+        return FileFormatError(self.path, f"byte {offset}", f"is {found}", expected)
+
+
+def _text(data: bytes, place: int) -> tuple[str, int]:
+    """Text with its length before it, and where it ends."""
+    length = struct.unpack_from("<I", data, place)[0]
+    end = place + 4 + length
+    if end > len(data):
+        raise struct.error(f"a text of {length} bytes")
+    return data[place + 4 : end].decode("utf-8"), end
+
+
+def _unpacked(data: bytes, compression: str, size: int, crc: int) -> bytes:
+    """Content of a chunk; raises ValueError or RuntimeError where it is damaged."""
+    if not compression:
+        if len(data) != size:
+            raise ValueError(f"{len(data)} bytes where {size} are said")
+        return data
+    from lz4.frame import LZ4FrameDecompressor  # pyright: ignore[reportMissingTypeStubs]
+    from rosbags.rosbag2.storage_mcap import zstd
+
+    # No more is unpacked than is said: a few bytes could unpack into gigabytes.
+    if compression == "lz4":
+        content = LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+    elif compression == "zstd":
+        try:
+            content = zstd.ZstdDecompressor().decompress(data, max_length=size + 1)
+        except zstd.ZstdError as error:
+            raise ValueError(str(error)) from error
+    else:
+        raise ValueError(f"compression {compression!r}, which is not read")
+    if len(content) != size:
+        raise ValueError(f"it unpacks into another size than {size} bytes")
+    if crc and crc32(content) != crc:
+        raise ValueError("its checksum is another")
+    return content

@@ -1,0 +1,177 @@
+"""ROS bags as recordings: MCAP and sqlite3 of ROS 2, and ROS 1. Which topics are read is said in `channels`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from commission.errors import FileFormatError
+from commission.io.recordings import ros_messages as ros
+from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions, Chosen, Role, Topic, choose
+from commission.io.recordings.collector import Collector, MotionKind
+from commission.io.recordings.frames import Frames
+from commission.io.recordings.ros_source import BagMessage, is_bag, open_bag
+from commission.site.record_log import RecordLog
+from commission.site.records import Record
+from commission.site.reference_mount import BASE, ReferenceMount
+from commission.site.scanner import ONLY_NAME
+from commission.site.truth import Truth
+
+
+class RosBag:
+    """A ROS bag; opening it reads its index and chooses its topics."""
+
+    def __init__(self, path: Path, options: ChannelOptions = NO_OPTIONS) -> None:
+        """Open a bag; raises FileFormatError, or UsageError where it has several candidates for one role."""
+        self.path = path
+        self.options = options
+        self._bag = open_bag(path)
+        found = [each for t in self._bag.topics for each in ros.topic_of(t.name, t.type, t.count)]
+        unasked = [topic for topic in found if ros.is_taken_unasked(topic)]
+        named = {word.partition("=")[2] for word in options.channels}
+        self.chosen = choose(path, unasked + [topic for topic in found if topic.name in named], options)
+        self._check()
+        self.scanners = tuple(sorted(self.chosen.scanners.values())) or (ONLY_NAME,)
+
+    @staticmethod
+    def recognizes(path: Path) -> bool:
+        """Whether a path is a bag, by its content."""
+        return is_bag(path)
+
+    def records(self) -> Iterator[Record]:
+        """Deliver every record in order of stamps; the bag is read through before the first one."""
+        return self.load().records()
+
+    def truth(self) -> Truth | None:
+        """No bag holds the constants of a virtual drive."""
+        return None
+
+    def reference_mount(self) -> ReferenceMount:
+        """A bag's reference is taken as that of base."""
+        return BASE
+
+    def load(self) -> RecordLog:
+        """Read everything into columns; raises FileFormatError."""
+        odometry = self.chosen.odometry
+        collector = Collector(
+            self.path,
+            self.scanners,
+            None if odometry is None else self._motion_kind(odometry),
+            self.options.wheels,
+        )
+        try:
+            notes = self._read(_Reading(self.chosen, self.scanners, collector, self.options))
+            return collector.log(notes)
+        finally:
+            collector.close()
+
+    def _motion_kind(self, odometry: Topic) -> MotionKind:
+        kind = ros.MOTION_KINDS[odometry.type]
+        if kind is MotionKind.WHEEL_ANGLES:
+            first = next(iter(self._bag.messages({odometry.name})), None)
+            if first is not None and not ros.has_wheel_angles(first.value):
+                return MotionKind.WHEEL_SPEEDS
+        return kind
+
+    def _check(self) -> None:
+        """Raise FileFormatError where the bag has nothing to read, or turning wheels of unknown size."""
+        chosen = self.chosen
+        if not chosen.scanners and chosen.odometry is None and chosen.reference is None:
+            has = ", ".join(f"{topic.name} ({topic.type})" for topic in self._bag.topics[:8]) or "none at all"
+            remedy = "sensor_msgs/LaserScan, nav_msgs/Odometry or geometry_msgs/PoseStamped"
+            raise FileFormatError(self.path, "", f"has no topic that is read (it has {has})", remedy)
+        if chosen.odometry is not None and chosen.odometry.type == "sensor_msgs/msg/JointState":
+            if self.options.wheels is None:
+                wanted = (
+                    "--wheels LEFT,RIGHT,RADIUS,SEPARATION (names of the joints, metres), or --channel odometry=none"
+                )
+                raise FileFormatError(
+                    self.path, chosen.odometry.name, "is the only odometry, of turning wheels", wanted
+                )
+
+    def _read(self, reading: _Reading) -> list[str]:
+        """Read every message; returns what is to be told."""
+        topics = {t.name for t in self._bag.topics if t.type in ros.TF_TYPES}
+        topics |= set(self.chosen.scanners)
+        topics |= {topic.name for topic in (self.chosen.odometry, self.chosen.reference) if topic is not None}
+        types = {topic.name: topic.type for topic in self._bag.topics}
+        for message in self._bag.messages(topics):
+            try:
+                reading.take(message, types[message.topic])
+            except (AttributeError, TypeError, ValueError, OverflowError) as error:
+                found = f"a message is no {types[message.topic]} ({error})"
+                raise FileFormatError(self.path, message.topic, found, "the fields that ROS gives it") from error
+        return [*self._chosen_notes(), *self._bag.notes, *reading.notes()]
+
+    def _chosen_notes(self) -> Iterator[str]:
+        """Which topics stand for what."""
+        for topic, name in self.chosen.scanners.items():
+            yield f"scans{'' if name == ONLY_NAME else f' of {name}'} are those of {topic}"
+        for role, topic in ((Role.ODOMETRY, self.chosen.odometry), (Role.REFERENCE, self.chosen.reference)):
+            if topic is not None:
+                yield f"the {role} is {topic.name} ({topic.type})"
+
+
+class _Reading:
+    """One pass over a bag."""
+
+    def __init__(
+        self, chosen: Chosen, scanners: tuple[str, ...], collector: Collector, options: ChannelOptions
+    ) -> None:
+        self.chosen = chosen
+        self.collector = collector
+        self.options = options
+        self.frames = Frames()
+        self._unstamped: Counter[str] = Counter()
+        self._scanner_of = {topic: scanners.index(name) for topic, name in chosen.scanners.items()}
+        self._frame_of: dict[str, str] = {}
+        """Frame of each scanner, by its name."""
+        self._base = ""
+
+    def take(self, message: BagMessage, kind: str) -> None:
+        """Hand a message to the collector."""
+        if kind in ros.TF_TYPES:
+            for each in message.value.transforms:
+                self.frames.add(each)
+            return
+        stamp, is_own = ros.stamp_of(message.value.header, message.log_time_ns)
+        if not is_own:
+            self._unstamped[message.topic] += 1
+        if message.topic in self._scanner_of:
+            self._take_scan(message, kind, stamp)
+        odometry, reference = self.chosen.odometry, self.chosen.reference
+        if odometry is not None and message.topic == odometry.name:
+            self._base = self._base or str(getattr(message.value, "child_frame_id", ""))
+            row = ros.motion_of(message.value, kind, self.options.wheels)
+            if row is None:
+                self.collector.told[f"messages of {message.topic} without those wheels are left out"] += 1
+            else:
+                self.collector.add_motion(stamp, row)
+        if reference is not None and message.topic == reference.name:
+            self.collector.add_reference(stamp, *ros.pose_of(message.value))
+
+    def _take_scan(self, message: BagMessage, kind: str, stamp: int) -> None:
+        scanner = self._scanner_of[message.topic]
+        scan = ros.scan_of(message.value, kind, stamp, scanner)
+        if scan is None:
+            self.collector.told[f"messages of {message.topic} without beams are left out"] += 1
+            return
+        self._frame_of[self.collector.scanners[scanner]] = _frame(message.value.header)
+        if scan.intensities is None:
+            self.collector.told[f"scans of {message.topic} have no intensities: no reflector can be seen in them"] += 1
+        self.collector.add_scan(scan)
+
+    def notes(self) -> Iterator[str]:
+        """What is to be told after the last message."""
+        for topic, count in self._unstamped.items():
+            yield f"{count} messages of {topic} have no stamp; the time of recording stands for it"
+        for scanner, frame in self._frame_of.items():
+            mounted = self.frames.mounting(frame, self._base)
+            if mounted:
+                yield f"scanner {scanner!r} is mounted at {mounted}"
+
+
+def _frame(header: Any) -> str:
+    return str(header.frame_id).strip("/")

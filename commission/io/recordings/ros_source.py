@@ -1,0 +1,235 @@
+"""Messages of ROS bags of every kind, decoded: MCAP by our own reader, sqlite3 and ROS 1 by `rosbags`.
+
+It knows no record of ours. Types come from the bag; a bag without definitions is read by those of a ROS distribution.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Collection, Generator, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+from commission.errors import FileFormatError, reason_of
+from commission.io.reading import cannot_read
+from commission.io.recordings.mcap_reader import MAGIC, McapChannel, McapFile
+
+if TYPE_CHECKING:
+    from rosbags.typesys.store import Typestore
+
+ROS1_MAGIC = b"#ROSBAG V2.0"
+SQLITE_MAGIC = b"SQLite format 3\0"
+METADATA = "metadata.yaml"
+
+
+@dataclass(frozen=True, slots=True)
+class BagTopic:
+    """A topic as the bag names it."""
+
+    name: str
+    """Its name."""
+    type: str
+    """Type of its messages, as `sensor_msgs/msg/LaserScan`."""
+    count: int | None
+    """Messages; None where the file does not say."""
+
+
+@dataclass(frozen=True, slots=True)
+class BagMessage:
+    """One message, decoded."""
+
+    topic: str
+    """Name of its topic."""
+    log_time_ns: int
+    """When it was recorded [ns]."""
+    value: Any
+    """Its fields, by the names of its type."""
+
+
+class BagSource(Protocol):
+    """A bag that is opened."""
+
+    @property
+    def topics(self) -> tuple[BagTopic, ...]:
+        """All topics whose messages can be decoded."""
+        ...
+
+    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
+        """Deliver the messages of some topics as they were written; raises FileFormatError."""
+        ...
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was noticed on the way, after the last message."""
+        ...
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a file or folder is a ROS bag, by its first bytes (a folder by its metadata or its files)."""
+    if path.is_dir():
+        return (path / METADATA).is_file() or bool(_files(path, ".mcap") or _files(path, ".db3"))
+    with path.open("rb") as file:
+        begin = file.read(len(SQLITE_MAGIC))
+    return begin.startswith((MAGIC, ROS1_MAGIC, SQLITE_MAGIC))
+
+
+def open_bag(path: Path) -> BagSource:
+    """Open a bag; raises FileFormatError where it is damaged or of a version that is not read."""
+    if path.is_dir():
+        files = _files(path, ".mcap")
+        return McapSource(path, files) if files else RosbagsSource(path)
+    with path.open("rb") as file:
+        is_mcap = file.read(len(MAGIC)) == MAGIC
+    return McapSource(path, [path]) if is_mcap else RosbagsSource(path)
+
+
+def _files(folder: Path, ending: str) -> list[Path]:
+    """Files of a folder in the order of their numbers: `bag_2` comes before `bag_10`."""
+    return sorted(folder.glob(f"*{ending}"), key=lambda file: (len(file.name), file.name))
+
+
+class McapSource:
+    """One or several MCAP files that follow each other."""
+
+    def __init__(self, path: Path, files: list[Path]) -> None:
+        """Read what the files say about their channels; one without a summary is read through."""
+        self.path = path
+        self.files = files
+        self._notes: list[str] = []
+        self._stores: dict[tuple[str, str, str], Typestore] = {}
+        found: dict[str, tuple[str, int | None]] = {}
+        for file in files:
+            mcap = McapFile(file)
+            counts: dict[str, int] = {}
+            if mcap.read_summary():
+                for number, channel in mcap.channels.items():
+                    counts[channel.topic] = counts.get(channel.topic, 0) + mcap.counts.get(number, 0)
+            else:
+                for message in mcap.messages():
+                    counts[message.channel.topic] = counts.get(message.channel.topic, 0) + 1
+            for channel in mcap.channels.values():
+                if channel.encoding in ("cdr", "ros1") and channel.topic in counts:
+                    before = found.get(channel.topic, ("", 0))[1] or 0
+                    found[channel.topic] = ros2_type(channel.schema), before + counts.pop(channel.topic)
+        self.topics = tuple(BagTopic(name, kind, count) for name, (kind, count) in found.items())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Which files are cut."""
+        return tuple(self._notes)
+
+    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
+        """Deliver the messages of some topics as they were written; raises FileFormatError."""
+        self._notes = []
+        for file in self.files:
+            mcap = McapFile(file)
+            with _told(file):
+                for message in mcap.messages():
+                    if message.channel.topic in topics:
+                        value = self._decoded(message.channel, message.data)
+                        yield BagMessage(message.channel.topic, message.log_time_ns, value)
+            if mcap.is_cut:
+                self._notes.append(f"{file.name} was cut while it was recorded; it is read up to there")
+
+    def _decoded(self, channel: McapChannel, data: bytes) -> Any:
+        store = self._store(channel)
+        kind = ros2_type(channel.schema)
+        return store.deserialize_ros1(data, kind) if channel.encoding == "ros1" else store.deserialize_cdr(data, kind)
+
+    def _store(self, channel: McapChannel) -> Typestore:
+        key = channel.schema, channel.schema_encoding, channel.definition
+        if key not in self._stores:
+            self._stores[key] = _store_of(channel)
+        return self._stores[key]
+
+
+def _store_of(channel: McapChannel) -> Typestore:
+    """Types that the messages of a channel are made of."""
+    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+    if not channel.definition:
+        return get_typestore(Stores.ROS1_NOETIC if channel.encoding == "ros1" else Stores.ROS2_HUMBLE)
+    store = get_typestore(Stores.EMPTY)
+    if channel.schema_encoding in ("ros2idl", "omgidl"):
+        for part in channel.definition.split("=" * 80 + "\n"):
+            text = part.split("\n", 1)[1] if part.startswith("IDL: ") else part
+            if text.strip():
+                store.register(get_types_from_idl(text))
+    else:
+        store.register(get_types_from_msg(channel.definition, ros2_type(channel.schema)))
+    return store
+
+
+class RosbagsSource:
+    """A ROS 1 bag, or a ROS 2 bag in sqlite3."""
+
+    def __init__(self, path: Path) -> None:
+        """Read what the bag says about its topics."""
+        self.path = path
+        self.notes: tuple[str, ...] = ()
+        with _told(path), self._reader() as reader:
+            found: dict[str, tuple[str, int]] = {}
+            for connection in reader.connections:
+                count = found.get(connection.topic, ("", 0))[1] + connection.msgcount
+                found[connection.topic] = connection.msgtype, count
+        self.topics = tuple(BagTopic(name, kind, count) for name, (kind, count) in found.items())
+
+    def messages(self, topics: Collection[str]) -> Iterator[BagMessage]:
+        """Deliver the messages of some topics in the order of their recording; raises FileFormatError."""
+        with _told(self.path), self._reader() as reader:
+            chosen = [connection for connection in reader.connections if connection.topic in topics]
+            if not chosen:
+                return
+            for connection, stamp, data in reader.messages(connections=chosen):
+                yield BagMessage(connection.topic, stamp, reader.deserialize(data, connection.msgtype))
+
+    def _reader(self) -> Any:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+
+        is_ros1 = self.path.is_file() and _begins_with(self.path, ROS1_MAGIC)
+        store = get_typestore(Stores.ROS1_NOETIC if is_ros1 else Stores.ROS2_HUMBLE)
+        return AnyReader([_with_suffix(self.path, is_ros1)], default_typestore=store)
+
+
+def _with_suffix(path: Path, is_ros1: bool) -> Path:
+    """Raise FileFormatError where the library, which goes by endings, would take a bag for another kind."""
+    if path.is_dir():
+        return path
+    wanted = ".bag" if is_ros1 else ".db3"
+    if path.suffix != wanted:
+        raise FileFormatError(path, "", f"is a bag that ends in {path.suffix!r}", f"a name that ends in {wanted}")
+    return path
+
+
+def _begins_with(path: Path, magic: bytes) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(magic)) == magic
+
+
+def ros2_type(name: str) -> str:
+    """Name of a type as ROS 2 has it: `sensor_msgs/msg/LaserScan` of `sensor_msgs/LaserScan`."""
+    parts = name.split("/")
+    return f"{parts[0]}/msg/{parts[1]}" if len(parts) == 2 else name
+
+
+@contextmanager
+def _told(path: Path) -> Generator[None]:
+    """Turn what the library raises over a damaged bag into one line."""
+    import apsw
+    from rosbags.highlevel import AnyReaderError
+    from rosbags.serde import SerdeError
+    from rosbags.typesys import TypesysError
+
+    garbage = (AnyReaderError, SerdeError, TypesysError, apsw.Error, struct.error)
+    plain = (ValueError, LookupError, AssertionError, EOFError, RuntimeError, TypeError, ArithmeticError)
+    try:
+        yield
+    except OSError as error:
+        raise cannot_read(path, error) from error
+    except (*garbage, *plain) as error:
+        reason = reason_of(error)
+        remedy = "a bag that was closed (ROS 1: rosbag reindex)" if "index" in reason else "a whole bag"
+        raise FileFormatError(path, "", f"is damaged or no bag ({reason})", remedy) from error

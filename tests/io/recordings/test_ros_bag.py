@@ -1,0 +1,335 @@
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from commission.errors import CommissionError, FileFormatError, UsageError
+from commission.io.recordings.base import load_log, open_recording
+from commission.io.recordings.channels import ChannelOptions
+from commission.io.recordings.motion import Wheels
+from commission.site.record_log import RecordLog
+from commission.site.records import Odometry, ReferencePose, Scan
+from tests.io.recordings import ros_bags as bags
+from tests.io.recordings.ros_bags import KINDS, START
+
+TENTH = 100_000_000
+"""A tenth of a second [ns]."""
+ECHO = [1.0, 2.0, math.inf, 0.05, 31.0]
+"""Ranges of which the first two are measurements within 0.1 to 30 m."""
+
+
+def drive() -> list[bags.Message]:
+    """Straight ahead by 0.1 m a step from (1, 2) towards 90 degrees, seen by one scanner and a second system."""
+    found: list[bags.Message] = []
+    for step in range(4):
+        stamp = START + step * TENTH
+        pose = (1.0, 2.0 + 0.1 * step, math.pi / 2)
+        found.append(bags.odometry(stamp, pose))
+        found.append(bags.scan(stamp, ECHO, intensities=[100.0, 4000.0, 0.0, 7.0, 8.0]))
+        found.append(bags.pose_stamped(stamp, (5.0, 0.1 * step, 0.5)))
+    return found
+
+
+@pytest.fixture(params=KINDS)
+def kind(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+def written(folder: Path, kind: str, messages: list[bags.Message]) -> Path:
+    return bags.write_bag(folder / f"bag_{kind[1:]}{kind}", messages)
+
+
+def read(folder: Path, messages: list[bags.Message], *channels: str, kind: str = ".mcap") -> RecordLog:
+    return load_log(written(folder, kind, messages), ChannelOptions(channels=channels))
+
+
+def test_drive_in_a_bag_becomes_its_records(tmp_path: Path, kind: str) -> None:
+    log = load_log(written(tmp_path, kind, drive()))
+
+    assert log.odometry_stamps_ns.tolist() == [START + step * TENTH for step in range(4)]
+    np.testing.assert_allclose(log.displacements, [[0.0, 0.0, 0.0], *3 * [[0.1, 0.0, 0.0]]], atol=1e-12)
+    np.testing.assert_allclose(log.reference_poses, [[5.0, 0.1 * step, 0.5] for step in range(4)], atol=1e-12)
+    scan = log.scans[0].scan(3)
+    assert scan.stamp_ns == START + 3 * TENTH
+    assert (scan.angle_min, scan.angle_increment) == (-0.5, 0.25)
+    np.testing.assert_array_equal(scan.ranges, np.array([1.0, 2.0, np.nan, np.nan, np.nan], dtype=np.float32))
+    assert scan.intensities is not None
+    assert scan.intensities.tolist() == [100.0, 4000.0, 0.0, 7.0, 8.0]
+    assert log.notes == (
+        "scans are those of /scan",
+        "the odometry is /odom (nav_msgs/msg/Odometry)",
+        "the reference is /truth (geometry_msgs/msg/PoseStamped)",
+    )
+
+
+def test_records_of_a_bag_come_in_order_of_their_stamps(tmp_path: Path, kind: str) -> None:
+    records = list(open_recording(written(tmp_path, kind, drive())).records())
+
+    assert [type(record) for record in records[:3]] == [Odometry, ReferencePose, Scan]
+    assert [record.stamp_ns for record in records] == sorted(record.stamp_ns for record in records)
+
+
+def test_bag_is_known_by_its_content_and_not_by_its_name(tmp_path: Path) -> None:
+    folder = written(tmp_path, ".mcap", drive())
+    renamed = next(folder.glob("*.mcap")).rename(tmp_path / "recording of tuesday")
+
+    assert len(load_log(renamed).odometry_stamps_ns) == 4
+
+
+def test_sqlite_file_without_its_folder_is_read_by_the_types_of_a_distribution(tmp_path: Path) -> None:
+    folder = written(tmp_path, ".db3", drive())
+    alone = next(folder.glob("*.db3")).rename(tmp_path / "alone.db3")
+
+    assert len(load_log(alone).odometry_stamps_ns) == 4
+
+
+def test_disorder_is_sorted_and_counted(tmp_path: Path, kind: str) -> None:
+    messages = drive()
+    messages[3:6], messages[6:9] = messages[6:9], messages[3:6]
+
+    log = load_log(written(tmp_path, kind, messages))
+
+    np.testing.assert_allclose(log.displacements[1:], 3 * [[0.1, 0.0, 0.0]], atol=1e-12)
+    assert np.all(np.diff(log.scans[0].stamps_ns) == TENTH)
+
+
+def test_what_came_late_by_its_own_stamp_is_told(tmp_path: Path) -> None:
+    order = [0, 2, 1, 3]
+    messages = [
+        (topic, kind, START + place * TENTH, make)
+        for place, step in enumerate(order)
+        for topic, kind, _, make in drive()[3 * step : 3 * step + 3]
+    ]
+
+    log = read(tmp_path, messages)
+
+    np.testing.assert_allclose(log.displacements[1:], 3 * [[0.1, 0.0, 0.0]], atol=1e-12)
+    assert log.scans[0].stamps_ns.tolist() == [START + step * TENTH for step in range(4)]
+    assert "1 rows of odometry came after a later one and are sorted" in log.notes
+    assert "1 scans came after a later one and are sorted" in log.notes
+    assert "1 reference poses came after a later one and are sorted" in log.notes
+
+
+def test_equal_stamps_are_counted_and_no_motion_is_lost(tmp_path: Path, kind: str) -> None:
+    messages = drive()
+    messages.append(bags.odometry(START + 3 * TENTH, (1.0, 2.4, math.pi / 2)))
+    messages.append(bags.scan(START + 3 * TENTH, ECHO, intensities=[1.0] * 5))
+
+    log = load_log(written(tmp_path, kind, messages))
+
+    np.testing.assert_allclose(log.displacements[:, 0].sum(), 0.4, atol=1e-12)
+    assert len(log.scans[0]) == 4
+    assert "1 rows of odometry have a stamp that is taken and are left out but for the last of each" in log.notes
+    assert "1 scans have a stamp that is taken and are left out" in log.notes
+
+
+def test_velocities_are_driven_along_arcs(tmp_path: Path) -> None:
+    quarter = (math.pi / 2, 0.0, math.pi / 2)
+    messages = [bags.twist_stamped(START + step * 10 * TENTH, quarter) for step in range(3)]
+
+    log = read(tmp_path, messages)
+
+    # A quarter of a circle of radius 1 m in each second.
+    np.testing.assert_allclose(log.displacements, [[0.0, 0.0, 0.0], *2 * [[1.0, 1.0, math.pi / 2]]], atol=1e-12)
+
+
+def test_odometry_that_has_velocities_only_is_driven_by_them(tmp_path: Path) -> None:
+    messages = [bags.odometry(START + step * 10 * TENTH, (0.0, 0.0, 0.0), (0.5, 0.0, 0.0)) for step in range(3)]
+
+    np.testing.assert_allclose(read(tmp_path, messages).displacements[:, 0], [0.0, 0.5, 0.5], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("positions", "speeds", "ticks"),
+    [
+        ([[0.0, 0.0], [1.0, 3.0], [2.0, 6.0]], [], None),
+        ([], [[1.0, 3.0], [1.0, 3.0], [1.0, 3.0]], None),
+        ([[65000.0, 64000.0], [464.0, 1464.0], [1464.0, 4464.0]], [], 1000.0 * 2.0 * math.pi),
+    ],
+    ids=["angles", "speeds", "ticks of a counter of 16 bit"],
+)
+def test_turning_wheels_become_motion(
+    tmp_path: Path, positions: list[list[float]], speeds: list[list[float]], ticks: float | None
+) -> None:
+    messages = [
+        bags.joint_state(
+            START + step * 10 * TENTH,
+            ["right", "mast", "left"],
+            [positions[step][1], 0.0, positions[step][0]] if positions else [],
+            [speeds[step][1], 0.0, speeds[step][0]] if speeds else [],
+        )
+        for step in range(3)
+    ]
+    wheels = Wheels(left="left", right="right", radius=0.1, separation=0.4, ticks=ticks)
+
+    log = load_log(written(tmp_path, ".mcap", messages), ChannelOptions(wheels=wheels))
+
+    # 0.1 m on the left and 0.3 m on the right: a circle of 0.4 m by half a radian.
+    arc = [0.4 * math.sin(0.5), 0.4 * (1.0 - math.cos(0.5)), 0.5]
+    np.testing.assert_allclose(log.displacements, [[0.0, 0.0, 0.0], arc, arc], atol=1e-12)
+
+
+def test_wheels_of_unknown_size_are_asked_for(tmp_path: Path) -> None:
+    bag = written(tmp_path, ".mcap", [bags.joint_state(START, ["left", "right"], [0.0, 0.0], [])])
+
+    with pytest.raises(FileFormatError, match="is the only odometry, of turning wheels; expected --wheels LEFT"):
+        load_log(bag)
+
+
+def test_strongest_echo_of_a_beam_counts(tmp_path: Path, kind: str) -> None:
+    log = load_log(
+        written(tmp_path, kind, [bags.multi_echo(START, [[4.0, 5.0], [], [6.0]], [[10.0, 900.0], [], [3.0]])])
+    )
+
+    scan = log.scans[0].scan(0)
+    np.testing.assert_array_equal(scan.ranges, np.array([5.0, np.nan, 6.0], dtype=np.float32))
+    assert scan.intensities is not None
+    assert scan.intensities.tolist() == [900.0, 0.0, 3.0]
+
+
+def test_scans_without_intensities_are_read_and_that_is_told(tmp_path: Path, kind: str) -> None:
+    log = load_log(written(tmp_path, kind, [bags.scan(START + step * TENTH, ECHO) for step in range(3)]))
+
+    assert log.scans[0].scan(0).intensities is None
+    assert "3 scans of /scan have no intensities: no reflector can be seen in them" in log.notes
+    assert "it holds no odometry: the vehicle is taken as standing where it is" in log.notes
+
+
+def test_folders_of_topics_are_scanners(tmp_path: Path, kind: str) -> None:
+    log = load_log(
+        written(tmp_path, kind, [bags.scan(START, ECHO, "/rear/scan"), bags.scan(START, ECHO[:2], "/front/scan")])
+    )
+
+    assert log.scanners == ("front", "rear")
+    assert [store.beams.tolist() for store in log.scans] == [[2], [5]]
+
+
+def test_several_candidates_are_listed_with_the_option_that_chooses(tmp_path: Path) -> None:
+    bag = written(tmp_path, ".mcap", [*drive(), bags.scan(START, ECHO, "/scan_filtered")])
+
+    listed = (
+        r"2 topics of scan: /scan \(sensor_msgs/msg/LaserScan, 4 messages\), "
+        r"/scan_filtered \(sensor_msgs/msg/LaserScan, 1 messages\); expected --channel scan=TOPIC"
+    )
+    with pytest.raises(UsageError, match=listed):
+        open_recording(bag)
+    log = load_log(bag, ChannelOptions(channels=("scan=/scan_filtered",)))
+    assert len(log.scans[0]) == 1
+
+
+def test_scanners_are_named_by_the_option(tmp_path: Path) -> None:
+    messages = [bags.scan(START, ECHO, "/a"), bags.scan(START, ECHO[:3], "/b")]
+
+    log = read(tmp_path, messages, "scan.left=/b", "scan.right=/a")
+
+    assert log.scanners == ("left", "right")
+    assert log.scans[0].beams.tolist() == [3]
+
+
+def test_odometry_can_be_the_reference_of_a_second_system(tmp_path: Path) -> None:
+    messages = [*drive(), *(bags.odometry(START, (7.0, 8.0, 0.0), topic="/second") for _ in range(1))]
+
+    log = read(tmp_path, messages, "odometry=/odom", "reference=/second")
+
+    assert log.reference_poses.tolist() == [[7.0, 8.0, 0.0]]
+
+
+def test_commands_and_goals_are_not_taken_for_what_was_measured(tmp_path: Path) -> None:
+    messages = [*drive(), bags.pose_stamped(START, (9.0, 9.0, 0.0), "/move_base/goal")]
+
+    assert len(read(tmp_path, messages).reference_poses) == 4
+
+
+def test_pose_with_covariance_is_a_reference(tmp_path: Path, kind: str) -> None:
+    log = load_log(written(tmp_path, kind, [bags.pose_with_covariance(START, (1.0, 2.0, -0.5))]))
+
+    np.testing.assert_allclose(log.reference_poses, [[1.0, 2.0, -0.5]], atol=1e-12)
+
+
+def test_topic_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"no topic '/odo' of odometry; expected --channel odometry=one of: /odom"):
+        read(tmp_path, drive(), "odometry=/odo")
+
+
+def test_bag_without_anything_to_read_says_what_it_has(tmp_path: Path) -> None:
+    with pytest.raises(FileFormatError, match=r"has no topic that is read \(it has /tf_static"):
+        read(tmp_path, [bags.transform(START, "a", "b", (0.0, 0.0, 0.0))])
+
+
+def test_mounting_is_told_through_all_frames_between(tmp_path: Path, kind: str) -> None:
+    messages = [
+        bags.transform(START, "base_link", "mast", (1.0, 0.5, math.pi / 2)),
+        bags.transform(START, "mast", "laser", (0.25, 0.0, 0.0), upside_down=True),
+        *drive(),
+    ]
+
+    log = load_log(written(tmp_path, kind, messages))
+
+    told = "scanner 'scanner' is mounted at [1, 0.75, 1.571], upside down (x [m], y [m], heading [rad] in base_link)"
+    assert told in log.notes
+
+
+def test_time_of_recording_stands_where_a_message_has_none(tmp_path: Path) -> None:
+    topic, kind, _, make = bags.scan(0, ECHO)
+
+    log = read(tmp_path, [(topic, kind, START + 5, make)])
+
+    assert log.scans[0].stamps_ns.tolist() == [START + 5]
+    assert "1 messages of /scan have no stamp; the time of recording stands for it" in log.notes
+
+
+@pytest.mark.parametrize("kept", [0.4, 0.7, 0.95])
+def test_mcap_is_read_to_where_it_was_cut(tmp_path: Path, kept: float) -> None:
+    messages = [bags.scan(START + step * TENTH, 2000 * [1.5], intensities=2000 * [1.0]) for step in range(300)]
+    file = next(written(tmp_path, ".mcap", messages).glob("*.mcap"))
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(file.read_bytes()[: int(kept * file.stat().st_size)])
+
+    log = load_log(cut)
+
+    assert 0.3 * kept < len(log.scans[0]) / 300 <= kept
+    assert "cut.mcap was cut while it was recorded; it is read up to there" in log.notes
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    folder = tmp_path_factory.mktemp("bags")
+    found: dict[str, bytes] = {}
+    for kind in KINDS:
+        path = written(folder, kind, drive())
+        found[kind] = (path if path.is_file() else next(path.glob(f"*{kind}"))).read_bytes()
+    return found
+
+
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+@pytest.mark.parametrize("damaged", [".mcap", ".bag", ".db3"])
+def test_damaged_bag_is_an_error_in_one_line_or_valid_records(
+    tmp_path_factory: pytest.TempPathFactory, whole: dict[str, bytes], damaged: str, data: st.DataObject
+) -> None:
+    content = bytearray(whole[damaged])
+    for _ in range(data.draw(st.integers(1, 4))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    end = data.draw(st.integers(0, len(content)))
+    file = tmp_path_factory.mktemp("damaged") / f"file{damaged}"
+    file.write_bytes(content[: end if data.draw(st.booleans()) else None])
+
+    try:
+        log = load_log(file)
+    except CommissionError as error:
+        assert "\n" not in str(error)
+    else:
+        assert all(np.isfinite(record.displacement).all() for record in log.records() if isinstance(record, Odometry))
+
+
+def test_real_bag_of_ros_1_is_read(shared_data: Path) -> None:
+    log = load_log(shared_data / "sick_captures" / "rms_1xxx_lms_1xx_movement_off.bag")
+
+    assert len(log.scans[0]) == 89
+    assert set(log.scans[0].beams.tolist()) == {541}
+    assert np.median(np.diff(log.scans[0].stamps_ns)) * 1e-9 == pytest.approx(0.02, abs=1e-3)
