@@ -87,10 +87,12 @@
     tell(ended.uuid, value);
   }
 
-  // Other scripts of the page enter values by it, too: what it says is never a draft.
+  // Other scripts of the page enter values by it, too: what it says is never a draft. False: there is no connection yet.
   window.commissionTell = tell;
   function tell(uuid, value) {
-    if (worker) post.call(worker, { type: "send", message: { type: "GuiUpdateMessage", uuid, updates: { value } } });
+    if (!worker) return false;
+    post.call(worker, { type: "send", message: { type: "GuiUpdateMessage", uuid, updates: { value } } });
+    return true;
   }
 
   // Show what held before, or what was written into the field while it was typed into.

@@ -13,6 +13,9 @@ import numpy as np
 
 from commission.geometry.arrays import FloatArray, read_only
 
+KEPT = 6
+"""Stretches between checkpoints that are kept: those that the last innovations of a reflector lie in, 0.4 MB each."""
+
 
 class PriorRows(NamedTuple):
     """Beliefs after *predict* of some cycles that follow each other."""
@@ -81,18 +84,19 @@ class ReplayedPriors:
     def __init__(self, bounds: Sequence[int], cycles: int, replay: Callable[[int, int], PriorRows]) -> None:
         self._bounds = np.unique((*bounds, cycles))
         self._replay = replay
-        self._newest: tuple[int, PriorRows] | None = None
-        """Of one checkpoint, with its cycle: a cursor that moves on needs them again."""
+        self._newest: dict[int, PriorRows] = {}
+        """Of a few checkpoints, by their cycles: a cursor that moves on needs them again."""
 
     def at(self, cycle: int) -> tuple[FloatArray, FloatArray]:
         """Return mean (3,) and covariance (3, 3) before the detections of a cycle."""
         index = int(np.searchsorted(self._bounds, cycle, side="right")) - 1
         first, last = self._bounds[index : index + 2].tolist()
-        newest = self._newest
-        if newest is None or newest[0] != first:
-            newest = first, self._replay(first, last)
-            self._newest = newest
-        return newest[1].means[cycle - first], newest[1].covariances[cycle - first]
+        kept = self._newest
+        rows = kept.get(first) or self._replay(first, last)
+        # The one used longest ago comes first. Exchanged whole, never changed: a study may ask in its own thread.
+        others = [pair for pair in kept.items() if pair[0] != first]
+        self._newest = dict([*others[1 - KEPT :], (first, rows)])
+        return rows.means[cycle - first], rows.covariances[cycle - first]
 
     def rows(self) -> PriorRows:
         """Return those of all cycles."""

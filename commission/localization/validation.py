@@ -49,23 +49,15 @@ def validation_ellipses(
     return laid_on_the_floor(belief, model, centers, with_constants)
 
 
-def validation_outlines(
-    setup: LocalizerSetup,
-    belief: Belief,
-    *,
-    points: int = 48,
-    scanner: int = 0,
-    before: FilterState | None = None,
-    twist: Sequence[float] | FloatArray = AT_REST,
-) -> FloatArray:
+def validation_outlines(setup: LocalizerSetup, ellipses: FloatArray, *, points: int = 48) -> FloatArray:
     """(N, points, 2) outline [m] of the validation gate around each reflector, map frame (the paper's Fig. 12).
 
     Parameters
     ----------
-    setup, belief, scanner, before, twist : as in `validation_ellipses`.
+    setup : map and gate.
+    ellipses : (N, 2, 2) `validation_ellipses` of all its reflectors [m^2].
     points : of each outline.
     """
-    ellipses = validation_ellipses(setup, belief, scanner=scanner, before=before, twist=twist)
     return ellipse_points(setup.reflectors.centers, ellipses, setup.filter.gate.d2**0.5, points)
 
 

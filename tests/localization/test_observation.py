@@ -29,6 +29,7 @@ from commission.localization.observation import (
     validation_ellipses,
 )
 from commission.localization.setup import LocalizerSetup
+from commission.localization.validation import validation_ellipses as areas_of
 from commission.localization.validation import validation_outlines
 from commission.site.parameters import AssociationParameters, FilterParameters, ObservationParameters, Parameters
 from commission.site.records import Detections, Odometry
@@ -168,7 +169,7 @@ def test_drawn_outline_of_the_gate_parts_what_the_localizer_takes_from_what_it_l
     setup = LocalizerSetup(reflectors, (Scanner(mounting=MOUNTING),), parameters)
     covariance = np.array([[4e-4, 1e-4, 1e-5], [1e-4, 9e-4, -2e-5], [1e-5, -2e-5, 1e-5]])
     belief = Belief(0, np.array([0.5, -0.5, 0.3]), covariance)
-    outlines = validation_outlines(setup, belief)
+    outlines = validation_outlines(setup, areas_of(setup, belief))
     for reflector, outline in zip(reflectors.reflectors, outlines, strict=True):
         center = np.array([reflector.x, reflector.y])
         # Polar coordinates bend an outline of 0.2 m at 4 m by up to 3 % of its size.
@@ -193,8 +194,8 @@ def test_drawn_outline_follows_the_gate_once_constants_are_correlated_with_the_p
     before = driven.state
     driven.feed(Odometry(stamp, se2.exp(0.04 * twist)))
     prior, moved = driven.belief, driven.state
-    outlines = validation_outlines(setup, prior, before=before, twist=twist)
-    alone = validation_outlines(setup, prior, twist=twist)
+    outlines = validation_outlines(setup, areas_of(setup, prior, before=before, twist=twist))
+    alone = validation_outlines(setup, areas_of(setup, prior, twist=twist))
     assert np.ptp(outlines[0], axis=0).max() < 0.9 * np.ptp(alone[0], axis=0).max(), "the correlation counts"
     for reflector, outline in zip(reflectors.reflectors, outlines, strict=True):
         center = np.array([reflector.x, reflector.y])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from commission.localization.growing_run import GrowingRun
-from commission.localization.priors import PriorRows, ReplayedPriors
+from commission.localization.priors import KEPT, PriorRows, ReplayedPriors
 from commission.localization.whole_run import run
 
 from .drives import Plan, random_drive
@@ -28,7 +28,7 @@ def test_priors_of_a_whole_run_are_those_of_the_live_one_in_any_order() -> None:
         assert one.tobytes() == other.tobytes()
 
 
-def test_a_cursor_that_moves_on_between_two_checkpoints_replays_once() -> None:
+def test_a_cursor_replays_between_two_checkpoints_once_while_it_is_near_them() -> None:
     asked: list[tuple[int, int]] = []
 
     def replay(first: int, last: int) -> PriorRows:
@@ -36,6 +36,10 @@ def test_a_cursor_that_moves_on_between_two_checkpoints_replays_once() -> None:
         means = np.arange(first, last)[:, np.newaxis] * np.ones(3)
         return PriorRows(means, np.zeros((last - first, 3, 3)))
 
-    priors = ReplayedPriors((0, 7, 10), 12, replay)
-    assert [priors.at(cycle)[0][0] for cycle in (0, 3, 6, 7, 9, 10, 11, 6)] == [0, 3, 6, 7, 9, 10, 11, 6]
-    assert asked == [(0, 7), (7, 10), (10, 12), (0, 7)]
+    ends = range(0, 10 * KEPT, 10)
+    cycles = (0, 3, 9, 12, 19, 10 * KEPT, 5, *range(25, 10 * KEPT, 10), 5, 12)
+    priors = ReplayedPriors((*ends, 10 * KEPT), 10 * KEPT + 3, replay)
+    assert [priors.at(cycle)[0][0] for cycle in cycles] == list(cycles)
+    stretches = [(0, 10), (10, 20), (10 * KEPT, 10 * KEPT + 3), *((first, first + 10) for first in ends[2:])]
+    # Of one more than are kept, the one used longest ago is replayed again when it is asked for.
+    assert asked == [*stretches, (10, 20)]

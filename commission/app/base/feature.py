@@ -62,6 +62,7 @@ ROUTES = Tab(Side.RIGHT, "Routes", 30)
 LEGEND = Tab(Side.RIGHT_BELOW, "Legend", 10)
 LAYERS = Tab(Side.RIGHT_BELOW, "Layers", 20)
 PROBLEMS = Tab(Side.RIGHT_BELOW, "Problems", 30)
+ASSOCIATION = Tab(Side.RIGHT_BELOW, "Association", 40)
 TIME = Tab(Side.BOTTOM, "Time", 10)
 ROUTE = Tab(Side.BOTTOM, "Route", 20)
 

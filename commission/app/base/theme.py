@@ -233,6 +233,32 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 .c-place:not(:empty){{padding-left:10px}}
 .c-scale{{position:fixed;left:{LEFT_PX + 16}px;top:calc(var(--c-top) + 10px);padding:1px 8px;border-radius:3px;
  background:rgba(16,18,21,.8);color:{css(INLIER)};font-size:12px;pointer-events:none;white-space:nowrap}}
+[data-dock-region=right] [role=tab]{{padding:0 .62em!important}}
+[data-shows~=c-association] [data-dock-scroll]>div:has(.c-association){{flex-grow:2!important}}
+.c-association{{padding:0 12px 0 4px}}
+@media (max-height:800px){{.c-a-picture{{max-width:216px!important}}}}
+.c-a-head{{font-size:12.5px;display:flex;gap:6px;padding:0 2px}}
+.c-a-head span{{margin-left:auto;white-space:nowrap;opacity:.7;font-variant-numeric:tabular-nums}}
+.c-a-verdict{{font-size:12px;padding:0 2px 3px;font-variant-numeric:tabular-nums}}
+.c-a-picture{{display:block;width:100%;max-width:420px;margin:auto;background:{css(BACKGROUND)};fill:none;
+ border-radius:3px}}
+.c-a-picture *{{vector-effect:non-scaling-stroke}}
+.c-a-fine{{stroke:#22252b;stroke-width:1}}
+.c-a-line{{stroke:#353a43;stroke-width:1}}
+.c-a-ray{{stroke:#6b7482;stroke-width:1;stroke-dasharray:2 4}}
+.c-a-gate{{stroke:{css(GATE)};stroke-width:1.6}}
+.c-a-rival{{stroke:{css(GATE)};stroke-width:1;opacity:.45}}
+.c-a-ring{{stroke-width:1.6}}
+.c-a-cloud{{stroke-width:2.4;stroke-linecap:round;opacity:.75}}
+.c-a-spread{{stroke:#c3ccd8;stroke-width:1.2;stroke-dasharray:4 3}}
+.c-a-vector{{stroke-width:1.4}}
+.c-a-detection,.c-a-mean,.c-a-other{{stroke-width:1.8}}
+.c-a-after{{stroke:#e8eaee;stroke-width:1.3}}
+.c-a-bar{{stroke:{css(VEHICLE)};stroke-width:1.5}}
+.c-a-word,.c-a-length{{fill:#d5dae2;font-size:11px;font-variant-numeric:tabular-nums}}
+.c-a-length{{font-weight:600}}
+.c-a-rows{{padding:0 14px 2px 6px}}
+.c-a-legend{{padding-top:4px}}
 .c-stale .c-badge{{background:{IDLE_COLOR}!important;font-size:0!important;letter-spacing:0!important}}
 .c-stale .c-badge::after{{content:var(--c-stale);font-size:13px}}
 .c-stale .c-beside{{visibility:hidden}}

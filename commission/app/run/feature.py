@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from commission.app.base.feature import LEGEND, RUN, SELECTION, TIME, TUNE, Docked, Feature
+from commission.app.base.feature import ASSOCIATION, LEGEND, RUN, SELECTION, TIME, TUNE, Docked, Feature
 from commission.app.run import reducer
 from commission.app.run.accumulated_layer import AccumulatedLayer
+from commission.app.run.association_panel import AssociationPanel
 from commission.app.run.badge import Badge
 from commission.app.run.detection_layer import DetectionLayer
 from commission.app.run.edits_panel import EditsPanel
@@ -41,6 +42,7 @@ FEATURE = Feature(
     panels=(
         Docked(make=lambda at: Badge(at.gui), tab=None, rank=10),
         Docked(make=lambda at: NowPanel(at.gui, at.browser), tab=SELECTION, rank=60, own=True),
+        Docked(make=lambda at: AssociationPanel(at.gui, at.post, at.browser), tab=ASSOCIATION, own=True),
         Docked(make=lambda at: RunPanel(at.gui, at.post, at.state), tab=RUN),
         Docked(make=lambda at: SummaryPanel(at.gui), tab=RUN, rank=5),
         Docked(make=lambda at: EditsPanel(at.gui, at.post, at.state), tab=RUN, rank=10),

@@ -19,7 +19,7 @@ from commission.localization.run_columns import Checkpoint, RunColumns
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState
 from commission.localization.sweep import points_at_stamp
-from commission.localization.validation import validation_outlines
+from commission.localization.validation import validation_ellipses, validation_outlines
 from commission.localization.whole_run import state_before
 from commission.planning.visibility import faces
 from commission.site.record_log import RecordLog
@@ -110,6 +110,7 @@ class Playback:
         belief = columns.initial if estimate is None else estimate.posterior
         segment = columns.segment(max(lived - 1, 0))
         scans = self._scan_points(belief, segment.setup)
+        areas = self._areas(lived, estimate, segment.setup)
         return RunView(
             result=self._result,
             lived=lived,
@@ -123,26 +124,20 @@ class Playback:
             scan_map=np.concatenate(scans),
             first_scan=len(scans[0]),
             judged_map=_judged(estimate, segment.setup),
-            gates=self._gates(lived, estimate, segment.setup),
+            areas=areas,
+            gates=_gates(estimate, segment.setup, areas),
             accumulated=self._accumulated(lived) if whole else None,
         )
 
-    def _gates(self, lived: int, estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
-        """(R, n, 2) validation areas of the reflectors that the scanner could see if nothing stood in between."""
-        if estimate is None or not len(setup.reflectors):
-            return np.empty((0, GATE_POINTS, 2))
-        scanner, before, twist = setup.scanners[estimate.scanner], None, np.zeros(3)
-        seen = range_bearing(estimate.prior.mean, scanner.mounting, setup.reflectors.centers)
-        in_view = faces(scanner, seen[:, 1]) & (seen[:, 0] <= min(scanner.reflector_range, scanner.range[1]))
-        if setup.constants is not None and lived > 1:
-            before, columns = self._state_before(lived - 1), self._result.columns
-            seconds = (estimate.stamp_ns - columns.stamps_ns[lived - 2]) * 1e-9
-            moved = se2.log(se2.compose(se2.inverse(columns.means[lived - 2]), estimate.prior.mean))
-            twist = moved / seconds if seconds > 0.0 else twist
-        outlines = validation_outlines(
-            setup, estimate.prior, points=GATE_POINTS, scanner=estimate.scanner, before=before, twist=twist
-        )
-        return outlines[in_view]
+    def _areas(self, lived: int, estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
+        """(N, 2, 2) where on the floor each reflector was expected to be detected, 1-sigma [m^2]."""
+        if estimate is None:
+            return np.empty((0, 2, 2))
+        before, twist = None, np.zeros(3)
+        if setup.constants is not None:
+            before = self._state_before(lived - 1)
+            twist = _twist_over(self._result.inputs.log, estimate.stamp_ns, before.motion.usual_ns)
+        return validation_ellipses(setup, estimate.prior, scanner=estimate.scanner, before=before, twist=twist)
 
     def _state_before(self, cycle: int) -> FilterState:
         """State before a cycle; while the vehicle drives on, from the one before it."""
@@ -180,6 +175,16 @@ class Playback:
         return points
 
 
+def _gates(estimate: Estimate | None, setup: LocalizerSetup, areas: FloatArray) -> FloatArray:
+    """(R, n, 2) validation areas of the reflectors that the scanner could see if nothing stood in between."""
+    if estimate is None or not len(setup.reflectors):
+        return np.empty((0, GATE_POINTS, 2))
+    scanner = setup.scanners[estimate.scanner]
+    seen = range_bearing(estimate.prior.mean, scanner.mounting, setup.reflectors.centers)
+    in_view = faces(scanner, seen[:, 1]) & (seen[:, 0] <= min(scanner.reflector_range, scanner.range[1]))
+    return validation_outlines(setup, areas, points=GATE_POINTS)[in_view]
+
+
 def _judged(estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
     """(N, 2) detections of a cycle seen from the belief before it [m], map frame."""
     if estimate is None:
@@ -208,6 +213,20 @@ def _twist_at(log: RecordLog, stamp_ns: int) -> FloatArray:
     for displacement in log.displacements[first:last]:
         moved = se2.compose(moved, displacement)
     return se2.log(moved) / ((stamps[last - 1] - stamps[first - 1]) * 1e-9) if last > first else moved
+
+
+def _twist_over(log: RecordLog, stamp_ns: int, usual_ns: int) -> FloatArray:
+    """(3,) velocity of base that the filter takes for a scan [m/s, m/s, rad/s]: that of the odometry around it.
+
+    Where the record behind the scan came too late to be waited for, the one before goes on.
+    """
+    stamps = log.odometry_stamps_ns
+    row = int(np.searchsorted(stamps, stamp_ns))
+    if row == len(stamps) or stamps[row] > stamp_ns + usual_ns:
+        row -= 1
+    if row < 1:
+        return np.zeros(3)
+    return se2.log(log.displacements[row]) / ((stamps[row] - stamps[row - 1]) * 1e-9)
 
 
 class _Cloud:

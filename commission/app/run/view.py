@@ -66,6 +66,8 @@ class RunView:
     """How many of these points are the first scanner's."""
     judged_map: FloatArray
     """(N, 2) detections of the newest cycle as the gates judge them: seen from the belief before it [m], map frame."""
+    areas: FloatArray
+    """(N, 2, 2) where each reflector was expected to be detected, 1-sigma [m^2], map axes; none before a cycle."""
     gates: FloatArray
     """(R, n, 2) outlines of the validation areas of the reflectors in view [m], map frame."""
     accumulated: Accumulated | None
