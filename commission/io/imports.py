@@ -87,7 +87,7 @@ def read_import(name: str, content: bytes, choice: LayoutChoice = WHOLE, *, prog
     title = shown_name(name)
     kept_as = _FORMATS.get(Path(title).suffix.lower())
     if kept_as is None:
-        raise FileFormatError(title, "", "is of a kind that is not read here", f"a file that ends in {_endings()}")
+        raise FileFormatError(title, "", "is of a kind that is not read here", _instead(title))
     if len(content) > SIZE_LIMIT:
         raise FileFormatError(title, "", f"has {len(content)} bytes", f"at most {SIZE_LIMIT} bytes")
     with tempfile.TemporaryDirectory(prefix="commission.") as folder:
@@ -128,7 +128,7 @@ def read_named(path: Path, choice: LayoutChoice = WHOLE, *, progress: Progress =
     with suppress(RuntimeError):  # there is no such user: then the file does not exist either
         path = path.expanduser()
     if path.suffix.lower() not in _FORMATS:
-        raise FileFormatError(path, "", "is of a kind that is not read here", f"a file that ends in {_endings()}")
+        raise FileFormatError(path, "", "is of a kind that is not read here", _instead(path.name))
     return read_import(path.name, read_bytes(path, SIZE_LIMIT), choice, progress=progress)
 
 
@@ -154,5 +154,8 @@ def _bounded(title: str, imported: Imported) -> Imported:
     return imported
 
 
-def _endings() -> str:
-    return f"{', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}"
+def _instead(name: str) -> str:
+    """Say what to bring instead of a file of a kind that is not read here."""
+    if name.lower().endswith(".smap"):
+        return f"the project that `commission convert {name} FOLDER` makes of a SEER map"
+    return f"a file that ends in {', '.join(ENDINGS[:-1])} or {ENDINGS[-1]}"

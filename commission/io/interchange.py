@@ -29,6 +29,7 @@ from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions
 from commission.io.recordings.csv_writer import write_recording
 from commission.io.reflector_tables import write_reflectors
 from commission.io.route_edges import RouteImport
+from commission.io.smap import FIELDS, read_smap
 from commission.io.table_import import read_any_table
 from commission.io.vda5050 import read_order
 from commission.site import network_diff
@@ -49,6 +50,7 @@ class Kind(StrEnum):
     DRAWING = "a CAD drawing (.dxf)"
     MODEL = "a 3D model (.stl, .obj, .glb, .ply)"
     MAP = "a floor map (.yaml)"
+    SMAP = "a SEER map (.smap)"
     RECORDING = "a recording"
 
 
@@ -61,6 +63,7 @@ TARGETS: dict[Kind, tuple[Kind, ...]] = {
     Kind.DRAWING: (Kind.MAP, Kind.PROJECT),
     Kind.MODEL: (Kind.MAP, Kind.PROJECT),
     Kind.MAP: (Kind.PROJECT, Kind.MAP),
+    Kind.SMAP: (Kind.PROJECT, Kind.TABLE, Kind.IMK, Kind.LIF, Kind.MAP),
     Kind.RECORDING: (Kind.RECORDING,),
 }
 """Into which kinds each kind can be converted."""
@@ -88,6 +91,7 @@ _SUFFIXES = {
     ".bag": Kind.RECORDING,
     ".mcap": Kind.RECORDING,
     ".db3": Kind.RECORDING,
+    ".smap": Kind.SMAP,
     **{f".{suffix}": Kind.MODEL for suffix in mesh.KINDS},
 }
 
@@ -109,7 +113,6 @@ _UNREAD = {
     ".pcap": _AS_CSV,
     ".pcapng": _AS_CSV,
     ".log": _AS_CSV,
-    ".smap": "its reflectors as a table (.csv) and its routes as VDMA LIF (.lif)",
     ".xml": "reflectors as a table (.csv), routes as VDMA LIF (.lif)",
     ".xls": "the table saved as CSV",
     ".xlsx": "the table saved as CSV",
@@ -243,7 +246,11 @@ def _from_reflectors(source: Path, target: Path, wanted: Kind, _: ConvertOptions
 
 
 def _from_routes(source: Path, target: Path, wanted: Kind, options: ConvertOptions) -> tuple[str, ...]:
-    imported = _routes(source, options)
+    return _written_routes(source, _routes(source, options), target, wanted)
+
+
+def _written_routes(source: Path, imported: RouteImport, target: Path, wanted: Kind) -> tuple[str, ...]:
+    """Write routes and stations; an existing project keeps those that the source does not speak of."""
     if wanted is Kind.LIF:
         return (*imported.warnings, *write_lif(_network(source, imported), target))
     project = _existing(target)
@@ -283,6 +290,22 @@ def _from_model(source: Path, target: Path, wanted: Kind, options: ConvertOption
     is_y_up = None if options.up is None else options.up == "y"
     model = mesh.read_model(source, unit=options.unit, y_up=is_y_up)
     return _written_map(_checked(lambda: model.floor_map(options.heights, options.resolution)), target, wanted)
+
+
+def _from_smap(source: Path, target: Path, wanted: Kind, options: ConvertOptions) -> tuple[str, ...]:
+    imported = read_smap(source)
+    notes = imported.warnings
+    if wanted is Kind.PROJECT:
+        # One after the other into the same project: what the map does not hold, it keeps.
+        if len(imported.walls):
+            notes += _written_map(_checked(lambda: imported.floor_map(options.resolution)), target, wanted)
+        notes += _written_reflectors(imported.reflectors, target, wanted, FIELDS)
+    if wanted in (Kind.PROJECT, Kind.LIF):
+        routes = RouteImport(routes=imported.routes, stations=imported.stations)
+        return (*notes, *_written_routes(source, routes, target, wanted))
+    if wanted is Kind.MAP:
+        return (*notes, *_written_map(_checked(lambda: imported.floor_map(options.resolution)), target, wanted))
+    return (*notes, *_written_reflectors(imported.reflectors, target, wanted))
 
 
 def _from_recording(source: Path, target: Path, _: Kind, options: ConvertOptions) -> tuple[str, ...]:
@@ -345,5 +368,6 @@ _CONVERTERS: dict[Kind, Callable[[Path, Path, Kind, ConvertOptions], tuple[str, 
     Kind.DRAWING: _from_drawing,
     Kind.MODEL: _from_model,
     Kind.MAP: _from_map,
+    Kind.SMAP: _from_smap,
     Kind.RECORDING: _from_recording,
 }

@@ -6,8 +6,6 @@ so do edges called NAME/1, NAME/2, ..., as `lif_writer` calls them.
 
 from __future__ import annotations
 
-import itertools
-import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -16,25 +14,18 @@ from pathlib import Path
 from commission.errors import UsageError
 from commission.io.findings import Findings, shown
 from commission.io.json_document import Fields, read_json
+from commission.io.route_chains import routes_along
 from commission.io.route_edges import (
-    CORNER,
     Angles,
     Edge,
     RouteImport,
     angles_of,
     curve,
     directed,
-    follows,
-    note_corners,
-    route_of,
     speed_in,
-    turn,
     unique,
 )
-from commission.site.routes import Route
 from commission.site.stations import Station
-
-_NUMBERED = re.compile(r"(?P<name>.+)/(?P<number>[1-9][0-9]{0,5})", re.DOTALL)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,7 +77,7 @@ def read_lif(path: Path, *, vehicle_type: str | None = None, layout: str | None 
         if part.text("vehicleTypeId") == kind
         for edge in _edge(fields, part, content)
     ]
-    routes = _routes(edges, found)
+    routes = routes_along(edges, found)
     stations = tuple(_stations(content, kind))
     return RouteImport(
         routes=routes, warnings=found.lines(), stations=stations, vehicle_types=tuple(counts), layouts=names
@@ -223,61 +214,3 @@ def _stations(content: _Layout, kind: str) -> Iterator[Station]:
             name = unique(name if len(usable) == 1 else f"{name} from {node}", taken)
             x, y = content.nodes[node]
             yield Station(name=name, x=x, y=y, heading=0.0 if theta is None else theta)
-
-
-def _routes(edges: list[Edge], found: Findings) -> tuple[Route, ...]:
-    """Join edges into routes."""
-    taken: set[str] = set()
-    routes: list[Route] = []
-    named, rest = _numbered(edges)
-    for wanted, chain in [*named, *_chains(rest)]:
-        name = unique(wanted, taken)
-        note_corners(name, chain, found)
-        routes.append(route_of(name, chain))
-    return tuple(routes)
-
-
-def _numbered(edges: list[Edge]) -> tuple[list[tuple[str, list[Edge]]], list[Edge]]:
-    """Edges called NAME/1, NAME/2, ... that follow one another, by NAME; and the others."""
-    groups: dict[str, dict[int, Edge]] = {}
-    for edge in edges:
-        if match := _NUMBERED.fullmatch(edge.id):
-            groups.setdefault(match["name"], {}).setdefault(int(match["number"]), edge)
-    chains: list[tuple[str, list[Edge]]] = []
-    used: set[int] = set()
-    for name, group in groups.items():
-        chain = [group[number] for number in range(1, len(group) + 1) if number in group]
-        pairs = itertools.pairwise(chain)
-        if len(chain) == len(group) and all(a.end == b.start and follows(a, b) for a, b in pairs):
-            chains.append((name, chain))
-            used.update(id(edge) for edge in chain)
-    return chains, [edge for edge in edges if id(edge) not in used]
-
-
-def _chains(edges: list[Edge]) -> Iterator[tuple[str, list[Edge]]]:
-    """Longest chains in which each edge has one successor and that one no other predecessor, ways back not counted."""
-    leaving: dict[str, list[Edge]] = {}
-    arriving: dict[str, list[Edge]] = {}
-    for edge in edges:
-        leaving.setdefault(edge.start, []).append(edge)
-        arriving.setdefault(edge.end, []).append(edge)
-    following: dict[int, Edge] = {}
-    for edge in edges:
-        onward = [e for e in leaving.get(edge.end, ()) if e.end != edge.start]
-        if len(onward) != 1:
-            continue
-        rivals = [e for e in arriving[edge.end] if e.start != onward[0].end]
-        if len(rivals) == 1 and follows(edge, onward[0]) and turn(edge.segment, onward[0].segment) <= CORNER:
-            following[id(edge)] = onward[0]
-    # A ring has no beginning: after the chains that have one, it is begun at the first of its edges.
-    heads = {id(edge) for edge in edges} - {id(edge) for edge in following.values()}
-    done: set[int] = set()
-    for edge in [*(e for e in edges if id(e) in heads), *(e for e in edges if id(e) not in heads)]:
-        chain: list[Edge] = []
-        step: Edge | None = edge
-        while step is not None and id(step) not in done:
-            done.add(id(step))
-            chain.append(step)
-            step = following.get(id(step))
-        if chain:
-            yield (chain[0].id if len(chain) == 1 else f"{chain[0].start} to {chain[-1].end}"), chain
