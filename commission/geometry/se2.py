@@ -216,9 +216,10 @@ def log_scalars(x: float, y: float, t: float) -> tuple[float, float, float]:
     """
     w = wrap_scalar(t)
     half = 0.5 * w
-    if abs(w) < SMALL_ANGLE:
+    if abs(w) < 0.1:
+        # The first term left out is w^10 / 47900160 < 3e-18.
         w2 = w * w
-        cotangent = 1.0 - w2 / 12.0 * (1.0 + w2 / 60.0)
+        cotangent = 1.0 - w2 * (1.0 / 12.0 + w2 * (1.0 / 720.0 + w2 * (1.0 / 30240.0 + w2 * (1.0 / 1209600.0))))
     else:
         cotangent = half / math.tan(half)
     return cotangent * x + half * y, cotangent * y - half * x, w

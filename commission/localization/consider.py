@@ -12,19 +12,23 @@ from typing import NamedTuple
 from commission.compiled import compiled_inline
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray
-from commission.localization.kalman import Gain, Innovation, correct, corrected_covariance, gain, innovation
+from commission.geometry.directions import UnitVector, composed, direction_of, turn_to, turned_by
+from commission.localization.kalman import (
+    Corrected,
+    Gain,
+    Innovation,
+    correct,
+    corrected_covariance,
+    gain,
+    innovation,
+)
 from commission.localization.observation import (
     Expected,
     ObservationModel,
-    UnitVector,
-    composed,
-    direction_of,
     expect,
     expect_at,
     offset_facing,
     scanner_offset,
-    turn_to,
-    turned_by,
 )
 from commission.localization.odometry import Motion, NextOdometry, velocity
 from commission.localization.pose_gaussian import PoseGaussian
@@ -58,8 +62,6 @@ class Considering(NamedTuple):
     """Velocity of base at the scan [m/s], in base."""
     speed_y: float
     turn_rate: float
-    facing: UnitVector
-    """Heading of the belief at the scan."""
 
 
 class Seen(NamedTuple):
@@ -134,8 +136,7 @@ def considering_at(
     """
     if cross is None:
         return None
-    facing = direction_of(belief.theta)
-    return Considering(variances, belief.x - pivot[0], belief.y - pivot[1], twist[0], twist[1], twist[2], facing)
+    return Considering(variances, belief.x - pivot[0], belief.y - pivot[1], twist[0], twist[1], twist[2])
 
 
 class ScannerJacobian(NamedTuple):
@@ -277,13 +278,17 @@ def innovation_with(  # noqa: PLR0917 - a measurement, number by number
     s_bb += e.bearing_theta * (bearing_pt + seen.tb) + seen.bb + model.bearing_variance
     # S - R is positive semi-definite; rounding may not say so.
     s_rr = max(s_rr + seen.rr + model.range_variance, model.range_variance)
-    w = s_rb / s_rr
+    per_s_rr = 1.0 / s_rr
+    w = s_rb * per_s_rr
+    schur = max(s_bb - w * s_rb, model.bearing_variance)
     return Innovation(
         measured_range - e.range,
         turn,
         s_rr,
         w,
-        max(s_bb - w * s_rb, model.bearing_variance),
+        schur,
+        per_s_rr,
+        1.0 / schur,
         model.range_variance,
         model.bearing_variance,
         range_px,
@@ -293,13 +298,6 @@ def innovation_with(  # noqa: PLR0917 - a measurement, number by number
         bearing_py,
         bearing_pt,
     )
-
-
-class Corrected(NamedTuple):
-    """A belief after a detection, and the direction of its heading."""
-
-    belief: PoseGaussian
-    facing: UnitVector
 
 
 @compiled_inline
@@ -342,7 +340,7 @@ def correct_with(  # noqa: PLR0917 - a measurement and a reflector, number by nu
 
 
 @compiled_inline
-def correct_aimed(  # noqa: PLR0917 - a measurement and a reflector, number by number
+def correct_aimed_with(  # noqa: PLR0917 - a measurement and a reflector, number by number
     belief: PoseGaussian,
     facing: UnitVector,
     measured_range: float,
@@ -356,7 +354,7 @@ def correct_aimed(  # noqa: PLR0917 - a measurement and a reflector, number by n
     width: int,
     at: int,
 ) -> Corrected:
-    """Correct a belief like `correct_with`, by directions instead of angles: without any arctangent, sine and cosine.
+    """Correct a belief like `correct_with`, by directions instead of angles: without arctangent, sine and cosine.
 
     Parameters
     ----------
@@ -493,10 +491,11 @@ def innovation_given(  # noqa: PLR0917 - a measurement, number by number
     -----
     No formula: `innovation` or `innovation_with`.
     """
+    turn = wrap_scalar(measured_bearing - e.bearing)
     if given is None or work is None:
-        return innovation(belief, e, measured_range, measured_bearing, surveyed_variance, model)
+        return innovation(belief, e, measured_range, turn, surveyed_variance, model)
     seen = seen_with(direction_of(belief.theta), e, surveyed_variance, given, work, at)
-    return innovation_with(belief, e, measured_range, wrap_scalar(measured_bearing - e.bearing), model, seen)
+    return innovation_with(belief, e, measured_range, turn, model, seen)
 
 
 @compiled_inline

@@ -13,17 +13,18 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
+from commission.geometry.directions import UnitVector, direction_of
 from commission.localization.association import INLIER, NOBODY, associate
 from commission.localization.consider import (
     BLOCKS,
     PER_REFLECTOR,
     Considering,
     considering,
-    correct_aimed,
+    correct_aimed_with,
 )
 from commission.localization.consider_columns import begin, busy_chunks, put_back, put_block, take_along
-from commission.localization.kalman import correct
-from commission.localization.observation import ObservationModel, UnitVector, direction_of
+from commission.localization.kalman import correct_aimed
+from commission.localization.observation import ObservationModel
 from commission.localization.odometry import NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.rejection import rejects_the_world, weigh
@@ -81,7 +82,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     cell_offsets: IntArray,
     cross: FloatArray | None,
     work: FloatArray | None,
-    aims: FloatArray | None,
+    aims: FloatArray,
     busy: IntArray | None,
     scanner: int,
     status: NDArray[np.int8],
@@ -101,7 +102,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     observation : mounting and noise of the scan's scanner.
     places, cell_offsets : the map, see `ReflectorIndex`.
     cross : (3, 2 N + 5 S) in and out: covariance of the pose with the considered constants; None: none is considered.
-    work, aims : (3, 8 + 2 n), (n, 3) room for the largest scan, see `room_for_scans`; None: as `cross`.
+    work, aims : (3, 8 + 2 n), (n, 3) room for the largest scan, see `room_for_scans`; no work: as `cross`.
     busy : see `busy_chunks`; None: as `cross`.
     scanner : index of the scan's scanner.
     status : (n,) in: INLIER or OUTLIER_DETECTOR; out: a `Status`.
@@ -116,12 +117,15 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     """
     prior, motion = reach(state.belief, state.motion, stamp_ns, following, model.odometry)
     given = considering(cross, prior, state.pivot, state.motion, following, model.consider)
+    facing = direction_of(prior.theta)
     prepare(cross, given, work, aims, first, last, detections, observation, len(places), scanner)
     associate(
         prior,
+        facing,
         first,
         last,
         detections,
+        aims,
         observation,
         model.gate,
         model.cells,
@@ -130,13 +134,26 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         cross,
         given,
         work,
-        aims,
         status,
         reflectors,
         d2,
     )
     posterior = corrected(
-        prior, first, last, detections, observation, places, cross, given, work, aims, busy, scanner, status, reflectors
+        prior,
+        facing,
+        first,
+        last,
+        detections,
+        aims,
+        observation,
+        places,
+        cross,
+        given,
+        work,
+        busy,
+        scanner,
+        status,
+        reflectors,
     )
     pivot = state.pivot if cross is None else (posterior.x, posterior.y)
     for i in range(first, last):
@@ -184,19 +201,19 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
 
 
 class Room(NamedTuple):
-    """What `process_scan` writes to and reads from while constants are considered."""
+    """What `process_scan` writes to and reads from."""
 
+    aims: FloatArray
     work: FloatArray | None
-    aims: FloatArray | None
     busy: IntArray | None
 
 
 def room_for_scans(cross: FloatArray | None, detections: int) -> Room:
-    """Return the room for scans of up to as many detections; None where no constants are considered."""
+    """Return the room for scans of up to as many detections; work is None where no constants are considered."""
+    aims = np.empty((detections, 3))
     if cross is None:
-        return Room(None, None, None)
-    work = np.empty((3, BLOCKS + PER_REFLECTOR * max(detections, 1)))
-    return Room(work, np.empty((detections, 3)), busy_chunks(cross))
+        return Room(aims, None, None)
+    return Room(aims, np.empty((3, BLOCKS + PER_REFLECTOR * max(detections, 1))), busy_chunks(cross))
 
 
 @compiled_inline
@@ -204,7 +221,7 @@ def prepare(  # noqa: PLR0917 - the scan's detections, array by array
     cross: FloatArray | None,
     given: Considering | None,
     work: FloatArray | None,
-    aims: FloatArray | None,
+    aims: FloatArray,
     first: int,
     last: int,
     detections: FloatArray,
@@ -212,12 +229,12 @@ def prepare(  # noqa: PLR0917 - the scan's detections, array by array
     reflectors: int,
     scanner: int,
 ) -> None:
-    """Write what a scan is worked out from; nothing where no constants are considered.
+    """Write what a scan is worked out from.
 
     Parameters
     ----------
     cross, given : covariance with the constants, and what the detections of the scan have in common, or None.
-    work, aims : written; or None.
+    work, aims : written; no work: none is considered.
     first, last, detections, observation, scanner : as in `corrected`.
     reflectors : N of the map.
 
@@ -226,26 +243,26 @@ def prepare(  # noqa: PLR0917 - the scan's detections, array by array
     aim = (cos, sin) of mount + bearing, by definition: all sines and cosines of a scan but those of the heading. The
     third column of `aims` is for where in `work` the reflector of a detection is.
     """
-    if cross is None or given is None or work is None or aims is None:
-        return
-    begin(work, cross, given, reflectors, scanner)
     for i in range(first, last):
         aim = direction_of(observation.mount_theta + detections[i, 1])
         aims[i - first, 0], aims[i - first, 1] = aim
+    if cross is not None and given is not None and work is not None:
+        begin(work, cross, given, reflectors, scanner)
 
 
 @compiled_inline
 def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by array
     prior: PoseGaussian,
+    facing: UnitVector,
     first: int,
     last: int,
     detections: FloatArray,
+    aims: FloatArray,
     observation: ObservationModel,
     places: FloatArray,
     cross: FloatArray | None,
     given: Considering | None,
     work: FloatArray | None,
-    aims: FloatArray | None,
     busy: IntArray | None,
     scanner: int,
     status: NDArray[np.int8],
@@ -255,31 +272,33 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
 
     Parameters
     ----------
-    prior : after *predict*.
+    prior, facing : after *predict*, and the direction of its heading.
     first, last : rows of the scan's detections, the last one excluded.
     detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
+    aims : see `prepare`.
     observation : mounting and noise of the scanner.
     places : the map, see `ReflectorIndex`.
     cross : covariance of the pose with the constants, written in place; None: none is considered.
-    given, work, aims, busy : of the scan, where constants are considered, else None.
+    given, work, busy : of the scan, where constants are considered, else None.
     scanner : index of the scanner.
     status : (n,) a `Status` each.
     entries : (n,) row of `places` of each, or NOBODY.
 
     Notes
     -----
-    No formula: `correct` or `correct_aimed` for each in turn, from the freshest state; constants that the scan does not
-    see are carried over it at the end, in one go.
+    No formula: `correct_aimed` or `correct_aimed_with` for each in turn, from the freshest state; constants that the
+    scan does not see are carried over it at the end, in one go.
     """
     belief = prior
-    if cross is None or given is None or work is None or aims is None or busy is None:
+    if cross is None or given is None or work is None or busy is None:
         for i in range(first, last):
             if status[i] == INLIER:
                 entry, distance = entries[i], detections[i, 0] - observation.range_bias
+                aim = UnitVector(aims[i - first, 0], aims[i - first, 1])
                 x, y, variance = places[entry, 0], places[entry, 1], places[entry, 2]
-                belief = correct(belief, distance, detections[i, 1], x, y, variance, observation)
+                belief, facing = correct_aimed(belief, facing, distance, aim, x, y, variance, observation)
         return belief
-    facing, width = given.facing, BLOCKS
+    width = BLOCKS
     for i in range(first, last):
         if status[i] != INLIER:
             continue
@@ -292,7 +311,7 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
         at = int(aims[earlier - first, 2])
         aim = UnitVector(aims[i - first, 0], aims[i - first, 1])
         x, y, variance = places[entry, 0], places[entry, 1], places[entry, 2]
-        belief, facing = correct_aimed(
+        belief, facing = correct_aimed_with(
             belief, facing, distance, aim, x, y, variance, observation, given, work, width, at
         )
     put_back(cross, work, len(places), scanner, busy)

@@ -6,11 +6,13 @@ correction starts from the freshest state and linearizes there; association alon
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from commission.compiled import compiled_inline
 from commission.geometry.angles import wrap_scalar
-from commission.localization.observation import Expected, ObservationModel, expect, scanner_offset
+from commission.geometry.directions import UnitVector, composed, direction_of, turn_to, turned_by
+from commission.localization.observation import Expected, ObservationModel, expect_at, offset_facing
 from commission.localization.pose_gaussian import PoseGaussian
 
 
@@ -25,6 +27,9 @@ class Innovation(NamedTuple):
     s_rr: float
     w: float
     schur: float
+    per_s_rr: float
+    """1 / s_rr: the one division, where each of its uses would take as long."""
+    per_schur: float
     range_noise: float
     bearing_noise: float
     range_px: float
@@ -52,7 +57,7 @@ def innovation(  # noqa: PLR0917 - a measurement, number by number
     belief: PoseGaussian,
     expected: Expected,
     measured_range: float,
-    measured_bearing: float,
+    turn: float,
     surveyed_variance: float,
     model: ObservationModel,
 ) -> Innovation:
@@ -61,8 +66,9 @@ def innovation(  # noqa: PLR0917 - a measurement, number by number
     Parameters
     ----------
     belief : before the correction.
-    expected : observation of the reflector expected from the mean of `belief`.
-    measured_range, measured_bearing : range bias already taken off [m], [rad].
+    expected : observation of the reflector expected from the mean of `belief`; its bearing is not read.
+    measured_range : range bias already taken off [m].
+    turn : from the expected bearing to the measured one [rad].
     surveyed_variance : of the reflector's place, each axis [m^2]; adds to R.
     model : of the observation.
 
@@ -82,14 +88,18 @@ def innovation(  # noqa: PLR0917 - a measurement, number by number
     s_rr = e.range_x * range_px + e.range_y * range_py + e.range_theta * range_pt + range_noise
     s_rb = e.bearing_x * range_px + e.bearing_y * range_py + e.bearing_theta * range_pt
     s_bb = e.bearing_x * bearing_px + e.bearing_y * bearing_py + e.bearing_theta * bearing_pt + bearing_noise
-    w = s_rb / s_rr
+    per_s_rr = 1.0 / s_rr
+    w = s_rb * per_s_rr
+    # S - R is positive semi-definite, so the Schur complement is at least that of R; rounding may not say so.
+    schur = max(s_bb - w * s_rb, bearing_noise)
     return Innovation(
         measured_range - e.range,
-        wrap_scalar(measured_bearing - e.bearing),
+        turn,
         s_rr,
         w,
-        # S - R is positive semi-definite, so the Schur complement is at least that of R; rounding may not say so.
-        max(s_bb - w * s_rb, bearing_noise),
+        schur,
+        per_s_rr,
+        1.0 / schur,
         range_noise,
         bearing_noise,
         range_px,
@@ -110,7 +120,7 @@ def squared_distance(given: Innovation) -> float:
     v^T S^-1 v = v_r^2 / S_rr + (v_b - w v_r)^2 / schur with w = S_rb / S_rr: solved with S = L D L^T, by definition.
     """
     rest = given.bearing - given.w * given.range
-    return given.range * given.range / given.s_rr + rest * rest / given.schur
+    return given.range * given.range * given.per_s_rr + rest * rest * given.per_schur
 
 
 @compiled_inline
@@ -135,18 +145,57 @@ def correct(  # noqa: PLR0917 - a measurement and a reflector, number by number
 
     Notes
     -----
+    No formula: `correct_aimed`, of the directions.
+    """
+    aim, facing = direction_of(model.mount_theta + measured_bearing), direction_of(belief.theta)
+    return correct_aimed(belief, facing, measured_range, aim, reflector_x, reflector_y, surveyed_variance, model).belief
+
+
+class Corrected(NamedTuple):
+    """A belief after a detection, and the direction of its heading."""
+
+    belief: PoseGaussian
+    facing: UnitVector
+
+
+@compiled_inline
+def correct_aimed(  # noqa: PLR0917 - a measurement and a reflector, number by number
+    belief: PoseGaussian,
+    facing: UnitVector,
+    measured_range: float,
+    aim: UnitVector,
+    reflector_x: float,
+    reflector_y: float,
+    surveyed_variance: float,
+    model: ObservationModel,
+) -> Corrected:
+    """Correct a belief like `correct`, by directions instead of angles: without arctangent, sine and cosine.
+
+    Parameters
+    ----------
+    belief : before the correction; it is linearized there.
+    facing : its heading.
+    measured_range : range bias already taken off [m].
+    aim : measured bearing, in base.
+    reflector_x, reflector_y, surveyed_variance, model : as in `correct`.
+
+    Notes
+    -----
     x = x + K v, and P as in `corrected_covariance`: Sobreira et al. 2016, Algorithm 1, lines 16 and 17, at the freshest
     state.
     """
-    offset_x, offset_y = scanner_offset(belief.theta, model)
-    e = expect(belief.x, belief.y, belief.theta, offset_x, offset_y, reflector_x, reflector_y, model.mount_theta)
-    v = innovation(belief, e, measured_range, measured_bearing, surveyed_variance, model)
+    offset_x, offset_y = offset_facing(facing, model)
+    dx, dy = reflector_x - (belief.x + offset_x), reflector_y - (belief.y + offset_y)
+    e = expect_at(dx, dy, math.nan, offset_x, offset_y)
+    turn = turn_to(-e.range_x, -e.range_y, composed(facing, aim))
+    v = innovation(belief, e, measured_range, turn, surveyed_variance, model)
     k = gain(v)
     xx, xy, xt, yy, yt, tt = corrected_covariance(belief, e, k, v.range_noise, v.bearing_noise)
-    return PoseGaussian(
+    heading = k.tr * v.range + k.tb * v.bearing
+    after = PoseGaussian(
         belief.x + k.xr * v.range + k.xb * v.bearing,
         belief.y + k.yr * v.range + k.yb * v.bearing,
-        wrap_scalar(belief.theta + k.tr * v.range + k.tb * v.bearing),
+        wrap_scalar(belief.theta + heading),
         xx,
         xy,
         xt,
@@ -154,6 +203,7 @@ def correct(  # noqa: PLR0917 - a measurement and a reflector, number by number
         yt,
         tt,
     )
+    return Corrected(after, turned_by(facing, heading))
 
 
 @compiled_inline
@@ -168,11 +218,11 @@ def gain(given: Innovation) -> Gain:
     xb, yb = _second(v.range_px, v.bearing_px, v), _second(v.range_py, v.bearing_py, v)
     tb = _second(v.range_pt, v.bearing_pt, v)
     return Gain(
-        v.range_px / v.s_rr - v.w * xb,
+        v.range_px * v.per_s_rr - v.w * xb,
         xb,
-        v.range_py / v.s_rr - v.w * yb,
+        v.range_py * v.per_s_rr - v.w * yb,
         yb,
-        v.range_pt / v.s_rr - v.w * tb,
+        v.range_pt * v.per_s_rr - v.w * tb,
         tb,
     )
 
@@ -224,4 +274,4 @@ def corrected_covariance(
 @compiled_inline
 def _second(range_p: float, bearing_p: float, given: Innovation) -> float:
     """Second element of S^-1 applied to [range_p, bearing_p]."""
-    return (bearing_p - given.w * range_p) / given.schur
+    return (bearing_p - given.w * range_p) * given.per_schur

@@ -16,16 +16,13 @@ from commission.compiled import compiled, compiled_inline
 from commission.geometry import se2
 from commission.geometry.angles import wrap, wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.geometry.directions import UnitVector, direction_of
 from commission.localization.estimate import Belief
 from commission.site.parameters import ObservationParameters
 from commission.site.scanner import Scanner
 
 SMALLEST_RANGE = 1e-3
 """Ranges are not linearized below this [m]: a reflector's center is never nearer than its radius."""
-
-
-SMALL_TURN = 0.01
-"""Turns up to this are made by series [rad]."""
 
 
 class ObservationModel(NamedTuple):
@@ -50,13 +47,6 @@ class Expected(NamedTuple):
     bearing_x: float
     bearing_y: float
     bearing_theta: float
-
-
-class UnitVector(NamedTuple):
-    """A direction as a unit vector: its cosine and sine."""
-
-    cos: float
-    sin: float
 
 
 def observation_model(scanner: Scanner, parameters: ObservationParameters) -> ObservationModel:
@@ -108,20 +98,6 @@ def offset_facing(facing: UnitVector, model: ObservationModel) -> tuple[float, f
 
 
 @compiled_inline
-def composed(first: UnitVector, second: UnitVector) -> UnitVector:
-    """Unit vector of the sum of two angles.
-
-    Notes
-    -----
-    cos(a + b) = cos a cos b - sin a sin b, sin(a + b) = sin a cos b + cos a sin b, by definition.
-    """
-    return UnitVector(
-        first.cos * second.cos - first.sin * second.sin,
-        first.sin * second.cos + first.cos * second.sin,
-    )
-
-
-@compiled_inline
 def expect(  # noqa: PLR0917 - a pose and a point, number by number
     x: float, y: float, theta: float, offset_x: float, offset_y: float, target_x: float, target_y: float, mount: float
 ) -> Expected:
@@ -157,8 +133,10 @@ def expect_at(dx: float, dy: float, bearing: float, offset_x: float, offset_y: f
     -----
     No formula: that of `expect`.
     """
-    distance = math.sqrt(dx * dx + dy * dy)
-    inverse = 1.0 / max(distance, SMALLEST_RANGE)
+    square = dx * dx + dy * dy
+    distance = math.sqrt(square)
+    # 1 / distance, without waiting for the root before it divides.
+    inverse = max(distance, SMALLEST_RANGE) * (1.0 / max(square, SMALLEST_RANGE * SMALLEST_RANGE))
     ux, uy = dx * inverse, dy * inverse
     # The scanner moves by (-offset_y, offset_x) per radian.
     return Expected(
@@ -171,58 +149,6 @@ def expect_at(dx: float, dy: float, bearing: float, offset_x: float, offset_y: f
         -ux * inverse,
         -(uy * offset_y + ux * offset_x) * inverse - 1.0,
     )
-
-
-@compiled_inline
-def direction_of(angle: float) -> UnitVector:
-    """Unit vector of an angle [rad].
-
-    Notes
-    -----
-    (cos(angle), sin(angle)), by definition.
-    """
-    return UnitVector(math.cos(angle), math.sin(angle))
-
-
-@compiled_inline
-def turned_by(direction: UnitVector, angle: float) -> UnitVector:
-    """Unit vector turned by an angle, which is mostly small [rad].
-
-    Notes
-    -----
-    R(angle) direction, by definition; up to `SMALL_TURN` the series of both, whose first terms left out are
-    angle^7 / 5040 and angle^8 / 40320.
-    """
-    if -SMALL_TURN < angle < SMALL_TURN:
-        a2 = angle * angle
-        c = 1.0 - a2 * (0.5 - a2 * (1.0 / 24.0 - a2 / 720.0))
-        s = angle * (1.0 - a2 * (1.0 / 6.0 - a2 / 120.0))
-    else:
-        c, s = math.cos(angle), math.sin(angle)
-    return composed(direction, UnitVector(c, s))
-
-
-@compiled_inline
-def turn_to(ux: float, uy: float, direction: UnitVector) -> float:
-    """Angle from a unit vector to a direction, mostly a small one [rad].
-
-    Parameters
-    ----------
-    ux, uy : what is turned from; shorter than 1 where there is nothing to be told.
-    direction : what is turned to.
-
-    Notes
-    -----
-    atan2(u x d, u . d), by definition; near 0 the series of the arcsine, whose first term left out is
-    (10395 / 599040) s^13.
-    """
-    s = ux * direction.sin - uy * direction.cos
-    c = ux * direction.cos + uy * direction.sin
-    if c > 0.998 and -0.05 < s < 0.05:
-        s2 = s * s
-        rest = 15.0 / 336.0 + s2 * (105.0 / 3456.0 + s2 * (945.0 / 42240.0))
-        return s + s * s2 * (1.0 / 6.0 + s2 * (3.0 / 40.0 + s2 * rest))
-    return math.atan2(s, c)
 
 
 def range_bearing(T_map_base: ArrayLike, mounting: ArrayLike, points_map: ArrayLike) -> FloatArray:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from commission.compiled import compiled_inline
 from commission.geometry.angles import wrap_scalar
+from commission.geometry.directions import direction_of, turned_by
 from commission.geometry.se2 import compose_scalars, exp_scalars, inverse_scalars, log_scalars
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.site.parameters import OdometryParameters
@@ -219,8 +220,8 @@ def predict(  # noqa: PLR0917 - a displacement, number by number
     P = F P F^T + Q with F = [[1, 0, -my], [0, 1, mx], [0, 0, 1]] and (mx, my) the motion in the map: Sobreira et al.
     2016, equation 1 and Algorithm 1, lines 3 and 4; Q derived as said above.
     """
-    x, y, theta = compose_scalars(belief.x, belief.y, belief.theta, dx, dy, dtheta)
-    mx, my = x - belief.x, y - belief.y
+    facing = direction_of(belief.theta)
+    mx, my = facing.cos * dx - facing.sin * dy, facing.sin * dx + facing.cos * dy
     # F P F^T, F = [[1, 0, -my], [0, 1, mx], [0, 0, 1]].
     xt = belief.xt - my * belief.tt
     yt = belief.yt + mx * belief.tt
@@ -244,12 +245,12 @@ def predict(  # noqa: PLR0917 - a displacement, number by number
         yy += along * my * my + across * mx * mx
     axis = noise.forward_per_s * seconds
     if axis > 0.0:
-        halfway = belief.theta + 0.5 * wrap_scalar(dtheta)
-        c, s = math.cos(halfway), math.sin(halfway)
+        c, s = turned_by(facing, 0.5 * wrap_scalar(dtheta))
         xx += axis * c * c
         xy += axis * c * s
         yy += axis * s * s
-    return PoseGaussian(x, y, theta, xx, xy, xt, yy, yt, belief.tt + heading)
+    theta = wrap_scalar(belief.theta + dtheta)
+    return PoseGaussian(belief.x + mx, belief.y + my, theta, xx, xy, xt, yy, yt, belief.tt + heading)
 
 
 @compiled_inline

@@ -191,7 +191,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
     cell_offsets: IntArray,
     cross: FloatArray | None,
     work: FloatArray | None,
-    aims: FloatArray | None,
+    aims: FloatArray,
     busy: IntArray | None,
     state: FilterState,
     columns: Columns,

@@ -9,6 +9,7 @@ import numpy as np
 
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
+from commission.geometry.directions import direction_of
 from commission.geometry.se2 import compose_scalars, inverse_scalars
 from commission.localization.consider import (
     BLOCKS,
@@ -24,14 +25,7 @@ from commission.localization.consider import (
 )
 from commission.localization.consider_columns import working_array
 from commission.localization.kalman import Gain, Innovation, corrected_covariance, gain, innovation
-from commission.localization.observation import (
-    Expected,
-    ObservationModel,
-    direction_of,
-    expect,
-    observation_at,
-    scanner_offset,
-)
+from commission.localization.observation import Expected, ObservationModel, expect, observation_at, scanner_offset
 from commission.localization.odometry import OdometryNoise, predict
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.planning.detection_noise import DetectionNoise, Worth, worth
@@ -255,7 +249,7 @@ def _after(  # noqa: PLR0917 - a detection, number by number
     range_noise = max(true.range_variance - 0.5 * true.range_wave * true.range_wave, 1e-12)
     bearing_noise = max(true.bearing_variance - 0.5 * true.bearing_wave * true.bearing_wave, 1e-12)
     white = ObservationModel(o.mount_x, o.mount_y, o.mount_theta, range_noise, bearing_noise, 0.0)
-    is_so = innovation(error, e, e.range, e.bearing, 0.0, white)
+    is_so = innovation(error, e, e.range, 0.0, 0.0, white)
     rest = _corrected(error, e, gain(is_so), is_so)
     taken = mixed(rest, _corrected(error, e, k, is_so), passing.smaller)
     rejected = mixed(rest, error, passing.larger)

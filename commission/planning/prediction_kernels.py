@@ -356,7 +356,8 @@ def separations(  # noqa: PLR0917 - the columns of a drive
         mount = observation.mount_theta
         own = expect(x, y, theta, offset_x, offset_y, places[reflector, 0], places[reflector, 1], mount)
         other = expect(x, y, theta, offset_x, offset_y, places[neighbor, 0], places[neighbor, 1], mount)
-        between = innovation(belief, own, other.range, other.bearing, places[reflector, 2], observation)
+        turn = wrap_scalar(other.bearing - own.bearing)
+        between = innovation(belief, own, other.range, turn, places[reflector, 2], observation)
         squared[i] = squared_distance(between)
 
 

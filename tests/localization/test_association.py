@@ -9,28 +9,26 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from commission.geometry.directions import direction_of
 from commission.localization.association import (
     NOBODY,
     Gate,
-    Viewpoint,
     associate,
     gate_of,
     likeliest,
-    search_radius,
-    viewpoint,
-    widened,
 )
 from commission.localization.consider import Considering, ConsiderModel, innovation_with, seen_with
 from commission.localization.estimate import Status
 from commission.localization.kalman import correct
-from commission.localization.observation import ObservationModel, direction_of, expect
+from commission.localization.observation import ObservationModel, expect
 from commission.localization.pose_gaussian import PoseGaussian, covariance_of, mean_of
 from commission.localization.reflector_index import ReflectorIndex, build_index
+from commission.localization.search import Viewpoint, search_radius2, viewpoint, widened
 from commission.site.parameters import AssociationParameters
 from commission.site.reflectors import Reflector, ReflectorMap
 from tests.localization.plain_observation import innovation_covariances, innovations, log_likelihoods, matrix
 
-NOTHING_CONSIDERED = (None, None, None, None)
+NOTHING_CONSIDERED = (None, None, None)
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -81,12 +79,14 @@ def test_nearby_search_equals_a_plain_search_over_all_reflectors(seed: int, enab
     rng = np.random.default_rng(seed)
     model, belief, index = random_model(rng), random_belief(rng), random_index(rng)
     gate = Gate(enabled, float(rng.choice([0.1, 5.991, 30.0])))
-    view = viewpoint(belief, model)
+    facing = direction_of(belief.theta)
+    view = viewpoint(belief, facing, model)
     for z in rng.uniform([0.0, -math.pi], [25.0, math.pi], (8, 2)):
         best, d2 = likeliest(
             belief,
+            facing,
             float(z[0]),
-            float(z[1]),
+            direction_of(belief.theta + model.mount_theta + float(z[1])),
             view,
             view,
             model,
@@ -123,7 +123,7 @@ def test_viewpoint_is_the_place_of_the_scanner_and_its_longest_sigma(seed: int) 
     # By a small turn of base the scanner moves across its lever.
     lever = np.array([[1.0, 0.0, -offset[1]], [0.0, 1.0, offset[0]]])
     longest = math.sqrt(np.linalg.eigvalsh(lever @ covariance_of(belief) @ lever.T)[1])
-    found = viewpoint(belief, model)
+    found = viewpoint(belief, direction_of(belief.theta), model)
     assert found == pytest.approx((*offset, longest, math.sqrt(belief.tt)), rel=1e-6, abs=1e-9)
 
 
@@ -140,11 +140,12 @@ def test_no_reflector_within_a_squared_distance_lies_beyond_the_radius_that_is_s
     places = point + rng.normal(size=(40, 2)) * np.exp(rng.uniform(-4, 2, (40, 1)))
     S = innovation_covariances(pose, covariance_of(belief), mounting, places, sigmas, surveyed)
     d2, _ = log_likelihoods(innovations(pose, mounting, places, z), S)
-    view = viewpoint(belief, model)
+    facing = direction_of(belief.theta)
+    view = viewpoint(belief, facing, model)
     for place, bound in zip(places, d2.tolist(), strict=True):
         if bound < 1e6:
-            radius = search_radius(bound * (1.0 + 1e-4), float(z[0]), view, model, surveyed**2)
-            assert math.dist(place, point) <= radius
+            within = search_radius2(math.sqrt(bound * (1.0 + 1e-4)), float(z[0]), view, model, surveyed**2)
+            assert math.dist(place, point) ** 2 <= within
 
 
 @settings(max_examples=300)
@@ -171,16 +172,15 @@ def test_bounds_that_hold_the_constants_hold_any_correlation_of_theirs_with_the_
     model = random_model(rng)
     bias, clock = np.exp(rng.uniform(-8.0, -3.0, 2))
     speed = rng.uniform(-1.0, 1.0, 3)
-    given = Considering(
-        ConsiderModel(joint[5, 5], joint[7, 7], bias**2, clock**2), 0.0, 0.0, *speed, direction_of(belief.theta)
-    )
-    view = viewpoint(belief, model)
+    given = Considering(ConsiderModel(joint[5, 5], joint[7, 7], bias**2, clock**2), 0.0, 0.0, *speed)
+    facing = direction_of(belief.theta)
+    view = viewpoint(belief, facing, model)
     wide = widened(view, joint[3, 3], given)
     place = np.array([belief.x, belief.y]) + rng.uniform(-9, 9, 2)
     e = expect(belief.x, belief.y, belief.theta, view.offset_x, view.offset_y, *place, model.mount_theta)
     work = np.zeros((3, 10))
     work[:, 8:10], work[:, 3:6] = joint[:3, 3:5], joint[:3, 5:8]
-    seen = seen_with(direction_of(belief.theta), e, joint[3, 3], given, work, 8)
+    seen = seen_with(facing, e, joint[3, 3], given, work, 8)
     v = innovation_with(belief, e, e.range, 0.0, model, seen)
     assert v.s_rr <= wide.position_sigma**2 + model.range_variance * (1.0 + 1e-9)
     bearing = (wide.position_sigma / e.range + wide.heading_sigma) ** 2 + model.bearing_variance
@@ -191,13 +191,13 @@ def test_radius_that_is_searched_is_no_larger_than_it_must_be_along_a_ray_and_ac
     # A pose known to 30 mm each way and 1 mrad, noise of 40 mm and 3 mrad, a survey of 120 mm: 130 mm along the ray.
     view = Viewpoint(0.0, 0.0, 0.03, 0.001)
     model = ObservationModel(0.0, 0.0, 0.0, 0.04**2, 0.003**2, 0.0)
-    near = search_radius(4.0, 0.2, view, model, 0.12**2)
-    # Two sigma of 130 mm reach behind a scanner 200 mm away: any direction counts. sqrt(0.26^2 + 0.2 * 0.46 * 4).
-    assert near == pytest.approx(math.sqrt(0.0676 + 0.368), rel=1e-6)
-    far = search_radius(4.0, 10.0, view, model, 0.12**2)
+    near = search_radius2(2.0, 0.2, view, model, 0.12**2)
+    # Two sigma of 130 mm reach behind a scanner 200 mm away: any direction counts. 0.26^2 + 0.2 * 0.46 * 4.
+    assert near == pytest.approx(0.0676 + 0.368, rel=1e-6)
+    far = search_radius2(2.0, 10.0, view, model, 0.12**2)
     # The bearing is seen from 10 m less 260 mm: its sigma is that of 30 mm and of 1 mrad added, of 3 mrad, of 120 mm.
     sigma2 = (0.03 / 9.74 + 0.001) ** 2 + 0.003**2 + (0.12 / 9.74) ** 2
-    assert far == pytest.approx(math.sqrt(0.0676 + 10.0 * 10.26 * 4.0 * sigma2), rel=1e-6)
+    assert far == pytest.approx(0.0676 + 10.0 * 10.26 * 4.0 * sigma2, rel=1e-6)
 
 
 UNCERTAIN = PoseGaussian(0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-4)
@@ -215,7 +215,10 @@ def associated(
     status, entries, d2 = np.zeros(count, np.int8), np.empty(count, np.int64), np.empty(count)
     gate = Gate(enabled, 5.991)
     the_map = (index.cells, index.places, index.offsets)
-    associate(belief, 0, count, detections, model, gate, *the_map, *NOTHING_CONSIDERED, status, entries, d2)
+    facing = direction_of(belief.theta)
+    aims = np.array([(math.cos(bearing), math.sin(bearing), 0.0) for _, bearing in detections])
+    scan = (0, count, detections, aims)
+    associate(belief, facing, *scan, model, gate, *the_map, *NOTHING_CONSIDERED, status, entries, d2)
     return status.tolist(), entries.tolist(), d2.tolist()
 
 

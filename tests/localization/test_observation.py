@@ -15,7 +15,6 @@ from commission.localization.estimate import Belief, Status
 from commission.localization.localizer import Localizer
 from commission.localization.observation import (
     ObservationModel,
-    direction_of,
     expect,
     innovation_covariances,
     jacobians,
@@ -24,8 +23,6 @@ from commission.localization.observation import (
     project_detections,
     range_bearing,
     scanner_offset,
-    turn_to,
-    turned_by,
     validation_ellipses,
 )
 from commission.localization.setup import LocalizerSetup
@@ -81,26 +78,6 @@ def test_point_is_observed_where_it_lies_in_the_scanner_frame(pose: np.ndarray, 
     measured = np.array([[polar[0] + MODEL.range_bias, polar[1]]])
     point = project_detections(pose[np.newaxis], np.array([0, 1]), measured, ROWS, scanners=np.zeros(1, np.int64))
     np.testing.assert_allclose(point, place_of(pose, polar), atol=1e-11)
-
-
-TURNS = st.one_of(st.floats(-3.0, 3.0), st.floats(-0.06, 0.06), st.floats(-0.011, 0.011), st.just(0.05))
-
-
-@given(st.floats(-7.0, 7.0), TURNS)
-def test_turn_to_a_direction_is_the_difference_of_the_angles(angle: float, turn: float) -> None:
-    found = turn_to(math.cos(angle), math.sin(angle), direction_of(angle + turn))
-    # The sum of the angles is rounded, their sines and cosines are, and two products of these.
-    assert found == pytest.approx(turn, abs=2e-15)
-
-
-def test_turn_away_from_nowhere_is_finite() -> None:
-    assert math.isfinite(turn_to(0.0, 0.0, direction_of(1.0)))
-
-
-@given(st.floats(-7.0, 7.0), TURNS)
-def test_direction_turned_by_an_angle_is_that_of_the_sum(angle: float, turn: float) -> None:
-    found = turned_by(direction_of(angle), turn)
-    assert found == pytest.approx((math.cos(angle + turn), math.sin(angle + turn)), abs=2e-15)
 
 
 def test_reflector_at_the_scanner_itself_has_a_finite_jacobian() -> None:

@@ -17,14 +17,14 @@ LOCALIZATION = (
     Mutant(
         name="likelihood with half of ln det S",
         file=FOLDER + "association.py",
-        find="d2 + math.log(v.s_rr",
-        replace="d2 + 0.5 * math.log(v.s_rr",
+        find="d2 + math.log(spread)",
+        replace="d2 + 0.5 * math.log(spread)",
         tests=(PLAIN, TIE),
     ),
     Mutant(
         name="likelihood without ln det S, as if all reflectors were surveyed alike",
         file=FOLDER + "association.py",
-        find="d2 + math.log(v.s_rr * v.schur / (model.range_variance * model.bearing_variance))",
+        find="d2 + math.log(spread)",
         replace="d2",
         tests=(PLAIN, TIE),
     ),
@@ -51,7 +51,7 @@ LOCALIZATION = (
     ),
     Mutant(
         name="search around a detection forgets the survey",
-        file=FOLDER + "association.py",
+        file=FOLDER + "search.py",
         find="model.range_variance + largest_variance",
         replace="model.range_variance - largest_variance",
         tests=(TESTS + RADIUS,),
@@ -59,13 +59,13 @@ LOCALIZATION = (
     Mutant(
         name="search goes on only where it need not",
         file=FOLDER + "association.py",
-        find="if best != NOBODY:",
-        replace="if best == NOBODY:",
+        find="if best != NOBODY:\n            # ln",
+        replace="if best == NOBODY:\n            # ln",
         tests=(TESTS + "test_association.py::test_nearby_search_equals_a_plain_search_over_all_reflectors",),
     ),
     Mutant(
         name="lever of the scanner turned the wrong way",
-        file=FOLDER + "association.py",
+        file=FOLDER + "search.py",
         find="belief.xx - 2.0 * offset_y * belief.xt",
         replace="belief.xx + 2.0 * offset_y * belief.xt",
         tests=(TESTS + VIEWPOINT,),
@@ -134,10 +134,10 @@ LOCALIZATION = (
         tests=(TESTS + "test_observation.py::test_kernel_agrees_with_the_array_functions", PLAIN),
     ),
     Mutant(
-        name="bearing of an innovation not wrapped",
+        name="bearing of an innovation turned the other way",
         file=FOLDER + "kalman.py",
-        find="wrap_scalar(measured_bearing - e.bearing)",
-        replace="measured_bearing - e.bearing",
+        find="turn = turn_to(",
+        replace="turn = -turn_to(",
         tests=(PLAIN,),
     ),
     Mutant(
@@ -150,8 +150,8 @@ LOCALIZATION = (
     Mutant(
         name="every correction starts from the prediction, as Algorithm 1 is printed",
         file=FOLDER + "cycle.py",
-        find="belief = correct(belief, distance",
-        replace="belief = correct(prior, distance",
+        find="belief, facing = correct_aimed(belief, facing",
+        replace="belief, facing = correct_aimed(prior, facing",
         tests=(PLAIN,),
     ),
     Mutant(

@@ -88,8 +88,8 @@ PLANNING = (
     Mutant(
         name="gate of the neighbor instead of the reflector's own",
         file=FOLDER + "prediction_kernels.py",
-        find="other.range, other.bearing, places[reflector, 2]",
-        replace="other.range, other.bearing, places[neighbor, 2]",
+        find="other.range, turn, places[reflector, 2]",
+        replace="other.range, turn, places[neighbor, 2]",
         tests=(
             TESTS
             + "test_association_risk.py::test_probability_is_that_of_half_the_distance_in_the_reflectors_own_gate",
