@@ -19,7 +19,6 @@ RETIRED = {
 FITTING = {
     "route_edges": "VDMA LIF and VDA 5050 call them edges",
     "_from_edges()": "the edges of a cluster of beams",
-    "_plate_edges()": "the edges of a plate",
     "_covering_all()": "columns of a covering problem",
     "record_store": "a store of records, in memory or in a file: what it is",
     "mapping()": "what YAML and JSON call a value with keys",

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from commission.geometry.arrays import BoolArray, FloatArray
 from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
 from commission.geometry.se2 import compose
+from commission.simulation.bright_kernels import meet_everything, meet_in_sweep, no_echoes, shine
+from commission.simulation.echo_intensity import SHINY, TAPE, at_distance, light_of
 from commission.simulation.scan_kernels import FLAT_COSINE, Hall, Moment, ScannerBeams, cast_scan, cast_sweep
 from commission.site.detection_rates import detection_rate
 from commission.site.disturbances import Disturbances
@@ -42,6 +45,8 @@ class VirtualScanner:
     """Walls, reflectors, then shiny objects."""
     beams: ScannerBeams
     """The scanner's numbers."""
+    everything: BoolArray
+    """(N,) all of the reflective objects."""
 
     @staticmethod
     def of(project: Project, scanner: Scanner) -> VirtualScanner:
@@ -53,7 +58,7 @@ class VirtualScanner:
         shiny = np.zeros(len(project.disturbances.shiny_objects))
         wall_depths = np.maximum(np.concatenate([glued, shiny]), wall_depth)
         hall = _hall(RayCaster(grid), project.reflectors, project.disturbances, wall_depths)
-        return VirtualScanner(scanner, project.disturbances, hall, _beams(scanner))
+        return VirtualScanner(scanner, project.disturbances, hall, _beams(scanner), np.ones(len(hall.radii), np.bool_))
 
     def scan(
         self,
@@ -101,11 +106,62 @@ class VirtualScanner:
         if self.scanner.upside_down:
             ranges, flags = ranges[::-1].copy(), flags[::-1].copy()
         self._glint(ranges, flags, rng)
+        self._blind(ranges, flags)
+        return ranges, flags
+
+    def bright_scan(
+        self,
+        T_map_base: FloatArray,
+        circles: FloatArray,
+        rng: np.random.Generator,
+        *,
+        beam_poses: FloatArray | None = None,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """One scan with intensities by `disturbances.intensity`, whether or not that is enabled.
+
+        Parameters
+        ----------
+        T_map_base, circles, beam_poses : as in `scan`.
+        rng : draws the noise of each beam, that of its intensity, then the glints, which are as strong as tape.
+
+        Returns
+        -------
+        ranges : (B,) float32 [m], NaN where nothing came back.
+        intensities : (B,) float32 [sensor's unit], 0 where nothing came back.
+        """
+        count, light = self.scanner.beam_count, light_of(self.disturbances.intensity)
+        ranges, intensities = np.empty(count, np.float32), np.empty(count, np.float32)
+        noise, flicker = rng.standard_normal((count, 2)), rng.standard_normal(count)
+        T_map_scanner = compose(T_map_base, self.scanner.mounting)
+        if self.scanner.upside_down:
+            noise = np.ascontiguousarray(noise[::-1] * (-1.0, 1.0))
+        moment = Moment(T_map_scanner, self.range_limit(T_map_base), circles, noise, True, self.everything)
+        kinds = np.full(len(self.everything), TAPE, np.int64)
+        kinds[len(kinds) - len(self.disturbances.shiny_objects) :] = SHINY
+        echoes, far = no_echoes(count), self.beams._replace(reflector_range=math.inf)
+        if beam_poses is None:
+            meet_everything(self.hall, far, moment, kinds, echoes)
+        else:
+            poses = compose(beam_poses, self.scanner.mounting)
+            poses = np.ascontiguousarray(poses[::-1]) if self.scanner.upside_down else poses
+            meet_in_sweep(self.hall, far, moment._replace(pose=poses), kinds, echoes)
+        shine(echoes, far, moment._replace(pose=T_map_scanner), light, flicker, ranges, intensities)
+        if self.scanner.upside_down:
+            ranges, intensities = ranges[::-1].copy(), intensities[::-1].copy()
+        glinting = np.zeros(count, np.bool_)
+        self._glint(ranges, glinting, rng)
+        for i in np.flatnonzero(glinting):
+            intensities[i] = min(light.tape * at_distance(float(ranges[i]), light), light.largest)
+        self._blind(ranges, intensities)
+        return ranges, intensities
+
+    def _blind(self, ranges: NDArray[np.float32], told: NDArray[Any]) -> None:
+        """Take away what comes from blind sectors: ranges, and flags or intensities."""
         blind = self.scanner.reported_blind_sectors
         if len(blind):
-            hidden = within(self.scanner.angle_min + self.scanner.angle_increment * np.arange(count), blind)
-            ranges[hidden], flags[hidden] = np.nan, False
-        return ranges, flags
+            bearings = self.scanner.angle_min + self.scanner.angle_increment * np.arange(len(ranges))
+            hidden = within(bearings, blind)
+            ranges[hidden], told[hidden] = np.nan, 0
 
     def range_limit(self, T_map_base: FloatArray) -> float:
         """Range at which the beams meet the floor at this place [m]; infinity on even floor."""
@@ -118,11 +174,11 @@ class VirtualScanner:
 
         What was taken for a reflector is taken for one in every scan: the rates are those of reflectors.
         """
-        shining = np.ones(len(self.hall.radii), np.bool_)
-        if self.scanner.detection_rates:
-            count = len(shining) - len(self.disturbances.shiny_objects)
-            distances = np.hypot(*(self.hall.centers[:count] - T_map_scanner[:2]).T)
-            shining[:count] = rng.random(count) < detection_rate(self.scanner.detection_rates, distances)
+        if not self.scanner.detection_rates:
+            return self.everything
+        shining, count = self.everything.copy(), len(self.everything) - len(self.disturbances.shiny_objects)
+        distances = np.hypot(*(self.hall.centers[:count] - T_map_scanner[:2]).T)
+        shining[:count] = rng.random(count) < detection_rate(self.scanner.detection_rates, distances)
         return shining
 
     def _glint(self, ranges: NDArray[np.float32], flags: BoolArray, rng: np.random.Generator) -> None:

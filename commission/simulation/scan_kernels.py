@@ -159,19 +159,35 @@ def cast_sweep(hall: Hall, beams: ScannerBeams, moment: Moment, ranges: NDArray[
     range[i] = cast from poses[i]: each beam is a scan of one beam from its own pose, by definition.
     """
     for i in range(len(ranges)):
-        beam = ScannerBeams(
-            beams.angle_min + i * beams.increment,
-            beams.increment,
-            beams.half_divergence,
-            beams.half_aperture,
-            beams.bearing_sigma,
-            beams.range_sigma,
-            beams.nearest,
-            beams.farthest,
-            beams.reflector_range,
-        )
+        beam = one_beam(beams, i)
         here = Moment(moment.pose[i], moment.range_limit, moment.circles, moment.noise[i : i + 1], True, moment.shining)
         cast_scan(hall, beam, here, ranges[i : i + 1], flags[i : i + 1])
+
+
+@compiled
+def one_beam(beams: ScannerBeams, index: int) -> ScannerBeams:
+    """Return a scanner that has one beam of another alone.
+
+    Parameters
+    ----------
+    beams : the other scanner.
+    index : of the beam.
+
+    Notes
+    -----
+    first bearing = angle_min + i increment, by definition.
+    """
+    return ScannerBeams(
+        beams.angle_min + index * beams.increment,
+        beams.increment,
+        beams.half_divergence,
+        beams.half_aperture,
+        beams.bearing_sigma,
+        beams.range_sigma,
+        beams.nearest,
+        beams.farthest,
+        beams.reflector_range,
+    )
 
 
 @compiled
@@ -182,12 +198,28 @@ def _first_beam(beams: ScannerBeams, bearing: float, count: int) -> tuple[int, i
 
 
 @compiled
-def _interval(
+def object_interval(
     hall: Hall, beams: ScannerBeams, moment: Moment, index: int, count: int
 ) -> tuple[int, int, int, float, float, float]:
-    """Beams that can meet a reflective object: first, last and number per turn; its range, bearing and half its size.
+    """Beams that can meet a reflective object.
 
-    First and last are unclipped; the last is before the first where no beam can.
+    Parameters
+    ----------
+    hall, beams, moment : as in `cast_scan`.
+    index : of the object.
+    count : beams of the scan.
+
+    Returns
+    -------
+    first, last : of the beams, not clipped to the scan; the last is before the first where no beam can.
+    turn : beams of a full turn.
+    distance : of its center [m].
+    bearing : of its center [rad], scanner frame.
+    high : half of the angle that it takes up [rad].
+
+    Notes
+    -----
+    asin(R / d) + w + 5 sigma about its bearing: what a beam of half width w can reach, derived.
     """
     dx, dy = hall.centers[index, 0] - moment.pose[0], hall.centers[index, 1] - moment.pose[1]
     distance, radius = math.hypot(dx, dy), hall.radii[index]
@@ -204,7 +236,7 @@ def _interval(
 @compiled
 def _want(hall: Hall, beams: ScannerBeams, moment: Moment, index: int, wanted: BoolArray) -> None:
     """Mark the beams that can meet a reflective object, and their neighbors."""
-    first, last, turn, _, _, _ = _interval(hall, beams, moment, index, len(wanted))
+    first, last, turn, _, _, _ = object_interval(hall, beams, moment, index, len(wanted))
     if last < first:
         return
     for k in range(first - NEIGHBORS, last + NEIGHBORS + 1):
@@ -213,18 +245,43 @@ def _want(hall: Hall, beams: ScannerBeams, moment: Moment, index: int, wanted: B
 
 
 @compiled
-def _meet_circle(beams: ScannerBeams, moment: Moment, index: int, echoes: Echoes) -> None:
-    """Shorten every beam whose middle meets a dull circle."""
+def circle_interval(
+    beams: ScannerBeams, moment: Moment, index: int, count: int
+) -> tuple[int, int, int, float, float, float]:
+    """Beams whose middle can meet a dull circle.
+
+    Parameters
+    ----------
+    beams, moment : as in `cast_scan`.
+    index : of the circle.
+    count : beams of the scan.
+
+    Returns
+    -------
+    first, last, turn, distance, bearing, high : as in `object_interval`.
+
+    Notes
+    -----
+    asin(R / d) + 5 sigma about its bearing, derived.
+    """
     radius = moment.circles[index, 2]
     dx, dy = moment.circles[index, 0] - moment.pose[0], moment.circles[index, 1] - moment.pose[1]
     distance = math.hypot(dx, dy)
     if distance <= radius or distance - radius > beams.farthest:
-        return
+        return 0, -1, 1, distance, 0.0, 0.0
     bearing = wrap_scalar(math.atan2(dy, dx) - moment.pose[2])
     half = math.asin(radius / distance)
-    middle, turn = _first_beam(beams, bearing, len(echoes.flags))
+    middle, turn = _first_beam(beams, bearing, count)
     reach = int((half + BEARING_MARGIN * beams.bearing_sigma) / beams.increment) + 1
-    for k in range(middle - reach, middle + reach + 1):
+    return middle - reach, middle + reach, turn, distance, bearing, half
+
+
+@compiled
+def _meet_circle(beams: ScannerBeams, moment: Moment, index: int, echoes: Echoes) -> None:
+    """Shorten every beam whose middle meets a dull circle."""
+    radius = moment.circles[index, 2]
+    first, last, turn, distance, bearing, half = circle_interval(beams, moment, index, len(echoes.flags))
+    for k in range(first, last + 1):
         i = k % turn
         if i >= len(echoes.flags):
             continue
@@ -240,16 +297,14 @@ def _meet_reflective(hall: Hall, beams: ScannerBeams, moment: Moment, index: int
     Retroreflecting tape outshines what the rest of the beam meets, so the echo is that of the lit part of the object:
     its middle gives the range.
     """
-    first, last, turn, distance, bearing, high = _interval(hall, beams, moment, index, len(echoes.flags))
+    first, last, turn, distance, bearing, high = object_interval(hall, beams, moment, index, len(echoes.flags))
     low, facing = -high, 0.0
     half_width = half_width_at(distance, beams.half_divergence, beams.half_aperture)
     if last >= first and hall.flat[index]:
-        facing = wrap_scalar(hall.headings[index] - bearing - moment.pose[2])
-        if math.isnan(facing):
-            facing = math.pi
+        facing = plate_facing(hall, moment, index, bearing)
         if -math.cos(facing) < FLAT_COSINE:
             return
-        low, high = _plate_edges(distance, hall.radii[index], facing)
+        low, high = plate_ends(distance, hall.radii[index], facing)
     for k in range(first, last + 1):
         i = k % turn
         if i >= len(echoes.flags):
@@ -268,8 +323,37 @@ def _meet_reflective(hall: Hall, beams: ScannerBeams, moment: Moment, index: int
 
 
 @compiled
-def _plate_edges(distance: float, half_width: float, facing: float) -> tuple[float, float]:
-    """Bearings of a plate's two ends, relative to that of its center [rad], lower first."""
+def plate_facing(hall: Hall, moment: Moment, index: int, bearing: float) -> float:
+    """Direction that a plate faces, from the line of sight [rad]; one of unknown direction faces the scanner.
+
+    Parameters
+    ----------
+    hall, moment : as in `cast_scan`.
+    index : of the plate.
+    bearing : of its center [rad], scanner frame.
+
+    Notes
+    -----
+    facing = heading - bearing - theta of the scanner, by definition.
+    """
+    facing = wrap_scalar(hall.headings[index] - bearing - moment.pose[2])
+    return math.pi if math.isnan(facing) else facing
+
+
+@compiled
+def plate_ends(distance: float, half_width: float, facing: float) -> tuple[float, float]:
+    """Bearings of a plate's two ends, relative to that of its center [rad], lower first.
+
+    Parameters
+    ----------
+    distance : of its center [m].
+    half_width : half of its width [m].
+    facing : direction that it faces, from the line of sight [rad].
+
+    Notes
+    -----
+    atan2(+-w cos(f), d -+ w sin(f)): the two ends, by definition.
+    """
     # The plate stands at a right angle to `facing`, which is measured from the line of sight.
     along, across = -half_width * math.sin(facing), half_width * math.cos(facing)
     one = math.atan2(across, distance + along)

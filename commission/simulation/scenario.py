@@ -182,15 +182,21 @@ def _scans(
             crowd.step(1e-9 * (stamp - before), pose)
         before = stamp
         legs = nobody if crowd is None else crowd.legs()
-        ranges, flags = virtual[index].scan(pose, legs, beams[index], whole=whole, beam_poses=beam_poses)
+        intensities, flags = None, None
+        if disturbances.intensity.enabled:
+            ranges, intensities = virtual[index].bright_scan(pose, legs, beams[index], beam_poses=beam_poses)
+        else:
+            ranges, flags = virtual[index].scan(pose, legs, beams[index], whole=whole, beam_poses=beam_poses)
         if any(0.0 <= 1e-9 * stamp - period.start < period.duration for period in disturbances.covered):
-            flags[:] = False
+            for told in (intensities, flags):
+                if told is not None:
+                    told[:] = 0
         record = Scan(
             stamp_ns=stamp,
             ranges=ranges,
             angle_min=scanners[index].angle_min,
             angle_increment=scanners[index].angle_increment,
-            intensities=None,
+            intensities=intensities,
             reflector=flags,
             scanner=index,
         )

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields
 from typing import Annotated
 
 from commission.site.checks import check_fields
+from commission.site.intensity import IntensityModel
 from commission.site.odometry_growth import (
     FORWARD_PER_SQRT_M,
     FORWARD_PER_SQRT_S,
@@ -212,6 +213,8 @@ class Disturbances:
     """True noise of the wheels."""
     constants: Annotated[ConstantErrors, Group("Constant errors")] = field(default_factory=ConstantErrors)
     """What is wrong in the same way over a whole drive."""
+    intensity: Annotated[IntensityModel, Group("Intensities")] = field(default_factory=IntensityModel)
+    """How strong echoes are."""
 
     def undisturbed(self) -> Disturbances:
         """Return the noise of the wheels alone: a hall without people, faults and constant errors."""

@@ -27,6 +27,12 @@ def main() -> None:
         virtual.scan(pose, nobody, rng)
     seconds = time.perf_counter() - start
     print(f"scan of {SCANNER.beam_count} beams: {seconds / len(poses) * 1e6:.0f} us")
+    virtual.bright_scan(poses[0], nobody, rng)
+    start = time.perf_counter()
+    for pose in poses:
+        virtual.bright_scan(pose, nobody, rng)
+    seconds = time.perf_counter() - start
+    print(f"the same with intensities: {seconds / len(poses) * 1e6:.0f} us")
     for people in (0, 50):
         crowded = replace(project, disturbances=Disturbances(people=people))
         start = time.perf_counter()

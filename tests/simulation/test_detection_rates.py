@@ -45,7 +45,7 @@ def shares(site: Project, *more: tuple[float, float]) -> tuple[np.ndarray, np.nd
     return seen.mean(axis=0), seen
 
 
-def test_reflectors_are_seen_as_often_as_the_table_says_and_independently_of_each_other():
+def test_reflectors_are_seen_as_often_as_the_table_says_each_by_its_own_chance():
     found, seen = shares(project(TABLE))
     # By hand: at 3.6 m as at 5; at 9.849 m 0.8 - 0.6 * 0.4849; at 16.3 m as at 15.
     expected = np.array([0.8, 0.5091, 0.2])

@@ -19,6 +19,7 @@ from commission.app.run.world_panel import WorldPanel
 from commission.errors import UsageError
 from commission.progress import silent
 from commission.site.disturbances import ConstantErrors, Disturbances, WheelNoise
+from commission.site.intensity import IntensityModel
 from commission.site.project import Project
 from tests.app.asking import after, joined, taking
 
@@ -34,6 +35,20 @@ FIELDS = {
     "wheels.heading_per_sqrt_rad": ("Heading, turning [°/√rad]", DEGREES),
     "wheels.forward_per_sqrt_s": ("Along, in time [mm/√s]", 1000.0),
     "wheels.heading_per_sqrt_s": ("Heading, in time [°/√s]", DEGREES),
+    "intensity.reference_distance": ("Intensities at [m]", 1.0),
+    "intensity.range_exponent": ("Falls by power", 1.0),
+    "intensity.near_distance": ("Near field to [m]", 1.0),
+    "intensity.reflector": ("Of reflectors", 1.0),
+    "intensity.reflector_exponent": ("Tape falls by power", 1.0),
+    "intensity.wall": ("Of walls", 1.0),
+    "intensity.people": ("Of people", 1.0),
+    "intensity.shiny": ("Of shiny objects", 1.0),
+    "intensity.shiny_lobe": ("Mirror's 1σ [°]", DEGREES),
+    "intensity.noise": ("Intensity 1σ [%]", 100.0),
+    "intensity.echo_length": ("Echoes mix over [m]", 1.0),
+    "intensity.crosstalk": ("Overflow [%]", 100.0),
+    "intensity.crosstalk_width": ("Overflows by [°]", DEGREES),
+    "intensity.largest": ("Saturates at", 1.0),
     "constants.survey_factor": ("Survey", 1.0),
     "constants.survey_sigma": ("Survey 1σ [mm]", 1000.0),
     "constants.mounting_sigma[0]": ("Mounting x 1σ [mm]", 1000.0),
@@ -48,19 +63,24 @@ FIELDS = {
 """Label and factor of the unit of each number's widget."""
 IN_FILE = {"shiny_objects", "tilted_stretches", "covered", "constants.scanners"}
 """Lists, which the page does not edit."""
+GROUPS = {"wheels", "constants", "intensity"}
+"""Values in folders of their own."""
+SWITCHES = {"intensity.enabled"}
+"""What is on or off."""
 
 
 def test_every_number_of_the_virtual_world_has_one_widget_that_sets_it_in_its_unit(project: Project) -> None:
-    names = {field.name for field in dataclasses.fields(Disturbances)} - {"people", "wheels", "constants"} - IN_FILE
+    names = {field.name for field in dataclasses.fields(Disturbances)} - GROUPS - IN_FILE - {"people"}
     names |= {f"wheels.{field.name}" for field in dataclasses.fields(WheelNoise)}
     names |= {f"constants.{field.name}" for field in dataclasses.fields(ConstantErrors)} - IN_FILE
+    names |= {f"intensity.{field.name}" for field in dataclasses.fields(IntensityModel)} - SWITCHES
     assert {name.partition("[")[0] for name in FIELDS} == names
     state, posted, server = joined(AppState(project=project, saved=project)), [], start_server("127.0.0.1", 0)
     try:
         panel = WorldPanel(server.gui, taking(posted), state)
         widgets = [each for each in server.gui._gui_input_handle_from_uuid.values() if getattr(each, "label", "")]
         widgets = [each for each in widgets if "(disturbances." in (getattr(each, "hint", None) or "")]
-        assert len(widgets) == len(FIELDS)
+        assert len(widgets) == len(FIELDS) + len(SWITCHES)
         for name, (label, factor) in FIELDS.items():
             (widget,) = [each for each in widgets if f"(disturbances.{name})" in each.hint]
             assert widget.label == label
@@ -82,7 +102,11 @@ def test_every_number_of_the_virtual_world_has_one_widget_that_sets_it_in_its_un
 
 def test_an_edit_of_the_virtual_world_is_one_step_that_is_undone_and_tunes_nothing(project: Project) -> None:
     state = joined(AppState(project=project, saved=project))
-    for name, value in (("wheels.lateral_per_sqrt_m", 0.05), ("constants.mounting_sigma[2]", 0.01)):
+    for name, value in (
+        ("wheels.lateral_per_sqrt_m", 0.05),
+        ("constants.mounting_sigma[2]", 0.01),
+        ("intensity.enabled", True),
+    ):
         changed = after(state, SetDisturbance(name, value)).state
         assert changed.project.disturbances != project.disturbances
         assert changed.project.parameters is project.parameters

@@ -6,6 +6,39 @@ FOLDER, TESTS = "commission/simulation/", "tests/simulation/"
 
 SIMULATION = (
     Mutant(
+        name="reflectors seen as seldom as the rates say of the others",
+        file=FOLDER + "scan.py",
+        find="rng.random(count) < detection_rate",
+        replace="rng.random(count) > detection_rate",
+        tests=(
+            TESTS
+            + "test_detection_rates.py::test_reflectors_are_seen_as_often_as_the_table_says_each_by_its_own_chance",
+        ),
+    ),
+    Mutant(
+        name="tape as dull as a wall at a slant",
+        file=FOLDER + "echo_intensity.py",
+        find="light.tape * cosine**light.tape_exponent",
+        replace="light.tape * cosine",
+        tests=(TESTS + "test_intensities.py::test_tape_fades_with_the_power_of_the_cosine_of_the_incidence",),
+    ),
+    Mutant(
+        name="mixed beam in the middle whatever the light",
+        file=FOLDER + "echo_intensity.py",
+        find="moment += strengths[k] * distances[k]",
+        replace="moment += strengths[strongest] * distances[k]",
+        tests=(TESTS + "test_intensities.py::test_a_mixed_beam_lies_between_what_it_meets_by_the_light_of_each",),
+    ),
+    Mutant(
+        name="overflow that does not fade with the angle",
+        file=FOLDER + "bright_kernels.py",
+        find="own * math.exp(-apart / light.crosstalk_width)",
+        replace="own * math.exp(-0.1 * apart / light.crosstalk_width)",
+        tests=(
+            TESTS + "test_intensities.py::test_beams_beside_a_strong_reflector_return_its_overflow_from_its_distance",
+        ),
+    ),
+    Mutant(
         name="reflector behind the floor's edge still shines",
         file=FOLDER + "scan_kernels.py",
         find="distance, flags[i] = moment.range_limit, False",
