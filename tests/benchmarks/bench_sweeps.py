@@ -23,7 +23,8 @@ def main() -> None:
     project = load_project(WAREHOUSE)
     for duration, rate in RATES.items():
         for name, fields in fields_of(duration).items() if 1e3 * duration in chosen else ():
-            found = swept(project, fields, range(DRIVES[duration]))
+            # Without a sweep there is nothing to neglect.
+            found = swept(project, fields, range(DRIVES[duration]), neglect="sweep_duration" in fields)
             sweep = f"{rate:g} scans/s, {1e3 * fields.get('sweep_duration', 0.0):g} ms"
             errors = f"{1e3 * found.corrected:.2f} mm | {1e3 * found.neglected:.1f} mm"
             print(f"| {sweep} | {name} | {errors} |", flush=True)

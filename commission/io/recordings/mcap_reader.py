@@ -52,7 +52,7 @@ class Message:
     """Its bytes."""
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, kw_only=True)
 class McapFile:
     """An MCAP file that is read from its begin."""
 

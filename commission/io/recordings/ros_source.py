@@ -101,7 +101,7 @@ class McapSource:
         self._stores: dict[tuple[str, str, str], Typestore] = {}
         found: dict[str, tuple[str, int | None]] = {}
         for file in files:
-            mcap = McapFile(file)
+            mcap = McapFile(path=file)
             counts: dict[str, int] = {}
             if mcap.read_summary():
                 for number, channel in mcap.channels.items():
@@ -124,7 +124,7 @@ class McapSource:
         """Deliver the messages of some topics as they were written; raises FileFormatError."""
         self._notes = []
         for file in self.files:
-            mcap = McapFile(file)
+            mcap = McapFile(path=file)
             with _told(file):
                 for message in mcap.messages():
                     if message.channel.topic in topics:
@@ -134,18 +134,18 @@ class McapSource:
                 self._notes.append(f"{file.name} was cut while it was recorded; it is read up to there")
 
     def _decoded(self, channel: McapChannel, data: bytes) -> Any:
-        store = self._store(channel)
+        store = self._typestore(channel)
         kind = ros2_type(channel.schema)
         return store.deserialize_ros1(data, kind) if channel.encoding == "ros1" else store.deserialize_cdr(data, kind)
 
-    def _store(self, channel: McapChannel) -> Typestore:
+    def _typestore(self, channel: McapChannel) -> Typestore:
         key = channel.schema, channel.schema_encoding, channel.definition
         if key not in self._stores:
-            self._stores[key] = _store_of(channel)
+            self._stores[key] = _typestore_of(channel)
         return self._stores[key]
 
 
-def _store_of(channel: McapChannel) -> Typestore:
+def _typestore_of(channel: McapChannel) -> Typestore:
     """Types that the messages of a channel are made of."""
     from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
