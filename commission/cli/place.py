@@ -23,6 +23,12 @@ STATIONS = "stations"
 STARTS = "starts"
 SPOT_FORM = f"{STATIONS}, {STARTS}, X,Y or X,Y,HEADING (metres, degrees)"
 HEIGHTS_FORM = "LOW,HIGH or LOW,HIGH,X1,Y1,X2,Y2 (metres)"
+NOT_MET = {
+    "visible": "too few visible",
+    "uncertainty": "uncertainty over its limit",
+    "pairs": "two pairs in sight with nearly the same distance",
+    "spread": "places along the walls far from any reflector",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +48,9 @@ class Place:
     """Route that counts. None: those that count in the project."""
     extend: bool = True
     """Whether the project's reflectors stay; with --no-extend the layout starts empty, with the locked ones alone."""
+    preset: Annotated[str | None, arg(metavar="NAME")] = None
+    """What the maker of a scanner asks of every layout, in place of what the project says. NAV350: at least 3 visible
+    after any single one has failed. None: what the project asks for."""
     visible: int | None = None
     """Reflectors that must be visible everywhere on the routes. None: as in the project (2 unless changed)."""
     survive_failure: bool = True
@@ -56,6 +65,12 @@ class Place:
     enough, as a share: 0.1 is 10 %; 0 takes nearly all of them. None: as in the project (0.1 unless changed)."""
     min_spacing: float | None = None
     """Smallest distance between two reflectors [m]. None: as in the project (0.5 unless changed)."""
+    pairs_differ: float | None = None
+    """By how much the distances of any two pairs of reflectors in sight at once must differ [m], so that a start search
+    tells them apart: 0.3 is usual, 0: they need not. None: as in the project (0 unless changed)."""
+    wall_reach: float | None = None
+    """How far any place along the walls that is seen from a route may be from the nearest reflector [m], so that they
+    spread along the walls; 0: any distance. None: as in the project (0 unless changed)."""
     unambiguous: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="stations|starts|X,Y|X,Y,HEADING")] = ()
     """Where a vehicle that is switched on must see which place it is: at the stations, at the starts of the routes, or
     at a spot [m, m, deg]; a spot without a heading counts with all. Beside those of the project."""
@@ -122,7 +137,8 @@ class Place:
         )
 
     def _demands(self, given: Demands) -> Demands:
-        """Those of the project, with what the command line says."""
+        """Those of the project, with what the command line says; raises ValueError for an unknown preset."""
+        given = given if self.preset is None else given.preset(self.preset.upper())
         spots = [text for text in self.unambiguous if text not in {STATIONS, STARTS}]
         return dataclasses.replace(
             given,
@@ -136,6 +152,8 @@ class Place:
                 heading_limit=None if self.heading_limit is None else math.radians(self.heading_limit),
                 leeway=self.leeway,
                 spacing=self.min_spacing,
+                pairs_differ=self.pairs_differ,
+                wall_reach=self.wall_reach,
             ),
         )
 
@@ -210,7 +228,7 @@ def _told(unmet: Unmet) -> str:
     if unmet.reason == "ambiguous":
         nearest = f" (nearest: metre {unmet.metres[0]} of route {unmet.route!r})" if unmet.metres else ""
         return f"{unmet.place}: another pose sees the same, or fewer than two reflectors are visible{nearest}"
-    what = "too few visible" if unmet.reason == "visible" else "uncertainty over its limit"
+    what = NOT_MET[unmet.reason]
     stretches = ", ".join(f"{first} to {last}" for first, last in unmet.stretches())
     where = f"route {unmet.route!r}: {what} on {len(unmet.metres)} m ({stretches} m)"
     return where if unmet.beyond is None else f"{where}: {unmet.beyond.told()}"

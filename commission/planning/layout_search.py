@@ -22,10 +22,12 @@ from commission.planning.ambiguity import AmbiguityOptions
 from commission.planning.cover import CoverProblem, cover, lower_bound, merged
 from commission.planning.fulfilling import Needs, exchanged, grown, pruned, with_one, without_one
 from commission.planning.layout_limits import Excess, LayoutLimits
+from commission.planning.pair_distances import PairDistances
 from commission.planning.route_prediction import PlannedRoute, PredictionOptions
 from commission.planning.telling_apart import ChosenPlace, Distinction, chosen_places, nearest_on_routes
 from commission.planning.unmet import Unmet
 from commission.planning.vehicle_visibility import VehicleVisibility
+from commission.planning.wall_spread import WallSpread
 from commission.progress import Progress
 from commission.site.checks import at_least
 from commission.site.layout_brief import CandidateOptions, Demands
@@ -45,6 +47,8 @@ RESTARTS = 4
 """How often the search begins elsewhere before a smaller layout counts as not to be found."""
 MOST_PAIRS = 300
 """Pairs of reflectors that are taken out to tell places apart, at most."""
+MOST_ALIKE = 8
+"""Reflectors of a layout that another place is looked for at a time, those with the most alike pairs first."""
 UNTIL_ONE_HOLDS = 0.4
 """Share of the progress until there is a layout that holds."""
 
@@ -105,8 +109,11 @@ class LayoutSearch:
         self._distinction = Distinction(visible, self._places, demands.survive_failure, options.ambiguity)
         self._apart: dict[bytes, BoolArray] = {}
         self._limits = LayoutLimits(planned, site, demands, lambda: self._report(None, "predicting"))
+        centers = visible.reflectors.centers
+        self._pairs = PairDistances(planned, self._covers, centers, demands.pairs_differ)
+        self._spread = WallSpread(planned, self._covers, centers, demands.wall_reach)
         self._cover = self._cover_problem(
-            np.arange(len(visible.reflectors)) < kept, _conflicts(visible.reflectors.centers, demands.spacing)
+            np.arange(len(visible.reflectors)) < kept, _conflicts(centers, demands.spacing)
         )
         self._system = Needs(self._cover)
         self._rivals_left: IntArray = np.zeros(len(self._places), np.int64)
@@ -120,6 +127,7 @@ class LayoutSearch:
         try:
             for smaller in self._ever_fewer(best, rng):
                 best = smaller
+            best = self._pairs_told_apart(best)
         except (JobCancelled, KeyboardInterrupt):
             self.was_stopped = True
         return best
@@ -144,7 +152,7 @@ class LayoutSearch:
         for place, rivals in zip(self._places, self._distinction.rivals(taken).tolist(), strict=True):
             if rivals:
                 found.append(self._ambiguous_at(place))
-        return tuple(found)
+        return (*found, *self._pairs.unmet(taken), *self._spread.unmet(taken))
 
     def _ambiguous_at(self, place: ChosenPlace) -> Unmet:
         route, metres = nearest_on_routes(place.poses[0, :2], self._planned)
@@ -153,8 +161,9 @@ class LayoutSearch:
     def _cover_problem(self, fixed: BoolArray, conflicts: tuple[IntArray, ...]) -> CoverProblem:
         """What must be visible whatever the predictions come to: covering of the routes' scans, and of the places."""
         places = self._distinction
-        covers = [*self._covers, places.sees]
-        counts = [np.full(len(each), self._base) for each in self._covers] + [np.full(len(places.sees), places.need)]
+        covers = [*self._covers, places.sees, self._spread.rows]
+        counts = [np.full(len(each), self._base) for each in self._covers]
+        counts += [np.full(len(places.sees), places.need), np.ones(len(self._spread.rows), np.int64)]
         rows, greatest = merged(np.concatenate(covers), np.concatenate(counts))
         return CoverProblem(rows.astype(np.float32), greatest, fixed, conflicts)
 
@@ -281,6 +290,51 @@ class LayoutSearch:
                 break
             taken = best
         return taken
+
+    def _pairs_told_apart(self, taken: BoolArray) -> BoolArray:
+        """Exchange reflectors one for one so that fewer pairs are alike, and all that held holds still."""
+        best, fewest = taken, len(self._pairs.alike(taken).distances)
+        left, judged, seen = fewest, 0, {taken.tobytes()}
+        while fewest and judged < self._options.checks:
+            found = None
+            for count, tried in self._less_alike(taken, left):
+                if tried.tobytes() in seen or judged >= self._options.checks:
+                    continue
+                self._report(None, "telling pairs apart")
+                seen.add(tried.tobytes())
+                judged += 1
+                if self._holds(tried, 1):
+                    found = count, tried
+                    break
+            if found is None:
+                break
+            left, taken = found
+            if left < fewest:
+                best, fewest = taken, left
+        return best
+
+    def _less_alike(self, taken: BoolArray, left: int) -> list[tuple[int, BoolArray]]:
+        """Layouts with one reflector elsewhere and no more alike pairs, that fulfil all rows; the best first."""
+        inside, four = np.flatnonzero(taken), self._pairs.alike(taken).reflectors
+        loads = np.bincount(four.reshape(-1), minlength=len(inside))
+        found: list[tuple[int, BoolArray]] = []
+        for out in inside[np.argsort(-loads, kind="stable")[:MOST_ALIKE]].tolist():
+            if self._cover.fixed[out]:
+                continue
+            without = taken.copy()
+            without[out] = False
+            lacking = self._system.lacking(without)
+            rows = np.flatnonzero(lacking > 0.0)
+            enough = np.all(self._system.gains[:, rows] >= lacking[rows], axis=1) & self._cover.allowed(without)
+            enough[out] = False
+            for into in np.flatnonzero(enough).tolist():
+                self._step()
+                tried = without.copy()
+                tried[into] = True
+                count = len(self._pairs.alike(tried).distances)
+                if count <= left:
+                    found.append((count, tried))
+        return sorted(found, key=lambda each: each[0])
 
     def _neighbors(self, taken: BoolArray) -> Iterator[BoolArray]:
         """Layouts with a reflector more that tells a place from a rival, and layouts with one or two less."""

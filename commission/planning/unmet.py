@@ -85,7 +85,7 @@ class Unmet:
     metres: tuple[int, ...]
     """Metres of its way; of an ambiguous place the metre nearest to it."""
     reason: str
-    """`visible`, `uncertainty` or `ambiguous`."""
+    """`visible`, `uncertainty`, `ambiguous`, `pairs` (two alike) or `spread` (a place is far from any reflector)."""
     place: str = ""
     """Which place is ambiguous."""
     beyond: Beyond | None = None

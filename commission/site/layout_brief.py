@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
 from commission.site.checks import check_fields
 from commission.site.quantity import (
@@ -123,6 +123,18 @@ class Demands:
         float, Quantity(label="Apart", unit="m", bounds=NOT_NEGATIVE, step=0.05, entry=(0.0, 100.0), decimals=4)
     ] = 0.5
     """Smallest distance between two reflectors."""
+    pairs_differ: Annotated[
+        float,
+        Quantity(label="Pairs differ by", unit="m", bounds=NOT_NEGATIVE, step=0.05, entry=(0.0, 10.0), decimals=4),
+    ] = 0.0
+    """By how much the distances between reflectors must differ, of any two pairs that are in sight at once, so that a
+    start search tells them apart; 0.3 m is usual. 0: they need not."""
+    wall_reach: Annotated[
+        float,
+        Quantity(label="Spread: within", unit="m", bounds=NOT_NEGATIVE, step=0.5, entry=(0.0, 1000.0), decimals=4),
+    ] = 0.0
+    """How far any place along the walls that is seen from a route may be from the nearest reflector, so that they
+    spread along the walls. 0: any distance."""
     unambiguous_stations: Annotated[bool, Switch("Unique stations")] = False
     """Whether a vehicle that is switched on at a station must see which place it is."""
     unambiguous_starts: Annotated[bool, Switch("Unique starts")] = False
@@ -135,6 +147,30 @@ class Demands:
         for spot in self.unambiguous_spots:
             if len(spot) not in (2, 3) or not all(math.isfinite(value) for value in spot):
                 raise ValueError(f"demands.unambiguous_spots has {spot}; expected x, y [m] and maybe a heading [rad]")
+
+    def preset(self, name: str) -> Demands:
+        """Return these demands with what a preset asks for; raises ValueError for one that there is not."""
+        if name not in DEMAND_PRESETS:
+            raise ValueError(f"preset of the demands is {name!r}; expected one of {', '.join(DEMAND_PRESETS)}")
+        return replace(self, **DEMAND_PRESETS[name].asks)
+
+
+class DemandPreset(NamedTuple):
+    """What the maker of a scanner or a plant asks of every layout."""
+
+    says: str
+    """For a person."""
+    asks: dict[str, Any]
+    """Fields of `Demands` and their values."""
+
+
+DEMAND_PRESETS = {
+    "NAV350": DemandPreset(
+        "at least 3 reflectors visible everywhere on the routes, after any single one has failed",
+        {"visible": 3, "survive_failure": True},
+    ),
+}
+"""By name."""
 
 
 @dataclass(frozen=True, slots=True)

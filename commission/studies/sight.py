@@ -7,30 +7,31 @@ is there is for prediction; that nothing can be said of it without reflectors is
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from commission.compiled import warm_up
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.stretches import stretches_of
+from commission.planning.candidates import wall_candidates
 from commission.planning.route_check import way_of
 from commission.planning.vehicle_visibility import VehicleVisibility, vehicle_visibility
 from commission.planning.visibility import VisibilityOptions
 from commission.progress import Progress, part, silent
 from commission.site.floor_map import FloorMap
+from commission.site.layout_brief import LayoutBrief
 from commission.site.parameters import Parameters
 from commission.site.project import Project
-from commission.site.reflectors import ReflectorMap
+from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
 from commission.studies.inputs import StudyInput
 from commission.studies.kernels import CURVES, SIGHT
+from commission.studies.layout_problems import ENOUGH, SeenAlong, lacking_along, lacking_at_walls
 from commission.studies.problems import MOST_OF_A_KIND, Problem, Severity, Subject, errors_first
 
-ENOUGH = 3
-"""Reflectors that fix a pose though one of them fails."""
 LEAST = 2
 """Reflectors that fix a pose."""
 STEP = 0.25
@@ -55,6 +56,8 @@ class SightInput(StudyInput):
     """Planned routes."""
     stations: tuple[Station, ...]
     """Where the vehicle has to stand accurately."""
+    layout: LayoutBrief
+    """What the project demands of a layout."""
 
     @staticmethod
     def of(project: Project) -> SightInput:
@@ -66,6 +69,7 @@ class SightInput(StudyInput):
             parameters=project.parameters,
             routes=project.routes,
             stations=project.stations,
+            layout=project.layout,
         )
 
 
@@ -93,26 +97,58 @@ def sight(inputs: SightInput, progress: Progress = silent) -> SightResult:
     if len(inputs.reflectors) and (inputs.routes or inputs.stations):
         warm_up((SIGHT, CURVES), part(progress, 0.0, 0.3))
         visible = vehicle_visibility(inputs, VisibilityOptions(detector=inputs.parameters.detector))
+        counted = inputs.layout.counted(inputs.routes)
+        demanded: list[SeenAlong] = []
         for number, route in enumerate(inputs.routes):
             progress(0.3 + 0.7 * number / len(inputs.routes), f"reflectors in sight along {route.name}")
-            found += _along(route, visible)
+            along = _seen_along(route, visible)
+            found += _along(along)
+            if route.name in counted:
+                demanded.append(along)
+                found += lacking_along(along, inputs.reflectors, inputs.layout.demands)
         found += _at_stations(inputs.stations, visible)
+        found += _at_walls(inputs, demanded)
     progress(1.0, "reflectors in sight")
     return SightResult(inputs, errors_first(found))
 
 
-def _along(route: Route, visible: VehicleVisibility) -> Iterator[Problem]:
-    """Stretches of a route on which fewer than `LEAST` are seen; and how much of it has fewer than `ENOUGH`."""
+def _seen_along(route: Route, visible: VehicleVisibility) -> SeenAlong:
     poses = way_of(route, STEP).poses
     metres = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(poses[:, :2], axis=0).T))))
-    seen = visible.visible_from_poses(poses).counts()
+    return SeenAlong(route.name, poses, metres, visible.visible_from_poses(poses).incidence(len(visible.reflectors)))
+
+
+def _at_walls(inputs: SightInput, along: list[SeenAlong]) -> Iterator[Problem]:
+    """Places along the walls that are far from any reflector, where that is demanded."""
+    brief = inputs.layout
+    if not brief.demands.wall_reach or inputs.floor_map is None or not along:
+        return
+    places = wall_candidates(inputs.floor_map.occupancy(), brief.candidates)
+    if not len(places):
+        return
+    put_up = tuple(
+        Reflector(id=str(number), x=x, y=y, radius=brief.candidates.radius)
+        for number, (x, y) in enumerate(places.tolist())
+    )
+    everywhere = replace(inputs, reflectors=ReflectorMap(put_up))
+    visible = vehicle_visibility(everywhere, VisibilityOptions(detector=inputs.parameters.detector))
+    poses = np.concatenate([each.poses for each in along])
+    in_sight = visible.visible_from_poses(poses).incidence(len(places)).any(axis=0)
+    useful = np.concatenate([each.sees for each in along]).any(axis=0)
+    yield from lacking_at_walls(places[in_sight], inputs.reflectors.centers[useful], brief.demands)
+
+
+def _along(along: SeenAlong) -> Iterator[Problem]:
+    """Stretches of a route on which fewer than `LEAST` are seen; and how much of it has fewer than `ENOUGH`."""
+    name, poses, metres = along.name, along.poses, along.metres
+    seen = along.sees.sum(axis=1)
     without = _joined(seen, metres)
     for first, end in without[:MOST_OF_A_KIND]:
         worst = first + int(seen[first:end].argmin())
         yield _problem(
             Severity.WARNING,
             Subject.ROUTE,
-            route.name,
+            name,
             poses[worst],
             f"{_count(int(seen[worst]))} in sight at worst from {metres[first]:.1f} to {metres[end - 1]:.1f} m; "
             f"expected {ENOUGH} or more, and {LEAST} at least: with fewer the pose is lost little by little",
@@ -120,7 +156,7 @@ def _along(route: Route, visible: VehicleVisibility) -> Iterator[Problem]:
     if len(without) > MOST_OF_A_KIND:
         first, _ = without[MOST_OF_A_KIND]
         more = f"... and {len(without) - MOST_OF_A_KIND} more stretches with fewer than {LEAST} reflectors in sight"
-        yield _problem(Severity.WARNING, Subject.ROUTE, route.name, poses[first], more)
+        yield _problem(Severity.WARNING, Subject.ROUTE, name, poses[first], more)
     few = seen == LEAST
     if few.any():
         # Every pose stands for half of the way to its neighbors.
@@ -128,7 +164,7 @@ def _along(route: Route, visible: VehicleVisibility) -> Iterator[Problem]:
         yield _problem(
             Severity.NOTE,
             Subject.ROUTE,
-            route.name,
+            name,
             poses[int(few.argmax())],
             f"{LEAST} reflectors in sight on {share[few].sum():.1f} m, first at {metres[few.argmax()]:.1f} m; expected "
             f"{ENOUGH} or more, so that one may fail",

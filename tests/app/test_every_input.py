@@ -235,6 +235,18 @@ ROWS: dict[str, Row] = {f"scanners[0].{name}": row for name, row in SCANNER.item
     "demands.spacing": Row(
         label="Apart [m]", read=lambda s: s.project.layout.demands.spacing, allowed=(0.0, 100.0), refused=(-0.05, 100.1)
     ),
+    "demands.pairs_differ": Row(
+        label="Pairs differ by [m]",
+        read=lambda s: s.project.layout.demands.pairs_differ,
+        allowed=(0.0, 10.0),
+        refused=(-0.05, 10.1),
+    ),
+    "demands.wall_reach": Row(
+        label="Spread: within [m]",
+        read=lambda s: s.project.layout.demands.wall_reach,
+        allowed=(0.0, 1000.0),
+        refused=(-0.5, 1000.5),
+    ),
     "candidates.spacing": Row(
         label="Try every [m]",
         read=lambda s: s.project.layout.candidates.spacing,

@@ -129,3 +129,17 @@ def test_before_and_after_are_told_side_by_side(commission, walled, tmp_path):
     assert lines[2].startswith("... any one failing")
     assert any(line.startswith("Stop if failing") for line in lines)
     assert any(line.startswith("Ambiguous") for line in lines)
+
+
+def test_a_preset_and_pairs_and_spread_are_demanded_on_the_command_line(commission, walled, tmp_path):
+    words = ("--no-extend", "--preset", "nav350", "--pairs-differ", 0.1, "--wall-reach", 4)
+    code, told, err = commission("place", walled, "--out", tmp_path / "placed", *words)
+    assert (code, err) == (0, "")
+    placed = load_project(tmp_path / "placed")
+    assert len(placed.reflectors) >= 4
+    delta = placed.reflectors.centers[:, np.newaxis] - placed.reflectors.centers
+    distances = np.sort(np.hypot(delta[..., 0], delta[..., 1])[np.triu_indices(len(placed.reflectors), 1)])
+    assert np.diff(distances).min() > 0.1 or "two pairs in sight with nearly the same distance" in told
+    code, _, err = commission("place", walled, "--out", tmp_path / "none", "--preset", "NAV999")
+    assert code == 2
+    assert "preset of the demands is 'NAV999'; expected one of NAV350" in err

@@ -147,6 +147,8 @@ def layouts() -> st.SearchStrategy[LayoutBrief]:
             visible=st.integers(1, 9),
             survive_failure=st.booleans(),
             position_limit=st.none() | POSITIVE,
+            pairs_differ=st.just(0.0) | POSITIVE,
+            wall_reach=st.just(0.0) | POSITIVE,
             unambiguous_spots=spots,
         ),
         candidates=st.builds(

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from commission.site.layout_brief import CandidateOptions, Demands, LayoutBrief
 from commission.site.project import Project
 from commission.site.routes import Route, Segment
 from commission.site.scanner import Scanner
@@ -76,3 +77,44 @@ def test_two_scanners_together_see_what_neither_sees_alone() -> None:
     behind = replace(ahead, name="rear", mounting=np.array([0.0, 0.0, np.pi]))
     assert found(places, stations=(station,), scanners=(ahead,))[0].severity is Severity.NOTE
     assert found(places, stations=(station,), scanners=(ahead, behind)) == ()
+
+
+def along_walls(pitch: float) -> list[tuple[float, float]]:
+    """Reflectors at both walls of the hall, those of the other wall a little off, so that few distances are alike."""
+    return [(x, y) for x in np.arange(1.0, 40.0, pitch).tolist() for y in (0.5, 7.5)]
+
+
+def asked(demands: Demands, *, ignored: tuple[str, ...] = (), places: list[tuple[float, float]]) -> list[str]:
+    layout = LayoutBrief(demands, CandidateOptions(spacing=2.0), ignored_routes=ignored)
+    problems = found(places, routes=(ROUTE,), scanners=(replace(SCANNER, reflector_range=8.0),), layout=layout)
+    demanded = [each for each in problems if each.text.endswith("as demanded")]
+    assert all(each.severity is Severity.NOTE and each.place is not None for each in demanded)
+    return [each.text for each in demanded]
+
+
+def test_what_a_preset_demands_is_told_where_fewer_are_in_sight_of_routes_that_count() -> None:
+    """Of pairs every 5 m at least two pairs are seen: enough for 3 when one fails, and too few for 5."""
+    places = along_walls(5.0)
+    assert asked(Demands(), places=places) == []
+    assert asked(Demands().preset("NAV350"), places=places) == []
+    (told,) = asked(Demands(visible=5), places=places)
+    assert told.startswith("Route 'Through': fewer than 6 reflectors in sight on ")
+    assert told.endswith("expected 6 or more, so that 5 are left when one fails, as demanded")
+    assert asked(Demands(visible=5), places=places, ignored=("Through",)) == []
+
+
+def test_pairs_of_nearly_the_same_distance_are_told_by_name_where_they_must_differ() -> None:
+    places = [(14.0, 0.5), (18.0, 7.5), (22.02, 0.5)]
+    unlike = [(14.0, 0.5), (18.0, 7.5), (22.9, 0.5)]
+    near = (*along_walls(5.0)[:2], *along_walls(5.0)[-2:])
+    told = asked(Demands(pairs_differ=0.3), places=[*places, *near])
+    assert any("R0 to R1 8.06 m, R1 to R2 8.07 m" in each and "more than 0.3 m between them" in each for each in told)
+    told = asked(Demands(pairs_differ=0.3), places=[*unlike, *near])
+    assert not any("R0 to R1" in each and "R1 to R2" in each for each in told)
+
+
+def test_walls_far_from_any_reflector_are_told_where_reflectors_must_spread() -> None:
+    assert asked(Demands(wall_reach=6.0), places=along_walls(5.0)) == []
+    (told,) = asked(Demands(wall_reach=1.0), places=along_walls(5.0))
+    assert told.startswith("Walls: ")
+    assert told.endswith("expected one within 1 m, as demanded")

@@ -21,6 +21,14 @@ class SetLayout(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class TakePreset(Action):
+    """Ask of the suggested layout what a preset says."""
+
+    name: str
+    """One of `DEMAND_PRESETS`."""
+
+
+@dataclass(frozen=True, slots=True)
 class EndSearch(Action):
     """End the search with the best layout found so far; without one, nothing is suggested."""
 

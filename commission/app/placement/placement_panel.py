@@ -22,6 +22,7 @@ from commission.app.placement.actions import (
     EndSearch,
     FreeAreas,
     SetLayout,
+    TakePreset,
 )
 from commission.app.placement.keep_out_tool import KeepOutTool
 from commission.app.placement.service import LAYOUT
@@ -29,14 +30,14 @@ from commission.app.placement.view import LayoutView
 from commission.app.placement.wish import LayoutWish
 from commission.planning.layout_figures import compared
 from commission.site.fields import get_field
-from commission.site.layout_brief import Demands, LayoutBrief
+from commission.site.layout_brief import DEMAND_PRESETS, Demands, LayoutBrief
 from commission.site.quantity import DEGREES, MILLIMETRES
 from commission.studies.placement import PlacementResult, UnmetStretch
 
 POSITION, HEADING = "demands.position_limit", "demands.heading_limit"
 DEMANDS = (
     *("visible", "survive_failure", "position_limit", "heading_limit", "leeway"),
-    *("unambiguous_starts", "unambiguous_stations"),
+    *("pairs_differ", "wall_reach", "unambiguous_starts", "unambiguous_stations"),
 )
 CANDIDATES = (
     "demands.spacing",
@@ -46,7 +47,13 @@ CANDIDATES = (
 FIRST = LayoutBrief(demands=Demands(position_limit=0.1, heading_limit=0.02))
 """What the inputs begin with."""
 MOST_UNMET = 12
-REASONS = {"visible": "too few visible", "uncertainty": "2σ over its limit", "ambiguous": "place not told apart"}
+REASONS = {
+    "visible": "too few visible",
+    "uncertainty": "2σ over its limit",
+    "ambiguous": "place not told apart",
+    "pairs": "pairs with nearly the same distance",
+    "spread": "walls far from any reflector",
+}
 DRAW, CLEAR = "Draw area", "Clear areas"
 
 
@@ -90,6 +97,9 @@ class LayoutPanel(BasePanel):
 
     def _add_demands(self) -> None:
         self._inputs.field("extend", LayoutWish())
+        says = "; ".join(f"{name}: {preset.says}" for name, preset in DEMAND_PRESETS.items())
+        presets = self._gui.add_button_group("Preset", tuple(DEMAND_PRESETS), hint=f"Takes these demands: {says}.")
+        presets.on_click(posting(self._post, lambda event: TakePreset(str(event.target.value))))
         for name in DEMANDS:
             self._inputs.field(f"demands.{name}", FIRST)
 

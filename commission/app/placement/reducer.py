@@ -42,6 +42,13 @@ def set_layout(action: actions.SetLayout, state: AppState, sender: Sender) -> Ou
 
 
 @reduce.register
+def take_preset(action: actions.TakePreset, state: AppState, sender: Sender) -> Outcome:
+    brief = state.project.layout
+    edit = Edit(f"demands of {action.name}", sender)
+    return _asking(state, replace(brief, demands=brief.demands.preset(action.name)), edit)
+
+
+@reduce.register
 def count_route(action: actions.CountRoute, state: AppState, sender: Sender) -> Outcome:
     state.project.route(action.name)
     brief = state.project.layout

@@ -24,6 +24,7 @@ from commission.app.placement.actions import (
     FreeAreas,
     KeepOut,
     SetLayout,
+    TakePreset,
 )
 from commission.app.placement.keep_out_tool import KeepOutTool
 from commission.app.placement.placement_panel import found_text
@@ -90,6 +91,16 @@ def test_demands_are_set_by_the_names_they_have_in_planning(project: Project) ->
     assert after(state, Undo(), Undo(), Undo()).project is project
 
 
+def test_a_preset_asks_for_all_it_says_in_one_undo_step(project: Project) -> None:
+    state = after(
+        AppState(project=project, saved=project), SetLayout("demands.pairs_differ", 0.3), TakePreset("NAV350")
+    )
+    demands = state.project.layout.demands
+    assert (demands.visible, demands.survive_failure, demands.pairs_differ) == (3, True, 0.3)
+    assert [step.name for step in state.undo] == ["set pairs differ of the layout", "demands of NAV350"]
+    assert after(state, Undo(), Undo()).project is project
+
+
 def test_a_slide_over_many_values_is_one_undo_step(project: Project) -> None:
     slide = [by(ME, SetLayout("candidates.spacing", 0.1 * step), 10.0 + 0.1 * step) for step in range(1, 9)]
     assert len(after(AppState(project=project, saved=project), *slide).undo) == 1
@@ -113,6 +124,7 @@ def test_a_route_that_does_not_count_keeps_to_it_under_another_name(project: Pro
         SetLayout("demands.visible", 0),
         SetLayout("candidates.spacing", -1.0),
         CountRoute("Nowhere", counts=True),
+        TakePreset("NAV999"),
     ],
 )
 def test_demands_that_do_not_exist_or_are_out_of_range_are_refused(project: Project, wish: Action) -> None:
