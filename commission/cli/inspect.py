@@ -15,7 +15,8 @@ class Inspect:
     """Tell what a recording holds: records, rates, pauses, time span, ranges of values, and what looks wrong."""
 
     recording: Annotated[Positional[Path], arg(metavar="REC")]
-    """Recording: a CSV folder (odometry.csv with detections.csv or scans.npz) or a ROS bag (.mcap, .db3, .bag)."""
+    """Recording: a CSV folder (odometry.csv with detections.csv or scans.npz), a ROS bag (.mcap, .db3, .bag)
+    or a capture (.pcap, .pcapng)."""
     project: Annotated[Path | None, arg(metavar="PROJECT")] = None
     """Project whose scanner and threshold the recording is held against. None: those of a new project."""
 

@@ -32,7 +32,8 @@ class Localize:
     project: Positional[Path]
     """Folder of the project (holds project.yaml)."""
     recording: Positional[Path]
-    """Recording: a CSV folder (odometry.csv with detections.csv or scans.npz) or a ROS bag (.mcap, .db3, .bag)."""
+    """Recording: a CSV folder (odometry.csv with detections.csv or scans.npz), a ROS bag (.mcap, .db3, .bag)
+    or a capture (.pcap, .pcapng)."""
     out: Annotated[Path, arg(metavar="DIR")]
     """Folder for the results; made when it does not exist."""
     initial_pose: Annotated[str | None, arg(metavar="X,Y,THETA[,SX,SY,STHETA]")] = None

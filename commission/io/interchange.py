@@ -91,6 +91,8 @@ _SUFFIXES = {
     ".bag": Kind.RECORDING,
     ".mcap": Kind.RECORDING,
     ".db3": Kind.RECORDING,
+    ".pcap": Kind.RECORDING,
+    ".pcapng": Kind.RECORDING,
     ".smap": Kind.SMAP,
     **{f".{suffix}": Kind.MODEL for suffix in mesh.KINDS},
 }
@@ -110,8 +112,6 @@ _UNREAD = {
     ".step": _AS_MODEL,
     ".stp": _AS_MODEL,
     ".3ds": _AS_MODEL,
-    ".pcap": _AS_CSV,
-    ".pcapng": _AS_CSV,
     ".log": _AS_CSV,
     ".xml": "reflectors as a table (.csv), routes as VDMA LIF (.lif)",
     ".xls": "the table saved as CSV",

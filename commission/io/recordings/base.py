@@ -8,6 +8,7 @@ from typing import Protocol
 
 from commission.errors import FileFormatError, UsageError
 from commission.io.reading import cannot_read
+from commission.io.recordings.capture import Capture
 from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions
 from commission.io.recordings.csv_folder import CsvFolder
 from commission.io.recordings.ros_bag import RosBag
@@ -59,9 +60,10 @@ def _csv_folder(path: Path, options: ChannelOptions) -> Recording:
 
 _FORMATS: tuple[tuple[Callable[[Path], bool], Callable[[Path, ChannelOptions], Recording]], ...] = (
     (CsvFolder.recognizes, _csv_folder),
+    (Capture.recognizes, Capture),
     (RosBag.recognizes, RosBag),
 )
-READ = "a folder with odometry.csv, or a ROS bag (.mcap, .db3, .bag)"
+READ = "a folder with odometry.csv, a ROS bag (.mcap, .db3, .bag), or a capture (.pcap, .pcapng)"
 """What a recording can be, in words."""
 
 

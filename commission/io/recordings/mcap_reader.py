@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from binascii import crc32
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
@@ -52,19 +52,23 @@ class Message:
     """Its bytes."""
 
 
-@dataclass(slots=True, kw_only=True)
 class McapFile:
-    """An MCAP file that is read from its begin."""
+    """An MCAP file that is read from its begin.
 
-    path: Path
-    """Where it is."""
-    channels: dict[int, McapChannel] = field(default_factory=dict[int, McapChannel])
-    """What was announced so far, by number; all of it once `read_summary` found a summary."""
-    counts: dict[int, int] = field(default_factory=dict[int, int])
-    """Messages of each channel, where the file has a summary."""
-    is_cut: bool = False
-    """Whether the file ends inside a record: its recorder was stopped."""
-    _schemas: dict[int, tuple[str, str, str]] = field(default_factory=dict[int, tuple[str, str, str]])
+    Parameters
+    ----------
+    path : where it is.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.channels: dict[int, McapChannel] = {}
+        """What was announced so far, by number; all of it once `read_summary` found a summary."""
+        self.counts: dict[int, int] = {}
+        """Messages of each channel, where the file has a summary."""
+        self.is_cut = False
+        """Whether the file ends inside a record: its recorder was stopped."""
+        self._schemas: dict[int, tuple[str, str, str]] = {}
 
     def read_summary(self) -> bool:
         """Read channels and counts from the end of the file; returns False where there is no summary.

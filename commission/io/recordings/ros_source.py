@@ -98,10 +98,10 @@ class McapSource:
         self.path = path
         self.files = files
         self._notes: list[str] = []
-        self._stores: dict[tuple[str, str, str], Typestore] = {}
+        self._typestores: dict[tuple[str, str, str], Typestore] = {}
         found: dict[str, tuple[str, int | None]] = {}
         for file in files:
-            mcap = McapFile(path=file)
+            mcap = McapFile(file)
             counts: dict[str, int] = {}
             if mcap.read_summary():
                 for number, channel in mcap.channels.items():
@@ -124,7 +124,7 @@ class McapSource:
         """Deliver the messages of some topics as they were written; raises FileFormatError."""
         self._notes = []
         for file in self.files:
-            mcap = McapFile(path=file)
+            mcap = McapFile(file)
             with _told(file):
                 for message in mcap.messages():
                     if message.channel.topic in topics:
@@ -140,9 +140,9 @@ class McapSource:
 
     def _typestore(self, channel: McapChannel) -> Typestore:
         key = channel.schema, channel.schema_encoding, channel.definition
-        if key not in self._stores:
-            self._stores[key] = _typestore_of(channel)
-        return self._stores[key]
+        if key not in self._typestores:
+            self._typestores[key] = _typestore_of(channel)
+        return self._typestores[key]
 
 
 def _typestore_of(channel: McapChannel) -> Typestore:

@@ -1,0 +1,1 @@
+"""Bytes of scanners turned into values: pure functions that raise `DecodeError`. No file and no socket here."""
