@@ -33,7 +33,7 @@ GLINT_BEAMS = (1, 8)
 Echoes = tuple[NDArray[np.float32], BoolArray]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class VirtualScanner:
     """A scanner in a hall, ready to scan from any pose."""
 
@@ -58,7 +58,13 @@ class VirtualScanner:
         shiny = np.zeros(len(project.disturbances.shiny_objects))
         wall_depths = np.maximum(np.concatenate([glued, shiny]), wall_depth)
         hall = _hall(RayCaster(grid), project.reflectors, project.disturbances, wall_depths)
-        return VirtualScanner(scanner, project.disturbances, hall, _beams(scanner), np.ones(len(hall.radii), np.bool_))
+        return VirtualScanner(
+            scanner=scanner,
+            disturbances=project.disturbances,
+            hall=hall,
+            beams=_beams(scanner),
+            everything=np.ones(len(hall.radii), np.bool_),
+        )
 
     def scan(
         self,
