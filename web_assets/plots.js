@@ -10,6 +10,7 @@
 
   const panel = document.createElement("div");
   panel.className = "c-plots";
+  panel.dataset.view = "plots";
   panel.innerHTML = `<div class="c-plots-bar"><span class="c-views"></span><span class="c-chips"></span>
     <span class="c-plots-end"><button class="c-whole" title="Show the whole drive (double click in a plot)">Whole run
     </button><button class="c-csv" title="Save what is shown, scan by scan, as a table">CSV</button>
@@ -30,13 +31,14 @@
   }
 
   // ---- what the program sends
-  const numbers = { curves: "", cursor: "" };
+  const numbers = {};
   function hear() {
     for (const carrier of document.querySelectorAll(".c-carried")) {
       const { kind, number, message } = carrier.dataset;
-      if (numbers[kind] === number + root?.dataset.inbox || !message) continue;
-      numbers[kind] = number + root?.dataset.inbox;
-      listeners[kind]?.(JSON.parse(message));
+      const known = `${number} ${root?.dataset.inbox}`;
+      if (numbers[kind] === known || !message || !listeners[kind]) continue;
+      numbers[kind] = known;
+      listeners[kind](JSON.parse(message));
       isDue = true;
     }
   }
@@ -60,6 +62,11 @@
     }
     view = plots.span;
     find(".c-whole").disabled = view[0] <= 0 && view[1] >= plots.duration;
+    showChips();
+  }
+
+  function showChips() {
+    if (!plots || panel.dataset.view !== "plots") return;
     const chosen = plots.charts.map(({ title }) => title);
     chips.replaceChildren(...plots.titles.map((title) => chip(title, chosen)));
   }
@@ -213,7 +220,7 @@
       pen.moveTo(left, y);
       pen.lineTo(right, y);
       pen.stroke();
-      if (index % every === 0) pen.fillText(written(value), left - 5, y);
+      if (index % every === 0) pen.fillText(written(value), left - 5, Math.max(y, top + 4));
     });
     pen.textAlign = "center";
     pen.textBaseline = "top";
@@ -304,7 +311,13 @@
     pen.textAlign = "left";
     pen.textBaseline = "alphabetic";
     const texts = [[lane.chart.title, INK]];
-    lane.chart.lines.forEach((line, index) => texts.push([`${line.label} ${valueOf(lane, index)}`, line.color]));
+    const values = lane.chart.lines.map((_, index) => valueOf(lane, index));
+    pen.font = FONT;
+    // Where there is no room for names, the colors have to do.
+    const room = lane.w - 1.15 * pen.measureText(lane.chart.title).width - 12;
+    const named = lane.chart.lines.map(({ label }, index) => `${label} ${values[index]}`);
+    const isNarrow = pen.measureText(named.join("")).width + 9 * named.length > room;
+    lane.chart.lines.forEach(({ color }, index) => texts.push([(isNarrow ? values : named)[index], color]));
     for (const { label, color, steps } of lane.chart.limits) {
       const at = hover ?? cursor.time;
       const [, value] = steps.findLast(([time]) => time <= at) ?? steps[0];
@@ -405,7 +418,7 @@
     draw();
   }
   window.commissionPlots = {
-    ask, seek, views, body, panel, listeners,
+    ask, seek, views, body, panel, listeners, chips, showChips,
     // Where a value of a plot is on the screen, and what is shown: for whoever looks at the page from outside.
     pixelOf(title, time, value) {
       const lane = lanes.find(({ chart }) => chart.title === title), box = canvas.getBoundingClientRect();

@@ -24,6 +24,7 @@ from commission.progress import Progress, silent
 from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
 from commission.studies.curves import longest_regular
 from commission.studies.inputs import StudyInput
+from commission.studies.reflector_figures import numbered
 from commission.studies.run import RunResult, limits_along
 
 JUMP_SHARE = 0.5
@@ -197,17 +198,15 @@ def _corrections(run: RunResult, progress: Progress) -> Iterator[RunEvent]:
         first = after
 
 
-def _numbers(columns: RunColumns) -> tuple[IntArray, list[str]]:
+def _numbers(columns: RunColumns) -> tuple[IntArray, tuple[str, ...]]:
     """(n,) number of the reflector of each detection, the same in all segments, and the names by these numbers."""
-    known: dict[str, int] = {}
+    names, _, own = numbered(columns)
     numbers = np.full(len(columns.reflector), -1, dtype=np.int64)
     ends = (*columns.firsts[1:].tolist(), len(columns))
-    for segment, end in zip(columns.segments, ends, strict=True):
-        own = [known.setdefault(each.id, len(known)) for each in segment.setup.reflectors.reflectors]
+    for segment, end, known in zip(columns.segments, ends, own, strict=True):
         rows = slice(int(columns.offsets[segment.first]), int(columns.offsets[end]))
-        some = columns.reflector[rows]
-        numbers[rows] = np.where(some >= 0, np.array([*own, -1])[some], -1)
-    return numbers, list(known)
+        numbers[rows] = known[columns.reflector[rows]]
+    return numbers, names
 
 
 def _scan_before(scanners: IntArray) -> IntArray:

@@ -185,6 +185,21 @@ div:has(>.c-carried){{display:none!important}}
 .c-plots-bar [aria-pressed=false]{{opacity:.5}}
 .c-plots-end button{{border-color:#44484f;margin-left:4px;font-size:11px}}
 .c-plots-body{{flex:1;min-height:0;position:relative;overflow:hidden}}
+.c-list-view{{position:absolute;inset:0;overflow:auto;padding:0 8px;display:none}}
+.c-plots[data-view=events] .c-events,.c-plots[data-view=reflectors] .c-reflectors{{display:block}}
+.c-plots:not([data-view=plots]) :is(canvas,.c-whole,.c-png){{display:none!important}}
+.c-list-view table{{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}}
+.c-events table{{width:auto;min-width:480px}}
+.c-list-view th{{position:sticky;top:0;background:#242424;text-align:right;font-weight:400;white-space:nowrap;
+ padding:1px 8px}}
+.c-list-view th button{{background:none;border:none;color:inherit;font:inherit;cursor:pointer;padding:0;opacity:.75}}
+.c-list-view th button:is(:hover,:focus-visible){{opacity:1;text-decoration:underline}}
+.c-list-view th .c-color{{padding-left:5px;color:{css(SELECTED)}}}
+.c-list-view td{{padding:1px 8px;text-align:right;white-space:nowrap;border-top:1px solid #2f3237}}
+.c-list-view :is(td,th):first-child,.c-events :is(td,th){{text-align:left}}
+.c-list-view tbody tr{{cursor:pointer}}
+.c-list-view tbody tr:is(:hover,:focus-visible){{background:#2c3036;outline:none}}
+.c-floor-scale i{{display:inline-block;width:16px;height:9px}}
 .c-plots-body canvas{{display:block;position:absolute;inset:0;cursor:crosshair;touch-action:none}}
 :root.c-higher{{--c-bottom:62vh!important}}
 :root:has(.c-fold input:checked){{--c-bottom:{FOLDED_PX}px}}

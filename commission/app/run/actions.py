@@ -156,6 +156,14 @@ class ShowCharts(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class ColorReflectors(Action):
+    """Color the reflectors on the floor by one of their figures."""
+
+    figure: str
+    """Key of its column; empty: none."""
+
+
+@dataclass(frozen=True, slots=True)
 class SaveCurves(Action):
     """Save what this browser's plots show as a table, cycle by cycle."""
 

@@ -11,14 +11,15 @@ import msgspec
 from msgspec import Meta, Struct
 
 from commission.app.base.actions import Action
-from commission.app.run.actions import SaveCurves, Seek, ShowCharts, ShowSpan
+from commission.app.editing.actions import SelectReflectors
+from commission.app.run.actions import ColorReflectors, SaveCurves, Seek, ShowCharts, ShowSpan
 
 Time: TypeAlias = Annotated[float, Meta(ge=0.0, le=1e9)]
 Text: TypeAlias = Annotated[str, Meta(max_length=200)]
 
 
-class Asked(Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag=str.lower):
-    """Base of all that can be asked; the name of a class is what the script says under `do`."""
+class Asked(Struct, frozen=True, forbid_unknown_fields=True, tag_field="do"):
+    """Base of all that can be asked; the tag of a class is what the script says under `do`."""
 
     n: int
     """Counts up: to ask for the same thing again is another text."""
@@ -28,7 +29,7 @@ class Asked(Struct, frozen=True, forbid_unknown_fields=True, tag_field="do", tag
         raise NotImplementedError
 
 
-class At(Asked, frozen=True):
+class MomentAsked(Asked, frozen=True, tag="at"):
     """A moment was clicked on."""
 
     time: Time
@@ -39,7 +40,7 @@ class At(Asked, frozen=True):
         return Seek(self.time)
 
 
-class Zoom(Asked, frozen=True):
+class ZoomAsked(Asked, frozen=True, tag="zoom"):
     """A stretch of time was dragged over, or the whole drive is wanted again."""
 
     span: tuple[Time, Time] | None
@@ -50,7 +51,7 @@ class Zoom(Asked, frozen=True):
         return ShowSpan(self.span)
 
 
-class Charts(Asked, frozen=True):
+class ChartsAsked(Asked, frozen=True, tag="charts"):
     """Other plots were chosen."""
 
     titles: Annotated[tuple[Text, ...], Meta(max_length=20)]
@@ -61,7 +62,29 @@ class Charts(Asked, frozen=True):
         return ShowCharts(self.titles)
 
 
-class Table(Asked, frozen=True):
+class ReflectorAsked(Asked, frozen=True, tag="reflector"):
+    """A reflector of the list was clicked on."""
+
+    id: Text
+    """Which one."""
+
+    def action(self) -> Action:
+        """Select it, and fly there."""
+        return SelectReflectors((self.id,), fly=True)
+
+
+class ColorAsked(Asked, frozen=True, tag="color"):
+    """The floor is to be colored by a column of the reflectors' figures, or by none."""
+
+    figure: Text
+    """Key of the column; empty: none."""
+
+    def action(self) -> Action:
+        """Color it."""
+        return ColorReflectors(self.figure)
+
+
+class TableAsked(Asked, frozen=True, tag="table"):
     """What is shown is wanted as a table."""
 
     def action(self) -> Action:
@@ -69,7 +92,7 @@ class Table(Asked, frozen=True):
         return SaveCurves()
 
 
-_DECODER = msgspec.json.Decoder(At | Zoom | Charts | Table)
+_DECODER = msgspec.json.Decoder(MomentAsked | ZoomAsked | ChartsAsked | ReflectorAsked | ColorAsked | TableAsked)
 
 
 def action_of(text: str) -> Action:

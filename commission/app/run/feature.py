@@ -9,6 +9,7 @@ from commission.app.run.association_panel import AssociationPanel
 from commission.app.run.badge import Badge
 from commission.app.run.detection_layer import DetectionLayer
 from commission.app.run.edits_panel import EditsPanel
+from commission.app.run.figure_layer import FigureLayer
 from commission.app.run.gate_layer import GateLayer
 from commission.app.run.now_panel import NowPanel
 from commission.app.run.plots import Plots
@@ -38,6 +39,7 @@ FEATURE = Feature(
         TrailLayer,
         ConsistencyLayer,
         ReferenceLayer,
+        FigureLayer,
     ),
     panels=(
         Docked(make=lambda at: Badge(at.gui), tab=None, rank=10),

@@ -1,4 +1,4 @@
-"""What the instruments below the floor have computed in the background: tables to save."""
+"""What the instruments below the floor compute in the background: events, figures of reflectors, tables to save."""
 
 from __future__ import annotations
 
@@ -8,7 +8,12 @@ from commission.app.base.service import Context
 from commission.app.run.actions import CurvesMade
 from commission.app.run.charts import BY_TITLE
 from commission.app.run.curve_table import curve_table
+from commission.app.run.found_table import Found
 from commission.app.run.state import PlotWindow
+from commission.progress import Progress, part
+from commission.site.floor_map import FloorMap
+from commission.studies.events import EventsInput, events
+from commission.studies.reflector_figures import ReflectorFiguresInput, reflector_figures
 from commission.studies.run import RunResult
 
 
@@ -22,6 +27,29 @@ class Instruments:
 
     def __init__(self, context: Context) -> None:
         self._jobs = context.jobs
+        self.found: Found | None = None
+        """What was found on the newest drive for which that is done; none before the first."""
+
+    def take(self, result: RunResult, floor_map: FloorMap | None) -> None:
+        """Find what happened on a drive, and what each reflector contributed.
+
+        Parameters
+        ----------
+        result : the whole drive.
+        floor_map : walls, by which reflectors are expected to be seen.
+        """
+        figures = ReflectorFiguresInput(
+            columns=result.columns, first_ns=result.inputs.log.first_ns, floor_map=floor_map
+        )
+
+        def look(progress: Progress) -> Found:
+            happened = events(EventsInput(result), part(progress, 0.0, 0.4))
+            return Found(happened, reflector_figures(figures, part(progress, 0.4, 1.0)))
+
+        self._jobs.start("Events and reflectors", look, then=self._keep, is_shown=False)
+
+    def _keep(self, found: Found) -> None:
+        self.found = found
 
     def save(self, result: RunResult, window: PlotWindow, sender: Sender) -> None:
         """Write what a browser's plots show, and let it save that.

@@ -17,7 +17,8 @@ from commission.app.base.view import PageView
 from commission.app.run.asked import action_of
 from commission.app.run.charts import BY_TITLE
 from commission.app.run.drawn_curves import as_text, drawn, values_at
-from commission.app.run.state import PlotWindow
+from commission.app.run.found_table import Found, message_of
+from commission.app.run.state import PlotWindow, RunState
 from commission.app.run.view import RunView
 
 EDIT = "#c08bff"
@@ -39,7 +40,8 @@ class Plots(BasePanel):
         inbox.on_update(posting(post, lambda event: action_of(event.target.value)))
         self.inbox = inbox
         gui.add_html(f"<div class='c-instruments' data-inbox='{viser_private.identifier(inbox)}'></div>")
-        self._curves, self._cursor = Carrier(gui, "curves"), Carrier(gui, "cursor")
+        self._curves, self._cursor, self._found = (Carrier(gui, kind) for kind in ("curves", "cursor", "found"))
+        self._listed: tuple[object, ...] = ()
         self._shown: tuple[object, ...] = ()
 
     def draw(self, view: PageView) -> None:
@@ -52,7 +54,8 @@ class Plots(BasePanel):
         self._cursor.write({"time": round(run.time, 4), "values": values})
 
     def draw_slowly(self, view: PageView) -> None:
-        """Send the curves where they are others."""
+        """Send curves and lists where they are others."""
+        self._list(view)
         run = view.part(RunView)
         if run is None or run.duration <= 0.0:
             return
@@ -70,6 +73,13 @@ class Plots(BasePanel):
             "editColor": EDIT,
         }
         self._curves.write(message)
+
+    def _list(self, view: PageView) -> None:
+        """Send the events and reflectors of the newest drive for which they are known."""
+        found, figure = view.part(Found), view.state.part(RunState).figure
+        if found is not None and self._listed != (found, figure):
+            self._listed = found, figure
+            self._found.write(message_of(found, figure))
 
     def _window(self, view: PageView) -> PlotWindow:
         return view.state.of_browser(self._browser, PlotWindow)

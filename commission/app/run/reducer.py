@@ -21,6 +21,7 @@ from commission.app.run.effects import (
     PlayOn,
     RunAfresh,
 )
+from commission.app.run.found_table import BY_KEY
 from commission.app.run.state import SPEEDS, PlotWindow, RunState
 from commission.site.fields import with_field
 
@@ -141,6 +142,14 @@ def show_charts(action: actions.ShowCharts, state: AppState, sender: Sender) -> 
         raise ValueError(f"the plots are to show {found}; expected one or more of {', '.join(BY_TITLE)}")
     titles = tuple(title for title in BY_TITLE if title in action.titles)
     return Outcome(_with_window(state, sender, titles=titles))
+
+
+@reduce.register
+def color_reflectors(action: actions.ColorReflectors, state: AppState, _sender: Sender) -> Outcome:
+    """Choose the figure that the floor shows."""
+    if action.figure and action.figure not in BY_KEY:
+        raise ValueError(f"reflectors are to be colored by {action.figure!r}; expected one of {', '.join(BY_KEY)}")
+    return Outcome(_with(state, figure=action.figure))
 
 
 @reduce.register

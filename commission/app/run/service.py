@@ -256,6 +256,7 @@ class RunService(Service):
     def _take(self, result: RunResult) -> Action | None:
         """Show a run: over the same drive, or one in its place, where the cursor is; a new one plays from its start."""
         playback = self.playback
+        self._instruments.take(result, self._project.floor_map)
         if playback is not None and playback.result.inputs.log is result.inputs.log:
             playback.replace(result)
             return None
@@ -308,4 +309,5 @@ class RunService(Service):
             return ()
         result, here = view.result, slice(view.lived)
         lived = LivedPath(result.columns.means[here], result.two_sigma[here], result.position_two_sigma[here])
-        return view, Followed((float(view.pose[0]), float(view.pose[1]))), lived
+        found = self._instruments.found
+        return view, Followed((float(view.pose[0]), float(view.pose[1]))), lived, *(() if found is None else (found,))

@@ -32,6 +32,8 @@ class RunState:
     """Whether an edit acts from the cursor on, and not on the whole drive."""
     only_the_map: bool = False
     """Whether an edit of the site moves the map alone, and the hall of a virtual drive stays."""
+    figure: str = ""
+    """Key of the figure by which the reflectors on the floor are colored; empty: none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,6 +15,7 @@ import pytest
 from commission.app.base.actions import Action
 from commission.app.base.effects import SendFile
 from commission.app.base.state import AppState
+from commission.app.editing.actions import SelectReflectors
 from commission.app.run import actions
 from commission.app.run.asked import action_of
 from commission.app.run.charts import BY_TITLE, CHARTS, SHOWN_FIRST, ceiling
@@ -217,6 +218,8 @@ def test_plots_that_do_not_exist_are_refused(project: Project, titles: tuple[str
         ('{"n":3,"do":"zoom","span":null}', actions.ShowSpan(None)),
         ('{"n":4,"do":"charts","titles":["a"]}', actions.ShowCharts(("a",))),
         ('{"n":5,"do":"table"}', actions.SaveCurves()),
+        ('{"n":6,"do":"reflector","id":"R1"}', SelectReflectors(("R1",), fly=True)),
+        ('{"n":7,"do":"color","figure":"nis"}', actions.ColorReflectors("nis")),
     ],
 )
 def test_what_the_script_says_is_an_action(text: str, meant: Action) -> None:

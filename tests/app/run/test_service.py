@@ -291,7 +291,7 @@ def test_steps_reach_the_cursor(bench: RunBench) -> None:
 
 def test_others_are_given_where_the_vehicle_is_and_was(bench: RunBench) -> None:
     bench.do(MoveTo(3.0))
-    view, followed, lived = bench.service.parts(slowly=True)
+    view, followed, lived, *_found = bench.service.parts(slowly=True)
     assert isinstance(view, RunView)
     assert followed == Followed((float(view.pose[0]), float(view.pose[1])))
     assert isinstance(lived, LivedPath)

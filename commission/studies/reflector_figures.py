@@ -1,0 +1,219 @@
+"""What each reflector of the map contributed to a drive: how often it should be seen and was, and how well it fits.
+
+Expected is what the floor map promises from the estimated pose: where the estimate is wrong, so is that.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from commission.geometry import se2
+from commission.geometry.angles import wrap
+from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.localization.estimate import Status
+from commission.localization.run_columns import RunColumns, RunSegment
+from commission.planning.visibility import VisibilityModel, VisibilityOptions, build_visibility, walls_of
+from commission.progress import Progress, silent
+from commission.site.floor_map import FloorMap
+from commission.studies.inputs import StudyInput
+from commission.studies.scanner_figures import BELONGS
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ReflectorFiguresInput(StudyInput):
+    """All that the study reads."""
+
+    columns: RunColumns
+    """The run."""
+    first_ns: int
+    """Stamp of the first record [ns]."""
+    floor_map: FloorMap | None
+    """Walls; none: nothing stands in between."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ReflectorFigures:
+    """Figures of M reflectors: all that some segment of the run has in its map."""
+
+    inputs: ReflectorFiguresInput
+    """What they were made of."""
+    names: tuple[str, ...]
+    """Id of each."""
+    places: FloatArray
+    """(M, 2) where each stands by the last map that has it [m], map frame."""
+    expected: IntArray
+    """(M,) scans in which it is in free sight from the estimated pose, in the field of view, near enough to pass the
+    detector, and not covered."""
+    seen: IntArray
+    """(M,) scans with a detection that passed the detector and lies within a metre of it."""
+    accepted: IntArray
+    """(M,) detections that corrected the estimate."""
+    rejected: IntArray
+    """(M,) detections within a metre of it that the gate rejected."""
+    along_mean: FloatArray
+    """(M,) mean of the accepted innovations along the beam: measured minus expected range [m]; NaN without any."""
+    along_spread: FloatArray
+    """(M,) their standard deviation [m]; NaN with fewer than two."""
+    across_mean: FloatArray
+    """(M,) mean of the accepted innovations across the beam, to the left: by the bearing, times the range [m]."""
+    across_spread: FloatArray
+    """(M,) their standard deviation [m]."""
+    nis: FloatArray
+    """(M,) mean squared Mahalanobis distance of accepted and rejected (2 degrees of freedom); NaN without any."""
+    last_seen: FloatArray
+    """(M,) time of the last accepted detection after the first record [s]; NaN without any."""
+
+    def __len__(self) -> int:
+        """Return the number of reflectors."""
+        return len(self.names)
+
+
+class _FigureSums:
+    """What is added up for each of M reflectors."""
+
+    def __init__(self, count: int) -> None:
+        self.expected, self.seen, self.accepted, self.rejected = np.zeros((4, count), dtype=np.int64)
+        self.first, self.second = np.zeros((2, count)), np.zeros((2, count))
+        self.nis = np.zeros(count)
+        self.last = np.full(count, math.nan)
+
+
+def reflector_figures(inputs: ReflectorFiguresInput, progress: Progress = silent) -> ReflectorFigures:
+    """Count and average over a drive.
+
+    Parameters
+    ----------
+    inputs : the run and the walls.
+    progress : told how far it is; may raise to cancel.
+    """
+    columns = inputs.columns
+    names, places, own = numbered(columns)
+    sums = _FigureSums(len(names))
+    caster, models = walls_of(inputs.floor_map), dict[int, tuple[VisibilityModel, ...]]()
+    for segment, first, means in _blocks(columns):
+        progress(first / len(columns), "what each reflector contributes")
+        index = columns.segments.index(segment)
+        if index not in models and not segment.covered and len(segment.setup.reflectors):
+            options = VisibilityOptions(detector=segment.setup.parameters.detector)
+            models[index] = tuple(
+                build_visibility(segment.setup.reflectors, scanner, caster, options)
+                for scanner in segment.setup.scanners
+            )
+        cycles = first, first + len(means)
+        if index in models:
+            sums.expected += _expected(columns, models[index], cycles, own[index], len(names))
+        _add(sums, columns, (segment, *cycles), (means, own[index]))
+    progress(1.0, "what each reflector contributes")
+    return _averaged(inputs, names, places, sums)
+
+
+def numbered(columns: RunColumns) -> tuple[tuple[str, ...], FloatArray, tuple[IntArray, ...]]:
+    """Give each reflector a number that is the same in all segments of a run.
+
+    Returns
+    -------
+    names : (M,) their ids.
+    places : (M, 2) where each stands by the last map that has it [m].
+    own : of each segment, the number of each of its reflectors, and -1 at the end: of none.
+    """
+    known: dict[str, int] = {}
+    places: dict[str, tuple[float, float]] = {}
+    own: list[IntArray] = []
+    for segment in columns.segments:
+        every = segment.setup.reflectors.reflectors
+        own.append(np.array([*(known.setdefault(each.id, len(known)) for each in every), -1], dtype=np.int64))
+        places |= {each.id: (each.x, each.y) for each in every}
+    return tuple(known), np.array([places[name] for name in known]).reshape(-1, 2), tuple(own)
+
+
+def _blocks(columns: RunColumns) -> Iterator[tuple[RunSegment, int, FloatArray]]:
+    """Beliefs before some cycles of one segment: the segment, the first cycle and the (B, 3) means."""
+    first = 0
+    for rows in columns.priors.blocks():
+        after = first + len(rows.means)
+        bounds = [first, *(bound for bound in columns.firsts.tolist() if first < bound < after), after]
+        for begin, end in itertools.pairwise(bounds):
+            yield columns.segment(begin), begin, rows.means[begin - first : end - first]
+        first = after
+
+
+def _expected(
+    columns: RunColumns, models: tuple[VisibilityModel, ...], cycles: tuple[int, int], own: IntArray, count: int
+) -> IntArray:
+    """(M,) scans of some cycles in which each reflector is in sight."""
+    found = np.zeros(count, dtype=np.int64)
+    here = slice(*cycles)
+    scanners = columns.detected.scanners[here]
+    for index, model in enumerate(models):
+        visible = model.visible_from_poses(columns.means[here][scanners == index])
+        found += np.bincount(own[visible.indices], minlength=count)
+    return found
+
+
+def _add(
+    sums: _FigureSums, columns: RunColumns, stretch: tuple[RunSegment, int, int], given: tuple[FloatArray, IntArray]
+) -> None:
+    """Add the detections of some cycles of one segment; `given` are the beliefs before them and the numbers."""
+    segment, first, after = stretch
+    priors, own = given
+    setup, count = segment.setup, len(sums.nis)
+    rows = slice(int(columns.offsets[first]), int(columns.offsets[after]))
+    reflector, status, d2 = columns.reflector[rows], columns.status[rows], columns.d2[rows]
+    if not len(setup.reflectors) or not len(reflector):
+        return
+    counts = np.diff(columns.offsets[first : after + 1])
+    mountings = np.array([scanner.mounting for scanner in setup.scanners])[columns.detected.scanners[first:after]]
+    sensors = np.repeat(se2.compose(priors, mountings), counts, axis=0)
+    delta = setup.reflectors.centers[reflector] - sensors[:, :2]
+    measured, ranges = columns.range_bearing[rows], np.hypot(delta[:, 0], delta[:, 1])
+    along = measured[:, 0] - setup.parameters.observation.range_bias - ranges
+    across = ranges * wrap(measured[:, 1] - np.arctan2(delta[:, 1], delta[:, 0]) + sensors[:, 2])
+    passed = (reflector >= 0) & (status != Status.OUTLIER_DETECTOR)
+    accepted = passed & (status == Status.INLIER)
+    near = accepted | (passed & (np.hypot(along, across) < BELONGS))
+    number, cycle = own[reflector], np.repeat(np.arange(first, after), counts)
+    sums.accepted += np.bincount(number[accepted], minlength=count)
+    sums.rejected += np.bincount(number[near & ~accepted], minlength=count)
+    scans = np.unique(number[near] * len(columns) + cycle[near]) // len(columns)
+    sums.seen += np.bincount(scans, minlength=count)
+    sums.nis += np.bincount(number[near], weights=d2[near], minlength=count)
+    for axis, values in enumerate((along, across)):
+        sums.first[axis] += np.bincount(number[accepted], weights=values[accepted], minlength=count)
+        sums.second[axis] += np.bincount(number[accepted], weights=values[accepted] ** 2, minlength=count)
+    # Cycles ascend: of each reflector the last one remains.
+    sums.last[number[accepted]] = cycle[accepted]
+
+
+def _averaged(
+    inputs: ReflectorFiguresInput, names: tuple[str, ...], places: FloatArray, sums: _FigureSums
+) -> ReflectorFigures:
+    """Figures of what was added up."""
+    total = sums.accepted.astype(np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        means = sums.first / total
+        variances = np.maximum(sums.second - total * means**2, 0.0) / (total - 1.0)
+        spreads = np.where(total > 1.0, np.sqrt(np.abs(variances)), math.nan)
+        nis = sums.nis / (sums.accepted + sums.rejected)
+    last = np.full(len(names), math.nan)
+    known = np.isfinite(sums.last)
+    last[known] = (inputs.columns.stamps_ns[sums.last[known].astype(np.int64)] - inputs.first_ns) * 1e-9
+    return ReflectorFigures(
+        inputs=inputs,
+        names=names,
+        places=read_only(places),
+        expected=read_only(sums.expected),
+        seen=read_only(sums.seen),
+        accepted=read_only(sums.accepted),
+        rejected=read_only(sums.rejected),
+        along_mean=read_only(means[0]),
+        along_spread=read_only(spreads[0]),
+        across_mean=read_only(means[1]),
+        across_spread=read_only(spreads[1]),
+        nis=read_only(nis),
+        last_seen=read_only(last),
+    )
