@@ -16,7 +16,16 @@ from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.ray_kernels import cast_ray
 from commission.localization.beam_echo import cylinder_echo, half_width_at, lit_part
-from commission.simulation.echo_intensity import PERSON, TAPE, WALL, Light, at_distance, mixed_echo, of_surface
+from commission.simulation.echo_intensity import (
+    PERSON,
+    TAPE,
+    WALL,
+    Light,
+    at_distance,
+    mixed_echo,
+    of_surface,
+    reported,
+)
 from commission.simulation.scan_kernels import (
     Hall,
     Moment,
@@ -148,7 +157,7 @@ def shine(  # noqa: PLR0917 - outputs of a scan
 
     Notes
     -----
-    I = min(sum of the echoes' strengths x (1 + noise), largest): by definition, see `mixed_echo`.
+    I = min(reported(sum of the echoes' strengths) x (1 + noise), largest): by definition, see `mixed_echo`.
     """
     _wall_cosines(echoes)
     for i in range(len(ranges)):
@@ -169,7 +178,8 @@ def shine(  # noqa: PLR0917 - outputs of a scan
         if not beams.nearest <= measured <= beams.farthest:
             measured, strength = math.nan, 0.0
         ranges[i] = measured
-        intensities[i] = min(max(strength * (1.0 + light.noise * noise[i]), 0.0), light.largest)
+        told = reported(strength, light) * max(1.0 + light.noise * noise[i], 0.0)
+        intensities[i] = min(told, light.largest)
 
 
 @compiled

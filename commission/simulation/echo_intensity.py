@@ -28,6 +28,7 @@ class Light(NamedTuple):
     echo_length: float
     crosstalk: float
     crosstalk_width: float
+    response: float
     largest: float
 
 
@@ -47,6 +48,7 @@ def light_of(model: IntensityModel) -> Light:
         model.echo_length,
         model.crosstalk,
         model.crosstalk_width,
+        model.response,
         model.largest,
     )
 
@@ -95,6 +97,24 @@ def of_surface(kind: int, cosine: float, light: Light) -> float:
         off = math.acos(min(cosine, 1.0)) / light.shiny_lobe
         return light.wall * cosine + light.shiny * math.exp(-0.5 * off * off)
     return light.wall * cosine
+
+
+@compiled_inline
+def reported(strength: float, light: Light) -> float:
+    """Intensity that the scanner reports of so much light, without noise.
+
+    Parameters
+    ----------
+    strength : of the light, in the unit of the model's intensities.
+    light : of the virtual world.
+
+    Notes
+    -----
+    min(t (I / t)^g, largest) with the intensity t of tape: by definition, what is as bright as tape stays as it is.
+    """
+    if light.response == 1.0 or light.tape == 0.0:
+        return min(strength, light.largest)
+    return min(light.tape * (strength / light.tape) ** light.response, light.largest)
 
 
 @compiled_inline

@@ -18,7 +18,7 @@ from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
 from commission.geometry.se2 import compose
 from commission.simulation.bright_kernels import meet_everything, meet_in_sweep, no_echoes, shine
-from commission.simulation.echo_intensity import SHINY, TAPE, at_distance, light_of
+from commission.simulation.echo_intensity import SHINY, TAPE, at_distance, light_of, reported
 from commission.simulation.scan_kernels import FLAT_COSINE, Hall, Moment, ScannerBeams, cast_scan, cast_sweep
 from commission.site.detection_rates import detection_rate
 from commission.site.disturbances import Disturbances
@@ -157,7 +157,7 @@ class VirtualScanner:
         glinting = np.zeros(count, np.bool_)
         self._glint(ranges, glinting, rng)
         for i in np.flatnonzero(glinting):
-            intensities[i] = min(light.tape * at_distance(float(ranges[i]), light), light.largest)
+            intensities[i] = reported(light.tape * at_distance(float(ranges[i]), light), light)
         self._blind(ranges, intensities)
         return ranges, intensities
 

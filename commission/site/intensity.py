@@ -73,6 +73,9 @@ class IntensityModel:
         float, Quantity(label="Overflows by", unit="rad", shown=DEGREES, bounds=_ANGLE, step=0.1, decimals=6)
     ] = 0.01
     """Angle over which that share falls to 37 %."""
+    response: Annotated[float, Quantity(label="Reported by power", bounds=Bounds.between(0.01, 10.0), step=0.01)] = 1.0
+    """Power of the light by which the reported intensity grows, from that of reflectors down; 1: in proportion. Many
+    scanners report far less than that: walls before a real TiM781S follow a power of 0.18."""
     largest: Annotated[float, Quantity(label="Saturates at", unit=UNIT, shown=BARE, bounds=POSITIVE, step=0.1)] = 10.0
     """Largest intensity that is reported."""
 

@@ -212,6 +212,14 @@ def test_overflow_hides_a_dark_wall_close_behind_and_mixes_with_it() -> None:
     assert ranges[first] == pytest.approx(5.0, abs=0.02)
 
 
+@pytest.mark.parametrize("response", [0.18, 0.5, 1.0])
+def test_a_scanner_reports_a_power_of_the_light_from_that_of_tape_down(response: float) -> None:
+    model = replace(PURE, reflector=300.0, wall=3.0, response=response)
+    assert scan(model, reflectors=plate(10.0))[1][ahead(THIN)] == pytest.approx(300.0, rel=1e-5)
+    of_wall = scan(model, floor_map=room(20.0, 20.0), pose=(10.05, 10.0, 0.0))[1][ahead(THIN)]
+    assert of_wall == pytest.approx(300.0 * (3.0 * (10.0 / 9.9) ** 2 / 300.0) ** response, rel=1e-5)
+
+
 @pytest.mark.parametrize(("level", "expected"), [(0.49, 49.0), (0.51, 50.0)])
 def test_the_receiver_saturates(level: float, expected: float) -> None:
     _, intensities = scan(replace(PURE, reflector=level, largest=50.0), reflectors=plate(1.0))

@@ -48,6 +48,7 @@ FIELDS = {
     "intensity.echo_length": ("Echoes mix over [m]", 1.0),
     "intensity.crosstalk": ("Overflow [%]", 100.0),
     "intensity.crosstalk_width": ("Overflows by [°]", DEGREES),
+    "intensity.response": ("Reported by power", 1.0),
     "intensity.largest": ("Saturates at", 1.0),
     "constants.survey_factor": ("Survey", 1.0),
     "constants.survey_sigma": ("Survey 1σ [mm]", 1000.0),
