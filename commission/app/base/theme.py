@@ -229,6 +229,11 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 .c-table td{{padding:1px 0;vertical-align:top}}
 .c-table td:first-child{{opacity:.65;padding-right:10px;white-space:nowrap}}
 .c-table td:last-child{{text-align:right}}
+.c-before-after{{width:100%;border-collapse:collapse;font-size:12px;font-variant-numeric:tabular-nums;margin-top:4px}}
+.c-before-after td{{padding:1px 0 1px 8px;text-align:right;white-space:nowrap}}
+.c-before-after td:first-child{{padding-left:0;text-align:left;opacity:.65;white-space:normal}}
+.c-before-after td[colspan]{{padding-top:5px;opacity:1}}
+.c-before-after tr:first-child td{{opacity:.65}}
 @media (max-width:1500px){{.c-beside{{display:none}}}}
 .c-list{{margin:1px 0 2px;padding-left:15px;font-size:12px;line-height:1.4;overflow-wrap:anywhere;
  font-variant-numeric:tabular-nums}}

@@ -24,11 +24,11 @@ from commission.app.placement.actions import (
     SetLayout,
     TakePreset,
 )
+from commission.app.placement.before_after import before_after
 from commission.app.placement.keep_out_tool import KeepOutTool
 from commission.app.placement.service import LAYOUT
 from commission.app.placement.view import LayoutView
 from commission.app.placement.wish import LayoutWish
-from commission.planning.layout_figures import compared
 from commission.site.fields import get_field
 from commission.site.layout_brief import DEMAND_PRESETS, Demands, LayoutBrief
 from commission.site.quantity import DEGREES, MILLIMETRES
@@ -193,9 +193,8 @@ def found_text(found: LayoutView) -> str:
     elif found.wished_otherwise:
         notes.append("The demands have changed since: suggest again.")
     notes_html = "".join(f"<div class='c-note'>{escaped(note)}</div>" for note in notes)
-    changes = compared(suggestion.before, suggestion.after)
-    notes_html += table([(escaped(name), escaped(change.replace("->", "→"))) for name, change in changes])
-    return f"<div class='c-layout' style='padding:2px 10px 4px 6px'>{table(rows)}{notes_html}</div>"
+    told = f"{table(rows)}{notes_html}{before_after(suggestion.before, suggestion.after)}"
+    return f"<div class='c-layout' style='padding:2px 10px 4px 6px'>{told}</div>"
 
 
 def _unmet_lines(suggestion: PlacementResult) -> list[tuple[str, theme.Color]]:
