@@ -220,10 +220,12 @@ def _told(path: Path) -> Generator[None]:
     """Turn what the library raises over a damaged bag into one line."""
     import apsw
     from rosbags.highlevel import AnyReaderError
+    from rosbags.rosbag1 import ReaderError as Ros1Error
+    from rosbags.rosbag2 import ReaderError as Ros2Error
     from rosbags.serde import SerdeError
     from rosbags.typesys import TypesysError
 
-    garbage = (AnyReaderError, SerdeError, TypesysError, apsw.Error, struct.error)
+    garbage = (AnyReaderError, Ros1Error, Ros2Error, SerdeError, TypesysError, apsw.Error, struct.error)
     plain = (ValueError, LookupError, AssertionError, EOFError, RuntimeError, TypeError, ArithmeticError)
     try:
         yield
