@@ -270,10 +270,24 @@ def importing(page: OpenPage, _runtime: Runtime) -> None:
     page.wait_for_text("Nothing has changed yet")
 
 
+def listed(name: str) -> Steps:
+    """Events or reflectors of the drive beside the plots; of reflectors the NIS colors the floor."""
+
+    def steps(page: OpenPage, _runtime: Runtime) -> None:
+        page.page.wait_for_function("() => /Events \\d/.test(document.querySelector('.c-views').innerText)")
+        page.page.locator(".c-views button", has_text=name).click()
+        if name == "Reflectors":
+            page.page.get_by_label("Color by NIS").click()
+
+    return steps
+
+
 PICTURES = (
     Picture("page_laboratory", "laboratory", tab("Run", "Legend")),
     Picture("page_3d", "shop_floor", three_d),
     Picture("covered", "shop_floor", covered),
+    Picture("events", "shop_floor", listed("Events"), world=vain),
+    Picture("reflectors", "shop_floor", listed("Reflectors")),
     Picture("site", "shop_floor", tab("Site", "Problems")),
     Picture("tune", "shop_floor", tab("Tune", "Reflectors")),
     Picture("page_shop_floor", "shop_floor", selected),

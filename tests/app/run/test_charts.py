@@ -95,6 +95,12 @@ def test_the_nis_of_each_is_that_of_all_near_a_reflector_accepted_or_not(strict:
     ]
     np.testing.assert_array_equal(line.values(strict), expected)
     np.testing.assert_array_equal(line.values(strict, slice(10, 30)), expected[10:30])
+    # What the detector did not pass has none, even where a distance stands in its row.
+    status = strict.columns.status.copy()
+    status[[3, 7]] = Status.OUTLIER_DETECTOR
+    passed = replace(strict, columns=replace(strict.columns, status=status))
+    assert np.flatnonzero(np.isnan(line.values(passed, slice(0, 10)))).tolist() == [3, 7]
+    assert np.isfinite(strict.columns.d2[:10]).all()
 
 
 @pytest.mark.parametrize("name", [name for name, expected in EXPECTED.items() if expected], ids=" ".join)

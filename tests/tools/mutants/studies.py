@@ -142,4 +142,35 @@ STUDIES = (
         ),
         tests=(TESTS + "test_inputs.py::test_whatever_edit_changes_a_result_changes_the_input",),
     ),
+    Mutant(
+        name="a second without an accepted detection is blind",
+        file="commission/studies/events.py",
+        find="if lasts > BLIND_S:",
+        replace="if lasts >= BLIND_S:",
+        tests=("tests/studies/test_events.py::test_a_stretch_without_an_accepted_detection_is_blind_beyond_a_second",),
+    ),
+    Mutant(
+        name="a jump is told by the position alone",
+        file="commission/studies/events.py",
+        find=" | (turned > JUMP_SHARE * limits[here, 1])",
+        replace="",
+        tests=("tests/studies/test_events.py::test_a_correction_is_a_jump_beyond_half_of_a_limit",),
+    ),
+    Mutant(
+        name="innovations across the beam count to the right",
+        file="commission/studies/reflector_figures.py",
+        find="across = ranges * wrap(",
+        replace="across = -ranges * wrap(",
+        tests=("tests/studies/test_reflector_figures.py::test_every_figure_equals_a_plain_recount",),
+    ),
+    Mutant(
+        name="reflectors are expected while they are covered",
+        file="commission/studies/reflector_figures.py",
+        find="if index not in models and not segment.covered and len",
+        replace="if index not in models and len",
+        tests=(
+            "tests/studies/test_reflector_figures.py::"
+            "test_nothing_is_expected_while_reflectors_are_covered_or_out_of_reach",
+        ),
+    ),
 )
