@@ -12,9 +12,9 @@ from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.consider import BLOCKS, PER_REFLECTOR, PER_SCANNER, Considering
 
-NOTHING = 1e-24
-"""What is smaller is 0 [m^2]: a millionth of a micrometre squared moves no pose, and costs as much as what does."""
-CHUNK = 64
+NOTHING = 1e-20
+"""What is smaller is 0 [m^2]: the square of a tenth of a nanometre moves no pose, and costs as much as what does."""
+CHUNK = 32
 """Columns that are carried over a scan, or left alone, together: of whole reflectors."""
 RECHECKED = 50
 """Scans after which a chunk is looked at whether anything is left in it."""

@@ -14,15 +14,10 @@ from numpy.typing import NDArray
 from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.directions import UnitVector, direction_of
-from commission.localization.association import INLIER, NOBODY, associate
-from commission.localization.consider import (
-    BLOCKS,
-    PER_REFLECTOR,
-    Considering,
-    considering,
-    correct_aimed_with,
-)
+from commission.localization.association import INLIER, NOBODY, Gate, associate
+from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering, considering
 from commission.localization.consider_columns import begin, busy_chunks, put_back, put_block, take_along
+from commission.localization.consider_correction import correct_aimed_with
 from commission.localization.kalman import correct_aimed
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import NextOdometry, OdometryNoise, advance, reach
@@ -146,6 +141,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         detections,
         aims,
         observation,
+        model.gate,
         places,
         cross,
         given,
@@ -259,6 +255,7 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
     detections: FloatArray,
     aims: FloatArray,
     observation: ObservationModel,
+    gate: Gate,
     places: FloatArray,
     cross: FloatArray | None,
     given: Considering | None,
@@ -277,6 +274,7 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
     detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
     aims : see `prepare`.
     observation : mounting and noise of the scanner.
+    gate : of the association filter: with it no two detections are of one reflector.
     places : the map, see `ReflectorIndex`.
     cross : covariance of the pose with the constants, written in place; None: none is considered.
     given, work, busy : of the scan, where constants are considered, else None.
@@ -303,12 +301,14 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
         if status[i] != INLIER:
             continue
         entry, distance = entries[i], detections[i, 0] - observation.range_bias
-        earlier = _earlier(i, first, status, entries)
+        earlier = i if gate.enabled else _earlier(i, first, status, entries)
         if earlier == i:
-            aims[i - first, 2] = width
-            take_along(work, width, cross, entry)
+            at = width
+            take_along(work, at, cross, entry)
             width += PER_REFLECTOR
-        at = int(aims[earlier - first, 2])
+        else:
+            at = int(aims[earlier - first, 2])
+        aims[i - first, 2] = at
         aim = UnitVector(aims[i - first, 0], aims[i - first, 1])
         x, y, variance = places[entry, 0], places[entry, 1], places[entry, 2]
         belief, facing = correct_aimed_with(
@@ -317,7 +317,7 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
     put_back(cross, work, len(places), scanner, busy)
     for i in range(first, last):
         if status[i] == INLIER:
-            put_block(cross, work, int(aims[_earlier(i, first, status, entries) - first, 2]), entries[i], busy)
+            put_block(cross, work, int(aims[i - first, 2]), entries[i], busy)
     return belief
 
 

@@ -79,12 +79,7 @@ def innovation(  # noqa: PLR0917 - a measurement, number by number
     e = expected
     range_noise = model.range_variance + surveyed_variance
     bearing_noise = model.bearing_variance + surveyed_variance * (e.bearing_x * e.bearing_x + e.bearing_y * e.bearing_y)
-    range_px = belief.xx * e.range_x + belief.xy * e.range_y + belief.xt * e.range_theta
-    range_py = belief.xy * e.range_x + belief.yy * e.range_y + belief.yt * e.range_theta
-    range_pt = belief.xt * e.range_x + belief.yt * e.range_y + belief.tt * e.range_theta
-    bearing_px = belief.xx * e.bearing_x + belief.xy * e.bearing_y + belief.xt * e.bearing_theta
-    bearing_py = belief.xy * e.bearing_x + belief.yy * e.bearing_y + belief.yt * e.bearing_theta
-    bearing_pt = belief.xt * e.bearing_x + belief.yt * e.bearing_y + belief.tt * e.bearing_theta
+    range_px, range_py, range_pt, bearing_px, bearing_py, bearing_pt = covariance_with_expected(belief, e)
     s_rr = e.range_x * range_px + e.range_y * range_py + e.range_theta * range_pt + range_noise
     s_rb = e.bearing_x * range_px + e.bearing_y * range_py + e.bearing_theta * range_pt
     s_bb = e.bearing_x * bearing_px + e.bearing_y * bearing_py + e.bearing_theta * bearing_pt + bearing_noise
@@ -242,32 +237,52 @@ def corrected_covariance(
 
     Notes
     -----
-    A P A^T + K R K^T with A = I - K H: Joseph form (Bar-Shalom, Li, Kirubarajan 2001, equation 5.2.3-18).
+    A P A^T + K R K^T with A = I - K H: Joseph form (Bar-Shalom, Li, Kirubarajan 2001, equation 5.2.3-18). A multiplies
+    as what it is, the identity less K H: M = P - K (H P), then M - (M H^T - K R) K^T, the upper triangle alone, which
+    is the one symmetrization.
     """
-    a00 = 1.0 - k.xr * e.range_x - k.xb * e.bearing_x
-    a01 = -k.xr * e.range_y - k.xb * e.bearing_y
-    a02 = -k.xr * e.range_theta - k.xb * e.bearing_theta
-    a10 = -k.yr * e.range_x - k.yb * e.bearing_x
-    a11 = 1.0 - k.yr * e.range_y - k.yb * e.bearing_y
-    a12 = -k.yr * e.range_theta - k.yb * e.bearing_theta
-    a20 = -k.tr * e.range_x - k.tb * e.bearing_x
-    a21 = -k.tr * e.range_y - k.tb * e.bearing_y
-    a22 = 1.0 - k.tr * e.range_theta - k.tb * e.bearing_theta
-    # M = A P, then A P A^T + K R K^T: the upper triangle alone, which is the one symmetrization.
-    m00, m01 = a00 * p.xx + a01 * p.xy + a02 * p.xt, a00 * p.xy + a01 * p.yy + a02 * p.yt
-    m02 = a00 * p.xt + a01 * p.yt + a02 * p.tt
-    m10, m11 = a10 * p.xx + a11 * p.xy + a12 * p.xt, a10 * p.xy + a11 * p.yy + a12 * p.yt
-    m12 = a10 * p.xt + a11 * p.yt + a12 * p.tt
-    m20, m21 = a20 * p.xx + a21 * p.xy + a22 * p.xt, a20 * p.xy + a21 * p.yy + a22 * p.yt
-    m22 = a20 * p.xt + a21 * p.yt + a22 * p.tt
-    rr, bb = range_noise, bearing_noise
+    range_px, range_py, range_pt, bearing_px, bearing_py, bearing_pt = covariance_with_expected(p, e)
+    m00, m01 = p.xx - k.xr * range_px - k.xb * bearing_px, p.xy - k.xr * range_py - k.xb * bearing_py
+    m10, m11 = p.xy - k.yr * range_px - k.yb * bearing_px, p.yy - k.yr * range_py - k.yb * bearing_py
+    m20, m21 = p.xt - k.tr * range_px - k.tb * bearing_px, p.yt - k.tr * range_py - k.tb * bearing_py
+    m02, m12 = p.xt - k.xr * range_pt - k.xb * bearing_pt, p.yt - k.yr * range_pt - k.yb * bearing_pt
+    m22 = p.tt - k.tr * range_pt - k.tb * bearing_pt
+    xr = m00 * e.range_x + m01 * e.range_y + m02 * e.range_theta - range_noise * k.xr
+    yr = m10 * e.range_x + m11 * e.range_y + m12 * e.range_theta - range_noise * k.yr
+    tr = m20 * e.range_x + m21 * e.range_y + m22 * e.range_theta - range_noise * k.tr
+    xb = m00 * e.bearing_x + m01 * e.bearing_y + m02 * e.bearing_theta - bearing_noise * k.xb
+    yb = m10 * e.bearing_x + m11 * e.bearing_y + m12 * e.bearing_theta - bearing_noise * k.yb
+    tb = m20 * e.bearing_x + m21 * e.bearing_y + m22 * e.bearing_theta - bearing_noise * k.tb
     return (
-        m00 * a00 + m01 * a01 + m02 * a02 + rr * k.xr * k.xr + bb * k.xb * k.xb,
-        m00 * a10 + m01 * a11 + m02 * a12 + rr * k.xr * k.yr + bb * k.xb * k.yb,
-        m00 * a20 + m01 * a21 + m02 * a22 + rr * k.xr * k.tr + bb * k.xb * k.tb,
-        m10 * a10 + m11 * a11 + m12 * a12 + rr * k.yr * k.yr + bb * k.yb * k.yb,
-        m10 * a20 + m11 * a21 + m12 * a22 + rr * k.yr * k.tr + bb * k.yb * k.tb,
-        m20 * a20 + m21 * a21 + m22 * a22 + rr * k.tr * k.tr + bb * k.tb * k.tb,
+        m00 - xr * k.xr - xb * k.xb,
+        m01 - xr * k.yr - xb * k.yb,
+        m02 - xr * k.tr - xb * k.tb,
+        m11 - yr * k.yr - yb * k.yb,
+        m12 - yr * k.tr - yb * k.tb,
+        m22 - tr * k.tr - tb * k.tb,
+    )
+
+
+@compiled_inline
+def covariance_with_expected(p: PoseGaussian, e: Expected) -> tuple[float, float, float, float, float, float]:
+    """Covariance of x, y and heading with the expected range, then with the expected bearing.
+
+    Parameters
+    ----------
+    p : its covariance is P; its mean is not read.
+    e : its Jacobian is H.
+
+    Notes
+    -----
+    P H^T, by definition.
+    """
+    return (
+        p.xx * e.range_x + p.xy * e.range_y + p.xt * e.range_theta,
+        p.xy * e.range_x + p.yy * e.range_y + p.yt * e.range_theta,
+        p.xt * e.range_x + p.yt * e.range_y + p.tt * e.range_theta,
+        p.xx * e.bearing_x + p.xy * e.bearing_y + p.xt * e.bearing_theta,
+        p.xy * e.bearing_x + p.yy * e.bearing_y + p.yt * e.bearing_theta,
+        p.xt * e.bearing_x + p.yt * e.bearing_y + p.tt * e.bearing_theta,
     )
 
 

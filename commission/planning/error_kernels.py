@@ -19,11 +19,11 @@ from commission.localization.consider import (
     ConsiderModel,
     ScannerJacobian,
     considering_at,
-    correct_given,
     innovation_given,
     scanner_jacobian,
 )
 from commission.localization.consider_columns import working_array
+from commission.localization.consider_correction import correct_given
 from commission.localization.kalman import Gain, Innovation, corrected_covariance, gain, innovation
 from commission.localization.observation import Expected, ObservationModel, expect, observation_at, scanner_offset
 from commission.localization.odometry import OdometryNoise, predict

@@ -18,10 +18,10 @@ from commission.localization.consider import (
     Considering,
     ConsiderModel,
     considering_at,
-    correct_given,
     innovation_given,
 )
 from commission.localization.consider_columns import put_back, put_block, take_out, working_array
+from commission.localization.consider_correction import correct_given
 from commission.localization.kalman import innovation, squared_distance
 from commission.localization.observation import ObservationModel, expect, observation_at, scanner_offset
 from commission.localization.odometry import OdometryNoise, predict

@@ -1,7 +1,7 @@
 """A project and a recording of the time of one scanner give what they gave then.
 
-`schema_1/` and the figures below are those of the program before it had several scanners, and on the machine on which
-they were made every bit is the same. Mathematical libraries round differently on other processors: 1e-9 is held here.
+`schema_1/` and the figures below are those of the program before it had several scanners. The filter rounds some last
+bits otherwise since it works with directions instead of angles, and so do other processors: 1e-9 is held here.
 Then, the beams expected of a reflector were those of equation 3 as printed: the project here asks for them. Predictions
 took in the reflectors of a scan in the order of their file; by distance, as now, figures are smaller by 0.1 to 0.35 %.
 """

@@ -36,14 +36,14 @@ def test_a_chunk_rests_once_nothing_is_left_in_it_and_wakes_with_its_reflector()
     cross = np.zeros((3, COLUMNS))
     cross[:, CHUNK + 2] = 1.0
     busy = busy_chunks(cross)
-    assert busy.tolist() == [0, RECHECKED, 0, 0]
+    assert busy.tolist() == [0, RECHECKED, 0, 0, 0, 0, 0]
     for _ in range(8 * RECHECKED):
         put_back(cross, scan(rng), REFLECTORS, 0, busy)
     assert not cross[:, :-5].any()
     # The scanner's columns are written at each scan.
-    assert (busy > 0).tolist() == [False, False, False, True]
-    put_block(cross, scan(rng), 8, REFLECTORS // 3, busy)
-    assert (busy > 0).tolist() == [False, True, False, True]
+    assert (busy > 0).tolist() == [False, False, False, False, False, False, True]
+    put_block(cross, scan(rng), 8, CHUNK // 2 + 1, busy)
+    assert (busy > 0).tolist() == [False, True, False, False, False, False, True]
 
 
 def test_what_is_smaller_than_nothing_is_zero() -> None:

@@ -1,0 +1,250 @@
+"""Correct with considered constants: the belief, and its covariance with them, take in one associated detection.
+
+What the constants are, and what they have to do with a detection, is in `consider`; without them it is `kalman`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from commission.compiled import compiled_inline
+from commission.geometry.angles import wrap_scalar
+from commission.geometry.arrays import FloatArray
+from commission.geometry.directions import UnitVector, composed, direction_of, turn_to, turned_by
+from commission.localization.consider import (
+    CLOCK,
+    MOUNT_HEADING,
+    MOUNT_X,
+    MOUNT_Y,
+    RANGE_BIAS,
+    Considering,
+    ConsiderModel,
+    Seen,
+    innovation_with,
+    seen_with,
+)
+from commission.localization.kalman import (
+    Corrected,
+    Gain,
+    correct,
+    corrected_covariance,
+    gain,
+)
+from commission.localization.observation import (
+    Expected,
+    ObservationModel,
+    expect,
+    expect_at,
+    offset_facing,
+    scanner_offset,
+)
+from commission.localization.pose_gaussian import PoseGaussian
+
+
+@compiled_inline
+def correct_with(  # noqa: PLR0917 - a measurement and a reflector, number by number
+    belief: PoseGaussian,
+    measured_range: float,
+    measured_bearing: float,
+    reflector_x: float,
+    reflector_y: float,
+    surveyed_variance: float,
+    model: ObservationModel,
+    given: Considering,
+    work: FloatArray,
+    at: int,
+) -> PoseGaussian:
+    """Correct a belief, and its covariance with the constants, by one detection of one reflector.
+
+    Parameters
+    ----------
+    belief : before the correction; it is linearized there.
+    measured_range, measured_bearing : range bias already taken off [m], [rad].
+    reflector_x, reflector_y : the reflector's center [m], map frame.
+    surveyed_variance : of the reflector's place, each axis [m^2].
+    model : of the observation.
+    given : of the scan.
+    work : working array of the scan, corrected in place.
+    at : first of the two columns of the reflector.
+
+    Notes
+    -----
+    No formula: `corrected_with`, of a bearing.
+    """
+    offset_x, offset_y = scanner_offset(belief.theta, model)
+    e = expect(belief.x, belief.y, belief.theta, offset_x, offset_y, reflector_x, reflector_y, model.mount_theta)
+    turn, facing = wrap_scalar(measured_bearing - e.bearing), direction_of(belief.theta)
+    width = work.shape[1]
+    return corrected_with(
+        belief, facing, e, measured_range, turn, surveyed_variance, model, given, work, width, at
+    ).belief
+
+
+@compiled_inline
+def correct_aimed_with(  # noqa: PLR0917 - a measurement and a reflector, number by number
+    belief: PoseGaussian,
+    facing: UnitVector,
+    measured_range: float,
+    aim: UnitVector,
+    reflector_x: float,
+    reflector_y: float,
+    surveyed_variance: float,
+    model: ObservationModel,
+    given: Considering,
+    work: FloatArray,
+    width: int,
+    at: int,
+) -> Corrected:
+    """Correct a belief like `correct_with`, by directions instead of angles: without arctangent, sine and cosine.
+
+    Parameters
+    ----------
+    belief : before the correction; it is linearized there.
+    facing : its heading.
+    measured_range : range bias already taken off [m].
+    aim : measured bearing, in base.
+    reflector_x, reflector_y, surveyed_variance, model, given, work, at : as in `correct_with`.
+    width : columns of `work` that are in use.
+
+    Notes
+    -----
+    No formula: `corrected_with`, of a direction.
+    """
+    offset_x, offset_y = offset_facing(facing, model)
+    dx, dy = reflector_x - (belief.x + offset_x), reflector_y - (belief.y + offset_y)
+    e = expect_at(dx, dy, math.nan, offset_x, offset_y)
+    turn = turn_to(-e.range_x, -e.range_y, composed(facing, aim))
+    return corrected_with(belief, facing, e, measured_range, turn, surveyed_variance, model, given, work, width, at)
+
+
+@compiled_inline
+def corrected_with(  # noqa: PLR0917 - a measurement and a reflector, number by number
+    belief: PoseGaussian,
+    facing: UnitVector,
+    e: Expected,
+    measured_range: float,
+    turn: float,
+    surveyed_variance: float,
+    model: ObservationModel,
+    given: Considering,
+    work: FloatArray,
+    width: int,
+    at: int,
+) -> Corrected:
+    """Belief, and its covariance with the constants, after one detection of one reflector.
+
+    Parameters
+    ----------
+    belief, facing : before the correction, and the direction of its heading.
+    e : observation expected from its mean; its bearing is not read.
+    measured_range : range bias already taken off [m].
+    turn : from the expected bearing to the measured one [rad].
+    surveyed_variance, model, given, work, at : as in `correct_with`.
+    width : columns of `work` that are in use.
+
+    Notes
+    -----
+    x = x + K v, P = A P A^T + K N K^T - D K^T - K D^T with D = C J^T and N = R + J P_p J^T + H D + (H D)^T, which is
+    Joseph's form of the whole state, and C = A C - K J P_p: Schmidt 1966; A = I - K H.
+    """
+    d = seen_with(facing, e, surveyed_variance, given, work, at)
+    v = innovation_with(belief, e, measured_range, turn, model, d)
+    k = gain(v)
+    hd_rr = e.range_x * d.xr + e.range_y * d.yr + e.range_theta * d.tr
+    hd_rb = e.range_x * d.xb + e.range_y * d.yb + e.range_theta * d.tb
+    hd_br = e.bearing_x * d.xr + e.bearing_y * d.yr + e.bearing_theta * d.tr
+    hd_bb = e.bearing_x * d.xb + e.bearing_y * d.yb + e.bearing_theta * d.tb
+    n_rb = d.rb + hd_rb + hd_br
+    xx, xy, xt, yy, yt, tt = corrected_covariance(
+        belief, e, k, v.range_noise + d.rr + 2.0 * hd_rr, v.bearing_noise + d.bb + 2.0 * hd_bb
+    )
+    _correct_cross(work, width, e, k)
+    _add_constants(work, at, e, k, d, surveyed_variance, given.variances)
+    heading = k.tr * v.range + k.tb * v.bearing
+    after = PoseGaussian(
+        belief.x + k.xr * v.range + k.xb * v.bearing,
+        belief.y + k.yr * v.range + k.yb * v.bearing,
+        wrap_scalar(belief.theta + heading),
+        xx + 2.0 * (n_rb * k.xr * k.xb - d.xr * k.xr - d.xb * k.xb),
+        xy + n_rb * (k.xr * k.yb + k.xb * k.yr) - d.xr * k.yr - d.xb * k.yb - k.xr * d.yr - k.xb * d.yb,
+        xt + n_rb * (k.xr * k.tb + k.xb * k.tr) - d.xr * k.tr - d.xb * k.tb - k.xr * d.tr - k.xb * d.tb,
+        yy + 2.0 * (n_rb * k.yr * k.yb - d.yr * k.yr - d.yb * k.yb),
+        yt + n_rb * (k.yr * k.tb + k.yb * k.tr) - d.yr * k.tr - d.yb * k.tb - k.yr * d.tr - k.yb * d.tb,
+        tt + 2.0 * (n_rb * k.tr * k.tb - d.tr * k.tr - d.tb * k.tb),
+    )
+    return Corrected(after, turned_by(facing, heading))
+
+
+@compiled_inline
+def _correct_cross(work: FloatArray, width: int, e: Expected, k: Gain) -> None:
+    """A C of every column in use."""
+    for j in range(width):
+        x, y, theta = work[0, j], work[1, j], work[2, j]
+        r = e.range_x * x + e.range_y * y + e.range_theta * theta
+        b = e.bearing_x * x + e.bearing_y * y + e.bearing_theta * theta
+        work[0, j] = x - k.xr * r - k.xb * b
+        work[1, j] = y - k.yr * r - k.yb * b
+        work[2, j] = theta - k.tr * r - k.tb * b
+
+
+@compiled_inline
+def _add_constants(  # noqa: PLR0917 - a detection and the constants, number by number
+    work: FloatArray, at: int, e: Expected, k: Gain, d: Seen, surveyed_variance: float, p: ConsiderModel
+) -> None:
+    """Take K J P_p off the columns of those constants that a detection has to do with."""
+    _add(work, MOUNT_X, k, p.mount_position * d.mount_xr, p.mount_position * d.mount_xb)
+    _add(work, MOUNT_Y, k, p.mount_position * d.mount_yr, p.mount_position * d.mount_yb)
+    _add(work, MOUNT_HEADING, k, 0.0, -p.mount_heading)
+    _add(work, RANGE_BIAS, k, p.range_bias, 0.0)
+    _add(work, CLOCK, k, p.clock * d.clock_r, p.clock * d.clock_b)
+    _add(work, at, k, -surveyed_variance * e.range_x, -surveyed_variance * e.bearing_x)
+    _add(work, at + 1, k, -surveyed_variance * e.range_y, -surveyed_variance * e.bearing_y)
+
+
+@compiled_inline
+def _add(work: FloatArray, column: int, k: Gain, r: float, b: float) -> None:
+    """Take K J P_p off one column."""
+    work[0, column] -= k.xr * r + k.xb * b
+    work[1, column] -= k.yr * r + k.yb * b
+    work[2, column] -= k.tr * r + k.tb * b
+
+
+@compiled_inline
+def correct_given(  # noqa: PLR0917 - a measurement and a reflector, number by number
+    belief: PoseGaussian,
+    measured_range: float,
+    measured_bearing: float,
+    reflector_x: float,
+    reflector_y: float,
+    surveyed_variance: float,
+    model: ObservationModel,
+    given: Considering | None,
+    work: FloatArray | None,
+    at: int,
+) -> PoseGaussian:
+    """Correct a belief by a detection, with constants where they are considered.
+
+    Parameters
+    ----------
+    belief, measured_range, measured_bearing : as in `kalman.correct`.
+    reflector_x, reflector_y, surveyed_variance, model : as in `kalman.correct`.
+    given, work, at : as in `correct_with`, or None.
+
+    Notes
+    -----
+    No formula: `correct` or `correct_with`.
+    """
+    if given is None or work is None:
+        return correct(belief, measured_range, measured_bearing, reflector_x, reflector_y, surveyed_variance, model)
+    return correct_with(
+        belief,
+        measured_range,
+        measured_bearing,
+        reflector_x,
+        reflector_y,
+        surveyed_variance,
+        model,
+        given,
+        work,
+        at,
+    )
