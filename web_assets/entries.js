@@ -94,6 +94,11 @@
     post.call(worker, { type: "send", message: { type: "GuiUpdateMessage", uuid, updates: { value } } });
     return true;
   }
+  // What another script has entered is shown at once, as if the program had written it.
+  window.commissionShow = (uuid, value) => {
+    const messages = [{ type: "GuiUpdateMessage", uuid, updates: { value } }];
+    worker?.onmessage({ data: { type: "message_batch", messages } });
+  };
 
   // Show what held before, or what was written into the field while it was typed into.
   function restore({ input, uuid, before: text, held }) {

@@ -181,7 +181,15 @@ class AssociationParameters:
     enabled: Annotated[bool, Switch("Association filter")] = True
     """Whether detections outside the validation gate of their likeliest reflector are rejected (association filter)."""
     gate_probability: Annotated[
-        float, Quantity(label="Gate", shown=PERCENT, bounds=Bounds.inside(0.0, 1.0), step=0.01, slider=(50.0, 99.99))
+        float,
+        Quantity(
+            label="Gate",
+            shown=PERCENT,
+            bounds=Bounds.inside(0.0, 1.0),
+            step=0.01,
+            slider=(50.0, 99.99),
+            is_tail=True,
+        ),
     ] = 0.95
     """Probability that a true detection falls inside the validation gate, P_G."""
 

@@ -187,6 +187,8 @@ class Quantity:
     """Step of its widget, in the page's unit; texts have its decimals."""
     slider: tuple[float, float] | None = None
     """Ends of its slider in the page's unit, a value beyond moves them; none: it is typed."""
+    is_tail: bool = False
+    """Whether its slider is logarithmic in what is missing to 1: of a probability near 1."""
     entry: tuple[float, float] | None = None
     """What may be typed on the page, in its unit; none: what the bounds allow."""
     decimals: int | None = None
@@ -236,6 +238,15 @@ class Quantity:
     def brief(self, value: float) -> str:
         """Return a value as the page writes it where room is scarce: with no digit that says nothing."""
         return _with_unit(self.on_page(value), self.shown_unit)
+
+    def limits(self) -> str:
+        """Say in the page's unit what may be entered; empty: any number."""
+        if self.entry is not None:
+            low, high = self.entry
+            return f"{low:g} to {_with_unit(high, self.shown_unit)}"
+        if self.bounds.low in (-LARGEST, -FARTHEST) and self.bounds.high in (LARGEST, FARTHEST):
+            return ""
+        return self.bounds.words(self.shown_unit, self.scale)
 
     def refusal(self, value: float) -> str:
         """Say in the page's unit why a value is not allowed; empty when it is."""

@@ -67,6 +67,21 @@ def test_the_page_refuses_in_its_own_unit():
     assert heading.refusal(2.0 * math.pi) == "Faces is 360°; expected -180 to 180°"
 
 
+@pytest.mark.parametrize(
+    ("quantity", "said"),
+    [
+        (Quantity(label="Gate", shown=PERCENT, bounds=Bounds.between(0.1, 0.9999)), "10 to 99.99 %"),
+        (Quantity(label="Speed", unit="m/s", bounds=Bounds.above(0.0)), "more than 0 m/s"),
+        (Quantity(label="Range", unit="m", shown=MILLIMETRES, bounds=Bounds.at_least(0.001)), "1 mm or more"),
+        (Quantity(label="Cell", unit="m", bounds=Bounds.above(0.0), entry=(0.05, 2.0)), "0.05 to 2 m"),
+        (Quantity(label="Angle", unit="rad"), ""),
+        (Quantity(label="x", unit="m", bounds=COORDINATE), ""),
+    ],
+)
+def test_what_may_be_entered_is_said_in_the_unit_of_the_page(quantity, said):
+    assert quantity.limits() == said
+
+
 def test_numbers_are_shown_in_the_unit_of_the_page_and_written_with_the_decimals_of_their_step():
     assert SIGMA.on_page(0.01234) == 12.34
     assert SIGMA.on_page(0.012345678) == 12.3457

@@ -173,5 +173,13 @@ class LookAgain(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class HoldSlider(Action):
+    """A slider is taken hold of, or let go."""
+
+    held: bool
+    """Whether it is taken hold of."""
+
+
+@dataclass(frozen=True, slots=True)
 class ClearFaults(Action):
     """The list of what went wrong was read."""

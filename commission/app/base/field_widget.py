@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from viser import GuiApi, GuiInputHandle, GuiNumberHandle, GuiSliderHandle
 
+from commission.app.base import viser_private
 from commission.site.fields import FieldInfo, field_info, get_field
 from commission.site.quantity import LARGEST, Choice, Quantity, Switch
 
@@ -24,7 +25,7 @@ def add_widget(gui: GuiApi, info: FieldInfo, value: Any, note: str = "") -> GuiI
     value : what it shows, in the unit of code and files.
     note : what stands behind the hint.
     """
-    hint = f"{info.hint} {note}".rstrip()
+    hint = hint_of(info, note)
     match info.descriptions[0]:
         case Quantity() as quantity if quantity.none:
             return gui.add_text(quantity.title, held(info, value), hint=f"{hint} Empty: {quantity.none}.")
@@ -36,6 +37,13 @@ def add_widget(gui: GuiApi, info: FieldInfo, value: Any, note: str = "") -> GuiI
             return gui.add_dropdown(label, info.options, initial_value=str(value), hint=hint)
         case description:
             return gui.add_text(description.label, str(value), hint=hint)
+
+
+def hint_of(info: FieldInfo, note: str = "") -> str:
+    """Return what a widget tells of its field: its hint, what may be entered, and a note behind it."""
+    limits = "" if info.quantity is None else info.quantity.limits()
+    bounds = f"{limits[0].upper()}{limits[1:]}." if limits else ""
+    return " ".join(part for part in (info.hint, bounds, note) if part)
 
 
 def labelled(info: FieldInfo, label: str) -> FieldInfo:
@@ -71,6 +79,42 @@ def meant(info: FieldInfo, content: Any) -> Any:
         return tuple(_allowed(info.quantity, float(each)) for each in typing.cast("Iterable[Any]", content))
     number = _allowed(info.quantity, content)
     return round(number) if info.kind is int else float(number)
+
+
+def write_saved(widget: GuiInputHandle[Any], content: Any) -> None:
+    """Put a tick on a slider where the saved project has it; other widgets have none."""
+    if isinstance(widget, GuiSliderHandle):
+        inside = isinstance(content, int | float) and widget.min <= content <= widget.max
+        viser_private.tick(widget, float(content) if inside else None)
+
+
+class Tail:
+    """What tells the page's script to make a slider logarithmic (web_assets/sliders.js): an element nobody sees.
+
+    Parameters
+    ----------
+    gui : where it is made.
+    quantity : of the slider.
+    widget : the slider.
+    """
+
+    def __init__(self, gui: GuiApi, quantity: Quantity, widget: GuiInputHandle[Any]) -> None:
+        self._field, self._ends = viser_private.identifier(widget), quantity.slider or (0.0, 1.0)
+        self._html = gui.add_html(self._content(None))
+        self._saved: float | None = None
+
+    def write_saved(self, content: float) -> None:
+        """Say where the saved project has it."""
+        if content != self._saved:
+            self._saved = content
+            self._html.content = self._content(content)
+
+    def _content(self, saved: float | None) -> str:
+        low, high = self._ends
+        return (
+            f"<div class='c-tail' data-field='{self._field}' data-low='{low:g}' data-high='{high:g}' "
+            f"data-saved='{'' if saved is None else f'{saved:g}'}'></div>"
+        )
 
 
 def write_held(widget: GuiInputHandle[Any], content: Any) -> None:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, TypeAlias
 
-from viser import GuiApi, GuiInputHandle
+from viser import GuiApi, GuiInputHandle, GuiSliderHandle
 
 from commission.app.base import theme
 from commission.app.base.actions import Action, LookAgain
-from commission.app.base.field_widget import add_widget, held, meant, write_held
+from commission.app.base.field_widget import add_widget, held, meant, write_held, write_saved
 from commission.app.base.panel import Post, escaped, posting, write
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.site.fields import FieldInfo, field_info, get_field
+from commission.site.project import Project
 from commission.site.quantity import PERCENT
 
 Setting: TypeAlias = bool | int | float | str | None
@@ -34,6 +36,7 @@ class Inputs:
     def __init__(self, gui: GuiApi, post: Post, make: Make, read: Read) -> None:
         self._gui, self._post, self._make, self._read = gui, post, make, read
         self._widgets: list[tuple[GuiInputHandle[Any], Callable[[AppState], Any]]] = []
+        self._marked: Project | None = None
         self._followed: dict[int, object] = {}
 
     def connect(
@@ -112,6 +115,13 @@ class Inputs:
             if value is not None and (index not in self._followed or self._followed[index] != value):
                 self._followed[index] = value
                 write_held(widget, value)
+
+        if state.saved is not self._marked:
+            self._marked = state.saved
+            as_saved = replace(state, project=state.saved)
+            for widget, shown in self._widgets:
+                if isinstance(widget, GuiSliderHandle):
+                    write_saved(widget, shown(as_saved))
 
     def forget(self) -> None:
         """Write every widget anew when it follows next, whatever stands in it: it is another thing's from now on."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
+
 from viser import GuiApi
 
-from commission.app.base import page_reducer
-from commission.app.base.actions import Camera, SetCamera, StopJob
+from commission.app.base import page_reducer, viser_private
+from commission.app.base.actions import Camera, HoldSlider, SetCamera, StopJob
 from commission.app.base.feature import LAYERS, LEGEND, Docked, Feature
 from commission.app.base.grid_layer import GridLayer
 from commission.app.base.inputs import show
@@ -42,12 +44,23 @@ class CameraButtons(BasePanel):
         buttons.on_click(posting(post, lambda event: SetCamera(Camera(event.target.value))))
 
 
+class SliderHold(BasePanel):
+    """A check box that nobody sees, which the page's script ticks while a slider is held (web_assets/sliders.js)."""
+
+    def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
+        held = gui.add_checkbox("A slider is held", False, visible=False)
+        held.on_update(posting(post, lambda event: HoldSlider(bool(event.target.value))))
+        script = f"window.commissionHold = {json.dumps(viser_private.identifier(held))}"
+        viser_private.run_on_page(viser_private.server_of(gui), browser, script)
+
+
 FEATURE = Feature(
     name="base",
     reducers=(page_reducer,),
     layers=(GridLayer,),
     panels=(
         Docked(make=lambda at: JobButton(at.gui, at.post), tab=None, rank=20),
+        Docked(make=lambda at: SliderHold(at.gui, at.post, at.browser), tab=None, own=True),
         Docked(make=lambda at: CameraButtons(at.gui, at.post), tab=None, rank=40),
         Docked(make=lambda at: LegendPanel(at.gui, at.post, at.layers, at.state), tab=LEGEND, rank=20),
         Docked(make=lambda at: LayersPanel(at.gui, at.post, at.layers, at.state), tab=LAYERS),

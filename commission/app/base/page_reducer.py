@@ -8,7 +8,7 @@ from commission.app.base import actions
 from commission.app.base.actions import Sender
 from commission.app.base.effects import CancelJob, FlyTo, PlaceCamera, Tell
 from commission.app.base.reducer import Outcome, reduce
-from commission.app.base.state import AppState, Step, refuse_read_only, with_maps_packed
+from commission.app.base.state import AppState, Holding, Step, refuse_read_only, with_maps_packed
 
 
 @reduce.register
@@ -63,6 +63,12 @@ def _in_the_way(step: Step, what: str) -> Tell:
         f"{what} it there, or here once that browser is closed",
         failed=False,
     )
+
+
+@reduce.register
+def hold_slider(action: actions.HoldSlider, state: AppState, sender: Sender) -> Outcome:
+    """What follows is another step than what was before, be it as quick as it may."""
+    return Outcome(replace(state.with_browser(sender.browser, Holding(action.held)), last_edit=None))
 
 
 @reduce.register

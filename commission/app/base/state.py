@@ -33,6 +33,14 @@ MERGE_WITHIN_S = 1.0
 
 
 @dataclass(frozen=True, slots=True)
+class Holding:
+    """Whether one browser has hold of a slider: what it changes until it lets go is one step, however long it takes."""
+
+    held: bool = False
+    """Whether it has."""
+
+
+@dataclass(frozen=True, slots=True)
 class Step:
     """A project that undo or redo brings back."""
 
@@ -179,7 +187,7 @@ def _is_merged(state: AppState, edit: Edit) -> bool:
         last is not None
         and bool(edit.key and state.undo)
         and (last.key, last.sender.browser) == (edit.key, sender.browser)
-        and sender.at - last.sender.at <= MERGE_WITHIN_S
+        and (state.of_browser(sender.browser, Holding).held or sender.at - last.sender.at <= MERGE_WITHIN_S)
     )
 
 

@@ -257,6 +257,13 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 [data-shows~=c-association] [data-dock-scroll]>div:has(.c-association){{flex-grow:2!important}}
 .c-association{{padding:0 12px 0 4px}}
 @media (max-height:800px){{.c-a-picture{{max-width:216px!important}}}}
+.mantine-Slider-markWrapper:only-child .mantine-Slider-mark{{background:{css(SELECTED)};border:none;width:2px;
+ height:12px;border-radius:0;transform:translateY(-3px)!important}}
+div:has(>.c-tail){{display:none}}
+.c-tail-plain{{opacity:0;pointer-events:none}}
+.c-tail-slider{{position:absolute;top:2px;margin:0;height:16px;color-scheme:dark;accent-color:{css(BRAND)};
+ cursor:pointer}}
+.c-tail-tick{{position:absolute;top:2px;width:2px;margin-left:-1px;height:16px;background:{css(SELECTED)};pointer-events:none}}
 .c-a-head{{font-size:12.5px;display:flex;gap:6px;padding:0 2px}}
 .c-a-head span{{margin-left:auto;white-space:nowrap;opacity:.7;font-variant-numeric:tabular-nums}}
 .c-a-verdict{{font-size:12px;padding:0 2px 3px;font-variant-numeric:tabular-nums}}

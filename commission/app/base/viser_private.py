@@ -22,6 +22,7 @@ from viser import (
     GuiButtonHandle,
     GuiEvent,
     GuiFormHandle,
+    GuiSliderHandle,
     SceneApi,
     ViserServer,
     _messages,
@@ -244,13 +245,31 @@ def say_at_field(server: ViserServer, number: int, widget: str, text: str) -> No
     widget : its identifier.
     text : plain text.
     """
-    script = f"window.commissionRefuse?.({json.dumps(widget)}, {json.dumps(text)})"
-    send(server, number, _messages.RunJavascriptMessage(script))
+    run_on_page(server, number, f"window.commissionRefuse?.({json.dumps(widget)}, {json.dumps(text)})")
 
 
 def run_on_pages(server: ViserServer, script: str) -> None:
     """Let every browser, also those that come later, run a script of ours."""
     server._websock_server.queue_message(_messages.RunJavascriptMessage(script))
+
+
+def run_on_page(server: ViserServer, number: int, script: str) -> None:
+    """Let one browser run a script of ours.
+
+    Parameters
+    ----------
+    server : of the page.
+    number : of the connection.
+    script : what it runs.
+    """
+    send(server, number, _messages.RunJavascriptMessage(script))
+
+
+def tick(slider: GuiSliderHandle[Any], place: float | None) -> None:
+    """Put one tick on a slider, in place of those it has; None: take it away."""
+    marks = None if place is None else (_messages.GuiSliderMark(place, None),)
+    if slider._marks != marks:
+        slider._marks = marks
 
 
 def identifier(widget: Any) -> str:

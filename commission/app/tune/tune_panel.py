@@ -9,7 +9,7 @@ from typing import Any
 
 from viser import GuiApi, GuiInputHandle
 
-from commission.app.base.field_widget import add_widget, held, meant, write_held
+from commission.app.base.field_widget import Tail, add_widget, held, meant, write_held, write_saved
 from commission.app.base.inputs import Inputs
 from commission.app.base.panel import BasePanel, Post, posting
 from commission.app.base.state import AppState
@@ -38,6 +38,8 @@ class TunePanel(BasePanel):
         self._gui, self._post = gui, post
         self._widgets: dict[str, GuiInputHandle[Any]] = {}
         self._infos: dict[str, FieldInfo] = {}
+        self._tails: dict[str, Tail] = {}
+        self._saved: Parameters | None = None
         groups = fields_of(Parameters)
         for name in (*FIRST, *(name for name in groups if name not in FIRST)):
             with gui.add_folder(groups[name].label, expand_by_default=name not in FOLDED):
@@ -63,12 +65,27 @@ class TunePanel(BasePanel):
                 )
             )
             self._widgets[key], self._infos[key] = widget, info
+            if info.quantity is not None and info.quantity.is_tail:
+                self._tails[key] = Tail(self._gui, info.quantity, widget)
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow undo, redo and reset; while somebody moves a slider, leave it alone."""
+        self._mark(view.state.saved.parameters)
         if view.state.last_edit is None:
             self.show(view.state.project.parameters)
             self._constants.follow(view.state)
+
+    def _mark(self, saved: Parameters) -> None:
+        """Put a tick on each slider where the saved project has it."""
+        if saved is self._saved:
+            return
+        self._saved = saved
+        for key, widget in self._widgets.items():
+            content = held(self._infos[key], get_field(saved, key))
+            if key in self._tails:
+                self._tails[key].write_saved(content)
+            else:
+                write_saved(widget, content)
 
     def show(self, parameters: Parameters) -> None:
         """Set every widget."""

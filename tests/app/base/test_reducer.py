@@ -26,7 +26,7 @@ from commission.app.run.state import RunState
 from commission.app.tune.actions import ParameterValue, ResetParameters, SetParameter
 from commission.errors import UsageError
 from commission.site.fields import get_field
-from tests.app.asking import ME, after, by
+from tests.app.asking import ME, OTHER, after, by, joined
 from tests.app.sites import room
 
 GATE = "association.gate_probability"
@@ -52,6 +52,24 @@ def test_changes_of_one_parameter_in_quick_succession_are_one_undo_step(state: A
     drag = [by(ME, SetParameter(GATE, 0.9 + 0.01 * i), 0.1 * i) for i in range(1, 5)]
     assert len(after(state, *drag).state.undo) == 1
     assert gate(after(state, *drag, actions.Undo()).state) == 0.95
+
+
+def test_what_is_changed_while_a_slider_is_held_is_one_undo_step_however_long_it_takes(state: AppState) -> None:
+    held = by(ME, actions.HoldSlider(held=True), 0.0), by(ME, actions.HoldSlider(held=False), 31.0)
+    drag = [by(ME, SetParameter(GATE, 0.9 + 0.01 * i), 10.0 * i) for i in range(1, 4)]
+    result = after(joined(state), held[0], *drag, held[1]).state
+    assert len(result.undo) == 1
+    assert gate(after(result, actions.Undo()).state) == 0.95
+    # Taken hold of again at once, it is another step; and so is what another browser does meanwhile.
+    again = by(ME, actions.HoldSlider(held=True), 31.1), by(ME, SetParameter(GATE, 0.8), 31.2)
+    assert len(after(result, *again).state.undo) == 2
+    others = by(OTHER, SetParameter(GATE, 0.7), 31.3), by(ME, SetParameter(GATE, 0.6), 31.4)
+    assert len(after(result, *again, *others).state.undo) == 4
+
+
+def test_without_a_held_slider_time_alone_parts_the_steps(state: AppState) -> None:
+    drag = [by(ME, SetParameter(GATE, 0.9 + 0.01 * i), 10.0 * i) for i in range(1, 4)]
+    assert len(after(joined(state), *drag).state.undo) == 3
 
 
 def test_a_later_change_of_the_same_parameter_is_its_own_undo_step(state: AppState) -> None:

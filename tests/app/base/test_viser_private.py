@@ -62,6 +62,7 @@ def test_each_private_name_of_viser_is_there() -> None:
         bench.gizmo,
         viser._scene_api,
         viser._viser,
+        server.gui.add_slider("", 0.0, 1.0, 0.1, 0.5)._impl.props,
     )
     used = private_names(PACKAGE / "app" / "base" / "viser_private.py")
     assert len(used) > 20
