@@ -138,8 +138,12 @@
   on("focusin", () => { caretIsKnown = false; });
   on("mouseup", () => { caretIsKnown = true; });
 
-  on("beforeinput", ({ target }) => {
+  on("beforeinput", ({ target, data }) => {
     if (!target.matches?.(FIELDS)) return;
+    // viser's input swallows what is no part of a number, and 1e2 would be 12 without a word.
+    const odd = isNumber(target) && /[^\d.,\s+-]/.exec(data ?? "");
+    const place = odd && placeOf(target);
+    if (place) setTimeout(() => refuse(place.field, `"${odd[0]}" is not taken; expected digits, a point, a minus`));
     if (draft?.input !== target) before.set(target, target.value);
     if (!caretIsKnown && isNumber(target)) lookAnew(target);
   });

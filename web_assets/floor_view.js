@@ -65,6 +65,16 @@
     const at = pointer && onFloor(...pointer);
     place.textContent = at ? `x ${at[0].toFixed(3)}   y ${at[1].toFixed(3)} m` : "";
   }
+  // Who has zoomed or moved the floor keeps what was zoomed to, though the page still builds up.
+  const BUILDS_UP_MS = 10_000;
+  let isOdd = false;
+  const tellMoved = ({ target }) => {
+    if (target !== viewer()?.canvas || performance.now() > BUILDS_UP_MS || !window.commissionMoved) return;
+    isOdd = !isOdd; // only what changes is heard
+    window.commissionTell?.(window.commissionMoved, isOdd);
+  };
+  for (const kind of ["wheel", "pointerdown"]) addEventListener(kind, tellMoved, { capture: true, passive: true });
+
   addEventListener("pointermove", (event) => {
     pointer = event.target === viewer()?.canvas ? [event.clientX, event.clientY] : null;
   }, true);

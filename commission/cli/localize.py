@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import sys
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,7 +17,7 @@ from commission.errors import UsageError
 from commission.site.quantity import MILLIMETRES, PERCENT, PLAIN_DEGREES
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Generator, Sequence
 
     from commission.site.project import Project
     from commission.site.record_log import RecordLog
@@ -152,14 +153,22 @@ class Localize:
     def _with_reference(self, log: RecordLog) -> RecordLog:
         """Return the log with a reference that measures where the options say."""
         mount = log.reference_mount
-        try:
-            if self.reference_antenna is not None:
+        if self.reference_antenna is not None:
+            with _named("--reference-antenna"):
                 mount = dataclasses.replace(mount, antenna=reference_antenna(self.reference_antenna))
-            if self.reference_clock is not None:
+        if self.reference_clock is not None:
+            with _named("--reference-clock"):
                 mount = dataclasses.replace(mount, clock_offset=self.reference_clock)
-        except ValueError as error:
-            raise UsageError(f"--reference-…: {error}") from None
         return dataclasses.replace(log, reference_mount=mount)
+
+
+@contextmanager
+def _named(option: str) -> Generator[None]:
+    """Let a refusal of a value say which option it came by."""
+    try:
+        yield
+    except ValueError as error:
+        raise UsageError(f"{option}: {error}") from None
 
 
 def _report(result: RunResult, cut: Sequence[Section]) -> list[str]:
@@ -180,7 +189,7 @@ def _report(result: RunResult, cut: Sequence[Section]) -> list[str]:
         f"{_known(fits.nis_before_gate_mean)} of all near a reflector; "
         f"{_known(PERCENT.of(fits.rejected_fraction), 1)} % rejected",
         f"Unseen       {_known(PERCENT.of(fits.unseen_fraction), 1)} % of the cycles without an accepted detection, "
-        f"{fits.longest_unseen:.1f} s at most",
+        f"{_seconds(fits.longest_unseen)} at most",
         *_by_section(cut),
         *_by_scanner(result),
         f"Supervisor   operational {PERCENT.text(result.operational_fraction, '.1f')}, lost "
@@ -223,6 +232,11 @@ def _mounted(result: RunResult) -> str:
     return "" if mount == BASE else f"; {mount.told()}"
 
 
+def _seconds(seconds: float) -> str:
+    """A time as it is read; one shorter than a second with two decimals, so that one scan is not none."""
+    return f"{seconds:.1f} s" if seconds >= 1.0 or seconds == 0.0 else f"{seconds:.2f} s"
+
+
 def _by_section(cut: Sequence[Section]) -> list[str]:
     """A line for each section between stations, where any is passed."""
     if len(cut) == 1:
@@ -232,7 +246,7 @@ def _by_section(cut: Sequence[Section]) -> list[str]:
         f"{_known(each.figures.nis_before_gate_mean)} of all near a reflector, "
         f"{_known(PERCENT.of(each.figures.rejected_fraction), 1)} % rejected; unseen "
         f"{PERCENT.text(each.figures.unseen_fraction, '.1f')} of the cycles, "
-        f"{each.figures.longest_unseen:.1f} s at most"
+        f"{_seconds(each.figures.longest_unseen)} at most"
         for each in cut
     ]
 

@@ -68,6 +68,10 @@ class Simulate:
         seconds = tally.last_ns * 1e-9
         sys.stdout.write(f"Drive        route {route!r}, {seconds:.1f} s, {tally.scans} scans, seed {self.seed}\n")
         sys.stdout.writelines(f"True         {line}\n" for line in truth_lines(truth))
+        for text, period in zip(self.cover, map(_covered_period, self.cover), strict=True):
+            if period.start >= seconds:
+                why = f"begins after the end of the drive of {seconds:.1f} s: it covers nothing"
+                sys.stdout.write(f"Note         --cover {text} {why}\n")
         sys.stdout.write(f"Written to   {self.out}\n")
 
     def _route(self, project: Project) -> str:

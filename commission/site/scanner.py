@@ -55,6 +55,17 @@ class StampOf(StrEnum):
     LAST = "last"
 
 
+_ON_A_VEHICLE = Bounds.between(-50.0, 50.0)
+"""No vehicle is longer [m]: a scanner farther from base is mounted in another unit."""
+
+
+def _split(low: float, high: float, first: float, last: float) -> str:
+    """Say how a sector across the back of a full turn is given: as two of them [deg]; empty: it is none."""
+    if last - first < 360.0 or not first <= low <= last < high:
+        return ""
+    return f"; across its end it is two: {low:g} {last:g}, {first:g} {high - 360.0:g}"
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Scanner:
     """A 2D laser scanner on the vehicle."""
@@ -63,8 +74,8 @@ class Scanner:
     """What it is called in files and results: letters, digits, blanks, - and _."""
     mounting: Annotated[
         FloatArray,
-        Quantity(label="Mounted at x", unit="m", decimals=4),
-        Quantity(label="Mounted at y", unit="m", decimals=4),
+        Quantity(label="Mounted at x", unit="m", bounds=_ON_A_VEHICLE, decimals=4),
+        Quantity(label="Mounted at y", unit="m", bounds=_ON_A_VEHICLE, decimals=4),
         Quantity(label="Faces", unit="rad", shown=DEGREES, step=0.01, decimals=6),
     ] = field(default_factory=lambda: frozen([0.0, 0.0, 0.0], (3,), "scanner.mounting"))
     """(3,) `T_base_scanner`: x, y and heading of the scanner in the base frame."""
@@ -202,7 +213,8 @@ class Scanner:
                 raise ValueError(f"{found}; expected first < last, at most 360 deg apart")
             if not (first <= low and high <= last):
                 found = f"scanner.blind_sectors_deg holds [{low:g}, {high:g}]"
-                raise ValueError(f"{found}; expected sectors inside of the field of view, {first:g} to {last:g} deg")
+                expected = f"sectors inside of the field of view, {first:g} to {last:g} deg"
+                raise ValueError(f"{found}; expected {expected}{_split(low, high, first, last)}")
         for (low, high), (begin, end) in itertools.pairwise(sorted(self.blind_sectors_deg)):
             if begin < high:
                 found = f"scanner.blind_sectors_deg holds [{low:g}, {high:g}] and [{begin:g}, {end:g}]"

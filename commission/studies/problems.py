@@ -322,6 +322,13 @@ def _scanner_problems(site: ProblemsInput) -> Iterable[Problem]:
     """Beams that meet the vehicle's own outline, scanner by scanner."""
     alone = len(site.scanners) == 1
     for scanner in site.scanners:
+        if not len(scanner.views):
+            text = (
+                f"The scanner{'' if alone else f' {scanner.name!r}'} is wholly blind: its blind sectors cover the "
+                "field of view; expected a part of it that sees"
+            )
+            yield Problem(severity=Severity.ERROR, text=text, subject=Subject.SCANNER)
+            continue
         yield from _outline_problems(scanner, site.vehicle, "" if alone else f" {scanner.name!r}")
 
 
@@ -348,7 +355,8 @@ def _outline_problems(scanner: Scanner, vehicle: Vehicle, name: str) -> Iterable
             f"{PLAIN_DEGREES.number(low, '.1f')} and {PLAIN_DEGREES.text(high, '.1f')}; "
             "expected a field of view that leaves the vehicle out"
         )
-        yield Problem(severity=Severity.WARNING, text=text, subject=Subject.SCANNER)
+        severity = Severity.ERROR if len(blocked) == scanner.beam_count else Severity.WARNING
+        yield Problem(severity=severity, text=text, subject=Subject.SCANNER)
 
 
 def _detector_problems(site: ProblemsInput) -> Iterable[Problem]:

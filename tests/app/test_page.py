@@ -30,7 +30,7 @@ from commission.app.run.vehicle_layer import VehicleLayer
 from commission.app.run.view import RunView
 from commission.app.tune.tune_panel import TunePanel
 from commission.localization.estimate import Mode, Status
-from commission.site.fields import field_info, fields_of, get_field, walk_fields, with_field
+from commission.site.fields import FieldInfo, field_info, fields_of, get_field, walk_fields, with_field
 from commission.site.parameters import Parameters
 from commission.site.presets import SCANNERS, ScannerPreset
 from commission.site.project import Project
@@ -89,6 +89,16 @@ def test_a_person_posts_and_the_server_itself_does_not() -> None:
     assert posted == [Seek(2.0)]
 
 
+def hinted(info: FieldInfo, key: str) -> str:
+    """What is said of the field, what may be entered, and its name in files."""
+    bounds = "" if info.quantity is None else info.quantity.bounds.words(info.quantity.shown_unit, info.quantity.scale)
+    bounds = "" if bounds == "a finite number" else bounds
+    hint = info.hint
+    for option in info.options:
+        hint = hint.replace(f"`{option}`", option.replace("_", " "))
+    return f"{hint} {bounds[:1].upper()}{bounds[1:]}. ({key})" if bounds else f"{hint} ({key})"
+
+
 def test_every_parameter_has_exactly_one_widget_with_its_label_its_unit_and_its_hint(
     server: viser.ViserServer, project: Project
 ) -> None:
@@ -103,12 +113,12 @@ def test_every_parameter_has_exactly_one_widget_with_its_label_its_unit_and_its_
     constants = [widget for widget in added if id(widget) not in parameters]
     assert len(added) == len(parameters) + len(constants)
     for widget, (name, info) in zip(constants, fields_of(Uncertainty).items(), strict=True):
-        assert widget.hint == f"{info.hint} (uncertainty.{name})"
+        assert widget.hint == hinted(info, f"uncertainty.{name}")
         assert info.quantity is not None
         assert widget.label == info.quantity.title
     for key, info in described.items():
         widget = panel._widgets[key]
-        assert widget.hint == f"{info.hint} ({key})"
+        assert widget.hint == hinted(info, key)
         assert widget.label == (info.quantity.title if info.quantity else info.label)
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from commission.cli.localize import _seconds
 from commission.io.project_file import load_project
 
 KEYS = [
@@ -298,7 +299,15 @@ def test_a_reference_of_an_antenna_is_told_by_the_recording_or_by_options(
     assert late > described
     line = ("localize", project, recording, "--out", tmp_path / "out")
     assert "--reference-antenna '1' has 1 numbers" in refused(*line, "--reference-antenna", "1")
-    assert "reference.clock_offset is 1e+06" in refused(*line, "--reference-clock", "1e6")
+    assert "--reference-clock: reference.clock_offset is 1e+06" in refused(*line, "--reference-clock", "1e6")
+    assert "--reference-antenna: reference.antenna" in refused(*line, "--reference-antenna", "1e12,0")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"), [(0.0, "0.0 s"), (0.04, "0.04 s"), (0.996, "1.00 s"), (1.0, "1.0 s"), (12.34, "12.3 s")]
+)
+def test_a_time_of_one_scan_is_not_told_as_none(seconds, told):
+    assert _seconds(seconds) == told
 
 
 def test_how_often_reflectors_are_seen_is_told_where_it_is_asked_for(commission, project, recording, tmp_path):

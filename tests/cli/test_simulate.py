@@ -44,6 +44,14 @@ def test_covered_reflectors_are_not_seen_for_that_time(commission, project, tmp_
     assert seen[~covered].any(axis=1).all()
 
 
+@pytest.mark.parametrize(("start", "is_told"), [("1000", True), ("4", False)])
+def test_a_time_behind_the_end_of_the_drive_covers_nothing_and_that_is_told(
+    commission, project, tmp_path, start, is_told
+):
+    told = commission("simulate", project, "--out", tmp_path / "rec", "--cover", f"{start},3")[1]
+    assert (f"--cover {start},3 begins after the end of the drive of" in told) == is_told
+
+
 def test_without_faults_the_disturbances_of_the_project_do_not_act(commission, project, tmp_path):
     with (project / "project.yaml").open("a", encoding="utf-8") as file:
         file.write("disturbances: {dropped_scans: 1.0}\n")

@@ -270,3 +270,24 @@ def test_a_plate_of_unknown_direction_is_not_taken_for_one_inside_a_wall():
     assert [text for text in found if "inside a wall" in text] == [
         "Reflector 'B' is inside a wall; expected where a ray can reach it"
     ]
+
+
+@pytest.mark.parametrize(
+    ("sectors", "severities"),
+    [(((-90.0, 90.0),), [Severity.ERROR]), (((-90.0, 0.0), (0.0, 89.0)), [])],
+    ids=["all of it", "all but a degree"],
+)
+def test_a_scanner_that_is_wholly_blind_is_an_error(
+    sectors: tuple[tuple[float, float], ...], severities: list[Severity]
+) -> None:
+    scanner = Scanner(mounting=np.array([0.5, 0.0, 0.0]), field_of_view_deg=(-90.0, 90.0), blind_sectors_deg=sectors)
+    found = checked(replace(SITE, scanners=(scanner,))).problems
+    assert [each.severity for each in found if "wholly blind" in each.text] == severities
+
+
+def test_an_outline_that_blocks_all_beams_is_an_error_and_one_that_blocks_some_a_warning() -> None:
+    for heading, severity in ((math.pi, Severity.ERROR), (0.5 * math.pi, Severity.WARNING)):
+        mounting = np.array([0.55, 0.0, heading])
+        scanner = Scanner(mounting=mounting, field_of_view_deg=(-60.0, 60.0))
+        found = checked(replace(SITE, scanners=(scanner,))).problems
+        assert [each.severity for each in found if "own outline blocks" in each.text] == [severity], heading

@@ -5,6 +5,7 @@ All browsers share one scene; the camera, and what only plan or 3D needs, belong
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ import numpy as np
 import viser
 from viser import CameraHandle, ClientHandle, SceneNodeHandle
 
+from commission.app.base import viser_private
 from commission.app.base.actions import Camera, Point
 from commission.app.base.extent import Extent
 from commission.app.base.layer import Layer
@@ -51,6 +53,8 @@ class ClientView:
     """Shape of the floor, width over height, that the plan was fitted to."""
     fitted: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the camera was put to show the whole site [m]."""
+    is_fitted: bool = False
+    """Whether the browser has shown the whole site."""
     came_at: float = field(default_factory=time.monotonic)
     """When it came, on the clock of this computer [s]."""
 
@@ -76,9 +80,24 @@ class Cameras:
     def connected(self, client: ClientHandle) -> None:
         """Begin with the plan of the whole site."""
         self._views[client.client_id] = ClientView(client=client)
+        self._let_hand_win(client)
         client.camera.on_update(self._watch)
         self._furnish(self._views[client.client_id])
         self.show(client.client_id, Camera.FIT)
+
+    def _let_hand_win(self, client: ClientHandle) -> None:
+        """Fit nothing anew once the floor is zoomed or moved by hand: the page's script tells (floor_view.js)."""
+        moved = client.gui.add_checkbox("The floor was moved by hand", False, visible=False)
+        script = f"window.commissionMoved = {json.dumps(viser_private.identifier(moved))}"
+        viser_private.run_on_page(self._server, client.client_id, script)
+        own = self._views[client.client_id]
+
+        def settle(_event: object) -> None:
+            # A wheel turned before the plan was there zooms nothing that anybody has seen.
+            if own.is_fitted:
+                own.came_at = -SETTLING
+
+        moved.on_update(settle)
 
     def disconnected(self, client_id: int) -> None:
         """Forget a browser; its nodes went with it."""
@@ -208,6 +227,7 @@ class Cameras:
         own = self._views.get(camera.client.client_id)
         if own is None or own.three_d or own.follow:
             return
+        own.is_fitted = own.is_fitted or np.allclose(camera.position, own.fitted, rtol=1e-3)
         shift = float(np.hypot(*(camera.look_at[:2] - self._extent.center)))
         is_reshaped = abs(_aspect(own.client) - own.aspect) > 0.01
         if time.monotonic() - own.came_at < SETTLING:

@@ -34,7 +34,7 @@ def add_widget(gui: GuiApi, info: FieldInfo, value: Any, note: str = "") -> GuiI
         case Switch(label):
             return gui.add_checkbox(label, bool(value), hint=hint)
         case Choice(label):
-            return gui.add_dropdown(label, info.options, initial_value=str(value), hint=hint)
+            return gui.add_dropdown(label, tuple(map(in_words, info.options)), initial_value=in_words(value), hint=hint)
         case description:
             return gui.add_text(description.label, str(value), hint=hint)
 
@@ -43,7 +43,15 @@ def hint_of(info: FieldInfo, note: str = "") -> str:
     """Return what a widget tells of its field: its hint, what may be entered, and a note behind it."""
     limits = "" if info.quantity is None else info.quantity.limits()
     bounds = f"{limits[0].upper()}{limits[1:]}." if limits else ""
-    return " ".join(part for part in (info.hint, bounds, note) if part)
+    hint = info.hint
+    for option in info.options:
+        hint = hint.replace(f"`{option}`", in_words(option))
+    return " ".join(part for part in (hint, bounds, note) if part)
+
+
+def in_words(option: object) -> str:
+    """Return an option of a choice as people read it: files have no blanks in it."""
+    return str(option).replace("_", " ")
 
 
 def labelled(info: FieldInfo, label: str) -> FieldInfo:
@@ -54,7 +62,7 @@ def labelled(info: FieldInfo, label: str) -> FieldInfo:
 def held(info: FieldInfo, value: Any) -> Any:
     """Return what the widget of a field holds while the field has this value."""
     if info.quantity is None:
-        return str(value) if info.options else value
+        return in_words(value) if info.options else value
     if info.quantity.none:
         return info.quantity.none if value is None else f"{info.quantity.on_page(value):g}"
     if isinstance(value, tuple | list | np.ndarray):
@@ -71,6 +79,8 @@ def meant(info: FieldInfo, content: Any) -> Any:
     ValueError
         the field's bounds do not allow it; says so in the page's unit.
     """
+    if info.options:
+        return info.kind(next((each for each in info.options if in_words(each) == content), content))
     if info.quantity is None:
         return content.strip() if info.kind is str else info.kind(content)
     if info.quantity.none:

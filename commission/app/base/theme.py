@@ -234,7 +234,11 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 .c-before-after td:first-child{{padding-left:0;text-align:left;opacity:.65;white-space:normal}}
 .c-before-after td[colspan]{{padding-top:5px;opacity:1}}
 .c-before-after tr:first-child td{{opacity:.65}}
-@media (max-width:1500px){{.c-beside{{display:none}}}}
+@media (max-width:1500px){{.c-beside{{white-space:normal;width:88px;min-width:0!important;font-size:11px!important;
+ line-height:1.25}}}}
+@media (max-width:1150px){{.c-beside{{width:78px;font-size:10px!important}}
+ .c-badge{{font-size:12px!important;padding:3px 7px!important;letter-spacing:.02em!important}}
+ .c-top>b{{display:none}} .c-top{{padding:0 6px!important;gap:8px!important}}}}
 .c-list{{margin:1px 0 2px;padding-left:15px;font-size:12px;line-height:1.4;overflow-wrap:anywhere;
  font-variant-numeric:tabular-nums}}
 @media (max-height:800px){{:root{{--c-bottom:{LOW_BOTTOM_PX}px}}
@@ -259,6 +263,9 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 @media (max-height:800px){{.c-a-picture{{max-width:216px!important}}}}
 .mantine-Slider-markWrapper:only-child .mantine-Slider-mark{{background:{css(SELECTED)};border:none;width:2px;
  height:12px;border-radius:0;transform:translateY(-3px)!important}}
+div:has(>div>.c-bottom):has(.c-no-run) button{{opacity:.35;pointer-events:none}}
+:root:has(.c-no-run):not(:has([role=tab][title=Route][aria-selected=true])){{--c-bottom:{FOLDED_PX}px}}
+:root:has(.c-no-run) .c-plots{{display:none}}
 div:has(>.c-tail){{display:none}}
 .c-tail-plain{{opacity:0;pointer-events:none}}
 .c-tail-slider{{position:absolute;top:2px;margin:0;height:16px;color-scheme:dark;accent-color:{css(BRAND)};

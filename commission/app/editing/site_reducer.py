@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -17,10 +18,11 @@ from commission.app.editing.editor import ControlPoint, Editor, Point, editor_of
 from commission.app.editing.route_gestures import route_of, segment_of
 from commission.errors import UsageError
 from commission.site.editing import routes as edits
-from commission.site.fields import get_field, with_field
+from commission.site.fields import described, get_field, with_field
 from commission.site.layout_brief import LayoutBrief
 from commission.site.routes import Route, Segment
 from commission.site.scanner import Scanner
+from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle
 
 EQUIPMENT = {"vehicle": "vehicle", "scanners": "scanner"}
 """Parts of a project that are equipment, and what each is called."""
@@ -192,13 +194,29 @@ def opposite(scanner: Scanner, name: str) -> Scanner:
     return replace(scanner, name=name, mounting=np.array([-x, -y, turned]))
 
 
+KINDS_OF_EQUIPMENT = (Scanner, DifferentialVehicle, TricycleVehicle, OmnidirectionalVehicle)
+
+
+def in_words_of_the_page(text: str) -> str:
+    """Return a refusal of a scanner or vehicle with fields called as their widgets are, not as files call them."""
+    labels = {name: each[0].label for kind in KINDS_OF_EQUIPMENT for name, each in described(kind)}
+
+    def called(found: re.Match[str]) -> str:
+        return labels.get(found[1], found[0])
+
+    return re.sub(r"\b(?:scanner|vehicle)\.(\w+)", called, text).replace(" deg", "°")
+
+
 @reduce.register
 def set_equipment(action: actions.SetEquipment, state: AppState, sender: Sender) -> Outcome:
     part = action.name.partition(".")[0]
     kind = EQUIPMENT.get(part.partition("[")[0])
     if kind is None:
         raise UsageError(f"no equipment is called {action.name!r}; expected one of {' or '.join(EQUIPMENT)}")
-    project = with_field(state.project, action.name, action.value)
+    try:
+        project = with_field(state.project, action.name, action.value)
+    except ValueError as error:
+        raise ValueError(in_words_of_the_page(str(error))) from error
     if get_field(project, part) == get_field(state.project, part):
         return Outcome(state)
     return Outcome(edited(state, project, Edit(f"change the {kind}", sender, action.name)))

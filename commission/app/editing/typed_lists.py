@@ -29,8 +29,21 @@ def list_text(value: tuple[Any, ...]) -> str:
     return " ".join(f"{number:.9g}" for number in value)
 
 
-def list_value(name: str, text: str) -> tuple[Any, ...]:
-    """Return what was typed; raises ValueError that says what is expected."""
+def list_value(name: str, text: str, label: str = "") -> tuple[Any, ...]:
+    """Return what was typed.
+
+    Parameters
+    ----------
+    name : of the field.
+    text : what stands in the line.
+    label : what the message calls it; empty: its name.
+
+    Raises
+    ------
+    ValueError
+        the text is no such list; says what is expected.
+    """
+    label = label or name
     try:
         if name not in PAIRS:
             return tuple(float(word) for word in text.split())
@@ -41,7 +54,18 @@ def list_value(name: str, text: str) -> tuple[Any, ...]:
             raise ValueError(text)
         return tuple(pairs)
     except ValueError as error:
-        raise ValueError(f"{name} is {text!r}; expected {LIKE[name]}") from error
+        raise ValueError(f"{label} is {text!r}; expected {LIKE[name]}{_parted(name, text)}") from error
+
+
+def _parted(name: str, text: str) -> str:
+    """Say where commas belong in numbers that are all there; empty: something else is wrong."""
+    try:
+        numbers = [float(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        return ""
+    if name not in PAIRS or not numbers or len(numbers) % 2:
+        return ""
+    return f"; perhaps {list_text(tuple(zip(numbers[::2], numbers[1::2], strict=True)))}"
 
 
 def add_list(gui: GuiApi, inputs: Inputs, name: str, of: tuple[Project, Read]) -> GuiInputHandle[Any]:
@@ -62,5 +86,5 @@ def add_list(gui: GuiApi, inputs: Inputs, name: str, of: tuple[Project, Read]) -
         value = read(state, name)
         return None if value is None else list_text(value)
 
-    inputs.connect(name, widget, lambda text: list_value(info.name, str(text)), shown)
+    inputs.connect(name, widget, lambda text: list_value(info.name, str(text), info.label), shown)
     return widget

@@ -47,10 +47,11 @@ class Badge(BasePanel):
             return
         self._shown = (word, color)
         self._show_badge(word, beside, color)
-        self._show_scale(view.state.magnify)
+        self._show_scale(view)
 
-    def _show_scale(self, magnify: float) -> None:
-        """Say on the floor by how much gates and offsets are drawn larger than they are."""
+    def _show_scale(self, view: PageView) -> None:
+        """Say on the floor by how much gates and offsets are drawn larger than they are, where there is a run."""
+        magnify = 1.0 if view.part(RunView) is None else view.state.magnify
         write_html(
             self._scale,
             "" if magnify == 1.0 else f"<div class='c-scale'>gates, 2σ and offsets ×{magnify:g}</div>",
@@ -70,4 +71,4 @@ class Badge(BasePanel):
     def draw_slowly(self, view: PageView) -> None:
         """Show the numbers beside the badge."""
         self._show_badge(*badge_text(view))
-        self._show_scale(view.state.magnify)
+        self._show_scale(view)

@@ -20,6 +20,11 @@ FOLD = (
     "<input type='checkbox' aria-label='Fold the plots away'></label></div>"
 )
 """A switch of the browser's own, which the page's style obeys: nobody else's plots are folded by it."""
+NO_RUN = (
+    "<div class='c-clock c-note c-no-run' title='Choose a route or a recording in the step Run' "
+    "style='white-space:nowrap'>"
+    "no run: see step Run</div>"
+)
 SHORTEST_SHOWN = 0.3
 """Percent of the time line that even the shortest episode takes, so that it is seen."""
 
@@ -61,8 +66,8 @@ class TimeLine(BasePanel):
             "", tuple(_factor(s) for s in SPEEDS), initial_value=_factor(speed), hint="Speed of the play clock."
         )
         self._speed.on_update(posting(post, lambda event: SetSpeed(float(str(event.target.value).rstrip("x")))))
-        self._clock = gui.add_html("")
-        self._slider = gui.add_slider("", 0.0, 1.0, 0.01, 0.0)
+        self._clock = gui.add_html(NO_RUN)
+        self._slider = gui.add_slider("", 0.0, 1.0, 0.01, 0.0, disabled=True)
         self._slider.on_update(posting(post, lambda event: Seek(float(event.target.value))))
         self._strip = gui.add_html(strip(None))
         self._shown = ("", "")
@@ -81,6 +86,8 @@ class TimeLine(BasePanel):
         run = view.part(RunView)
         if run is None:
             return
+        if self._slider.disabled:
+            self._slider.disabled = False
         if self._slider.max != run.duration and run.duration > 0.0:
             self._slider.max = run.duration
         shown_time = round(min(run.time, run.duration), 2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ import msgspec
 from commission.errors import FileFormatError
 from commission.io.reading import read_text
 from commission.io.yaml_document import YamlDocument
+
+_NO_NUMBER = re.compile(r"[\[:,]\s*(-?(?:NaN|nan|Infinity|inf))\b")
 
 
 def read_json_of(path: Path, limit: int, expected: str) -> tuple[Any, YamlDocument]:
@@ -26,9 +29,13 @@ def read_json_of(path: Path, limit: int, expected: str) -> tuple[Any, YamlDocume
     FileFormatError
         the file is too large or no JSON.
     """
+    text = read_text(path, limit)
     try:
-        values = msgspec.json.decode(read_text(path, limit))
+        values = msgspec.json.decode(text)
     except (msgspec.DecodeError, RecursionError) as error:
+        word = _NO_NUMBER.search(text)
+        if word is not None:
+            raise FileFormatError(path, "", f"holds {word[1]}, for which JSON has no word", "finite numbers") from error
         raise FileFormatError(path, "", f"is no JSON ({error})", expected) from error
     return values, YamlDocument(path, values)
 

@@ -447,6 +447,8 @@ def test_a_reference_says_where_it_measures_and_is_read_back_as_it_was_written(t
     ("text", "message"),
     [
         ("{", "is no JSON"),
+        ('{"antenna": [NaN, 1.0]}', "holds NaN, for which JSON has no word; expected finite numbers"),
+        ('{"clock_offset": -Infinity}', "holds -Infinity, for which"),
         ("[1]", "an object with antenna"),
         ('{"antenna": [1.0]}', "has 1 numbers; expected x, y"),
         ('{"antenna": "left"}', "antenna"),

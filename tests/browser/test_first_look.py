@@ -1,0 +1,102 @@
+"""What meets the eye of who has just come: no run yet, a small window, a wheel turned at once, letters in a number."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from commission.app.run.actions import Play, VirtualDrive
+from tests.app.sites import room
+from tests.browser.page import OpenPage
+from tests.browser.serving import Served
+from tests.browser.test_floor_view import FITTED_AFTER_MS
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    project = room()
+    opened = Served(project, source=VirtualDrive(project.routes[0].name))
+    opened.until(lambda: opened.view is not None)
+    opened.runtime.post(Play(playing=False))
+    yield opened
+    opened.close()
+
+
+def test_without_a_run_the_page_says_what_to_do_and_offers_nothing_that_does_nothing(
+    window: Callable[..., OpenPage],
+) -> None:
+    served = Served(room())
+    try:
+        page = window(served.server)
+        page.open()
+        page.wait_for_text("no run: see step Run")
+        play = page.page.get_by_role("button", name="Play", exact=True)
+        assert play.evaluate("button => getComputedStyle(button).pointerEvents") == "none"
+        assert not page.page.locator(".c-plots").is_visible()
+        assert "offsets ×" not in page.text()
+        assert page.errors == []
+    finally:
+        served.close()
+
+
+@pytest.mark.parametrize("size", [(1024, 700), (1280, 720), (1600, 900)])
+def test_name_and_numbers_beside_the_badge_are_seen_whole_at_every_width(
+    served: Served, window: Callable[..., OpenPage], size: tuple[int, int]
+) -> None:
+    page = window(served.server, size)
+    page.open()
+    name = page.page.locator(".c-top span").first
+    assert name.inner_text() == "Room"
+    cut = "e => e.getBoundingClientRect().right > e.parentElement.getBoundingClientRect().right + 0.5"
+    assert not name.evaluate(cut)
+    beside = page.page.locator(".c-beside")
+    beside.wait_for(state="visible")
+    assert "mm" in beside.inner_text()
+    assert "°" in beside.inner_text()
+    boxes = [each.bounding_box() for each in (name, page.page.locator(".c-badge"), beside)]
+    ends = [(box["x"], box["x"] + box["width"]) for box in boxes if box is not None]
+    assert len(ends) == 3
+    assert all(one[1] <= other[0] for one, other in itertools.pairwise(ends)), "beside each other"
+    undo = page.page.get_by_role("button", name="Undo").first.bounding_box()
+    assert undo is not None
+    assert ends[-1][1] <= undo["x"]
+
+
+def test_who_turns_the_wheel_while_the_page_builds_up_keeps_what_was_zoomed_to(
+    served: Served, window: Callable[..., OpenPage]
+) -> None:
+    page = window(served.server)
+    client = page.open()
+    x, y = page.pixel_of((3.0, 6.0))
+    page.page.wait_for_timeout(300)
+    fitted = float(client.camera.position[2])
+    page.page.mouse.move(x, y)
+    for _ in range(5):
+        page.page.mouse.wheel(0, -300)
+        page.page.wait_for_timeout(50)
+    page.page.wait_for_timeout(600)
+    zoomed = float(client.camera.position[2])
+    assert zoomed < 0.8 * fitted
+    page.page.wait_for_timeout(FITTED_AFTER_MS)
+    assert float(client.camera.position[2]) == pytest.approx(zoomed)
+
+
+@pytest.mark.parametrize("letter", ["e", "a", "%"])
+def test_a_letter_that_a_number_does_not_take_is_told(
+    served: Served, window: Callable[..., OpenPage], letter: str
+) -> None:
+    page = window(served.server)
+    page.open()
+    page.open_tab("Tune")
+    row = page.row("Range jump")
+    field = row.locator("input").last
+    field.click()
+    page.page.keyboard.press("End")
+    page.page.keyboard.type(letter)
+    page.page.wait_for_function(
+        "letter => document.querySelector('[data-refused]')?.dataset.refused.startsWith(`\"${letter}\" is not taken`)",
+        arg=letter,
+    )
+    page.page.keyboard.press("Escape")
