@@ -52,7 +52,7 @@ def neighbor_risks(planned: PlannedRoute, prediction: RoutePrediction) -> tuple[
     Parameters
     ----------
     planned : drive and visible reflectors.
-    prediction : of that drive; its covariance before each scan is what the gate is made of.
+    prediction : of that drive; its covariance of each innovation is what the gate is made of.
 
     Returns
     -------
@@ -65,19 +65,22 @@ def neighbor_risks(planned: PlannedRoute, prediction: RoutePrediction) -> tuple[
     gate = model.gate_d2 if math.isfinite(model.gate_d2) else WITHOUT_GATE
     pairs = cKDTree(centers).query_pairs(_reach(planned, prediction, gate), output_type="ndarray").reshape(-1, 2)
     risks: list[NeighborRisk] = []
-    sees = _scans_by_reflector(planned)
+    sees = _rows_by_reflector(planned)
+    scan_of = np.repeat(np.arange(len(planned.drive), dtype=np.int64), planned.visible.counts())
     for reflector, neighbor in np.concatenate((pairs, pairs[:, ::-1])).tolist():
-        scans = sees[reflector]
-        squared = np.empty(len(scans))
+        rows = sees[reflector]
+        scans = scan_of[rows]
+        squared = np.empty(len(rows))
         separations(
+            rows,
             scans,
             planned.drive.poses,
             planned.drive.scanners,
-            prediction.prior_covariances,
+            prediction.innovations,
             planned.places,
             reflector,
             neighbor,
-            model,
+            model.observations,
             squared,
         )
         inside = squared <= gate
@@ -99,25 +102,18 @@ def neighbor_risks(planned: PlannedRoute, prediction: RoutePrediction) -> tuple[
 
 def _reach(planned: PlannedRoute, prediction: RoutePrediction, gate: float) -> float:
     """Distance on the floor beyond which no neighbor is ever inside a gate [m]."""
-    variances = np.diagonal(prediction.prior_covariances, axis1=1, axis2=2).max(axis=0)
-    noise = planned.parameters.observation
-    surveyed = float(planned.places[:, 2].max(initial=0.0))
     farthest = float(planned.farthest.max(initial=0.0)) + max(
         float(np.hypot(*scanner.mounting[:2])) for scanner in planned.scanners
     )
-    # Of several scanners, the largest noise of each kind.
-    range_sigma, bearing_sigma = np.max(
-        [scanner.detection_sigmas(noise.range_sigma, noise.bearing_sigma) for scanner in planned.scanners], axis=0
-    ).tolist()
     # Range and bearing each within sqrt(gate) of their own sigma; the bearing seen from the farthest reflector.
-    along = variances[0] + variances[1] + range_sigma**2 + surveyed
-    across = variances[0] + variances[1] + surveyed + farthest**2 * (variances[2] + bearing_sigma**2)
+    s_rr, w, schur = prediction.innovations.T
+    along = float(s_rr.max(initial=0.0))
+    across = farthest**2 * float((schur + w * w * s_rr).max(initial=0.0))
     return math.sqrt(gate * (along + across))
 
 
-def _scans_by_reflector(planned: PlannedRoute) -> list[IntArray]:
-    """Scans at which each reflector is visible."""
-    scans = np.repeat(np.arange(len(planned.drive), dtype=np.int64), planned.visible.counts())
+def _rows_by_reflector(planned: PlannedRoute) -> list[IntArray]:
+    """Where each reflector stands among those visible at all scans, one scan after the other."""
     order = np.argsort(planned.visible.indices, kind="stable")
     starts = np.searchsorted(planned.visible.indices[order], np.arange(len(planned.places) + 1))
-    return [scans[order[starts[m] : starts[m + 1]]] for m in range(len(planned.places))]
+    return [order[starts[m] : starts[m + 1]] for m in range(len(planned.places))]

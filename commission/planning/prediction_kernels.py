@@ -22,7 +22,7 @@ from commission.localization.consider import (
 )
 from commission.localization.consider_columns import put_back, put_block, take_out, working_array
 from commission.localization.consider_correction import correct_given
-from commission.localization.kalman import innovation, squared_distance
+from commission.localization.kalman import Innovation, squared_distance
 from commission.localization.observation import ObservationModel, expect, observation_at, scanner_offset
 from commission.localization.odometry import OdometryNoise, predict
 from commission.localization.pose_gaussian import PoseGaussian
@@ -60,6 +60,8 @@ class PredictionColumns(NamedTuple):
     modes: NDArray[np.int8]
     seen: IntArray
     on_odometry: FloatArray
+    innovations: FloatArray
+    """(N, 3) covariance S of the innovation of every visible reflector: S_rr, w = S_rb / S_rr, S_bb - w S_rb."""
 
 
 @compiled
@@ -99,7 +101,7 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
     P = p (I - K H) P + (1 - p) P per visible reflector, p the probability that it is detected: Sinopoli et al. 2004,
     with the localizer's own *predict* and *correct*.
     """
-    prior_covariances, means, covariances, modes, seen, on_odometry = columns
+    prior_covariances, means, covariances, modes, seen, on_odometry, innovations = columns
     mode, last_seen_at, pivot = 0, metres[0], (belief.x, belief.y)
     for k in range(len(stamps_ns)):
         x, y, theta = poses[k, 0], poses[k, 1], poses[k, 2]
@@ -124,9 +126,9 @@ def predict_covariances(  # noqa: PLR0917 - the columns of a drive
             target_x, target_y = places[m, 0] + shifts[m, 0], places[m, 1] + shifts[m, 1]
             truth = expect(x, y, theta, offset_x, offset_y, target_x, target_y, observation.mount_theta)
             at = BLOCKS + PER_REFLECTOR * (i - first)
-            passes[i - first] = truth.range <= reach[m] and _inside_gate(
-                prior, truth.range, truth.bearing, places, m, observation, model.gate_d2, given, work, at
-            )
+            v = _expected_innovation(prior, truth.range, truth.bearing, places, m, observation, given, work, at)
+            passes[i - first] = truth.range <= reach[m] and squared_distance(v) <= model.gate_d2
+            innovations[i, 0], innovations[i, 1], innovations[i, 2] = v.s_rr, v.w, v.schur
         for i in range(first, last):
             if not passes[i - first]:
                 continue
@@ -319,67 +321,65 @@ def mix(work: FloatArray | None, kept: FloatArray | None, probability: float) ->
 
 @compiled
 def separations(  # noqa: PLR0917 - the columns of a drive
+    rows: IntArray,
     scans: IntArray,
     poses: FloatArray,
     scanners: IntArray,
-    prior_covariances: FloatArray,
+    innovations: FloatArray,
     places: FloatArray,
     reflector: int,
     neighbor: int,
-    model: PredictionModel,
+    observations: FloatArray,
     squared: FloatArray,
 ) -> None:
     """Squared Mahalanobis distance between the expected observations of two reflectors at some scans.
 
     Parameters
     ----------
-    scans : (n,) rows of `poses` and `prior_covariances`.
+    rows : (n,) of `innovations`: where the reflector is seen.
+    scans : (n,) rows of `poses`.
     poses : (K, 3) `T_map_base` of the scans of a drive [m, m, rad].
     scanners : (K,) scanner of each.
-    prior_covariances : (K, 3, 3) before the detections of each scan.
+    innovations : (N, 3) as in `PredictionColumns`.
     places : (M, 4) as in `predict_covariances`.
     reflector, neighbor : rows of `places`; the covariance is that of the reflector's innovation.
-    model : of the observation.
+    observations : (S, 6) `observation_rows` of the scanners.
     squared : (n,) output.
 
     Notes
     -----
     d2 = v^T S^-1 v with v = h(neighbor) - h(reflector): Sobreira et al. 2016, Algorithm 3, with a neighbor in the place
-    of the detection.
+    of the detection. S is that of the filter, with what it considers.
     """
-    for i in range(len(scans)):
+    for i in range(len(rows)):
         x, y, theta = poses[scans[i], 0], poses[scans[i], 1], poses[scans[i], 2]
-        c = prior_covariances[scans[i]]
-        belief = PoseGaussian(x, y, theta, c[0, 0], c[0, 1], c[0, 2], c[1, 1], c[1, 2], c[2, 2])
-        observation = observation_at(model.observations, int(scanners[int(scans[i])]))
+        observation = observation_at(observations, int(scanners[int(scans[i])]))
         offset_x, offset_y = scanner_offset(theta, observation)
         mount = observation.mount_theta
         own = expect(x, y, theta, offset_x, offset_y, places[reflector, 0], places[reflector, 1], mount)
         other = expect(x, y, theta, offset_x, offset_y, places[neighbor, 0], places[neighbor, 1], mount)
-        turn = wrap_scalar(other.bearing - own.bearing)
-        between = innovation(belief, own, other.range, turn, places[reflector, 2], observation)
-        squared[i] = squared_distance(between)
+        along, s_rr = other.range - own.range, innovations[rows[i], 0]
+        across = wrap_scalar(other.bearing - own.bearing) - innovations[rows[i], 1] * along
+        squared[i] = along * along / s_rr + across * across / innovations[rows[i], 2]
 
 
 @compiled_inline
-def _inside_gate(  # noqa: PLR0917 - a measurement, number by number
+def _expected_innovation(  # noqa: PLR0917 - a measurement, number by number
     prior: PoseGaussian,
     distance: float,
     bearing: float,
     places: FloatArray,
     m: int,
     observation: ObservationModel,
-    gate_d2: float,
     given: Considering | None,
     work: FloatArray | None,
     at: int,
-) -> bool:
-    """Whether the expected detection passes the association filter at the predicted belief."""
+) -> Innovation:
+    """Innovation of the expected detection at the predicted belief, constants considered."""
     offset_x, offset_y = scanner_offset(prior.theta, observation)
     mount = observation.mount_theta
     expected = expect(prior.x, prior.y, prior.theta, offset_x, offset_y, places[m, 0], places[m, 1], mount)
-    v = innovation_given(prior, expected, distance, bearing, places[m, 2], observation, given, work, at)
-    return squared_distance(v) <= gate_d2
+    return innovation_given(prior, expected, distance, bearing, places[m, 2], observation, given, work, at)
 
 
 @compiled_inline

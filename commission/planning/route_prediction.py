@@ -193,6 +193,9 @@ class RoutePrediction:
     """(K,) reflectors in sight that are detected in at least half of all scans, and inside the gate."""
     on_odometry: FloatArray
     """(K,) way driven since a reflector was seen last [m]."""
+    innovations: FloatArray
+    """(N, 3) covariance S of the innovation of every visible reflector, in the order of `PlannedRoute.visible`: S_rr,
+    w = S_rb / S_rr, S_bb - w S_rb. With what the filter considers."""
 
     @property
     def two_sigma(self) -> FloatArray:
@@ -358,6 +361,7 @@ def predict_route(planned: PlannedRoute, damage: Damage = NO_DAMAGE) -> RoutePre
         np.empty(count, np.int8),
         np.empty(count, np.int64),
         np.empty(count),
+        np.empty((len(planned.visible.indices), 3)),
     )
     cross, blocks = planned.constants()
     start = Belief(0, planned.drive.poses[0], np.diag(np.square(planned.options.start_sigmas)))
@@ -386,6 +390,7 @@ def predict_route(planned: PlannedRoute, damage: Damage = NO_DAMAGE) -> RoutePre
         modes=read_only(columns.modes),
         seen=read_only(columns.seen),
         on_odometry=read_only(columns.on_odometry),
+        innovations=read_only(columns.innovations),
     )
 
 

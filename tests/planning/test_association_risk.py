@@ -9,15 +9,19 @@ from scipy.stats import norm
 
 from commission.planning.association_risk import neighbor_risks
 from commission.planning.route_prediction import plan_route, predict_route
+from commission.site.parameters import FilterParameters, Parameters
 from commission.site.reflectors import ReflectorMap
 from tests.localization import plain_observation as plain
-from tests.planning.sites import open_field, reflectors_at
+from tests.planning.sites import open_field, reflectors_at, surely_detected
 
 CLOSE = ((3.0, 3.0), (8.0, -2.0), (12.0, 2.5), (12.05, 2.5), (18.0, -3.0))
 
 
+NOT_CONSIDERED = Parameters(filter=FilterParameters(consider=False))
+
+
 def risks_of(places):
-    planned = plan_route(open_field(places), "Line")
+    planned = plan_route(open_field(places, parameters=NOT_CONSIDERED), "Line")
     prediction = predict_route(planned)
     return planned, prediction, neighbor_risks(planned, prediction)
 
@@ -49,7 +53,7 @@ def surveyed(*sigmas: float):
     """Two reflectors close to each other, with 1-sigma of their places."""
     places = reflectors_at([CLOSE[2], CLOSE[3], CLOSE[0]]).reflectors
     given = tuple(replace(r, sigma=sigma) for r, sigma in zip(places, (*sigmas, 0.0), strict=True))
-    planned = plan_route(replace(open_field(()), reflectors=ReflectorMap(given)), "Line")
+    planned = plan_route(replace(open_field((), parameters=NOT_CONSIDERED), reflectors=ReflectorMap(given)), "Line")
     prediction = predict_route(planned)
     return planned, prediction, neighbor_risks(planned, prediction)
 
@@ -86,3 +90,68 @@ def test_the_nearer_the_neighbor_the_likelier_the_mistake():
 @pytest.mark.parametrize("places", [(), ((5.0, 2.0),)])
 def test_fewer_than_two_reflectors_are_never_mistaken(places):
     assert risks_of(places)[2] == ()
+
+
+def considered_innovations(planned, prediction) -> dict[tuple[int, int], np.ndarray]:
+    """S of each scan and visible reflector by a filter of pose and constants together, whose gain moves no constant.
+
+    What odometry adds is taken from the prediction. Constants: places of reflectors, then mounting, range and clock.
+    """
+    count, u, mounting = len(planned.places), planned.uncertainty, np.array(planned.scanners[0].mounting)
+    sigmas = [*np.sqrt(planned.places[:, 2]).repeat(2), *(u.mounting_position,) * 2, u.mounting_heading]
+    P = np.diag(np.square([*planned.options.start_sigmas, *sigmas, u.range_bias, u.clock]))
+    noise = planned.parameters.observation
+    R, drive, found = np.diag([noise.range_sigma**2, noise.bearing_sigma**2]), planned.drive, {}
+    for k, pose in enumerate(drive.poses):
+        velocity = np.zeros(3)
+        if k > 0:
+            step = pose - drive.poses[k - 1]
+            F = np.eye(len(P))
+            F[:2, 2] = -step[1], step[0]
+            P = F @ P @ F.T
+            P[:3, :3] += prediction.prior_covariances[k] - F[:3, :3] @ prediction.covariances[k - 1] @ F[:3, :3].T
+            velocity = step / (1e-9 * (drive.stamps_ns[k] - drive.stamps_ns[k - 1]))
+        rows = {}
+        for m in planned.visible.of(k).tolist():
+
+            def seen(x: np.ndarray, m: int = m, pose: np.ndarray = pose) -> np.ndarray:
+                center = planned.places[m, :2] + x[3 + 2 * m : 5 + 2 * m]
+                own = 3 + 2 * count
+                there = pose + x[:3] - velocity * x[own + 4]  # noqa: B023 - called within this scan
+                range_and_bearing = plain.observed(there, mounting + x[own : own + 3], center[np.newaxis])[0]
+                return range_and_bearing + np.array([x[own + 3], 0.0])
+
+            tiny = 1e-6 * np.eye(len(P))
+            rows[m] = np.column_stack([(seen(each) - seen(-each)) / 2e-6 for each in tiny])
+            # Right behind the scanner, one of the two bearings may be a turn off.
+            rows[m][1] = plain.turned(2e-6 * rows[m][1]) / 2e-6
+            found[k, m] = rows[m] @ P @ rows[m].T + R
+        for B in rows.values():
+            gain = P @ B.T @ np.linalg.inv(B @ P @ B.T + R)
+            gain[3:] = 0.0
+            A = np.eye(len(P)) - gain @ B
+            P = 0.95 * (A @ P @ A.T + gain @ R @ gain.T) + 0.05 * P
+    return found
+
+
+def test_the_gate_is_that_of_a_filter_which_considers_survey_mounting_range_and_clock():
+    places = [CLOSE[1], (9.0, 3.0), (9.06, 3.0), CLOSE[4]]
+    planned = surely_detected(plan_route(open_field(places, 8.0), "Line"))
+    prediction = predict_route(planned)
+    risks = {(risk.reflector, risk.neighbor): risk for risk in neighbor_risks(planned, prediction)}
+    innovations, checked = considered_innovations(planned, prediction), 0
+    for k in range(0, len(planned.drive), 7):
+        centers = planned.places[:, :2]
+        seen = plain.observed(planned.drive.poses[k], planned.scanners[0].mounting, centers)
+        for one, other in ((1, 2), (2, 1)):
+            if (k, one) not in innovations:
+                continue
+            d = seen[other] - seen[one]
+            squared = float(d @ np.linalg.solve(innovations[k, one], d))
+            risk = risks[one, other]
+            at = np.flatnonzero(risk.scans == k)
+            assert len(at) == (squared <= -2.0 * math.log(0.05))
+            if len(at):
+                assert risk.probability[at[0]] == pytest.approx(norm.sf(0.5 * math.sqrt(squared)), rel=1e-4)
+                checked += 1
+    assert checked > 10

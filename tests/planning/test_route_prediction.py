@@ -183,6 +183,7 @@ def by_hand(position_sigma: list[float], heading_sigma: list[float], bias: list[
         modes=np.array(modes, dtype=np.int8),
         seen=np.full(count, 2),
         on_odometry=np.zeros(count),
+        innovations=np.zeros((0, 3)),
     )
 
 

@@ -31,6 +31,7 @@ def accuracies(said: list[tuple[float, float]], true: list[tuple[float, float]])
         modes=np.zeros(count, dtype=np.int8),
         seen=np.full(count, 2),
         on_odometry=np.zeros(count),
+        innovations=np.zeros((0, 3)),
     )
     stations = (Station(name="Dock", x=1.0, y=0.0, required_accuracy=0.02), Station(name="Far", x=9.0, y=9.0))
     # Three quarters of the square of each error are noise, a quarter is the clock's.

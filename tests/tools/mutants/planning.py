@@ -87,9 +87,9 @@ PLANNING = (
     ),
     Mutant(
         name="gate of the neighbor instead of the reflector's own",
-        file=FOLDER + "prediction_kernels.py",
-        find="other.range, turn, places[reflector, 2]",
-        replace="other.range, turn, places[neighbor, 2]",
+        file=FOLDER + "association_risk.py",
+        find="rows = sees[reflector]",
+        replace="rows = sees[neighbor]",
         tests=(
             TESTS
             + "test_association_risk.py::test_probability_is_that_of_half_the_distance_in_the_reflectors_own_gate",
