@@ -1,3 +1,5 @@
+"""The fuzzing of decoders finds what it shall: telegrams that are decoded, and others that are refused."""
+
 from __future__ import annotations
 
 import pytest
