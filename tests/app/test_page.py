@@ -18,10 +18,13 @@ from commission.app.base.server import start_server
 from commission.app.base.state import AppState, LastEdit
 from commission.app.base.view import view_of
 from commission.app.editing.scanner_fields import source_html
+from commission.app.editing.tool_panel import ToolButtons
+from commission.app.floor_map.tool_fields import MapToolButtons
 from commission.app.page import Page
 from commission.app.project.site_panel import rows as site_rows
 from commission.app.project.top_bar import title
 from commission.app.run.actions import Seek
+from commission.app.run.association_panel import AssociationPanel
 from commission.app.run.badge import badge_text
 from commission.app.run.now_panel import rows
 from commission.app.run.playback import Playback
@@ -61,6 +64,28 @@ def change(widget: Any, value: Any, client: object | None) -> None:
     widget._impl.value = value
     for callback in widget._impl.update_cb:
         callback(SimpleNamespace(client=client, client_id=None, target=widget))
+
+
+def test_no_key_stands_for_two_commands(
+    server: viser.ViserServer, project: Project, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keys: dict[tuple[object, object], list[str]] = {}
+    add_command = viser.GuiApi.add_command
+
+    def noted(gui: viser.GuiApi, label: str, **options: Any) -> viser.CommandHandle:
+        if options.get("hotkey") is not None:
+            keys.setdefault((options["hotkey"], options.get("modifier")), []).append(label)
+        return add_command(gui, label, **options)
+
+    monkeypatch.setattr(viser.GuiApi, "add_command", noted)
+    state = AppState(project=project, saved=project)
+    Page(server, lambda _action: None, state, FEATURES)
+    # What each browser has of its own.
+    ToolButtons(server.gui, lambda _action: None)
+    MapToolButtons(server.gui, lambda _action: None)
+    AssociationPanel(server.gui, lambda _action: None, 1)
+    assert len(keys) > 18
+    assert {key: labels for key, labels in keys.items() if len(labels) > 1} == {}
 
 
 def test_the_whole_page_is_built_and_draws_a_run(server: viser.ViserServer, project: Project, run: RunView) -> None:

@@ -71,15 +71,16 @@ class TimeLine(BasePanel):
         self._slider.on_update(posting(post, lambda event: Seek(float(event.target.value))))
         self._strip = gui.add_html(strip(None))
         self._shown = ("", "")
-        keys: tuple[tuple[str, Literal["P", "N", "V", "R", "B"], actions.Action], ...] = (
-            ("Play or pause", "P", Play()),
-            ("One scan further", "N", StepScan()),
-            ("One scan back", "V", StepScan(back=True)),
-            ("Play backward", "R", Play(playing=True, backward=True)),
-            ("Run the drive afresh", "B", Restart()),
+        keys: tuple[tuple[str, Literal["P", "N", "B"], Literal["shift"] | None, actions.Action], ...] = (
+            ("Play or pause", "P", None, Play()),
+            ("Play backward", "P", "shift", Play(playing=True, backward=True)),
+            ("One scan further", "N", None, StepScan()),
+            ("One scan back", "N", "shift", StepScan(back=True)),
+            ("Run the drive afresh", "B", None, Restart()),
         )
-        for label, key, action in keys:
-            gui.add_command(label, hotkey=key).on_trigger(posting(post, lambda _event, action=action: action))
+        for label, key, modifier, action in keys:
+            command = gui.add_command(label, hotkey=key, modifier=modifier)
+            command.on_trigger(posting(post, lambda _event, action=action: action))
 
     def draw_slowly(self, view: PageView) -> None:
         """Show time and episodes."""
