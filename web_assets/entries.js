@@ -22,6 +22,9 @@
   // key's change 50 ms later) is no other entry. A person who goes on comes with a key or the pointer.
   const settled = new Set();
   const sent = new Map(); // the last entry of each widget
+  const letters = new WeakMap(); // of the numbers that are typed, the last letter that none has
+  const spoiled = new WeakMap(); // those that go on behind it
+  const forget = (input) => { letters.delete(input); spoiled.delete(input); };
 
   // The widget of an input: the nearest element around it that has a label, which names the widget.
   function placeOf(input) {
@@ -78,6 +81,12 @@
     if (!ended) return;
     // Where another value has come meanwhile, what stood there before is an entry like any other.
     if (ended.held === undefined && isSame(ended.input, ended.input.value, ended.before)) return restore(ended);
+    const odd = spoiled.get(ended.input);
+    forget(ended.input);
+    if (odd) {
+      refuse(ended.field, `${oddly(odd)}; nothing is entered`);
+      return restore(ended);
+    }
     const value = meantBy(ended);
     if ([value].flat().some(Number.isNaN)) {
       refuse(ended.field, `found "${ended.input.value}"; expected a number`);
@@ -100,9 +109,18 @@
     worker?.onmessage({ data: { type: "message_batch", messages } });
   };
 
+  const oddly = (odd) => `"${odd}" is not taken; expected digits, a point, a minus in front`;
+  function oddIn(input, data) {
+    const letter = /[^\d.,\s+-]/.exec(data);
+    if (letter) return letter[0];
+    const isInFront = input.selectionStart === 0 || input.value === "";
+    return /^[+-]/.test(data) && !isInFront ? data[0] : null;
+  }
+
   // Show what held before, or what was written into the field while it was typed into.
   function restore({ input, uuid, before: text, held }) {
     settled.add(uuid);
+    forget(input);
     if (input.value !== text) {
       const kind = input instanceof HTMLTextAreaElement ? HTMLTextAreaElement : HTMLInputElement;
       isRestoring = true;
@@ -140,17 +158,33 @@
 
   on("beforeinput", ({ target, data }) => {
     if (!target.matches?.(FIELDS)) return;
-    // viser's input swallows what is no part of a number, and 1e2 would be 12 without a word.
-    const odd = isNumber(target) && /[^\d.,\s+-]/.exec(data ?? "");
-    const place = odd && placeOf(target);
-    if (place) setTimeout(() => refuse(place.field, `"${odd[0]}" is not taken; expected digits, a point, a minus`));
+    // viser's input swallows what is no part of a number, and takes a minus to the front from wherever it is typed:
+    // 1e-1 would be -11 without a word. An entry that goes on behind such a letter is none.
+    const odd = isNumber(target) && oddIn(target, data ?? "");
+    if (odd === "-" || odd === "+" || (letters.has(target) && /\d/.test(data ?? ""))) {
+      spoiled.set(target, letters.get(target) ?? odd);
+    } else if (odd) letters.set(target, odd);
     if (draft?.input !== target) before.set(target, target.value);
     if (!caretIsKnown && isNumber(target)) lookAnew(target);
   });
+  on("paste", (event) => {
+    const { target, clipboardData } = event;
+    const text = clipboardData?.getData("text/plain") ?? "";
+    if (!isNumber(target) || !target.matches?.(FIELDS) || /^\s*[+-]?[\d.,\s]*$/.test(text)) return;
+    event.preventDefault();
+    event.stopImmediatePropagation();
+    const place = placeOf(target);
+    if (place) refuse(place.field, `found "${text.trim().slice(0, 40)}"; expected a number, such as 0.25`);
+  });
   on("input", ({ target }) => {
-    if (isRestoring || draft?.input === target || !target.matches?.(FIELDS)) return;
-    finish();
-    begin(target);
+    if (target.value === "") forget(target); // begun anew
+    if (isRestoring || !target.matches?.(FIELDS)) return;
+    if (draft?.input !== target) {
+      finish();
+      begin(target);
+    }
+    const odd = spoiled.get(target) ?? letters.get(target);
+    if (odd && draft) refuse(draft.field, oddly(odd));
   });
   on("keydown", (event) => {
     caretIsKnown = true;

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from commission.geometry import se2
 from commission.geometry.angles import wrap
@@ -20,6 +21,7 @@ from commission.localization.run_columns import RunColumns, RunSegment
 from commission.planning.visibility import VisibilityModel, VisibilityOptions, build_visibility, walls_of
 from commission.progress import Progress, silent
 from commission.site.floor_map import FloorMap
+from commission.site.reflectors import ReflectorMap
 from commission.studies.inputs import StudyInput
 from commission.studies.scanner_figures import BELONGS
 
@@ -64,7 +66,8 @@ class ReflectorFigures:
     across_spread: FloatArray
     """(M,) their standard deviation [m]."""
     nis: FloatArray
-    """(M,) mean squared Mahalanobis distance of accepted and rejected (2 degrees of freedom); NaN without any."""
+    """(M,) mean squared Mahalanobis distance of accepted and rejected (2 degrees of freedom), of those that the filter
+    knows: it looks no farther than detections can be and pass the gate. NaN without any."""
     last_seen: FloatArray
     """(M,) time of the last accepted detection after the first record [s]; NaN without any."""
 
@@ -79,7 +82,7 @@ class _FigureSums:
     def __init__(self, count: int) -> None:
         self.expected, self.seen, self.accepted, self.rejected = np.zeros((4, count), dtype=np.int64)
         self.first, self.second = np.zeros((2, count)), np.zeros((2, count))
-        self.nis = np.zeros(count)
+        self.nis, self.judged = np.zeros((2, count))
         self.last = np.full(count, math.nan)
 
 
@@ -163,15 +166,21 @@ def _add(
     priors, own = given
     setup, count = segment.setup, len(sums.nis)
     rows = slice(int(columns.offsets[first]), int(columns.offsets[after]))
-    reflector, status, d2 = columns.reflector[rows], columns.status[rows], columns.d2[rows]
-    if not len(setup.reflectors) or not len(reflector):
+    status, d2 = columns.status[rows], columns.d2[rows]
+    if not len(setup.reflectors) or not len(status):
         return
     counts = np.diff(columns.offsets[first : after + 1])
     mountings = np.array([scanner.mounting for scanner in setup.scanners])[columns.detected.scanners[first:after]]
     sensors = np.repeat(se2.compose(priors, mountings), counts, axis=0)
+    measured = columns.range_bearing[rows] - (setup.parameters.observation.range_bias, 0.0)
+    reflector = np.where(
+        (columns.reflector[rows] < 0) & (status == Status.OUTLIER_ASSOCIATION),
+        _nearest(setup.reflectors, sensors, measured),
+        columns.reflector[rows],
+    )
     delta = setup.reflectors.centers[reflector] - sensors[:, :2]
-    measured, ranges = columns.range_bearing[rows], np.hypot(delta[:, 0], delta[:, 1])
-    along = measured[:, 0] - setup.parameters.observation.range_bias - ranges
+    ranges = np.hypot(delta[:, 0], delta[:, 1])
+    along = measured[:, 0] - ranges
     across = ranges * wrap(measured[:, 1] - np.arctan2(delta[:, 1], delta[:, 0]) + sensors[:, 2])
     passed = (reflector >= 0) & (status != Status.OUTLIER_DETECTOR)
     accepted = passed & (status == Status.INLIER)
@@ -181,12 +190,25 @@ def _add(
     sums.rejected += np.bincount(number[near & ~accepted], minlength=count)
     scans = np.unique(number[near] * len(columns) + cycle[near]) // len(columns)
     sums.seen += np.bincount(scans, minlength=count)
-    sums.nis += np.bincount(number[near], weights=d2[near], minlength=count)
+    judged = near & np.isfinite(d2)
+    sums.nis += np.bincount(number[judged], weights=d2[judged], minlength=count)
+    sums.judged += np.bincount(number[judged], minlength=count)
     for axis, values in enumerate((along, across)):
         sums.first[axis] += np.bincount(number[accepted], weights=values[accepted], minlength=count)
         sums.second[axis] += np.bincount(number[accepted], weights=values[accepted] ** 2, minlength=count)
     # Cycles ascend: of each reflector the last one remains.
     sums.last[number[accepted]] = cycle[accepted]
+
+
+def _nearest(reflectors: ReflectorMap, sensors: FloatArray, measured: FloatArray) -> IntArray:
+    """(n,) reflector nearest to where each detection (n, 2) lies, seen from its scanner (n, 3).
+
+    The filter names none where its search, which is no wider than the gate, found nobody: a reflector that was surveyed
+    a hand off would look unseen.
+    """
+    bearings = sensors[:, 2] + measured[:, 1]
+    places = sensors[:, :2] + measured[:, :1] * np.stack((np.cos(bearings), np.sin(bearings)), axis=1)
+    return np.asarray(cKDTree(reflectors.centers).query(places)[1], dtype=np.int64)
 
 
 def _averaged(
@@ -198,7 +220,7 @@ def _averaged(
         means = sums.first / total
         variances = np.maximum(sums.second - total * means**2, 0.0) / (total - 1.0)
         spreads = np.where(total > 1.0, np.sqrt(np.abs(variances)), math.nan)
-        nis = sums.nis / (sums.accepted + sums.rejected)
+        nis = sums.nis / sums.judged
     last = np.full(len(names), math.nan)
     known = np.isfinite(sums.last)
     last[known] = (inputs.columns.stamps_ns[sums.last[known].astype(np.int64)] - inputs.first_ns) * 1e-9

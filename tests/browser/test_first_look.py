@@ -83,6 +83,55 @@ def test_who_turns_the_wheel_while_the_page_builds_up_keeps_what_was_zoomed_to(
     assert float(client.camera.position[2]) == pytest.approx(zoomed)
 
 
+@pytest.mark.parametrize(
+    ("typed", "told"), [("1e-1", '"e" is not taken'), ("1e2", '"e" is not taken'), ("1-1", '"-" is not taken')]
+)
+def test_an_entry_with_letters_inside_is_refused_and_what_held_before_stays(
+    served: Served, window: Callable[..., OpenPage], typed: str, told: str
+) -> None:
+    page = window(served.server)
+    page.open()
+    page.open_tab("Tune")
+    field = page.row("Range jump").locator("input").last
+    before, state = field.input_value(), served.state.project
+    field.click()
+    page.page.keyboard.press("Control+A")
+    page.page.keyboard.type(typed)
+    page.page.keyboard.press("Enter")
+    page.page.wait_for_function(
+        "told => document.querySelector('[data-refused]')?.dataset.refused.startsWith(told)", arg=told
+    )
+    assert "nothing is entered" in page.page.locator("[data-refused]").first.get_attribute("data-refused")
+    assert field.input_value() == before
+    assert served.state.project is state
+
+
+def test_what_is_pasted_into_a_number_and_is_none_is_refused_whole(
+    served: Served, window: Callable[..., OpenPage]
+) -> None:
+    page = window(served.server)
+    page.open()
+    page.open_tab("Tune")
+    field = page.row("Range jump").locator("input").last
+    before, state = field.input_value(), served.state.project
+    field.click()
+    page.page.keyboard.press("Control+A")
+    page.page.evaluate(
+        """() => {
+            const clipboardData = new DataTransfer();
+            clipboardData.setData('text/plain', '1e-1');
+            const pasted = new ClipboardEvent('paste', { clipboardData, bubbles: true, cancelable: true });
+            document.activeElement.dispatchEvent(pasted);
+        }"""
+    )
+    page.page.wait_for_function(
+        "() => document.querySelector('[data-refused]')?.dataset.refused.startsWith('found \"1e-1\"; expected')"
+    )
+    page.page.keyboard.press("Enter")
+    assert field.input_value() == before
+    assert served.state.project is state
+
+
 @pytest.mark.parametrize("letter", ["e", "a", "%"])
 def test_a_letter_that_a_number_does_not_take_is_told(
     served: Served, window: Callable[..., OpenPage], letter: str

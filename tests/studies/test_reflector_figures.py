@@ -53,11 +53,18 @@ def test_every_figure_equals_a_plain_recount(driven: RunResult) -> None:
             px + math.cos(heading) * mx - math.sin(heading) * my,
             py + math.sin(heading) * mx + math.cos(heading) * my,
         )
-        for (distance, bearing), status, index, d2 in zip(
+        for (distance, bearing), status, named, d2 in zip(
             estimate.detections, estimate.status, estimate.reflector, estimate.d2, strict=True
         ):
-            if index < 0 or status == Status.OUTLIER_DETECTOR:
+            if status == Status.OUTLIER_DETECTOR:
                 continue
+            index = named
+            if named < 0:
+                x, y = (
+                    sx + distance * math.cos(heading + turn + bearing),
+                    sy + distance * math.sin(heading + turn + bearing),
+                )
+                index = min(range(len(setup.reflectors)), key=lambda i: math.dist(setup.reflectors.centers[i], (x, y)))
             reflector = setup.reflectors.reflectors[index]
             true = math.hypot(reflector.x - sx, reflector.y - sy)
             along = distance - setup.parameters.observation.range_bias - true
@@ -67,7 +74,7 @@ def test_every_figure_equals_a_plain_recount(driven: RunResult) -> None:
                 accepted[reflector.id].append((along, across))
                 last[reflector.id].append(driven.times[cycle])
             if status == Status.INLIER or math.hypot(along, across) < 1.0:
-                near[reflector.id].append(d2)
+                near[reflector.id].append(d2)  # NaN where the filter found nobody in its search
                 scans[reflector.id].append(cycle)
     assert set(found.names) == {"R1", "R2", "R3", "R4"}
     assert found.rejected.sum() > 10
@@ -80,7 +87,7 @@ def test_every_figure_equals_a_plain_recount(driven: RunResult) -> None:
             assert math.isnan(found.nis[number])
             assert math.isnan(found.last_seen[number])
             continue
-        assert found.nis[number] == pytest.approx(np.mean(near[name]), rel=1e-9)
+        assert found.nis[number] == pytest.approx(np.nanmean(near[name]), rel=1e-9)
         assert found.last_seen[number] == pytest.approx(max(last[name]), abs=1e-9)
         for axis, (mean, spread) in enumerate(
             ((found.along_mean, found.along_spread), (found.across_mean, found.across_spread))
@@ -91,6 +98,18 @@ def test_every_figure_equals_a_plain_recount(driven: RunResult) -> None:
     # The one that the second map does not have was seen in the first half alone, and stands where that map says.
     assert found.last_seen[0] < 0.51 * driven.duration
     assert found.places[:2].tolist() == [[0.25, 2.0], [0.27, 6.5]]
+
+
+def test_a_reflector_that_was_surveyed_a_hand_off_is_seen_and_rejected_and_not_unseen() -> None:
+    site = hall()
+    one, *others = site.reflectors.reflectors
+    askew = replace(site, reflectors=replace(site.reflectors, reflectors=(replace(one, x=one.x + 0.3), *others)))
+    run = replayed(site, standing_still(50))
+    found = figures(judged_run(run.inputs.with_setup(LocalizerSetup.of(askew)), earlier=run))
+    seen = figures(run).seen
+    assert seen[0] > 0
+    assert (found.seen[0], found.rejected[0], found.accepted[0]) == (seen[0], seen[0], 0)
+    assert found.seen[1:].tolist() == seen[1:].tolist()
 
 
 def test_all_in_free_sight_are_expected_in_every_scan_and_none_behind_a_wall() -> None:
