@@ -35,16 +35,15 @@ class Inspect:
         from commission.io.project_file import load_project
         from commission.io.recordings.base import load_log
         from commission.io.recordings.channels import ChannelOptions
-        from commission.site.project import Project
         from commission.site.truth import truth_lines
         from commission.studies.plausibility import PlausibilityInput, plausibility
         from commission.studies.recording_overview import channels
 
         log = load_log(self.recording, ChannelOptions.parse(self.channel, self.wheels))
-        project = Project() if self.project is None else load_project(self.project)
         lines = [f"{channel.name.capitalize():12} {channel.text}" for channel in channels(log)]
         true = [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
-        found = plausibility(PlausibilityInput.of(project, log))
+        given = None if self.project is None else load_project(self.project)
+        found = plausibility(PlausibilityInput.alone(log) if given is None else PlausibilityInput.of(given, log))
         notes = [f"Note         {finding}" for finding in (*log.notes, *found)]
         sys.stdout.write("\n".join([*lines, *true, *notes]) + "\n")
         if self.strict and found:

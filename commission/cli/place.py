@@ -214,10 +214,10 @@ def _heights(text: str) -> AllowedHeights:
 
 def _report(found: Placement) -> list[str]:
     """Lines for a person."""
-    lines = [
-        f"Reflectors   {found.added} suggested among {len(found.candidates)} places, "
-        f"{len(found.reflectors) - found.added} kept; fewer than {found.at_least} new ones cannot be enough",
-    ]
+    # Where no layout from these places meets the demands, there is no number that is enough.
+    bound = f"; fewer than {found.at_least} new ones cannot be enough" if found.at_least else ""
+    kept = len(found.reflectors) - found.added
+    lines = [f"Reflectors   {found.added} suggested among {len(found.candidates)} places, {kept} kept{bound}"]
     if found.was_ended:
         lines.append("Ended        before its time, with the best layout so far: fewer reflectors might do")
     return lines + [f"Not met      {_told(unmet)}" for unmet in found.unmet]

@@ -36,6 +36,9 @@ THINNED = 4.0
 """Factor by which the rate may be lower: recorders often keep each second or third scan only."""
 _PERIODS_S = (0.0005, 5.0)
 """Usual time between two records of one kind [s]."""
+FARTHEST = 200.0
+"""Range beyond which no scanner of this kind measures [m]."""
+_SEEN = ("detections", "scans")
 _FULL_SHARE = 0.99
 _TOLD_GAPS = 3
 
@@ -72,6 +75,11 @@ class PlausibilityInput(StudyInput):
         """Pick what the study reads from a project."""
         return PlausibilityInput(log=log, scanners=project.scanners, detector=project.parameters.detector)
 
+    @staticmethod
+    def alone(log: RecordLog) -> PlausibilityInput:
+        """Return the input where no project is named: then nothing is said to be another scanner than the project's."""
+        return PlausibilityInput(log=log, scanners=(), detector=DetectorParameters())
+
 
 def plausibility(inputs: PlausibilityInput, progress: Progress = silent) -> tuple[Finding, ...]:
     """Judge a recording before it is localized.
@@ -90,6 +98,7 @@ def plausibility(inputs: PlausibilityInput, progress: Progress = silent) -> tupl
         ("clocks", _clocks),
         ("odometry", _odometry),
         ("gaps", _gaps),
+        ("silent scanners", _silent_scanners),
         ("detections", _detections),
         ("scans", _scans),
         ("reference", _reference),
@@ -134,7 +143,7 @@ def _scanner_of(inputs: PlausibilityInput, name: str) -> Scanner | None:
 
 
 def _unknown_scanners(inputs: PlausibilityInput) -> Iterator[Finding]:
-    for name in inputs.log.scanners:
+    for name in inputs.log.scanners if inputs.scanners else ():
         if _scanner_of(inputs, name) is None:
             yield Finding(
                 found=f"the recording's scanner {name!r} is none of the project's",
@@ -165,7 +174,8 @@ def _period_s(stamps_ns: IntArray) -> float:
 
 
 def _clocks(inputs: PlausibilityInput) -> Iterator[Finding]:
-    kinds = _kinds(inputs.log)
+    # A single record, which a reader may have made up, tells of no clock.
+    kinds = tuple((name, stamps) for name, stamps in _kinds(inputs.log) if len(stamps) > 1)
     first = int(kinds[0][1][0]) if kinds else 0
     for name, stamps in kinds[1:]:
         begin, end = kinds[0][1][[0, -1]].tolist()
@@ -239,7 +249,7 @@ def _high(values: FloatArray) -> float:
 def _gaps(inputs: PlausibilityInput) -> Iterator[Finding]:
     """Stretches in which scans go on and odometry does not."""
     stamps = inputs.log.odometry_stamps_ns
-    seen = np.concatenate([s for name, s in _kinds(inputs.log) if name in ("detections", "scans")] or [stamps[:0]])
+    seen = np.concatenate([s for name, s in _kinds(inputs.log) if name.startswith(_SEEN)] or [stamps[:0]])
     if len(stamps) < 2 or not len(seen) or seen.max() < stamps[0] or seen.min() > stamps[-1]:
         return
     longest = max(LONGEST_GAP_S, 5.0 * _period_s(stamps))
@@ -264,6 +274,27 @@ def _gaps(inputs: PlausibilityInput) -> Iterator[Finding]:
         )
 
 
+def _silent_scanners(inputs: PlausibilityInput) -> Iterator[Finding]:
+    """Find scanners that begin long after the others, or end long before them.
+
+    Detections of sensors that detect themselves may be missing where there is nothing to see.
+    """
+    kinds = [(name, stamps) for name, stamps in _kinds(inputs.log) if name.startswith("scans")]
+    if len(kinds) < 2:
+        return
+    begin, end = min(int(stamps[0]) for _, stamps in kinds), max(int(stamps[-1]) for _, stamps in kinds)
+    for name, stamps in kinds:
+        longest = LONGEST_GAP_S + 5.0 * np.nan_to_num(_period_s(stamps))
+        first, last = int(stamps[0]), int(stamps[-1])
+        for missing, at, word in ((first - begin, first, "begin"), (end - last, last, "end")):
+            if missing * 1e-9 > longest:
+                yield Finding(
+                    found=f"the {name} {word} at {(at - begin) * 1e-9:.1f} s of {(end - begin) * 1e-9:.1f} s",
+                    probably="that scanner was off, its connection was lost, or the recording was cut",
+                    remedy="until then or from then on the vehicle sees with the others alone; record all throughout",
+                )
+
+
 def _detections(inputs: PlausibilityInput) -> Iterator[Finding]:
     ranges, bearings = inputs.log.range_bearing.T
     if not len(ranges):
@@ -278,14 +309,13 @@ def _detections(inputs: PlausibilityInput) -> Iterator[Finding]:
     scanners = np.repeat(log.detection_scanners, np.diff(log.detection_offsets))
     for index, name in enumerate(log.scanners):
         scanner = _scanner_of(inputs, name)
-        if scanner is not None:
-            called = "detections" if len(log.scanners) == 1 else f"detections of {name}"
-            yield from _ranges(called, ranges[scanners == index], scanner)
+        called = "detections" if len(log.scanners) == 1 else f"detections of {name}"
+        yield from _ranges(called, ranges[scanners == index], scanner)
 
 
-def _ranges(name: str, ranges: FloatArray, scanner: Scanner) -> Iterator[Finding]:
-    """Ranges beyond what the scanner measures; `ranges` holds no NaN."""
-    farthest = scanner.range[1]
+def _ranges(name: str, ranges: FloatArray, scanner: Scanner | None) -> Iterator[Finding]:
+    """Ranges beyond what the scanner measures, or any does; `ranges` holds no NaN."""
+    farthest = FARTHEST if scanner is None else scanner.range[1]
     beyond = float(np.mean(ranges > 1.05 * farthest)) if len(ranges) else 0.0
     if beyond <= 0.01:
         return
@@ -302,11 +332,11 @@ def _ranges(name: str, ranges: FloatArray, scanner: Scanner) -> Iterator[Finding
 def _scans(inputs: PlausibilityInput) -> Iterator[Finding]:
     for scans in inputs.log.scans:
         scanner = _scanner_of(inputs, inputs.log.scanners[scans.scanner])
-        if scanner is not None and len(scans):
+        if len(scans):
             yield from _scans_of(inputs, scans, scanner)
 
 
-def _scans_of(inputs: PlausibilityInput, scans: ScanStore, scanner: Scanner) -> Iterator[Finding]:
+def _scans_of(inputs: PlausibilityInput, scans: ScanStore, scanner: Scanner | None) -> Iterator[Finding]:
     """Scans of one scanner that are not what the project says of it."""
     called = scans_name(inputs.log, scans)
     # A few scans spread over the drive tell as much as all of them.
@@ -317,7 +347,9 @@ def _scans_of(inputs: PlausibilityInput, scans: ScanStore, scanner: Scanner) -> 
     yield from _ranges(called, ranges[returned], scanner)
     if some.intensities is not None and some.reflector is None and returned.any():
         strengths = np.asarray(some.intensities, dtype=np.float64)[returned]
-        yield from _intensities(strengths, ranges[returned], inputs.detector)
+        yield from _intensities(called, strengths, ranges[returned], inputs.detector)
+    if scanner is None:
+        return
     step, expected = float(np.median(np.abs(scans.angle_increment))), scanner.angle_increment
     if not expected / RATE_RATIO <= step <= expected * RATE_RATIO:
         yield Finding(
@@ -334,19 +366,19 @@ def _scans_of(inputs: PlausibilityInput, scans: ScanStore, scanner: Scanner) -> 
         )
 
 
-def _intensities(values: FloatArray, ranges: FloatArray, detector: DetectorParameters) -> Iterator[Finding]:
+def _intensities(name: str, values: FloatArray, ranges: FloatArray, detector: DetectorParameters) -> Iterator[Finding]:
     share, threshold = float(np.mean(values >= threshold_at(ranges, detector))), detector.intensity_threshold
     low, high = float(values.min()), float(values.max())
     where = f"detector.intensity_threshold {threshold:g} (intensities are {low:.4g} to {high:.4g})"
     if share > _FULL_SHARE:
         yield Finding(
-            found=f"{PERCENT.text(share)} of the beams reach {where}",
+            found=f"{PERCENT.text(share)} of the beams of the {name} reach {where}",
             probably="every wall counts as a reflector",
             remedy="set the threshold between the intensities of walls and of reflectors",
         )
     elif share == 0.0:
         yield Finding(
-            found=f"no beam reaches {where}",
+            found=f"no beam of the {name} reaches {where}",
             probably="no reflector can be detected",
             remedy="set the threshold between the intensities of walls and of reflectors",
         )

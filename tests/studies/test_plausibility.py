@@ -126,8 +126,11 @@ def test_ranges_of_scans_beyond_the_scanner_are_told(ranges: float) -> None:
 
 def test_threshold_that_all_or_no_beams_reach_is_told_with_the_intensities() -> None:
     bright = only(with_scans(intensities=60.0 + 100.0 * MIXED))
-    assert bright.found == "100 % of the beams reach detector.intensity_threshold 0.5 (intensities are 70 to 150)"
-    assert "no beam reaches" in only(with_scans(intensities=0.1 * MIXED)).found
+    assert (
+        bright.found
+        == "100 % of the beams of the scans reach detector.intensity_threshold 0.5 (intensities are 70 to 150)"
+    )
+    assert "no beam of the scans reaches" in only(with_scans(intensities=0.1 * MIXED)).found
 
 
 def test_step_and_rate_of_another_scanner_are_told() -> None:
@@ -153,3 +156,56 @@ def test_study_can_be_cancelled() -> None:
 
     with pytest.raises(JobCancelled):
         plausibility(PlausibilityInput.of(PROJECT, drive(1.0)), cancel)
+
+
+def two_scanners(front: np.ndarray, rear: np.ndarray) -> RecordLog:
+    """A recording of two scanners with intensities of their own; each has a scan every 0.1 s."""
+    log = with_scans(intensities=MIXED)
+    scans = tuple(
+        dataclasses.replace(scan_log(intensities=values), scanner=index) for index, values in enumerate((front, rear))
+    )
+    return dataclasses.replace(log, scans=scans, scanners=("front", "rear"))
+
+
+def test_without_a_project_nothing_is_said_to_be_another_scanner_than_its() -> None:
+    log = dataclasses.replace(with_scans(intensities=MIXED[:, ::4], step_deg=2.0), scanners=("left",))
+    assert any("another scanner" in each.probably for each in judged(log))
+    assert plausibility(PlausibilityInput.alone(log)) == ()
+    assert plausibility(PlausibilityInput.alone(two_scanners(MIXED, MIXED))) == ()
+
+
+def test_without_a_project_millimetres_are_told_all_the_same() -> None:
+    log = with_scans(intensities=MIXED, ranges=5000.0)
+    (finding,) = plausibility(PlausibilityInput.alone(log))
+    assert finding.probably == "they are in millimetres"
+
+
+def test_a_scanner_that_falls_silent_is_told_with_its_name_and_when() -> None:
+    found = plausibility(PlausibilityInput.alone(two_scanners(MIXED, MIXED[:50])))
+    assert [each.found for each in found] == ["the scans of rear end at 4.9 s of 19.9 s"]
+    # Up to a second and five scans nothing is said.
+    assert plausibility(PlausibilityInput.alone(two_scanners(MIXED, MIXED[:186]))) == ()
+    assert len(plausibility(PlausibilityInput.alone(two_scanners(MIXED, MIXED[:184])))) == 1
+
+
+def test_odometry_that_ends_is_told_with_several_scanners_too() -> None:
+    log = two_scanners(MIXED, MIXED)
+    kept = log.odometry_stamps_ns < 8 * SECOND
+    cut = dataclasses.replace(
+        log, odometry_stamps_ns=log.odometry_stamps_ns[kept], displacements=log.displacements[kept]
+    )
+    (finding,) = plausibility(PlausibilityInput.alone(cut))
+    assert "the odometry ends at 8.0 s, and scans go on" in finding.found
+
+
+def test_a_single_record_tells_of_no_clock() -> None:
+    log = with_scans(intensities=MIXED)
+    made_up = dataclasses.replace(
+        log, odometry_stamps_ns=log.odometry_stamps_ns[:1] - 10 * SECOND, displacements=log.displacements[:1]
+    )
+    assert plausibility(PlausibilityInput.alone(made_up)) == ()
+
+
+def test_what_is_told_of_intensities_names_the_scanner() -> None:
+    (finding,) = plausibility(PlausibilityInput.alone(two_scanners(MIXED, MIXED * 0.1)))
+    assert finding.found.startswith("no beam of the scans of rear reaches")
