@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from commission.geometry import se2
 from commission.geometry.angles import wrap
@@ -208,7 +208,7 @@ def _nearest(reflectors: ReflectorMap, sensors: FloatArray, measured: FloatArray
     """
     bearings = sensors[:, 2] + measured[:, 1]
     places = sensors[:, :2] + measured[:, :1] * np.stack((np.cos(bearings), np.sin(bearings)), axis=1)
-    return np.asarray(cKDTree(reflectors.centers).query(places)[1], dtype=np.int64)
+    return np.asarray(KDTree(reflectors.centers).query(places)[1], dtype=np.int64)
 
 
 def _averaged(
