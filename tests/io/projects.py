@@ -39,7 +39,15 @@ SPEED = st.floats(0.001, 100.0)
 POSITIVE = st.floats(1e-6, 1e3)
 NAME = st.text(st.characters(blacklist_categories=("Cs",)), min_size=1, max_size=12)
 POINT = st.tuples(METRES, METRES)
-OUTLINE = st.lists(POINT, min_size=3, max_size=9).map(tuple)
+LENGTHS = st.lists(st.floats(0.1, 1e4), min_size=3, max_size=9)
+# Corners around the base one after the other: an outline that crosses itself is none.
+OUTLINE = LENGTHS.map(
+    lambda lengths: tuple(
+        (length * math.cos(2.0 * math.pi * i / len(lengths)), length * math.sin(2.0 * math.pi * i / len(lengths)))
+        for i, length in enumerate(lengths)
+    )
+)
+ARM = st.floats(-50.0, 50.0)
 
 
 def vehicles() -> st.SearchStrategy[Vehicle]:
@@ -59,7 +67,7 @@ def vehicles() -> st.SearchStrategy[Vehicle]:
 def scanners() -> st.SearchStrategy[Scanner]:
     return st.builds(
         Scanner,
-        mounting=st.tuples(METRES, METRES, st.floats(-math.pi, math.pi)).map(np.array),
+        mounting=st.tuples(ARM, ARM, st.floats(-math.pi, math.pi)).map(np.array),
         field_of_view_deg=st.tuples(st.floats(-180.0, -1.0), st.floats(1.0, 180.0)),
         resolution_deg=st.floats(0.05, 2.0),
         rate=st.floats(1.0, 100.0),
