@@ -32,12 +32,15 @@ BUTTONS: tuple[Button, ...] = (
 
 def title(state: AppState) -> str:
     """Return the left end of the bar; what does not fit between name and buttons is cut, and shown by the pointer."""
-    stands = escaped(standing(state))
+    stands, files = escaped(standing(state)), state.part(FilesState)
+    # Where edits might be lost, that is read before the name is.
+    is_urgent = bool(files.holder or files.kept_in or files.foreign) or not files.is_protected
+    name_gives, least = ("min-width:2em;overflow:hidden;text-overflow:ellipsis", "8em") if is_urgent else ("", "0")
     return (
         "<div class='c-top' style='display:flex;align-items:center;padding:0 14px;gap:14px;font-size:13px;"
         "white-space:nowrap;overflow:hidden'>"
-        f"<b>Commission</b><span style='opacity:.85'>{escaped(state.project.name)}</span>"
-        f"<span style='opacity:.55;min-width:0;overflow:hidden;text-overflow:ellipsis' title='{stands}'>"
+        f"<b>Commission</b><span style='opacity:.85;{name_gives}'>{escaped(state.project.name)}</span>"
+        f"<span style='opacity:.55;min-width:{least};overflow:hidden;text-overflow:ellipsis' title='{stands}'>"
         f"{stands}</span></div>"
     )
 
