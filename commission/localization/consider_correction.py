@@ -30,54 +30,8 @@ from commission.localization.kalman import (
     corrected_covariance,
     gain,
 )
-from commission.localization.observation import (
-    Expected,
-    ObservationModel,
-    expect,
-    expect_at,
-    offset_facing,
-    scanner_offset,
-)
+from commission.localization.observation import Expected, ObservationModel, expect_at, offset_facing
 from commission.localization.pose_gaussian import PoseGaussian
-
-
-@compiled_inline
-def correct_with(  # noqa: PLR0917 - a measurement and a reflector, number by number
-    belief: PoseGaussian,
-    measured_range: float,
-    measured_bearing: float,
-    reflector_x: float,
-    reflector_y: float,
-    surveyed_variance: float,
-    model: ObservationModel,
-    given: Considering,
-    work: FloatArray,
-    at: int,
-) -> PoseGaussian:
-    """Correct a belief, and its covariance with the constants, by one detection of one reflector.
-
-    Parameters
-    ----------
-    belief : before the correction; it is linearized there.
-    measured_range, measured_bearing : range bias already taken off [m], [rad].
-    reflector_x, reflector_y : the reflector's center [m], map frame.
-    surveyed_variance : of the reflector's place, each axis [m^2].
-    model : of the observation.
-    given : of the scan.
-    work : working array of the scan, corrected in place.
-    at : first of the two columns of the reflector.
-
-    Notes
-    -----
-    No formula: `corrected_with`, of a bearing.
-    """
-    offset_x, offset_y = scanner_offset(belief.theta, model)
-    e = expect(belief.x, belief.y, belief.theta, offset_x, offset_y, reflector_x, reflector_y, model.mount_theta)
-    turn, facing = wrap_scalar(measured_bearing - e.bearing), direction_of(belief.theta)
-    width = work.shape[1]
-    return corrected_with(
-        belief, facing, e, measured_range, turn, surveyed_variance, model, given, work, width, at
-    ).belief
 
 
 @compiled_inline
@@ -95,58 +49,30 @@ def correct_aimed_with(  # noqa: PLR0917 - a measurement and a reflector, number
     width: int,
     at: int,
 ) -> Corrected:
-    """Correct a belief like `correct_with`, by directions instead of angles: without arctangent, sine and cosine.
+    """Correct a belief, and its covariance with the constants, by one detection of one reflector.
 
     Parameters
     ----------
-    belief : before the correction; it is linearized there.
-    facing : its heading.
+    belief, facing : before the correction, where it is linearized, and the direction of its heading.
     measured_range : range bias already taken off [m].
-    aim : measured bearing, in base.
-    reflector_x, reflector_y, surveyed_variance, model, given, work, at : as in `correct_with`.
+    aim : measured bearing as a direction, in base.
+    reflector_x, reflector_y : the reflector's center [m], map frame.
+    surveyed_variance : of the reflector's place, each axis [m^2].
+    model : of the observation.
+    given : of the scan.
+    work : working array of the scan, corrected in place.
     width : columns of `work` that are in use.
-
-    Notes
-    -----
-    No formula: `corrected_with`, of a direction.
-    """
-    offset_x, offset_y = offset_facing(facing, model)
-    dx, dy = reflector_x - (belief.x + offset_x), reflector_y - (belief.y + offset_y)
-    e = expect_at(dx, dy, math.nan, offset_x, offset_y)
-    turn = turn_to(-e.range_x, -e.range_y, composed(facing, aim))
-    return corrected_with(belief, facing, e, measured_range, turn, surveyed_variance, model, given, work, width, at)
-
-
-@compiled_inline
-def corrected_with(  # noqa: PLR0917 - a measurement and a reflector, number by number
-    belief: PoseGaussian,
-    facing: UnitVector,
-    e: Expected,
-    measured_range: float,
-    turn: float,
-    surveyed_variance: float,
-    model: ObservationModel,
-    given: Considering,
-    work: FloatArray,
-    width: int,
-    at: int,
-) -> Corrected:
-    """Belief, and its covariance with the constants, after one detection of one reflector.
-
-    Parameters
-    ----------
-    belief, facing : before the correction, and the direction of its heading.
-    e : observation expected from its mean; its bearing is not read.
-    measured_range : range bias already taken off [m].
-    turn : from the expected bearing to the measured one [rad].
-    surveyed_variance, model, given, work, at : as in `correct_with`.
-    width : columns of `work` that are in use.
+    at : first of the two columns of the reflector.
 
     Notes
     -----
     x = x + K v, P = A P A^T + K N K^T - D K^T - K D^T with D = C J^T and N = R + J P_p J^T + H D + (H D)^T, which is
     Joseph's form of the whole state, and C = A C - K J P_p: Schmidt 1966; A = I - K H.
     """
+    offset_x, offset_y = offset_facing(facing, model)
+    dx, dy = reflector_x - (belief.x + offset_x), reflector_y - (belief.y + offset_y)
+    e = expect_at(dx, dy, math.nan, offset_x, offset_y)
+    turn = turn_to(-e.range_x, -e.range_y, composed(facing, aim))
     d = seen_with(facing, e, surveyed_variance, given, work, at)
     v = innovation_with(belief, e, measured_range, turn, model, d)
     k = gain(v)
@@ -228,23 +154,16 @@ def correct_given(  # noqa: PLR0917 - a measurement and a reflector, number by n
     ----------
     belief, measured_range, measured_bearing : as in `kalman.correct`.
     reflector_x, reflector_y, surveyed_variance, model : as in `kalman.correct`.
-    given, work, at : as in `correct_with`, or None.
+    given, work, at : as in `correct_aimed_with`, or None.
 
     Notes
     -----
-    No formula: `correct` or `correct_with`.
+    No formula: `correct`, or `correct_aimed_with` of the directions.
     """
+    x, y = reflector_x, reflector_y
     if given is None or work is None:
-        return correct(belief, measured_range, measured_bearing, reflector_x, reflector_y, surveyed_variance, model)
-    return correct_with(
-        belief,
-        measured_range,
-        measured_bearing,
-        reflector_x,
-        reflector_y,
-        surveyed_variance,
-        model,
-        given,
-        work,
-        at,
-    )
+        return correct(belief, measured_range, measured_bearing, x, y, surveyed_variance, model)
+    aim, facing, width = direction_of(model.mount_theta + measured_bearing), direction_of(belief.theta), work.shape[1]
+    return correct_aimed_with(
+        belief, facing, measured_range, aim, x, y, surveyed_variance, model, given, work, width, at
+    ).belief

@@ -170,6 +170,26 @@ def range_bearing(T_map_base: ArrayLike, mounting: ArrayLike, points_map: ArrayL
     return np.stack((np.hypot(delta[:, 0], delta[:, 1]), bearing), axis=1)
 
 
+def residuals(T_map_scanner: FloatArray, places: FloatArray, measured: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Measured ranges and bearings minus those expected (equation 2 without its noise), each from a pose of its own.
+
+    Parameters
+    ----------
+    T_map_scanner : (n, 3) pose of the scanner at each detection [m, m, rad].
+    places : (n, 2) where what was detected stands [m], map frame.
+    measured : (n, 2) range [m], without the bias that is known of it, and bearing [rad], scanner frame.
+
+    Returns
+    -------
+    residuals : (n, 2) of range [m] and bearing [rad], bearings in [-pi, pi).
+    distances : (n,) expected ranges [m].
+    """
+    rays = places - T_map_scanner[:, :2]
+    distances = np.hypot(rays[:, 0], rays[:, 1])
+    turns = wrap(measured[:, 1] - np.arctan2(rays[:, 1], rays[:, 0]) + T_map_scanner[:, 2])
+    return np.stack((measured[:, 0] - distances, turns), axis=1), distances
+
+
 def jacobians(T_map_base: ArrayLike, mounting: ArrayLike, points_map: ArrayLike) -> FloatArray:
     """Jacobian of `range_bearing` with respect to `T_map_base`.
 

@@ -18,7 +18,7 @@ from commission.geometry.gaussian import mahalanobis_squared
 from commission.localization.detector import passing_widths
 from commission.localization.detector_model import class_of
 from commission.localization.estimate import Estimate, Status
-from commission.localization.observation import SMALLEST_RANGE, range_bearing
+from commission.localization.observation import SMALLEST_RANGE, range_bearing, residuals
 from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
 from commission.site.reflectors import Reflector
@@ -263,11 +263,10 @@ def innovations_of(columns: RunColumns, rows: IntArray) -> FloatArray:
         setup = columns.segments[segment].setup
         poses = np.array([columns.priors.at(cycle)[0] for cycle in cycles[here].tolist()])
         T_map_scanner = se2.compose(poses, setup.scanners[scanner].mounting)
-        rays = setup.reflectors.centers[columns.reflector[rows[here]]] - T_map_scanner[:, :2]
-        seen, distances = columns.range_bearing[rows[here]], np.hypot(rays[:, 0], rays[:, 1])
-        bearings = wrap(seen[:, 1] - np.arctan2(rays[:, 1], rays[:, 0]) + T_map_scanner[:, 2])
-        along = seen[:, 0] - setup.observations[scanner].range_bias - distances
-        found[here] = np.stack((along, distances * bearings), axis=1)
+        measured = columns.range_bearing[rows[here]] - (setup.observations[scanner].range_bias, 0.0)
+        places = setup.reflectors.centers[columns.reflector[rows[here]]]
+        innovations, distances = residuals(T_map_scanner, places, measured)
+        found[here] = np.stack((innovations[:, 0], distances * innovations[:, 1]), axis=1)
     return found
 
 

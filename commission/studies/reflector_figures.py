@@ -13,17 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import KDTree
 
-from commission.geometry import se2
-from commission.geometry.angles import wrap
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.estimate import Status
+from commission.localization.observation import residuals
 from commission.localization.run_columns import RunColumns, RunSegment
 from commission.planning.visibility import VisibilityModel, VisibilityOptions, build_visibility, walls_of
 from commission.progress import Progress, silent
 from commission.site.floor_map import FloorMap
 from commission.site.reflectors import ReflectorMap
 from commission.studies.inputs import StudyInput
-from commission.studies.scanner_figures import BELONGS
+from commission.studies.scanner_figures import BELONGS, sensors_of
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -169,22 +168,19 @@ def _add(
     status, d2 = columns.status[rows], columns.d2[rows]
     if not len(setup.reflectors) or not len(status):
         return
-    counts = np.diff(columns.offsets[first : after + 1])
-    mountings = np.array([scanner.mounting for scanner in setup.scanners])[columns.detected.scanners[first:after]]
-    sensors = np.repeat(se2.compose(priors, mountings), counts, axis=0)
+    sensors = sensors_of(columns, priors, stretch)
     measured = columns.range_bearing[rows] - (setup.parameters.observation.range_bias, 0.0)
     reflector = np.where(
         (columns.reflector[rows] < 0) & (status == Status.OUTLIER_ASSOCIATION),
         _nearest(setup.reflectors, sensors, measured),
         columns.reflector[rows],
     )
-    delta = setup.reflectors.centers[reflector] - sensors[:, :2]
-    ranges = np.hypot(delta[:, 0], delta[:, 1])
-    along = measured[:, 0] - ranges
-    across = ranges * wrap(measured[:, 1] - np.arctan2(delta[:, 1], delta[:, 0]) + sensors[:, 2])
+    found, distances = residuals(sensors, setup.reflectors.centers[reflector], measured)
+    along, across = found[:, 0], found[:, 1] * distances
     passed = (reflector >= 0) & (status != Status.OUTLIER_DETECTOR)
     accepted = passed & (status == Status.INLIER)
     near = accepted | (passed & (np.hypot(along, across) < BELONGS))
+    counts = np.diff(columns.offsets[first : after + 1])
     number, cycle = own[reflector], np.repeat(np.arange(first, after), counts)
     sums.accepted += np.bincount(number[accepted], minlength=count)
     sums.rejected += np.bincount(number[near & ~accepted], minlength=count)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry import se2
-from commission.geometry.angles import wrap
 from commission.geometry.arrays import BoolArray, FloatArray, Growing
 from commission.localization.estimate import Status
+from commission.localization.observation import residuals
 from commission.localization.run_columns import RunColumns, RunSegment
 from commission.site.quantity import DEGREES, MILLIMETRES
 
@@ -97,20 +97,29 @@ def _residuals(
     ranges : (n,) array [m].
     """
     segment, first, last = stretch
-    setup, cycles = segment.setup, slice(first, last)
+    setup = segment.setup
     rows = slice(int(columns.offsets[first]), int(columns.offsets[last]))
     measured, reflectors = columns.range_bearing[rows], columns.reflector[rows]
     if not len(setup.reflectors) or not len(reflectors):
         return np.full(measured.shape, math.nan), measured[:, 0]
-    mountings = np.array([scanner.mounting for scanner in setup.scanners])[columns.detected.scanners[cycles]]
-    counts = np.diff(columns.offsets[first : last + 1])
-    sensors = np.repeat(se2.compose(poses[cycles], mountings), counts, axis=0)
-    delta = setup.reflectors.centers[reflectors] - sensors[:, :2]
-    bias = setup.parameters.observation.range_bias
-    ranges = measured[:, 0] - bias - np.hypot(delta[:, 0], delta[:, 1])
-    bearings = wrap(measured[:, 1] - np.arctan2(delta[:, 1], delta[:, 0]) + sensors[:, 2])
-    found = np.where((reflectors >= 0)[:, np.newaxis], np.stack((ranges, bearings), axis=1), math.nan)
-    return found, measured[:, 0]
+    sensors, bias = sensors_of(columns, poses[first:last], stretch), setup.parameters.observation.range_bias
+    found, _ = residuals(sensors, setup.reflectors.centers[reflectors], measured - (bias, 0.0))
+    return np.where((reflectors >= 0)[:, np.newaxis], found, math.nan), measured[:, 0]
+
+
+def sensors_of(columns: RunColumns, poses: FloatArray, stretch: tuple[RunSegment, int, int]) -> FloatArray:
+    """(n, 3) pose of the scanner at each detection of some cycles [m, m, rad], map frame.
+
+    Parameters
+    ----------
+    columns : the run.
+    poses : (B, 3) pose of base in each of these cycles [m, m, rad], map frame.
+    stretch : segment, first cycle and the one behind the last.
+    """
+    segment, first, last = stretch
+    mounted = np.array([scanner.mounting for scanner in segment.setup.scanners])
+    mountings = mounted[columns.detected.scanners[first:last]]
+    return np.repeat(se2.compose(poses, mountings), np.diff(columns.offsets[first : last + 1]), axis=0)
 
 
 def _stretches(columns: RunColumns) -> Iterator[tuple[RunSegment, int, int]]:

@@ -35,7 +35,6 @@ from commission.app.run.view import DrivenHall, RunView
 from commission.app.run.world import World
 from commission.geometry import rasterize, se2, spline_kernels
 from commission.localization.detection_log import cycle_stamps
-from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress
 from commission.simulation import follower, scan
@@ -137,10 +136,7 @@ class RunService(Service):
                 self._instruments.save(playback.result, window, sender)
             case RunAfresh() if playback is not None and self._wanted is not None:
                 playback.seek(0.0)
-                setup = LocalizerSetup.of(state.project)
-                self._localize(
-                    RunInput(log=self._wanted.log, start=self._wanted.start, segments=(RunSegment(0, setup),))
-                )
+                self._localize(RunInput.of(state.project, self._wanted.log, self._wanted.start))
             case DriveAgain() if self._wanted is not None:
                 self._drives_again(state)
             case _:

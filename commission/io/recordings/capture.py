@@ -15,11 +15,10 @@ from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions, Role, 
 from commission.io.recordings.collector import Collector
 from commission.io.recordings.device_clock import DeviceClock
 from commission.io.recordings.pcap import Payload, is_capture, payloads
+from commission.io.recordings.whole import WholeRecording
 from commission.site.record_log import RecordLog
-from commission.site.records import Record, Scan
-from commission.site.reference_mount import BASE, ReferenceMount
+from commission.site.records import Scan
 from commission.site.scanner import ONLY_NAME
-from commission.site.truth import Truth
 
 LOOKED_AT = 5_000
 """Packets by which the senders of a capture are known."""
@@ -29,13 +28,13 @@ Timed = tuple[int | None, int, Callable[[int, int], Scan | None]]
 """Time by the device's clock [ns] or None, time of capture [ns], and what makes the scan from stamp and scanner."""
 
 
-class Capture:
+class Capture(WholeRecording):
     """A capture; opening it looks at its first packets for scanners."""
 
     def __init__(self, path: Path, options: ChannelOptions = NO_OPTIONS) -> None:
         """Open a capture; raises FileFormatError where it holds no telegram that is read."""
         self.path = path
-        senders = {name: kind for name, kind in _senders(path)}
+        senders = dict(_senders(path))
         if not senders:
             remedy = "telegrams of SICK CoLa (LMDscandata), NAV350, Compact or safety scanners"
             raise FileFormatError(path, "", "holds no telegram that is read", remedy)
@@ -55,18 +54,6 @@ class Capture:
     def recognizes(path: Path) -> bool:
         """Whether a path is a capture, by its first bytes."""
         return is_capture(path)
-
-    def records(self) -> Iterator[Record]:
-        """Deliver every record in order of stamps; the capture is read through before the first one."""
-        return self.load().records()
-
-    def truth(self) -> Truth | None:
-        """No capture holds the constants of a virtual drive."""
-        return None
-
-    def reference_mount(self) -> ReferenceMount:
-        """A capture holds no reference."""
-        return BASE
 
     def load(self) -> RecordLog:
         """Read everything into columns; raises FileFormatError."""

@@ -13,14 +13,12 @@ from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions, Chosen
 from commission.io.recordings.collector import Collector, MotionKind
 from commission.io.recordings.frames import Frames
 from commission.io.recordings.ros_source import BagMessage, is_bag, open_bag
+from commission.io.recordings.whole import WholeRecording
 from commission.site.record_log import RecordLog
-from commission.site.records import Record
-from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import ONLY_NAME
-from commission.site.truth import Truth
 
 
-class RosBag:
+class RosBag(WholeRecording):
     """A ROS bag; opening it reads its index and chooses its topics."""
 
     def __init__(self, path: Path, options: ChannelOptions = NO_OPTIONS) -> None:
@@ -39,18 +37,6 @@ class RosBag:
     def recognizes(path: Path) -> bool:
         """Whether a path is a bag, by its content."""
         return is_bag(path)
-
-    def records(self) -> Iterator[Record]:
-        """Deliver every record in order of stamps; the bag is read through before the first one."""
-        return self.load().records()
-
-    def truth(self) -> Truth | None:
-        """No bag holds the constants of a virtual drive."""
-        return None
-
-    def reference_mount(self) -> ReferenceMount:
-        """A bag's reference is taken as that of base."""
-        return BASE
 
     def load(self) -> RecordLog:
         """Read everything into columns; raises FileFormatError."""

@@ -159,8 +159,8 @@ STUDIES = (
     Mutant(
         name="innovations across the beam count to the right",
         file="commission/studies/reflector_figures.py",
-        find="across = ranges * wrap(",
-        replace="across = -ranges * wrap(",
+        find="found[:, 1] * distances",
+        replace="-found[:, 1] * distances",
         tests=("tests/studies/test_reflector_figures.py::test_every_figure_equals_a_plain_recount",),
     ),
     Mutant(
