@@ -240,9 +240,9 @@ class Quantity:
         return _with_unit(self.on_page(value), self.shown_unit)
 
     def limits(self) -> str:
-        """Say in the page's unit what may be entered; empty: any number."""
-        if self.entry is not None:
-            low, high = self.entry
+        """Say in the page's unit what may be entered, on a slider what lies between its ends; empty: any number."""
+        if ends := self.slider or self.entry:
+            low, high = ends
             return f"{low:g} to {_with_unit(high, self.shown_unit)}"
         if self.bounds.low in (-LARGEST, -FARTHEST) and self.bounds.high in (LARGEST, FARTHEST):
             return ""

@@ -111,5 +111,11 @@ def test_a_tick_says_where_the_saved_project_has_it_and_the_hint_what_may_be_ent
     assert box_of(row.locator(".mantine-Slider-mark")) == saved
     assert box_of(row.locator("[role=slider]"))["x"] > before["x"] + 20.0
     page.row("Gate").locator("input").last.hover()
-    page.wait_for_text("More than 0 and less than 100 %.")
+    page.wait_for_text("50 to 99.99 %.")
+    # The same that is said where it is refused.
+    page.fill("Gate", "45")
+    page.page.wait_for_function(
+        "() => document.querySelector('[data-refused]')?.dataset.refused.endsWith('found 45; expected 50 to 99.99')"
+    )
+    assert len(served.state.undo) == 1
     assert page.errors == []

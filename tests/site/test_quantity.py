@@ -74,6 +74,7 @@ def test_the_page_refuses_in_its_own_unit():
         (Quantity(label="Speed", unit="m/s", bounds=Bounds.above(0.0)), "more than 0 m/s"),
         (Quantity(label="Range", unit="m", shown=MILLIMETRES, bounds=Bounds.at_least(0.001)), "1 mm or more"),
         (Quantity(label="Cell", unit="m", bounds=Bounds.above(0.0), entry=(0.05, 2.0)), "0.05 to 2 m"),
+        (Quantity(label="Gate", shown=PERCENT, bounds=Bounds.inside(0.0, 1.0), slider=(50.0, 99.99)), "50 to 99.99 %"),
         (Quantity(label="Angle", unit="rad"), ""),
         (Quantity(label="x", unit="m", bounds=COORDINATE), ""),
     ],
