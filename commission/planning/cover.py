@@ -19,6 +19,10 @@ from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 
 ROUNDING = 1e-6
 """What the solver of the linear program may be off, before its bound is rounded up."""
+NEGLIGIBLE = 1e-7
+"""Part of a row's need below which a column's gain is handed to all sets at once: the solver drops what is smaller."""
+SOLVER_SECONDS = 20.0
+"""What the solver may take. It cannot be interrupted, and a bound that is not found in time is not waited for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -117,6 +121,7 @@ def lower_bound(problem: CoverProblem, gains: FloatArray | None = None, needs: F
         goal = np.concatenate((goal, further[asks]))
     if len(goal) == 0:
         return 0
+    matrix, goal = _conditioned(matrix, goal)
     matrix = csr_array(matrix)
     pairs = [(a, b) for a, b in _conflicting_pairs(problem) if not problem.fixed[a] and not problem.fixed[b]]
     sides, bounds = -matrix, -goal
@@ -128,9 +133,35 @@ def lower_bound(problem: CoverProblem, gains: FloatArray | None = None, needs: F
             (np.ones(len(entries)), (np.repeat(np.arange(len(pairs)), 2), entries)), shape=(len(pairs), len(columns))
         )
         sides, bounds = vstack((sides, apart)), np.concatenate((bounds, np.ones(len(pairs))))
-    solved = linprog(np.ones(len(columns)), A_ub=sides, b_ub=bounds, bounds=(0.0, 1.0), method="highs")
-    # Conflicts may forbid what columns without them could do; then there is no bound to give but none.
-    return math.ceil(float(solved.fun) - ROUNDING) if solved.status == 0 else 0
+    solved = linprog(
+        np.ones(len(columns)),
+        A_ub=sides,
+        b_ub=bounds,
+        bounds=(0.0, 1.0),
+        method="highs",
+        options={"time_limit": SOLVER_SECONDS},
+    )
+    if solved.status == 0:
+        return math.ceil(float(solved.fun) - ROUNDING)
+    # Conflicts may forbid what columns without them could do, and a hard program may take too long. Fewer rows bound
+    # less, but hold as well; without any there is no bound to give but none.
+    return 0 if gains is None else lower_bound(problem)
+
+
+def _conditioned(gains: FloatArray, needs: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rows of a linear program that say the same of every set of whole columns, in parts of what each row needs.
+
+    Gains of information span fourteen decades, at which a simplex does not come to an end. A column that gains more
+    than a row needs meets it alone, whatever it gains beyond (the tightening of a knapsack's cover), and what no row
+    would notice is taken off the needs for all sets at once. Both leave what any set of whole columns meets.
+    """
+    parts = gains / needs[:, None]
+    # What a column takes away must stay, and with it what others gain beyond.
+    only_adds = (parts >= 0.0).all(axis=1, keepdims=True)
+    parts = np.where(only_adds, np.minimum(parts, 1.0), parts)
+    negligible = np.abs(parts) < NEGLIGIBLE
+    left = 1.0 - np.where(negligible, np.maximum(parts, 0.0), 0.0).sum(axis=1)
+    return np.where(negligible & (parts >= 0.0), 0.0, parts), left
 
 
 def _filled(

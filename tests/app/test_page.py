@@ -118,6 +118,10 @@ def hinted(info: FieldInfo, key: str) -> str:
     """What is said of the field, what may be entered, and its name in files."""
     bounds = "" if info.quantity is None else info.quantity.bounds.words(info.quantity.shown_unit, info.quantity.scale)
     bounds = "" if bounds == "a finite number" else bounds
+    if info.quantity is not None and info.quantity.slider is not None:
+        low, high = info.quantity.slider
+        unit = info.quantity.shown_unit
+        bounds = f"{low:g} to {high:g}{'' if unit == '°' else ' '}{unit}".strip()
     hint = info.hint
     for option in info.options:
         hint = hint.replace(f"`{option}`", option.replace("_", " "))
