@@ -16,8 +16,9 @@ from commission.errors import FileFormatError
 from commission.io.reading import cannot_read
 
 MAGIC = b"\x89MCAP0\r\n"
-SCHEMA, CHANNEL, MESSAGE, CHUNK = 0x03, 0x04, 0x05, 0x06
-HEADER, FOOTER, STATISTICS, DATA_END = 0x01, 0x02, 0x0B, 0x0F
+HEADER, FOOTER, SCHEMA, CHANNEL, MESSAGE, CHUNK = 0x01, 0x02, 0x03, 0x04, 0x05, 0x06
+MESSAGE_INDEX, CHUNK_INDEX, STATISTICS = 0x07, 0x08, 0x0B
+METADATA, METADATA_INDEX, SUMMARY_OFFSET, DATA_END = 0x0C, 0x0D, 0x0E, 0x0F
 RECORD_LIMIT = 256_000_000
 """Bytes of one record, a chunk unpacked included; writers make chunks of 1 to 10 MB."""
 _HEADER = struct.Struct("<BQ")

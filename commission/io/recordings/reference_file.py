@@ -11,7 +11,8 @@ import msgspec
 from commission.errors import FileFormatError
 from commission.io.atomic import write_text
 from commission.io.conversion import convert
-from commission.io.recordings.versioned_json import read_json_of, refuse_other_versions
+from commission.io.reading import read_text
+from commission.io.recordings.versioned_json import json_of, refuse_other_versions
 from commission.site.reference_mount import ReferenceMount
 
 REFERENCE_MOUNT = "reference.json"
@@ -35,8 +36,13 @@ class ReferenceDocument:
 
 def write_reference_mount(path: Path, mount: ReferenceMount) -> None:
     """Write where a reference measures; raises FileFormatError when the file cannot be written."""
+    write_text(path, reference_mount_text(mount))
+
+
+def reference_mount_text(mount: ReferenceMount) -> str:
+    """Return where a reference measures as the text of the file."""
     values = {"schema": SCHEMA, **msgspec.to_builtins(mount)}
-    write_text(path, json.dumps(values) + "\n")
+    return json.dumps(values) + "\n"
 
 
 def read_reference_mount(path: Path) -> ReferenceMount:
@@ -47,7 +53,12 @@ def read_reference_mount(path: Path) -> ReferenceMount:
     FileFormatError
         the file is damaged, of another version, or holds something that is not expected; names the key.
     """
-    values, document = read_json_of(path, SIZE_LIMIT, '{"antenna": [x, y], "clock_offset": s}')
+    return reference_mount_of(path, read_text(path, SIZE_LIMIT))
+
+
+def reference_mount_of(path: Path, text: str) -> ReferenceMount:
+    """Return what the text of such a file says; raises FileFormatError like `read_reference_mount`, naming the path."""
+    values, document = json_of(path, text, '{"antenna": [x, y], "clock_offset": s}')
     if not isinstance(values, dict):
         raise document.error((), f"is {values!r}", "an object with antenna and clock_offset")
     refuse_other_versions(document, values.get("schema", SCHEMA), SCHEMA)

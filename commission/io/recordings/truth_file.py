@@ -13,7 +13,8 @@ import msgspec
 
 from commission.io.atomic import write_text
 from commission.io.conversion import convert
-from commission.io.recordings.versioned_json import read_json_of, refuse_other_versions
+from commission.io.reading import read_text
+from commission.io.recordings.versioned_json import json_of, refuse_other_versions
 from commission.site.disturbances import ScannerError
 from commission.site.truth import TruePlace, TrueWheels, Truth
 
@@ -44,8 +45,13 @@ class TruthDocument:
 
 def write_truth(path: Path, truth: Truth) -> None:
     """Write what is true in a virtual drive; raises FileFormatError when the file cannot be written."""
+    write_text(path, truth_text(truth))
+
+
+def truth_text(truth: Truth) -> str:
+    """Return what is true in a virtual drive as the text of the file."""
     values = {"schema": SCHEMA, **msgspec.to_builtins(truth)}
-    write_text(path, json.dumps(values, indent=1, ensure_ascii=False) + "\n")
+    return json.dumps(values, indent=1, ensure_ascii=False) + "\n"
 
 
 def read_truth(path: Path) -> Truth:
@@ -56,7 +62,12 @@ def read_truth(path: Path) -> Truth:
     FileFormatError
         the file is damaged, of another version, or holds something that is not expected; names the key.
     """
-    values, document = read_json_of(path, SIZE_LIMIT, "what this program wrote")
+    return truth_of(path, read_text(path, SIZE_LIMIT))
+
+
+def truth_of(path: Path, text: str) -> Truth:
+    """Return what the text of such a file says; raises FileFormatError like `read_truth`, naming the path."""
+    values, document = json_of(path, text, "what this program wrote")
     if not isinstance(values, dict) or "schema" not in values:
         raise document.error(("schema",), "is missing", f"an object that begins with schema {SCHEMA}")
     refuse_other_versions(document, values["schema"], SCHEMA)

@@ -9,27 +9,25 @@ from typing import Any
 import msgspec
 
 from commission.errors import FileFormatError
-from commission.io.reading import read_text
 from commission.io.yaml_document import YamlDocument
 
 _NO_NUMBER = re.compile(r"[\[:,]\s*(-?(?:NaN|nan|Infinity|inf))\b")
 
 
-def read_json_of(path: Path, limit: int, expected: str) -> tuple[Any, YamlDocument]:
-    """Read a file of JSON: its content, and the same as a document that names its keys in errors.
+def json_of(path: Path, text: str, expected: str) -> tuple[Any, YamlDocument]:
+    """Return what a text of JSON holds: its content, and the same as a document that names its keys in errors.
 
     Parameters
     ----------
-    path : the file.
-    limit : largest size that is read [bytes].
-    expected : said of a file that is no JSON.
+    path : where it was read, for messages.
+    text : of the file.
+    expected : said of a text that is no JSON.
 
     Raises
     ------
     FileFormatError
-        the file is too large or no JSON.
+        it is no JSON.
     """
-    text = read_text(path, limit)
     try:
         values = msgspec.json.decode(text)
     except (msgspec.DecodeError, RecursionError) as error:
