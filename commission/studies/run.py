@@ -38,6 +38,7 @@ from commission.studies.metrics import (
     without_reference,
 )
 from commission.studies.scanner_figures import ScannerFigures, scanner_figures
+from commission.studies.scanner_figures import warm_up as scanner_figures_warm_up
 from commission.studies.start import Start
 
 Number = int | float | None
@@ -175,6 +176,7 @@ def warm_up() -> None:
     whole_run.warm_up()
     nees(np.zeros((1, 3)), np.eye(3)[np.newaxis])
     nees(np.zeros((1, 2)), np.eye(2)[np.newaxis])
+    scanner_figures_warm_up()
 
 
 def judged_run(

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from commission.compiled import compiled
 from commission.geometry import se2
-from commission.geometry.arrays import BoolArray, FloatArray, Growing
+from commission.geometry.angles import wrap_scalar
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.localization.estimate import Status
-from commission.localization.observation import residuals
+from commission.localization.observation import observation_at, observation_model, observation_rows, scanner_offset
 from commission.localization.run_columns import RunColumns, RunSegment
 from commission.site.quantity import DEGREES, MILLIMETRES
 
@@ -65,46 +67,81 @@ def scanner_figures(columns: RunColumns, references: FloatArray) -> tuple[Scanne
 
 def _means_of_near(columns: RunColumns, poses: FloatArray, names: list[str]) -> list[tuple[float, float]]:
     """Mean residuals [m, rad] of the detections of each scanner that are near their reflector."""
-    near = [(Growing(np.float64), Growing(np.float64)) for _ in names]
-    for segment, first, last in _stretches(columns):
-        found, ranges = _residuals(columns, poses, (segment, first, last))
-        with np.errstate(invalid="ignore"):
-            belongs = np.hypot(found[:, 0], (ranges - found[:, 0]) * found[:, 1]) < BELONGS
-        counts = np.diff(columns.offsets[first : last + 1])
-        of = np.repeat(columns.detected.scanners[first:last], counts)
-        for index, scanner in enumerate(segment.setup.scanners):
+    totals = np.zeros((len(names), 3))
+    ends = (*columns.firsts[1:].tolist(), len(columns))
+    for segment, end in zip(columns.segments, ends, strict=True):
+        setup = segment.setup
+        if not len(setup.reflectors):
+            continue
+        cycles, rows = slice(segment.first, end), slice(columns.offsets[segment.first], columns.offsets[end])
+        sums = _sums_of_near(
+            read_only(columns.offsets[segment.first : end + 1]),
+            read_only(columns.detected.scanners[cycles]),
+            read_only(poses[cycles]),
+            read_only(columns.range_bearing[rows]),
+            read_only(columns.reflector[rows]),
+            read_only(setup.reflectors.centers),
+            observation_rows([observation_model(each, setup.parameters.observation) for each in setup.scanners]),
+        )
+        for scanner, found in zip(setup.scanners, sums, strict=True):
             if scanner.name in names:
-                chosen = found[belongs & (of == index)]
-                for kept, values in zip(near[names.index(scanner.name)], chosen.T, strict=True):
-                    kept.append(values)
-    return [(_mean(ranges.array()), _mean(bearings.array())) for ranges, bearings in near]
+                totals[names.index(scanner.name)] += found
+    return [(float(ranges / of), float(bearings / of)) if of else (math.nan, math.nan) for ranges, bearings, of in totals]
 
 
-def _residuals(
-    columns: RunColumns, poses: FloatArray, stretch: tuple[RunSegment, int, int]
-) -> tuple[FloatArray, FloatArray]:
-    """Measured range and bearing minus those expected of the associated reflector, and the measured ranges.
+@compiled
+def _sums_of_near(  # noqa: PLR0917 - columns and tables, array by array
+    offsets: IntArray,
+    scanners: IntArray,
+    poses: FloatArray,
+    measured: FloatArray,
+    reflectors: IntArray,
+    centers: FloatArray,
+    models: FloatArray,
+) -> FloatArray:
+    """(S, 3) sums of the residuals in range [m] and bearing [rad] of what is near its reflector, and how many.
 
     Parameters
     ----------
-    columns : the run.
-    poses : (K, 3) pose of base in each cycle [m, m, rad], map frame.
-    stretch : segment, first cycle and the one behind the last.
+    offsets : (K + 1,) first row of each cycle, counted in any way that goes on, and behind the last.
+    scanners : (K,) scanner of each cycle.
+    poses : (K, 3) pose of base [m, m, rad], map frame; NaN where unknown.
+    measured : (n, 2) range [m] and bearing [rad] of each row, scanner frame.
+    reflectors : (n,) index of the reflector of each row; negative: nobody's.
+    centers : (N, 2) reflector centers [m], map frame.
+    models : (S, 6) rows of `observation_rows`.
 
-    Returns
-    -------
-    residuals : (n, 2) array [m, rad]; the range bias that the localizer knows is taken off; NaN for nobody.
-    ranges : (n,) array [m].
+    Notes
+    -----
+    Residuals: z - h of equation 2 of Sobreira et al. 2016, less the range bias. Near: hypot(dr, r dphi) < `BELONGS`.
     """
-    segment, first, last = stretch
-    setup = segment.setup
-    rows = slice(int(columns.offsets[first]), int(columns.offsets[last]))
-    measured, reflectors = columns.range_bearing[rows], columns.reflector[rows]
-    if not len(setup.reflectors) or not len(reflectors):
-        return np.full(measured.shape, math.nan), measured[:, 0]
-    sensors, bias = sensors_of(columns, poses[first:last], stretch), setup.parameters.observation.range_bias
-    found, _ = residuals(sensors, setup.reflectors.centers[reflectors], measured - (bias, 0.0))
-    return np.where((reflectors >= 0)[:, np.newaxis], found, math.nan), measured[:, 0]
+    sums = np.zeros((len(models), 3))
+    for k in range(len(scanners)):
+        x, y, theta = poses[k, 0], poses[k, 1], poses[k, 2]
+        if not math.isfinite(x + y + theta):
+            continue
+        model = observation_at(models, scanners[k])
+        offset_x, offset_y = scanner_offset(theta, model)
+        for row in range(offsets[k] - offsets[0], offsets[k + 1] - offsets[0]):
+            if reflectors[row] < 0:
+                continue
+            rx, ry = centers[reflectors[row], 0] - x - offset_x, centers[reflectors[row], 1] - y - offset_y
+            distance = math.sqrt(rx * rx + ry * ry)
+            along = measured[row, 0] - model.range_bias - distance
+            turn = wrap_scalar(measured[row, 1] - math.atan2(ry, rx) + theta + model.mount_theta)
+            across = (measured[row, 0] - along) * turn
+            if along * along + across * across < BELONGS * BELONGS:
+                sums[scanners[k], 0] += along
+                sums[scanners[k], 1] += turn
+                sums[scanners[k], 2] += 1.0
+    return sums
+
+
+def warm_up() -> None:
+    """Compile what sums up residuals."""
+    rows, nobody = read_only(np.zeros((0, 2))), read_only(np.zeros(0, dtype=np.int64))
+    offsets, models = read_only(np.zeros(1, dtype=np.int64)), read_only(np.zeros((1, 6)))
+    _sums_of_near(offsets, nobody, read_only(np.zeros((0, 3))), rows, nobody, rows, models)
 
 
 def sensors_of(columns: RunColumns, poses: FloatArray, stretch: tuple[RunSegment, int, int]) -> FloatArray:
