@@ -63,7 +63,8 @@
       length.textContent = written(metres);
     }
     const at = pointer && onFloor(...pointer);
-    place.textContent = at ? `x ${at[0].toFixed(3)}   y ${at[1].toFixed(3)} m` : "";
+    const [x0, y0] = window.commissionOrigin ?? [0, 0]; // of the scene, in the map (map_scene.py)
+    place.textContent = at ? `x ${(x0 + at[0]).toFixed(3)}   y ${(y0 + at[1]).toFixed(3)} m` : "";
   }
   // Who has zoomed or moved the floor keeps what was zoomed to, though the page still builds up.
   const BUILDS_UP_MS = 10_000;

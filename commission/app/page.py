@@ -22,6 +22,7 @@ from commission.app.base.effects import Effect, FlyTo, PlaceCamera, SendFile, Te
 from commission.app.base.extent import extent_of
 from commission.app.base.feature import Docked, Feature, PanelPlace, Side, Tab
 from commission.app.base.layer import Layer
+from commission.app.base.map_scene import SceneOrigin
 from commission.app.base.panel import Panel, Post
 from commission.app.base.pointer import floor_drag, take_clicks
 from commission.app.base.state import AppState
@@ -72,6 +73,8 @@ class Page:
         self._hidden: frozenset[str] = frozenset()
         self._project: Project | None = None
         self._browsers: dict[int, BrowserPage] = {}
+        self._origin = SceneOrigin()
+        self._scene = self._origin.scene(server.scene)
         docked = sorted((panel for feature in features for panel in feature.panels), key=lambda panel: panel.rank)
         self._own = tuple(panel for panel in docked if panel.own)
         for script in sorted(bundled_folder("web_assets").glob("*.js")):
@@ -84,10 +87,12 @@ class Page:
             server.scene.world_axes.visible = False
             server.scene.set_background_image(np.full((2, 2, 3), theme.BACKGROUND, np.uint8), format="png")
             _light(server.scene)
-            layers = [make(server.scene) for feature in features for make in feature.layers]
+            layers = [make(self._scene) for feature in features for make in feature.layers]
             self._layers: tuple[Layer, ...] = tuple(sorted(layers, key=lambda layer: layer.rank))
             self._panels, self._tabs = self._build(docked)
-            self._cameras = Cameras(server, self._layers, extent_of(state.project), floor_drag(post))
+            self._cameras = Cameras(
+                server, self._layers, extent_of(state.project), self._origin, on_drag=floor_drag(post)
+            )
 
     def _build(self, docked: Sequence[Docked]) -> tuple[tuple[Panel, ...], dict[Tab, GuiTabHandle]]:
         """Make the panels that everybody shares: steps on the left, what is selected on the right, time below."""
@@ -107,7 +112,7 @@ class Page:
 
     def _made(self, panel: Docked, gui: GuiApi, container: Any, client: ClientHandle | None = None) -> Panel:
         """Make a panel where its widgets belong."""
-        scene = self._server.scene if client is None else client.scene
+        scene = self._scene if client is None else self._origin.scene(client.scene)
         with ExitStack() as inside:
             if container is not None:
                 inside.enter_context(container)
@@ -232,7 +237,7 @@ class Page:
             tabs = self._tabs
             panels = tuple(self._made(panel, client.gui, panel.tab and tabs[panel.tab], client) for panel in self._own)
             self._browsers[browser] = BrowserPage(client, panels)
-            take_clicks(client, self._post)
+            take_clicks(client, self._origin.scene(client.scene), self._post)
             self._cameras.connected(client)
 
     def disconnected(self, browser: int) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
@@ -30,4 +32,26 @@ def room(rate: float = 10.0, resolution_deg: float = 0.5) -> Project:
         vehicle=DifferentialVehicle(),
         scanners=(Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=resolution_deg, rate=rate),),
         parameters=Parameters(odometry=PRECISE),
+    )
+
+
+def moved(project: Project, east: float, north: float) -> Project:
+    """Return a project with its map, reflectors and routes moved [m]."""
+    assert project.floor_map is not None
+    routes = tuple(
+        replace(
+            route,
+            segments=tuple(
+                replace(segment, control_points=np.add(segment.control_points, (east, north)))
+                for segment in route.segments
+            ),
+        )
+        for route in project.routes
+    )
+    reflectors = tuple(replace(r, x=r.x + east, y=r.y + north) for r in project.reflectors.reflectors)
+    return replace(
+        project,
+        floor_map=replace(project.floor_map, origin=np.add(project.floor_map.origin, (east, north, 0.0))),
+        reflectors=ReflectorMap(reflectors),
+        routes=routes,
     )

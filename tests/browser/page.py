@@ -34,7 +34,8 @@ _HIDE_TOAST = ".mantine-Notifications-root{display:none !important}"
 
 _PIXEL_OF = """([x, y, z]) => {
   const viewer = window.__viserMutable;
-  const point = viewer.camera.position.clone().set(x, y, z);
+  const [x0, y0] = window.commissionOrigin ?? [0, 0];
+  const point = viewer.camera.position.clone().set(x - x0, y - y0, z);
   viewer.camera.updateMatrixWorld();
   point.applyMatrix4(viewer.nodeRefFromName[''].matrixWorld).project(viewer.camera);
   const box = viewer.canvas.getBoundingClientRect();

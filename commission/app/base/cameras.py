@@ -19,6 +19,7 @@ from commission.app.base import viser_private
 from commission.app.base.actions import Camera, Point
 from commission.app.base.extent import Extent
 from commission.app.base.layer import Layer
+from commission.app.base.map_scene import SceneOrigin, origin_for
 
 PLAN_FOV = 0.02
 """Vertical opening of the camera in the plan [rad]: from so far away that heights do not shift anything."""
@@ -60,20 +61,44 @@ class ClientView:
 
 
 class Cameras:
-    """The views of all browsers; called by the owner thread alone."""
+    """The views of all browsers, in map coordinates; called by the owner thread alone.
+
+    Parameters
+    ----------
+    server : a started one.
+    layers : everything that is drawn on the floor.
+    extent : of the site.
+    origin : of the scene.
+    on_drag : takes drags of the floor; none: they do nothing.
+    """
 
     def __init__(
-        self, server: viser.ViserServer, layers: Sequence[Layer], extent: Extent, on_drag: OnDrag | None = None
+        self,
+        server: viser.ViserServer,
+        layers: Sequence[Layer],
+        extent: Extent,
+        origin: SceneOrigin,
+        *,
+        on_drag: OnDrag | None = None,
     ) -> None:
         self._on_drag = on_drag or _ignore
         self._server = server
         self._layers = layers
         self._extent = extent
+        self._origin = origin
         self._views: dict[int, ClientView] = {}
         self._target: tuple[float, float] | None = None
+        self._begin_at(extent)
+
+    def _begin_at(self, extent: Extent) -> None:
+        """Put the scene's origin near the site, and the camera that a browser begins with above it."""
+        place = origin_for(extent, self._origin.place)
+        if place != self._origin.place:
+            self._origin.move(place)
+            viser_private.run_on_pages(self._server, f"window.commissionOrigin = {json.dumps(place)}")
         height = _visible_height(extent, ASPECT_AT_START) / PLAN_FOV
-        start = server.initial_camera
-        x, y = extent.center
+        start = self._server.initial_camera
+        x, y, _ = map(float, self._origin.to_scene((*extent.center, 0.0)))
         start.position, start.look_at, start.up = (x, y, height), (x, y, 0.0), (0.0, 1.0, 0.0)
         start.fov, start.near, start.far = PLAN_FOV, _nearest(height), 6.0 * height
 
@@ -128,7 +153,7 @@ class Cameras:
         if own is None:
             return
         own.follow, own.came_at = False, -SETTLING
-        camera = own.client.camera
+        camera = self._origin.camera(own.client)
         distance = float(np.linalg.norm(camera.position - camera.look_at))
         if not own.three_d:
             self._look_down(own.client, place, min(distance * PLAN_FOV, NEAREST_FLIGHT))
@@ -154,9 +179,12 @@ class Cameras:
         extent : of the site as it is now.
         hidden : names of the layers that are switched off.
         """
-        self._extent = extent
+        before, self._extent = self._origin.place, extent
+        self._begin_at(extent)
         for own in self._views.values():
             self._furnish_layers(own, changed)
+            if self._origin.place != before:
+                self.show(own.client.client_id, Camera.FIT)
         for name in hidden & changed:
             self.show_layer(name, visible=False)
 
@@ -166,7 +194,7 @@ class Cameras:
         target = np.array([*self._target, 0.0])
         for own in self._views.values():
             if own.follow:
-                camera = own.client.camera
+                camera = self._origin.camera(own.client)
                 shift = target - camera.look_at
                 with own.client.atomic():
                     camera.position = camera.position + shift
@@ -178,7 +206,7 @@ class Cameras:
         for node in own.furniture.pop(LOCK, ()):
             node.remove()
         if not own.three_d:
-            own.furniture[LOCK] = (_rotation_lock(own.client, self._on_drag),)
+            own.furniture[LOCK] = (self._rotation_lock(own.client),)
 
     def _furnish_layers(self, own: ClientView, names: frozenset[str]) -> None:
         """Replace a browser's own nodes of some layers."""
@@ -186,7 +214,7 @@ class Cameras:
             if layer.name in names:
                 for node in own.furniture.get(layer.name, ()):
                     node.remove()
-                own.furniture[layer.name] = layer.furnish(own.client.scene, three_d=own.three_d)
+                own.furniture[layer.name] = layer.furnish(self._origin.scene(own.client.scene), three_d=own.three_d)
 
     def _fit(self, own: ClientView) -> None:
         """Show the plan of the whole site."""
@@ -197,7 +225,7 @@ class Cameras:
 
     def _look_down(self, client: ClientHandle, center: tuple[float, float], visible_height: float) -> None:
         distance = visible_height / PLAN_FOV
-        camera = client.camera
+        camera = self._origin.camera(client)
         with client.atomic():
             fitted = _visible_height(self._extent, _aspect(client)) / PLAN_FOV
             camera.fov, camera.near, camera.far = PLAN_FOV, _nearest(fitted), 6.0 * fitted
@@ -209,7 +237,7 @@ class Cameras:
     def _look_from_the_south(self, client: ClientHandle) -> None:
         x, y = self._extent.center
         reach = _visible_height(self._extent, _aspect(client))
-        camera = client.camera
+        camera = self._origin.camera(client)
         with client.atomic():
             camera.fov, camera.near, camera.far = THREE_D_FOV, 0.05, 50.0 * reach
             camera.min_orbit_distance, camera.max_orbit_distance = 0.5, 20.0 * reach
@@ -217,27 +245,46 @@ class Cameras:
             camera.position = (x, y - 0.85 * reach, 0.85 * reach)
             camera.look_at = (x, y, 0.0)
 
-    async def _watch(self, camera: CameraHandle) -> None:
+    async def _watch(self, moved: CameraHandle) -> None:
         """Fit anew while the page still builds up, and keep north up afterwards.
 
         A browser reports the camera that it began with, and the floor takes its shape when the panels have come: a plan
         fitted before that shows a corner of the site. Later the floor changes its shape with the window, or when the
         plots are folded: who had the whole site in view keeps it.
         """
-        own = self._views.get(camera.client.client_id)
+        own, camera = self._views.get(moved.client.client_id), self._origin.camera(moved.client)
         if own is None or own.three_d or own.follow:
             return
-        own.is_fitted = own.is_fitted or np.allclose(camera.position, own.fitted, rtol=1e-3)
+        own.is_fitted = own.is_fitted or self._is_where_fitted(camera, own)
         shift = float(np.hypot(*(camera.look_at[:2] - self._extent.center)))
         is_reshaped = abs(_aspect(own.client) - own.aspect) > 0.01
         if time.monotonic() - own.came_at < SETTLING:
             is_due = is_reshaped or shift > 0.01 * max(self._extent.size)
         else:
-            is_due = is_reshaped and np.allclose(camera.position, own.fitted, rtol=1e-3)
+            is_due = is_reshaped and self._is_where_fitted(camera, own)
         if is_due:
             self._fit(own)
             return
         self._keep_north_up(camera)
+
+    def _is_where_fitted(self, camera: CameraHandle, own: ClientView) -> bool:
+        """Whether a camera still shows the whole site as it was put to."""
+        away = np.abs(camera.position - own.fitted)
+        return bool(np.all(away <= 1e-3 * np.array([*self._extent.size, own.fitted[2]])))
+
+    def _rotation_lock(self, client: ClientHandle) -> SceneNodeHandle:
+        """Put a sheet under everything that takes left drags: the camera would turn by them, and north not stay up."""
+        sheet = self._origin.scene(client.scene).add_box(
+            LOCK,
+            dimensions=(20_000.0, 20_000.0, 0.01),
+            position=(*self._origin.place, -1.0),
+            opacity=0.0,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+        sheet.on_drag("left")(self._on_drag)
+        sheet.on_drag("left", modifier="shift")(self._on_drag)
+        return sheet
 
     def _keep_north_up(self, camera: CameraHandle) -> None:
         """Undo a turn by the arrow keys, which cannot be switched off."""
@@ -266,21 +313,6 @@ def _aspect(client: ClientHandle) -> float:
     """Width of a browser's floor over its height."""
     aspect = float(client.camera.aspect)
     return aspect if 0.2 < aspect < 8.0 else ASPECT_AT_START
-
-
-def _rotation_lock(client: ClientHandle, on_drag: OnDrag) -> SceneNodeHandle:
-    """Put a sheet under everything that takes left drags: the camera would turn by them, and north not stay up."""
-    sheet = client.scene.add_box(
-        LOCK,
-        dimensions=(20_000.0, 20_000.0, 0.01),
-        position=(0.0, 0.0, -1.0),
-        opacity=0.0,
-        cast_shadow=False,
-        receive_shadow=False,
-    )
-    sheet.on_drag("left")(on_drag)
-    sheet.on_drag("left", modifier="shift")(on_drag)
-    return sheet
 
 
 async def _ignore(_event: object) -> None:

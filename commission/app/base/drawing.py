@@ -1,24 +1,27 @@
-"""From points of the floor to arrays that the scene takes: float32, with a height. Nothing here knows viser."""
+"""From points of the floor to what the scene takes: points with a height, map frame. Nothing here knows viser."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray, Scalar
 
-Points = NDArray[np.float32]
+Points = NDArray[Any]
+"""(..., 3) points of the map frame with a height [m], float64: far from zero float32 is too coarse (`map_scene`)."""
 
-NO_POINTS: Points = np.empty((0, 3), np.float32)
+NO_POINTS: Points = np.empty((0, 3))
 # An empty array of segments makes the browser drop the buffer's size; one of zero length, far below, draws nothing.
-NO_SEGMENTS: Points = np.full((1, 2, 3), -1000.0, np.float32)
+NO_SEGMENTS: Points = np.full((1, 2, 3), -1000.0)
 
 RING_POINTS = 28
 
 
 def lift(points: FloatArray, height: float) -> Points:
     """Return (N, 2) points [m] as (N, 3) at a height [m]."""
-    lifted = np.full((len(points), 3), height, np.float32)
+    lifted = np.full((len(points), 3), height)
     lifted[:, :2] = points
     return lifted
 

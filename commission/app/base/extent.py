@@ -10,6 +10,8 @@ from commission.geometry import se2
 from commission.site.project import Project
 
 MARGIN = 0.6
+FAR = 1000.0
+"""A site without a floor map shows the map's zero, too, where everything is nearer to it than this [m]."""
 SMALLEST, SMALLEST_FIELD = 4.0, 12.0
 """Least width and height of a hall, and of an open field: one that is empty has room for a site [m]."""
 
@@ -40,7 +42,7 @@ class Extent:
 
 def extent_of(project: Project) -> Extent:
     """Return the rectangle around floor map, reflectors and routes, with a margin."""
-    points = [np.zeros((1, 2))]
+    points = [np.empty((0, 2))]
     if project.floor_map is not None:
         width, height = project.floor_map.size
         corners = np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]])
@@ -49,6 +51,8 @@ def extent_of(project: Project) -> Extent:
         points.append(project.reflectors.centers)
     points.extend(segment.control_points for route in project.routes for segment in route.segments)
     every = np.concatenate(points)
+    if project.floor_map is None and np.all(np.abs(every) < FAR):
+        every = np.concatenate([every, np.zeros((1, 2))])
     low, high = every.min(axis=0) - MARGIN, every.max(axis=0) + MARGIN
     smallest = SMALLEST_FIELD if project.floor_map is None else SMALLEST
     middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 0.5 * smallest)

@@ -26,7 +26,7 @@ def add_lines(
     thickness : on the screen [pixels].
     lines : (N, 2, 3) segments [m], frame of the parent node.
     """
-    return scene.add_line_segments(name, lines, color, thickness=thickness, thickness_units="screen")
+    return scene.add_line_segments(name, points=lines, colors=color, thickness=thickness, thickness_units="screen")
 
 
 def add_points(
@@ -51,7 +51,7 @@ def add_points(
     """
     # viser's default, float16, has steps of 16 mm in 16 m.
     return scene.add_point_cloud(
-        name, points, color, point_size=size, point_shape=shape, point_shading="flat", precision="float32"
+        name, points=points, colors=color, point_size=size, point_shape=shape, point_shading="flat", precision="float32"
     )
 
 

@@ -31,16 +31,23 @@ def reach_of(client: ClientHandle) -> float:
     return REACH_SHARE * 2.0 * distance * float(np.tan(0.5 * camera.fov))
 
 
-def take_clicks(client: ClientHandle, post: Post) -> None:
-    """Post each click of a browser on the floor."""
+def take_clicks(client: ClientHandle, scene: SceneApi, post: Post) -> None:
+    """Post each click of a browser on the floor.
+
+    Parameters
+    ----------
+    client : the browser.
+    scene : its own, in map coordinates.
+    post : takes the actions.
+    """
 
     def clicked(event: SceneClickEvent, *, add: bool) -> None:
         place = on_floor(event.ray_origin, event.ray_direction)
         if place is not None:
             post(from_browser(ClickFloor(place, reach_of(client), add), client.client_id))
 
-    client.scene.on_click()(lambda event: clicked(event, add=False))
-    client.scene.on_click(modifier="shift")(lambda event: clicked(event, add=True))
+    scene.on_click()(lambda event: clicked(event, add=False))
+    scene.on_click(modifier="shift")(lambda event: clicked(event, add=True))
 
 
 class FloorClicks(BasePanel):

@@ -65,7 +65,7 @@ class Overlay(BasePanel):
             if event.client is None:
                 return
             self._dragging = event.phase != "end"
-            x, y = (float(value) for value in event.target.position[:2])
+            x, y = (float(value) for value in self._handle.position[:2])
             post(from_browser(actions.DragSelection(event.phase, (x, y)), event.client.client_id))
 
         return dragged
