@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Localize:
-    """Run the localizer over a recording; writes estimates.csv, detections.csv and summary.json."""
+    """Run the localizer over a recording; writes estimates, detections, events, reflectors (.csv) and summary.json."""
 
     project: Positional[Path]
     """Folder of the project (holds project.yaml)."""
@@ -74,19 +74,21 @@ class Localize:
         from commission.io.project_file import apply_settings, load_project
         from commission.io.recordings.base import load_log
         from commission.io.recordings.channels import ChannelOptions
-        from commission.io.results import DETECTIONS, ESTIMATES, SUMMARY, write_results
+        from commission.io.results import RESULTS, write_events, write_reflector_figures, write_results
         from commission.localization import whole_run
         from commission.site.truth import truth_lines
         from commission.studies.detection_rates import rate_entries, rate_told
+        from commission.studies.events import EventsInput, events
         from commission.studies.plausibility import PlausibilityInput, plausibility
+        from commission.studies.reflector_figures import ReflectorFiguresInput, reflector_figures
         from commission.studies.run import RunInput, judged_run, summary
         from commission.studies.run_findings import run_findings
         from commission.studies.scanner_figures import figures_entries
         from commission.studies.sections import section_entries, sections
         from commission.studies.start import start_of
 
-        names, sources = (ESTIMATES, DETECTIONS, SUMMARY), (self.recording, self.project)
-        out = result_folder(self.out, "localize", names, force=self.force, sources=sources)
+        sources = (self.recording, self.project)
+        out = result_folder(self.out, "localize", RESULTS, force=self.force, sources=sources)
         self._refuse_to_rate()
         project = as_saved = load_project(self.project)
         project = dataclasses.replace(project, parameters=apply_settings(project.parameters, self.set))
@@ -111,6 +113,8 @@ class Localize:
         rated = self._rate(as_saved, project, result, rates)
         with out.writing() as folder:
             write_results(folder, result.columns, summary(result) | more)
+            write_events(folder, events(EventsInput(result)))
+            write_reflector_figures(folder, reflector_figures(ReflectorFiguresInput.of(result, project.floor_map)))
         true = [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
         notes = [f"Note         {finding}" for finding in findings]
         sys.stdout.write(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,10 +16,15 @@ from numpy.typing import NDArray
 from commission.io.atomic import atomic_file, write_text
 from commission.localization.estimate import Mode, Status
 from commission.localization.run_columns import RunColumns
+from commission.studies.events import EventsResult, told
+from commission.studies.reflector_figures import ReflectorFigures
 
 ESTIMATES = "estimates.csv"
 DETECTIONS = "detections.csv"
 SUMMARY = "summary.json"
+EVENTS = "events.csv"
+REFLECTORS = "reflectors.csv"
+RESULTS = (ESTIMATES, DETECTIONS, SUMMARY, EVENTS, REFLECTORS)
 
 ESTIMATE_COLUMNS = (
     *("stamp_ns", "x", "y", "theta", "var_x", "cov_xy", "cov_xtheta", "var_y", "cov_ytheta", "var_theta"),
@@ -27,6 +33,17 @@ ESTIMATE_COLUMNS = (
 BEAM_COLUMNS = ("beams", "expected_beams")
 """Width of each cluster, and that of the likeliest kind of reflector there; empty where the sensor itself detected."""
 DETECTION_COLUMNS = ("stamp_ns", "range", "bearing", "x", "y", "status", "reflector_id", "d2", "scanner", *BEAM_COLUMNS)
+
+EVENT_COLUMNS = (
+    *("stamp_ns", "kind", "duration_s", "position", "heading", "position_limit", "heading_limit", "rejected_fraction"),
+    *("reflector_before", "reflector_after", "told"),
+)
+"""Metres and radians; empty what an event of this kind does not have."""
+REFLECTOR_COLUMNS = (
+    *("id", "x", "y", "expected", "seen", "accepted", "rejected"),
+    *("along_mean", "along_spread", "across_mean", "across_spread", "nis", "last_seen_s"),
+)
+"""Scans and detections counted, metres; empty where nothing is known."""
 
 UPPER_TRIANGLE = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 ROWS_AT_ONCE = 50_000
@@ -50,6 +67,42 @@ def write_results(folder: Path, run: RunColumns, summary: Mapping[str, Any]) -> 
     _write_table(folder / ESTIMATES, ESTIMATE_COLUMNS, _estimate_rows(run))
     _write_table(folder / DETECTIONS, DETECTION_COLUMNS, _detection_rows(run))
     write_text(folder / SUMMARY, json.dumps(dict(summary), indent=2, allow_nan=False) + "\n")
+
+
+def write_events(folder: Path, found: EventsResult) -> None:
+    """Write `events.csv`: one row for each event, in the order of time."""
+    first_ns = found.inputs.run.inputs.log.first_ns
+    rows = [
+        (
+            first_ns + round(event.time * 1e9),
+            event.kind.value,
+            *map(_or_empty, (event.lasts, event.position, event.heading, *event.limits, event.share)),
+            *event.names,
+            told(event),
+        )
+        for event in found.events
+    ]
+    _write_table(folder / EVENTS, EVENT_COLUMNS, iter([rows]))
+
+
+def write_reflector_figures(folder: Path, figures: ReflectorFigures) -> None:
+    """Write `reflectors.csv`: what each reflector contributed."""
+    counts = (figures.expected, figures.seen, figures.accepted, figures.rejected)
+    means = (figures.along_mean, figures.along_spread, figures.across_mean, figures.across_spread)
+    columns = (*means, figures.nis, figures.last_seen)
+    rows = zip(
+        figures.names,
+        *figures.places.T.tolist(),
+        *(count.tolist() for count in counts),
+        *(map(_or_empty, column.tolist()) for column in columns),
+        strict=True,
+    )
+    _write_table(folder / REFLECTORS, REFLECTOR_COLUMNS, iter([rows]))
+
+
+def _or_empty(value: float) -> float | str:
+    """A figure, or nothing where it is unknown."""
+    return value if math.isfinite(value) else ""
 
 
 def _estimate_rows(run: RunColumns) -> Iterator[Iterable[Any]]:

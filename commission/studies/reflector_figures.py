@@ -9,6 +9,7 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from scipy.spatial import KDTree
@@ -22,6 +23,7 @@ from commission.progress import Progress, silent
 from commission.site.floor_map import FloorMap
 from commission.site.reflectors import ReflectorMap
 from commission.studies.inputs import StudyInput
+from commission.studies.run import RunResult
 from commission.studies.scanner_figures import BELONGS, sensors_of
 
 
@@ -35,6 +37,11 @@ class ReflectorFiguresInput(StudyInput):
     """Stamp of the first record [ns]."""
     floor_map: FloorMap | None
     """Walls; none: nothing stands in between."""
+
+    @classmethod
+    def of(cls, result: RunResult, floor_map: FloorMap | None) -> Self:
+        """Input of a whole drive."""
+        return cls(columns=result.columns, first_ns=result.inputs.log.first_ns, floor_map=floor_map)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

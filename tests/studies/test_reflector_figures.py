@@ -21,9 +21,7 @@ from tests.studies.test_run import hall, replayed, standing_still
 
 
 def figures(run: RunResult, floor_map=None) -> ReflectorFigures:
-    return reflector_figures(
-        ReflectorFiguresInput(columns=run.columns, first_ns=run.inputs.log.first_ns, floor_map=floor_map)
-    )
+    return reflector_figures(ReflectorFiguresInput.of(run, floor_map))
 
 
 @pytest.fixture(scope="module")

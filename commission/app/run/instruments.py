@@ -38,9 +38,7 @@ class Instruments:
         result : the whole drive.
         floor_map : walls, by which reflectors are expected to be seen.
         """
-        figures = ReflectorFiguresInput(
-            columns=result.columns, first_ns=result.inputs.log.first_ns, floor_map=floor_map
-        )
+        figures = ReflectorFiguresInput.of(result, floor_map)
 
         def look(progress: Progress) -> Found:
             happened = events(EventsInput(result), part(progress, 0.0, 0.4))
