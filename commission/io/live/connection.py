@@ -1,0 +1,211 @@
+"""A live source at work: a thread that receives, decodes and counts, and connects again when the other side is gone.
+
+Sockets are bound to the address that was asked for and no other; what is kept is bounded, whatever arrives.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter, OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from commission.errors import DecodeError, SourceError
+from commission.io.live.clocks import DevicePlace, HostClock
+from commission.io.live.driver import Driver
+from commission.io.live.links import Link, Opened, Piece
+from commission.io.live.registry import SourceAddress
+from commission.io.live.sorter import stamped
+from commission.io.live.status import Numbers, SourceState, SourceStatus, Tally
+from commission.io.protocols.message import Message, Sent
+
+RETRY_S = (0.1, 0.2, 0.5, 1.0, 2.0)
+"""Times before connecting again, the last one for ever [s]."""
+SENDER_LIMIT = 8
+"""Senders to one address that are remembered at once."""
+LET_GO_NS = 1_000_000_000
+"""Time after which another computer may be the scanner that was silent [ns]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """A record and when it came."""
+
+    record: Sent
+    """Stamped by the host's clock."""
+    arrived_ns: int
+    """When the piece that completes it arrived [ns]."""
+    conversation: int
+    """Number of the sender since the start: another one when it began again."""
+
+
+class LiveSource(Protocol):
+    """What every live source offers; a virtual one in a test, too."""
+
+    @property
+    def address(self) -> SourceAddress:
+        """Where it is; the port is the one in use."""
+        ...
+
+    def start(self, deliver: Callable[[Arrival], bool]) -> None:
+        """Begin to receive; raises SourceError where an address cannot be listened at.
+
+        Parameters
+        ----------
+        deliver : takes a record, from the source's own thread; returns whether there was room for it.
+        """
+        ...
+
+    def stop(self) -> None:
+        """Close the connection and end the thread; it can be started again."""
+        ...
+
+    def status(self) -> SourceStatus:
+        """Return how it is doing."""
+        ...
+
+
+class Connection:
+    """A live source.
+
+    Parameters
+    ----------
+    address : which one, and where.
+    make : makes its driver, anew for each conversation.
+    link : what opens the connection.
+    clock : the host's.
+    """
+
+    def __init__(self, address: SourceAddress, make: Callable[[], Driver], link: Link, clock: HostClock) -> None:
+        self.address = address
+        self._make, self._link, self._clock = make, link, clock
+        self._tally = Tally()
+        self._told: Counter[str] = Counter()
+        self._stopped = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._conversations = 0
+        self._is_one_scanner = False
+        self._host: tuple[str, int] = "", 0
+
+    def start(self, deliver: Callable[[Arrival], bool]) -> None:
+        """Begin to receive; see `LiveSource`."""
+        if self._thread is not None:
+            return
+        self._stopped.clear()
+        self._tally.state = SourceState.CONNECTING
+        opened = None
+        if self._link.listens:
+            # Whoever asks for an address that cannot be had is told at once.
+            opened = self._link.open()
+            self.address = self._link.here(self.address, opened)
+        name = f"source {self.address.name}"
+        self._thread = threading.Thread(target=self._run, args=(deliver, opened), name=name, daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Close the connection; see `LiveSource`."""
+        self._stopped.set()
+        if self._thread is not None:
+            self._thread.join(timeout=5.0)
+        self._thread = None
+        self._tally.state = SourceState.STOPPED
+
+    def status(self) -> SourceStatus:
+        """Return how it is doing; from any thread."""
+        return self._tally.status(self._clock.now_ns(), self._told)
+
+    def _run(self, deliver: Callable[[Arrival], bool], opened: Opened | None) -> None:
+        """Receive until it is stopped; connect again when the connection ends."""
+        tries = 0
+        while not self._stopped.is_set():
+            try:
+                opened = opened or self._link.open()
+                with opened:
+                    tries = 0
+                    self._converse(opened, deliver)
+            except (OSError, SourceError) as error:
+                self._tally.trouble = str(error) or type(error).__name__
+            opened = None
+            if not self._stopped.is_set():
+                self._tally.state = SourceState.CONNECTING
+                self._stopped.wait(RETRY_S[min(tries, len(RETRY_S) - 1)])
+                tries += 1
+
+    def _converse(self, opened: Opened, deliver: Callable[[Arrival], bool]) -> None:
+        """Receive from one connection until it ends."""
+        conversations: OrderedDict[object, _Conversation] = OrderedDict()
+        self._tally.state = SourceState.WAITING
+        if not self._link.listens:
+            conversations[None] = self._begun()
+            opened.send(conversations[None].driver.greeting())
+        while not self._stopped.is_set():
+            piece = opened.receive()
+            arrived_ns = self._clock.now_ns()
+            if piece is None:
+                for talk in conversations.values():
+                    opened.send(talk.driver.reply(arrived_ns))
+                continue
+            self._tally.bytes_received += len(piece.data)
+            if self._is_foreign(piece, arrived_ns):
+                self._told["datagrams of another computer are left out"] += 1
+                continue
+            if piece.sender not in conversations:
+                conversations[piece.sender] = self._begun()
+            conversations.move_to_end(piece.sender)
+            if len(conversations) > SENDER_LIMIT:
+                conversations.popitem(last=False)
+            talk = conversations[piece.sender]
+            try:
+                for message in talk.driver.take(piece.data, arrived_ns):
+                    self._deliver(message, arrived_ns, talk, deliver)
+            except DecodeError as error:
+                self._tally.undecodable += 1
+                self._tally.trouble = str(error)
+            opened.send(talk.driver.reply(arrived_ns))
+
+    def _is_foreign(self, piece: Piece, arrived_ns: int) -> bool:
+        """Whether a datagram is of another computer than the scanner that sends: two would be taken for one."""
+        if piece.sender is None or not self._is_one_scanner:
+            return False
+        host, arrived = self._host
+        if host != piece.sender[0] and host and arrived_ns - arrived < LET_GO_NS:
+            return True
+        self._host = piece.sender[0], arrived_ns
+        return False
+
+    def _begun(self) -> _Conversation:
+        """Return a conversation with a sender that begins."""
+        driver = self._make()
+        # Of all conversations, one count.
+        driver.told = self._told
+        self._is_one_scanner = driver.is_one_scanner
+        self._conversations += 1
+        self._tally.connects += 1
+        return _Conversation(driver, self._conversations)
+
+    def _deliver(
+        self, message: Message, arrived_ns: int, talk: _Conversation, deliver: Callable[[Arrival], bool]
+    ) -> None:
+        """Stamp a record and hand it on, unless it came before."""
+        before = talk.place.begun_again
+        stamp_ns = talk.place.stamp(message.device_ns, arrived_ns)
+        if talk.place.begun_again != before:
+            self._conversations += 1
+            talk.number, talk.numbers = self._conversations, Numbers()
+        lost = talk.numbers.taken(message.sequence)
+        if lost is None:
+            self._tally.duplicates += 1
+            return
+        self._tally.lost = max(self._tally.lost + lost, 0)
+        self._tally.arrived(arrived_ns, None if message.device_ns is None else arrived_ns - stamp_ns)
+        if not deliver(Arrival(stamped(message.record, stamp_ns), arrived_ns, talk.number)):
+            self._tally.overrun += 1
+
+
+class _Conversation:
+    """One sender, from when it began."""
+
+    def __init__(self, driver: Driver, number: int) -> None:
+        self.driver, self.number = driver, number
+        self.numbers, self.place = Numbers(), DevicePlace()

@@ -1,0 +1,212 @@
+"""The localizer on a vehicle that drives now: records in, columns of a run out, as of a recording of the same.
+
+It reads no clock and opens no connection: a session feeds it.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.errors import UsageError
+from commission.geometry.arrays import FloatArray, read_only
+from commission.io.live.spooled_scans import SpooledScans
+from commission.localization.estimate import Belief, Estimate, Mode
+from commission.localization.growing_run import GrowingRun
+from commission.localization.setup import LocalizerSetup
+from commission.localization.state import belief_of
+from commission.site.project import Project
+from commission.site.record_log import RecordLog
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+from commission.studies.run import RunInput, RunResult, judge
+from commission.studies.start import Start, StartOrigin, belief_at, route_start
+
+UNKNOWN_SPEED = 1.0
+"""Speed that a vehicle of which nothing is heard may have, where the project has no route that says one [m/s]."""
+UNKNOWN_TURN = 0.5
+"""The same of its turning [rad/s]."""
+NOTHING_HEARD_NS = 200_000_000
+"""Time without odometry from which on the vehicle may be anywhere that it can have driven to [ns]."""
+FIRST_ROWS = 1_024
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LiveResult:
+    """A live run so far."""
+
+    result: RunResult | None
+    """The run up to the newest cycle; None before the first."""
+    belief: Belief | None
+    """What is known of the pose by the newest odometry; None before the first record."""
+    mode: Mode
+    """State of the supervisor."""
+
+
+class LiveRun:
+    """A run that grows: fed by one thread, looked at by any.
+
+    Parameters
+    ----------
+    project : reflectors, scanners, parameters; `use` takes another one.
+    pose : (3,) pose of base at the first record [m, m, rad], map frame; None: the start of the first route.
+    sigmas : (3,) 1-sigma of it [m, m, rad]; None: the usual ones.
+
+    Raises
+    ------
+    UsageError
+        nothing says where the vehicle starts.
+    """
+
+    def __init__(
+        self, project: Project, pose: Sequence[float] | None = None, sigmas: Sequence[float] | None = None
+    ) -> None:
+        if pose is None and not project.routes:
+            raise UsageError(
+                "nothing says where the vehicle is: no route in the project; expected an initial pose X,Y,THETA in "
+                "metres and radians"
+            )
+        self._origin = StartOrigin.ROUTE if pose is None else StartOrigin.GIVEN
+        self._pose = tuple(route_start(project.routes[0]) if pose is None else pose)
+        self._sigmas = sigmas
+        self._speed = max((route.speed for route in project.routes), default=UNKNOWN_SPEED)
+        self._setup = LocalizerSetup.of(project)
+        self._names = tuple(scanner.name for scanner in project.scanners)
+        self._lock = threading.Lock()
+        self._run: GrowingRun | None = None
+        self._start: Start | None = None
+        self._spools: dict[int, SpooledScans] = {}
+        self._odometry = _Rows(3)
+        self._reference = _Rows(3)
+        self._detections = _Rows(2)
+        self._seen = _Rows(2)
+        self._newest_ns = self._odometry_ns = 0
+        self._spent = 0.0
+
+    def take(self, record: Record) -> tuple[Estimate, ...]:
+        """Take in one record in its order; returns the estimates that follow."""
+        with self._lock:
+            # A run without a cycle is empty, and yet the one that was begun.
+            run = self._run = self._begun(record) if self._run is None else self._run
+            before = time.perf_counter()
+            estimates = run.feed(record)
+            self._spent += time.perf_counter() - before
+            self._keep(record)
+            return estimates
+
+    def end(self) -> tuple[Estimate, ...]:
+        """Process what waits, since no more comes; returns the estimates that follow."""
+        with self._lock:
+            return () if self._run is None else self._run.flush()
+
+    def use(self, project: Project) -> None:
+        """Localize with another project's reflectors and parameters from the next record on."""
+        setup = LocalizerSetup.of(project)
+        with self._lock:
+            self._setup = setup
+            if self._run is not None:
+                self._run.begin_segment(setup)
+
+    def so_far(self, now_ns: int | None = None) -> LiveResult:
+        """Return the run so far; its figures are those of a recording of the same drive.
+
+        Parameters
+        ----------
+        now_ns : time by the host's clock [ns]: where no odometry came for a moment, the belief grows as far as the
+            vehicle may have driven; None: it does not.
+        """
+        with self._lock:
+            run, start = self._run, self._start
+            if run is None or start is None:
+                return LiveResult(None, None, Mode.OPERATIONAL)
+            belief, mode = belief_of(run.state), Mode(run.state.mode)
+            columns = run.columns() if len(run) else None
+            log, spent = self._log(), self._spent
+        silent_ns = 0 if now_ns is None else now_ns - max(self._odometry_ns, belief.stamp_ns)
+        if silent_ns > NOTHING_HEARD_NS:
+            belief = self.grown(belief, silent_ns * 1e-9)
+        if columns is None:
+            return LiveResult(None, belief, mode)
+        inputs = RunInput(log=log, start=start, segments=columns.segments)
+        return LiveResult(judge(inputs, columns, spent * 1e6 / len(columns)), belief, mode)
+
+    def grown(self, belief: Belief, seconds: float) -> Belief:
+        """Return a belief after a time in which nothing was heard: 2-sigma is as far as the vehicle can have driven.
+
+        Parameters
+        ----------
+        belief : the last one.
+        seconds : time since then [s].
+        """
+        way, turn = 0.5 * self._speed * seconds, min(0.5 * UNKNOWN_TURN * seconds, np.pi)
+        grown = belief.covariance + np.diag([way**2, way**2, turn**2])
+        return Belief(belief.stamp_ns + round(seconds * 1e9), belief.mean, read_only(grown))
+
+    def _begun(self, record: Record) -> GrowingRun:
+        """Return the run that begins with a record."""
+        self._start = Start(belief_at(record.stamp_ns, self._pose, self._sigmas), self._origin)
+        return GrowingRun(self._setup, self._start.belief)
+
+    def _keep(self, record: Record) -> None:
+        """Remember a record: small ones in memory, scans in a file."""
+        self._newest_ns = record.stamp_ns
+        match record:
+            case Odometry():
+                self._odometry_ns = record.stamp_ns
+                self._odometry.append(record.stamp_ns, record.displacement[np.newaxis])
+            case ReferencePose():
+                self._reference.append(record.stamp_ns, record.pose[np.newaxis])
+            case Detections():
+                self._seen.append(record.stamp_ns, np.array([[len(record.range_bearing), record.scanner]]))
+                self._detections.append(record.stamp_ns, record.range_bearing)
+            case Scan():
+                if record.scanner not in self._spools:
+                    self._spools[record.scanner] = SpooledScans(record.scanner)
+                self._spools[record.scanner].append(record)
+
+    def _log(self) -> RecordLog:
+        """Return the records so far as columns."""
+        seen = self._seen.values.astype(np.int64)
+        return RecordLog(
+            odometry_stamps_ns=self._odometry.stamps_ns,
+            displacements=self._odometry.values,
+            scanners=self._names,
+            scans=tuple(self._spools[scanner].so_far() for scanner in sorted(self._spools)),
+            detection_stamps_ns=self._seen.stamps_ns,
+            detection_offsets=np.concatenate([[0], np.cumsum(seen[:, 0])]).astype(np.int64),
+            range_bearing=self._detections.values,
+            detection_scanners=seen[:, 1],
+            reference_stamps_ns=self._reference.stamps_ns,
+            reference_poses=self._reference.values,
+        )
+
+
+class _Rows:
+    """Stamped rows that grow; what was given out never changes again."""
+
+    def __init__(self, width: int) -> None:
+        self._stamps = np.empty(FIRST_ROWS, np.int64)
+        self._values = np.empty((FIRST_ROWS, width))
+        self._count = 0
+
+    @property
+    def stamps_ns(self) -> NDArray[np.int64]:
+        return read_only(self._stamps[: self._count])
+
+    @property
+    def values(self) -> FloatArray:
+        return read_only(self._values[: self._count])
+
+    def append(self, stamp_ns: int, rows: NDArray[Any]) -> None:
+        last = self._count + len(rows)
+        while last > len(self._stamps):
+            self._stamps = np.concatenate([self._stamps, np.empty_like(self._stamps)])
+            self._values = np.concatenate([self._values, np.empty_like(self._values)])
+        self._stamps[self._count : last] = stamp_ns
+        self._values[self._count : last] = rows
+        self._count = last

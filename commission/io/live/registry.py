@@ -1,0 +1,111 @@
+"""Live sources by name, and how one is named in a command: `json:127.0.0.1:6061`, `sick-safety@front left:6060`.
+
+A source's module is imported when the source is asked for.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from commission.errors import UsageError
+from commission.io.live.driver import Driver
+
+LOCAL = "127.0.0.1"
+LAST_PORT = 65_535
+
+
+class SourceKind(NamedTuple):
+    """Where the driver of a protocol is."""
+
+    module: str
+    driver: str
+    virtual: str
+    """Module with the `Device` that sends as such a device does."""
+    transport: str
+    """`udp`: is listened to at an address of this computer; `tcp`, `websocket`: is connected to."""
+    port: int
+    """The usual one."""
+    words: str
+    """What it is."""
+
+
+KINDS: dict[str, SourceKind] = {
+    "json": SourceKind("json_driver", "JsonDriver", "virtual_json", "udp", 6061, "records as JSON over UDP"),
+    "sick-safety": SourceKind(
+        "safety_driver", "SafetyDriver", "virtual_safety", "udp", 6060, "SICK microScan3, nanoScan3, outdoorScan3"
+    ),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class SourceAddress:
+    """Which protocol, where, and of which scanner."""
+
+    name: str
+    """Key of `KINDS`."""
+    host: str
+    """Address of this computer that is listened at (UDP), or of the device that is connected to (TCP)."""
+    port: int
+    """Its port; 0 takes a free one to listen at."""
+    scanner: str | None = None
+    """The vehicle's scanner that it is, by its name; None: the first, or what messages themselves say."""
+
+    @staticmethod
+    def parse(text: str) -> SourceAddress:
+        """Read `NAME[@SCANNER]:[HOST:]PORT`; raises UsageError that says what is expected."""
+        head, _, rest = text.partition(":")
+        name, _, scanner = head.partition("@")
+        host, _, port = rest.rpartition(":")
+        if name not in KINDS:
+            raise UsageError(f"source {text!r} is of no known kind; expected one of {', '.join(KINDS)}")
+        if not rest:
+            port = str(KINDS[name].port)
+        if not (port.isascii() and port.isdecimal() and len(port) <= 5 and int(port) <= LAST_PORT):
+            raise UsageError(f"source {text!r} has no port; expected {name}:HOST:PORT such as {name}:{LOCAL}:6061")
+        return SourceAddress(name, host.strip("[]") or LOCAL, int(port), scanner or None)
+
+    @property
+    def kind(self) -> SourceKind:
+        """Where its driver is."""
+        return KINDS[self.name]
+
+    def __str__(self) -> str:
+        """Return the text that is read back as this."""
+        scanner = "" if self.scanner is None else f"@{self.scanner}"
+        return f"{self.name}{scanner}:{self.host}:{self.port}"
+
+
+def device_of(address: SourceAddress, scanners: tuple[str, ...]) -> Any:
+    """Return a virtual device that sends to, or is connected to at, an address; not open.
+
+    Parameters
+    ----------
+    address : of who listens (UDP), or of the device (TCP, websocket).
+    scanners : names of the vehicle's scanners.
+    """
+    return importlib.import_module(f"commission.io.live.{address.kind.virtual}").Device(address, scanners)
+
+
+def driver_of(address: SourceAddress, scanners: tuple[str, ...]) -> Callable[[], Driver]:
+    """Return what makes a driver of a source, anew for each conversation.
+
+    Parameters
+    ----------
+    address : which one.
+    scanners : names of the vehicle's scanners.
+
+    Raises
+    ------
+    UsageError
+        the vehicle has no such scanner.
+    """
+    if address.scanner is not None and address.scanner not in scanners:
+        known = ", ".join(map(repr, scanners))
+        raise UsageError(f"source {str(address)!r}: there is no scanner {address.scanner!r}; expected one of {known}")
+    index = 0 if address.scanner is None else scanners.index(address.scanner)
+    module = importlib.import_module(f"commission.io.live.{address.kind.module}")
+    driver: Any = getattr(module, address.kind.driver)
+    return lambda: driver(scanners, index)

@@ -1,0 +1,125 @@
+"""A session and a live run at work: one thread localizes what arrives, one tells how it goes."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from commission.errors import SourceError
+from commission.io.live.live_run import LiveResult, LiveRun
+from commission.io.live.registry import SourceAddress
+from commission.io.live.session import Session
+from commission.io.live.status import SourceStatus
+from commission.site.project import Project
+from commission.site.records import Record
+
+log = logging.getLogger(__name__)
+
+TELL_S = 0.1
+"""Time from one snapshot to the next [s]."""
+TELLING_SHARE = 0.1
+"""Share of its time that telling may take: of a run of hours, figures come less often."""
+WAIT_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class SourceNow:
+    """A source and how it is doing."""
+
+    address: SourceAddress
+    """Which one."""
+    status: SourceStatus
+    """As it is now."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LiveSnapshot:
+    """All that is known of a live run at a moment."""
+
+    sources: tuple[SourceNow, ...]
+    """Its sources."""
+    run: LiveResult
+    """The run so far."""
+    told: dict[str, int]
+    """What was left out or sorted, and how often."""
+
+
+class LiveRunner:
+    """Localizes what a session delivers.
+
+    Parameters
+    ----------
+    session : not started.
+    run : not begun.
+    publish : takes a snapshot some times in a second, from a thread of its own.
+    keep : takes each record in its order, for a recorder.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        run: LiveRun,
+        publish: Callable[[LiveSnapshot], None],
+        keep: Callable[[Record], None] | None = None,
+    ) -> None:
+        self.session, self.run = session, run
+        self._publish, self._keep = publish, keep
+        self._stopped = threading.Event()
+        self._threads = [
+            threading.Thread(target=self._localize, name="live localizer", daemon=True),
+            threading.Thread(target=self._tell, name="live figures", daemon=True),
+        ]
+
+    def start(self) -> None:
+        """Begin; raises SourceError where a source cannot be listened at."""
+        self.session.start()
+        for thread in self._threads:
+            thread.start()
+
+    def stop(self) -> LiveSnapshot:
+        """End: what has arrived is localized, and the last snapshot returned."""
+        self.session.stop()
+        self._stopped.set()
+        for thread in self._threads:
+            if thread.ident is not None:
+                thread.join(timeout=5.0)
+        return self.snapshot()
+
+    def use(self, project: Project) -> None:
+        """Localize with another project from the next record on."""
+        self.run.use(project)
+
+    def snapshot(self) -> LiveSnapshot:
+        """Return how it goes now."""
+        sources = tuple(SourceNow(source.address, source.status()) for source in self.session.sources)
+        told: Counter[str] = Counter(self.session.sorter.told)
+        now_ns = None if self._stopped.is_set() else self.session.clock.now_ns()
+        return LiveSnapshot(sources, self.run.so_far(now_ns), {words: count for words, count in told.items() if count})
+
+    def _localize(self) -> None:
+        while not self._stopped.is_set():
+            for record, _ in self.session.records(WAIT_S):
+                self._take(record)
+        for record in self.session.rest():
+            self._take(record)
+        self.run.end()
+
+    def _take(self, record: Record) -> None:
+        """Localize a record; one that cannot be is told to the log, and the next one is taken."""
+        try:
+            self.run.take(record)
+            if self._keep is not None:
+                self._keep(record)
+        except SourceError:
+            log.exception("a record of a live source")
+
+    def _tell(self) -> None:
+        while not self._stopped.is_set():
+            before = time.perf_counter()
+            self._publish(self.snapshot())
+            spent = time.perf_counter() - before
+            self._stopped.wait(max(TELL_S, spent / TELLING_SHARE))

@@ -1,0 +1,137 @@
+"""Sources of one vehicle together: what they deliver, in one order. It neither localizes nor writes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from queue import Empty, Full, Queue
+
+from commission.errors import UsageError
+from commission.io.live.clocks import HostClock
+from commission.io.live.connection import Arrival, Connection, LiveSource
+from commission.io.live.links import Link, TcpLink, UdpLink
+from commission.io.live.registry import SourceAddress, driver_of
+from commission.io.live.sorter import PATIENCE_NS, Sorter
+from commission.site.records import Record
+
+QUEUE_LIMIT = 4_096
+"""Records that wait to be taken; of more, the newest are dropped and counted."""
+
+
+def connection_of(address: SourceAddress, scanners: tuple[str, ...], clock: HostClock) -> Connection:
+    """Return the connection of a source, not started.
+
+    Parameters
+    ----------
+    address : which one, and where.
+    scanners : names of the vehicle's scanners.
+    clock : the host's.
+
+    Raises
+    ------
+    UsageError
+        the vehicle has no such scanner.
+    """
+    return Connection(address, driver_of(address, scanners), link_of(address), clock)
+
+
+def link_of(address: SourceAddress) -> Link:
+    """Return what opens the connection of a source."""
+    if address.kind.transport == "udp":
+        return UdpLink(address.host, address.port)
+    return TcpLink(address.host, address.port)
+
+
+class Session:
+    """All sources of a vehicle.
+
+    Parameters
+    ----------
+    sources : one at least, not started.
+    patience_ns : how long a record waits for one with an earlier stamp [ns].
+    clock : the host's, the same as that of the sources.
+    """
+
+    def __init__(
+        self, sources: Sequence[LiveSource], patience_ns: int = PATIENCE_NS, clock: HostClock | None = None
+    ) -> None:
+        if not sources:
+            raise UsageError("no source was named; expected one at least")
+        self.sources = tuple(sources)
+        self.clock = clock or HostClock()
+        self.sorter = Sorter(patience_ns)
+        self._queue: Queue[tuple[int, Arrival]] = Queue(QUEUE_LIMIT)
+
+    @staticmethod
+    def of(addresses: Sequence[SourceAddress], scanners: tuple[str, ...], patience_ns: int = PATIENCE_NS) -> Session:
+        """Return the session of some addresses; raises UsageError where one cannot be.
+
+        Parameters
+        ----------
+        addresses : one at least.
+        scanners : names of the vehicle's scanners.
+        patience_ns : how long a record waits for one with an earlier stamp [ns].
+        """
+        clock = HostClock()
+        return Session([connection_of(address, scanners, clock) for address in addresses], patience_ns, clock)
+
+    def start(self) -> None:
+        """Start all sources; where one cannot be, none is, and its SourceError passes through."""
+        try:
+            for number, source in enumerate(self.sources):
+                source.start(self._into(number))
+        except Exception:
+            self.stop()
+            raise
+
+    def stop(self) -> None:
+        """Stop all sources; what has arrived is still delivered."""
+        for source in self.sources:
+            source.stop()
+
+    def _into(self, number: int) -> Callable[[Arrival], bool]:
+        def deliver(arrival: Arrival) -> bool:
+            try:
+                self._queue.put_nowait((number, arrival))
+            except Full:
+                return False
+            return True
+
+        return deliver
+
+    def records(self, wait_s: float) -> Iterator[tuple[Record, int]]:
+        """Deliver what is due, after waiting for the next arrival.
+
+        Parameters
+        ----------
+        wait_s : time to wait at most [s].
+
+        Yields
+        ------
+        record, arrived_ns : in ascending order; the time [ns] is that of the newest arrival so far.
+        """
+        due_ns = self.sorter.next_due_ns()
+        if due_ns is not None:
+            wait_s = min(wait_s, max(due_ns - self.clock.now_ns(), 0) * 1e-9)
+        newest_ns = 0
+        try:
+            number, arrival = self._queue.get(timeout=wait_s) if wait_s > 0.0 else self._queue.get_nowait()
+            while True:
+                newest_ns = arrival.arrived_ns
+                self.sorter.push(number, arrival.record, arrival.arrived_ns, arrival.conversation)
+                for record in self.sorter.due(self.clock.now_ns()):
+                    yield record, newest_ns
+                number, arrival = self._queue.get_nowait()
+        except Empty:
+            pass
+        for record in self.sorter.due(self.clock.now_ns()):
+            yield record, newest_ns
+
+    def rest(self) -> Iterator[Record]:
+        """Deliver everything that is there, since no more comes."""
+        while True:
+            try:
+                number, arrival = self._queue.get_nowait()
+            except Empty:
+                break
+            self.sorter.push(number, arrival.record, arrival.arrived_ns, arrival.conversation)
+        yield from self.sorter.rest()

@@ -1,0 +1,212 @@
+"""A live run is the run over the recording of the same session, to the last bit."""
+
+from __future__ import annotations
+
+import itertools
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from commission.io.bundled import bundled_folder
+from commission.io.live.live_run import LiveRun
+from commission.io.live.registry import KINDS, SourceAddress
+from commission.io.live.runner import LiveRunner
+from commission.io.live.session import Session
+from commission.io.live.spooled_scans import SpooledScans
+from commission.io.live.virtual_vehicle import addresses_of, send_drive
+from commission.io.project_file import load_project
+from commission.io.recordings.base import load_log
+from commission.io.recordings.csv_writer import write_recording
+from commission.simulation.scenario import records
+from commission.site.project import Project
+from commission.site.records import Detections, Odometry, Record, Scan
+from commission.studies.run import RunInput, RunResult, judged_run
+from tests.io.live.virtual import scan, until
+
+SPEED = 4.0
+SECONDS = 8
+
+
+@pytest.fixture(scope="module")
+def warehouse() -> Project:
+    return load_project(bundled_folder("maps") / "warehouse")
+
+
+@pytest.fixture(scope="module")
+def drive(warehouse: Project) -> list[Record]:
+    whole = records(warehouse, warehouse.routes[0].name, 1)
+    return list(itertools.takewhile(lambda record: record.stamp_ns < SECONDS * 10**9, whole))
+
+
+def names_of(project: Project) -> tuple[str, ...]:
+    return tuple(scanner.name for scanner in project.scanners)
+
+
+def assert_same_run(live: RunResult, replayed: RunResult) -> None:
+    for name in ("means", "covariances", "modes", "status", "reflector", "d2", "range_bearing", "stamps_ns", "offsets"):
+        a, b = getattr(live.columns, name), getattr(replayed.columns, name)
+        assert a.tobytes() == b.tobytes(), name
+    assert live.columns.final == replayed.columns.final
+    assert live.errors.tobytes() == replayed.errors.tobytes()
+    assert live.statistics == replayed.statistics
+
+
+def listening_to(name: str, project: Project, free: Iterator[int]) -> Session:
+    """A session of a virtual vehicle's sources, each at a free port."""
+    wanted = addresses_of(SourceAddress(name, "127.0.0.1", next(free)), names_of(project), None)
+    here = [
+        SourceAddress(each.name, each.host, 0 if each.kind.transport == "udp" else each.port, each.scanner)
+        for each in wanted
+    ]
+    # Under the load of other tests a thread may stand still for long.
+    return Session.of(here, names_of(project), patience_ns=10**9)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_live_estimate_is_that_of_the_recording_of_the_same_session(
+    name: str, warehouse: Project, drive: list[Record], tmp_path: Path
+) -> None:
+    session = listening_to(name, warehouse, itertools.count(20_000))
+    run, kept = LiveRun(warehouse), list[Record]()
+    snapshots = []
+    runner = LiveRunner(session, run, snapshots.append, kept.append)
+    runner.start()
+    sent = send_drive(drive, [source.address for source in session.sources], names_of(warehouse), speed=SPEED)
+    assert until(lambda: sum(source.status().records for source in session.sources) >= sent.records)
+    last = runner.stop()
+
+    live = last.run.result
+    assert live is not None
+    assert sum(isinstance(record, Scan) for record in kept) == sent.scans == SECONDS * 25
+    assert all(source.status.lost == source.status.undecodable == 0 for source in last.sources)
+    # It follows the drive that it saw.
+    assert live.operational_fraction > 0.9
+    write_recording(tmp_path / "session", kept, scanners=names_of(warehouse))
+    log = load_log(tmp_path / "session")
+    assert_same_run(live, judged_run(RunInput.of(warehouse, log, live.inputs.start)))
+    assert snapshots
+
+
+def test_parameters_that_change_on_the_way_act_from_the_next_record_on(warehouse: Project, drive: list[Record]) -> None:
+    from commission.site.fields import with_field
+
+    other = warehouse.__class__(
+        **{
+            **{name: getattr(warehouse, name) for name in warehouse.__dataclass_fields__},
+            "parameters": with_field(warehouse.parameters, "association.gate_probability", 0.6),
+        }
+    )
+    run = LiveRun(warehouse)
+    for index, record in enumerate(drive[:800]):
+        if index == 400:
+            run.use(other)
+        run.take(record)
+    run.end()
+    found = run.so_far().result
+    assert found is not None
+    assert len(found.columns.segments) == 2
+    assert_same_run(found, judged_run(found.inputs))
+
+
+def test_two_sigma_goes_on_growing_while_nothing_is_heard(warehouse: Project, drive: list[Record]) -> None:
+    run = LiveRun(warehouse)
+    for record in drive[:400]:
+        run.take(record)
+    last_ns = drive[399].stamp_ns
+    sigmas = []
+    for silent_ms in (0, 250, 500, 1000, 2000):
+        belief = run.so_far(last_ns + silent_ms * 10**6).belief
+        assert belief is not None
+        sigmas.append(2.0 * np.sqrt(np.diagonal(belief.covariance)))
+    assert (np.diff(np.array(sigmas), axis=0) > 0.0).all()
+    # After 2 s it may be as far as its fastest route lets it drive.
+    assert sigmas[-1][0] == pytest.approx(2.0 * max(route.speed for route in warehouse.routes), rel=0.1)
+    # What it really is goes on as if nothing had been shown.
+    again = LiveRun(warehouse)
+    for record in drive[:800]:
+        run.take(record) if record in drive[400:800] else None
+    for record in drive[:800]:
+        again.take(record)
+    first, second = run.so_far().result, again.so_far().result
+    assert first is not None
+    assert second is not None
+    assert first.columns.means.tobytes() == second.columns.means.tobytes()
+
+
+def test_two_sigma_grows_by_odometry_alone_while_the_scanner_is_silent(warehouse: Project, drive: list[Record]) -> None:
+    run = LiveRun(warehouse)
+    for record in drive[:200]:
+        run.take(record)
+    before = run.so_far(drive[199].stamp_ns).belief
+    newest = drive[199].stamp_ns
+    for record in drive[200:400]:
+        if isinstance(record, Odometry):
+            run.take(record)
+            newest = record.stamp_ns
+    after = run.so_far(newest).belief
+    assert before is not None
+    assert after is not None
+    assert np.linalg.det(after.covariance) > np.linalg.det(before.covariance)
+
+
+def test_a_session_that_is_killed_and_restarted_twenty_times_goes_on(warehouse: Project, drive: list[Record]) -> None:
+    rng = np.random.default_rng(4)
+    names, kept = names_of(warehouse), list[Record]()
+    session = Session.of([SourceAddress.parse("sick-safety:0"), SourceAddress.parse("json:0")], names)
+    run = LiveRun(warehouse)
+    runner = LiveRunner(session, run, lambda _: None, kept.append)
+    runner.start()
+    addresses = [source.address for source in session.sources]
+    for _ in range(20):
+        alive = threading.Event()
+        alive.set()
+        arguments = {"speed": 20.0, "stopped": lambda alive=alive: not alive.is_set()}
+        sender = threading.Thread(target=send_drive, args=(drive, addresses, names), kwargs=arguments)
+        before = len(kept)
+        sender.start()
+        assert until(lambda before=before: len(kept) > before + 10)
+        alive.wait(0.0)
+        threading.Event().wait(float(rng.uniform(0.0, 0.1)))
+        alive.clear()
+        sender.join()
+    last = runner.stop()
+    order = [(record.stamp_ns, type(record), getattr(record, "scanner", 0)) for record in kept]
+    assert len(set(order)) == len(order)
+    stamps = [record.stamp_ns for record in kept]
+    assert stamps == sorted(stamps)
+    assert all(source.status.connects == 20 for source in last.sources)
+    result = last.run.result
+    assert result is not None
+    # Motion never jumps by a lap: a sender that begins again does not say where it was.
+    assert max(np.hypot(*record.displacement[:2]) for record in kept if isinstance(record, Odometry)) < 1.0
+
+
+def test_detections_that_a_sensor_reports_are_kept_too(warehouse: Project) -> None:
+    run = LiveRun(warehouse, pose=(4.0, 4.0, 0.0))
+    for step in range(50):
+        run.take(Odometry(step * 40_000_000, np.array([0.01, 0.0, 0.0])))
+        run.take(Detections(step * 40_000_000, np.array([[2.0 + 0.01 * step, 0.5]] * (step % 3)).reshape(-1, 2)))
+    run.end()
+    found = run.so_far().result
+    assert found is not None
+    assert len(found.columns) == 50
+    assert_same_run(found, judged_run(found.inputs))
+
+
+def test_scans_are_read_back_from_their_file_and_the_oldest_forgotten() -> None:
+    spool = SpooledScans(0, limit=10 * 541 * 5)
+    for number in range(25):
+        spool.append(scan(number))
+    store = spool.so_far()
+    assert len(store) == 25
+    for number in range(15, 25):
+        found, sent = store.scan(number), scan(number)
+        np.testing.assert_array_equal(found.ranges, sent.ranges)
+        np.testing.assert_array_equal(found.reflector, sent.reflector)
+        assert (found.stamp_ns, found.angle_min) == (sent.stamp_ns, sent.angle_min)
+    assert np.isnan(store.scan(14).ranges).all()
+    assert store.block(20, 23).ranges.shape == (3, 541)
+    assert len(store.block(3, 3)) == 0
