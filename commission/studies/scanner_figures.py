@@ -86,7 +86,9 @@ def _means_of_near(columns: RunColumns, poses: FloatArray, names: list[str]) -> 
         for scanner, found in zip(setup.scanners, sums, strict=True):
             if scanner.name in names:
                 totals[names.index(scanner.name)] += found
-    return [(float(ranges / of), float(bearings / of)) if of else (math.nan, math.nan) for ranges, bearings, of in totals]
+    return [
+        (float(ranges / of), float(bearings / of)) if of else (math.nan, math.nan) for ranges, bearings, of in totals
+    ]
 
 
 @compiled

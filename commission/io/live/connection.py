@@ -18,7 +18,7 @@ from commission.io.live.links import Link, Opened, Piece
 from commission.io.live.registry import SourceAddress
 from commission.io.live.sorter import stamped
 from commission.io.live.status import Numbers, SourceState, SourceStatus, Tally
-from commission.io.protocols.message import Message, Sent
+from commission.io.protocols.message import LiveMessage, Sent
 
 RETRY_S = (0.1, 0.2, 0.5, 1.0, 2.0)
 """Times before connecting again, the last one for ever [s]."""
@@ -185,7 +185,7 @@ class Connection:
         return _Conversation(driver, self._conversations)
 
     def _deliver(
-        self, message: Message, arrived_ns: int, talk: _Conversation, deliver: Callable[[Arrival], bool]
+        self, message: LiveMessage, arrived_ns: int, talk: _Conversation, deliver: Callable[[Arrival], bool]
     ) -> None:
         """Stamp a record and hand it on, unless it came before."""
         before = talk.place.begun_again

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import ClassVar, Protocol
 
 from commission.io.protocols.assembly import Assembly
-from commission.io.protocols.message import Message
+from commission.io.protocols.message import LiveMessage
 
 
 class Driver(Protocol):
@@ -22,7 +22,7 @@ class Driver(Protocol):
         """Return what is sent first; nothing to who is only listened to."""
         ...
 
-    def take(self, data: bytes, arrived_ns: int) -> Iterator[Message]:
+    def take(self, data: bytes, arrived_ns: int) -> Iterator[LiveMessage]:
         """Deliver what a piece completes; raises DecodeError where it cannot be, and goes on with the next piece.
 
         Parameters
@@ -78,9 +78,9 @@ class ScannerDriver(BaseDriver):
         super().__init__(scanners, scanner)
         self._assembly = type(self).assembly(scanners[scanner], self.told)
 
-    def take(self, data: bytes, arrived_ns: int) -> Iterator[Message]:
+    def take(self, data: bytes, arrived_ns: int) -> Iterator[LiveMessage]:
         """Deliver the scans that a piece completes; raises DecodeError."""
         for device_ns, _, make in self._assembly.found(data, arrived_ns):
             scan = make(arrived_ns, self.scanner)
             if scan is not None:
-                yield Message(scan, device_ns=device_ns)
+                yield LiveMessage(scan, device_ns=device_ns)

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 from commission.io.live.driver import BaseDriver
 from commission.io.protocols.json_records import decode_message
-from commission.io.protocols.message import Message
+from commission.io.protocols.message import LiveMessage
 
 
 class JsonDriver(BaseDriver):
     """Whatever sends records as JSON."""
 
-    def take(self, data: bytes, arrived_ns: int) -> Iterator[Message]:  # noqa: ARG002 - the driver's
+    def take(self, data: bytes, arrived_ns: int) -> Iterator[LiveMessage]:  # noqa: ARG002 - the driver's
         """Deliver the record of a datagram; raises DecodeError."""
         yield decode_message(data, self.scanners)

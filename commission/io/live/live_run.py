@@ -81,10 +81,10 @@ class LiveRun:
         self._run: GrowingRun | None = None
         self._start: Start | None = None
         self._spools: dict[int, SpooledScans] = {}
-        self._odometry = _Rows(3)
-        self._reference = _Rows(3)
-        self._detections = _Rows(2)
-        self._seen = _Rows(2)
+        self._odometry = _StampedRows(3)
+        self._reference = _StampedRows(3)
+        self._detections = _StampedRows(2)
+        self._seen = _StampedRows(2)
         self._newest_ns = self._odometry_ns = 0
         self._spent = 0.0
 
@@ -186,7 +186,7 @@ class LiveRun:
         )
 
 
-class _Rows:
+class _StampedRows:
     """Stamped rows that grow; what was given out never changes again."""
 
     def __init__(self, width: int) -> None:

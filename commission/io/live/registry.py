@@ -22,8 +22,8 @@ class SourceKind(NamedTuple):
 
     module: str
     driver: str
-    virtual: str
-    """Module with the `Device` that sends as such a device does."""
+    virtual: tuple[str, str]
+    """Module and class of the virtual device."""
     transport: str
     """`udp`: is listened to at an address of this computer; `tcp`, `websocket`: is connected to."""
     port: int
@@ -33,9 +33,16 @@ class SourceKind(NamedTuple):
 
 
 KINDS: dict[str, SourceKind] = {
-    "json": SourceKind("json_driver", "JsonDriver", "virtual_json", "udp", 6061, "records as JSON over UDP"),
+    "json": SourceKind(
+        "json_driver", "JsonDriver", ("virtual_json", "JsonVehicle"), "udp", 6061, "records as JSON over UDP"
+    ),
     "sick-safety": SourceKind(
-        "safety_driver", "SafetyDriver", "virtual_safety", "udp", 6060, "SICK microScan3, nanoScan3, outdoorScan3"
+        "safety_driver",
+        "SafetyDriver",
+        ("virtual_safety", "VirtualSafetyScanner"),
+        "udp",
+        6060,
+        "SICK microScan3, nanoScan3, outdoorScan3",
     ),
 }
 
@@ -86,7 +93,8 @@ def device_of(address: SourceAddress, scanners: tuple[str, ...]) -> Any:
     address : of who listens (UDP), or of the device (TCP, websocket).
     scanners : names of the vehicle's scanners.
     """
-    return importlib.import_module(f"commission.io.live.{address.kind.virtual}").Device(address, scanners)
+    module, name = address.kind.virtual
+    return getattr(importlib.import_module(f"commission.io.live.{module}"), name)(address, scanners)
 
 
 def driver_of(address: SourceAddress, scanners: tuple[str, ...]) -> Callable[[], Driver]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from commission.io.live.driver import BaseDriver
 from commission.io.protocols import safety
-from commission.io.protocols.message import Message
+from commission.io.protocols.message import LiveMessage
 
 
 class SafetyDriver(BaseDriver):
@@ -24,7 +24,7 @@ class SafetyDriver(BaseDriver):
         super().__init__(scanners, scanner)
         self._reassembly = safety.Reassembly()
 
-    def take(self, data: bytes, arrived_ns: int) -> Iterator[Message]:
+    def take(self, data: bytes, arrived_ns: int) -> Iterator[LiveMessage]:
         """Deliver the scan that a fragment completes, by the time of arrival: the scanner's clock jitters."""
         instance = self._reassembly.add(safety.decode_fragment(data))
         found = None if instance is None else safety.decode_instance(instance)
@@ -35,4 +35,4 @@ class SafetyDriver(BaseDriver):
         if found.glare.any():
             self.told["scans have beams that were blinded"] += 1
         # Every data set of a channel has a number of its own: what is missing between two was lost.
-        yield Message(safety.scan_of(found, arrived_ns, scanner=self.scanner), sequence=found.sequence)
+        yield LiveMessage(safety.scan_of(found, arrived_ns, scanner=self.scanner), sequence=found.sequence)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from commission.io.live.virtual_device import DatagramDevice
 from commission.io.protocols.json_records import encode_message
-from commission.io.protocols.message import Message, Sent
+from commission.io.protocols.message import LiveMessage, Sent
 
 
-class Device(DatagramDevice):
+class JsonVehicle(DatagramDevice):
     """Sends every record, numbered."""
 
     sends_all = True
@@ -15,6 +15,6 @@ class Device(DatagramDevice):
 
     def pieces(self, record: Sent) -> list[bytes]:
         """Return the one datagram of a record."""
-        message = Message(record, device_ns=record.stamp_ns, sequence=self._sequence)
+        message = LiveMessage(record, device_ns=record.stamp_ns, sequence=self._sequence)
         self._sequence += 1
         return [encode_message(message, self.scanners)]

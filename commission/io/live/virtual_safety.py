@@ -8,7 +8,7 @@ from commission.io.protocols.message import Sent
 from commission.site.records import Scan
 
 
-class Device(DatagramDevice):
+class VirtualSafetyScanner(DatagramDevice):
     """Sends scans in fragments."""
 
     _sequence = 0

@@ -16,7 +16,7 @@ from msgspec import Meta, Struct
 
 from commission.errors import DecodeError
 from commission.geometry.arrays import FloatArray, read_only
-from commission.io.protocols.message import Message, OdometryPose
+from commission.io.protocols.message import LiveMessage, OdometryPose
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
 
 MESSAGE_LIMIT = 65_507
@@ -73,7 +73,7 @@ _Any: TypeAlias = _Odometry | _Scan | _Detections | _Reference
 _DECODER: msgspec.json.Decoder[_Any] = msgspec.json.Decoder(_Any)
 
 
-def decode_message(data: bytes, scanners: Sequence[str]) -> Message:
+def decode_message(data: bytes, scanners: Sequence[str]) -> LiveMessage:
     """Decode one message.
 
     Parameters
@@ -93,7 +93,7 @@ def decode_message(data: bytes, scanners: Sequence[str]) -> Message:
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise DecodeError(f"it is no message: {error}", 0) from None
     try:
-        return Message(_record(sent, scanners), device_ns=sent.stamp_ns, sequence=sent.seq)
+        return LiveMessage(_record(sent, scanners), device_ns=sent.stamp_ns, sequence=sent.seq)
     except ValueError as error:
         raise DecodeError(str(error), 0) from None
 
@@ -150,7 +150,7 @@ def _scan(sent: _Scan, stamp_ns: int, scanner: int) -> Scan:
     )
 
 
-def encode_message(message: Message, scanners: Sequence[str]) -> bytes:
+def encode_message(message: LiveMessage, scanners: Sequence[str]) -> bytes:
     """Encode a record as a message; what is decoded again is the same.
 
     Parameters

@@ -30,7 +30,7 @@ Sent: TypeAlias = Record | OdometryPose
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class LiveMessage:
     """One record from outside; its stamp is set where clocks are known."""
 
     record: Sent

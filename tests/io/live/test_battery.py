@@ -16,15 +16,15 @@ from commission.errors import DecodeError, SourceError, UsageError
 from commission.io.live.driver import Driver
 from commission.io.live.registry import KINDS, SourceAddress
 from commission.io.live.status import SourceState
-from commission.io.protocols.message import Message
+from commission.io.protocols.message import LiveMessage
 from tests.io.live.virtual import ALL, Listening, Sending, numbers_of, scan, until
 
 DATAGRAMS = tuple(name for name in ALL if KINDS[name].transport == "udp")
 
 
-def fed(driver: Driver, pieces: list[bytes]) -> list[Message]:
+def fed(driver: Driver, pieces: list[bytes]) -> list[LiveMessage]:
     """What a driver makes of pieces; those that cannot be decoded are passed over, as a connection does."""
-    found: list[Message] = []
+    found: list[LiveMessage] = []
     for piece in pieces:
         try:
             found.extend(driver.take(piece, 10**18))
@@ -37,7 +37,7 @@ def flat(pieces: list[list[bytes]]) -> list[bytes]:
     return [piece for group in pieces for piece in group]
 
 
-def numbers(found: list[Message]) -> list[int]:
+def numbers(found: list[LiveMessage]) -> list[int]:
     return numbers_of([message.record for message in found])  # type: ignore[misc]
 
 

@@ -11,7 +11,7 @@ from hypothesis.extra import numpy as npst
 from commission.errors import DecodeError
 from commission.geometry.arrays import equal_fields
 from commission.io.protocols.json_records import MESSAGE_LIMIT, decode_message, encode_message
-from commission.io.protocols.message import Message, OdometryPose
+from commission.io.protocols.message import LiveMessage, OdometryPose
 from commission.site.records import Detections, Odometry, ReferencePose, Scan
 
 NAMES = ("front", "rear")
@@ -57,7 +57,7 @@ RECORDS = st.one_of(
 
 @given(RECORDS, st.integers(0, 2**53))
 def test_what_is_encoded_is_decoded_as_the_same(record: Odometry, sequence: int) -> None:
-    found = decode_message(encode_message(Message(record, record.stamp_ns, sequence), NAMES), NAMES)
+    found = decode_message(encode_message(LiveMessage(record, record.stamp_ns, sequence), NAMES), NAMES)
     assert (found.device_ns, found.sequence) == (record.stamp_ns, sequence)
     assert type(found.record) is type(record)
     for name in record.__dataclass_fields__:
