@@ -13,19 +13,13 @@ from numpy.typing import NDArray
 
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.geometry.occupancy import OccupancyGrid
+from commission.geometry.se2 import inverse
+from commission.simulation.people_kernels import STRIDE, People, Walkable, arrived, can_walk, legs_of, walk_on
 from commission.site.floor_map import FREE
 from commission.site.project import Project
 
-LEG_RADIUS = 0.07
-"""Radius of a leg at the height of a safety scanner, with its trouser [m]."""
-HIP_WIDTH = 0.18
-"""Distance between the two legs of a person, across [m]."""
-STRIDE = 0.7
-"""Length of a step [m]; the legs swing by up to half of it, fore and aft."""
 CLEARANCE = 0.35
 """Distance of a person's middle from walls and reflectors [m]."""
-KEEP_FROM_VEHICLE = 1.0
-"""Distance from base at which a person steps aside [m]."""
 SPEED_SPREAD = 0.25
 """1-sigma of a person's walking speed, as a share of the mean."""
 LONGEST_WALK = 8.0
@@ -34,6 +28,8 @@ TRIES = 30
 """Random points tried before a person stays for now."""
 MARGIN = 2.0
 """Width of the floor around reflectors and routes on which people walk where there is no floor map [m]."""
+STANDING = 1e-9
+"""Way below which a person has not turned to where it goes [m]."""
 FIELD_CELL = 0.1
 """Cell of that floor [m]."""
 
@@ -68,10 +64,11 @@ class WalkableFloor:
         rows, columns = np.where(inside[:, np.newaxis], cells, 0).T
         return inside & self.walkable[rows, columns]
 
-    def allows_straight(self, start: FloatArray, end: FloatArray) -> bool:
-        """Whether a person can walk straight from one point (2,) to another."""
-        count = max(2, math.ceil(math.dist(start, end) / (0.5 * self.grid.resolution)) + 1)
-        return bool(self.allows(start + (end - start) * np.linspace(0.0, 1.0, count)[:, np.newaxis]).all())
+    def plain(self) -> Walkable:
+        """Return the same as plain arrays and numbers, for kernels."""
+        to_grid = inverse(self.grid.origin)
+        turned = np.array([to_grid[0], to_grid[1], np.cos(to_grid[2]), np.sin(to_grid[2])])
+        return Walkable(self.walkable, self.grid.resolution, turned)
 
     def draw(self, rng: np.random.Generator) -> FloatArray:
         """Draw a point (2,) on the floor [m]; the middle of a cell."""
@@ -84,71 +81,58 @@ class Crowd:
     def __init__(self, floor: WalkableFloor, people: int, mean_speed: float, rng: np.random.Generator) -> None:
         if not len(floor.cells):
             people = 0
-        self._floor = floor
+        self._floor, self._walkable = floor, floor.plain()
         self._rng = rng
         self._mean_speed = mean_speed
-        self._positions = np.array([floor.draw(rng) for _ in range(people)]).reshape(-1, 2)
-        self._targets = self._positions.copy()
-        self._speeds = np.zeros(people)
-        self._headings = rng.uniform(-math.pi, math.pi, people)
-        self._walked = rng.uniform(0.0, 2.0 * STRIDE, people)
+        positions = np.array([floor.draw(rng) for _ in range(people)]).reshape(-1, 2)
+        self._people = People(
+            positions=positions,
+            targets=positions.copy(),
+            speeds=np.zeros(people),
+            headings=rng.uniform(-math.pi, math.pi, people),
+            walked=rng.uniform(0.0, 2.0 * STRIDE, people),
+        )
+        self._moves = np.zeros((people, 2))
 
     @property
     def positions(self) -> FloatArray:
         """(P, 2) middle of each person [m], map frame."""
-        return self._positions.copy()
+        return self._people.positions.copy()
 
     def legs(self) -> FloatArray:
         """(2 P, 3) x, y and radius of every leg [m], map frame."""
-        ahead = np.stack([np.cos(self._headings), np.sin(self._headings)], axis=1)
-        left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
-        swing = 0.5 * STRIDE * np.sin(math.pi * self._walked / STRIDE)[:, np.newaxis]
-        offset = 0.5 * HIP_WIDTH * left + 0.5 * swing * ahead
-        centers = np.concatenate([self._positions + offset, self._positions - offset])
-        return np.concatenate([centers, np.full((len(centers), 1), LEG_RADIUS)], axis=1)
+        return legs_of(self._people)
 
     def step(self, seconds: float, vehicle: FloatArray) -> None:
         """Move everybody on by a time [s]; people near the vehicle's pose (3,) step aside."""
-        if not len(self._positions):
+        if not len(self._moves):
             return
-        to_target = self._targets - self._positions
-        left = np.hypot(to_target[:, 0], to_target[:, 1])
-        for person in np.flatnonzero(left < 1e-6):
-            self._choose_target(int(person))
-        to_target = self._targets - self._positions
-        left = np.hypot(to_target[:, 0], to_target[:, 1])
-        moves = to_target * np.minimum(1.0, self._speeds * seconds / np.maximum(left, 1e-9))[:, np.newaxis]
-        from_vehicle = self._positions - vehicle[:2]
-        distance = np.hypot(from_vehicle[:, 0], from_vehicle[:, 1])
-        for person in np.flatnonzero(distance < KEEP_FROM_VEHICLE):
-            moves[person] = self._step_aside(int(person), from_vehicle[person], seconds)
-        walked = np.hypot(moves[:, 0], moves[:, 1])
-        turning = walked > 1e-9
-        self._headings[turning] = np.arctan2(moves[turning, 1], moves[turning, 0])
-        self._walked += walked
-        self._positions += moves
+        for person in arrived(self._people).tolist():
+            self._choose_target(person)
+        aside = 1.5 * self._mean_speed * seconds
+        x, y = float(vehicle[0]), float(vehicle[1])
+        walk_on(self._walkable, self._people, seconds, x, y, aside, self._moves)
+        moves = self._moves
+        turning = np.hypot(moves[:, 0], moves[:, 1]) > STANDING
+        np.copyto(self._people.headings, np.arctan2(moves[:, 1], moves[:, 0]), where=turning)
 
     def _choose_target(self, person: int) -> None:
         """Give one person a new point that it can walk to straight, or leave it where it is."""
-        here = self._positions[person]
+        here = self._people.positions[person]
         for _ in range(TRIES):
             target = self._floor.draw(self._rng)
-            if math.dist(here, target) <= LONGEST_WALK and self._floor.allows_straight(here, target):
-                self._targets[person] = target
+            distance = math.dist(here, target)
+            if distance <= LONGEST_WALK and self._can_walk(here, target, distance):
+                self._people.targets[person] = target
                 break
-        self._speeds[person] = self._mean_speed * max(0.2, 1.0 + SPEED_SPREAD * self._rng.standard_normal())
+        self._people.speeds[person] = self._mean_speed * max(
+            0.2, 1.0 + SPEED_SPREAD * self._rng.standard_normal()
+        )
 
-    def _step_aside(self, person: int, away: FloatArray, seconds: float) -> FloatArray:
-        """Motion (2,) away from the vehicle, or along a wall, or none where there is no room."""
-        self._targets[person] = self._positions[person]
-        heading = math.atan2(away[1], away[0])
-        step = 1.5 * self._mean_speed * seconds
-        for turn in (0.0, 0.5, -0.5, 1.0, -1.0, 1.4, -1.4):
-            move = step * np.array([math.cos(heading + turn), math.sin(heading + turn)])
-            if self._floor.allows((self._positions[person] + move)[np.newaxis])[0]:
-                self._targets[person] = self._positions[person] + move
-                return move
-        return np.zeros(2)
+    def _can_walk(self, start: FloatArray, end: FloatArray, distance: float) -> bool:
+        """Whether a person can walk straight from one point (2,) to another, a distance [m] away."""
+        count = max(2, math.ceil(distance / (0.5 * self._floor.grid.resolution)) + 1)
+        return can_walk(self._walkable, *start.tolist(), *end.tolist(), count)
 
 
 def _keep_from(points: FloatArray, grid: OccupancyGrid, walkable: BoolArray) -> None:
@@ -170,3 +154,10 @@ def _field(project: Project) -> OccupancyGrid:
     low, high = corners.min(axis=0) - MARGIN, corners.max(axis=0) + MARGIN
     columns, rows = np.ceil((high - low) / FIELD_CELL).astype(int)
     return OccupancyGrid(np.zeros((rows, columns), np.bool_), FIELD_CELL, np.array([low[0], low[1], 0.0]))
+
+
+def warm_up() -> None:
+    """Compile the kernels of walking: three people around the place of an empty project."""
+    crowd = Crowd(WalkableFloor.of(Project()), 3, 1.0, np.random.default_rng(0))
+    crowd.step(0.04, np.zeros(3))
+    crowd.legs()

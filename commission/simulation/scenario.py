@@ -16,7 +16,7 @@ import numpy as np
 
 from commission.geometry.arrays import FloatArray, IntArray, frozen
 from commission.progress import Progress, silent
-from commission.simulation import follower, scan
+from commission.simulation import follower, people, scan
 from commission.simulation.constants import draw_truth, error_of, true_site
 from commission.simulation.drive import DriveOptions, TrueMotion, drive, measure
 from commission.simulation.people import Crowd, WalkableFloor
@@ -239,3 +239,4 @@ def warm_up() -> None:
     """Compile every kernel of the simulation."""
     follower.warm_up()
     scan.warm_up()
+    people.warm_up()

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from commission.simulation.people import KEEP_FROM_VEHICLE, LEG_RADIUS, Crowd, WalkableFloor
+from commission.simulation.people import Crowd, WalkableFloor
+from commission.simulation.people_kernels import KEEP_FROM_VEHICLE, LEG_RADIUS
 from commission.site.floor_map import OCCUPIED, FloorMap
 from commission.site.project import Project
 from tests.simulation.halls import RESOLUTION, hall, room
