@@ -1,4 +1,4 @@
-"""Compiled ray casting by jumps over free squares, for `raycast` and for kernels that cast rays of their own.
+"""Compiled ray casting by jumps over free rectangles, for `raycast` and for kernels that cast rays of their own.
 
 Two rules make the answer unique, and equal to that of cell-by-cell traversal. A ray enters a cell at
 t = (border - start) / direction, computed from the start and never accumulated. Where it would cross two borders at
@@ -13,20 +13,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.compiled import compiled, compiled_parallel, parallel_range
+from commission.compiled import compiled, compiled_inline, compiled_parallel, parallel_range
 from commission.geometry.arrays import BoolArray, FloatArray
 
-# A square of more cells than a byte can count is stored as one of this size.
-LARGEST_SQUARE = 255
+# Edges of more cells than a byte can count are stored as this.
+LONGEST_EDGE = 255
 # Rays of a batch that take turns, so that while one waits for memory the others go on (twice as fast where the rays
 # have nothing in common, since each of their jumps misses the caches).
 LANES = 16
-# Stands in the place of a free square for a ray that has left the grid or its range.
+# Stands in the place of a free rectangle for a ray that has left the grid or its range.
 MISSED = -1
 # Rays that one core takes at a time.
 CHUNK = 1024
-# A tile of 8 x 8 bytes is one cache line, so neighbors in both directions are usually loaded together.
-TILE = 8
+# A tile of 4 x 8 cells of two bytes is one cache line, so neighbors in both directions are usually loaded together.
+TILE_ROWS, TILE_COLUMNS = 4, 8
+LINE = 64
 # Smallest size of a direction component; zero becomes this, smaller ones grow to it and keep their sign, which decides
 # on which side of its border a start lies. The next border is then beyond any range, without dividing by zero.
 TINY = 1e-300
@@ -39,13 +40,14 @@ CERTAIN = 1e-6
 class RayTables(NamedTuple):
     """What the kernels need to know of a grid, as plain arrays and numbers."""
 
-    squares: NDArray[np.uint8]
-    """Flat: per quadrant (x backward + 2 * y backward), tile by tile, the largest free square from a cell onward."""
+    rectangles: NDArray[np.uint16]
+    """Flat: per quadrant (x backward + 2 * y backward), tile by tile, a large free rectangle from a cell onward: its
+    columns, and 256 times its rows."""
     rows: int
     columns: int
     tile_columns: int
     quadrant_size: int
-    """Bytes of one quadrant's table."""
+    """Cells of one quadrant's table."""
     resolution: float
     """Edge of a cell [m]."""
     origin_x: float
@@ -74,12 +76,13 @@ def cast_ray(  # noqa: PLR0917 - one ray, number by number
 
     Notes
     -----
-    t = (border - start) / direction at each border of a free square: Amanatides, Woo 1987, by squares instead of cells.
+    t = (border - start) / direction at each border of a free rectangle: Amanatides, Woo 1987, by rectangles instead of
+    cells.
     """
     limit = max_range * (1.0 / tables.resolution)
     x, y, dx, dy, inverse_x, inverse_y, t, row, column = _begin(tables, x, y, dir_x, dir_y)
     while row >= 0 and t <= limit:
-        size = _free_square(tables, dx, dy, row, column)
+        size = _free_rectangle(tables, dx, dy, row, column)
         if size == 0:
             return t * tables.resolution, row, column
         t, row, column = _jump(tables.rows, tables.columns, size, x, y, dx, dy, inverse_x, inverse_y, row, column)
@@ -101,11 +104,34 @@ def is_line_free(tables: RayTables, ax: float, ay: float, bx: float, by: float) 
 
 
 @compiled
-def _free_square(tables: RayTables, dx: float, dy: float, row: int, column: int) -> int:
-    """Edge of the free square [cells] that a ray in this cell may cross at once; 0 in a wall."""
+def _free_rectangle(tables: RayTables, dx: float, dy: float, row: int, column: int) -> int:
+    """Free rectangle that a ray in this cell may cross at once, columns + 256 rows [cells]; 0 in a wall."""
     table = ((0 if dx > 0.0 else 1) + (0 if dy > 0.0 else 2)) * tables.quadrant_size
-    tile = (row >> 3) * tables.tile_columns + (column >> 3)
-    return int(tables.squares[table + (tile << 6) + ((row & 7) << 3) + (column & 7)])
+    return int(tables.rectangles[table + _place_in_table(tables, row, column)])
+
+
+@compiled
+def _place_in_table(tables: RayTables, row: int, column: int) -> int:
+    """Index of a cell in a table that is kept tile by tile: tiles of `TILE_ROWS` x `TILE_COLUMNS` cells."""
+    return ((((row >> 2) * tables.tile_columns + (column >> 3)) << 5) | ((row & 3) << 3)) | (column & 7)
+
+
+@compiled
+def is_occupied(tables: RayTables, row: int, column: int) -> bool:
+    """Whether a cell stops rays; cells outside the grid do not.
+
+    Parameters
+    ----------
+    tables : of a `RayCaster`.
+    row, column : of the cell.
+
+    Notes
+    -----
+    No formula: a look into the table of free rectangles, which are 0 in a wall.
+    """
+    if row < 0 or row >= tables.rows or column < 0 or column >= tables.columns:
+        return False
+    return tables.rectangles[_place_in_table(tables, row, column)] == 0
 
 
 @compiled
@@ -145,12 +171,13 @@ def _jump(  # noqa: PLR0917
     row: int,
     column: int,
 ) -> tuple[float, int, int]:
-    """When a ray leaves the free square it is in, and the cell it enters; row -1 outside the grid. Units: cells.
+    """When a ray leaves the free rectangle it is in, and the cell it enters; row -1 outside the grid. Units: cells.
 
     Takes numbers and not the tables, and has one way into its slow part: small enough to be inlined.
     """
-    next_column = column + size if dx > 0.0 else column - size
-    next_row = row + size if dy > 0.0 else row - size
+    width, height = size & 0xFF, size >> 8
+    next_column = column + width if dx > 0.0 else column - width
+    next_row = row + height if dy > 0.0 else row - height
     time_x = ((next_column if dx > 0.0 else next_column + 1) - x) * inverse_x
     time_y = ((next_row if dy > 0.0 else next_row + 1) - y) * inverse_y
     # Selected, not branched: which border comes first is a coin toss that no processor predicts.
@@ -283,7 +310,7 @@ def _cast_in_turns(tables: RayTables, rays: FloatArray, max_range: float, ranges
         for lane in range(active):
             row, column = places[lane, 0], places[lane, 1]
             inside = row >= 0 and times[lane] <= limit
-            sizes[lane] = _free_square(tables, lines[lane, 2], lines[lane, 3], row, column) if inside else MISSED
+            sizes[lane] = _free_rectangle(tables, lines[lane, 2], lines[lane, 3], row, column) if inside else MISSED
         # From the last lane down, so that a lane that moves into the place of a finished one has had its turn.
         for lane in range(active - 1, -1, -1):
             if sizes[lane] > 0:
@@ -324,34 +351,73 @@ def lines_free(tables: RayTables, points_a: FloatArray, points_b: FloatArray) ->
 
 
 @compiled
-def free_squares(occupied: BoolArray, down: bool, left: bool) -> NDArray[np.uint8]:
-    """Edge of the largest free square that has its corner in each cell and extends into one quadrant.
+def free_rectangles(occupied: BoolArray, down: bool, left: bool) -> NDArray[np.uint16]:
+    """Find a large free rectangle that has its corner in each cell and extends into one quadrant.
 
     Parameters
     ----------
     occupied : (H, W) array.
-    down, left : whether the square extends towards lower rows, towards lower columns.
+    down, left : whether the rectangle extends towards lower rows, towards lower columns.
 
     Returns
     -------
-    sizes : (H, W) uint8 array [cells]: 0 in occupied cells; outside the grid counts as free; at most 255.
+    rectangles : (H, W) array, columns + 256 rows [cells], each 1 to 255: 0 in occupied cells; outside the grid counts
+        as free.
 
     Notes
     -----
-    size = 1 + min(size of the three neighbors onward) in a free cell: the recursion of the largest square, by
-    induction.
+    A free rectangle next door grows by the cell's own row or column, as far as these are free: free by induction. Of
+    three such (from beside, from above, from across) that one is kept whose w h / (w + h) is the largest: half the
+    harmonic mean of its edges, which stands for how far a ray of any direction gets in it. On halls rays make as many
+    jumps as with the best of all rectangles, within 1 %.
     """
     height, width = occupied.shape
-    padded = np.full((height + 2, width + 2), LARGEST_SQUARE, dtype=np.uint8)
-    step_row, step_column = -1 if down else 1, -1 if left else 1
+    found = np.zeros((height, width), dtype=np.uint16)
+    # Of the row before: edges of its rectangles, and how far its columns are free; of cells outside, as long as can be.
+    wide = np.full(width, LONGEST_EDGE, dtype=np.int64)
+    high, upward = wide.copy(), wide.copy()
     for i in range(height):
-        row = i + 1 if down else height - i
+        row = i if down else height - 1 - i
+        beside_w, beside_h, across_w, across_h = LONGEST_EDGE, LONGEST_EDGE, LONGEST_EDGE, LONGEST_EDGE
+        onward = LONGEST_EDGE
         for j in range(width):
-            column = j + 1 if left else width - j
-            if occupied[row - 1, column - 1]:
-                padded[row, column] = 0
+            column = j if left else width - 1 - j
+            above_w, above_h = wide[column], high[column]
+            if occupied[row, column]:
+                w, h, onward, upward[column] = 0, 0, 0, 0
             else:
-                side = min(padded[row + step_row, column], padded[row, column + step_column])
-                smallest = min(side, padded[row + step_row, column + step_column])
-                padded[row, column] = min(int(smallest) + 1, LARGEST_SQUARE)
-    return padded[1:-1, 1:-1].copy()
+                onward = min(onward + 1, LONGEST_EDGE)
+                upward[column] = min(upward[column] + 1, LONGEST_EDGE)
+                w, h = grown(beside_w, beside_h, above_w, above_h, across_w, across_h, onward, upward[column])
+                found[row, column] = w + (h << 8)
+            across_w, across_h = above_w, above_h
+            beside_w, beside_h = w, h
+            wide[column], high[column] = w, h
+    return found
+
+
+@compiled_inline
+def grown(  # noqa: PLR0917 - three rectangles and two runs, number by number
+    beside_w: int, beside_h: int, above_w: int, above_h: int, across_w: int, across_h: int, onward: int, upward: int
+) -> tuple[int, int]:
+    """Pick the rectangle of a free cell from those of its neighbors; 0 x 0 is that of a wall.
+
+    Parameters
+    ----------
+    beside_w, beside_h, above_w, above_h, across_w, across_h : columns and rows of the neighbors' rectangles [cells].
+    onward, upward : free cells from the cell on, along its row and along its column, itself included.
+
+    Notes
+    -----
+    a / b > c / d as a d > c b, so that integers do; the three candidates as in `free_rectangles`.
+    """
+    w, h = min(across_w + 1, onward), min(across_h + 1, upward)
+    other_w = min(beside_w + 1, LONGEST_EDGE)
+    other_h = min(beside_h, upward) if beside_w > 0 else upward
+    if other_w * other_h * (w + h) > w * h * (other_w + other_h):
+        w, h = other_w, other_h
+    other_w = min(above_w, onward) if above_w > 0 else onward
+    other_h = min(above_h + 1, LONGEST_EDGE)
+    if other_w * other_h * (w + h) > w * h * (other_w + other_h):
+        w, h = other_w, other_h
+    return w, h

@@ -1,6 +1,6 @@
 """Exact ray casting on an occupancy grid: each ray stops at the cell that cell-by-cell traversal would stop at.
 
-A ray jumps from free square to free square instead of from cell to cell. Noise, beams and reflectors are not its
+A ray jumps from free rectangle to free rectangle instead of from cell to cell. Noise, beams and reflectors are not its
 business; kernels elsewhere call `ray_kernels.cast_ray` and `is_line_free` with the `tables` of a `RayCaster`.
 """
 
@@ -15,12 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 from commission.geometry.arrays import BoolArray, FloatArray, equal_fields
 from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.ray_kernels import (
-    TILE,
+    LINE,
+    TILE_COLUMNS,
+    TILE_ROWS,
     RayTables,
     cast_parallel,
     cast_ray,
     cast_serial,
-    free_squares,
+    free_rectangles,
     is_line_free,
     lines_free,
 )
@@ -30,7 +32,7 @@ from commission.geometry.ray_kernels import (
 class RayCaster:
     """A grid prepared for rays; everything outside it is free, a start inside a wall has range 0.
 
-    Memory is four bytes per cell; preparing 8 million cells takes about 0.2 s.
+    Memory is eight bytes per cell; preparing 8 million cells takes about 0.4 s.
     """
 
     grid: OccupancyGrid
@@ -43,15 +45,15 @@ class RayCaster:
         rows, columns = grid.occupied.shape
         # Tables in the order of the quadrant's number: x backward adds 1, y backward adds 2.
         quadrants = [
-            _tiled(free_squares(grid.occupied, down, left)) for down in (False, True) for left in (False, True)
+            _tiled(free_rectangles(grid.occupied, down, left)) for down in (False, True) for left in (False, True)
         ]
-        squares = _aligned(np.concatenate(quadrants))
-        squares.setflags(write=False)
+        rectangles = _aligned(np.concatenate(quadrants))
+        rectangles.setflags(write=False)
         tables = RayTables(
-            squares=squares,
+            rectangles=rectangles,
             rows=rows,
             columns=columns,
-            tile_columns=-(-columns // TILE),
+            tile_columns=-(-columns // TILE_COLUMNS),
             quadrant_size=quadrants[0].size,
             resolution=float(grid.resolution),
             origin_x=x,
@@ -111,19 +113,19 @@ def warm_up() -> None:
     is_line_free(caster.tables, 0.5, 1.5, 1.5, 2.5)
 
 
-def _tiled(sizes: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _tiled(cells: NDArray[np.uint16]) -> NDArray[np.uint16]:
     """Reorder an (H, W) table tile by tile, flat; cells added to fill the last tiles are never read."""
-    rows, columns = -(-sizes.shape[0] // TILE), -(-sizes.shape[1] // TILE)
-    whole = np.zeros((rows * TILE, columns * TILE), dtype=np.uint8)
-    whole[: sizes.shape[0], : sizes.shape[1]] = sizes
-    return whole.reshape(rows, TILE, columns, TILE).transpose(0, 2, 1, 3).reshape(-1)
+    rows, columns = -(-cells.shape[0] // TILE_ROWS), -(-cells.shape[1] // TILE_COLUMNS)
+    whole = np.zeros((rows * TILE_ROWS, columns * TILE_COLUMNS), dtype=np.uint16)
+    whole[: cells.shape[0], : cells.shape[1]] = cells
+    return whole.reshape(rows, TILE_ROWS, columns, TILE_COLUMNS).transpose(0, 2, 1, 3).reshape(-1)
 
 
-def _aligned(table: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Copy to an address that is a multiple of the tile's size, so that each tile is one cache line and not two."""
-    room = np.empty(table.size + TILE * TILE, dtype=np.uint8)
-    start = -room.ctypes.data % (TILE * TILE)
-    aligned = room[start : start + table.size]
+def _aligned(table: NDArray[np.uint16]) -> NDArray[np.uint16]:
+    """Copy to an address that is a multiple of a cache line, so that each tile is one of them and not two."""
+    room = np.empty(table.nbytes + LINE, dtype=np.uint8)
+    start = -room.ctypes.data % LINE
+    aligned = room[start : start + table.nbytes].view(np.uint16)
     aligned[:] = table
     return aligned
 

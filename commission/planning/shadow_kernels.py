@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
-from commission.geometry.ray_kernels import RayTables, cast_ray
+from commission.geometry.ray_kernels import RayTables, cast_ray, is_occupied
 
 # Ranges of a shadow map are rounded to float32 (7 digits: 0.01 mm at 100 m); this much is left to the exact test.
 ROUNDING = 1e-4
@@ -122,25 +122,6 @@ def trusted_range(cell: float, sine_yaw: float, cosine_yaw: float, bins: int) ->
     """
     is_aligned = abs(sine_yaw * cosine_yaw) < 1e-9
     return 0.95 * cell * bins / (8.0 / math.sqrt(2.0) if is_aligned else 8.0)
-
-
-@compiled
-def is_occupied(tables: RayTables, row: int, column: int) -> bool:
-    """Whether a cell stops rays; cells outside the grid do not.
-
-    Parameters
-    ----------
-    tables : of a `RayCaster`.
-    row, column : of the cell.
-
-    Notes
-    -----
-    No formula: a look into the table of free squares, which are 0 in a wall.
-    """
-    if row < 0 or row >= tables.rows or column < 0 or column >= tables.columns:
-        return False
-    tile = (row >> 3) * tables.tile_columns + (column >> 3)
-    return tables.squares[(tile << 6) + ((row & 7) << 3) + (column & 7)] == 0
 
 
 @compiled

@@ -128,7 +128,7 @@ class VisibilityModel:
     """Reflectors, scanner and walls, prepared so that lines of sight cost one comparison each.
 
     Memory: 8 bytes per reflector and bin of direction (16 MB for 500 reflectors at 30 m and cells of 0.05 m), besides
-    the four bytes per cell of the ray caster; a mask of N points adds 8 bytes per point for every 64 reflectors.
+    the eight bytes per cell of the ray caster; a mask of N points adds 8 bytes per point for every 64 reflectors.
     """
 
     reflectors: ReflectorMap

@@ -125,14 +125,13 @@ class Crowd:
             if distance <= LONGEST_WALK and self._can_walk(here, target, distance):
                 self._people.targets[person] = target
                 break
-        self._people.speeds[person] = self._mean_speed * max(
-            0.2, 1.0 + SPEED_SPREAD * self._rng.standard_normal()
-        )
+        self._people.speeds[person] = self._mean_speed * max(0.2, 1.0 + SPEED_SPREAD * self._rng.standard_normal())
 
     def _can_walk(self, start: FloatArray, end: FloatArray, distance: float) -> bool:
         """Whether a person can walk straight from one point (2,) to another, a distance [m] away."""
         count = max(2, math.ceil(distance / (0.5 * self._floor.grid.resolution)) + 1)
-        return can_walk(self._walkable, *start.tolist(), *end.tolist(), count)
+        (x, y), (end_x, end_y) = start.tolist(), end.tolist()
+        return can_walk(self._walkable, x, y, end_x, end_y, count)
 
 
 def _keep_from(points: FloatArray, grid: OccupancyGrid, walkable: BoolArray) -> None:

@@ -70,7 +70,7 @@ def can_stand(floor: Walkable, x: float, y: float) -> bool:
     column = math.floor((floor.from_map[0] + (c * x - s * y)) / floor.resolution)
     row = math.floor((floor.from_map[1] + (s * x + c * y)) / floor.resolution)
     rows, columns = floor.cells.shape
-    return 0 <= row < rows and 0 <= column < columns and floor.cells[row, column]
+    return 0 <= row < rows and 0 <= column < columns and bool(floor.cells[row, column])
 
 
 @compiled

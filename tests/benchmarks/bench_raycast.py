@@ -101,7 +101,7 @@ def main() -> int:
     RayCaster(OccupancyGrid(np.ones((8, 8), dtype=np.bool_), 1.0))
     start = time.perf_counter()
     caster = RayCaster(grid)
-    duration, megabytes = time.perf_counter() - start, caster.tables.squares.nbytes / 1e6
+    duration, megabytes = time.perf_counter() - start, caster.tables.rectangles.nbytes / 1e6
     print(f"tables for {COLUMNS} x {ROWS} cells: {duration:.2f} s, {megabytes:.0f} MB")
     passed = True
     for name, rays in (("random poses", free_poses(grid, rng, RAYS)), ("scans", drive(grid, rng, RAYS))):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from commission.geometry import raycast
 from commission.geometry.occupancy import OccupancyGrid
-from commission.geometry.ray_kernels import cast_ray, free_squares
+from commission.geometry.ray_kernels import cast_ray, free_rectangles
 from commission.geometry.raycast import RayCaster
 from commission.geometry.se2 import transform_points
 
@@ -136,7 +136,7 @@ def test_wall_exactly_at_the_maximum_range_is_hit_and_beyond_is_not() -> None:
     np.testing.assert_array_equal(caster.cast([0.0, 0.5, 0.0], math.nextafter(8.0, 0.0)), math.inf)
 
 
-def test_squares_longer_than_a_byte_are_walked_in_several_jumps() -> None:
+def test_rectangles_longer_than_a_byte_are_walked_in_several_jumps() -> None:
     occupied = np.zeros((600, 900), dtype=bool)
     occupied[590, 890] = True
     caster = RayCaster(OccupancyGrid(occupied, 1.0))
@@ -158,17 +158,45 @@ def test_impossible_rays_hit_nothing_and_return(bad: float) -> None:
     assert cast_ray(tables, -5.0, 20.0, 0.0, 1.0, math.inf) == MISS
 
 
+def free_from(occupied: NDArray[np.bool_], row: int, column: int) -> list[tuple[int, int]]:
+    """Columns and rows of every free rectangle from a cell to higher rows and columns, by looking into all cells."""
+    rows, columns = occupied.shape
+    return [
+        (w, h)
+        for h in range(1, rows - row + 1)
+        for w in range(1, columns - column + 1)
+        if not occupied[row : row + h, column : column + w].any()
+    ]
+
+
 @pytest.mark.parametrize(("down", "left"), [(False, False), (False, True), (True, False), (True, True)])
-def test_free_squares_match_brute_force(down: bool, left: bool) -> None:
+def test_rectangles_are_free_and_on_average_nearly_as_large_as_the_best(down: bool, left: bool) -> None:
     occupied = random_map(5, 12, 15, 0.08)
-    sizes = free_squares(occupied, down, left)
-    padded = np.zeros((12 + 2 * 20, 15 + 2 * 20), dtype=bool)
-    padded[20:32, 20:35] = occupied
-    for row, column in np.argwhere(sizes < 20):
-        for edge, expected in ((int(sizes[row, column]), False), (int(sizes[row, column]) + 1, True)):
-            rows = slice(row + 21 - edge, row + 21) if down else slice(row + 20, row + 20 + edge)
-            columns = slice(column + 21 - edge, column + 21) if left else slice(column + 20, column + 20 + edge)
-            assert padded[rows, columns].any() == expected
+    occupied[[0, -1]] = occupied[:, [0, -1]] = True
+    rectangles = free_rectangles(occupied, down, left)
+    # Turned so that all of them extend to higher rows and columns.
+    turned = occupied[::-1] if down else occupied
+    turned, rectangles = (turned[:, ::-1], rectangles[:, ::-1]) if left else (turned, rectangles)
+    rectangles = rectangles[::-1] if down else rectangles
+    np.testing.assert_array_equal(rectangles == 0, turned)
+    found, best = [], []
+    for row, column in np.argwhere(~turned):
+        w, h = int(rectangles[row, column]) & 0xFF, int(rectangles[row, column]) >> 8
+        free = free_from(turned, row, column)
+        assert (w, h) in free
+        found.append(w * h / (w + h))
+        best.append(max(w * h / (w + h) for w, h in free))
+    assert np.mean(found) >= 0.97 * np.mean(best)
+
+
+def test_a_rectangle_that_reaches_out_of_the_grid_is_as_large_as_can_be() -> None:
+    occupied = np.zeros((4, 5), dtype=bool)
+    occupied[1, 3] = True
+    rectangles = free_rectangles(occupied, False, False)
+    assert rectangles[2, 0] == 255 + (255 << 8)
+    assert rectangles[1, 4] == 255 + (255 << 8)
+    assert rectangles[1, 2] == 1 + (255 << 8)
+    assert rectangles[1, 3] == 0
 
 
 POSES = st.tuples(st.floats(-50, 50), st.floats(-50, 50), st.floats(-3.1, 3.1))
