@@ -170,8 +170,10 @@ def test_pictures_come_at_most_25_times_a_second(bench: Bench) -> None:
 
 
 def test_a_recording_that_cannot_be_read_is_told_and_listed_and_the_page_lives_on(bench: Bench) -> None:
+    shown = bench.runtime.state.part(RunState).source
     bench.post(ChooseSource(RecordedDrive(Path("nothing"))))
     bench.until(lambda: bool(bench.page.told))
+    assert bench.runtime.state.part(RunState).source is shown, "what drives is still what drove before"
     assert "not a recording" in bench.page.told[0][0]
     assert bench.page.told[0][1]
     assert len(bench.runtime.state.faults) == 1

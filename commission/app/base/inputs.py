@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, TypeAlias
 
-from viser import GuiApi, GuiInputHandle, GuiSliderHandle
+from viser import GuiApi, GuiButtonHandle, GuiInputHandle, GuiSliderHandle
 
 from commission.app.base import theme
 from commission.app.base.actions import Action, LookAgain
@@ -21,6 +21,10 @@ from commission.site.quantity import PERCENT
 Setting: TypeAlias = bool | int | float | str | None
 Read: TypeAlias = Callable[[AppState, str], Any]
 Make: TypeAlias = Callable[[str, Setting], Action]
+
+
+NOT_NOW = " – not now: "
+"""Stands between what a button does and why it cannot be pressed."""
 
 
 class Inputs:
@@ -203,6 +207,22 @@ def write_html(widget: Any, content: str) -> None:
     if widget.content != content:
         widget.content = content
     show(widget, visible=bool(content))
+
+
+def enable(button: GuiButtonHandle, why_not: str) -> None:
+    """Let a button be pressed, or say on it, when it is pointed at, why it cannot be.
+
+    Parameters
+    ----------
+    button : with the hint of what it does.
+    why_not : one line; empty: it can be pressed.
+    """
+    if button.disabled is not bool(why_not):
+        button.disabled = bool(why_not)
+    does = (button.hint or "").split(NOT_NOW)[0]
+    hint = f"{does}{NOT_NOW}{why_not}." if why_not else does
+    if button.hint != hint:
+        button.hint = hint
 
 
 def show(widget: Any, *, visible: bool) -> None:

@@ -6,7 +6,7 @@ from viser import GuiApi
 
 from commission.app.base.conditions import Conditions, SetCondition
 from commission.app.base.floor_picture import FloorPicture, SetOpacity
-from commission.app.base.inputs import Inputs, WorkBar, show
+from commission.app.base.inputs import Inputs, WorkBar, enable, show
 from commission.app.base.panel import BasePanel, Post, posting
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
@@ -57,7 +57,7 @@ class HeatmapPanel(BasePanel):
         for inputs in (self._inputs, self._floor, self._conditions):
             inputs.follow(view.state)
         self._work.follow(view)
-        self._clear.disabled = not settings.spots
+        enable(self._clear, "" if settings.spots else "no spot has been clicked")
         show(self._given, visible=settings.heading is Heading.GIVEN)
         show(self._odometry, visible=settings.measurement is Measurement.RANGE_BEARING_PRIOR)
 

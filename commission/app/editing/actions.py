@@ -52,6 +52,14 @@ class DragSelection(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class Nudge(Action):
+    """Move what is selected by a little: reflectors, a control point or a station."""
+
+    by: Point
+    """How far [m], map frame."""
+
+
+@dataclass(frozen=True, slots=True)
 class SelectReflectors(Action):
     """Select these reflectors and nothing else."""
 

@@ -163,6 +163,24 @@ def middle_of(state: AppState, editor: Editor) -> tuple[float, float]:
     return sum(r.x for r in movable) / len(movable), sum(r.y for r in movable) / len(movable)
 
 
+@reduce.register
+def nudge(action: actions.Nudge, state: AppState, sender: Sender) -> Outcome:
+    editor, (dx, dy) = editor_of(state, sender.browser), action.by
+    ids = tuple(r.id for r in selected_of(state.project, editor))
+    if ids:
+        edit = Edit(f"move {counted(state, editor)}", sender, f"{ids}:nudge")
+        moved_map = edits.move(state.project.reflectors, ids, action.by)
+        return _telling_of_locked(state, ids, with_reflectors(state, moved_map, edit))
+    station = next((each for each in state.project.stations if each.name == editor.station), None)
+    if station is not None:
+        return reduce(MoveStation((station.x + dx, station.y + dy), station.heading), state, sender)
+    if editor.point is None:
+        return Outcome(state)
+    segments = state.project.route(editor.point.route).segments
+    x, y = segments[editor.point.segment].control_points[editor.point.index]
+    return reduce(actions.PlaceControlPoint((float(x) + dx, float(y) + dy)), state, sender)
+
+
 def _dropped(state: AppState, editor: Editor, sender: Sender) -> Outcome:
     """Do what the drag that ends now was for."""
     drag = editor.drag

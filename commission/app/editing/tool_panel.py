@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 from viser import GuiApi
 
@@ -17,12 +17,14 @@ from commission.app.editing.actions import (
     DeleteSelected,
     DuplicateSelected,
     Finish,
+    Nudge,
     SetSnapping,
 )
 from commission.app.editing.editor import Snapping, editor_of
 from commission.app.editing.site_tools import SITE_TOOLS, MeasureTool, PlaceTool, RouteTool, StationTool
 from commission.app.editing.tool import Tool
 from commission.site.fields import get_field, names_of
+from commission.site.quantity import MILLIMETRES
 
 SELECT = "Select"
 """On the button that puts the tool away."""
@@ -43,6 +45,16 @@ COMMANDS: tuple[Command, ...] = (
 )
 
 
+NUDGES: tuple[tuple[str, Literal["arrowleft", "arrowright", "arrowup", "arrowdown"], tuple[int, int]], ...] = (
+    ("left", "arrowleft", (-1, 0)),
+    ("right", "arrowright", (1, 0)),
+    ("up", "arrowup", (0, 1)),
+    ("down", "arrowdown", (0, -1)),
+)
+STEPS: tuple[tuple[float, Literal["shift"] | None], ...] = ((0.001, None), (0.01, "shift"))
+"""How far an arrow key moves what is selected [m], and with which other key."""
+
+
 class ToolButtons(BasePanel):
     """A row of buttons, and keys for what the hand does most."""
 
@@ -54,6 +66,12 @@ class ToolButtons(BasePanel):
         for label, key, modifier, action in COMMANDS:
             command = gui.add_command(label, hotkey=key, modifier=modifier)
             command.on_trigger(posting(post, lambda _event, action=action: action))
+        for label, key, (x, y) in NUDGES:
+            for step, modifier in STEPS:
+                name = f"Move the selection {label} by {MILLIMETRES.text(step)}"
+                command = gui.add_command(name, hotkey=key, modifier=modifier)
+                nudge = Nudge((x * step, y * step))
+                command.on_trigger(posting(post, lambda _event, nudge=nudge: nudge))
 
 
 class FinishButton(BasePanel):

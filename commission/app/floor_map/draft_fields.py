@@ -13,7 +13,7 @@ from viser import GuiApi, GuiEvent
 from commission.app.base import actions as page_actions
 from commission.app.base import theme
 from commission.app.base.field_widget import add_widget, held, meant, write_held
-from commission.app.base.inputs import add_find, write_html
+from commission.app.base.inputs import add_find, enable, write_html
 from commission.app.base.panel import Post, escaped, posting, table
 from commission.app.base.rows import Rows
 from commission.app.floor_map import actions
@@ -223,7 +223,8 @@ class MapDraftFields:
         if draft is None:
             return
         self._facts.content = f"<div style='padding:2px 6px;overflow-wrap:anywhere'>{table(facts(draft))}</div>"
-        self._make.disabled = isinstance(draft.read, Picture) and draft.placement() is None
+        is_unscaled = isinstance(draft.read, Picture) and draft.placement() is None
+        enable(self._make, "click two points of the picture, and type how far apart they are" if is_unscaled else "")
         if isinstance(draft.read, Drawing):
             self._show_layers(draft, draft.read)
         if isinstance(draft.read, Picture):

@@ -9,7 +9,7 @@ from viser import GuiApi, GuiEvent
 from commission.app.base import actions as page_actions
 from commission.app.base import theme
 from commission.app.base.field_widget import add_widget, held, labelled, meant
-from commission.app.base.inputs import Inputs, show
+from commission.app.base.inputs import Inputs, enable, show
 from commission.app.base.panel import BasePanel, Post, posting, table, write
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
@@ -120,7 +120,10 @@ class MapToolFields(BasePanel):
         write(self._moves, EVERYTHING if tool.everything else MAP_ONLY)
         self._said.content = f"<div style='padding:2px 6px'>{alignment_text(tool)}</div>"
         found = tool.alignment()
-        self._align.disabled = found is None or found.share > WRONG
+        why_not = "two points and their places in the plant are needed" if found is None else ""
+        if found is not None and found.share > WRONG:
+            why_not = "the distances on the map and in the plant differ too much"
+        enable(self._align, why_not)
 
 
 def alignment_text(tool: AlignTool) -> str:

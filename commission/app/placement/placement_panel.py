@@ -8,7 +8,7 @@ from viser import GuiApi
 
 from commission.app.base import theme
 from commission.app.base.actions import Action, LookAt
-from commission.app.base.inputs import Inputs, Text, WorkBar, show
+from commission.app.base.inputs import Inputs, Text, WorkBar, enable, show
 from commission.app.base.panel import BasePanel, Post, escaped, posting, table
 from commission.app.base.rows import Rows
 from commission.app.base.state import AppState
@@ -136,7 +136,7 @@ class LayoutPanel(BasePanel):
         self._follow_routes(state)
         count = len(state.project.layout.candidates.keep_out)
         self._areas.write((count,), lambda: f"<div class='c-note' style='padding:2px 6px'>{_areas_text(count)}</div>")
-        self._ask.disabled = self._work.follow(view)
+        enable(self._ask, "a search is under way" if self._work.follow(view) else "")
         if found is self._shown:
             return
         self._shown, self._suggestion = found, None if found is None else found.suggestion

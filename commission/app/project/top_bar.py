@@ -7,9 +7,9 @@ from typing import Literal, TypeAlias
 
 from viser import GuiApi
 
-from commission.app.base import theme
+from commission.app.base import style, theme
 from commission.app.base.actions import Action, Redo, Undo
-from commission.app.base.inputs import show
+from commission.app.base.inputs import enable, show
 from commission.app.base.panel import BasePanel, Post, escaped, posting, shortened, write_label
 from commission.app.base.state import AppState, Step
 from commission.app.base.view import PageView
@@ -67,19 +67,28 @@ def button_text(label: str, steps: tuple[Step, ...]) -> str:
     return f"{label} {shortened(steps[-1].name, LONGEST_NAME)}"
 
 
+def _why_not(label: str, state: AppState, *, foreign: bool) -> str:
+    """Return why a button cannot be pressed."""
+    if state.read_only:
+        return f"Read-only: {state.read_only}"
+    if label == "Save":
+        return "First say what becomes of the files that somebody else has changed" if foreign else "All is saved"
+    return "Nothing has been changed yet" if label == "Undo" else "Nothing has been taken back"
+
+
 class TitlePanel(BasePanel):
     """The left end of the bar. It brings the page's style, which turns the main panel into a bar."""
 
     def __init__(self, gui: GuiApi, state: AppState) -> None:
-        self._head = title(state)
-        self._title = gui.add_html(theme.STYLE + self._head)
+        self._head, self._style = title(state), theme.STYLE + style.BAR_AND_GUIDE
+        self._title = gui.add_html(self._style + self._head)
 
     def draw_slowly(self, view: PageView) -> None:
         """Follow the project's name, and what has become of its files."""
         head = title(view.state)
         if head != self._head:
             self._head = head
-            self._title.content = theme.STYLE + head
+            self._title.content = self._style + head
 
 
 class ProjectButtons(BasePanel):
@@ -117,7 +126,6 @@ class ProjectButtons(BasePanel):
         if state.read_only:
             wanted = dict.fromkeys(wanted, False)
         for label, enabled in wanted.items():
-            if self._buttons[label].disabled is enabled:
-                self._buttons[label].disabled = not enabled
+            enable(self._buttons[label], "" if enabled else _why_not(label, state, foreign=foreign))
         for label, steps in (("Undo", state.undo), ("Redo", state.redo)):
             write_label(self._buttons[label], button_text(label, steps))

@@ -47,6 +47,14 @@ class ChooseSource(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class SourceLoaded(Action):
+    """A drive that was asked for is there: it is what drives from now on."""
+
+    source: Source
+    """What drives."""
+
+
+@dataclass(frozen=True, slots=True)
 class Play(Action):
     """Start or stop the play clock."""
 

@@ -6,7 +6,7 @@ from viser import GuiApi
 
 from commission.app.base import theme
 from commission.app.base.inputs import write_html
-from commission.app.base.panel import BasePanel, escaped
+from commission.app.base.panel import BasePanel, clock, escaped
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 from commission.localization.estimate import Mode
@@ -23,13 +23,31 @@ def badge_text(view: PageView) -> tuple[str, str, str]:
     position, heading = run.result.position_two_sigma[run.newest], run.result.two_sigma[run.newest, 2]
     beside = (
         f"2σ {MILLIMETRES.against(position, limits.position_limit, ('.0f', '.0f'))}"
-        f" &nbsp; {DEGREES.against(heading, limits.heading_limit, ('.2f', '.1f'))}"
+        f"{_share(position, limits.position_limit)}"
+        f"{DEGREES.against(heading, limits.heading_limit, ('.2f', '.1f'))}"
+        f"{_share(heading, limits.heading_limit)}"
     )
+    lived = run.lived_episodes
     if run.mode is not Mode.OPERATIONAL:
-        lived = run.lived_episodes
         since = f" {run.time - lived[-1][0]:.0f} s" if lived else ""
         return f"{run.mode.name}{since}", beside, theme.FAIL_COLOR
     return "OPERATIONAL", beside, theme.OPERATIONAL_COLOR
+
+
+def operational_since(view: PageView) -> str:
+    """Return for how long the supervisor has been content; empty while it is not."""
+    run = view.part(RunView)
+    if run is None or run.estimate is None or run.mode is not Mode.OPERATIONAL:
+        return ""
+    lived = run.lived_episodes
+    return clock(run.time - (lived[-1][1] if lived else 0.0))
+
+
+def _share(value: float, limit: float) -> str:
+    """Return a value as a bar against its limit: full where it reaches it."""
+    share = min(value / limit, 1.0)
+    color = theme.FAIL_COLOR if share >= 1.0 else theme.css(theme.SCAN)
+    return f"<span class='c-share'><i style='width:{share:.0%};background:{color}'></i></span>"
 
 
 class Badge(BasePanel):
@@ -46,7 +64,7 @@ class Badge(BasePanel):
         if (word, color) == self._shown:
             return
         self._shown = (word, color)
-        self._show_badge(word, beside, color)
+        self._show_badge(word, beside, color, operational_since(view))
         self._show_scale(view)
 
     def _show_scale(self, view: PageView) -> None:
@@ -57,12 +75,13 @@ class Badge(BasePanel):
             "" if magnify == 1.0 else f"<div class='c-scale'>gates, 2σ and offsets ×{magnify:g}</div>",
         )
 
-    def _show_badge(self, word: str, beside: str, color: str) -> None:
+    def _show_badge(self, word: str, beside: str, color: str, since: str) -> None:
         """Write the badge: in the row with the buttons, because above them it would cover them on a small screen."""
         self._badge.content = (
-            "<div style='display:flex;align-items:center;gap:12px;margin-right:24px;white-space:nowrap'>"
+            "<div style='display:flex;align-items:center;gap:8px;margin-right:8px;white-space:nowrap'>"
             f"<span class='c-badge' style='background:{color};color:#fff;font-weight:700;font-size:15px;"
             f"letter-spacing:.1em;padding:3px 20px;border-radius:3px'>{word}</span>"
+            f"<span class='c-since' title='operational for'>{since}</span>"
             "<span class='c-beside' style='font-size:12px;opacity:.8;font-variant-numeric:tabular-nums;"
             "min-width:130px'>"
             f"{beside}</span></div>"
@@ -70,5 +89,5 @@ class Badge(BasePanel):
 
     def draw_slowly(self, view: PageView) -> None:
         """Show the numbers beside the badge."""
-        self._show_badge(*badge_text(view))
+        self._show_badge(*badge_text(view), operational_since(view))
         self._show_scale(view)

@@ -37,10 +37,16 @@ def _with(state: AppState, **changes: Any) -> AppState:
 
 @reduce.register
 def choose_source(action: actions.ChooseSource, state: AppState, _sender: Sender) -> Outcome:
-    """Load what drives."""
+    """Load what drives; what drives now stays what is shown until that has come."""
     if isinstance(action.source, actions.VirtualDrive):
         state.project.route(action.source.route)
-    return Outcome(_with(state, source=action.source), (LoadSource(action.source),))
+    return Outcome(state, (LoadSource(action.source),))
+
+
+@reduce.register
+def source_loaded(action: actions.SourceLoaded, state: AppState, _sender: Sender) -> Outcome:
+    """Say that it drives."""
+    return Outcome(_with(state, source=action.source))
 
 
 @reduce.register

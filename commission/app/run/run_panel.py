@@ -8,6 +8,7 @@ from viser import GuiApi
 
 from commission.app.base import actions
 from commission.app.base.field_widget import Entry
+from commission.app.base.inputs import enable
 from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.reach import typed_path
 from commission.app.base.state import AppState
@@ -99,9 +100,9 @@ class RunPanel(BasePanel):
         names = _routes(state)
         if self._route.options != names:
             self._route.options = names
-        for widget in (self._route, self._drive):
-            if widget.disabled is not (names == NO_ROUTE):
-                widget.disabled = names == NO_ROUTE
+        if self._route.disabled is not (names == NO_ROUTE):
+            self._route.disabled = names == NO_ROUTE
+        enable(self._drive, "the project has no route; draw one with the tool Route" if names == NO_ROUTE else "")
 
     def draw_slowly(self, view: PageView) -> None:
         """Show what runs and what is being prepared."""

@@ -16,7 +16,7 @@ from commission.app.base.service import IDLE_S, Context, Due, Service
 from commission.app.base.state import AppState
 from commission.app.base.view import Followed, LivedPath
 from commission.app.run import drives
-from commission.app.run.actions import ChooseSource, Play, RecordedDrive, Source
+from commission.app.run.actions import ChooseSource, Play, RecordedDrive, Source, SourceLoaded
 from commission.app.run.drives import Drive
 from commission.app.run.effects import (
     CoverFromHere,
@@ -223,11 +223,12 @@ class RunService(Service):
             return
         self._localize(self._wanted.with_cover(first, covered=covered))
 
-    def _begin(self, drive: Drive, source: Source, world: World | None) -> None:
+    def _begin(self, drive: Drive, source: Source, world: World | None) -> Action:
         """Localize a new drive; the run before stays on the page until that is done."""
         self._jobs.cancel(DRIVE_AGAIN)
         self._source, self._world, self._coming = source, world, None
         self._localize(RunInput.of(self._project, drive.log, drive.start))
+        return SourceLoaded(source)
 
     def _localize(self, wanted: RunInput) -> None:
         """Localize the whole drive in the background, unless that is what is there, or under way."""

@@ -1,0 +1,96 @@
+"""The way of who has never seen the page: from an empty folder to a driving vehicle by what the page itself offers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from commission.app.run.actions import Play, Seek, VirtualDrive
+from commission.io.project_file import open_project
+from commission.site.reflectors import Reflector
+from tests.app.sites import room
+from tests.browser.page import OpenPage
+from tests.browser.serving import Served
+
+
+def second(served: Served) -> Reflector:
+    return served.state.project.reflectors.reflectors[1]
+
+
+def press_on_card(page: OpenPage, title: str) -> None:
+    page.page.locator(".c-card button", has_text=title).click()
+
+
+def test_the_card_of_an_empty_site_leads_to_a_driving_vehicle(window: Callable[..., OpenPage], tmp_path: Path) -> None:
+    opened = open_project(tmp_path / "hall")
+    served = Served(opened.project, opened.folder, is_new=True)
+    try:
+        page = window(served.server, (1024, 700))
+        client = page.open().client_id
+        card = page.page.locator(".c-card")
+        card.wait_for(state="visible")
+        drive = card.locator("button", has_text="Drive")
+        assert drive.is_disabled()
+        assert "first: reflectors and a route" in card.inner_text()
+        assert page.page.get_by_role("tab", name="Tune", exact=True).get_attribute("title").startswith("missing: refl")
+        press_on_card(page, "Place reflectors")
+        served.until(lambda: served.editor(client).tool is not None)
+        page.page.locator(".c-card-line").wait_for(state="visible")  # out of the way of the clicks
+        for count, place in enumerate(((-3.0, -3.0), (3.0, -3.0), (0.0, 4.0)), start=1):
+            page.click_at(place)
+            served.until(lambda count=count: len(served.state.project.reflectors) == count)
+        press_on_card(page, "Draw a route")
+        served.until(lambda: served.editor(client).tool is not None and "oute" in served.editor(client).tool.name)
+        for count, place in enumerate(((-2.0, 0.0), (0.0, 0.0), (1.0, 0.0), (2.0, 1.0)), start=1):
+            page.click_at(place)
+            served.until(lambda count=count: len(served.editor(client).points) == count)
+        page.page.keyboard.press("Enter")
+        served.until(lambda: len(served.state.project.routes) == 1)
+        page.page.wait_for_function("() => !document.querySelector('.c-card li:last-child button').disabled")
+        press_on_card(page, "Drive")
+        served.until(lambda: served.view is not None)
+        card.wait_for(state="hidden")
+        page.page.wait_for_function(
+            "() => document.querySelector('[role=tab][data-lacks]').title.includes('floor map')"
+        )
+        tune = page.page.get_by_role("tab", name="Tune", exact=True)
+        assert tune.get_attribute("title") == "has all that it needs"
+        assert page.errors == []
+    finally:
+        served.close()
+
+
+def test_arrows_move_the_selection_by_millimetres_and_escape_cancels_wherever_the_focus_is(
+    window: Callable[..., OpenPage],
+) -> None:
+    project = room()
+    served = Served(project, source=VirtualDrive(project.routes[0].name))
+    try:
+        served.until(lambda: served.view is not None)
+        served.runtime.post(Play(playing=False))
+        served.runtime.post(Seek(6.0))
+        page = window(served.server, (1024, 700))
+        client = page.open()
+        page.click_at((0.25, 6.5))
+        served.until(lambda: served.editor(client.client_id).selected == ("R2",))
+        before, steps = tuple(client.camera.position), len(served.state.undo)
+        for key in ("ArrowRight", "ArrowRight", "ArrowRight", "Shift+ArrowUp"):
+            page.page.keyboard.press(key)
+        served.until(lambda: round(second(served).y, 6) == 6.51)
+        assert round(second(served).x, 6) == 0.253
+        assert len(served.state.undo) == steps + 1
+        page.page.wait_for_timeout(300)
+        assert tuple(client.camera.position) == before
+        badge, name = page.page.locator(".c-badge").bounding_box(), page.page.locator(".c-top").bounding_box()
+        assert badge is not None
+        assert name is not None
+        assert badge["x"] < 12.0, "at the left end"
+        assert badge["x"] + badge["width"] < name["x"]
+        page.open_tab("Layers")
+        box = page.page.locator("input[type=checkbox]:visible").first
+        box.focus()
+        page.page.keyboard.press("Escape")
+        served.until(lambda: not served.editor(client.client_id).has_selection)
+        assert page.errors == []
+    finally:
+        served.close()
