@@ -1,6 +1,6 @@
 // It shows at the tabs what they lack or how much is in them, and leads from the card of a new site to where things are.
 //
-// What is shown at a tab comes in elements with `data-tab` (commission/app/guide/guide_panel.py, problem_count.py); a
+// What is shown at a tab comes in elements with `data-tab` (commission/app/project/guide_panel.py, problem_count.py); a
 // button with `data-go="tab:Run press:Drive"` brings a tab to the front, opens a folder, presses a button.
 (() => {
   if (window.commissionGuide) return; // the server sends this script again after each reconnection

@@ -26,7 +26,6 @@ from commission.app.editing import feature as editing
 from commission.app.exchange import feature as exchange
 from commission.app.failures import feature as failures
 from commission.app.floor_map import feature as floor_map
-from commission.app.guide import feature as guide
 from commission.app.page import Page
 from commission.app.placement import feature as placement
 from commission.app.prediction import feature as prediction
@@ -58,7 +57,6 @@ FEATURES = (
     placement.FEATURE,
     run.FEATURE,
     tune.FEATURE,
-    guide.FEATURE,
 )
 """What there is on the page: a new feature is a folder and a line here."""
 

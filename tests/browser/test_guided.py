@@ -73,12 +73,11 @@ def test_arrows_move_the_selection_by_millimetres_and_escape_cancels_wherever_th
         client = page.open()
         page.click_at((0.25, 6.5))
         served.until(lambda: served.editor(client.client_id).selected == ("R2",))
-        before, steps = tuple(client.camera.position), len(served.state.undo)
+        before = tuple(client.camera.position)
         for key in ("ArrowRight", "ArrowRight", "ArrowRight", "Shift+ArrowUp"):
             page.page.keyboard.press(key)
         served.until(lambda: round(second(served).y, 6) == 6.51)
         assert round(second(served).x, 6) == 0.253
-        assert len(served.state.undo) == steps + 1
         page.page.wait_for_timeout(300)
         assert tuple(client.camera.position) == before
         badge, name = page.page.locator(".c-badge").bounding_box(), page.page.locator(".c-top").bounding_box()

@@ -264,3 +264,18 @@ def test_a_row_of_the_table_selects_and_flies_there(state: AppState) -> None:
     result = after(state, actions.SelectReflectors(("R3",), fly=True))
     assert editor(result.state).selected == ("R3",)
     assert result.effects == (FlyTo((11.75, 1.5)),)
+
+
+def test_arrow_keys_in_quick_succession_are_one_step_and_move_what_is_selected(state: AppState) -> None:
+    before = reflector(state, "R2")
+    nudges = [by(ME, actions.Nudge(step), at) for step, at in (((0.001, 0.0), 0.0), ((0.001, 0.0), 0.3))]
+    moved = after(state, by(ME, actions.SelectReflectors(("R2",))), *nudges).state
+    assert (reflector(moved, "R2").x, reflector(moved, "R2").y) == pytest.approx((before.x + 0.002, before.y))
+    assert len(moved.undo) == 1
+    later = after(moved, by(ME, actions.Nudge((0.0, -0.01)), 5.0)).state
+    assert reflector(later, "R2").y == pytest.approx(before.y - 0.01)
+    assert len(later.undo) == 2
+    nothing = after(state, actions.Nudge((0.001, 0.0))).state
+    assert nothing.project is state.project
+    point = after(state, click(2.0, 2.0), actions.Nudge((0.0, 0.001))).state
+    assert point.project.routes[0].segments[0].control_points[0] == pytest.approx((2.0, 2.001))

@@ -8,7 +8,7 @@ from commission.app.base.inputs import write_html
 from commission.app.base.panel import BasePanel, escaped
 from commission.app.base.view import LivedPath, PageView
 from commission.app.editing.editor import editor_of
-from commission.app.guide.lacking import Task, lacking, tasks
+from commission.app.project.lacking import Task, lacking, tasks
 from commission.site.project import Project
 
 
