@@ -22,7 +22,8 @@ from commission.localization.pose_gaussian import to_belief
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, belief_of, output_of, state_at_start
 from commission.localization.sweep import Sweep, bring_to_stamp
-from commission.site.parameters import Parameters
+from commission.localization.wheel_scale import as_driven
+from commission.site.parameters import OdometryParameters, Parameters
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
@@ -51,6 +52,7 @@ def warm_up() -> None:
     )
     localizer.feed(Detections(3, np.array([[2.0, 0.0]])))
     localizer.flush()
+    as_driven(np.zeros((1, 3)), OdometryParameters(forward_scale=0.01))
 
 
 class Localizer:
@@ -162,7 +164,7 @@ class Localizer:
             if isinstance(record, Odometry):
                 if record.stamp_ns > until_ns:
                     return NOT_YET
-                dx, dy, dtheta = (float(value) for value in record.displacement)
+                dx, dy, dtheta = self._driven(record)
                 return NextOdometry(True, int(record.stamp_ns), dx, dy, dtheta)
         return NOT_YET if until_ns == stamp_ns or self._horizon_ns > until_ns else None
 
@@ -190,9 +192,15 @@ class Localizer:
                 detected = detect(record, model, self._setup.parameters.detector, blind)
                 return self._process(record, detected, following)
 
+    def _driven(self, record: Odometry) -> tuple[float, float, float]:
+        """Displacement of an odometry record [m, m, rad], with what is known of the wheels."""
+        driven = as_driven(record.displacement[np.newaxis], self._setup.parameters.odometry)
+        dx, dy, dtheta = driven[0].tolist()
+        return dx, dy, dtheta
+
     def _advance(self, record: Odometry) -> None:
         """Predict over the motion of an odometry record."""
-        dx, dy, dtheta = (float(value) for value in record.displacement)
+        dx, dy, dtheta = self._driven(record)
         noise = self._setup.filter.odometry
         state = self._state
         moved = process_odometry(state._replace(cross=None), record.stamp_ns, dx, dy, dtheta, noise)

@@ -23,6 +23,7 @@ from commission.localization.run_columns import RunColumns
 from commission.localization.setup import FilterModel, LocalizerSetup
 from commission.localization.state import FilterState
 from commission.localization.sweep import bring_to_stamp, sweep_at
+from commission.localization.wheel_scale import as_driven
 from commission.site.record_log import RecordLog
 
 
@@ -147,7 +148,7 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
     room = room_for_scans(cross, int(np.diff(detected.offsets).max(initial=0)))
     after = _run(
         read_only(log.odometry_stamps_ns[rows]),
-        read_only(log.displacements[rows]),
+        read_only(as_driven(log.displacements[rows], setup.parameters.odometry)),
         last - first,
         detected.stamps_ns,
         detected.offsets,

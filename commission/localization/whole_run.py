@@ -26,8 +26,9 @@ from commission.localization.run_columns import Checkpoint, RunColumns, RunSegme
 from commission.localization.run_loop import CycleStretch, continued, cut, empty_columns, odometry_rows, take_over
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, state_at_start
+from commission.localization.wheel_scale import as_driven
 from commission.progress import Progress, part, silent
-from commission.site.parameters import Parameters
+from commission.site.parameters import OdometryParameters, Parameters
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanLog
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -270,5 +271,6 @@ def warm_up() -> None:
     scans = ScanLog.even(np.array([2]), ranges, (-0.02, 0.01), reflector=flags)
     log = RecordLog(odometry_stamps_ns=np.array([0, 1]), displacements=np.zeros((2, 3)), scans=(scans,))
     run(log, setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3))).points_map()
+    as_driven(log.displacements, OdometryParameters(forward_scale=0.01))
     # What the page says of a rejected cluster.
     passing_widths(2.0, 0.01, 0, setup.detectors[0])

@@ -29,6 +29,9 @@ from commission.site.quantity import (
     Switch,
 )
 
+_SCALE = Bounds.between(-0.5, 0.5)
+"""Wheels that are off by more are other wheels."""
+
 
 @dataclass(frozen=True, slots=True)
 class ObservationParameters:
@@ -117,6 +120,30 @@ class OdometryParameters:
         ),
     ] = 1.0
     """Fastest turn of the vehicle: how far it may have turned where odometry is missing is unknown up to it."""
+    forward_scale: Annotated[
+        float,
+        Quantity(label="Way longer by", shown=PERCENT, bounds=_SCALE, step=0.01, slider=(-10.0, 10.0)),
+    ] = 0.0
+    """Share by which the true way is longer than odometry says: wheels that are larger than the vehicle knows."""
+    turn_scale: Annotated[
+        float,
+        Quantity(label="Turns larger by", shown=PERCENT, bounds=_SCALE, step=0.01, slider=(-10.0, 10.0)),
+    ] = 0.0
+    """Share by which true turns are larger than odometry says: wheels that are closer together than the vehicle
+    knows."""
+    turn_per_m: Annotated[
+        float,
+        Quantity(
+            label="Course off by",
+            unit="rad/m",
+            shown=Shown("°/m", DEGREES.scale),
+            bounds=_SCALE,
+            step=0.001,
+            slider=(-3.0, 3.0),
+        ),
+    ] = 0.0
+    """True turn to the left with each metre forward beyond what odometry says: a left wheel that is smaller than the
+    right one."""
 
     def __post_init__(self) -> None:
         check_fields(self, "odometry.")

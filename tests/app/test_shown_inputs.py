@@ -35,7 +35,15 @@ from tests.app.asking import FEATURES, ME, after, joined, taking
 DEGREES = 180.0 / math.pi
 UNITS = {
     **{"mm": 1000.0, "mm/√m": 1000.0, "mm/√s": 1000.0, "ms": 1000.0, "m": 1.0, "m/s": 1.0, "m/s²": 1.0},
-    **{"°": DEGREES, "°/√m": DEGREES, "°/√rad": DEGREES, "°/√s": DEGREES, "°/s": DEGREES, "°/s²": DEGREES},
+    **{
+        "°": DEGREES,
+        "°/√m": DEGREES,
+        "°/√rad": DEGREES,
+        "°/√s": DEGREES,
+        "°/s": DEGREES,
+        "°/s²": DEGREES,
+        "°/m": DEGREES,
+    },
     **{"%": 100.0, "%/m": 100.0, "": 1.0, "s": 1.0, "detections": 1.0},
 }
 """Number on the page for one SI unit, by the unit that the label names."""
@@ -86,6 +94,9 @@ PARAMETERS = {
     "odometry.turn_acceleration": ("Turning [°/s²]", DEGREES),
     "odometry.gap_speed": ("Speed in a gap [m/s]", 1.0),
     "odometry.gap_turn_rate": ("Turn in a gap [°/s]", DEGREES),
+    "odometry.forward_scale": ("Way longer by [%]", 100.0),
+    "odometry.turn_scale": ("Turns larger by [%]", 100.0),
+    "odometry.turn_per_m": ("Course off by [°/m]", DEGREES),
 }
 """Label and factor of each parameter's widget; None: not a number."""
 

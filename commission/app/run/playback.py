@@ -20,8 +20,10 @@ from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState
 from commission.localization.sweep import points_at_stamp
 from commission.localization.validation import validation_ellipses, validation_outlines
+from commission.localization.wheel_scale import as_driven
 from commission.localization.whole_run import state_before
 from commission.planning.visibility import faces
+from commission.site.parameters import OdometryParameters
 from commission.site.record_log import RecordLog
 from commission.site.records import Scan
 from commission.studies.run import RunResult
@@ -136,7 +138,8 @@ class Playback:
         before, twist = None, np.zeros(3)
         if setup.constants is not None:
             before = self._state_before(lived - 1)
-            twist = _twist_over(self._result.inputs.log, estimate.stamp_ns, before.motion.usual_ns)
+            wheels, usual_ns = setup.parameters.odometry, before.motion.usual_ns
+            twist = _twist_over(self._result.inputs.log, estimate.stamp_ns, usual_ns, wheels)
         return validation_ellipses(setup, estimate.prior, scanner=estimate.scanner, before=before, twist=twist)
 
     def _state_before(self, cycle: int) -> FilterState:
@@ -169,7 +172,8 @@ class Playback:
                 # Where the sensor itself detects, a scan is no cycle.
                 is_cycle = cycle >= 0 and columns.stamps_ns[cycle] == stamp_ns
                 T_map_base = columns.means[cycle] if is_cycle else belief.mean
-                seen = points_at_stamp(scanner, _returns(scans.scan(newest)), _twist_at(log, stamp_ns))
+                twist = _twist_at(log, stamp_ns, setup.parameters.odometry)
+                seen = points_at_stamp(scanner, _returns(scans.scan(newest)), twist)
                 T_map_scanner = se2.compose(T_map_base, scanner.mounting)
                 points[int(indices[scans.scanner])] = se2.transform_points(T_map_scanner, seen)
         return points
@@ -204,18 +208,18 @@ def _returns(scan: Scan) -> FloatArray:
     return np.stack((scan.ranges[hit].astype(np.float64), scan.bearings[hit]), axis=1)
 
 
-def _twist_at(log: RecordLog, stamp_ns: int) -> FloatArray:
+def _twist_at(log: RecordLog, stamp_ns: int, wheels: OdometryParameters) -> FloatArray:
     """(3,) velocity of base by the odometry about a time [m/s, m/s, rad/s]; zeros where there is none."""
     stamps = log.odometry_stamps_ns
     first, last = np.searchsorted(stamps, (stamp_ns - TWIST_NS, stamp_ns + TWIST_NS), side="right").tolist()
     first = max(first, 1)
     moved = np.zeros(3)
-    for displacement in log.displacements[first:last]:
+    for displacement in as_driven(log.displacements[first:last], wheels):
         moved = se2.compose(moved, displacement)
     return se2.log(moved) / ((stamps[last - 1] - stamps[first - 1]) * 1e-9) if last > first else moved
 
 
-def _twist_over(log: RecordLog, stamp_ns: int, usual_ns: int) -> FloatArray:
+def _twist_over(log: RecordLog, stamp_ns: int, usual_ns: int, wheels: OdometryParameters) -> FloatArray:
     """(3,) velocity of base that the filter takes for a scan [m/s, m/s, rad/s]: that of the odometry around it.
 
     Where the record behind the scan came too late to be waited for, the one before goes on.
@@ -226,7 +230,7 @@ def _twist_over(log: RecordLog, stamp_ns: int, usual_ns: int) -> FloatArray:
         row -= 1
     if row < 1:
         return np.zeros(3)
-    return se2.log(log.displacements[row]) / ((stamps[row] - stamps[row - 1]) * 1e-9)
+    return se2.log(as_driven(log.displacements[row : row + 1], wheels)[0]) / ((stamps[row] - stamps[row - 1]) * 1e-9)
 
 
 class _Cloud:
