@@ -409,7 +409,7 @@ def grown(  # noqa: PLR0917 - three rectangles and two runs, number by number
 
     Notes
     -----
-    a / b > c / d as a d > c b, so that integers do; the three candidates as in `free_rectangles`.
+    a / b > c / d as a d > c b, so that integers do, derived; the three candidates are those of `free_rectangles`.
     """
     w, h = min(across_w + 1, onward), min(across_h + 1, upward)
     other_w = min(beside_w + 1, LONGEST_EDGE)

@@ -18,7 +18,7 @@ from commission.geometry.raycast import RayTables
 from commission.planning import vehicle_fixes
 from commission.planning.dilution import Fixes, FixOptions, as_fixes
 from commission.planning.dilution_kernels import FIGURES
-from commission.planning.shadow_kernels import BitMask, Targets, see_points
+from commission.planning.shadow_kernels import ALL_CLEAR, ALL_HIDDEN, BitMask, Targets, see_points, sight_of_disc
 from commission.planning.vehicle_fixes import FloorSight, views_of
 from commission.planning.vehicle_visibility import VehicleVisibility, vehicle_visibility
 from commission.planning.view_kernels import ViewMask
@@ -32,6 +32,8 @@ from commission.site.reflectors import Reflector, ReflectorMap
 POINTS_PER_TILE = 1 << 17
 """A tile is a band of whole rows; its masks and its grouping take about 40 bytes per point and 8 more for every 64
 reflectors, and view: some 14 MB with 500 reflectors, however large the floor."""
+SQUARE = 8
+"""Points of the lattice along a square of which a whole is often in sight of a moved reflector, or out of it."""
 MARGIN = 5.0
 """Floor around reflectors and routes where there is no map [m]."""
 
@@ -158,7 +160,8 @@ def coverage(
         progress(tile.start / len(lattice), "coverage")
         places = views.places(points[tile])
         sight[:, tile] = views.sight(visible.models, places)
-        seen = FloorSight(points[tile], np.ascontiguousarray(sight[:, tile]), views.stands(places, visible.caster))
+        mask, stands = np.ascontiguousarray(sight[:, tile]), views.stands(places, visible.caster)
+        seen = FloorSight(points[tile], places, mask, stands)
         every = np.arange(len(seen.points))
         views.fill(visible.reflectors, seen, every, counts=counts[tile], figures=figures[tile])
     progress(1.0, "coverage")
@@ -190,10 +193,11 @@ class LiveCoverage:
         self._models = [replace(model, targets=copied(model.targets)) for model in visible.models]
         self._views = views_of(visible.scanners, found.options)
         points = lattice.points()
-        self._places = self._views.places(points)
-        self._seen = FloorSight(points, found.sight.copy(), self._views.stands(self._places, visible.caster))
+        places = self._views.places(points)
+        stands = self._views.stands(places, visible.caster)
+        self._seen = FloorSight(points, places, found.sight.copy(), stands)
         self._counts, self._figures = fixes.visible.copy(), np.stack(fixes[1:], axis=-1)
-        self._changed = np.empty(len(lattice), dtype=np.int64)
+        self._is_listed = np.zeros(len(lattice), dtype=np.bool_)
         self._coverage = replace(found, fixes=as_fixes(self._counts, self._figures), sight=self._seen.mask)
 
     @property
@@ -237,36 +241,38 @@ class LiveCoverage:
             ]
             self._fill_all()
             return [Window(0, self._lattice.rows, 0, self._lattice.columns)]
-        before = [self._window_around(index, view) for view in range(len(self._views))]
+        before, saw = self._seen_from(index)
         for model in self._models:
             replace_target(model.targets, index, reflector, model)
         self._models = [replace(model, reflectors=reflectors) for model in self._models]
-        after = [self._window_around(index, view) for view in range(len(self._views))]
-        rows = self._change_views(index, before, after)
-        self._views.fill(reflectors, self._seen, rows, counts=self._counts, figures=self._figures)
+        after, sees = self._seen_from(index)
+        rows = [
+            _change_bits(index, old, new, mask, self._is_listed)
+            for old, new, mask in zip(saw, sees, self._seen.mask, strict=True)
+        ]
+        changed = rows[0] if len(rows) == 1 else np.unique(np.concatenate(rows))
+        self._views.fill(reflectors, self._seen, changed, counts=self._counts, figures=self._figures)
         return [*before, *after]
 
-    def _change_views(self, index: int, before: list[Window], after: list[Window]) -> IntArray:
-        """Set the bits of a reflector anew in each view; return the points that saw it or see it now, each once."""
-        rows: list[IntArray] = []
-        for view, scanner in enumerate(self._views.scanners):
-            model = self._models[scanner]
-            count = _change_bits(
-                model.caster.tables,
-                model.targets,
+    def _seen_from(self, index: int) -> tuple[list[Window], list[IntArray]]:
+        """Of each view, the part of the lattice within reach of a reflector, and the points that see it."""
+        windows = [self._window_around(index, view) for view in range(len(self._views))]
+        seen = [
+            _points_that_see(
+                self._models[scanner].caster.tables,
+                self._models[scanner].targets,
                 index,
-                np.array((before[view], after[view])),
+                np.array(window),
                 self._lattice.columns,
-                self._places[view],
-                self._seen.mask[view],
-                self._changed,
+                places,
             )
-            rows.append(self._changed[:count].copy())
-        return rows[0] if len(rows) == 1 else np.unique(np.concatenate(rows))
+            for window, scanner, places in zip(windows, self._views.scanners, self._seen.places, strict=True)
+        ]
+        return windows, seen
 
     def _fill_all(self) -> None:
         """Compute every point anew."""
-        self._seen.mask[:] = self._views.sight(self._models, self._places)
+        self._seen.mask[:] = self._views.sight(self._models, self._seen.places)
         every = np.arange(len(self._lattice))
         self._views.fill(self.reflectors, self._seen, every, counts=self._counts, figures=self._figures)
 
@@ -274,8 +280,8 @@ class LiveCoverage:
         """Part of the lattice within reach of a reflector in one view."""
         lattice, targets = self._lattice, self._models[self._views.scanners[view]].targets
         reach = targets.farthest[index] / lattice.spacing + 1.0
-        column = (targets.centers[index, 0] - self._places[view, 0, 0]) / lattice.spacing
-        row = (targets.centers[index, 1] - self._places[view, 0, 1]) / lattice.spacing
+        column = (targets.centers[index, 0] - self._seen.places[view, 0, 0]) / lattice.spacing
+        row = (targets.centers[index, 1] - self._seen.places[view, 0, 1]) / lattice.spacing
         return Window(
             min(max(0, math.floor(row - reach)), lattice.rows),
             max(0, min(lattice.rows, math.ceil(row + reach) + 1)),
@@ -285,46 +291,61 @@ class LiveCoverage:
 
 
 @compiled
-def _change_bits(  # noqa: PLR0917 - arrays in, arrays out
-    tables: RayTables,
-    targets: Targets,
-    m: int,
-    windows: IntArray,
-    columns: int,
-    points: FloatArray,
-    mask: BitMask,
-    changed: IntArray,
-) -> int:
+def _points_that_see(  # noqa: PLR0917 - one reflector, a window of the lattice
+    tables: RayTables, targets: Targets, m: int, window: IntArray, columns: int, points: FloatArray
+) -> IntArray:
+    """Rows of `points` within a window of the lattice that see reflector m all around, square by square."""
+    found = np.empty(max(0, (window[1] - window[0]) * (window[3] - window[2])), dtype=np.int64)
+    members, seen = np.empty(SQUARE * SQUARE, dtype=np.int64), np.empty(SQUARE * SQUARE, dtype=np.bool_)
+    count = 0
+    for row in range(window[0], window[1], SQUARE):
+        for column in range(window[2], window[3], SQUARE):
+            last_row, last_column = min(row + SQUARE, window[1]), min(column + SQUARE, window[3])
+            low, high = points[row * columns + column], points[(last_row - 1) * columns + last_column - 1]
+            dx, dy = 0.5 * (low[0] + high[0]) - targets.centers[m, 0], 0.5 * (low[1] + high[1]) - targets.centers[m, 1]
+            spread = 0.5 * math.hypot(high[0] - low[0], high[1] - low[1]) + 1e-9
+            if dx * dx + dy * dy > (targets.farthest[m] + spread) ** 2:
+                continue
+            sight = sight_of_disc(targets, m, dx, dy, spread)
+            if sight == ALL_HIDDEN:
+                continue
+            size = 0
+            for r in range(row, last_row):
+                for c in range(column, last_column):
+                    members[size] = r * columns + c
+                    size += 1
+            if sight == ALL_CLEAR:
+                seen[:size] = True
+            else:
+                see_points(tables, targets, m, points, members[:size], seen)
+            for i in range(size):
+                if seen[i]:
+                    found[count] = members[i]
+                    count += 1
+    return found[:count].copy()
+
+
+@compiled
+def _change_bits(m: int, saw: IntArray, sees: IntArray, mask: BitMask, is_listed: BoolArray) -> IntArray:
     """Set the bits of reflector m anew; list the points that saw it or see it now, each once.
 
-    `windows` holds the window around the old place and that around the new one.
+    `is_listed` (N,) is scratch: False on entry and again on return.
     """
     word, bit = m >> 6, np.uint64(1) << np.uint64(m & 63)
-    old, new = windows[0], windows[1]
-    width = max(0, new[3] - new[2])
-    members = np.empty(max(0, new[1] - new[0]) * width, dtype=np.int64)
-    seen = np.empty(len(members), dtype=np.bool_)
-    for i in range(len(members)):
-        members[i] = (new[0] + i // width) * columns + new[2] + i % width
-    see_points(tables, targets, m, points, members, seen)
-    count = 0
-    for i in range(len(members)):
-        n = members[i]
-        saw = mask[n, word] & bit != 0
-        if seen[i] != saw:
-            mask[n, word] ^= bit
-        if seen[i] or saw:
+    changed = np.empty(len(saw) + len(sees), dtype=np.int64)
+    changed[: len(saw)] = saw
+    count = len(saw)
+    for n in saw:
+        mask[n, word] &= ~bit
+        is_listed[n] = True
+    for n in sees:
+        mask[n, word] |= bit
+        if not is_listed[n]:
             changed[count] = n
             count += 1
-    for row in range(old[0], old[1]):
-        for column in range(old[2], old[3]):
-            n = row * columns + column
-            done = new[0] <= row < new[1] and new[2] <= column < new[3]
-            if not done and mask[n, word] & bit != 0:
-                mask[n, word] ^= bit
-                changed[count] = n
-                count += 1
-    return count
+    for n in saw:
+        is_listed[n] = False
+    return changed[:count].copy()
 
 
 def warm_up() -> None:

@@ -32,6 +32,13 @@ PROMISING = 4
 """First column of which more is better."""
 
 Counts = NDArray[np.int32]
+Chosen = NDArray[np.uint64]
+
+EVERY_HEADING = np.uint64(0xFFFFFFFFFFFFFFFF)
+MOST_AT_ONCE = 32
+"""Headings whose sets of reflectors are compared at once, as bits of a word that also holds them turned around."""
+UNSURE = 1e-9
+"""Angle from the edge of a field of view below which a reflector is looked at exactly [rad]."""
 
 # Position of the lowest set bit of a word from its product with a de Bruijn sequence (Leiserson et al. 1998).
 DE_BRUIJN = 0x03F79D71B4CB0A89
@@ -201,7 +208,7 @@ def weights_of(
 
 @compiled
 def fix_at_heading(  # noqa: PLR0917 - one point and heading
-    seen: int, parts: FloatArray, turns: FloatArray, free: FloatArray, heading: float, model: FixModel, one: FloatArray
+    seen: int, parts: FloatArray, chosen: Chosen, free: FloatArray, h: int, model: FixModel, one: FloatArray
 ) -> int:
     """Fill the figures of one point and heading, variances in place of sigmas; return the number of reflectors.
 
@@ -209,10 +216,10 @@ def fix_at_heading(  # noqa: PLR0917 - one point and heading
     ----------
     seen : reflectors seen all around: rows in use of the next three.
     parts : (M, 6) information of each, see `reflector_information`.
-    turns : (M,) bearing of each from the map's x-axis [rad].
+    chosen : (M,) the headings in which each is in the field of view and not blind, a bit for each.
     free : (M,) probability that nobody stands before it.
-    heading : of the scanner [rad], map frame.
-    model : prior, field of view and the fewest reflectors of a fix.
+    h : which heading, 0 to 63.
+    model : prior and the fewest reflectors of a fix.
     one : (FIGURES,) output.
 
     Notes
@@ -223,12 +230,10 @@ def fix_at_heading(  # noqa: PLR0917 - one point and heading
     i_xx, i_xy, i_xt = model.prior_position, 0.0, 0.0
     i_yy, i_yt, i_tt = model.prior_position, 0.0, model.prior_heading
     expected, none, single, pair = 0.0, 1.0, 0.0, 0.0
-    first, width, is_narrow, is_crowded = model.first, model.width, model.width < FULL_TURN, model.free_per_m < 1.0
+    is_crowded, bit = model.free_per_m < 1.0, np.uint64(1) << np.uint64(h)
     count = 0
     for k in range(seen):
-        if is_narrow and not in_field_of_view(turns[k] - heading, first, width):
-            continue
-        if len(model.blind) and is_blind(turns[k] - heading, model.blind):
+        if chosen[k] & bit == np.uint64(0):
             continue
         count += 1
         i_xx += parts[k, 0]
@@ -306,6 +311,133 @@ def fill_figures(best: FloatArray, model: FixModel, figures: FloatArray) -> None
 
 
 @compiled
+def fix_of_headings(  # noqa: PLR0917 - arrays in, arrays out
+    seen: int,
+    parts: FloatArray,
+    turns: FloatArray,
+    chosen: Chosen,
+    free: FloatArray,
+    model: FixModel,
+    one: FloatArray,
+    best: FloatArray,
+) -> int:
+    """Fill the worst or best figures of the headings of one point, and return the number of reflectors.
+
+    Parameters
+    ----------
+    seen, parts, free, model : as for `fix_at_heading`.
+    turns : (M,) bearing of each from the map's x-axis [rad].
+    chosen : (M,) scratch; on entry each bit is set where the field of view is a full turn without blind sectors.
+    one : (FIGURES,) scratch.
+    best : (FIGURES,) output, variances in place of sigmas.
+
+    Notes
+    -----
+    Whatever is added to a set of reflectors adds information: the worst of the headings is one whose set has no part
+    that another heading sees alone, derived from the sum of positive semi-definite matrices. So headings that see as
+    much as a neighbor and more are left out for the worst, those that see less for the best, and of equal ones all but
+    one.
+    """
+    many, narrow = len(model.headings), model.width < FULL_TURN or len(model.blind) > 0
+    if not narrow:
+        return fix_at_heading(seen, parts, chosen, free, 0, model, best)
+    if 1 < many <= MOST_AT_ONCE and len(model.blind) == 0:
+        left = deciding_headings(seen, turns, model, chosen)
+        h = lowest_bit(left)
+        count = fix_at_heading(seen, parts, chosen, free, h, model, best)
+        left &= left - np.uint64(1)
+        while left != np.uint64(0):
+            other = fix_at_heading(seen, parts, chosen, free, lowest_bit(left), model, one)
+            left &= left - np.uint64(1)
+            count = min(count, other) if model.combine == WORST else max(count, other)
+            keep_worse_or_better(one, model.combine, best)
+        return count
+    count = -1
+    for heading in model.headings:
+        for k in range(seen):
+            is_in = in_field_of_view(turns[k] - heading, model.first, model.width)
+            chosen[k] = np.uint64(is_in and not is_blind(turns[k] - heading, model.blind))
+        other = fix_at_heading(seen, parts, chosen, free, 0, model, one)
+        if count < 0:
+            count, best[:] = other, one
+        else:
+            count = min(count, other) if model.combine == WORST else max(count, other)
+            keep_worse_or_better(one, model.combine, best)
+    return count
+
+
+@compiled
+def deciding_headings(seen: int, turns: FloatArray, model: FixModel, chosen: Chosen) -> np.uint64:
+    """Find the headings among which the worst ones are, or the best: a bit for each.
+
+    Parameters
+    ----------
+    seen : reflectors seen all around.
+    turns : (M,) bearing of each from the map's x-axis [rad].
+    model : at most `MOST_AT_ONCE` evenly spaced headings and a field of view without blind sectors.
+    chosen : (M,) output: the headings in which each of them is in the field of view.
+
+    Notes
+    -----
+    With S_h the set that heading h sees: lost has bit h where S_h holds what S_(h+1) does not, gained where S_(h+1)
+    holds what S_h does not; S_(h+1) is a proper part of S_h where lost alone is set. Derived.
+    """
+    count = len(model.headings)
+    every = (np.uint64(1) << np.uint64(count)) - np.uint64(1)
+    lost, gained = np.uint64(0), np.uint64(0)
+    for k in range(seen):
+        mask = headings_that_see(turns[k], model)
+        chosen[k] = mask
+        onward = ((mask >> np.uint64(1)) | (mask << np.uint64(count - 1))) & every
+        lost |= mask & ~onward
+        gained |= onward & ~mask
+    fewer_onward, more_onward, as_onward = lost & ~gained, gained & ~lost, every & ~(lost | gained)
+    if model.combine != WORST:
+        fewer_onward, more_onward = more_onward, fewer_onward
+    # Of each heading, what the one before it says of it.
+    before = more_onward | as_onward
+    before = ((before << np.uint64(1)) | (before >> np.uint64(count - 1))) & every
+    deciding = every & ~fewer_onward & ~before
+    return deciding if deciding != np.uint64(0) else np.uint64(1)
+
+
+@compiled
+def headings_that_see(turn: float, model: FixModel) -> np.uint64:
+    """Find the headings in which a reflector is in the field of view: a bit for each.
+
+    Parameters
+    ----------
+    turn : its bearing from the map's x-axis [rad].
+    model : at most `MOST_AT_ONCE` evenly spaced headings.
+
+    Notes
+    -----
+    Headings h with (turn - heading_h - first) mod 2 pi <= width, by definition: a run of them around the circle. Where
+    an end of the run is within rounding of the edge, each heading is asked by `in_field_of_view`.
+    """
+    count = len(model.headings)
+    step = FULL_TURN / count
+    offset = turn - model.headings[0] - model.first
+    offset -= FULL_TURN * math.floor(offset / FULL_TURN)
+    last = min(int(offset / step), count - 1)
+    rest = offset - last * step
+    span = (model.width - rest) / step
+    run = math.floor(span)
+    edge = min(rest, step - rest, (span - run) * step, (run + 1 - span) * step)
+    if edge < UNSURE:
+        mask = np.uint64(0)
+        for h in range(count):
+            if in_field_of_view(turn - model.headings[h], model.first, model.width):
+                mask |= np.uint64(1) << np.uint64(h)
+        return mask
+    if run < 0:
+        return np.uint64(0)
+    length = min(run + 1, count)
+    mask = ((np.uint64(1) << np.uint64(length)) - np.uint64(1)) << np.uint64((last - length + 1) % count)
+    return (mask | (mask >> np.uint64(count))) & ((np.uint64(1) << np.uint64(count)) - np.uint64(1))
+
+
+@compiled
 def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
     centers: FloatArray,
     survey_sigmas: FloatArray,
@@ -338,8 +470,9 @@ def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
     """
     many = max(1, len(centers))
     parts, turns, free = np.empty((many, 6)), np.zeros(many), np.ones(many)
+    chosen = np.full(many, EVERY_HEADING, dtype=np.uint64)
     one, best = np.empty(FIGURES), np.empty(FIGURES)
-    headings, free_per_m = model.headings, model.free_per_m
+    free_per_m = model.free_per_m
     narrow = model.width < FULL_TURN or len(model.blind) > 0
     lever_x, lever_y = model.lever_x, model.lever_y
     # Divisions are the slow part, and most maps know no survey error.
@@ -367,11 +500,7 @@ def fill_fixes(  # noqa: PLR0917 - arrays in, arrays out
                 if free_per_m < 1.0:
                     free[seen] = free_per_m ** math.hypot(dx, dy)
                 seen += 1
-        count = fix_at_heading(seen, parts, turns, free, headings[0], model, best)
-        for h in range(1, len(headings)):
-            other = fix_at_heading(seen, parts, turns, free, headings[h], model, one)
-            count = min(count, other) if model.combine == WORST else max(count, other)
-            keep_worse_or_better(one, model.combine, best)
+        count = fix_of_headings(seen, parts, turns, chosen, free, model, one, best)
         counts[n] = count
         fill_figures(best, model, figures[n])
 

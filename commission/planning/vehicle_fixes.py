@@ -85,8 +85,8 @@ class Views:
         """
         centers, sigmas = np.array(reflectors.centers), survey_sigmas(reflectors)
         if len(self) == 1:
-            places = np.ascontiguousarray(seen.points + self.tables.levers[0])
-            dilution_kernels.fill_fixes(centers, sigmas, places, rows, seen.mask[0], self.model, counts, figures)
+            places, mask = seen.places[0], seen.mask[0]
+            dilution_kernels.fill_fixes(centers, sigmas, places, rows, mask, self.model, counts, figures)
         else:
             view_kernels.fill_view_fixes(
                 centers, sigmas, seen.points, rows, seen.mask, seen.stands, self.tables, self.model, counts, figures
@@ -99,6 +99,8 @@ class FloorSight:
 
     points: FloatArray
     """(N, 2) [m], map frame."""
+    places: FloatArray
+    """(V, N, 2) where the scanners of the views stand [m], map frame."""
     mask: ViewMask
     """(V, N, ceil(M / 64)) which of the M reflectors each view sees."""
     stands: BoolArray
@@ -197,7 +199,7 @@ def fixes(visible: VehicleVisibility, points: ArrayLike, options: FixOptions) ->
     xy = np.ascontiguousarray(np.asarray(points, dtype=np.float64).reshape(-1, 2))
     views = views_of(visible.scanners, options)
     places = views.places(xy)
-    seen = FloorSight(xy, views.sight(visible.models, places), views.stands(places, visible.caster))
+    seen = FloorSight(xy, places, views.sight(visible.models, places), views.stands(places, visible.caster))
     counts, figures = np.empty(len(xy), dtype=np.int32), np.empty((len(xy), dilution_kernels.FIGURES))
     views.fill(visible.reflectors, seen, np.arange(len(xy)), counts=counts, figures=figures)
     return as_fixes(counts, figures)

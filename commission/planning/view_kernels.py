@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from commission.compiled import compiled
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.planning.dilution_kernels import (
+    EVERY_HEADING,
     FIGURES,
     WORST,
     Counts,
@@ -239,7 +240,8 @@ def fill_view_fixes(  # noqa: PLR0917 - arrays in, arrays out
     definition. Where the vehicle cannot stand in any heading nothing is seen.
     """
     scanners, many = views.view_of.shape[1], max(1, len(centers))
-    parts, turns, free = np.empty((many, 6)), np.zeros(many), np.ones(many)
+    parts, free = np.empty((many, 6)), np.ones(many)
+    chosen = np.full(many, EVERY_HEADING, dtype=np.uint64)
     one, best = np.empty(FIGURES), np.empty(FIGURES)
     words = np.empty((scanners, mask.shape[2]), dtype=np.uint64)
     for n in rows:
@@ -250,14 +252,14 @@ def fill_view_fixes(  # noqa: PLR0917 - arrays in, arrays out
             for s in range(scanners):
                 words[s] = mask[views.view_of[h, s], n]
             seen = parts_at_heading(centers, survey_sigmas, points[n], words, h, views, model, parts, free)
-            found = fix_at_heading(seen, parts, turns, free, 0.0, model, one)
+            found = fix_at_heading(seen, parts, chosen, free, 0, model, one)
             if count < 0:
                 count, best[:] = found, one
             else:
                 count = min(count, found) if model.combine == WORST else max(count, found)
                 keep_worse_or_better(one, model.combine, best)
         if count < 0:
-            count = fix_at_heading(0, parts, turns, free, 0.0, model, best)
+            count = fix_at_heading(0, parts, chosen, free, 0, model, best)
         counts[n] = count
         fill_figures(best, model, figures[n])
 

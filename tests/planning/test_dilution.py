@@ -211,6 +211,30 @@ def test_worst_and_best_heading_bracket_every_given_one():
         np.testing.assert_array_equal(best[i], np.max([f[i] for f in given_ones], axis=0))
 
 
+@pytest.mark.parametrize("view", [(-135.0, 135.0), (-90.0, 90.0), (-20.0, 40.0), (-5.0, 5.0), (-170.0, 175.0)])
+@pytest.mark.parametrize("headings", [2, 7, 16, 32, 33])
+@pytest.mark.parametrize("blocked", [0.0, 0.03])
+def test_worst_and_best_headings_are_those_of_all_given_ones_one_by_one(view, headings, blocked):
+    rng = np.random.default_rng(headings)
+    points, centers = rng.uniform(2, 8, (40, 2)), rng.uniform(0, 10, (9, 2))
+    # On the edge of the field of view of some headings, and alike from all: where a quick answer goes wrong first.
+    centers[:3] = points[:3] + 3.0 * np.array([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)])
+    scanner = Scanner(field_of_view_deg=view, resolution_deg=1.0, mounting=(0.0, 0.0, 0.3), range=(0.05, 30.0))
+    reflectors = ReflectorMap(tuple(Reflector(id=str(i), x=x, y=y) for i, (x, y) in enumerate(centers.tolist())))
+    model = vehicle_visibility(Project(reflectors=reflectors, scanners=(scanner,)))
+    options = FixOptions(headings=headings, blocked_per_m=blocked)
+    turns = np.arange(headings) * (2.0 * math.pi / headings)
+    each = [fixes(model, points, replace(options, heading=Heading.GIVEN, given_heading=float(t))) for t in turns]
+    for heading, worst_of_first, worst_of_last in ((Heading.WORST, np.max, np.min), (Heading.BEST, np.min, np.max)):
+        found = fixes(model, points, replace(options, heading=heading))
+        for name in ("position_sigma", "heading_sigma", "position_dop", "heading_dop"):
+            np.testing.assert_array_equal(
+                getattr(found, name), worst_of_first([getattr(f, name) for f in each], axis=0)
+            )
+        for name in ("visible", "expected_visible", "two_or_more", "three_or_more"):
+            np.testing.assert_array_equal(getattr(found, name), worst_of_last([getattr(f, name) for f in each], axis=0))
+
+
 def test_a_given_heading_is_the_fix_of_that_pose_with_its_mounting():
     model = open_field(np.random.default_rng(5).uniform(-8.0, 8.0, (6, 2)), narrow((0.6, -0.2, 0.4)))
     points = np.random.default_rng(6).uniform(-4.0, 4.0, (10, 2))
