@@ -27,8 +27,8 @@ class Simulate:
 
     project: Positional[Path]
     """Folder of the project (holds project.yaml)."""
-    out: Annotated[Path, arg(metavar="DIR")]
-    """Folder for the recording; made when it does not exist."""
+    out: Annotated[Path, arg(metavar="DIR|FILE.mcap")]
+    """Folder for the recording, made when it does not exist, or an MCAP file."""
     route: Annotated[str | None, arg(metavar="NAME")] = None
     """Route to drive. None: the project's first."""
     seed: int = 1
@@ -42,28 +42,27 @@ class Simulate:
     cover: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="START,DURATION")] = ()
     """A time during which all reflectors are covered: start and length [s]."""
     force: bool = False
-    """Whether a recording that is in DIR already is replaced."""
+    """Whether a recording that is there already is replaced."""
 
     def run(self) -> None:
         """Simulate, write, and tell in a few lines what was written and what is true in it."""
         if self.seed < 0:
             raise UsageError(f"--seed is {self.seed}; expected 0 or more")
 
-        from commission.io.overwriting import refuse_recording
         from commission.io.project_file import load_project
-        from commission.io.recordings.csv_writer import write_recording
+        from commission.io.recordings.writers import refuse_to_write, write_records
         from commission.simulation.constants import draw_truth
         from commission.simulation.scenario import records
         from commission.site.truth import truth_lines
 
-        refuse_recording(self.out, force=self.force)
+        refuse_to_write(self.out, force=self.force)
         project = load_project(self.project)
         route = self._route(project)
         project = dataclasses.replace(project, disturbances=self._disturbances(project))
         tally = _Tally()
         truth = draw_truth(project, route, self.seed)
         names = tuple(scanner.name for scanner in project.scanners)
-        write_recording(self.out, tally.count(records(project, route, self.seed)), truth, scanners=names)
+        write_records(self.out, tally.count(records(project, route, self.seed)), truth, scanners=names)
 
         seconds = tally.last_ns * 1e-9
         sys.stdout.write(f"Drive        route {route!r}, {seconds:.1f} s, {tally.scans} scans, seed {self.seed}\n")

@@ -21,12 +21,12 @@ from commission.io.json_document import read_json
 from commission.io.lif import read_lif
 from commission.io.lif_writer import write_lif
 from commission.io.map_server import read_floor_map, write_floor_map
-from commission.io.overwriting import refuse_files, refuse_recording
+from commission.io.overwriting import refuse_files
 from commission.io.project_copy import refuse_to_replace
 from commission.io.project_file import FILE_NAME, load_project, project_file, save_project
 from commission.io.recordings.base import is_recording, open_recording
 from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions
-from commission.io.recordings.csv_writer import write_recording
+from commission.io.recordings.writers import refuse_to_write, write_records
 from commission.io.reflector_tables import write_reflectors
 from commission.io.route_edges import RouteImport
 from commission.io.smap import FIELDS, read_smap
@@ -74,7 +74,7 @@ _CALLED = {
     Kind.IMK: "one that ends with .imk for a SICK layout",
     Kind.LIF: "one that ends with .lif for a VDMA LIF layout",
     Kind.MAP: "one that ends with .yaml for a floor map",
-    Kind.RECORDING: "a folder, since a recording is written as a folder of tables",
+    Kind.RECORDING: "a folder for the tables of a recording, or a name that ends with .mcap",
 }
 """How a target of each kind is called."""
 
@@ -215,7 +215,7 @@ def _refuse_to_overwrite(target: Path, wanted: Kind, *, force: bool) -> None:
     if wanted is Kind.PROJECT:
         refuse_to_replace(_folder(target), force=force)
     elif wanted is Kind.RECORDING:
-        refuse_recording(target, force=force)
+        refuse_to_write(target, force=force)
     elif wanted is Kind.MAP:
         refuse_files(target, target.with_suffix(".png"), force=force)
     else:
@@ -311,7 +311,7 @@ def _from_smap(source: Path, target: Path, wanted: Kind, options: ConvertOptions
 def _from_recording(source: Path, target: Path, _: Kind, options: ConvertOptions) -> tuple[str, ...]:
     recording = open_recording(source, options.recording)
     log = recording.load()
-    write_recording(target, log.records(), log.truth, scanners=log.scanners, reference_mount=log.reference_mount)
+    write_records(target, log.records(), log.truth, scanners=log.scanners, reference_mount=log.reference_mount)
     return log.notes
 
 

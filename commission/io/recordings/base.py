@@ -11,6 +11,7 @@ from commission.io.reading import cannot_read
 from commission.io.recordings.capture import Capture
 from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions
 from commission.io.recordings.csv_folder import CsvFolder
+from commission.io.recordings.mcap_recording import McapRecording
 from commission.io.recordings.ros_bag import RosBag
 from commission.site.record_log import RecordLog
 from commission.site.records import Record
@@ -58,9 +59,15 @@ def _csv_folder(path: Path, options: ChannelOptions) -> Recording:
     return CsvFolder(path)
 
 
+def _own_mcap(path: Path, options: ChannelOptions) -> Recording:
+    """Open a file of our recorder: by what it says, or as a bag where topics are named."""
+    return McapRecording(path) if options == NO_OPTIONS else RosBag(path, options)
+
+
 _FORMATS: tuple[tuple[Callable[[Path], bool], Callable[[Path, ChannelOptions], Recording]], ...] = (
     (CsvFolder.recognizes, _csv_folder),
     (Capture.recognizes, Capture),
+    (McapRecording.recognizes, _own_mcap),
     (RosBag.recognizes, RosBag),
 )
 READ = "a folder with odometry.csv, a ROS bag (.mcap, .db3, .bag), or a capture (.pcap, .pcapng)"

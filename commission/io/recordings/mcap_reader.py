@@ -91,7 +91,7 @@ class McapFile:
                 return False
             file.seek(start)
             for kind, data in self._records(file):
-                self._note(kind, data)
+                self.note(kind, data)
                 if kind == FOOTER:
                     break
         return bool(self.channels)
@@ -113,7 +113,7 @@ class McapFile:
                 elif kind in (DATA_END, FOOTER):
                     return
                 else:
-                    self._note(kind, data)
+                    self.note(kind, data)
             self.is_cut = True
 
     def _open(self) -> IO[bytes]:
@@ -142,11 +142,11 @@ class McapFile:
         """Messages of a chunk."""
         try:
             size, crc = struct.unpack_from("<QI", data, 16)
-            compression, place = _text(data, 28)
+            compression, place = text_of(data, 28)
             packed = struct.unpack_from("<Q", data, place)[0]
             if size > RECORD_LIMIT or packed > len(data):
                 raise self._error(offset, f"a chunk of {size} bytes", f"at most {RECORD_LIMIT} bytes")
-            content = _unpacked(data[place + 8 : place + 8 + packed], compression, size, crc)
+            content = unpacked(data[place + 8 : place + 8 + packed], compression, size, crc)
         except (struct.error, ValueError, RuntimeError, EOFError) as error:
             raise self._error(offset, f"a damaged chunk ({error})", "a whole file") from error
         place = 0
@@ -160,7 +160,7 @@ class McapFile:
             if kind == MESSAGE:
                 yield self._message(record, offset)
             else:
-                self._note(kind, record)
+                self.note(kind, record)
 
     def _message(self, data: bytes, offset: int) -> Message:
         if len(data) < 22:
@@ -171,18 +171,18 @@ class McapFile:
             raise self._error(offset, f"a message of channel {number}", "channels that are announced first")
         return Message(channel, log_time, data[22:])
 
-    def _note(self, kind: int, data: bytes) -> None:
-        """Remember schemas, channels and counts."""
+    def note(self, kind: int, data: bytes) -> None:
+        """Remember schemas, channels and counts; raises FileFormatError where the record is damaged."""
         try:
             if kind == SCHEMA:
-                name, place = _text(data, 2)
-                encoding, place = _text(data, place)
-                definition, _ = _text(data, place)
+                name, place = text_of(data, 2)
+                encoding, place = text_of(data, place)
+                definition, _ = text_of(data, place)
                 self._schemas[struct.unpack_from("<H", data)[0]] = name, encoding, definition
             elif kind == CHANNEL:
                 number, schema = struct.unpack_from("<HH", data)
-                topic, place = _text(data, 4)
-                encoding, _ = _text(data, place)
+                topic, place = text_of(data, 4)
+                encoding, _ = text_of(data, place)
                 name, language, definition = self._schemas.get(schema, ("", "", ""))
                 self.channels[number] = McapChannel(
                     topic=topic, encoding=encoding, schema=name, schema_encoding=language, definition=definition
@@ -197,8 +197,8 @@ class McapFile:
         return FileFormatError(self.path, f"byte {offset}", f"is {found}", expected)
 
 
-def _text(data: bytes, place: int) -> tuple[str, int]:
-    """Text with its length before it, and where it ends."""
+def text_of(data: bytes, place: int) -> tuple[str, int]:
+    """Return a text with its length before it, and where it ends; raises struct.error or UnicodeDecodeError."""
     length = struct.unpack_from("<I", data, place)[0]
     end = place + 4 + length
     if end > len(data):
@@ -206,12 +206,38 @@ def _text(data: bytes, place: int) -> tuple[str, int]:
     return data[place + 4 : end].decode("utf-8"), end
 
 
-def _unpacked(data: bytes, compression: str, size: int, crc: int) -> bytes:
-    """Content of a chunk; raises ValueError or RuntimeError where it is damaged."""
+def metadata_of(path: Path, data: bytes) -> tuple[str, dict[str, str]]:
+    """Return the name and the texts of a record of metadata; raises FileFormatError, naming the path."""
+    try:
+        name, place = text_of(data, 0)
+        end = place + 4 + struct.unpack_from("<I", data, place)[0]
+        place, values = place + 4, dict[str, str]()
+        while place < min(end, len(data)):
+            key, place = text_of(data, place)
+            values[key], place = text_of(data, place)
+    except (struct.error, UnicodeDecodeError) as error:
+        raise FileFormatError(path, "", f"has damaged metadata ({error})", "a whole MCAP file") from error
+    return name, values
+
+
+def unpacked(data: bytes, compression: str, size: int, crc: int) -> bytes:
+    """Return the content of a chunk.
+
+    Parameters
+    ----------
+    data : as it is packed.
+    compression : `lz4`, `zstd`, or nothing.
+    size, crc : bytes of the content, and its checksum; 0: none.
+
+    Raises
+    ------
+    ValueError, RuntimeError, EOFError
+        it is damaged, or packed in another way.
+    """
     if not compression:
         if len(data) != size:
             raise ValueError(f"{len(data)} bytes where {size} are said")
-        return data
+        return _checked(data, crc)
     from lz4.frame import LZ4FrameDecompressor  # pyright: ignore[reportMissingTypeStubs]
     from rosbags.rosbag2.storage_mcap import zstd
 
@@ -227,6 +253,10 @@ def _unpacked(data: bytes, compression: str, size: int, crc: int) -> bytes:
         raise ValueError(f"compression {compression!r}, which is not read")
     if len(content) != size:
         raise ValueError(f"it unpacks into another size than {size} bytes")
+    return _checked(content, crc)
+
+
+def _checked(content: bytes, crc: int) -> bytes:
     if crc and crc32(content) != crc:
         raise ValueError("its checksum is another")
     return content

@@ -82,6 +82,8 @@ def composed(stamps_ns: IntArray, displacements: FloatArray) -> Sorted:
     """
     order = np.argsort(stamps_ns, kind="stable")
     stamps, rows = stamps_ns[order], displacements[order].copy()
+    if not (stamps[1:] == stamps[:-1]).any():
+        return Sorted(stamps_ns=stamps, rows=rows, disordered=_disordered(stamps_ns), repeated=0)
     kept: list[int] = []
     for index in range(len(stamps)):
         if kept and stamps[kept[-1]] == stamps[index]:

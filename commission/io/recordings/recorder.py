@@ -110,8 +110,8 @@ class Recorder:
             if isinstance(record, Scan):
                 topic = self._topics[record.scanner]
                 frame = frame_of(topic)
-                self._write(topic, ros.LASER_SCAN, record.stamp_ns, ros.laser_scan(record, frame), "")
                 self._write(beams_topic(topic), ros.BEAMS, record.stamp_ns, ros.beams(record, frame), "")
+                self._write(topic, ros.LASER_SCAN, record.stamp_ns, ros.laser_scan(record, frame), "")
             elif isinstance(record, Odometry):
                 self._append_odometry(record)
             elif isinstance(record, Detections):

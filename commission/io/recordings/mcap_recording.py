@@ -1,0 +1,204 @@
+"""Reading back what our recorder wrote, to the last bit: from the messages that stand beside those of ROS.
+
+Scans stay in the file. Any other MCAP is a bag (`ros_source`), and so is this one where topics are named.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from commission.errors import FileFormatError
+from commission.io.recordings import motion
+from commission.io.recordings.mcap_columns import (
+    BeamColumns,
+    PairColumns,
+    RowColumns,
+    ScanColumns,
+    in_order_once,
+    read_columns,
+)
+from commission.io.recordings.mcap_index import McapIndex
+from commission.io.recordings.mcap_reader import MAGIC
+from commission.io.recordings.mcap_scans import McapScans, ScanPlaces
+from commission.io.recordings.recorder import (
+    DISPLACEMENTS,
+    METADATA,
+    REFERENCES,
+    VERSION,
+    beams_topic,
+    detected_topic,
+    scanner_topics,
+)
+from commission.io.recordings.reference_file import reference_mount_of
+from commission.io.recordings.scan_archive import IN_MEMORY
+from commission.io.recordings.truth_file import truth_of
+from commission.io.recordings.whole import WholeRecording
+from commission.site.record_log import RecordLog
+from commission.site.record_store import ScanStore
+from commission.site.reference_mount import BASE, ReferenceMount
+from commission.site.scanner import is_name
+from commission.site.truth import Truth
+
+_BEGIN = 400
+"""Bytes in which the file says whose it is."""
+
+
+class McapRecording(WholeRecording):
+    """A file of our recorder.
+
+    Parameters
+    ----------
+    path : where it is.
+
+    Raises
+    ------
+    FileFormatError
+        it is damaged, or of a version that this program does not know.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._index = McapIndex(path)
+        self._said = self._index.metadata.get(METADATA, {})
+        version = self._said.get("version")
+        if version != VERSION:
+            remedy = f"{VERSION}, the version this program knows"
+            raise FileFormatError(path, "metadata version", f"is {version!r}", remedy)
+        try:
+            names = tuple(json.loads(self._said.get("scanners", "")))
+        except (ValueError, TypeError, RecursionError):
+            names = ()
+        if (
+            not names
+            or not all(isinstance(name, str) and is_name(name) for name in names)
+            or len(set(names)) < len(names)
+        ):
+            raise FileFormatError(path, "metadata scanners", "names no scanners", "their names, as a list")
+        self.scanners: tuple[str, ...] = names
+
+    @staticmethod
+    def recognizes(path: Path) -> bool:
+        """Whether a path is such a file, by its first bytes."""
+        if not path.is_file():
+            return False
+        with path.open("rb") as file:
+            begin = file.read(_BEGIN)
+        return begin.startswith(MAGIC) and b"\x0a\x00\x00\x00commission" in begin[len(MAGIC) + 30 :]
+
+    def truth(self) -> Truth | None:
+        """Return the constants of a virtual drive; None of a real vehicle. Raises FileFormatError."""
+        text = self._said.get("truth")
+        return None if text is None else truth_of(self.path, text)
+
+    def reference_mount(self) -> ReferenceMount:
+        """Return where on the vehicle the reference measures; raises FileFormatError."""
+        text = self._said.get("reference")
+        return BASE if text is None else reference_mount_of(self.path, text)
+
+    def load(self) -> RecordLog:
+        """Read everything but scans into columns; raises FileFormatError."""
+        moved, referred = RowColumns(3), RowColumns(3)
+        topics = scanner_topics(self.scanners)
+        scans = [(ScanColumns(), BeamColumns()) for _ in topics]
+        detected = [PairColumns() for _ in topics]
+        takers = {DISPLACEMENTS: moved.take, REFERENCES: referred.take}
+        for topic, (ranges, beams), pairs in zip(topics, scans, detected, strict=True):
+            takers |= {topic: ranges.take, beams_topic(topic): beams.take, detected_topic(topic): pairs.take}
+        read_columns(self._index, takers)
+        notes = [f"{self.path.name} was cut while it was recorded; it is read up to there"] * self._index.is_cut
+        odometry = motion.composed(moved.stamps_ns.array(), moved.rows.array())
+        notes += _told("rows of odometry", odometry.disordered, odometry.repeated, "composed")
+        reference_stamps, reference_poses = referred.stamps_ns.array(), referred.rows.array()
+        rows, late, repeated = in_order_once(reference_stamps)
+        notes += _told("reference poses", late, repeated, "left out")
+        stores: list[ScanStore] = []
+        for scanner, (ranges, beams) in enumerate(scans):
+            found, told = self._scans(scanner, ranges, beams)
+            notes += told
+            stores += [] if found is None else [found]
+        detections = self._detections(detected)
+        if not (len(odometry.stamps_ns) or len(rows) or stores or len(detections[0])):
+            raise FileFormatError(self.path, "", "holds no record", "a recording of a drive")
+        self._check(odometry.rows, "displacements")
+        return RecordLog(
+            odometry_stamps_ns=odometry.stamps_ns,
+            displacements=odometry.rows,
+            scanners=self.scanners,
+            scans=tuple(stores),
+            detection_stamps_ns=detections[0],
+            detection_scanners=detections[1],
+            detection_offsets=detections[2],
+            range_bearing=detections[3],
+            reference_stamps_ns=reference_stamps[rows],
+            reference_poses=reference_poses[rows],
+            reference_mount=self.reference_mount(),
+            truth=self.truth(),
+            notes=tuple(notes),
+        )
+
+    def _scans(self, scanner: int, found: ScanColumns, exact: BeamColumns) -> tuple[ScanStore | None, list[str]]:
+        """Scans of one scanner, in memory or in the file by their size, and what was mended."""
+        # The one stands behind the other: where the file is cut between them, one is left over.
+        count = min(len(found.stamps_ns.array()), len(exact.stamps_ns.array()))
+        stamps = found.stamps_ns.array()[:count]
+        if not count:
+            return None, []
+        if not np.array_equal(stamps, exact.stamps_ns.array()[:count]):
+            where = scanner_topics(self.scanners)[scanner]
+            raise FileFormatError(self.path, where, "has scans whose angles are missing", "a file as it was recorded")
+        rows, late, repeated = in_order_once(stamps)
+        beams, flags = found.beams.array()[:count], exact.flags.array()[:count]
+        angles = exact.angles.array()[:count]
+        if (beams < 1).any() or ((flags != beams) & (flags > 0)).any() or not np.isfinite(angles).all():
+            where = scanner_topics(self.scanners)[scanner]
+            raise FileFormatError(self.path, where, "has scans of no beams, or with other flags", "as it was recorded")
+        places = ScanPlaces(
+            chunks=found.chunks.array()[:count],
+            ranges=found.ranges.array()[:count],
+            intensities=found.intensities.array()[:count] if found.has_intensities else None,
+            flag_chunks=exact.chunks.array()[:count],
+            reflector=np.where(flags > 0, exact.places.array()[:count], -1) if flags.any() else None,
+            limits=found.limits.array()[:count],
+        )
+        store = McapScans(
+            index=self._index,
+            places=places.chosen(rows),
+            stamps_ns=stamps[rows],
+            angle_min=angles[rows, 0],
+            angle_increment=angles[rows, 1],
+            beams=beams[rows],
+            most=int(beams.max()),
+            scanner=scanner,
+        )
+        is_small = len(store) * store.most * 9 <= IN_MEMORY
+        return store.block(0, len(store)) if is_small else store, _told("scans", late, repeated, "left out")
+
+    def _detections(self, found: list[PairColumns]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Stamps, scanners, offsets and pairs of what the scanners themselves detected, in order of their stamps."""
+        stamps = np.concatenate([each.stamps_ns.array() for each in found])
+        counts = np.concatenate([each.counts.array() for each in found])
+        pairs = np.concatenate([each.pairs.array() for each in found])
+        scanners = np.repeat(np.arange(len(found)), [len(each.stamps_ns.array()) for each in found])
+        order = np.argsort(stamps, kind="stable")
+        begins = (np.cumsum(counts) - counts)[order]
+        counts = counts[order]
+        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
+        rows = np.repeat(begins - offsets[:-1], counts) + np.arange(int(counts.sum()))
+        self._check(pairs, "detections")
+        if len(pairs) and not pairs[:, 0].min() > 0.0:
+            raise FileFormatError(self.path, "detections", f"has a range of {pairs[:, 0].min():g} m", "more than 0 m")
+        return stamps[order], scanners[order], offsets, pairs[rows]
+
+    def _check(self, values: np.ndarray, name: str) -> None:
+        """Raise FileFormatError where a number is not finite."""
+        if not np.isfinite(values).all():
+            raise FileFormatError(self.path, name, "has a number that is not finite", "a file as it was recorded")
+
+
+def _told(name: str, late: int, repeated: int, fate: str) -> list[str]:
+    """What is said of records that were out of order, or had a stamp that was taken."""
+    notes = [f"{late} {name} came after a later one and are sorted"] if late else []
+    return [*notes, f"{repeated} {name} have a stamp that is taken and are {fate}"] if repeated else notes

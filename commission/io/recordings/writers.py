@@ -1,0 +1,72 @@
+"""In which format a recording is written: chosen by the name of where it goes. The formats are other modules."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from commission.errors import UsageError
+from commission.io.overwriting import refuse_files, refuse_recording
+from commission.io.recordings.csv_writer import write_recording
+from commission.io.recordings.recorder import write_mcap
+from commission.site.records import Record
+from commission.site.reference_mount import BASE, ReferenceMount
+from commission.site.scanner import ONLY_NAME
+from commission.site.truth import Truth
+
+MCAP = ".mcap"
+_READ_ONLY = (".bag", ".db3", ".pcap", ".pcapng", ".log", ".clf")
+WRITTEN = "a folder for tables (odometry.csv with detections.csv or scans.npz), or a name that ends in .mcap"
+"""What a recording can be written as, in words."""
+
+
+def refuse_to_write(path: Path, *, force: bool) -> None:
+    """Look at where a recording is about to be written.
+
+    Parameters
+    ----------
+    path : folder, or file that ends in .mcap.
+    force : whether a recording that is there may be replaced.
+
+    Raises
+    ------
+    UsageError
+        the ending is one of a format that is read only, or something is there that would be overwritten.
+    """
+    if path.suffix.lower() in _READ_ONLY and not path.is_dir():
+        raise UsageError(f"{path} ends in {path.suffix}, which is read only; expected {WRITTEN}")
+    if _is_mcap(path):
+        refuse_files(path, force=force)
+    else:
+        refuse_recording(path, force=force)
+
+
+def write_records(
+    path: Path,
+    records: Iterable[Record],
+    truth: Truth | None = None,
+    *,
+    scanners: tuple[str, ...] = (ONLY_NAME,),
+    reference_mount: ReferenceMount = BASE,
+) -> None:
+    """Write a recording: as MCAP where the name ends so, else as a CSV folder.
+
+    Parameters
+    ----------
+    path : where; the recording there is replaced once the new one is complete.
+    records : in the order of their stamps; a source's error passes through and leaves what is there as it was.
+    truth : the constants of a virtual drive.
+    scanners : names of the scanners that records have indices of.
+    reference_mount : where the reference measures.
+
+    Raises
+    ------
+    FileFormatError
+        it cannot be written, or the format cannot hold a record.
+    """
+    write = write_mcap if _is_mcap(path) else write_recording
+    write(path, records, truth, scanners=scanners, reference_mount=reference_mount)
+
+
+def _is_mcap(path: Path) -> bool:
+    return path.suffix.lower() == MCAP and not path.is_dir()
