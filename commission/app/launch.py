@@ -26,6 +26,8 @@ from commission.app.editing import feature as editing
 from commission.app.exchange import feature as exchange
 from commission.app.failures import feature as failures
 from commission.app.floor_map import feature as floor_map
+from commission.app.live import feature as live
+from commission.app.live.state import LiveState
 from commission.app.page import Page
 from commission.app.placement import feature as placement
 from commission.app.prediction import feature as prediction
@@ -56,6 +58,7 @@ FEATURES = (
     ambiguity.FEATURE,
     placement.FEATURE,
     run.FEATURE,
+    live.FEATURE,
     tune.FEATURE,
 )
 """What there is on the page: a new feature is a folder and a line here."""
@@ -73,6 +76,7 @@ def serve(
     open_browser: bool = True,
     recording: Path | None = None,
     demo: bool = False,
+    sources: tuple[str, ...] = (),
 ) -> None:
     """Serve the page until the program is interrupted.
 
@@ -83,6 +87,7 @@ def serve(
     open_browser : whether to open the page in this computer's browser.
     recording : what to play; none: choose on the page.
     demo : whether the project is a bundled one, which is never written to; its first route is driven at once.
+    sources : live ones that are listened to at once, each as `NAME[@SCANNER]:HOST:PORT`.
 
     Raises
     ------
@@ -99,7 +104,14 @@ def serve(
         source = first_source(loaded, recording, demo)
         reach = Reach.within((folder, *access.files)) if access.lets_others_in else EVERYWHERE
         runtime = open_page(
-            server, loaded, folder=folder, source=source, is_new=opened.is_new, reach=reach, notes=opened.notes
+            server,
+            loaded,
+            folder=folder,
+            source=source,
+            is_new=opened.is_new,
+            reach=reach,
+            notes=opened.notes,
+            live=LiveState(sources=sources),
         )
         open_things.callback(runtime.stop)
         wait_for_interruption = open_things.enter_context(interruption())
@@ -183,6 +195,7 @@ def open_page(
     is_new: bool = False,
     reach: Reach = EVERYWHERE,
     notes: tuple[str, ...] = (),
+    live: LiveState | None = None,
 ) -> Runtime:
     """Fill a server with the page of a project and start its owner thread; returns at once.
 
@@ -196,6 +209,7 @@ def open_page(
     is_new : whether nothing of the project is on disk yet.
     reach : where browsers may read and write.
     notes : what was doubted while the project was read, one line each; listed among the problems.
+    live : sources that are listened to at once; none: no such.
     """
     greeting = f"A new project in {folder}: it is empty until you load a map or place something" if is_new else ""
     state = AppState(
@@ -208,6 +222,7 @@ def open_page(
         greeting=greeting,
         faults=notes,
     ).with_part(RunState(source=source, repeat=folder is None))
+    state = state.with_part(live or LiveState())
     runtime = Runtime(state, FEATURES)
     page = Page(server, runtime.post, state, FEATURES)
 

@@ -36,7 +36,9 @@ class _Page:
     open: bool = True
     """Whether to open the page in this computer's browser."""
 
-    def serve(self, project: Path, recording: Path | None = None, *, demo: bool = False) -> None:
+    def serve(
+        self, project: Path, recording: Path | None = None, *, demo: bool = False, sources: tuple[str, ...] = ()
+    ) -> None:
         """Serve the page until it is interrupted."""
         if not 0 <= self.port <= LAST_PORT:
             raise UsageError(f"--port is {self.port}; expected 0 to {LAST_PORT}")
@@ -53,7 +55,7 @@ class _Page:
                 public_url=self.public_url,
                 files=tuple(self.files),
             )
-            serve(project, access, open_browser=self.open, recording=recording, demo=demo)
+            serve(project, access, open_browser=self.open, recording=recording, demo=demo, sources=sources)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +83,9 @@ class Serve(_Page):
     """Folder of the project (holds project.yaml); one that is empty or does not exist yet begins a new project."""
     recording: Annotated[Path | None, arg(metavar="PATH")] = None
     """Recording to play: a CSV folder. None: choose it on the page, or drive a virtual AGV."""
+    source: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME[@SCANNER]:HOST:PORT")] = ()
+    """Live source to listen to at once, such as json:127.0.0.1:6061; repeat it for several. NAME is one of json,
+    sick-safety. Datagrams come to HOST, an address of this computer; devices are connected to at theirs."""
 
     def run(self) -> None:
         """Serve the project; a recording that is none is an error now, not only on the page."""
@@ -88,4 +93,9 @@ class Serve(_Page):
             from commission.io.recordings.base import open_recording
 
             open_recording(self.recording)
-        self.serve(self.project, self.recording)
+        if self.source:
+            from commission.io.live.registry import SourceAddress
+
+            for text in self.source:
+                SourceAddress.parse(text)
+        self.serve(self.project, self.recording, sources=tuple(self.source))

@@ -1,8 +1,9 @@
-"""The command `simulate`: a virtual drive, written as the recording of a real vehicle would be."""
+"""The command `simulate`: a virtual drive, written as the recording of a real vehicle, or sent as by a real one."""
 
 from __future__ import annotations
 
 import dataclasses
+import shlex
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -23,12 +24,12 @@ COVER_FORM = "START,DURATION (seconds)"
 
 @dataclass(frozen=True, kw_only=True)
 class Simulate:
-    """Drive a virtual AGV along a route and write what it reports as a recording, ground truth included."""
+    """Drive a virtual AGV along a route and write what it reports as a recording, ground truth included; or send it."""
 
     project: Positional[Path]
     """Folder of the project (holds project.yaml)."""
-    out: Annotated[Path, arg(metavar="DIR|FILE.mcap")]
-    """Folder for the recording, made when it does not exist, or an MCAP file."""
+    out: Annotated[Path | None, arg(metavar="DIR|FILE.mcap")] = None
+    """Folder for the recording, made when it does not exist, or an MCAP file. None: with --live, nothing is written."""
     route: Annotated[str | None, arg(metavar="NAME")] = None
     """Route to drive. None: the project's first."""
     seed: int = 1
@@ -43,11 +44,27 @@ class Simulate:
     """A time during which all reflectors are covered: start and length [s]."""
     force: bool = False
     """Whether a recording that is there already is replaced."""
+    live: Annotated[str | None, arg(metavar="PROTOCOL")] = None
+    """Send the drive over the network instead, scans by this protocol: json or sick-safety. What a scanner does not say
+    (odometry, the true pose) goes as JSON beside it."""
+    address: Annotated[str | None, arg(metavar="HOST:PORT")] = None
+    """Where to send to; of several scanners the next ones have the next ports. None: 127.0.0.1 and the usual port."""
+    odometry: Annotated[str, arg(metavar="HOST:PORT")] = "127.0.0.1:6061"
+    """Where what the scanner does not say goes."""
+    speed: float = 1.0
+    """Factor of a drive that is sent against real time, more than 0."""
 
     def run(self) -> None:
-        """Simulate, write, and tell in a few lines what was written and what is true in it."""
+        """Simulate, write or send, and tell in a few lines what was, and what is true in it."""
         if self.seed < 0:
             raise UsageError(f"--seed is {self.seed}; expected 0 or more")
+        if self.live is not None:
+            self._send(self.live)
+            return
+        if self.out is None:
+            raise UsageError(
+                "neither --out nor --live is given; expected a folder to write to, or a protocol to send by"
+            )
 
         from commission.io.project_file import load_project
         from commission.io.recordings.writers import refuse_to_write, write_records
@@ -72,6 +89,29 @@ class Simulate:
                 why = f"begins after the end of the drive of {seconds:.1f} s: it covers nothing"
                 sys.stdout.write(f"Note         --cover {text} {why}\n")
         sys.stdout.write(f"Written to   {self.out}\n")
+
+    def _send(self, protocol: str) -> None:
+        """Send the drive over the network until it is over, or interrupted."""
+        if self.out is not None:
+            raise UsageError("--out and --live are both given; expected one: who listens can record what arrives")
+
+        from commission.io.live.registry import SourceAddress
+        from commission.io.live.virtual_vehicle import addresses_of, send_drive
+        from commission.io.project_file import load_project
+        from commission.simulation.scenario import records
+
+        project = load_project(self.project)
+        route = self._route(project)
+        project = dataclasses.replace(project, disturbances=self._disturbances(project))
+        names = tuple(scanner.name for scanner in project.scanners)
+        address = SourceAddress.parse(f"{protocol}:{self.address or ''}")
+        addresses = addresses_of(address, names, SourceAddress.parse(f"json:{self.odometry}"))
+        sources = " ".join(f"--source {shlex.quote(str(each))}" for each in addresses)
+        sys.stdout.write(f"Listen with  commission serve {shlex.quote(str(self.project))} {sources}\n")
+        sys.stdout.flush()
+        sent = send_drive(records(project, route, self.seed), addresses, names, speed=self.speed)
+        seconds = sent.seconds
+        sys.stdout.write(f"Sent         route {route!r}, {seconds:.1f} s, {sent.scans} scans, seed {self.seed}\n")
 
     def _route(self, project: Project) -> str:
         """Name of the route to drive; raises UsageError when there is none."""

@@ -55,6 +55,11 @@ class SourceLoaded(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class ShowLive(Action):
+    """A live run has begun and is on the page."""
+
+
+@dataclass(frozen=True, slots=True)
 class Play(Action):
     """Start or stop the play clock."""
 

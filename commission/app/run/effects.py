@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from commission.app.base.effects import Effect
+from commission.app.base.growing import RunGrew
 from commission.app.run.actions import Source
 from commission.app.run.state import PlotWindow
 
@@ -15,6 +16,14 @@ class LoadSource(Effect):
 
     source: Source
     """What drives."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShowGrown(Effect):
+    """Show a live run as far as it has come."""
+
+    grown: RunGrew
+    """The run so far."""
 
 
 @dataclass(frozen=True, slots=True)

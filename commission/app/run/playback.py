@@ -83,6 +83,14 @@ class Playback:
             for chosen in (result.columns.status == Status.INLIER, result.columns.status != Status.INLIER)
         )
 
+    def grow(self, result: RunResult) -> None:
+        """Show more of the same drive; a cursor at its end goes along."""
+        was_at_end = self.at_end
+        self.replace(result)
+        self.end_ns = result.inputs.log.last_ns
+        if was_at_end:
+            self._at_ns = self.end_ns
+
     def seek(self, seconds: float) -> None:
         """Go to a time after the start [s]; one before it or behind the end is the start or the end."""
         # Compared before it is rounded: a slider may ask for more nanoseconds than there are numbers.

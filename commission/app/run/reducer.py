@@ -7,9 +7,11 @@ from typing import Any
 
 from commission.app.base.actions import Sender
 from commission.app.base.effects import SendFile
+from commission.app.base.growing import RunGrew
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.run import actions
+from commission.app.run.actions import ShowLive
 from commission.app.run.charts import BY_TITLE
 from commission.app.run.effects import (
     CoverFromHere,
@@ -20,6 +22,7 @@ from commission.app.run.effects import (
     MoveTo,
     PlayOn,
     RunAfresh,
+    ShowGrown,
 )
 from commission.app.run.found_table import BY_KEY
 from commission.app.run.state import SPEEDS, PlotWindow, RunState
@@ -46,7 +49,19 @@ def choose_source(action: actions.ChooseSource, state: AppState, _sender: Sender
 @reduce.register
 def source_loaded(action: actions.SourceLoaded, state: AppState, _sender: Sender) -> Outcome:
     """Say that it drives."""
-    return Outcome(_with(state, source=action.source))
+    return Outcome(_with(state, source=action.source, live=False))
+
+
+@reduce.register
+def run_grew(action: RunGrew, state: AppState, _sender: Sender) -> Outcome:
+    """Show a live run as far as it has come, unless something else was chosen since it began."""
+    return Outcome(state, (ShowGrown(action),))
+
+
+@reduce.register
+def show_live(_action: ShowLive, state: AppState, _sender: Sender) -> Outcome:
+    """Say that a vehicle drives now."""
+    return Outcome(_with(state, source=None, live=True, playing=False))
 
 
 @reduce.register

@@ -136,6 +136,8 @@ def _now(view: PageView) -> str:
         what = f"Virtual drive, route <b>{escaped(source.route)}</b>, seed {source.seed}"
     elif isinstance(source, RecordedDrive):
         what = f"Recording <b>{escaped(source.path.name)}</b>"
+    elif view.state.part(RunState).live:
+        what = "Live vehicle"
     else:
         what = "Nothing drives yet: choose a virtual drive or a recording."
     under_way = [escaped(job.line) for job in view.jobs]

@@ -11,12 +11,13 @@ import numpy as np
 from commission import compiled
 from commission.app.base.actions import Action, Envelope, Report, Sender
 from commission.app.base.effects import Effect
+from commission.app.base.growing import RunGrew
 from commission.app.base.jobs import Job, Lane
 from commission.app.base.service import IDLE_S, Context, Due, Service
 from commission.app.base.state import AppState
 from commission.app.base.view import Followed, LivedPath
 from commission.app.run import drives
-from commission.app.run.actions import ChooseSource, Play, RecordedDrive, Source, SourceLoaded
+from commission.app.run.actions import ChooseSource, Play, RecordedDrive, ShowLive, Source, SourceLoaded
 from commission.app.run.drives import Drive
 from commission.app.run.effects import (
     CoverFromHere,
@@ -27,6 +28,7 @@ from commission.app.run.effects import (
     MoveTo,
     PlayOn,
     RunAfresh,
+    ShowGrown,
 )
 from commission.app.run.instruments import Instruments
 from commission.app.run.playback import Playback
@@ -42,6 +44,7 @@ from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.studies import curves, run
 from commission.studies.run import RunInput, RunResult, judged_run
+from commission.studies.start import Start
 
 PREPARE, COMPILE, LOCALIZE = "Preparing the drive", "Getting ready", "Localizing"
 DRIVE_AGAIN = "Driving again in the changed hall"
@@ -78,7 +81,7 @@ class RunService(Service):
     compile_all : compiles all kernels that a run needs.
     """
 
-    effects = (LoadSource, MoveTo, MoveByScans, PlayOn, CoverFromHere, RunAfresh, DriveAgain, MakeCurves)
+    effects = (LoadSource, MoveTo, MoveByScans, PlayOn, CoverFromHere, RunAfresh, DriveAgain, MakeCurves, ShowGrown)
 
     def __init__(
         self,
@@ -99,6 +102,9 @@ class RunService(Service):
         self._world: World | None = None
         self._coming: World | None = None
         self._again: RecordLog | None = None
+        # The live run that is on the page, and the start of the one that something else was chosen instead of.
+        self._live: RunGrew | None = None
+        self._left: Start | None = None
 
     def start(self) -> None:
         """Compile, and load what the page begins with."""
@@ -110,7 +116,8 @@ class RunService(Service):
     def project_changed(self, action: Action, before: AppState, after: AppState) -> None:  # noqa: ARG002 - the service's
         """Run again with what is different: from the start, or from here on where that is asked for."""
         self._project = after.project
-        if self._wanted is None or self._drives_again(after):
+        if self._wanted is None or self._live is not None or self._drives_again(after):
+            # A live run goes on with the change: its localizer is told by who feeds it.
             return
         is_same = all(getattr(before.project, part) is getattr(after.project, part) for part in READS)
         first = self._cursor() if after.part(RunState).from_here_on else 0
@@ -123,10 +130,15 @@ class RunService(Service):
         match effect:
             case LoadSource(source):
                 self._load(source, state, sender)
+            case ShowGrown(grown):
+                self._show_grown(grown)
             case MoveTo(seconds) if playback is not None:
                 playback.seek(seconds)
             case MoveByScans(scans) if playback is not None:
                 playback.step(scans)
+            case CoverFromHere() | RunAfresh() if self._live is not None:
+                told = Report("the vehicle drives now: what is past stays as it was", failed=False)
+                self.context.post(Envelope(told, sender))
             case CoverFromHere(covered):
                 self._cover(self._cursor(), sender, covered=covered)
             case PlayOn(backward) if playback is not None:
@@ -223,9 +235,30 @@ class RunService(Service):
             return
         self._localize(self._wanted.with_cover(first, covered=covered))
 
+    def _show_grown(self, grown: RunGrew) -> None:
+        """Show a live run as far as it has come; one that is over is a run as any other."""
+        start = grown.result.inputs.start
+        if start is self._left:
+            return
+        playback = self.playback
+        if playback is None or playback.result.inputs.start is not start:
+            self._jobs.cancel(DRIVE_AGAIN)
+            self._jobs.cancel(LOCALIZE)
+            self._source = self._world = self._coming = None
+            self.playback = playback = Playback(grown.result)
+            playback.seek(grown.result.duration)
+            self.context.post(ShowLive())
+        else:
+            playback.grow(grown.result)
+        self._wanted, self._live = grown.result.inputs, None if grown.is_over else grown
+        if grown.is_over:
+            self._instruments.take(grown.result, self._project.floor_map)
+
     def _begin(self, drive: Drive, source: Source, world: World | None) -> Action:
         """Localize a new drive; the run before stays on the page until that is done."""
         self._jobs.cancel(DRIVE_AGAIN)
+        if self._live is not None:
+            self._left, self._live = self._live.result.inputs.start, None
         self._source, self._world, self._coming = source, world, None
         self._localize(RunInput.of(self._project, drive.log, drive.start))
         return SourceLoaded(source)
@@ -289,6 +322,10 @@ class RunService(Service):
         if self.playback is None or self._wanted is None:
             return None
         view = self.playback.view(covered=self._wanted.segment(self._cursor()).covered, whole=whole)
+        if self._live is not None and self.playback.at_end:
+            # Since the newest scan the vehicle has moved on, or nothing was heard of it.
+            belief = self._live.belief
+            view = replace(view, pose=belief.mean, covariance=belief.covariance, mode=self._live.mode)
         return replace(view, hall=self._hall())
 
     def _hall(self) -> DrivenHall:

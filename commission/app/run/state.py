@@ -18,6 +18,8 @@ class RunState:
 
     source: Source | None = None
     """What drives."""
+    live: bool = False
+    """Whether it is a vehicle that drives now, and no source."""
     playing: bool = False
     """Whether the play clock runs."""
     speed: float = 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -12,7 +13,7 @@ import numpy as np
 
 from commission.errors import UsageError
 from commission.geometry import se2
-from commission.io.live.registry import LOCAL, SourceAddress, device_of
+from commission.io.live.registry import LAST_PORT, LOCAL, SourceAddress, device_of
 from commission.io.live.virtual_device import VirtualDevice
 from commission.io.protocols.message import OdometryPose, Sent
 from commission.site.records import Odometry, Record, Scan
@@ -55,7 +56,7 @@ def addresses_of(address: SourceAddress, scanners: Sequence[str], beside: Source
         SourceAddress(address.name, address.host, address.port + index, name if several else None)
         for index, name in enumerate(scanners)
     ]
-    if found[-1].port > 65_535:
+    if found[-1].port > LAST_PORT:
         raise UsageError(f"--address ends at port {found[-1].port}; expected one whose {len(found)} ports exist")
     is_datagram = address.kind.transport == "udp"
     return [*found, beside or SourceAddress(ODOMETRY, address.host if is_datagram else LOCAL, 6061)]
@@ -86,7 +87,7 @@ def send_drive(
     OSError
         an address cannot be sent to.
     """
-    if not speed > 0.0:
+    if not 0.0 < speed < math.inf:
         raise UsageError(f"--speed is {speed:g}; expected more than 0")
     rest = threading.Event()
     scans = count = 0

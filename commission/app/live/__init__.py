@@ -1,0 +1,1 @@
+"""Live: sources of a vehicle that drives now, connected to from the page."""

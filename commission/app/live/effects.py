@@ -1,0 +1,22 @@
+"""What the live sources have to do besides changing the state, as frozen values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from commission.app.base.effects import Effect
+
+
+@dataclass(frozen=True, slots=True)
+class OpenSources(Effect):
+    """Listen to sources."""
+
+    sources: tuple[str, ...]
+    """Each as `NAME[@SCANNER]:HOST:PORT`."""
+    start: tuple[float, float, float] | None
+    """Pose of base at the first record [m, m, rad]; none: the start of the first route."""
+
+
+@dataclass(frozen=True, slots=True)
+class CloseSources(Effect):
+    """Listen no longer."""

@@ -1,0 +1,117 @@
+"""Connections to a vehicle that drives now: which, how they are doing, and what to look at when one is silent."""
+
+from __future__ import annotations
+
+import math
+
+from viser import GuiApi
+
+from commission.app.base import theme
+from commission.app.base.actions import Action
+from commission.app.base.inputs import show, write_html
+from commission.app.base.panel import BasePanel, Post, escaped, posting
+from commission.app.base.state import AppState
+from commission.app.base.view import PageView
+from commission.app.live.actions import Connect, Disconnect
+from commission.app.live.state import LiveState
+from commission.app.live.view import LiveView, SourceView
+from commission.io.live.registry import KINDS
+from commission.io.live.status import SourceState, SourceStatus
+from commission.site.quantity import DEGREES, PERCENT
+
+FIRST = "json:127.0.0.1:6061"
+NUMBERS = 3
+
+
+class LivePanel(BasePanel):
+    """Widgets of the connections."""
+
+    def __init__(self, gui: GuiApi, post: Post, state: AppState) -> None:
+        asked = state.part(LiveState)
+        kinds = ", ".join(KINDS)
+        self._sources = gui.add_text(
+            "Sources",
+            ", ".join(asked.sources) or FIRST,
+            hint=f"NAME[@SCANNER]:HOST:PORT, several with commas between; NAME is one of {kinds}. Of this computer's "
+            "address 127.0.0.1 nobody else is heard.",
+        )
+        self._start = gui.add_text(
+            "Start at [m, m, deg]",
+            "" if asked.start is None else _pose_text(asked.start),
+            hint="Pose of base now: x, y, heading. Empty: the start of the first route.",
+        )
+        self._connect = gui.add_button("Connect", hint="Listen to the sources and localize what they say.")
+        self._connect.on_click(posting(post, lambda _event: self._asked()))
+        self._disconnect = gui.add_button(
+            "Disconnect", color="gray", hint="Listen no longer; the run so far stays.", visible=False
+        )
+        self._disconnect.on_click(posting(post, lambda _event: Disconnect()))
+        self._table = gui.add_html("", visible=False)
+
+    def _asked(self) -> Action:
+        """Return what the fields ask for; raises ValueError where the pose is none."""
+        sources = tuple(text.strip() for text in self._sources.value.split(",") if text.strip())
+        return Connect(sources, start_pose(self._start.value))
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Show how the sources are doing."""
+        connected = view.state.part(LiveState).connected
+        show(self._disconnect, visible=connected)
+        live = view.part(LiveView) if connected else None
+        write_html(self._table, "" if live is None else live_table(live))
+
+
+def start_pose(text: str) -> tuple[float, float, float] | None:
+    """Return x [m], y [m] and heading [rad] of a text with degrees; none of an empty one.
+
+    Raises
+    ------
+    ValueError
+        it is no pose: says what is expected.
+    """
+    if not text.strip():
+        return None
+    words = text.replace(",", " ").split()
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError:
+        numbers = []
+    if len(numbers) != NUMBERS or not all(map(math.isfinite, numbers)):
+        raise ValueError(f"the start is {text!r}; expected x [m], y [m] and heading [deg] such as 4, 2.5, 90")
+    return numbers[0], numbers[1], math.radians(numbers[2])
+
+
+def _pose_text(pose: tuple[float, float, float]) -> str:
+    return f"{pose[0]:g}, {pose[1]:g}, {DEGREES.of(pose[2]):g}"
+
+
+def live_table(live: LiveView) -> str:
+    """Return the sources as html: state, rate, loss, latency, and what to look at."""
+    told = "".join(f"<div class='c-note'>{escaped(line)}</div>" for line in live.told)
+    return f"<div style='font-size:12px;padding:2px 4px'>{''.join(map(_source, live.sources))}{told}</div>"
+
+
+def _source(source: SourceView) -> str:
+    status = source.status
+    color = theme.OPERATIONAL_COLOR if status.state is SourceState.RECEIVING else theme.FAIL_COLOR
+    head = f"<b>{escaped(source.address)}</b> <span style='color:{color}'>{escaped(state_words(status))}</span>"
+    figures = (
+        f"{status.records} records, {status.rate:.0f}/s, lost {PERCENT.of(status.loss):.1f} %, "
+        f"latency {_milliseconds(status.latency_s)}, jitter {_milliseconds(status.jitter_s)}"
+    )
+    left_out = [f"{count} {words}" for words, count in (status.told or {}).items()]
+    left_out += [f"{status.duplicates} came twice"] if status.duplicates else []
+    left_out += [f"{status.undecodable} cannot be decoded"] if status.undecodable else []
+    notes = "".join(f"<li>{escaped(line)}</li>" for line in (*source.checks, *left_out))
+    return f"<div>{head}<br>{figures}{f'<ul style=margin:0>{notes}</ul>' if notes else ''}</div>"
+
+
+def state_words(status: SourceStatus) -> str:
+    """Return what a source is doing; of a silent one, for how long."""
+    if status.state is SourceState.SILENT:
+        return f"silent for {status.silent_s:.0f} s"
+    return str(status.state)
+
+
+def _milliseconds(seconds: float) -> str:
+    return "unknown" if math.isnan(seconds) else f"{seconds * 1e3:.1f} ms"

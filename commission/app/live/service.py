@@ -1,0 +1,123 @@
+"""Brings live sources in step with what is asked: connects, localizes what they say, tells how they are doing."""
+
+from __future__ import annotations
+
+from commission.app.base.actions import Action, Sender
+from commission.app.base.effects import Effect
+from commission.app.base.growing import RunGrew
+from commission.app.base.service import IDLE_S, Context, Due, Service
+from commission.app.base.state import AppState
+from commission.app.live.actions import Connect, Disconnect
+from commission.app.live.effects import CloseSources, OpenSources
+from commission.app.live.state import LiveState
+from commission.app.live.view import LiveView, SourceView
+from commission.errors import CommissionError
+from commission.io.live.checklist import checklist, own_addresses
+from commission.io.live.live_run import LiveRun
+from commission.io.live.registry import SourceAddress
+from commission.io.live.runner import LiveRunner, LiveSnapshot
+from commission.io.live.session import Session
+
+FOLLOW_S = 0.1
+"""Time after which a live run is looked at again [s]."""
+READS = ("reflectors", "scanners", "parameters", "uncertainty")
+"""Parts of the project that the localizer is set up with."""
+
+
+class LiveService(Service):
+    """The sources that are listened to, and the run that they feed.
+
+    Parameters
+    ----------
+    context : what it is made with.
+    """
+
+    effects = (OpenSources, CloseSources)
+
+    def __init__(self, context: Context) -> None:
+        super().__init__(context)
+        self._runner: LiveRunner | None = None
+        # Written by the runner's thread, read by the owner's: the newest one wins.
+        self._latest: LiveSnapshot | None = None
+        self._shown: LiveSnapshot | None = None
+        self._own: tuple[str, ...] = ()
+
+    def start(self) -> None:
+        """Connect to what the page begins with."""
+        asked = self.context.state.part(LiveState)
+        if asked.sources:
+            self.context.post(Connect(asked.sources, asked.start))
+
+    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:  # noqa: ARG002 - the service's
+        """Connect or disconnect; raises SourceError where an address cannot be listened at."""
+        self._end()
+        if isinstance(effect, OpenSources):
+            try:
+                self._open(effect, state)
+            except CommissionError:
+                self._latest = self._shown = None
+                self.context.post(Disconnect())
+                raise
+
+    def _open(self, effect: OpenSources, state: AppState) -> None:
+        names = tuple(scanner.name for scanner in state.project.scanners)
+        session = Session.of([SourceAddress.parse(text) for text in effect.sources], names)
+        runner = LiveRunner(session, LiveRun(state.project, effect.start), self._publish)
+        runner.start()
+        self._own = own_addresses()
+        self._runner = runner
+
+    def _end(self) -> None:
+        """Stop listening; the run so far is shown as any other."""
+        runner, self._runner = self._runner, None
+        if runner is None:
+            return
+        self._latest = last = runner.stop()
+        self._grow(last, is_over=True)
+
+    def _publish(self, snapshot: LiveSnapshot) -> None:
+        self._latest = snapshot
+
+    def project_changed(self, action: Action, before: AppState, after: AppState) -> None:  # noqa: ARG002 - the service's
+        """Localize with what is different from the next record on."""
+        if self._runner is not None and any(
+            getattr(before.project, part) is not getattr(after.project, part) for part in READS
+        ):
+            self._runner.use(after.project)
+
+    def follow(self, state: AppState) -> Due:  # noqa: ARG002 - the service's
+        """Hand the newest run on."""
+        latest = self._latest
+        if latest is None or latest is self._shown:
+            return Due.NEVER
+        self._shown = latest
+        if self._runner is not None:
+            self._grow(latest, is_over=False)
+        return Due.SOON
+
+    def _grow(self, snapshot: LiveSnapshot, *, is_over: bool) -> None:
+        """Tell of the run so far, where there is one."""
+        run = snapshot.run
+        if run.result is not None and run.belief is not None:
+            self.context.post(RunGrew(run.result, run.belief, run.mode, is_over))
+
+    def rest(self, state: AppState) -> float:  # noqa: ARG002 - the service's
+        """Return the time until something is due again [s]."""
+        return IDLE_S if self._runner is None else FOLLOW_S
+
+    def parts(self, *, slowly: bool) -> tuple[object, ...]:  # noqa: ARG002 - the service's
+        """Return how the sources are doing."""
+        shown = self._shown
+        if shown is None:
+            return ()
+        sources = tuple(
+            SourceView(each.address, each.status, checklist(each.address, each.status, self._own))
+            for each in shown.sources
+        )
+        return (LiveView(sources, tuple(f"{count} {words}" for words, count in shown.told.items())),)
+
+    def close(self) -> None:
+        """Stop listening."""
+        runner, self._runner = self._runner, None
+        if runner is not None:
+            runner.stop()

@@ -1,0 +1,17 @@
+"""What the live sources are asked to do: the feature's part of the page's state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LiveState:
+    """Which sources are listened to."""
+
+    sources: tuple[str, ...] = ()
+    """Each as `NAME[@SCANNER]:HOST:PORT`."""
+    start: tuple[float, float, float] | None = None
+    """Pose of base at the first record [m, m, rad]; none: the start of the first route."""
+    connected: bool = False
+    """Whether they are listened to."""

@@ -1,0 +1,49 @@
+"""A person connects to a vehicle that drives now, sees it, and sees that it has fallen silent."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from commission.app.live.service import LiveService
+from commission.app.run.state import RunState
+from commission.io.live.virtual_vehicle import send_drive
+from commission.simulation.scenario import records
+from tests.app.sites import room
+from tests.browser.page import OpenPage
+from tests.browser.serving import Served
+
+
+@pytest.fixture
+def served() -> Iterator[Served]:
+    opened = Served(room())
+    yield opened
+    opened.close()
+
+
+def test_a_person_connects_sees_the_vehicle_drive_and_fall_silent(
+    served: Served, window: Callable[..., OpenPage]
+) -> None:
+    page = window(served.server)
+    page.open()
+    page.open_tab("Run")
+    page.fill("Sources", "sick-safety:127.0.0.1:0, json:127.0.0.1:0")
+    page.press("Connect")
+    page.wait_for_text("nothing that is SICK microScan3")
+    page.wait_for_text("this computer has 127.0.0.1")
+    live = served.runtime.service(LiveService).parts(slowly=True)[0]
+    addresses = [source.address for source in live.sources]  # type: ignore[attr-defined]
+    project = room()
+    drive = list(records(project, project.routes[0].name, 1))
+    sender = threading.Thread(target=send_drive, args=(drive, addresses, ("scanner",)), kwargs={"speed": 2.0})
+    sender.start()
+    page.wait_for_text("receiving")
+    page.wait_for_text("OPERATIONAL")
+    page.wait_for_text("Live vehicle")
+    assert served.state.part(RunState).live
+    sender.join()
+    page.wait_for_text("silent for")
+    page.press("Disconnect")
+    served.until(lambda: served.view is not None and served.view.result.cycles > 50)
