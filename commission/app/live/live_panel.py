@@ -17,7 +17,7 @@ from commission.app.live.state import LiveState
 from commission.app.live.view import LiveView, SourceView
 from commission.io.live.registry import KINDS
 from commission.io.live.status import SourceState, SourceStatus
-from commission.site.quantity import DEGREES, PERCENT
+from commission.site.quantity import DEGREES, MILLISECONDS, PERCENT
 
 FIRST = "json:127.0.0.1:6061"
 NUMBERS = 3
@@ -114,4 +114,4 @@ def state_words(status: SourceStatus) -> str:
 
 
 def _milliseconds(seconds: float) -> str:
-    return "unknown" if math.isnan(seconds) else f"{seconds * 1e3:.1f} ms"
+    return "unknown" if math.isnan(seconds) else MILLISECONDS.text(seconds, ".1f")

@@ -12,7 +12,10 @@ from collections.abc import Callable
 WINDOW_NS = 10_000_000_000
 """Time over which the least delay is looked for, twice at most: with a drift of 50 us in a second it is off by 1 ms."""
 RESTART_NS = 1_000_000_000
-"""A device's clock that goes back by more, or a delay that is longer, is that of a device that began again."""
+"""A device's clock that goes back by more is that of a device that began again [ns]."""
+STALL_NS = 1_000_000_000
+"""Delays that are longer than the least by more, for so long, are those of a clock that stood still [ns]; for a shorter
+time the network has stalled, and what was delayed is stamped as it was measured."""
 
 
 class HostClock:
@@ -37,6 +40,7 @@ class DevicePlace:
         self._stamp_ns = 0
         self._least: tuple[int, int] | None = None
         self._window_begin_ns = 0
+        self._stalled_since_ns: int | None = None
         self.begun_again = 0
         """How often the device's clock began again."""
 
@@ -56,11 +60,13 @@ class DevicePlace:
         if device_ns is None:
             return arrived_ns
         delay = arrived_ns - device_ns
-        if self._least is None or self._is_another(device_ns, delay):
-            self.begun_again += self._least is not None
+        went_back = self._newest_ns is not None and device_ns < self._newest_ns - RESTART_NS
+        self.begun_again += went_back
+        if self._least is None or went_back or self._stood_still(delay, arrived_ns):
             self._least = delay, delay
-            self._window_begin_ns, self._newest_ns = arrived_ns, None
-        if arrived_ns - self._window_begin_ns > WINDOW_NS:
+            self._window_begin_ns, self._stalled_since_ns = arrived_ns, None
+            self._newest_ns = None if went_back else self._newest_ns
+        if arrived_ns - self._window_begin_ns > WINDOW_NS and self._stalled_since_ns is None:
             self._least = self._least[1], delay
             self._window_begin_ns = arrived_ns
         self._least = self._least[0], min(self._least[1], delay)
@@ -76,7 +82,11 @@ class DevicePlace:
             return min(stamp, self._stamp_ns - 1)
         return self._stamp_ns
 
-    def _is_another(self, device_ns: int, delay: int) -> bool:
-        """Whether the device's clock has begun again."""
-        went_back = self._newest_ns is not None and device_ns < self._newest_ns - RESTART_NS
-        return went_back or (self._least is not None and delay > min(self._least) + RESTART_NS)
+    def _stood_still(self, delay: int, arrived_ns: int) -> bool:
+        """Whether delays have been too long for so long that the device's clock must have stood still."""
+        if self._least is None or delay <= min(self._least) + STALL_NS:
+            self._stalled_since_ns = None
+            return False
+        if self._stalled_since_ns is None:
+            self._stalled_since_ns = arrived_ns
+        return arrived_ns - self._stalled_since_ns > STALL_NS

@@ -39,6 +39,25 @@ def test_a_device_that_begins_again_is_placed_anew() -> None:
     assert place.begun_again == 1
 
 
+def test_what_a_network_that_stalls_delays_is_stamped_as_it_was_measured() -> None:
+    place = DevicePlace()
+    for number in range(50):
+        place.stamp(number * 40 * MS, 9 * S + number * 40 * MS)
+    # For 3 s nothing comes, then everything at once.
+    late = [place.stamp(number * 40 * MS, 9 * S + 125 * 40 * MS + number * MS // 10) for number in range(50, 125)]
+    assert late == [9 * S + number * 40 * MS for number in range(50, 125)]
+    assert place.begun_again == 0
+
+
+def test_a_clock_that_stood_still_is_placed_anew_without_a_new_sender() -> None:
+    place = DevicePlace()
+    for number in range(200):
+        paused = 0 if number < 100 else 5 * S
+        stamp = place.stamp(number * 40 * MS, 9 * S + number * 40 * MS + paused)
+    assert stamp == 9 * S + 199 * 40 * MS + 5 * S
+    assert place.begun_again == 0
+
+
 def test_a_device_whose_clock_drifts_is_followed() -> None:
     place = DevicePlace()
     for number in range(5_000):
