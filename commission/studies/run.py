@@ -270,6 +270,11 @@ def _of_places_known(columns: RunColumns, log: RecordLog, references: FloatArray
     )
 
 
+def covariances_of_errors(result: RunResult) -> FloatArray:
+    """(K, 3, 3) covariances of what the errors of a run are of: of base, or of the reference's antenna."""
+    return _of_places_known(result.columns, result.inputs.log, result.errors)
+
+
 def references_of(log: RecordLog, columns: RunColumns) -> FloatArray:
     """(K, 3) pose of base at each cycle by the reference [m, m, rad], map frame; NaN where there is none.
 
