@@ -59,6 +59,8 @@
       }
       // The first one of a plot is on top: no inliers are no inliers, though there are no outliers either.
       chart.drawn = [...chart.lines].reverse().sort((one, other) => other.bars - one.bars);
+      // Variants lie below what is shown, so that where they are the same nothing changes.
+      chart.drawn.sort((one, other) => (other.variant ?? false) - (one.variant ?? false));
     }
     view = plots.span;
     find(".c-whole").disabled = view[0] <= 0 && view[1] >= plots.duration;
@@ -424,6 +426,7 @@
       const lane = lanes.find(({ chart }) => chart.title === title), box = canvas.getBoundingClientRect();
       return lane ? [box.left + xOf(lane, time), box.top + yOf(lane, value)] : null;
     },
+    drawnLines: () => lanes.flatMap(({ chart }) => chart.lines),
     get shown() { return { view, cursor, titles: lanes.map(({ chart }) => chart.title) }; },
   };
   goOn();

@@ -5,6 +5,7 @@
   window.commissionTables = true;
   const { ask, seek, views, body, panel, listeners, chips, showChips } = window.commissionPlots;
   const COLORS = { fail: "#ff5252", lost: "#ff5252", recovered: "#40c896" };
+  let compared = null; // variants
   let found = null, hidden = new Set(), sorted = { column: 0, isDown: false };
 
   const make = (tag, properties = {}, ...children) => {
@@ -13,11 +14,13 @@
     return element;
   };
   const lists = { events: make("div", { className: "c-list-view c-events" }),
-    reflectors: make("div", { className: "c-list-view c-reflectors" }) };
+    reflectors: make("div", { className: "c-list-view c-reflectors" }),
+    variants: make("div", { className: "c-list-view c-variants" }) };
   body.append(...Object.values(lists));
 
   const buttons = {};
-  for (const [view, title] of [["plots", "Plots"], ["events", "Events"], ["reflectors", "Reflectors"]]) {
+  for (const [view, title] of [["plots", "Plots"], ["events", "Events"], ["reflectors", "Reflectors"],
+    ["variants", "Variants"]]) {
     buttons[view] = make("button", { textContent: title, onclick: () => show(view) });
     views.append(buttons[view]);
   }
@@ -34,10 +37,17 @@
     draw();
   };
 
+  listeners.variants = (message) => {
+    compared = message;
+    buttons.variants.textContent = message.names.length ? `Variants ${message.names.length - 1}` : "Variants";
+    draw();
+  };
+
   function draw() {
     const { view } = panel.dataset;
     if (view === "plots") return showChips();
     chips.replaceChildren();
+    if (view === "variants") return drawVariants();
     if (!found) return lists[view].replaceChildren("Not known yet: the drive is being looked through.");
     if (view === "events") drawEvents(); else drawReflectors();
   }
@@ -120,6 +130,49 @@
     table(lists.reflectors, head, rows);
   }
 
+  function drawVariants() {
+    if (!compared) return;
+    const keep = make("button", { textContent: "Keep", disabled: !compared.free, className: "c-keep",
+      title: "Keep this run as the next variant, and try something else beside it", onclick: () => ask({ do: "keep" }) });
+    chips.append(keep);
+    const { names, moments } = compared;
+    if (!names.length) return lists.variants.replaceChildren(
+      "Keep the run as it is now, then change a parameter: both are shown beside each other, on the floor, in the plots and here.");
+    chips.append(make("span", { title: compared.rule, innerHTML:
+      "<i class='c-better'>green</i>, <i class='c-worse'>red</i>: better or worse than now beyond chance; <i class='c-different'>yellow</i>: different" }));
+    const cell = (text, kind, expected) => {
+      const element = make("td", { textContent: text, className: `c-${kind}`, title: compared.rule });
+      if (expected) element.append(make("small", { textContent: `(${expected})`, title: "What a consistent filter shows" }));
+      return element;
+    };
+    const rows = [...compared.settings.map(([key, label, texts]) => make("tr", { className: "c-setting", title: key },
+        make("td", { textContent: label }), ...texts.map((text) => make("td", { textContent: text })))),
+      ...compared.figures.map(([label, cells]) => make("tr", {}, make("td", { textContent: label }),
+        ...cells.map(([text, verdict, expected]) => cell(text, verdict, expected))))];
+    const whole = (head, body) => make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...body));
+    const half = Math.ceil(rows.length / 2), heads = () => [make("th"), ...names.map(variantHeader)];
+    const places = moments.map(([time, text]) => row([make("td", { textContent: `${time.toFixed(1)} s` }),
+      make("td", { textContent: text })], "Go to this moment", () => seek(time)));
+    const top = lists.variants.scrollTop, where = whole([make("th", { colSpan: 2, textContent: "They differ most" })], places);
+    where.className = "c-moments";
+    lists.variants.replaceChildren(make("div", {}, whole(heads(), rows.slice(0, half)), whole(heads(), rows.slice(half)),
+      ...(places.length ? [where] : [])));
+    lists.variants.scrollTop = top;
+  }
+
+  function variantHeader(name, index) {
+    const title = make("th", {}, make("b", { textContent: name }));
+    title.style.color = compared.colors[index];
+    if (!index) return title;
+    const use = make("button", { textContent: "use", title: `Set the parameters of ${name} again (undo takes it back)`,
+      onclick: () => ask({ do: "use", letter: name }) });
+    const drop = make("button", { textContent: "×", title: `Forget ${name}`, onclick: () => ask({ do: "drop", letter: name }) });
+    drop.setAttribute("aria-label", `Forget ${name}`);
+    use.setAttribute("aria-label", `Use ${name}`);
+    title.append(use, drop);
+    return title;
+  }
+
   function scale() {
     if (!found.scale) return make("span", { textContent: "○ in a column's head colors the floor by it; heads sort; a row flies there" });
     const { title, bounds, colors } = found.scale;
@@ -136,10 +189,13 @@
   const button = panel.querySelector(".c-csv"), ofPlots = button.onclick;
   button.onclick = () => {
     const { view } = panel.dataset;
-    if (view === "plots" || !found) return ofPlots();
+    if (view === "plots" || (view === "variants" ? !compared?.names.length : !found)) return ofPlots();
     const quoted = (value) => /[",\n]/.test(value) ? `"${String(value).replaceAll('"', '""')}"` : String(value ?? "");
     const lines = view === "events"
       ? [["time", "what", "figure"], ...found.events.filter(([, kind]) => !hidden.has(kind))]
+      : view === "variants" ? [["figure", ...compared.names, ...compared.names.slice(1).map((name) => `${name} is`)],
+        ...compared.settings.map(([key, , texts]) => [key, ...texts]),
+        ...compared.figures.map(([label, cells]) => [label, ...cells.map(([text]) => text), ...cells.slice(1).map((each) => each[1])])]
       : [["reflector", ...found.columns.map(({ key }) => key)], ...inOrder()];
     const link = make("a", { download: `${view}.csv` });
     link.href = URL.createObjectURL(new Blob([lines.map((line) => line.map(quoted).join(",")).join("\n") + "\n"]));

@@ -13,7 +13,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from commission.geometry.arrays import FloatArray
+from commission.geometry.arrays import BoolArray, FloatArray
 from commission.localization.estimate import Mode, Status
 from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT, Shown
 from commission.studies.consistency import has_distance
@@ -66,7 +66,7 @@ class VariantFigure:
         return f"{self.shown.of(value):{self.form}}{f' {self.shown.unit}' if self.shown.unit else ''}"
 
 
-def _every(run: RunResult, chosen: FloatArray) -> Rows:
+def _every(run: RunResult, chosen: FloatArray | BoolArray) -> Rows:
     """What is counted or averaged over all cycles."""
     return np.asarray(chosen, dtype=np.float64), np.ones(run.cycles)
 
@@ -79,8 +79,8 @@ def _of_detections(run: RunResult, values: FloatArray, counted: FloatArray) -> R
     return above, below
 
 
-def _nis(run: RunResult, chosen: FloatArray) -> Rows:
-    return _of_detections(run, np.where(chosen, run.columns.d2, 0.0), chosen)
+def _nis(run: RunResult, chosen: BoolArray) -> Rows:
+    return _of_detections(run, np.where(chosen, run.columns.d2, 0.0), chosen.astype(np.float64))
 
 
 def _known(values: FloatArray) -> Rows:
@@ -133,6 +133,22 @@ def _of_errors(name: str) -> Callable[[RunResult], float]:
     return lambda run: math.nan if run.statistics is None else float(getattr(run.statistics, name))
 
 
+def _accepted(run: RunResult) -> Rows:
+    """Accepted, and all detections of each cycle."""
+    return run.counts[:, Status.INLIER].astype(np.float64), run.counts.sum(axis=1).astype(np.float64)
+
+
+def _rejected(run: RunResult) -> Rows:
+    """Those that the gate rejected, and those that it judged, of each cycle."""
+    rejected = run.counts[:, Status.OUTLIER_ASSOCIATION].astype(np.float64)
+    return rejected, rejected + run.counts[:, Status.INLIER]
+
+
+def _ratio(rows: Rows) -> float:
+    above, below = (float(each.sum()) for each in rows)
+    return above / below if below else math.nan
+
+
 FIGURES = (
     VariantFigure(
         key="operational_fraction",
@@ -149,9 +165,7 @@ FIGURES = (
         value=lambda run: float(len(run.episodes)),
         rows=lambda run: _every(run, _begins(run)),
     ),
-    VariantFigure(
-        key="longest_fail_s", label="Longest fail episode", shown=SECONDS, form=".1f", value=longest_episode
-    ),
+    VariantFigure(key="longest_fail_s", label="Longest fail episode", shown=SECONDS, form=".1f", value=longest_episode),
     VariantFigure(
         key="lost_fraction",
         label="Lost",
@@ -165,7 +179,7 @@ FIGURES = (
         shown=PERCENT,
         aim=Aim.NONE,
         value=lambda run: _ratio(_accepted(run)),
-        rows=lambda run: _accepted(run),
+        rows=_accepted,
     ),
     VariantFigure(
         key="rejected_fraction",
@@ -173,7 +187,7 @@ FIGURES = (
         shown=PERCENT,
         aim=Aim.NONE,
         value=lambda run: run.consistency.rejected_fraction,
-        rows=lambda run: _rejected(run),
+        rows=_rejected,
     ),
     VariantFigure(
         key="unseen_fraction",
@@ -262,19 +276,3 @@ FIGURES = (
 )
 BY_KEY = {figure.key: figure for figure in FIGURES}
 """The figures by their keys."""
-
-
-def _accepted(run: RunResult) -> Rows:
-    """Accepted, and all detections of each cycle."""
-    return run.counts[:, Status.INLIER].astype(np.float64), run.counts.sum(axis=1).astype(np.float64)
-
-
-def _rejected(run: RunResult) -> Rows:
-    """Those that the gate rejected, and those that it judged, of each cycle."""
-    rejected = run.counts[:, Status.OUTLIER_ASSOCIATION].astype(np.float64)
-    return rejected, rejected + run.counts[:, Status.INLIER]
-
-
-def _ratio(rows: Rows) -> float:
-    above, below = (float(each.sum()) for each in rows)
-    return above / below if below else math.nan

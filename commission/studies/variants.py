@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -26,7 +26,7 @@ from commission.studies.run import RunResult
 from commission.studies.variant_figures import FIGURES, Aim, VariantFigure
 
 MOST_BLOCKS, FEWEST_BLOCKS = 20, 5
-"""Blocks of time that a drive is cut into; with fewer the scatter of their means is not known, and nothing is marked."""
+"""Blocks of time that a drive is cut into; of fewer the scatter is not known, and nothing is marked."""
 BLOCK_S = 2.0
 """Shortest block [s]: what is correlated from scan to scan stays within one."""
 LEVEL = 0.99
@@ -284,4 +284,3 @@ def _peaks(times: FloatArray, apart: FloatArray, names: tuple[str, str]) -> list
         left[slice(*np.searchsorted(times, (times[index] - NEAREST_S, times[index] + NEAREST_S)))] = 0.0
         left[index] = 0.0
     return found
-

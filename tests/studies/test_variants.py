@@ -29,9 +29,8 @@ from commission.studies.variants import (
 )
 from tests.studies.recorded import PROJECT, drive, start
 
-
 LIMIT = 0.03
-"""Limit of the supervisor that 2-sigma passes at times where the gate is far too narrow [m]: it is 25 mm in the middle."""
+"""Limit of the supervisor that 2-sigma passes at times where the gate is far too narrow [m]: its median is 25 mm."""
 
 
 def run_with(parameters: Parameters, earlier: RunResult | None = None) -> RunResult:
@@ -46,9 +45,7 @@ def strict() -> Parameters:
     """A gate far too narrow, and a limit that the covariance then passes at times."""
     parameters = PROJECT.parameters
     association = replace(parameters.association, gate_probability=0.05)
-    return replace(
-        parameters, association=association, supervisor=replace(parameters.supervisor, position_limit=LIMIT)
-    )
+    return replace(parameters, association=association, supervisor=replace(parameters.supervisor, position_limit=LIMIT))
 
 
 @pytest.fixture(scope="module")
@@ -173,9 +170,7 @@ def test_the_moment_of_the_largest_distance_is_found(wide: RunResult) -> None:
 
 
 def test_the_largest_jump_is_the_longest_way_a_scan_moves_the_estimate(wide: RunResult) -> None:
-    moved = [
-        math.dist(wide.columns.estimate(k).prior.mean[:2], wide.columns.means[k, :2]) for k in range(wide.cycles)
-    ]
+    moved = [math.dist(wide.columns.estimate(k).prior.mean[:2], wide.columns.means[k, :2]) for k in range(wide.cycles)]
     assert largest_correction(wide) == pytest.approx(max(moved))
 
 

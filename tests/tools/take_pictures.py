@@ -31,12 +31,15 @@ from commission.app.placement.service import PlacementService
 from commission.app.prediction.service import PredictionService
 from commission.app.run.actions import Cover, Play, Seek, VirtualDrive
 from commission.app.run.service import RunService
+from commission.app.run.variant_actions import KeepVariant
 from commission.app.runtime import Runtime
+from commission.app.tune.actions import SetParameter
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
 from commission.site.disturbances import ConstantErrors, Disturbances, ScannerError
 from commission.site.project import Project
 from commission.site.stations import Station
+from commission.studies.variants import VariantsResult
 from tests.browser.page import CHROMIUM, FLAGS, SMALL, WIDE, OpenPage
 from tests.browser.serving import Served
 
@@ -309,6 +312,34 @@ PICTURES = (
     Picture("station", "shop_floor", at_station),
     Picture("several", "shop_floor", several),
     Picture("importing", "shop_floor", importing),
+)
+
+
+def _with_gate(runtime: Runtime, probability: float) -> None:
+    """Move the gate, and wait for the run with it."""
+    runtime.post(SetParameter("association.gate_probability", probability))
+    until(
+        lambda: (
+            (view := runtime.service(RunService).view()) is not None
+            and view.result.inputs.segments[-1].setup.parameters.association.gate_probability == probability
+        )
+    )
+
+
+def variants(page: OpenPage, runtime: Runtime, shown: str = "Variants 2") -> None:
+    """Two variants are kept beside the run of now."""
+    page.open_tab("Tune")
+    runtime.post(KeepVariant())
+    _with_gate(runtime, 0.3)
+    runtime.post(KeepVariant())
+    _with_gate(runtime, 0.6)
+    until(lambda: any(isinstance(p, VariantsResult) for p in runtime.service(RunService).parts(slowly=True)))
+    page.page.locator(".c-views button", has_text=shown).click()
+
+
+PICTURES += (
+    Picture("variants", "shop_floor", variants),
+    Picture("variant_plots", "shop_floor", lambda page, runtime: variants(page, runtime, "Plots")),
 )
 
 

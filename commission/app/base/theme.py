@@ -51,6 +51,8 @@ SECOND_TWIN: Color = (255, 120, 220)
 KEEP_OUT: Color = (222, 150, 70)
 TOO_LITTLE: Color = (240, 132, 52)
 REFUSED: Color = (255, 122, 110)
+# Variants of a drive, on the floor and in the plots: neither lived nor computed nor true.
+VARIANTS: tuple[Color, Color, Color] = ((255, 128, 214), (168, 230, 92), (250, 170, 120))
 # What an error comes from: apart from each other, and from the ramp of the share of a limit.
 FROM_NOISE: Color = (138, 148, 164)
 FROM_MAP: Color = (74, 134, 255)
@@ -186,7 +188,8 @@ div:has(>.c-carried){{display:none!important}}
 .c-plots-end button{{border-color:#44484f;margin-left:4px;font-size:11px}}
 .c-plots-body{{flex:1;min-height:0;position:relative;overflow:hidden}}
 .c-list-view{{position:absolute;inset:0;overflow:auto;padding:0 8px;display:none}}
-.c-plots[data-view=events] .c-events,.c-plots[data-view=reflectors] .c-reflectors{{display:block}}
+.c-plots[data-view=events] .c-events,.c-plots[data-view=reflectors] .c-reflectors,
+.c-plots[data-view=variants] .c-variants{{display:block}}
 .c-plots:not([data-view=plots]) :is(canvas,.c-whole,.c-png){{display:none!important}}
 .c-list-view table{{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}}
 .c-events table{{width:auto;min-width:480px}}
@@ -199,6 +202,17 @@ div:has(>.c-carried){{display:none!important}}
 .c-list-view :is(td,th):first-child,.c-events :is(td,th){{text-align:left}}
 .c-list-view tbody tr{{cursor:pointer}}
 .c-list-view tbody tr:is(:hover,:focus-visible){{background:#2c3036;outline:none}}
+.c-variants>div{{display:flex;gap:22px;align-items:flex-start}}
+.c-variants table{{width:auto;flex:none}}
+.c-variants tbody tr{{cursor:default}}
+.c-variants .c-moments tbody tr{{cursor:pointer}}
+.c-moments td{{text-align:left}}
+.c-better{{color:#58d68d;font-style:normal}}
+.c-worse{{color:#ff7a6e;font-style:normal}}
+.c-different{{color:#ffd34d;font-style:normal}}
+.c-variants td small{{opacity:.6;padding-left:5px}}
+.c-variants .c-setting td{{color:#b9c0ca;font-style:italic}}
+.c-variants th button{{padding-left:7px}}
 .c-floor-scale i{{display:inline-block;width:16px;height:9px}}
 .c-plots-body canvas{{display:block;position:absolute;inset:0;cursor:crosshair;touch-action:none}}
 :root.c-higher{{--c-bottom:62vh!important}}

@@ -13,8 +13,10 @@ from msgspec import Meta, Struct
 from commission.app.base.actions import Action
 from commission.app.editing.actions import SelectReflectors
 from commission.app.run.actions import ColorReflectors, SaveCurves, Seek, ShowCharts, ShowSpan
+from commission.app.run.variant_actions import DropVariant, KeepVariant, UseVariant
 
 Time: TypeAlias = Annotated[float, Meta(ge=0.0, le=1e9)]
+Letter: TypeAlias = Annotated[str, Meta(max_length=1)]
 Text: TypeAlias = Annotated[str, Meta(max_length=200)]
 
 
@@ -92,7 +94,39 @@ class TableAsked(Asked, frozen=True, tag="table"):
         return SaveCurves()
 
 
-_DECODER = msgspec.json.Decoder(MomentAsked | ZoomAsked | ChartsAsked | ReflectorAsked | ColorAsked | TableAsked)
+class KeepAsked(Asked, frozen=True, tag="keep"):
+    """The run that is shown is wanted as a variant."""
+
+    def action(self) -> Action:
+        """Keep it."""
+        return KeepVariant()
+
+
+class DropAsked(Asked, frozen=True, tag="drop"):
+    """A variant is no longer wanted."""
+
+    letter: Letter
+    """Which one."""
+
+    def action(self) -> Action:
+        """Forget it."""
+        return DropVariant(self.letter)
+
+
+class UseAsked(Asked, frozen=True, tag="use"):
+    """The parameters of a variant are wanted back."""
+
+    letter: Letter
+    """Which one."""
+
+    def action(self) -> Action:
+        """Take them."""
+        return UseVariant(self.letter)
+
+
+_DECODER = msgspec.json.Decoder(
+    MomentAsked | ZoomAsked | ChartsAsked | ReflectorAsked | ColorAsked | TableAsked | KeepAsked | DropAsked | UseAsked
+)
 
 
 def action_of(text: str) -> Action:

@@ -69,6 +69,11 @@ class Chart:
     is_shown: bool = True
     """Whether it is shown before somebody chooses."""
 
+    @property
+    def compared(self) -> Line:
+        """The curve of it that variants are compared by: the first of cycles."""
+        return next(line for line in self.lines if not line.of_detections)
+
 
 def _gate(parameters: Parameters) -> float:
     return chi_square_gate(parameters.association.gate_probability, 2)
@@ -207,3 +212,8 @@ def ceiling(value: float) -> float:
     """Return the next of 1, 2, 5, 10, 20, ... : an axis that ends there stays while its curves change a little."""
     decade = 10.0 ** math.floor(math.log10(value))
     return next(step * decade for step in (1.0, 2.0, 5.0, 10.0) if step * decade >= value * (1.0 - 1e-12))
+
+
+def color_of(letter: str) -> str:
+    """Return the CSS color of a variant."""
+    return theme.css(theme.VARIANTS["ABC".index(letter)])

@@ -9,11 +9,13 @@ import base64
 import json
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from commission.app.run.charts import Chart, Limit, Line, ceiling
+from commission.app.run.charts import Chart, Limit, Line, ceiling, color_of
+from commission.app.run.view import KeptRun
 from commission.geometry.arrays import FloatArray
 from commission.site.parameters import Parameters
 from commission.studies.curves import Bins, bins_of, extremes, longest_regular
@@ -23,7 +25,7 @@ Span: TypeAlias = tuple[float, float]
 """Begin and end of a stretch of time [s]."""
 
 
-def drawn(run: RunResult, charts: Sequence[Chart], span: Span) -> dict[str, Any]:
+def drawn(run: RunResult, charts: Sequence[Chart], span: Span, kept: Sequence[KeptRun] = ()) -> dict[str, Any]:
     """Return what the script needs to draw some plots over a span of time.
 
     Parameters
@@ -31,6 +33,7 @@ def drawn(run: RunResult, charts: Sequence[Chart], span: Span) -> dict[str, Any]
     run : the whole drive.
     charts : which plots.
     span : what of the drive.
+    kept : its variants; of each the first curve of a plot is laid over it.
 
     Returns
     -------
@@ -42,11 +45,13 @@ def drawn(run: RunResult, charts: Sequence[Chart], span: Span) -> dict[str, Any]
         "duration": run.duration,
         "span": list(span),
         "times": packed(with_gaps(bins.times - span[0], bins)),
-        "charts": [_chart(run, chart, bins) for chart in charts],
+        "charts": [_chart(run, chart, bins, kept) for chart in charts],
     }
 
 
-def values_at(run: RunResult, charts: Iterable[Chart], cycle: int) -> list[list[list[float] | None]]:
+def values_at(
+    run: RunResult, charts: Iterable[Chart], cycle: int, kept: Sequence[KeptRun] = ()
+) -> list[list[list[float] | None]]:
     """Return lowest and highest value of each curve of each plot at a cycle; None where it is unknown.
 
     Parameters
@@ -54,8 +59,12 @@ def values_at(run: RunResult, charts: Iterable[Chart], cycle: int) -> list[list[
     run : the whole drive.
     charts : which plots.
     cycle : index of the cycle; -1 before the first: nothing is known.
+    kept : variants of the drive; their values follow those of a plot's own curves.
     """
-    return [[_at(run, line, cycle) for line in chart.lines] for chart in charts]
+    return [
+        [*(_at(run, line, cycle) for line in chart.lines), *(_at(each.run, chart.compared, cycle) for each in kept)]
+        for chart in charts
+    ]
 
 
 def binned(run: RunResult, line: Line, bins: Bins) -> tuple[FloatArray, FloatArray]:
@@ -103,15 +112,20 @@ def with_gaps(values: FloatArray, bins: Bins) -> FloatArray:
     return np.insert(values, np.flatnonzero(bins.follows_gap), math.nan)
 
 
-def _chart(run: RunResult, chart: Chart, bins: Bins) -> dict[str, Any]:
-    lines = [binned(run, line, bins) for line in chart.lines]
+def _chart(run: RunResult, chart: Chart, bins: Bins, kept: Sequence[KeptRun]) -> dict[str, Any]:
+    every = [(run, line) for line in chart.lines]
+    every += [(each.run, replace(chart.compared, label=each.letter, color=color_of(each.letter))) for each in kept]
+    lines = [binned(of, line, bins) for of, line in every]
     largest = float(np.fmax.reduce(np.concatenate([highs for _, highs in lines]), initial=math.nan))
     parameters = [segment.setup.parameters for segment in run.columns.segments]
     return {
         "title": chart.title,
         "axis": axis_of(chart, parameters, largest),
         "log": chart.is_logarithmic,
-        "lines": [_line(line, bins, *values) for line, values in zip(chart.lines, lines, strict=True)],
+        "lines": [
+            _line(line, bins, *values) | ({} if of is run else {"variant": True})
+            for (of, line), values in zip(every, lines, strict=True)
+        ],
         "limits": [_limit(run, limit) for limit in chart.limits],
     }
 

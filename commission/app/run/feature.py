@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from commission.app.base.feature import ASSOCIATION, LEGEND, RUN, SELECTION, TIME, TUNE, Docked, Feature
-from commission.app.run import reducer
+from commission.app.run import reducer, variant_reducer
 from commission.app.run.accumulated_layer import AccumulatedLayer
 from commission.app.run.association_panel import AssociationPanel
 from commission.app.run.badge import Badge
@@ -19,15 +19,16 @@ from commission.app.run.service import RunService
 from commission.app.run.state import RunState
 from commission.app.run.summary_panel import SummaryPanel
 from commission.app.run.time_line import TimeLine
-from commission.app.run.trail_layers import ConsistencyLayer, ReferenceLayer, TrailLayer
+from commission.app.run.trail_layers import ConsistencyLayer, ReferenceLayer, TrailLayer, VariantLayer
 from commission.app.run.trail_legend import TrailLegend
 from commission.app.run.uncertainty_layer import UncertaintyLayer
+from commission.app.run.variants_panel import VariantsPanel
 from commission.app.run.vehicle_layer import VehicleLayer
 from commission.app.run.world_panel import WorldPanel
 
 FEATURE = Feature(
     name="run",
-    reducers=(reducer,),
+    reducers=(reducer, variant_reducer),
     services=(RunService,),
     layers=(
         GateLayer,
@@ -37,6 +38,7 @@ FEATURE = Feature(
         VehicleLayer,
         UncertaintyLayer,
         TrailLayer,
+        VariantLayer,
         ConsistencyLayer,
         ReferenceLayer,
         FigureLayer,
@@ -50,6 +52,7 @@ FEATURE = Feature(
         Docked(make=lambda at: EditsPanel(at.gui, at.post, at.state), tab=RUN, rank=10),
         Docked(make=lambda at: WorldPanel(at.gui, at.post, at.state), tab=RUN, rank=20, folder="Virtual world"),
         Docked(make=lambda at: EditsPanel(at.gui, at.post, at.state), tab=TUNE, rank=-10),
+        Docked(make=lambda at: VariantsPanel(at.gui, at.post), tab=TUNE, rank=-5),
         Docked(make=lambda at: TrailLegend(at.gui), tab=LEGEND, rank=16),
         Docked(make=lambda at: TimeLine(at.gui, at.post, at.state.part(RunState).speed), tab=TIME, rank=10),
         Docked(make=lambda at: Plots(at.gui, at.post, at.browser), tab=TIME, rank=20, own=True),

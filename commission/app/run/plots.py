@@ -19,7 +19,10 @@ from commission.app.run.charts import BY_TITLE
 from commission.app.run.drawn_curves import as_text, drawn, values_at
 from commission.app.run.found_table import Found, message_of
 from commission.app.run.state import PlotWindow, RunState
+from commission.app.run.variant_reducer import VariantsState
+from commission.app.run.variant_table import variants_message
 from commission.app.run.view import RunView
+from commission.studies.variants import VariantsResult
 
 EDIT = "#c08bff"
 """Where an edit acts from, or reflectors are covered."""
@@ -41,6 +44,7 @@ class Plots(BasePanel):
         self.inbox = inbox
         gui.add_html(f"<div class='c-instruments' data-inbox='{viser_private.identifier(inbox)}'></div>")
         self._curves, self._cursor, self._found = (Carrier(gui, kind) for kind in ("curves", "cursor", "found"))
+        self._variants = Carrier(gui, "variants")
         self._listed: tuple[object, ...] = ()
         self._shown: tuple[object, ...] = ()
 
@@ -50,22 +54,23 @@ class Plots(BasePanel):
         if run is None or run.duration <= 0.0:
             return
         charts = [BY_TITLE[title] for title in self._window(view).titles]
-        values = values_at(run.result, charts, run.newest)
+        values = values_at(run.result, charts, run.newest, run.kept)
         self._cursor.write({"time": round(run.time, 4), "values": values})
 
     def draw_slowly(self, view: PageView) -> None:
         """Send curves and lists where they are others."""
         self._list(view)
+        self._variants.write(variants_message(view.part(VariantsResult), view.state.part(VariantsState)))
         run = view.part(RunView)
         if run is None or run.duration <= 0.0:
             return
         window = self._window(view)
-        shown = (id(run.result), window)
+        shown = (id(run.result), window, tuple((each.letter, id(each.run)) for each in run.kept))
         if shown == self._shown:
             return
         self._shown = shown
         span = window.span or (0.0, run.duration)
-        message = drawn(run.result, [BY_TITLE[title] for title in window.titles], span)
+        message = drawn(run.result, [BY_TITLE[title] for title in window.titles], span, run.kept)
         message |= {
             "titles": list(BY_TITLE),
             "fails": [list(stretch) for stretch in run.episodes],

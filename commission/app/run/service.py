@@ -33,6 +33,8 @@ from commission.app.run.effects import (
 from commission.app.run.instruments import Instruments
 from commission.app.run.playback import Playback
 from commission.app.run.state import RunState
+from commission.app.run.variant_actions import DropRun, KeepRun
+from commission.app.run.variant_runs import VariantRuns
 from commission.app.run.view import DrivenHall, RunView
 from commission.app.run.world import World
 from commission.geometry import rasterize, se2, spline_kernels
@@ -81,7 +83,19 @@ class RunService(Service):
     compile_all : compiles all kernels that a run needs.
     """
 
-    effects = (LoadSource, MoveTo, MoveByScans, PlayOn, CoverFromHere, RunAfresh, DriveAgain, MakeCurves, ShowGrown)
+    effects = (
+        LoadSource,
+        MoveTo,
+        MoveByScans,
+        PlayOn,
+        CoverFromHere,
+        RunAfresh,
+        DriveAgain,
+        MakeCurves,
+        ShowGrown,
+        KeepRun,
+        DropRun,
+    )
 
     def __init__(
         self,
@@ -94,6 +108,7 @@ class RunService(Service):
         self._prepare, self._compile = prepare, compile_all
         self._jobs = context.jobs
         self._instruments = Instruments(context)
+        self._variants = VariantRuns(context)
         self._followed_at = context.clock()
         self._project = context.state.project
         self._wanted: RunInput | None = None
@@ -146,6 +161,10 @@ class RunService(Service):
                     playback.seek(playback.result.duration if backward else 0.0)
             case MakeCurves(window) if playback is not None:
                 self._instruments.save(playback.result, window, sender)
+            case KeepRun(letter):
+                self._variants.keep(letter, self._wanted, state)
+            case DropRun(letter):
+                self._variants.drop(letter, state)
             case RunAfresh() if playback is not None and self._wanted is not None:
                 playback.seek(0.0)
                 self._localize(RunInput.of(state.project, self._wanted.log, self._wanted.start))
@@ -287,6 +306,7 @@ class RunService(Service):
         """Show a run: over the same drive, or one in its place, where the cursor is; a new one plays from its start."""
         playback = self.playback
         self._instruments.take(result, self._project.floor_map)
+        self._variants.take(result)
         if playback is not None and playback.result.inputs.log is result.inputs.log:
             playback.replace(result)
             return None
@@ -326,7 +346,7 @@ class RunService(Service):
             # Since the newest scan the vehicle has moved on, or nothing was heard of it.
             belief = self._live.belief
             view = replace(view, pose=belief.mean, covariance=belief.covariance, mode=self._live.mode)
-        return replace(view, hall=self._hall())
+        return replace(view, hall=self._hall(), kept=self._variants.kept)
 
     def _hall(self) -> DrivenHall:
         """Whether the drive is one in the hall, and with the vehicle, of the project."""
@@ -343,5 +363,5 @@ class RunService(Service):
             return ()
         result, here = view.result, slice(view.lived)
         lived = LivedPath(result.columns.means[here], result.two_sigma[here], result.position_two_sigma[here])
-        found = self._instruments.found
-        return view, Followed((float(view.pose[0]), float(view.pose[1]))), lived, *(() if found is None else (found,))
+        found = (each for each in (self._instruments.found, self._variants.compared) if each is not None)
+        return view, Followed((float(view.pose[0]), float(view.pose[1]))), lived, *found

@@ -12,6 +12,7 @@ from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.run.state import RunState
 from commission.app.run.trail_colors import COLORINGS, TrailBy, palette, pieces, values_of
+from commission.app.run.variant_reducer import LETTERS
 from commission.app.run.view import RunView
 
 MOST_POINTS = 800
@@ -79,6 +80,42 @@ class ConsistencyLayer(BaseLayer):
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the lines, one for each color."""
         return self._lines
+
+
+class VariantLayer(BaseLayer):
+    """Trails of the variants."""
+
+    name = "Trails of variants"
+    rank = 212
+    legend = tuple(
+        theme.Legend(f"trail of variant {letter}", color, theme.Mark.LINE)
+        for letter, color in zip(LETTERS, theme.VARIANTS, strict=True)
+    )
+
+    def __init__(self, scene: SceneApi) -> None:
+        super().__init__(scene)
+        self._lines = {
+            letter: add_lines(scene, f"/run/variant/{letter}", color, 2.0)
+            for letter, color in zip(LETTERS, theme.VARIANTS, strict=True)
+        }
+
+    def draw_slowly(self, view: PageView) -> None:
+        """Draw the trails up to now."""
+        run = view.part(RunView)
+        kept = {} if run is None else {each.letter: each.run for each in run.kept}
+        for letter, line in self._lines.items():
+            places = np.empty((0, 2)) if letter not in kept or run is None else kept[letter].columns.means[: run.lived]
+            if len(places) or len(line.points) > 1:
+                line.points = polyline_segments(thinned(places[:, :2], MOST_POINTS), theme.Height.TRAIL)
+
+    def is_used(self, view: PageView) -> bool:
+        """Whether there is one."""
+        run = view.part(RunView)
+        return run is not None and bool(run.kept)
+
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Return the lines, one for each letter."""
+        return tuple(self._lines.values())
 
 
 class ReferenceLayer(BaseLayer):

@@ -38,6 +38,16 @@ class Accumulated:
     """(M, 2) points [m], map frame."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class KeptRun:
+    """A variant: the same drive localized with what was set earlier."""
+
+    letter: str
+    """What it is called."""
+    run: RunResult
+    """The whole drive."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RunView:
     """The run as it is now: what lies before the cursor is lived, what lies behind it is computed only."""
@@ -74,6 +84,8 @@ class RunView:
     """Every detection so far; none in views that are drawn at the full rate."""
     hall: DrivenHall = DrivenHall.RECORDED
     """Whether the drive is one in the project's hall."""
+    kept: tuple[KeptRun, ...] = ()
+    """Its variants."""
 
     @property
     def duration(self) -> float:

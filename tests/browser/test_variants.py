@@ -1,0 +1,109 @@
+"""Variants as a person uses them: keep one, move the gate, see both and their figures, take the move back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+
+from commission.app.run.actions import Play, Seek, VirtualDrive
+from commission.app.run.charts import color_of
+from commission.app.run.service import RunService
+from commission.studies.variants import VariantsResult
+from tests.app.sites import room
+from tests.browser.page import OpenPage
+from tests.browser.serving import Served
+
+FIGURES = ".c-variants table:not(.c-moments) tbody tr"
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    project = room()
+    opened = Served(project, source=VirtualDrive(project.routes[0].name))
+    opened.until(lambda: opened.view is not None)
+    opened.runtime.post(Play(playing=False))
+    opened.runtime.post(Seek(10.0))
+    yield opened
+    opened.close()
+
+
+def compared(served: Served) -> VariantsResult | None:
+    parts = served.runtime.service(RunService).parts(slowly=True)
+    return next((part for part in parts if isinstance(part, VariantsResult)), None)
+
+
+def figures(page: OpenPage) -> dict[str, list[str]]:
+    rows = page.page.locator(FIGURES).all()
+    cells = [[cell.inner_text() for cell in row.locator("td").all()] for row in rows]
+    return {name: values for name, *values in cells}
+
+
+def test_a_kept_variant_stays_beside_a_moved_gate_and_undo_brings_it_back(
+    served: Served, window: Callable[..., OpenPage]
+) -> None:
+    page = window(served.server)
+    page.open(nodes=["/run/trail", "/run/variant/A"])
+    page.open_tab("Tune")
+    page.page.locator(".c-views button", has_text="Variants").click()
+    page.wait_for_text("Keep the run as it is now")
+    page.page.locator(".c-keep").click()
+    page.page.locator(FIGURES).first.wait_for()
+    before = figures(page)
+    assert before["Rejected by the gate"][0] == before["Rejected by the gate"][1]
+
+    page.fill("Gate", "50")
+    page.page.wait_for_function(
+        "() => document.querySelector('.c-setting')?.innerText.replace(/\\s+/g, ' ') === 'Gate 50 % 95 %'"
+    )
+    served.until(lambda: (found := compared(served)) is not None and found.figures[5].values[0] > 0.02)
+    page.page.wait_for_function(
+        "() => { const row = [...document.querySelectorAll('.c-variants tr')]"
+        ".find(each => each.innerText.startsWith('Rejected by the gate'));"
+        " return row && parseFloat(row.children[1].innerText) > 2; }"
+    )
+    shown = figures(page)
+    now, kept = shown["Rejected by the gate"]
+    assert kept == before["Rejected by the gate"][1]
+    found = compared(served)
+    assert found is not None
+    assert now == f"{100.0 * found.figures[5].values[0]:.2f} %"
+    assert shown["Position error, RMS"][0] != shown["Position error, RMS"][1]
+
+    # Both on the floor and in the plots, each where its numbers are.
+    view = served.view
+    assert view is not None
+    (variant,) = view.kept
+    assert variant.letter == "A"
+    assert not np.array_equal(variant.run.columns.means, view.result.columns.means)
+    page.page.locator(".c-views button", has_text="Plots").click()
+    legend = page.page.evaluate(
+        "window.commissionPlots.drawnLines().filter(line => line.variant).map(line => [line.label, line.color])"
+    )
+    assert legend
+    assert set(map(tuple, legend)) == {("A", color_of("A"))}
+
+    # A moment at which they differ is gone to.
+    page.page.locator(".c-views button", has_text="Variants").click()
+    moment = found.moments[0]
+    page.page.locator(".c-moments tbody tr").first.click()
+    served.until(lambda: served.view is not None and abs(served.view.time - moment.time) < 1e-3, 10.0)
+
+    page.page.get_by_role("button", name="Undo").first.click()
+    page.page.wait_for_function("() => !document.querySelector('.c-setting')")
+    page.page.wait_for_function(
+        "() => { const row = [...document.querySelectorAll('.c-variants tr')]"
+        ".find(each => each.innerText.startsWith('Rejected by the gate'));"
+        " return row && row.children[1].innerText === row.children[2].innerText; }"
+    )
+    assert figures(page)["Rejected by the gate"] == before["Rejected by the gate"]
+
+    # Its parameters are taken back by its own button, too; then it is forgotten.
+    page.fill("Gate", "60")
+    page.page.get_by_label("Use A").click()
+    served.until(lambda: served.state.project.parameters.association.gate_probability == 0.95, 10.0)
+    page.page.get_by_label("Forget A").click()
+    page.wait_for_text("Keep the run as it is now")
+    served.until(lambda: served.view is not None and served.view.kept == (), 10.0)
+    assert page.errors == []
