@@ -175,10 +175,10 @@ def test_the_largest_jump_is_the_longest_way_a_scan_moves_the_estimate(wide: Run
 
 
 def test_nearer_to_what_a_consistent_filter_shows_is_better_from_either_side() -> None:
-    assert BY_KEY["nis_mean"].aim is Aim.EXPECTED
-    figure = BY_KEY["nis_before_gate_mean"]
-    assert gains_of(figure, (6.0, 3.0), (2.0, 2.0), 1) > 0.0
-    assert gains_of(figure, (1.0, 0.5), (2.0, 2.0), 1) < 0.0
+    assert BY_KEY["nis_mean"].aim is Aim.NONE
+    figure = BY_KEY["anees_position"]
+    assert gains_of(figure, (3.0, 1.5), (1.0, 1.0), 1) > 0.0
+    assert gains_of(figure, (0.5, 0.25), (1.0, 1.0), 1) < 0.0
 
 
 def test_variants_of_another_drive_are_refused(wide: RunResult) -> None:
