@@ -272,6 +272,7 @@ class RunService(Service):
         self._wanted, self._live = grown.result.inputs, None if grown.is_over else grown
         if grown.is_over:
             self._instruments.take(grown.result, self._project.floor_map)
+            self._variants.take(grown.result)
 
     def _begin(self, drive: Drive, source: Source, world: World | None) -> Action:
         """Localize a new drive; the run before stays on the page until that is done."""
@@ -346,7 +347,7 @@ class RunService(Service):
             # Since the newest scan the vehicle has moved on, or nothing was heard of it.
             belief = self._live.belief
             view = replace(view, pose=belief.mean, covariance=belief.covariance, mode=self._live.mode)
-        return replace(view, hall=self._hall(), kept=self._variants.kept)
+        return replace(view, hall=self._hall(), kept=self._variants.kept_over(view.result))
 
     def _hall(self) -> DrivenHall:
         """Whether the drive is one in the hall, and with the vehicle, of the project."""
@@ -363,5 +364,5 @@ class RunService(Service):
             return ()
         result, here = view.result, slice(view.lived)
         lived = LivedPath(result.columns.means[here], result.two_sigma[here], result.position_two_sigma[here])
-        found = (each for each in (self._instruments.found, self._variants.compared) if each is not None)
+        found = (each for each in (self._instruments.found, self._variants.compared_over(result)) if each is not None)
         return view, Followed((float(view.pose[0]), float(view.pose[1]))), lived, *found

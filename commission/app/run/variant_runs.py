@@ -33,12 +33,18 @@ class VariantRuns:
 
     @property
     def kept(self) -> tuple[KeptRun, ...]:
-        """Those over the drive that is shown."""
-        shown = self._shown
-        if shown is None:
-            return ()
+        """Those over the drive that was shown last, as a whole."""
+        return () if self._shown is None else self.kept_over(self._shown)
+
+    def kept_over(self, shown: RunResult) -> tuple[KeptRun, ...]:
+        """Return those over the drive of a run; none over one that a vehicle is driving."""
         same = (item for item in sorted(self._runs.items()) if item[1].inputs.log is shown.inputs.log)
         return tuple(KeptRun(letter, run) for letter, run in same)
+
+    def compared_over(self, shown: RunResult) -> VariantsResult | None:
+        """Return what was compared over the drive of a run."""
+        known = self.compared
+        return known if known is not None and known.inputs.runs[0].inputs.log is shown.inputs.log else None
 
     def keep(self, letter: str, wanted: RunInput | None, state: AppState) -> None:
         """Keep a run, as it is shown, or as soon as it is known where something else is wanted already.

@@ -153,7 +153,11 @@ def test_variants_follow_onto_another_drive(
     # The same records as another drive: the variant is localized over them with its own gate.
     log = replace(result.inputs.log)
     other = judged_run(replace(narrow.inputs, log=log))
+    # As long as that is not known, nothing of another drive is laid over it: a vehicle may still be driving it.
+    assert runs.kept_over(other) == ()
+    assert runs.compared_over(other) is None
     runs.take(other)
+    assert runs.compared_over(other) is runs.compared
     (kept,) = runs.kept
     assert kept.run.inputs.log is log
     assert kept.run.consistency.rejected_fraction == result.consistency.rejected_fraction
