@@ -161,17 +161,13 @@ class RunService(Service):
                     playback.seek(playback.result.duration if backward else 0.0)
             case MakeCurves(window) if playback is not None:
                 self._instruments.save(playback.result, window, sender)
-            case KeepRun(letter):
-                self._variants.keep(letter, self._wanted, state)
-            case DropRun(letter):
-                self._variants.drop(letter, state)
             case RunAfresh() if playback is not None and self._wanted is not None:
                 playback.seek(0.0)
                 self._localize(RunInput.of(state.project, self._wanted.log, self._wanted.start))
             case DriveAgain() if self._wanted is not None:
                 self._drives_again(state)
             case _:
-                pass
+                self._variants.carry_out(effect, self._wanted, state)
 
     def _drives_again(self, state: AppState) -> bool:
         """Simulate a virtual drive again where its world is another one now; return whether that is under way."""

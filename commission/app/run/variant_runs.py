@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from commission.app.base.effects import Effect
 from commission.app.base.service import Context
 from commission.app.base.state import AppState
+from commission.app.run.variant_actions import DropRun, KeepRun
 from commission.app.run.variant_reducer import VariantsState
 from commission.app.run.view import KeptRun
 from commission.progress import Progress
@@ -45,6 +47,16 @@ class VariantRuns:
         """Return what was compared over the drive of a run."""
         known = self.compared
         return known if known is not None and known.inputs.runs[0].inputs.log is shown.inputs.log else None
+
+    def carry_out(self, effect: Effect, wanted: RunInput | None, state: AppState) -> None:
+        """Keep the run that is wanted or let one go; other effects are not for variants."""
+        match effect:
+            case KeepRun(letter):
+                self.keep(letter, wanted, state)
+            case DropRun(letter):
+                self.drop(letter, state)
+            case _:
+                pass
 
     def keep(self, letter: str, wanted: RunInput | None, state: AppState) -> None:
         """Keep a run, as it is shown, or as soon as it is known where something else is wanted already.
