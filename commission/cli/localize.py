@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from commission.site.project import Project
     from commission.site.record_log import RecordLog
+    from commission.studies.consistency import Consistency
     from commission.studies.detection_rates import DetectionRate
     from commission.studies.run import RunResult
     from commission.studies.sections import Section
@@ -79,7 +80,7 @@ class Localize:
         from commission.site.truth import truth_lines
         from commission.studies.detection_rates import rate_entries, rate_told
         from commission.studies.events import EventsInput, events
-        from commission.studies.plausibility import PlausibilityInput, plausibility
+        from commission.studies.plausibility import PlausibilityInput, has_motion, plausibility
         from commission.studies.reflector_figures import ReflectorFiguresInput, reflector_figures
         from commission.studies.run import RunInput, judged_run, summary
         from commission.studies.run_findings import run_findings
@@ -93,6 +94,9 @@ class Localize:
         project = as_saved = load_project(self.project)
         project = dataclasses.replace(project, parameters=apply_settings(project.parameters, self.set))
         log = self._with_reference(load_log(self.recording, ChannelOptions.parse(self.channel, self.wheels)))
+        if not has_motion(log):
+            found = "holds no odometry: between scans nobody knows where the vehicle went"
+            raise SourceError(f"{self.recording} {found}; expected odometry, in a bag by --channel odometry=TOPIC")
         start = start_of(project, log, given and given.pose, given and given.sigmas)
         if self.strict:
             for finding in plausibility(PlausibilityInput.of(project, log)):
@@ -189,9 +193,7 @@ def _report(result: RunResult, cut: Sequence[Section]) -> list[str]:
         f"Detections   {result.count(Status.INLIER)} inliers, "
         f"{result.count(Status.OUTLIER_DETECTOR)} outliers of the detector, "
         f"{result.count(Status.OUTLIER_ASSOCIATION)} of the association",
-        f"NIS          mean {_known(fits.nis_mean)} of the accepted ({fits.nis_expected:.2f} is consistent), "
-        f"{_known(fits.nis_before_gate_mean)} of all near a reflector; "
-        f"{_known(PERCENT.of(fits.rejected_fraction), 1)} % rejected",
+        f"NIS          {_nis(fits)}",
         f"Unseen       {_known(PERCENT.of(fits.unseen_fraction), 1)} % of the cycles without an accepted detection, "
         f"{_seconds(fits.longest_unseen)} at most",
         *_by_section(cut),
@@ -221,6 +223,21 @@ def _report(result: RunResult, cut: Sequence[Section]) -> list[str]:
         f"Danger       {errors.wrong_while_operational} of {errors.compared} cycles operational with an error "
         f"beyond {MILLIMETRES.text(limit)}",
     ]
+
+
+def _nis(fits: Consistency) -> str:
+    """How far detections lie from their reflectors; in words where there are none."""
+    if math.isnan(fits.nis_before_gate_mean):
+        return "none: no detection lies near a reflector"
+    accepted = (
+        "of the accepted: there is none"
+        if math.isnan(fits.nis_mean)
+        else f"mean {fits.nis_mean:.2f} of the accepted ({fits.nis_expected:.2f} is consistent)"
+    )
+    return (
+        f"{accepted}, {fits.nis_before_gate_mean:.2f} of all near a reflector; "
+        f"{_known(PERCENT.of(fits.rejected_fraction), 1)} % rejected"
+    )
 
 
 def _known(figure: float, digits: int = 2) -> str:

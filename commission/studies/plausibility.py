@@ -94,6 +94,7 @@ def plausibility(inputs: PlausibilityInput, progress: Progress = silent) -> tupl
     findings : none for a sound recording.
     """
     checks: tuple[tuple[str, Callable[[PlausibilityInput], Iterator[Finding]]], ...] = (
+        ("kinds of records", _missing_kinds),
         ("time units", _time_units),
         ("clocks", _clocks),
         ("odometry", _odometry),
@@ -148,8 +149,33 @@ def _unknown_scanners(inputs: PlausibilityInput) -> Iterator[Finding]:
             yield Finding(
                 found=f"the recording's scanner {name!r} is none of the project's",
                 probably="it is called otherwise there",
-                remedy=f"expected one of: {', '.join(each.name for each in inputs.scanners)}",
+                remedy="name it as there (a bag: --channel scan.NAME=TOPIC; a CSV folder: scans_NAME.npz); "
+                f"expected one of: {', '.join(each.name for each in inputs.scanners)}",
             )
+
+
+def _missing_kinds(inputs: PlausibilityInput) -> Iterator[Finding]:
+    """Find recordings in which nothing is seen, or nothing tells how the vehicle moved."""
+    log = inputs.log
+    if not any(len(scans) for scans in log.scans) and not len(log.detection_stamps_ns):
+        yield Finding(
+            found="the recording holds no scan and no detection",
+            probably="the scanner's topic or file was not recorded, or another one was named",
+            remedy="record the scanner; in a bag name its topic: --channel scan=TOPIC",
+        )
+    # A reader may have made up the first row, from which on motion counts.
+    if not has_motion(log):
+        yield Finding(
+            found="the recording holds no odometry",
+            probably="it was not recorded, or is in a topic that is not read",
+            remedy="record it, or in a bag name its topic: --channel odometry=TOPIC",
+        )
+
+
+def has_motion(log: RecordLog) -> bool:
+    """Whether a recording tells how the vehicle moved between what it saw: a single row is a begin, and no motion."""
+    seen = np.concatenate([log.detection_stamps_ns, log.scan_stamps_ns])
+    return len(log.odometry_stamps_ns) > 1 or (len(log.odometry_stamps_ns) == 1 and len(np.unique(seen)) < 2)
 
 
 def _time_units(inputs: PlausibilityInput) -> Iterator[Finding]:
@@ -367,6 +393,15 @@ def _scans_of(inputs: PlausibilityInput, scans: ScanStore, scanner: Scanner | No
 
 
 def _intensities(name: str, values: FloatArray, ranges: FloatArray, detector: DetectorParameters) -> Iterator[Finding]:
+    known = np.isfinite(values)
+    if not known.any():
+        yield Finding(
+            found=f"no beam of the {name} has an intensity that is a number",
+            probably="the scanner was not told to send intensities",
+            remedy="switch them on in the scanner; without them no reflector can be detected",
+        )
+        return
+    values, ranges = values[known], ranges[known]
     share, threshold = float(np.mean(values >= threshold_at(ranges, detector))), detector.intensity_threshold
     low, high = float(values.min()), float(values.max())
     where = f"detector.intensity_threshold {threshold:g} (intensities are {low:.4g} to {high:.4g})"

@@ -266,7 +266,7 @@ def test_figures_of_detections_are_unknown_where_there_are_none(commission, proj
     (recording / "detections.csv").write_text("\n".join(nothing) + "\n", encoding="utf-8")
     code, told, _ = commission("localize", project, recording, "--out", tmp_path / "result")
     assert code == 0
-    assert "mean unknown of the accepted" in told
+    assert "NIS          none: no detection lies near a reflector\n" in told
     assert "nan" not in told
     summary = json.loads((tmp_path / "result" / "summary.json").read_text(encoding="utf-8"))
     assert summary["nis_mean"] is None

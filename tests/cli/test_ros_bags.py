@@ -78,3 +78,23 @@ def test_csv_folder_has_no_topics_to_choose_from(tmp_path: Path, capsys: pytest.
 
     assert run("inspect", str(tmp_path / "csv"), "--channel", "odometry=/odom") == 2
     assert "is a CSV folder" in capsys.readouterr().err
+
+
+def test_bag_without_odometry_is_no_standing_vehicle(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scans = [bags.scan(START + step * 40_000_000, SHOT, intensities=[10.0, 300.0, 20.0]) for step in range(5)]
+    path = str(bags.write_bag(tmp_path / "still.mcap", scans))
+
+    assert run("localize", "maps/laboratory", path, "--out", str(tmp_path / "out"), "--initial-pose", "2,2.2,0") == 2
+    assert "holds no odometry" in capsys.readouterr().err
+    assert run("inspect", path) == 0
+    assert "how the vehicle moved is not known" in capsys.readouterr().out
+    assert run("inspect", "--strict", path) == 2
+
+
+def test_bag_without_scans_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    moves = [bags.odometry(START + step * 40_000_000, (0.02 * step, 0.0, 0.0)) for step in range(5)]
+    path = str(bags.write_bag(tmp_path / "blind.mcap", moves))
+
+    assert run("inspect", path) == 0
+    assert "the recording holds no scan and no detection" in capsys.readouterr().out
+    assert run("inspect", "--strict", path) == 2

@@ -146,8 +146,20 @@ def test_reference_in_degrees_is_told_and_one_that_was_never_wrapped_is_not() ->
     assert "in degrees" in only(dataclasses.replace(log, reference_poses=degrees)).probably
 
 
-def test_empty_recording_is_passed() -> None:
-    assert judged(RecordLog(odometry_stamps_ns=np.empty(0, np.int64), displacements=np.empty((0, 3)))) == ()
+def test_recording_in_which_nothing_is_seen_and_nothing_moves_is_told() -> None:
+    found = judged(RecordLog(odometry_stamps_ns=np.empty(0, np.int64), displacements=np.empty((0, 3))))
+
+    assert [each.found for each in found] == [
+        "the recording holds no scan and no detection",
+        "the recording holds no odometry",
+    ]
+    assert "--channel scan=TOPIC" in found[0].remedy
+    assert "--channel odometry=TOPIC" in found[1].remedy
+
+
+def test_scans_whose_intensities_are_no_numbers_are_told() -> None:
+    (finding,) = judged(with_scans(intensities=np.full_like(MIXED, np.nan)))
+    assert finding.found == "no beam of the scans has an intensity that is a number"
 
 
 def test_study_can_be_cancelled() -> None:
@@ -203,7 +215,9 @@ def test_a_single_record_tells_of_no_clock() -> None:
     made_up = dataclasses.replace(
         log, odometry_stamps_ns=log.odometry_stamps_ns[:1] - 10 * SECOND, displacements=log.displacements[:1]
     )
-    assert plausibility(PlausibilityInput.alone(made_up)) == ()
+    assert [each.found for each in plausibility(PlausibilityInput.alone(made_up))] == [
+        "the recording holds no odometry"
+    ]
 
 
 def test_what_is_told_of_intensities_names_the_scanner() -> None:

@@ -9,6 +9,7 @@ from typing import Protocol
 from commission.errors import FileFormatError, UsageError
 from commission.io.reading import cannot_read
 from commission.io.recordings.capture import Capture
+from commission.io.recordings.carmen import CarmenLog
 from commission.io.recordings.channels import NO_OPTIONS, ChannelOptions
 from commission.io.recordings.csv_folder import CsvFolder
 from commission.io.recordings.mcap_recording import McapRecording
@@ -69,8 +70,9 @@ _FORMATS: tuple[tuple[Callable[[Path], bool], Callable[[Path, ChannelOptions], R
     (Capture.recognizes, Capture),
     (McapRecording.recognizes, _own_mcap),
     (RosBag.recognizes, RosBag),
+    (CarmenLog.recognizes, CarmenLog),
 )
-READ = "a folder with odometry.csv, a ROS bag (.mcap, .db3, .bag), or a capture (.pcap, .pcapng)"
+READ = "a folder with odometry.csv, a ROS bag (.mcap, .db3, .bag), a capture (.pcap, .pcapng), or a CARMEN log"
 """What a recording can be, in words."""
 
 

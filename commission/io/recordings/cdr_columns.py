@@ -62,7 +62,22 @@ class CdrColumns:
         return self.rows(places, kind, 1)[:, 0]
 
     def rows(self, places: IntArray, kind: str, count: int) -> NDArray[Any]:
-        """(N, count) numbers from a place of each message on; raises ValueError where a message ends before them."""
+        """Numbers that follow each other.
+
+        Parameters
+        ----------
+        places : (N,) where the first one of each message stands.
+        kind, count : their type, as numpy has it, and how many they are.
+
+        Returns
+        -------
+        numbers : (N, count).
+
+        Raises
+        ------
+        ValueError
+            a message ends before them.
+        """
         size = np.dtype(kind).itemsize * count
         if (places + size > self.ends).any() or (places < 0).any():
             raise ValueError("a message ends before its last field")

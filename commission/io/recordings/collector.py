@@ -147,7 +147,7 @@ class Collector:
             raise FileFormatError(self.path, "", "holds no scan, odometry or pose", "a recording of a drive")
         more = list(notes)
         if not len(stamps):
-            more.append("it holds no odometry: the vehicle is taken as standing where it is")
+            more.append("it holds no odometry: how the vehicle moved is not known")
             stamps, displacements = np.array([min(firsts)]), np.zeros((1, 3))
         counts = [len(rows) for rows in range_bearing]
         return RecordLog(

@@ -135,7 +135,13 @@ class McapIndex:
             return content
 
     def error(self, offset: int, found: str, expected: str) -> FileFormatError:
-        """Error at a byte of the file."""
+        """Return the error about something in the file.
+
+        Parameters
+        ----------
+        offset : where it is [bytes].
+        found, expected : what was found, and what is expected.
+        """
         return FileFormatError(self.path, f"byte {offset}", f"is {found}", expected)
 
     def _read_through(self) -> None:

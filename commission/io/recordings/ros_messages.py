@@ -98,6 +98,9 @@ def scan_of(message: Any, kind: str, stamp_ns: int, scanner: int) -> Scan | None
             outside |= ranges > np.float32(farthest)
     ranges[outside] = np.nan
     intensities = np.array(strengths, dtype=np.float32) if len(strengths) == len(ranges) else None
+    if intensities is not None and not np.isfinite(intensities).any():
+        # A driver whose scanner sends none fills in NaN: that is no strength of 0.
+        intensities = None
     if intensities is not None:
         intensities[~np.isfinite(intensities)] = 0.0
     return Scan(

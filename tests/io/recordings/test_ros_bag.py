@@ -197,7 +197,7 @@ def test_scans_without_intensities_are_read_and_that_is_told(tmp_path: Path, kin
 
     assert log.scans[0].scan(0).intensities is None
     assert "3 scans of /scan have no intensities: no reflector can be seen in them" in log.notes
-    assert "it holds no odometry: the vehicle is taken as standing where it is" in log.notes
+    assert "it holds no odometry: how the vehicle moved is not known" in log.notes
 
 
 def test_folders_of_topics_are_scanners(tmp_path: Path, kind: str) -> None:
@@ -339,3 +339,12 @@ def test_real_bag_of_ros_1_is_read(shared_data: Path) -> None:
     assert len(log.scans[0]) == 89
     assert set(log.scans[0].beams.tolist()) == {541}
     assert np.median(np.diff(log.scans[0].stamps_ns)) * 1e-9 == pytest.approx(0.02, abs=1e-3)
+
+
+def test_intensities_that_are_all_nan_are_none(tmp_path: Path) -> None:
+    messages = [bags.scan(START, ECHO, intensities=[math.nan] * 5), bags.odometry(START, (0.0, 0.0, 0.0))]
+
+    log = read(tmp_path, messages)
+
+    assert log.scans[0].scan(0).intensities is None
+    assert "1 scans of /scan have no intensities: no reflector can be seen in them" in log.notes
