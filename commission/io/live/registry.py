@@ -22,8 +22,8 @@ class SourceKind(NamedTuple):
 
     module: str
     driver: str
-    virtual: tuple[str, str]
-    """Module and class of the virtual device."""
+    virtual: tuple[str, str] | None
+    """Module and class of the virtual device; None: there is none."""
     transport: str
     """`udp`: is listened to at an address of this computer; `tcp`, `websocket`: is connected to."""
     port: int
@@ -44,6 +44,8 @@ KINDS: dict[str, SourceKind] = {
         6060,
         "SICK microScan3, nanoScan3, outdoorScan3",
     ),
+    "cola": SourceKind("cola_driver", "ColaDriver", None, "tcp", 2112, "SICK TiM, LMS, LRS, MRS that speak CoLa B"),
+    "compact": SourceKind("compact_driver", "CompactDriver", None, "udp", 2115, "SICK picoScan, multiScan"),
 }
 
 
@@ -92,7 +94,15 @@ def device_of(address: SourceAddress, scanners: tuple[str, ...]) -> Any:
     ----------
     address : of who listens (UDP), or of the device (TCP, websocket).
     scanners : names of the vehicle's scanners.
+
+    Raises
+    ------
+    UsageError
+        there is no virtual device of that protocol.
     """
+    if address.kind.virtual is None:
+        known = ", ".join(name for name, kind in KINDS.items() if kind.virtual is not None)
+        raise UsageError(f"there is no virtual {address.name}; expected one of {known}")
     module, name = address.kind.virtual
     return getattr(importlib.import_module(f"commission.io.live.{module}"), name)(address, scanners)
 

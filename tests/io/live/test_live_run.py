@@ -12,7 +12,7 @@ import pytest
 
 from commission.io.bundled import bundled_folder
 from commission.io.live.live_run import LiveRun
-from commission.io.live.registry import KINDS, SourceAddress
+from commission.io.live.registry import SourceAddress
 from commission.io.live.runner import LiveRunner
 from commission.io.live.session import Session
 from commission.io.live.spooled_scans import SpooledScans
@@ -24,7 +24,7 @@ from commission.simulation.scenario import records
 from commission.site.project import Project
 from commission.site.records import Detections, Odometry, Record, Scan
 from commission.studies.run import RunInput, RunResult, judged_run
-from tests.io.live.virtual import scan, until
+from tests.io.live.virtual import ALL, scan, until
 
 SPEED = 4.0
 SECONDS = 8
@@ -65,7 +65,7 @@ def listening_to(name: str, project: Project, free: Iterator[int]) -> Session:
     return Session.of(here, names_of(project), patience_ns=10**9)
 
 
-@pytest.mark.parametrize("name", KINDS)
+@pytest.mark.parametrize("name", ALL)
 def test_live_estimate_is_that_of_the_recording_of_the_same_session(
     name: str, warehouse: Project, drive: list[Record], tmp_path: Path
 ) -> None:

@@ -17,7 +17,7 @@ from commission.site.records import Record, Scan
 
 NAMES = ("scanner",)
 PERIOD_NS = 40_000_000
-ALL = tuple(KINDS)
+ALL = tuple(name for name, kind in KINDS.items() if kind.virtual is not None)
 
 
 def scan(number: int, beams: int = 541) -> Scan:
