@@ -15,6 +15,7 @@ from typing import NoReturn
 
 from commission.app.base.logs import SHOW_TRACEBACK, one_line_each
 from commission.cli.ambiguity import Ambiguity
+from commission.cli.calibrate import Calibrate
 from commission.cli.convert import Convert
 from commission.cli.coverage import CoverageCommand
 from commission.cli.inspect import Inspect
@@ -40,6 +41,7 @@ COMMANDS: dict[str, type[Command]] = {
     "coverage": CoverageCommand,
     "predict": Predict,
     "ambiguity": Ambiguity,
+    "calibrate": Calibrate,
     "place": Place,
     "problems": Problems,
     "convert": Convert,

@@ -42,7 +42,19 @@ def as_driven(displacements: FloatArray, parameters: OdometryParameters) -> Floa
 def _scale(
     displacements: FloatArray, forward_scale: float, turn_scale: float, turn_per_m: float, driven: FloatArray
 ) -> None:
-    """`as_driven` into `driven`."""
+    """Write `as_driven` of displacements.
+
+    Parameters
+    ----------
+    displacements : (M, 3) as reported [m, m, rad].
+    forward_scale, turn_scale : shares by which way and turn are larger.
+    turn_per_m : turn with the way [rad/m].
+    driven : (M, 3) output.
+
+    Notes
+    -----
+    No formula: that of `as_driven`.
+    """
     for row in range(len(displacements)):
         forward, left, turn = log_scalars(displacements[row, 0], displacements[row, 1], displacements[row, 2])
         driven[row, 0], driven[row, 1], driven[row, 2] = exp_scalars(

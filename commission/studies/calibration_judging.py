@@ -1,0 +1,251 @@
+"""Whether a value deserves to be used: the project's own localizer over a part of the drive that did not make it.
+
+Innovations judge constants. The noise of a detection is judged by two localizers that see different reflectors: how far
+they differ is what their covariances have to say, whatever is correlated in time.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from commission.geometry import se2
+from commission.geometry.angles import wrap
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
+from commission.localization import whole_run
+from commission.localization.detection_log import DetectionLog
+from commission.localization.detector import INLIER
+from commission.localization.estimate import Belief
+from commission.localization.observation import residuals
+from commission.localization.run_columns import RunColumns
+from commission.localization.setup import LocalizerSetup
+from commission.site.parameters import AssociationParameters, FilterParameters
+from commission.site.record_log import RecordLog
+from commission.site.reflectors import ReflectorMap
+
+FARTHEST_D2 = 25.0
+"""A detection counts no more than this: false ones weigh the same under every value."""
+BLOCK_S = 10.0
+"""Innovations within this time are taken for one: they are correlated [s]."""
+OPEN_GATE = 0.9999
+"""Gate of the two localizers: their detections are given to reflectors beforehand."""
+FACTORS = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)
+"""Multiples of the noise of a detection that are tried."""
+FEWEST_REFLECTORS = 4
+"""Two reflectors for each of two localizers."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Score:
+    """Log-likelihood of the innovations of a run."""
+
+    blocks: FloatArray
+    """(B,) sum over the detections of each stretch of `BLOCK_S`; 0 where there is none."""
+    counts: FloatArray
+    """(B,) detections of each stretch."""
+    nis: float
+    """Mean squared Mahalanobis distance of all detections, clipped at `FARTHEST_D2`."""
+
+    def part(self, rows: BoolArray) -> Score:
+        """Return the score of some stretches."""
+        return Score(self.blocks[rows], self.counts[rows], self.nis)
+
+    @property
+    def mean(self) -> float:
+        """Log-likelihood per detection."""
+        return float(self.blocks.sum() / max(self.counts.sum(), 1.0))
+
+
+def gain(better: Score, worse: Score) -> tuple[float, float]:
+    """Log-likelihood per detection that one run has more than another, and its 1-sigma by the scatter of stretches."""
+    difference = better.blocks - worse.blocks
+    count = max(float(worse.counts.sum()), 1.0)
+    scatter = float(np.sqrt(((difference - difference.mean()) ** 2).sum())) if len(difference) > 1 else 0.0
+    return float(difference.sum()) / count, scatter / count
+
+
+def score(log: RecordLog, setup: LocalizerSetup, start: Belief, detected: DetectionLog) -> Score:
+    """Localize with a setup, and say how likely what was seen is.
+
+    Parameters
+    ----------
+    log : the recording.
+    setup : what is to be judged.
+    start : belief before the first record.
+    detected : detections of the recording.
+
+    Notes
+    -----
+    -(nu^T S^-1 nu + log det S) / 2 of each detection against its likeliest reflector, S = H P H^T + R and what the
+    project's uncertainty adds, P from before its scan.
+    """
+    run = whole_run.run(log, setup, start, detected=detected)
+    d2, log_det = _innovations(run, setup)
+    judged = detected.status == INLIER
+    d2 = np.minimum(np.where(np.isfinite(d2), d2, FARTHEST_D2), FARTHEST_D2)
+    known = np.isfinite(log_det) & judged
+    log_det = np.where(known, log_det, float(np.median(log_det[known])) if known.any() else 0.0)
+    likelihood = np.where(judged, -0.5 * (d2 + log_det), 0.0)
+    seconds = (run.stamps_ns - run.stamps_ns[0]) * 1e-9
+    block = np.repeat((seconds / BLOCK_S).astype(np.int64), np.diff(run.offsets))
+    size = int(seconds[-1] / BLOCK_S) + 1
+    return Score(
+        np.bincount(block, likelihood, size).astype(np.float64),
+        np.bincount(block, judged.astype(np.float64), size).astype(np.float64),
+        float(d2[judged].mean()) if judged.any() else math.nan,
+    )
+
+
+def _innovations(run: RunColumns, setup: LocalizerSetup) -> tuple[FloatArray, FloatArray]:
+    """(n,) squared Mahalanobis distance and log det S of each detection; NaN where it has no reflector."""
+    priors = run.priors.rows()
+    counts = np.diff(run.offsets)
+    of = np.repeat(run.detected.scanners, counts)
+    mountings = np.array([each.mounting for each in setup.scanners])
+    T = np.repeat(priors.means, counts, axis=0)
+    sensors = se2.compose(T, mountings[of])
+    nobody = run.reflector < 0
+    if not len(setup.reflectors) or not len(of):
+        return np.full(len(of), math.nan), np.full(len(of), math.nan)
+    centers = setup.reflectors.centers[np.where(nobody, 0, run.reflector)]
+    bias = setup.parameters.observation.range_bias
+    nu, distance = residuals(sensors, centers, run.range_bearing - (bias, 0.0))
+    distance = np.maximum(distance, 1e-3)
+    u = (centers - sensors[:, :2]) / distance[:, np.newaxis]
+    arm = sensors[:, :2] - T[:, :2]
+    H = np.zeros((len(of), 2, 3))
+    H[:, 0, :2] = -u
+    H[:, 1, 0], H[:, 1, 1] = u[:, 1] / distance, -u[:, 0] / distance
+    H[:, 0, 2] = u[:, 0] * arm[:, 1] - u[:, 1] * arm[:, 0]
+    H[:, 1, 2] = -(u[:, 0] * arm[:, 0] + u[:, 1] * arm[:, 1]) / distance - 1.0
+    S = H @ np.repeat(priors.covariances, counts, axis=0) @ np.swapaxes(H, 1, 2)
+    noise = setup.observation_rows[of, 3:5]
+    known = setup.uncertainty
+    place = known.survey**2 + known.mounting_position**2 if setup.parameters.filter.consider else 0.0
+    S[:, 0, 0] += noise[:, 0] + place + (known.range_bias**2 if place else 0.0)
+    S[:, 1, 1] += noise[:, 1] + place / distance**2 + (known.mounting_heading**2 if place else 0.0)
+    det = S[:, 0, 0] * S[:, 1, 1] - S[:, 0, 1] ** 2
+    d2 = (S[:, 1, 1] * nu[:, 0] ** 2 - 2.0 * S[:, 0, 1] * nu[:, 0] * nu[:, 1] + S[:, 0, 0] * nu[:, 1] ** 2) / det
+    d2[nobody] = math.nan
+    return d2, np.where(nobody, math.nan, np.log(det))
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """How two localizers that see different reflectors agree, for one noise of a detection."""
+
+    factor: float
+    """Multiple of the noise."""
+    likelihood: float
+    """Mean log-likelihood of their differences."""
+    ratio: float
+    """Mean squared difference over its expectation: 1 is consistent, more is too sure."""
+
+
+def agreements(
+    log: RecordLog, setup: LocalizerSetup, start: Belief, detected: DetectionLog, reflector: IntArray
+) -> tuple[Agreement, ...]:
+    """Try multiples of the noise of a detection.
+
+    Parameters
+    ----------
+    log : the recording.
+    setup : with the noise that residuals show.
+    start : belief before the first record.
+    detected : detections of the recording.
+    reflector : (n,) reflector of each, by the calibration; -1: none, it is left out.
+
+    Returns
+    -------
+    agreements : one for each of `FACTORS`; none where there are too few reflectors.
+    """
+    seen = np.unique(reflector[reflector >= 0])
+    if len(seen) < FEWEST_REFLECTORS:
+        return ()
+    halves = (seen[::2], seen[1::2])
+    parts = [(_map_of(setup, half), _detections_of(detected, np.isin(reflector, half))) for half in halves]
+    found: list[Agreement] = []
+    for factor in FACTORS:
+        runs = [whole_run.run(log, _plain(part, factor), start, detected=own) for part, own in parts]
+        found.append(_agreement(runs[0], runs[1], factor))
+    return tuple(found)
+
+
+def best_factor(found: Sequence[Agreement]) -> float:
+    """Least multiple of the noise with which two localizers differ as much as they say; 1 where nothing was tried."""
+    ratios = np.array([each.ratio for each in found])
+    if not found or ratios[0] <= 1.0:
+        return 1.0
+    if ratios.min() > 1.0:
+        return found[-1].factor
+    after = int(np.argmax(ratios <= 1.0))
+    share = (ratios[after - 1] - 1.0) / (ratios[after - 1] - ratios[after])
+    return float(found[after - 1].factor + share * (found[after].factor - found[after - 1].factor))
+
+
+def _map_of(setup: LocalizerSetup, reflectors: IntArray) -> LocalizerSetup:
+    """Return the setup with some of its reflectors alone."""
+    return replace(setup, reflectors=ReflectorMap(tuple(setup.reflectors.reflectors[i] for i in reflectors)))
+
+
+def _plain(setup: LocalizerSetup, factor: float) -> LocalizerSetup:
+    """Return the setup without constants and with an open gate, its noise multiplied."""
+    given, noise = setup.parameters, setup.parameters.observation
+    parameters = replace(
+        given,
+        observation=replace(noise, range_sigma=factor * noise.range_sigma, bearing_sigma=factor * noise.bearing_sigma),
+        filter=FilterParameters(consider=False),
+        association=AssociationParameters(gate_probability=OPEN_GATE),
+    )
+    return replace(setup, parameters=parameters)
+
+
+def _detections_of(detected: DetectionLog, kept: BoolArray) -> DetectionLog:
+    """Return the log with some of its detections alone."""
+    before = np.concatenate(([0], np.cumsum(kept)))
+    return DetectionLog(
+        stamps_ns=detected.stamps_ns,
+        scanners=detected.scanners,
+        offsets=read_only(before[detected.offsets].astype(np.int64)),
+        range_bearing=read_only(detected.range_bearing[kept]),
+        beams=read_only(detected.beams[kept]),
+        expected=read_only(detected.expected[kept]),
+        status=read_only(detected.status[kept]),
+    )
+
+
+def _agreement(one: RunColumns, other: RunColumns, factor: float) -> Agreement:
+    """Compare the poses of two runs over one odometry.
+
+    Notes
+    -----
+    Both predict with the same noise of odometry, so that their errors are correlated: C = A (F C F^T + Q) B^T, with
+    A = P P_prior^-1 = I - K H of the one and B of the other, and Q = P_prior - F P F^T; var(x - y) = P + P' - C - C^T.
+    """
+    priors = (one.priors.rows(), other.priors.rows())
+    start = one.initial
+    before = np.concatenate((start.mean[np.newaxis], one.means[:-1]))
+    spread = np.concatenate((start.covariance[np.newaxis], one.covariances[:-1]))
+    F = np.broadcast_to(np.eye(3), (len(one), 3, 3)).copy()
+    F[:, 0, 2], F[:, 1, 2] = before[:, 1] - priors[0].means[:, 1], priors[0].means[:, 0] - before[:, 0]
+    Q = priors[0].covariances - F @ spread @ np.swapaxes(F, 1, 2)
+    A, B = (
+        np.swapaxes(np.linalg.solve(prior.covariances, run.covariances), 1, 2)
+        for prior, run in zip(priors, (one, other), strict=True)
+    )
+    B_T, F_T = np.swapaxes(B, 1, 2), np.swapaxes(F, 1, 2)
+    common, shared = np.array(start.covariance), np.empty((len(one), 3, 3))
+    for k in range(len(one)):
+        common = A[k] @ (F[k] @ common @ F_T[k] + Q[k]) @ B_T[k]
+        shared[k] = common
+    # Where neither has seen anything yet the two are one: a floor of 0.1 mm.
+    V = one.covariances + other.covariances - shared - np.swapaxes(shared, 1, 2) + 1e-8 * np.eye(3)
+    difference = one.means - other.means
+    difference[:, 2] = wrap(difference[:, 2])
+    d2 = np.einsum("ki,ki->k", difference, np.linalg.solve(V, difference[:, :, np.newaxis])[:, :, 0])
+    _, log_det = np.linalg.slogdet(V)
+    clipped = np.minimum(d2, 3.0 * FARTHEST_D2)
+    return Agreement(factor, float(np.mean(-0.5 * (clipped + log_det))), float(np.mean(d2) / 3.0))
