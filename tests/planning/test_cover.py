@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from commission.planning import cover as covering
+from commission.planning import cover as solver
 from commission.planning.cover import CoverProblem, cover, lower_bound, merged
 
 NONE = np.empty(0, dtype=np.int64)
@@ -133,7 +133,7 @@ def test_a_program_that_is_not_solved_in_time_leaves_the_bound_of_the_rows_of_si
     problem = problem_of([[1, 1, 0], [0, 0, 1]], [1, 1])
     gains, needs = np.array([[1.0, 1.0, 1.0]]), np.array([3.0])
     assert lower_bound(problem, gains, needs) == 3
-    solve = covering.linprog
+    solve = solver.linprog
 
     def only_short_ones(costs, **keys):
         solved = solve(costs, **keys)
@@ -141,5 +141,5 @@ def test_a_program_that_is_not_solved_in_time_leaves_the_bound_of_the_rows_of_si
             solved.status = 1
         return solved
 
-    monkeypatch.setattr(covering, "linprog", only_short_ones)
+    monkeypatch.setattr(solver, "linprog", only_short_ones)
     assert lower_bound(problem, gains, needs) == 2
