@@ -333,10 +333,9 @@ def fix_of_headings(  # noqa: PLR0917 - arrays in, arrays out
 
     Notes
     -----
-    Whatever is added to a set of reflectors adds information: the worst of the headings is one whose set has no part
-    that another heading sees alone, derived from the sum of positive semi-definite matrices. So headings that see as
-    much as a neighbor and more are left out for the worst, those that see less for the best, and of equal ones all but
-    one.
+    S a part of T => I(S) <= I(T), derived from the sum of positive semi-definite matrices: whatever is added to a set
+    of reflectors adds information. So headings that see as much as a neighbor and more are left out for the worst,
+    those that see less for the best, and of equal ones all but one.
     """
     many, narrow = len(model.headings), model.width < FULL_TURN or len(model.blind) > 0
     if not narrow:

@@ -38,6 +38,8 @@ NEARLY = 0.9
 """Share of a limit from which, with all places, it is looked at which failing ones cost most."""
 DEAREST = 2
 """Reflectors at one place of a route whose failing is predicted with all others standing."""
+MOST_FAILING = 40
+"""Such predictions at most: they are the slowest of all, and with very many reflectors one is worth little."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,6 +50,18 @@ class Excess:
     """(M,) what each reflector adds."""
     need: float
     """Sum of them at which the limit is kept, as far as shares in a fix say."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Dearest:
+    """What is missed most at one scan of a route when all M reflectors stand."""
+
+    scan: int
+    """Of the drive."""
+    reflectors: tuple[int, ...]
+    """Those with the largest part in the information."""
+    factor: float
+    """By which the sigma grows at least without the first of them."""
 
 
 class LayoutLimits:
@@ -72,6 +86,9 @@ class LayoutLimits:
         self._hard: dict[tuple[int, int], None] = {}
         """Route and reflector failing that were too much of late, the latest last."""
         self._necessary: list[tuple[FloatArray, float]] = []
+        self._last: tuple[BoolArray, list[FloatArray]] | None = None
+        self.predicted_sightings = 0
+        """Sightings of reflectors that predictions went through so far: what they cost, whatever the machine."""
 
     @property
     def necessary(self) -> tuple[FloatArray, FloatArray]:
@@ -81,10 +98,13 @@ class LayoutLimits:
 
     def kept(self, taken: BoolArray) -> list[FloatArray]:
         """Per route, (K, 3) largest 2-sigma with nothing broken or with any single reflector failing."""
-        result = [np.zeros_like(limits) for limits in self._demanded]
-        for (index, _), _, variances in self._predicted(taken, self._damages(taken)):
-            result[index] = np.maximum(result[index], 2.0 * np.sqrt(variances))
-        return result
+        # Of the last layout it is asked again, when it has become the result.
+        if self._last is None or not np.array_equal(self._last[0], taken):
+            result = [np.zeros_like(limits) for limits in self._demanded]
+            for (index, _), _, variances in self._predicted(taken, self._damages(taken)):
+                result[index] = np.maximum(result[index], 2.0 * np.sqrt(variances))
+            self._last = taken.copy(), result
+        return self._last[1]
 
     def beyond(self, taken: BoolArray) -> list[Beyond | None]:
         """Per route, the metres on which a limit is passed, and how near to it all M reflectors would come."""
@@ -109,23 +129,34 @@ class LayoutLimits:
         """Per route, (K, 3) 2-sigma with all M reflectors; near a limit, without those that cost most there as well."""
         everything, result = np.ones(self._count, np.bool_), [np.zeros_like(limits) for limits in self._demanded]
         damages: list[tuple[int, int]] = []
+        places: list[tuple[int, _Dearest]] = []
         for key, prediction, variances in self._predicted(everything, [(i, NOTHING) for i in range(len(result))]):
             result[key[0]] = 2.0 * np.sqrt(variances)
             if self._survives:
-                damages += [(key[0], gone) for gone in self._dearest(key[0], prediction, result[key[0]])]
+                dearest = self._dearest(key[0], prediction, result[key[0]])
+                places += [(key[0], each) for each in dearest]
+                damages += [(key[0], gone) for gone in sorted({gone for each in dearest for gone in each.reflectors})]
+        if len(damages) > MOST_FAILING:
+            for index, each in places:
+                metres = self._planned[index].drive.metres
+                result[index][np.abs(metres - metres[each.scan]) < APART_M] *= each.factor
+            return result
         for (index, _), _, variances in self._predicted(everything, damages):
             result[index] = np.maximum(result[index], 2.0 * np.sqrt(variances))
         return result
 
-    def _dearest(self, index: int, prediction: RoutePrediction, two_sigma: FloatArray) -> list[int]:
+    def _dearest(self, index: int, prediction: RoutePrediction, two_sigma: FloatArray) -> list[_Dearest]:
         """Reflectors that have the largest part in the information wherever even all together are near a limit."""
         route, shares = self._planned[index], two_sigma / self._demanded[index]
         everything = np.ones(self._count, np.bool_)
-        found: set[int] = set()
+        found: list[_Dearest] = []
         for scan, axis in _worst_apart(route, shares, NEARLY, len(shares)):
             gains = fix_shares(route, prediction, scan, axis, everything).gains
-            found.update(np.argsort(-gains, kind="stable")[:DEAREST].tolist())
-        return sorted(found)
+            reflectors = np.argsort(-gains, kind="stable")[:DEAREST]
+            # A part of the information is at least so much of the variance: the share says no less (`fix_shares`).
+            factor = 1.0 / np.sqrt(max(1.0 - float(gains.max(initial=0.0)), LEAST_MORE))
+            found.append(_Dearest(scan, tuple(reflectors.tolist()), float(factor)))
+        return found
 
     def excess(self, taken: BoolArray, enough: int = 1) -> list[Excess]:
         """Return rows that a layout does not fulfil: none when it keeps all limits.
@@ -164,6 +195,7 @@ class LayoutLimits:
         """Predict damages in turn: each with (K, 3) variances, of the filter or of its error, whichever is larger."""
         # First without all that is not taken, which is most.
         routes = [restricted(route, taken) for route in self._planned]
+        cost = [len(route.visible.indices) + len(route.drive) for route in routes]
 
         def predicted(key: tuple[int, int]) -> tuple[tuple[int, int], RoutePrediction, FloatArray]:
             route = restricted(routes[key[0]], _without(taken, key[1]))
@@ -174,7 +206,9 @@ class LayoutLimits:
         with ThreadPoolExecutor(CORES) as pool:
             for start in range(0, len(damages), CORES):
                 self._step()
-                yield from pool.map(predicted, damages[start : start + CORES])
+                some = damages[start : start + CORES]
+                self.predicted_sightings += sum(cost[index] for index, _ in some)
+                yield from pool.map(predicted, some)
 
     def _rows(
         self, taken: BoolArray, key: tuple[int, int], prediction: RoutePrediction, variances: FloatArray

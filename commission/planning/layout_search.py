@@ -49,6 +49,9 @@ MOST_PAIRS = 300
 """Pairs of reflectors that are taken out to tell places apart, at most."""
 MOST_ALIKE = 8
 """Reflectors of a layout that another place is looked for at a time, those with the most alike pairs first."""
+MOST_SIGHTINGS = 40_000_000
+"""Sightings of reflectors that all predictions of a search go through at most: it comes to an end on any site, and for
+the same input on any machine with the same layout."""
 UNTIL_ONE_HOLDS = 0.4
 """Share of the progress until there is a layout that holds."""
 
@@ -132,6 +135,11 @@ class LayoutSearch:
             self.was_stopped = True
         return best
 
+    @property
+    def is_spent(self) -> bool:
+        """Whether predictions have gone through as many sightings as a search may take."""
+        return self._limits.predicted_sightings >= MOST_SIGHTINGS
+
     def bound(self) -> int:
         """Fewest new reflectors that visibility and the information that limits ask for leave possible.
 
@@ -184,6 +192,8 @@ class LayoutSearch:
         """Exchange, add and take out reflectors until a layout holds, or nothing more can be asked for."""
         patience = PATIENCE
         for number in range(FIRST_ROUNDS):
+            if self.is_spent:
+                break
             self._report(0.1 + (UNTIL_ONE_HOLDS - 0.1) * number / (number + 20.0), "choosing reflectors")
             if self._holds(taken, ROWS_AT_FIRST):
                 return True, taken
@@ -247,7 +257,7 @@ class LayoutSearch:
     def _one_fewer(self, best: BoolArray, left: int, rng: np.random.Generator) -> tuple[BoolArray | None, int]:
         """Look for a layout of one reflector less that holds, judging `left` of them at most; return those left."""
         taken, restarts = without_one(self._system, best), 0
-        while left > 0:
+        while left > 0 and not self.is_spent:
             self._report(1.0 - (1.0 - UNTIL_ONE_HOLDS) * left / self._options.checks, "doing with fewer")
             tried = exchanged(self._system, taken, SHRINKING, self._step)
             if self._system.lacking(tried).any():

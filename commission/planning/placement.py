@@ -96,7 +96,7 @@ def choose(
         at_least=search.bound(),
         candidates=centers,
         unmet=search.unmet(taken),
-        was_ended=search.was_stopped,
+        was_ended=search.was_stopped or search.is_spent,
     )
 
 
