@@ -50,7 +50,12 @@ class Needs:
         return self._needs[: self._count]
 
     def add(self, gains: FloatArray, needs: FloatArray) -> None:
-        """Append rows (K, C) and (K,); what all columns together do not reach is needed as far as they do."""
+        """Append rows (K, C) and (K,); what all columns together do not reach is needed as far as they do.
+
+        Raises ValueError for gains that are not finite, or a need that is no number: no set would ever fulfil them.
+        """
+        if not np.isfinite(gains).all() or np.isnan(needs).any():
+            raise ValueError("rows hold gains or needs that are not numbers; expected finite gains")
         needs = np.minimum(needs, gains.sum(axis=1) * (1.0 - 1e-3))
         last = self._count + len(needs)
         if last > len(self._needs):
@@ -189,7 +194,7 @@ def _best_swap(system: Needs, taken: BoolArray, weights: Gains, is_barred: BoolA
     missing = system.missing(taken)
     outs = movable[np.argsort(_missed(system, missing, movable, weights), kind="stable")[:OUT_TRIED]]
     rows = np.flatnonzero(missing > 0.0)
-    worth = np.minimum(system.gains[:, rows], missing[rows]) @ weights[rows]
+    worth = _weighted(np.minimum(system.gains[:, rows], missing[rows]), weights[rows])
     worth[taken | is_barred] = 0.0
     ins = np.argsort(-worth, kind="stable")[:IN_TRIED]
     ins = ins[worth[ins] > 0.0]
@@ -203,7 +208,7 @@ def _best_swap(system: Needs, taken: BoolArray, weights: Gains, is_barred: BoolA
         if len(columns) == 0:
             continue
         still = np.maximum(without[rows] - system.gains[np.ix_(columns, rows)], 0.0)
-        lack = still @ weights[rows]
+        lack = _weighted(still, weights[rows])
         index = int(lack.argmin())
         if lack[index] < least:
             best, least = (out, int(columns[index])), float(lack[index])
@@ -212,4 +217,15 @@ def _best_swap(system: Needs, taken: BoolArray, weights: Gains, is_barred: BoolA
 
 def _missed(system: Needs, missing: Gains, movable: IntArray, weights: Gains) -> Gains:
     """(n,) weighted lack that comes without each of the movable columns, where a set misses so much."""
-    return np.maximum(np.minimum(system.gains[movable] + missing, system.gains[movable]), 0.0) @ weights
+    lost = np.maximum(np.minimum(system.gains[movable] + missing, system.gains[movable]), 0.0)
+    return _weighted(lost, weights)
+
+
+def _weighted(lacks: Gains, weights: Gains) -> Gains:
+    """(n,) sums of (n, R) lacks by the weights of their rows; both are finite (`Needs.add`).
+
+    The library behind the product computes in lanes of which some hold what is left from before, and so may raise the
+    processor's flag of an invalid operation for finite numbers (numpy issue 24067, OpenBLAS issue 1924).
+    """
+    with np.errstate(invalid="ignore"):
+        return lacks @ weights

@@ -95,3 +95,14 @@ def test_needs_that_no_set_meets_are_asked_for_as_far_as_all_columns_reach() -> 
     everything = grown(system, choice.fixed)
     assert everything.all()
     assert not system.lacking(everything).any()
+
+
+@pytest.mark.parametrize(("gain", "need"), [(np.nan, 1.0), (np.inf, 1.0), (-np.inf, 1.0), (1.0, np.nan)])
+def test_rows_that_hold_no_numbers_are_refused(gain: float, need: float) -> None:
+    system, _ = system_of(0)
+    gains = np.ones((1, COLUMNS))
+    gains[0, 3] = gain
+    with pytest.raises(ValueError, match="expected finite gains"):
+        system.add(gains, np.array([need]))
+    system.add(np.ones((1, COLUMNS)), np.array([np.inf]))
+    assert np.isfinite(system.lacking(np.zeros(COLUMNS, np.bool_))).all()
