@@ -35,6 +35,8 @@ from commission.site.scanner import Scanner
 
 # Points are handled in squares of this edge [m]: whether a whole square sees a reflector is often one answer.
 BUCKET = 2.0
+# Buckets along the edge of a block of them.
+BLOCK_EDGE = 8
 # Bearings this far outside the field of view still count [rad]: the last beam of a scan is rounded too.
 BEARING_TOLERANCE = 1e-9
 # A ray to a plate that is drawn inside a wall ends this far in front of the wall [m].
@@ -338,9 +340,15 @@ def unpack(mask: BitMask, reflectors: int) -> BoolArray:
 
 
 def buckets(points: FloatArray) -> tuple[IntArray, IntArray]:
-    """Group points (N, 2) by squares of the plane: their indices bucket by bucket, and where each bucket starts."""
+    """Group points (N, 2) by squares of the plane: their indices bucket by bucket, and where each bucket starts.
+
+    Buckets come block by block: what is near to a block and looked at for each of its buckets then stays in the caches,
+    however wide the floor is.
+    """
     cells = np.floor((points - points.min(axis=0)) / BUCKET).astype(np.int64)
-    keys = cells[:, 1] * (cells[:, 0].max() + 1) + cells[:, 0]
+    blocks, within_block = cells // BLOCK_EDGE, cells % BLOCK_EDGE
+    keys = blocks[:, 1] * (blocks[:, 0].max() + 1) + blocks[:, 0]
+    keys = (keys * BLOCK_EDGE + within_block[:, 1]) * BLOCK_EDGE + within_block[:, 0]
     order = np.argsort(keys, kind="stable")
     changes = np.flatnonzero(np.diff(keys[order])) + 1
     return order, np.concatenate(([0], changes, [len(points)])).astype(np.int64)
