@@ -129,6 +129,19 @@ def test_what_cannot_be_met_is_named_by_route_and_metre():
     assert 7 in next(unmet for unmet in found.unmet if unmet.reason == "visible").metres
 
 
+def test_a_search_that_has_predicted_enough_ends_and_says_so_and_what_does_not_hold(monkeypatch):
+    demands = Demands(visible=2, position_limit=0.03)
+    options = PlacementOptions(demands=demands)
+    whole = place(hall(parameters=POOR), options=options)
+    assert not whole.was_ended
+    monkeypatch.setattr("commission.planning.layout_search.MOST_SIGHTINGS", 1)
+    ended = place(hall(parameters=POOR), options=options)
+    assert ended.was_ended
+    # It has only seen to visibility: what it lacks is named, and by no fewer than hold.
+    assert not holds(hall(parameters=POOR), ended.reflectors, demands)
+    assert {unmet.reason for unmet in ended.unmet} == {"uncertainty"}
+
+
 def test_an_open_field_has_no_candidates():
     found = place(open_field([(3.0, 2.0)]))
     assert found.added == 0
