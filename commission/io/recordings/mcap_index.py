@@ -111,8 +111,19 @@ class McapIndex:
         """Numbers of the channels of a topic that have messages."""
         return tuple(n for n, channel in self.announced.channels.items() if channel.topic == topic and n in self.places)
 
-    def content(self, chunk: int) -> bytes:
-        """Return the records of a chunk, unpacked; raises FileFormatError where they are damaged."""
+    def content(self, chunk: int, *, is_checked: bool = True) -> bytes:
+        """Return the records of a chunk, unpacked.
+
+        Parameters
+        ----------
+        chunk : its index.
+        is_checked : whether its checksum is; without, it does not stay at hand.
+
+        Raises
+        ------
+        FileFormatError
+            it is damaged.
+        """
         with self._lock:
             if chunk in self._kept:
                 self._kept.move_to_end(chunk)
@@ -126,9 +137,11 @@ class McapIndex:
             try:
                 if len(data) != place.packed:
                     raise ValueError("it ends early")
-                content = mcap.unpacked(data, place.compression, place.unpacked, place.crc)
+                content = mcap.unpacked(data, place.compression, place.unpacked, place.crc if is_checked else 0)
             except (ValueError, RuntimeError, EOFError) as error:
                 raise self.error(place.begin, f"a damaged chunk ({error})", "a whole file") from error
+            if not is_checked:
+                return content
             self._kept[chunk] = content
             while len(self._kept) > _KEPT:
                 self._kept.popitem(last=False)

@@ -238,13 +238,14 @@ def unpacked(data: bytes, compression: str, size: int, crc: int) -> bytes:
         if len(data) != size:
             raise ValueError(f"{len(data)} bytes where {size} are said")
         return _checked(data, crc)
-    from lz4.frame import LZ4FrameDecompressor  # pyright: ignore[reportMissingTypeStubs]
-    from rosbags.rosbag2.storage_mcap import zstd
-
     # No more is unpacked than is said: a few bytes could unpack into gigabytes.
     if compression == "lz4":
+        from lz4.frame import LZ4FrameDecompressor  # pyright: ignore[reportMissingTypeStubs]
+
         content = LZ4FrameDecompressor().decompress(data, max_length=size + 1)
     elif compression == "zstd":
+        from rosbags.rosbag2.storage_mcap import zstd
+
         try:
             content = zstd.ZstdDecompressor().decompress(data, max_length=size + 1)
         except zstd.ZstdError as error:

@@ -61,7 +61,7 @@ class McapRecording(WholeRecording):
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._index = McapIndex(path)
+        self._index: McapIndex | None = McapIndex(path)
         self._said = self._index.metadata.get(METADATA, {})
         version = self._said.get("version")
         if version != VERSION:
@@ -107,8 +107,11 @@ class McapRecording(WholeRecording):
         takers = {DISPLACEMENTS: moved.take, REFERENCES: referred.take}
         for topic, (ranges, beams), pairs in zip(topics, scans, detected, strict=True):
             takers |= {topic: ranges.take, beams_topic(topic): beams.take, detected_topic(topic): pairs.take}
-        read_columns(self._index, takers)
-        notes = [f"{self.path.name} was cut while it was recorded; it is read up to there"] * self._index.is_cut
+        index, self._index = self._index or McapIndex(self.path), None
+        read_columns(index, takers)
+        # What scans still need is in their own places.
+        index.places.clear()
+        notes = [f"{self.path.name} was cut while it was recorded; it is read up to there"] * index.is_cut
         odometry = motion.composed(moved.stamps_ns.array(), moved.rows.array())
         notes += _told("rows of odometry", odometry.disordered, odometry.repeated, "composed")
         reference_stamps, reference_poses = referred.stamps_ns.array(), referred.rows.array()
@@ -116,11 +119,11 @@ class McapRecording(WholeRecording):
         notes += _told("reference poses", late, repeated, "left out")
         stores: list[ScanStore] = []
         for scanner, (ranges, beams) in enumerate(scans):
-            found, told = self._scans(scanner, ranges, beams)
+            found, told = self._scans(index, scanner, ranges, beams)
             notes += told
             stores += [] if found is None else [found]
         detections = self._detections(detected)
-        if not (len(odometry.stamps_ns) or len(rows) or stores or len(detections[0])):
+        if not (len(odometry.stamps_ns) or len(reference_stamps) or stores or len(detections[0])):
             raise FileFormatError(self.path, "", "holds no record", "a recording of a drive")
         self._check(odometry.rows, "displacements")
         return RecordLog(
@@ -139,7 +142,9 @@ class McapRecording(WholeRecording):
             notes=tuple(notes),
         )
 
-    def _scans(self, scanner: int, found: ScanColumns, exact: BeamColumns) -> tuple[ScanStore | None, list[str]]:
+    def _scans(
+        self, index: McapIndex, scanner: int, found: ScanColumns, exact: BeamColumns
+    ) -> tuple[ScanStore | None, list[str]]:
         """Scans of one scanner, in memory or in the file by their size, and what was mended."""
         # The one stands behind the other: where the file is cut between them, one is left over.
         count = min(len(found.stamps_ns.array()), len(exact.stamps_ns.array()))
@@ -164,7 +169,7 @@ class McapRecording(WholeRecording):
             limits=found.limits.array()[:count],
         )
         store = McapScans(
-            index=self._index,
+            index=index,
             places=places.chosen(rows),
             stamps_ns=stamps[rows],
             angle_min=angles[rows, 0],

@@ -34,7 +34,7 @@ class ScanPlaces:
     limits: NDArray[np.float32]
     """(K, 2) least and largest range that the scanner measures, as the message says [m]."""
 
-    def chosen(self, rows: IntArray) -> ScanPlaces:
+    def chosen(self, rows: IntArray | slice) -> ScanPlaces:
         """Return those of some scans."""
         return ScanPlaces(
             chunks=self.chunks[rows],

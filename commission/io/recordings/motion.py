@@ -80,6 +80,8 @@ def composed(stamps_ns: IntArray, displacements: FloatArray) -> Sorted:
     stamps_ns : (N,) as they came [ns].
     displacements : (N, 3) motion since the row before, in the base frame of the row before [m, m, rad].
     """
+    if len(stamps_ns) < 2 or int(np.diff(stamps_ns).min()) > 0:
+        return Sorted(stamps_ns=stamps_ns, rows=displacements, disordered=0, repeated=0)
     order = np.argsort(stamps_ns, kind="stable")
     stamps, rows = stamps_ns[order], displacements[order].copy()
     if not (stamps[1:] == stamps[:-1]).any():

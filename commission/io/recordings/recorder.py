@@ -35,6 +35,10 @@ VERSION = "1"
 DISPLACEMENTS, REFERENCES = "/commission/displacement", "/commission/reference"
 ESTIMATE, POINTS, MODE = "/commission/estimate", "/commission/detections", "/commission/mode"
 _ODOMETRY, _REFERENCE, _TF, _TF_STATIC = "/odom", "/reference", "/tf", "/tf_static"
+_CHUNK_BYTES = 4_000_000
+"""Bytes of a chunk, at most."""
+_LONG_S = 600.0
+"""Time of a chunk where nothing is lost that could not be written again [s]: few and large ones open fast."""
 _SMALL = "lz4"
 """Compression of everything but scans, whose noise does not shrink: poses have 36 zeros of covariance."""
 
@@ -49,6 +53,7 @@ class Recorder:
     truth : the constants of a virtual drive.
     reference_mount : where the reference measures.
     mounted : the vehicle's scanners, for viewers: where on it their scans are drawn.
+    chunk_s : what comes within this time is written at once, and lost where the program is killed before [s].
     file : an empty file to write into instead; it is not closed.
 
     Raises
@@ -65,6 +70,7 @@ class Recorder:
         truth: Truth | None = None,
         reference_mount: ReferenceMount = BASE,
         mounted: Sequence[Scanner] = (),
+        chunk_s: float = 1.0,
         file: IO[bytes] | None = None,
     ) -> None:
         self.path = path
@@ -77,7 +83,7 @@ class Recorder:
         """Latest stamp [ns]."""
         self._is_owner = file is None
         self._file = _opened(path) if file is None else file
-        self._writer = McapWriter(path, self._file)
+        self._writer = McapWriter(path, self._file, chunk_bytes=_CHUNK_BYTES, chunk_ns=round(chunk_s * 1e9))
         self._channels: dict[str, int] = {}
         self._topics = scanner_topics(self.scanners)
         self._pose = np.zeros(3)
@@ -222,7 +228,7 @@ def write_mcap(
         the file cannot be written, or a stamp is none that ROS can hold.
     """
     with atomic_file(path) as file:
-        recorder = Recorder(path, scanners, truth=truth, reference_mount=reference_mount, file=file)
+        recorder = Recorder(path, scanners, truth=truth, reference_mount=reference_mount, chunk_s=_LONG_S, file=file)
         for record in records:
             recorder.append(record)
         recorder.close()

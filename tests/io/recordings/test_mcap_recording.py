@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
@@ -283,3 +284,42 @@ def test_virtual_drive_is_written_as_mcap_and_localized_as_from_a_folder(
     capsys.readouterr()
     one, two = ((tmp_path / f"{out} result" / "estimates.csv").read_bytes() for out in ("drive", "drive.mcap"))
     assert one == two
+
+
+def test_memory_does_not_grow_with_the_scans(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mcap_recording, "IN_MEMORY", 0)
+    beams, count = 1081, 8000
+    ranges = np.random.default_rng(1).uniform(1.0, 30.0, beams).astype(np.float32)
+    scans = (
+        Scan(stamp_ns=step * 40_000_000, ranges=ranges, angle_min=-2.0, angle_increment=0.004) for step in range(count)
+    )
+    write_mcap(tmp_path / "long.mcap", scans)
+    size = (tmp_path / "long.mcap").stat().st_size
+
+    tracemalloc.start()
+    try:
+        log = load_log(tmp_path / "long.mcap")
+        for first in range(0, count, 500):
+            assert log.scans[0].block(first, first + 500).ranges[-1, -1] == ranges[-1]
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+    assert size > count * beams * 4
+    # Three chunks of 4 MB are kept, and a block of 2 MB is made.
+    assert peak < 22_000_000 < size / 1.5
+
+
+def test_damaged_scan_in_a_large_file_is_told_when_it_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mcap_recording, "IN_MEMORY", 0)
+    path = tmp_path / "drive.mcap"
+    write_mcap(path, steps(), scanners=NAMES)
+    content = bytearray(path.read_bytes())
+    place = content.index(np.full(5, 4.0, np.float32).tobytes())
+    content[place] ^= 1
+    path.write_bytes(content)
+
+    log = load_log(path)
+
+    with pytest.raises(FileFormatError, match="its checksum is another"):
+        log.scans[0].scan(3)
