@@ -38,9 +38,10 @@ class Localize:
     or a capture (.pcap, .pcapng)."""
     out: Annotated[Path, arg(metavar="DIR")]
     """Folder for the results; made when it does not exist."""
-    initial_pose: Annotated[str | None, arg(metavar="X,Y,THETA[,SX,SY,STHETA]")] = None
-    """Pose of base at the first record and its 1-sigma, map frame [m, m, rad]. None: the first reference pose, else the
-    start of the project's first route, with 1-sigma 0.02 m and 0.01 rad."""
+    initial_pose: Annotated[str | None, arg(metavar="X,Y,THETA[,SX,SY,STHETA]|auto")] = None
+    """Pose of base at the first record and its 1-sigma, map frame [m, m, rad]; auto: it is looked for in the whole map
+    by what is seen. None: the first reference pose, else the start of the project's first route, with 1-sigma 0.02 m
+    and 0.01 rad, else auto."""
     reference_antenna: Annotated[str | None, arg(metavar="X,Y[,Z]")] = None
     """Point of the vehicle whose place the reference measures, base frame [m]. None: as the recording's reference.json
     says, else base."""
@@ -68,7 +69,8 @@ class Localize:
 
     def run(self) -> None:
         """Localize, write, and tell in a few lines how it went."""
-        given = None if self.initial_pose is None else initial_pose(self.initial_pose)
+        searched = self.initial_pose == "auto"
+        given = None if self.initial_pose is None or searched else initial_pose(self.initial_pose)
 
         from commission.errors import SourceError
         from commission.io.overwriting import result_folder
@@ -86,7 +88,7 @@ class Localize:
         from commission.studies.run_findings import run_findings
         from commission.studies.scanner_figures import figures_entries
         from commission.studies.sections import section_entries, sections
-        from commission.studies.start import start_of
+        from commission.studies.start import start_of, unknown_start
 
         sources = (self.recording, self.project)
         out = result_folder(self.out, "localize", RESULTS, force=self.force, sources=sources)
@@ -97,7 +99,8 @@ class Localize:
         if not has_motion(log):
             found = "holds no odometry: between scans nobody knows where the vehicle went"
             raise SourceError(f"{self.recording} {found}; expected odometry, in a bag by --channel odometry=TOPIC")
-        start = start_of(project, log, given and given.pose, given and given.sigmas)
+        pose, sigmas = given and given.pose, given and given.sigmas
+        start = unknown_start(project, log) if searched else start_of(project, log, pose, sigmas)
         if self.strict:
             for finding in plausibility(PlausibilityInput.of(project, log)):
                 raise SourceError(f"{self.recording}: {finding}")
@@ -183,13 +186,11 @@ def _report(result: RunResult, cut: Sequence[Section]) -> list[str]:
     """Lines that tell a person how the run went; millimetres and degrees as is the habit."""
     from commission.localization.estimate import Status
 
-    start = result.inputs.start
     fits = result.consistency
     limit = result.inputs.segments[0].setup.parameters.supervisor.position_limit
-    x, y, theta = start.belief.mean
     lines = [
         f"Recording    {result.cycles} cycles in {result.duration:.1f} s",
-        f"Start        x {x:.3f} m, y {y:.3f} m, heading {PLAIN_DEGREES.text(theta, '.1f')} ({start.origin.value})",
+        f"Start        {_start(result)}",
         f"Detections   {result.count(Status.INLIER)} inliers, "
         f"{result.count(Status.OUTLIER_DETECTOR)} outliers of the detector, "
         f"{result.count(Status.OUTLIER_ASSOCIATION)} of the association",
@@ -238,6 +239,24 @@ def _nis(fits: Consistency) -> str:
         f"{accepted}, {fits.nis_before_gate_mean:.2f} of all near a reflector; "
         f"{_known(PERCENT.of(fits.rejected_fraction), 1)} % rejected"
     )
+
+
+def _start(result: RunResult) -> str:
+    """Where the run starts and who says so; a vehicle that looks for itself: where and when it was found."""
+    import numpy as np
+
+    from commission.localization.estimate import Mode
+    from commission.studies.start import StartOrigin
+
+    start = result.inputs.start
+    (x, y, theta), when = start.belief.mean, ""
+    if start.origin is StartOrigin.SEARCH:
+        found = np.flatnonzero(result.columns.modes != Mode.INITIALIZING)
+        if not len(found):
+            return f"{start.origin.value}; not found"
+        x, y, theta = result.columns.means[found[0]]
+        when = f"; found after {result.times[found[0]]:.1f} s"
+    return f"x {x:.3f} m, y {y:.3f} m, heading {PLAIN_DEGREES.text(theta, '.1f')} ({start.origin.value}{when})"
 
 
 def _known(figure: float, digits: int = 2) -> str:

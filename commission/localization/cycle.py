@@ -61,6 +61,7 @@ def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
         state.sensor_detects,
         state.pivot,
         state.cross,
+        state.search,
     )
 
 
@@ -192,6 +193,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
             state.sensor_detects,
             pivot,
             state.cross,
+            state.search,
         ),
     )
 

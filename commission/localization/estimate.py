@@ -20,6 +20,8 @@ class Mode(IntEnum):
     """The covariance is too large, or was so and no detections confirm the pose yet: the output is withheld."""
     LOST = 2
     """Too many detections fit no reflector, however small the covariance is: the output is withheld."""
+    INITIALIZING = 3
+    """Nobody has said where the vehicle is, and it has not been found yet: there is no output."""
 
 
 class Status(IntEnum):

@@ -9,16 +9,26 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
+from numpy.typing import NDArray
 
 from commission.errors import SourceError
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.cross_covariance import columns_of, cross_covariance
-from commission.localization.cycle import process_odometry, process_scan, room_for_scans
+from commission.localization.cycle import Cycle, process_odometry, process_scan, room_for_scans
 from commission.localization.detector import DetectedReflectors, detect, status_of_reported
 from commission.localization.estimate import Belief, Estimate, Mode
 from commission.localization.observation import project_detections
 from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import to_belief
+from commission.localization.relocalization import (
+    SeenScan,
+    associate_nothing,
+    is_sought,
+    searching_odometry,
+    sought,
+    unlocated,
+)
+from commission.localization.search_map import SearchMap, search_map
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, belief_of, output_of, state_at_start
 from commission.localization.sweep import Sweep, bring_to_stamp
@@ -69,6 +79,7 @@ class Localizer:
         self._state = state_at_start(start) if isinstance(start, Belief) else start
         self._newest_ns = self._horizon_ns = self._state.newest_ns
         self._waiting: deque[Record] = deque()
+        self._map: SearchMap | None = None
 
     @property
     def setup(self) -> LocalizerSetup:
@@ -100,7 +111,7 @@ class Localizer:
 
     def replace_setup(self, setup: LocalizerSetup) -> None:
         """Use other parameters (or another map) for what is processed from now on; the state stays."""
-        self._setup = setup
+        self._setup, self._map = setup, None
 
     def feed(self, record: Record) -> tuple[Estimate, ...]:
         """Take in one record, and process what can be processed now: `push`, then every `pull`.
@@ -203,6 +214,9 @@ class Localizer:
         dx, dy, dtheta = self._driven(record)
         noise = self._setup.filter.odometry
         state = self._state
+        if state.search is not None:
+            self._state = searching_odometry(state, record.stamp_ns, (dx, dy, dtheta), noise)
+            return
         moved = process_odometry(state._replace(cross=None), record.stamp_ns, dx, dy, dtheta, noise)
         self._state = moved._replace(cross=state.cross)
 
@@ -217,38 +231,34 @@ class Localizer:
 
     def _process(self, scan: Scan | Detections, seen: DetectedReflectors, following: NextOdometry) -> Estimate:
         """Predict to the scan's stamp, associate, correct, supervise."""
-        model, stamp_ns = self._setup.filter, scan.stamp_ns
+        stamp_ns, before = scan.stamp_ns, self._state
         measured = read_only(seen.range_bearing)
         detections = self._at_stamp(scan.scanner, measured, following)
         count = len(detections)
         status = seen.status.copy()
         reflector: IntArray = np.empty(count, dtype=np.int64)
         d2 = np.empty(count)
-        constants = self._setup.constants
-        cross = columns_of(self._state.cross, constants)
-        room = room_for_scans(cross, count)
-        cycle = process_scan(
-            self._state._replace(cross=None),
-            stamp_ns,
-            0,
-            count,
-            detections,
-            model,
-            self._setup.observations[scan.scanner],
-            self._setup.index.places,
-            self._setup.index.offsets,
-            cross,
-            room.work,
-            room.aims,
-            room.busy,
-            scan.scanner,
-            status,
-            reflector,
-            d2,
-            following,
-        )
-        self._state = cycle.state._replace(cross=cross_covariance(cross, constants))
-        posterior = belief_of(cycle.state)
+        if before.mode == Mode.INITIALIZING:
+            associate_nothing(status, reflector, d2)
+            cycle = unlocated(before, stamp_ns, following, self._setup.filter.odometry)
+        else:
+            cycle = self._filtered(scan, detections, following, (status, reflector, d2))
+        self._state = cycle.state
+        if not is_sought(before, self._setup.filter.limits):
+            self._state = cycle.state._replace(search=None)
+        if is_sought(before, self._setup.filter.limits) or is_sought(self._state, self._setup.filter.limits):
+            if self._map is None:
+                self._map = search_map(self._setup)
+            scan_seen = SeenScan(
+                stamp_ns=stamp_ns,
+                detections=detections,
+                status=seen.status,
+                scanner=scan.scanner,
+                observation=self._setup.observations[scan.scanner],
+                following=following,
+            )
+            self._state = sought(before, cycle.state, scan_seen, self._map)
+        posterior = belief_of(self._state)
         offsets = np.array((0, count), dtype=np.int64)
         scanners = np.array((scan.scanner,), dtype=np.int64)
         points = project_detections(
@@ -258,7 +268,7 @@ class Localizer:
             stamp_ns=stamp_ns,
             prior=to_belief(cycle.prior, stamp_ns),
             posterior=posterior,
-            output=output_of(cycle.state),
+            output=output_of(self._state),
             mode=self.mode,
             detections=detections,
             measured=measured,
@@ -268,6 +278,38 @@ class Localizer:
             status=status,
             reflector=reflector,
             d2=d2,
-            gate=model.gate.d2,
+            gate=self._setup.filter.gate.d2,
             scanner=scan.scanner,
         )
+
+    def _filtered(
+        self,
+        scan: Scan | Detections,
+        detections: FloatArray,
+        following: NextOdometry,
+        written: tuple[NDArray[np.int8], IntArray, FloatArray],
+    ) -> Cycle:
+        """Let the filter process a scan; what becomes of its detections is written."""
+        constants = self._setup.constants
+        cross = columns_of(self._state.cross, constants)
+        room = room_for_scans(cross, len(detections))
+        cycle = process_scan(
+            self._state._replace(cross=None, search=None),
+            scan.stamp_ns,
+            0,
+            len(detections),
+            detections,
+            self._setup.filter,
+            self._setup.observations[scan.scanner],
+            self._setup.index.places,
+            self._setup.index.offsets,
+            cross,
+            room.work,
+            room.aims,
+            room.busy,
+            scan.scanner,
+            *written,
+            following,
+        )
+        state = cycle.state._replace(cross=cross_covariance(cross, constants), search=self._state.search)
+        return Cycle(cycle.prior, state)

@@ -16,12 +16,22 @@ from commission.localization.cross_covariance import columns_of, cross_covarianc
 from commission.localization.cycle import process_odometry, process_scan, room_for_scans
 from commission.localization.detection_log import DetectionLog
 from commission.localization.observation import observation_at
-from commission.localization.odometry import NextOdometry, waits_until
+from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.priors import PriorRows
+from commission.localization.relocalization import (
+    SeenScan,
+    associate_nothing,
+    is_sought,
+    searching_odometry,
+    sought,
+    unlocated,
+)
 from commission.localization.run_columns import RunColumns
+from commission.localization.search_map import SearchMap, search_map
 from commission.localization.setup import FilterModel, LocalizerSetup
 from commission.localization.state import FilterState
+from commission.localization.supervisor import INITIALIZING, LOST
 from commission.localization.sweep import bring_to_stamp, sweep_at
 from commission.localization.wheel_scale import as_driven
 from commission.site.record_log import RecordLog
@@ -140,13 +150,107 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
     stretch : what to go over, and where its cycles are written.
     """
     own, detected = log.detection_stamps_ns, stretch.detected
-    first, last = stretch.rows
+    done, (row, end), count = 0, stretch.rows, len(detected)
+    search: SearchMap | None = None
+    while True:
+        if state.search is None:
+            state, cycles, rows = _tracked(log, setup, state, _part(stretch, (done, count), (row, end)))
+        elif done < count:
+            search = search or search_map(setup)
+            cycles, rows = 1, _until(log, int(detected.stamps_ns[done]), (row, end))
+            state = _searched(log, setup, search, state, _part(stretch, (done, done + 1), (row, row + rows)))
+        else:
+            cycles, rows = 0, end - row
+            state = _carried(log, setup, state, (row, end))
+        done, row = done + cycles, row + rows
+        if is_sought(state, setup.filter.limits) and state.search is None:
+            # The scan that told so is the first one of the search.
+            search = search or search_map(setup)
+            state = sought(state, state, _seen(setup, _part(stretch, (done - 1, done), (row, row)), NOT_YET), search)
+        if done == count and row == end:
+            break
+    if len(own) and count and detected.stamps_ns[-1] >= own[0]:
+        return state._replace(sensor_detects=True)
+    return state
+
+
+def _part(stretch: CycleStretch, cycles: tuple[int, int], rows: tuple[int, int]) -> CycleStretch:
+    """Cut some cycles and some rows of odometry out of a stretch."""
+    if cycles == (0, len(stretch.detected)):
+        return stretch._replace(rows=rows)
+    here = slice(*cycles)
+    priors = PriorRows(stretch.priors.means[here], stretch.priors.covariances[here])
+    return CycleStretch(rows, stretch.detected.part(*cycles), cut(stretch.columns, stretch.detected, *cycles), priors)
+
+
+def _until(log: RecordLog, stamp_ns: int, rows: tuple[int, int]) -> int:
+    """Rows of odometry that are delivered before a scan."""
+    return int(np.searchsorted(log.odometry_stamps_ns[slice(*rows)], stamp_ns, side="right"))
+
+
+def _carried(log: RecordLog, setup: LocalizerSetup, state: FilterState, rows: tuple[int, int]) -> FilterState:
+    """Take in odometry while a search is on."""
+    for row in range(*rows):
+        stamp_ns, displacement = int(log.odometry_stamps_ns[row]), log.displacements[row].tolist()
+        state = searching_odometry(state, stamp_ns, (*displacement,), setup.filter.odometry)
+    return state
+
+
+def _seen(setup: LocalizerSetup, cycle: CycleStretch, following: NextOdometry) -> SeenScan:
+    """Return what the scan of a single cycle saw."""
+    scanner = int(cycle.detected.scanners[0])
+    settled = cycle.columns.settled
+    return SeenScan(
+        stamp_ns=int(cycle.detected.stamps_ns[0]),
+        detections=settled if len(settled) else cycle.detected.range_bearing,
+        status=cycle.detected.status,
+        scanner=scanner,
+        observation=setup.observations[scanner],
+        following=following,
+    )
+
+
+def _searched(
+    log: RecordLog, setup: LocalizerSetup, search: SearchMap, state: FilterState, cycle: CycleStretch
+) -> FilterState:
+    """Go over a single cycle while a search is on; what it has found is written in place of what the filter has."""
+    state = _carried(log, setup, state, cycle.rows)
+    stamp_ns, row = int(cycle.detected.stamps_ns[0]), cycle.rows[1]
+    following = NOT_YET
+    if row < len(log.odometry_stamps_ns) and log.odometry_stamps_ns[row] <= waits_until(state.motion, stamp_ns):
+        following = NextOdometry(True, int(log.odometry_stamps_ns[row]), *log.displacements[row].tolist())
+    columns, scanner = cycle.columns, int(cycle.detected.scanners[0])
+    if state.mode == INITIALIZING:
+        if len(columns.settled):
+            measured, sweep = cycle.detected.range_bearing, sweep_at(setup.sweep_rows, scanner)
+            rows = (0, len(measured))
+            bring_to_stamp(
+                state.motion, following, *rows, measured, sweep, setup.observations[scanner], columns.settled
+            )
+        prior, after = unlocated(state, stamp_ns, following, setup.filter.odometry)
+        associate_nothing(columns.status, columns.reflectors, columns.d2)
+        _write_belief(prior, 0, cycle.priors.means, cycle.priors.covariances)
+    else:
+        after, _, _ = _tracked(log, setup, state._replace(search=None), cycle._replace(rows=(row, row)))
+        if not is_sought(state, setup.filter.limits):
+            return after
+    state = sought(state, after, _seen(setup, cycle, following), search)
+    _write_belief(state.belief, 0, columns.means, columns.covariances)
+    columns.modes[0] = state.mode
+    return state
+
+
+def _tracked(
+    log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch: CycleStretch
+) -> tuple[FilterState, int, int]:
+    """Go over a stretch until the vehicle is lost; return the state, and how many cycles and rows that took."""
+    detected, (first, last) = stretch.detected, stretch.rows
     # One row more than is delivered: the last scans may lie between it and the row before.
     rows = slice(first, last + 1)
     cross = columns_of(state.cross, setup.constants)
     settled = stretch.columns.settled
     room = room_for_scans(cross, int(np.diff(detected.offsets).max(initial=0)))
-    after = _run(
+    after, cycles, delivered = _run(
         read_only(log.odometry_stamps_ns[rows]),
         read_only(as_driven(log.displacements[rows], setup.parameters.odometry)),
         last - first,
@@ -169,10 +273,8 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
         stretch.priors,
     )
     # Odometry alone changes nothing of it, nor does another setup before its first scan.
-    state = after._replace(cross=cross_covariance(cross, setup.constants) if len(detected) else state.cross)
-    if len(own) and len(detected) and detected.stamps_ns[-1] >= own[0]:
-        return state._replace(sensor_detects=True)
-    return state
+    cross_after = cross_covariance(cross, setup.constants) if len(detected) else state.cross
+    return after._replace(cross=cross_after), cycles, delivered
 
 
 @compiled
@@ -197,8 +299,10 @@ def _run(  # noqa: PLR0917 - the columns of the log
     state: FilterState,
     columns: Columns,
     priors: PriorRows,
-) -> FilterState:
-    """Deliver odometry and scans in the order of their stamps, odometry first; return the state after the last.
+) -> tuple[FilterState, int, int]:
+    """Deliver odometry and scans in the order of their stamps, odometry first, until the vehicle is lost.
+
+    Returns the state after the last record, and how many scans and rows of odometry were delivered.
 
     Of the odometry the rows up to `delivered`; the one behind them only tells the motion of scans before it. Where
     there are sweeps, `detections` is a view of the column `settled`, which is written before it is read.
@@ -242,11 +346,13 @@ def _run(  # noqa: PLR0917 - the columns of the log
         _write_belief(cycle.prior, k, priors.means, priors.covariances)
         _write_belief(state.belief, k, means, covariances)
         modes[k] = state.mode
+        if state.mode == LOST and model.limits.find_again:
+            return state, k + 1, rows
     while rows < delivered:
         dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
         state = process_odometry(state, odometry_stamps[rows], dx, dy, dtheta, model.odometry)
         rows += 1
-    return state
+    return state, len(scan_stamps), rows
 
 
 @compiled_inline

@@ -13,6 +13,7 @@ from commission.localization.estimate import Belief, Mode
 from commission.localization.odometry import AT_REST, Motion
 from commission.localization.pose_gaussian import PoseGaussian, from_belief, to_belief
 from commission.localization.rejection import NO_EVIDENCE, Evidence
+from commission.localization.search_state import Search, new_search
 
 NO_RECORD_NS = -(2**63)
 """Stamp of the newest record before there is one: no stamp is older [ns]."""
@@ -43,6 +44,8 @@ class FilterState(NamedTuple):
     """Where the belief was after the newest scan [m]: `cross` is about that place."""
     cross: CrossCovariance | None
     """Covariance with the considered constants; None: all are zero. Kernels are handed its array, and None here."""
+    search: Search | None = None
+    """What is known of a vehicle that is lost or not located yet; None while it knows where it is, and in kernels."""
 
 
 def state_at_start(initial: Belief) -> FilterState:
@@ -62,6 +65,18 @@ def state_at_start(initial: Belief) -> FilterState:
         pivot=(belief.x, belief.y),
         cross=None,
     )
+
+
+def state_unlocated(stamp_ns: int, anywhere: PoseGaussian) -> FilterState:
+    """Return the state before the first record of a vehicle that is not told where it is.
+
+    Parameters
+    ----------
+    stamp_ns : of the first record [ns].
+    anywhere : a belief as wide as the floor, see `SearchMap`.
+    """
+    unknown = state_at_start(to_belief(anywhere, stamp_ns))
+    return unknown._replace(mode=int(Mode.INITIALIZING), search=new_search(stamp_ns))
 
 
 def belief_of(state: FilterState) -> Belief:

@@ -20,6 +20,7 @@ from commission.site.parameters import SupervisorParameters
 OPERATIONAL = int(Mode.OPERATIONAL)
 FAIL = int(Mode.FAIL)
 LOST = int(Mode.LOST)
+INITIALIZING = int(Mode.INITIALIZING)
 
 
 class SupervisorLimits(NamedTuple):
@@ -30,6 +31,8 @@ class SupervisorLimits(NamedTuple):
     position: float
     heading: float
     recovery_ratio: float
+    find_again: bool = True
+    """Whether a lost vehicle is searched for."""
 
 
 def supervisor_limits(parameters: SupervisorParameters) -> SupervisorLimits:
@@ -40,6 +43,7 @@ def supervisor_limits(parameters: SupervisorParameters) -> SupervisorLimits:
         float(parameters.position_limit),
         float(parameters.heading_limit),
         float(parameters.recovery_ratio),
+        bool(parameters.find_again),
     )
 
 

@@ -304,6 +304,9 @@ class SupervisorParameters:
         int, Quantity(label="Confirmed by", unit="detections", bounds=NOT_NEGATIVE, step=1, slider=(0, 100))
     ] = 20
     """Detections accepted after such doubt until the vehicle may drive; 0: none, as Algorithm 4 has it."""
+    find_again: Annotated[bool, Switch("Search when lost")] = True
+    """Whether a lost vehicle looks for its pose in the whole map, and is lost until one is left. If not, it is believed
+    again as soon as its detections fit."""
 
     def __post_init__(self) -> None:
         check_fields(self, "supervisor.")

@@ -19,6 +19,7 @@ from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_onl
 from commission.geometry.stretches import stretches_of
 from commission.localization.estimate import Mode, Status
 from commission.localization.observation import project_detections
+from commission.localization.relocalization import CONFIRMATIONS
 from commission.localization.run_columns import RunColumns
 from commission.progress import Progress, silent
 from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
@@ -46,6 +47,10 @@ class EventKind(StrEnum):
     """The vehicle may drive again."""
     LOST = "lost"
     """Too many detections fit no reflector."""
+    SEARCHING = "not located"
+    """Nobody has said where the vehicle is: it looks for itself."""
+    FOUND = "found"
+    """Of all places in the map, one is left; the output is still withheld until detections confirm it."""
     JUMP = "jump"
     """One scan moved the estimate far."""
     BLIND = "blind"
@@ -131,7 +136,7 @@ def _modes(run: RunResult) -> Iterator[RunEvent]:
     """Every change of the supervisor's mode; a drive that does not begin operational begins with one."""
     modes, times, limits = run.columns.modes, run.times, limits_along(run.columns)
     before = np.concatenate(([Mode.OPERATIONAL], modes[:-1]))
-    stopped_at = 0.0
+    stopped_at = searched_from = 0.0
     for cycle in np.flatnonzero(modes != before).tolist():
         time, mode = float(times[cycle]), Mode(int(modes[cycle]))
         if mode is Mode.OPERATIONAL:
@@ -140,7 +145,15 @@ def _modes(run: RunResult) -> Iterator[RunEvent]:
         if before[cycle] == Mode.OPERATIONAL:
             stopped_at = time
         if mode is Mode.LOST:
+            searched_from = time
             yield RunEvent(kind=EventKind.LOST, time=time, share=float(run.recent.rejected[cycle]))
+            continue
+        if mode is Mode.INITIALIZING:
+            searched_from = time
+            yield RunEvent(kind=EventKind.SEARCHING, time=time)
+            continue
+        if before[cycle] == Mode.INITIALIZING or (before[cycle] == Mode.LOST and _searches(run, cycle)):
+            yield RunEvent(kind=EventKind.FOUND, time=time, lasts=time - searched_from)
             continue
         yield RunEvent(
             kind=EventKind.FAIL,
@@ -149,6 +162,11 @@ def _modes(run: RunResult) -> Iterator[RunEvent]:
             heading=float(run.two_sigma[cycle, 2]),
             limits=(float(limits[cycle, 0]), float(limits[cycle, 1])),
         )
+
+
+def _searches(run: RunResult, cycle: int) -> bool:
+    """Whether a lost vehicle looks for its place in the map."""
+    return run.columns.segment(cycle).setup.parameters.supervisor.find_again
 
 
 def _blind(run: RunResult) -> Iterator[RunEvent]:
@@ -309,6 +327,10 @@ def told(event: RunEvent) -> str:
             text = f"{PERCENT.text(event.share)} rejected in 1 s" if known else "nothing seen in 1 s"
         case EventKind.JUMP:
             text = f"by {MILLIMETRES.text(event.position)}, {DEGREES.text(event.heading, '.2f')}"
+        case EventKind.SEARCHING:
+            text = "looks for its place in the map"
+        case EventKind.FOUND:
+            text = f"after {event.lasts:.2f} s, the only place left in {CONFIRMATIONS} attempts"
         case EventKind.BLIND:
             text = f"nothing accepted for {event.lasts:.2f} s, {event.position:.2f} m"
         case EventKind.GAP:

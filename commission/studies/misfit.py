@@ -20,6 +20,7 @@ from commission.localization.detection_log import DetectionLog
 from commission.localization.estimate import Belief, Status
 from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
+from commission.localization.state import FilterState
 from commission.progress import Progress, silent
 from commission.site.disturbances import WheelNoise
 from commission.site.quantity import DEGREES, MILLIMETRES, MILLISECONDS, PERCENT
@@ -68,8 +69,8 @@ class MisfitInput(StudyInput):
     """The recording."""
     setup: LocalizerSetup
     """Reflectors, scanners and parameters of the run."""
-    initial: Belief
-    """Belief before the first record."""
+    initial: Belief | FilterState
+    """Belief or state before the first record."""
     run: RunColumns
     """The run with them."""
 
@@ -110,6 +111,8 @@ def misfit(inputs: MisfitInput, progress: Progress = silent) -> tuple[Finding, .
     detected = inputs.run.detected.part(0, min(JUDGED_CYCLES, len(inputs.run)))
     if not len(detected.range_bearing):
         return lost
+    # A wrong setup is judged by how it fits, not by what a search makes of it.
+    inputs = replace(inputs, setup=_tracking(inputs.setup))
     progress(0.0, "as recorded")
     before = _fit(inputs, detected)
     progress(0.1, "mounting")
@@ -123,6 +126,12 @@ def misfit(inputs: MisfitInput, progress: Progress = silent) -> tuple[Finding, .
     lags = tuple(_lag(replace(inputs, setup=trusting(inputs.setup)), detected))
     progress(1.0, "")
     return (*lost, *apart, *biases, *lags)
+
+
+def _tracking(setup: LocalizerSetup) -> LocalizerSetup:
+    """Return the setup with a supervisor that does not search."""
+    supervisor = replace(setup.parameters.supervisor, find_again=False)
+    return replace(setup, parameters=replace(setup.parameters, supervisor=supervisor))
 
 
 def _mounting(inputs: MisfitInput, detected: DetectionLog, before: _Fit) -> Iterator[Finding]:

@@ -208,7 +208,7 @@ def judged_run(
     columns = run_segments(
         log,
         inputs.segments,
-        inputs.start.belief,
+        inputs.start.state(),
         earlier=earlier.columns if earlier is not None and known else None,
         progress=part(progress, 0.0, 1.0 - JUDGING_SHARE),
     )

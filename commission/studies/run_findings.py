@@ -37,7 +37,7 @@ def run_findings(result: RunResult, progress: Progress = silent) -> tuple[Findin
     inputs = MisfitInput(
         log=result.inputs.log,
         setup=result.inputs.segments[0].setup,
-        initial=result.inputs.start.belief,
+        initial=result.inputs.start.state(),
         run=result.columns,
     )
     before = plausibility(recording_input(result), part(progress, 0.0, JUDGED_BEFORE))

@@ -14,6 +14,9 @@ from commission.errors import UsageError
 from commission.geometry.angles import wrap
 from commission.geometry.arrays import frozen
 from commission.localization.estimate import Belief
+from commission.localization.pose_gaussian import from_belief, to_belief
+from commission.localization.search_map import anywhere
+from commission.localization.state import FilterState, state_at_start, state_unlocated
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.routes import Direction, Route
@@ -31,6 +34,7 @@ class StartOrigin(StrEnum):
     REFERENCE = "first reference pose"
     ROUTE = "start of the first route"
     DRIVE = "start of the virtual drive"
+    SEARCH = "not told: searched by what is seen"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,6 +46,31 @@ class Start:
     origin: StartOrigin
     """Who says so."""
 
+    def state(self) -> FilterState:
+        """Return the state of the localizer before the first record."""
+        if self.origin is StartOrigin.SEARCH:
+            return state_unlocated(int(self.belief.stamp_ns), from_belief(self.belief))
+        return state_at_start(self.belief)
+
+
+def unknown_start(project: Project, log: RecordLog) -> Start:
+    """Return the start of a run of which nobody says where it starts: the vehicle looks where it is.
+
+    Parameters
+    ----------
+    project : its reflectors say how large the floor is.
+    log : the recording; not empty, else UsageError.
+    """
+    floor = anywhere(project.reflectors.centers)
+    return Start(to_belief(floor, _first_stamp(log)), StartOrigin.SEARCH)
+
+
+def _first_stamp(log: RecordLog) -> int:
+    """Stamp of the first record [ns]."""
+    if len(log) == 0:
+        raise UsageError("the recording holds no record; expected odometry and scans or detections")
+    return log.first_ns
+
 
 def start_of(
     project: Project,
@@ -52,7 +81,7 @@ def start_of(
     """Return the belief to start a run with.
 
     It is, in this order: the pose given; the first reference pose, if it has a heading and comes within a second of the
-    first record; the start of the project's first route.
+    first record; the start of the project's first route; else the vehicle looks where it is.
 
     Parameters
     ----------
@@ -64,11 +93,9 @@ def start_of(
     Raises
     ------
     UsageError
-        nothing says where the run starts, or the recording is empty.
+        the recording is empty.
     """
-    if len(log) == 0:
-        raise UsageError("the recording holds no record; expected odometry and scans or detections")
-    first_ns = log.first_ns
+    first_ns = _first_stamp(log)
     if pose is not None:
         return Start(belief_at(first_ns, pose, sigmas), StartOrigin.GIVEN)
     known = np.flatnonzero(
@@ -81,10 +108,7 @@ def start_of(
         )
     if project.routes:
         return Start(belief_at(first_ns, route_start(project.routes[0]), sigmas), StartOrigin.ROUTE)
-    raise UsageError(
-        "nothing says where the recording starts: no reference pose within its first second, no route in the project; "
-        "expected an initial pose X,Y,THETA in metres and radians"
-    )
+    return unknown_start(project, log)
 
 
 def belief_at(stamp_ns: int, pose: ArrayLike, sigmas: Sequence[float] | None = None) -> Belief:

@@ -73,24 +73,30 @@ def test_localizer_agrees_with_the_plain_one(plan: Plan, parameters: Parameters)
     parameters = dataclasses.replace(parameters, filter=WHITE)
     setup = LocalizerSetup(with_close_neighbors(rng, random_map(rng, 12)), (Scanner(mounting=MOUNTING),), parameters)
     drive = random_drive(setup, rng, plan)
-    arrays = run(drive.log, setup, drive.initial)
+    whole = run(drive.log, setup, drive.initial)
     plain = PlainLocalizer(setup.reflectors, setup.scanners[0], parameters, drive.initial).run(drive.log)
-    assert len(plain) == len(arrays)
+    assert len(plain) == len(whole)
+    # A lost vehicle is found again; the plain one does not search.
+    again = np.flatnonzero((whole.modes[:-1] == Mode.LOST) & (whole.modes[1:] != Mode.LOST))
+    count = int(again[0]) + 1 if len(again) else len(whole)
+    assert count >= 40
+    plain, rows = plain[:count], slice(0, int(whole.offsets[count]))
     # The plain one differentiates numerically: 1e-10 of relative error, which the gain passes on.
-    assert_close(arrays.means, np.array([cycle["mean"] for cycle in plain]), 1e-8)
-    np.testing.assert_allclose(arrays.covariances, [cycle["cov"] for cycle in plain], rtol=1e-6, atol=1e-12)
-    assert_close(arrays.priors.rows().means, np.array([cycle["prior_mean"] for cycle in plain]), 1e-8)
+    assert_close(whole.means[:count], np.array([cycle["mean"] for cycle in plain]), 1e-8)
+    np.testing.assert_allclose(whole.covariances[:count], [cycle["cov"] for cycle in plain], rtol=1e-6, atol=1e-12)
+    priors = whole.priors.rows()
+    assert_close(priors.means[:count], np.array([cycle["prior_mean"] for cycle in plain]), 1e-8)
     np.testing.assert_allclose(
-        arrays.priors.rows().covariances, [cycle["prior_cov"] for cycle in plain], rtol=1e-6, atol=1e-12
+        priors.covariances[:count], [cycle["prior_cov"] for cycle in plain], rtol=1e-6, atol=1e-12
     )
-    assert [Mode(mode).name.lower() for mode in arrays.modes] == [cycle["mode"] for cycle in plain]
+    assert [Mode(mode).name.lower() for mode in whole.modes[:count]] == [cycle["mode"] for cycle in plain]
     kept = [status == "inlier" for cycle in plain for status in cycle["status"]]
-    inlier = arrays.status == Status.INLIER
+    inlier = whole.status[rows] == Status.INLIER
     assert inlier.tolist() == kept
     chosen = np.array([j for cycle in plain for j in cycle["chosen"]])
     d2 = np.array([value for cycle in plain for value in cycle["d2"]])
-    np.testing.assert_array_equal(arrays.reflector[inlier], chosen[inlier])
-    np.testing.assert_allclose(arrays.d2[inlier], d2[inlier], rtol=1e-5, atol=1e-6)
+    np.testing.assert_array_equal(whole.reflector[rows][inlier], chosen[inlier])
+    np.testing.assert_allclose(whole.d2[rows][inlier], d2[inlier], rtol=1e-5, atol=1e-6)
 
 
 def assert_close(means: np.ndarray, expected: np.ndarray, tolerance: float) -> None:

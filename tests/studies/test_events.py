@@ -76,10 +76,33 @@ def test_lost_within_a_fail_is_told_and_the_recovery_counts_from_the_first_stop(
     assert found == [
         (EventKind.FAIL, 3.0),
         (EventKind.LOST, 3.5),
-        (EventKind.FAIL, 4.0),
+        (EventKind.FOUND, 4.0),
         (EventKind.RECOVERED, 4.5),
     ]
     assert of(failed, EventKind.RECOVERED)[0].lasts == pytest.approx(1.5)
+
+
+def test_what_is_not_searched_for_is_not_found(run: RunResult) -> None:
+    segment = run.columns.segments[0]
+    supervisor = replace(segment.setup.parameters.supervisor, find_again=False)
+    setup = replace(segment.setup, parameters=replace(segment.setup.parameters, supervisor=supervisor))
+    run = replace(run, columns=replace(run.columns, segments=(replace(segment, setup=setup),)))
+    failed = with_modes(run, [(range(30, 45), Mode.FAIL), (range(35, 40), Mode.LOST)])
+    assert [event.kind for event in events(EventsInput(failed)).events] == [
+        EventKind.FAIL,
+        EventKind.LOST,
+        EventKind.FAIL,
+        EventKind.RECOVERED,
+    ]
+
+
+def test_a_drive_that_nobody_has_located_says_so_and_when_it_was_found(run: RunResult) -> None:
+    found = with_modes(run, [(range(25), Mode.INITIALIZING), (range(25, 30), Mode.FAIL)])
+    seeking, located, again = events(EventsInput(found)).events
+    assert (seeking.kind, seeking.time) == (EventKind.SEARCHING, 0.0)
+    assert (located.kind, located.time, located.lasts) == (EventKind.FOUND, 2.5, 2.5)
+    assert (again.kind, again.lasts) == (EventKind.RECOVERED, 3.0)
+    assert told(located) == "after 2.50 s, the only place left in 5 attempts"
 
 
 def test_a_drive_that_begins_stopped_and_ends_so_says_it_once(run: RunResult) -> None:

@@ -5,9 +5,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from commission.errors import UsageError
+from commission.localization.estimate import Mode
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry, ReferencePose
+from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Direction, Route, Segment
 from commission.studies.start import DEFAULT_SIGMAS, StartOrigin, route_start, start_of
 
@@ -51,9 +53,21 @@ def test_a_route_that_starts_in_reverse_has_the_vehicle_face_backward():
     assert_allclose(heading, math.pi * 1.5)
 
 
-def test_a_recording_whose_start_nobody_knows_is_refused_with_the_remedy():
-    with pytest.raises(UsageError, match="expected an initial pose"):
-        start_of(Project(), recording())
+def test_where_nobody_says_where_a_recording_starts_the_vehicle_looks_for_itself():
+    reflectors = ReflectorMap((Reflector(id="A", x=0.0, y=-1.0), Reflector(id="B", x=10.0, y=3.0)))
+    start = start_of(Project(reflectors=reflectors), recording())
+    assert start.origin is StartOrigin.SEARCH
+    state = start.state()
+    assert state.mode == Mode.INITIALIZING
+    assert state.search is not None
+    # Evenly spread over the rectangle around the reflectors and 5 m beyond, and over all headings.
+    assert_allclose(start.belief.mean, [5.0, 1.0, 0.0])
+    assert_allclose(start.belief.covariance, np.diag([20.0**2 / 12.0, 14.0**2 / 12.0, math.pi**2 / 3.0]))
+
+
+def test_a_start_that_somebody_knows_is_tracked_from_the_first_record():
+    state = start_of(project_with_route(), recording()).state()
+    assert (state.mode, state.search) == (Mode.OPERATIONAL, None)
 
 
 def test_an_empty_recording_is_refused():

@@ -24,6 +24,7 @@ MODES = {
     Mode.OPERATIONAL: "operational",
     Mode.FAIL: "fail: too uncertain, output withheld",
     Mode.LOST: "lost: rejects what it sees, output withheld",
+    Mode.INITIALIZING: "initializing: looks where it is, no output",
 }
 """What the page says of each."""
 MOST_REJECTED = 4

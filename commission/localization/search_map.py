@@ -1,0 +1,87 @@
+"""What a search for the vehicle reads of site and scanners: made once for a setup, when it is first needed."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.geometry.occupancy import OccupancyGrid
+from commission.geometry.ray_kernels import RayTables
+from commission.geometry.raycast import RayCaster
+from commission.localization.odometry import OdometryNoise
+from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.reflector_index import Cells
+from commission.localization.setup import LocalizerSetup
+from commission.localization.start import MARGIN, DistanceTable, pair_table
+from commission.site.reflectors import ReflectorKind
+
+
+class SearchMap(NamedTuple):
+    """Reflectors, what hides them, and how scanners see."""
+
+    table: DistanceTable
+    """All pairs of reflectors."""
+    cells: Cells
+    places: FloatArray
+    offsets: IntArray
+    """See `ReflectorIndex`."""
+    facings: FloatArray
+    """(N,) direction that the reflector of each row of `places` faces [rad]; NaN: seen from all sides."""
+    eyes: FloatArray
+    """(E, 5) scanner, first bearing and width of a stretch of its field of view [rad], smallest and largest range of a
+    reflector [m]."""
+    walls: RayTables
+    """Of the floor map."""
+    walled: bool
+    """Whether there is one."""
+    odometry: OdometryNoise
+    anywhere: PoseGaussian
+    """A belief as wide as the floor."""
+
+
+def search_map(setup: LocalizerSetup) -> SearchMap:
+    """Return what a search with this setup reads."""
+    index, reflectors = setup.index, setup.reflectors.reflectors
+    rows = index.places[:, 3].astype(np.int64).tolist()
+    facings = np.full(len(rows), np.nan)
+    for row, at in enumerate(rows):
+        each = reflectors[at]
+        if each.kind is ReflectorKind.FLAT and each.heading is not None:
+            facings[row] = each.heading
+    eyes = [
+        (number, first, last - first, scanner.range[0], min(scanner.range[1], scanner.reflector_range))
+        for number, scanner in enumerate(setup.scanners)
+        for first, last in scanner.views.tolist()
+    ]
+    longest = 2.0 * max((eye[4] for eye in eyes), default=1.0)
+    caster = RayCaster(OccupancyGrid(np.zeros((1, 1), dtype=np.bool_), 1.0))
+    return SearchMap(
+        pair_table(index.places, longest),
+        index.cells,
+        index.places,
+        index.offsets,
+        read_only(facings),
+        read_only(np.array(eyes, dtype=np.float64).reshape(-1, 5)),
+        caster.tables,
+        False,
+        setup.filter.odometry,
+        anywhere(index.places),
+    )
+
+
+def anywhere(places: FloatArray) -> PoseGaussian:
+    """Belief of a vehicle that may be anywhere: variances of a rectangle around all reflectors, and of any heading.
+
+    Parameters
+    ----------
+    places : (N, 2) or more columns: x, y of the reflectors [m], map frame.
+    """
+    if len(places) == 0:
+        return PoseGaussian(0.0, 0.0, 0.0, MARGIN**2, 0.0, 0.0, MARGIN**2, 0.0, math.pi**2 / 3.0)
+    low, high = places[:, :2].min(axis=0) - MARGIN, places[:, :2].max(axis=0) + MARGIN
+    x, y = (0.5 * (low + high)).tolist()
+    xx, yy = (np.square(high - low) / 12.0).tolist()
+    return PoseGaussian(x, y, 0.0, xx, 0.0, 0.0, yy, 0.0, math.pi**2 / 3.0)

@@ -1,0 +1,74 @@
+"""What is remembered while a vehicle does not know where it is: a value in the filter's state. No step in here."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from commission.geometry.arrays import FloatArray, read_only
+from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.sightings import COLUMNS
+from commission.localization.start import ROW
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Search:
+    """What is remembered while the vehicle does not know where it is; arrays are read-only."""
+
+    since_ns: int
+    """When the search began [ns]."""
+    around: PoseGaussian | None
+    """The last good pose, as uncertain as it is by now; None: there is none."""
+    track: PoseGaussian
+    """Pose of base in the frame of odometry, which is base when the search began; covariance since the last scan."""
+    drift: tuple[float, float] = (0.0, 0.0)
+    """Variance of odometry up to the last scan: position [m^2], heading [rad^2]."""
+    things: FloatArray
+    """(C, COLUMNS) what was seen, see `sightings`."""
+    views: FloatArray
+    """(V, 5) pose of scanners in the frame of odometry, scanner, and time [s]."""
+    hypotheses: FloatArray
+    """(H, ROW) see `start`, the likeliest first."""
+    searched_ns: int
+    """Stamp of the last search of all pairs [ns]."""
+    judged_ns: int
+    """Stamp of the last attempt [ns]."""
+
+    def _content(self) -> tuple[object, ...]:
+        """All of it, comparable."""
+        arrays = (each.tobytes() for each in (self.things, self.views, self.hypotheses))
+        scalars = (self.since_ns, self.around, self.track, self.drift, self.searched_ns, self.judged_ns)
+        return (*scalars, *arrays)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether both go on alike, to the last bit."""
+        return isinstance(other, Search) and self._content() == other._content()
+
+    def __hash__(self) -> int:
+        """Equal ones have the same."""
+        return hash(self._content())
+
+
+NOTHING = PoseGaussian(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+LONG_AGO_NS = -(2**62)
+
+
+def new_search(stamp_ns: int, around: PoseGaussian | None = None) -> Search:
+    """Return a search that begins.
+
+    Parameters
+    ----------
+    stamp_ns : now [ns].
+    around : the last good pose, as uncertain as it is by now; None: there is none.
+    """
+    return Search(
+        since_ns=stamp_ns,
+        around=around,
+        track=NOTHING,
+        things=read_only(np.empty((0, COLUMNS))),
+        views=read_only(np.empty((0, 5))),
+        hypotheses=read_only(np.empty((0, ROW))),
+        searched_ns=LONG_AGO_NS,
+        judged_ns=LONG_AGO_NS,
+    )

@@ -1,0 +1,210 @@
+"""Matching what was seen to a part of the map: against brute force over all pairs, and numbers by hand."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from commission.geometry.arrays import read_only
+from commission.geometry.occupancy import OccupancyGrid
+from commission.geometry.raycast import RayCaster
+from commission.localization.reflector_index import build_index
+from commission.localization.relocalization import probabilities
+from commission.localization.start import CANDIDATES, ROW, SEEN, Prior, candidates, judge, pair_table
+from commission.site.reflectors import Reflector, ReflectorMap
+from tests.localization.drives import random_map
+
+SIGMA = 0.03
+EVEN = Prior(math.log(1e-3), False, 0.0, 0.0, 0.0, 1.0, 1.0)
+NO_WALLS = RayCaster(OccupancyGrid(np.zeros((1, 1), dtype=np.bool_), 1.0)).tables
+AHEAD = np.array([[0.0, -0.5 * math.pi, math.pi, 0.1, 10.0]])
+"""One scanner that sees half a turn, from 0.1 m to 10 m."""
+ORIGIN = np.array([[0.0, 0.0, 0.0, 0.0, 1.0]])
+"""A single view, from the origin along x."""
+
+
+def things_at(points: np.ndarray, sigma: float = SIGMA) -> np.ndarray:
+    square = np.full(len(points), sigma**2)
+    return read_only(np.column_stack((points, square, np.zeros(len(points)), square)))
+
+
+def seen_from(pose: np.ndarray, points_map: np.ndarray) -> np.ndarray:
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    return (points_map - pose[:2]) @ np.array([[c, -s], [s, c]])
+
+
+def brute_force(things: np.ndarray, centers: np.ndarray, reach: float) -> tuple[int, np.ndarray]:
+    """Most things that any motion brings onto a reflector, and that motion: every pair onto every pair, in numpy."""
+    best, motion = 0, np.full(3, np.nan)
+    for i, j in itertools.combinations(range(len(things)), 2):
+        local = complex(*(things[j] - things[i]))
+        for a, b in itertools.permutations(range(len(centers)), 2):
+            target = complex(*(centers[b] - centers[a]))
+            if abs(abs(local) - abs(target)) > reach:
+                continue
+            turn = target / local
+            turn /= abs(turn)
+            middle = complex(*(0.5 * (centers[a] + centers[b]))) - turn * complex(*(0.5 * (things[i] + things[j])))
+            moved = turn * (things[:, 0] + 1j * things[:, 1]) + middle
+            gaps = np.abs(moved[:, np.newaxis] - (centers[:, 0] + 1j * centers[:, 1])).min(axis=1)
+            fits = int((gaps < reach).sum())
+            if fits > best:
+                best, motion = fits, np.array([middle.real, middle.imag, math.atan2(turn.imag, turn.real)])
+    return best, motion
+
+
+def found_in(reflectors: ReflectorMap, things: np.ndarray) -> np.ndarray:
+    index, found = build_index(reflectors), np.empty((CANDIDATES, 4))
+    table = pair_table(index.places, 40.0)
+    pairs = read_only(np.array(list(itertools.combinations(range(len(things)), 2)), dtype=np.int64))
+    count = candidates(
+        things_at(things), pairs, table.distances, table.ends, index.cells, index.places, index.offsets, found
+    )
+    return found[:count]
+
+
+def test_the_table_holds_every_pair_both_ways_by_distance() -> None:
+    index = build_index(random_map(np.random.default_rng(0), 9))
+    table = pair_table(index.places, 12.0)
+    expected = sorted(
+        (math.dist(index.places[a, :2], index.places[b, :2]), a, b) for a, b in itertools.permutations(range(9), 2)
+    )
+    expected = [row for row in expected if row[0] <= 12.0]
+    assert 0 < len(expected) < 72
+    assert [(a, b) for _, a, b in expected] == [tuple(row) for row in table.ends.tolist()]
+    np.testing.assert_allclose(table.distances, [distance for distance, _, _ in expected])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_best_candidate_is_that_of_brute_force_over_all_pairs(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    reflectors = random_map(rng, 12)
+    pose = np.array([*rng.uniform(2.0, 18.0, 2), rng.uniform(-math.pi, math.pi)])
+    seen = seen_from(pose, reflectors.centers[rng.choice(12, 6, replace=False)]) + rng.normal(0.0, 0.01, (6, 2))
+    things = rng.permutation(np.concatenate((seen, rng.uniform(-8.0, 8.0, (3, 2)))))
+    fits, motion = brute_force(things, reflectors.centers, 0.1)
+    assert fits >= 6
+    best = found_in(reflectors, things)[0]
+    np.testing.assert_allclose(best[:2], motion[:2], atol=0.12)
+    assert abs(math.remainder(best[2] - motion[2], 2.0 * math.pi)) < 0.03
+    np.testing.assert_allclose(best[:2], pose[:2], atol=0.12)
+
+
+def test_candidates_come_best_first_and_each_place_once() -> None:
+    rng = np.random.default_rng(3)
+    reflectors = random_map(rng, 40)
+    found = found_in(reflectors, seen_from(np.array([10.0, 10.0, 1.0]), reflectors.centers[:8]))
+    assert (np.diff(found[:, 3]) <= 0.0).all()
+    assert found[0, 3] == pytest.approx(8.0, abs=0.5)
+    assert len(np.unique(np.round(found[:, :3], 9), axis=0)) == len(found) > 1
+
+
+TRIANGLE = ReflectorMap(
+    (Reflector(id="A", x=4.0, y=1.0), Reflector(id="B", x=6.0, y=-2.0), Reflector(id="C", x=3.0, y=-1.0))
+)
+
+
+def judged(
+    pose: tuple[float, float, float],
+    things: np.ndarray,
+    reflectors: ReflectorMap = TRIANGLE,
+    *,
+    prior: Prior = EVEN,
+    walls: RayCaster | None = None,
+    facings: np.ndarray | None = None,
+) -> np.ndarray:
+    index, row = build_index(reflectors), np.empty((1, ROW))
+    every = np.full(len(index.places), np.nan)
+    judge(
+        read_only(np.array([pose])),
+        things_at(things),
+        0.0,
+        0.0,
+        0.05,
+        prior,
+        read_only(ORIGIN),
+        read_only(AHEAD),
+        NO_WALLS if walls is None else walls.tables,
+        walls is not None,
+        read_only(every if facings is None else facings),
+        index.cells,
+        index.places,
+        index.offsets,
+        row,
+    )
+    return row[0]
+
+
+def test_evidence_is_the_laplace_approximation_of_the_likelihood_ratio() -> None:
+    things = TRIANGLE.centers.copy()
+    row = judged((0.02, -0.03, 0.004), things)
+    np.testing.assert_allclose(row[:3], 0.0, atol=1e-6)
+    assert row[10] == 3.0
+    # J of a point that turns about the origin; W of every thing is 1 / sigma^2.
+    J = np.concatenate([[[1.0, 0.0, -y], [0.0, 1.0, x]] for x, y in things])
+    P = np.linalg.inv(J.T @ J / SIGMA**2)
+    np.testing.assert_allclose(row[3:9], P[np.triu_indices(3)], rtol=1e-6, atol=1e-12)
+    each = SEEN * multivariate_normal(np.zeros(2), SIGMA**2 * np.eye(2)).pdf(np.zeros(2)) / 0.05
+    expected = 3.0 * math.log(each) + 0.5 * math.log((2.0 * math.pi) ** 3 * np.linalg.det(P)) + math.log(1e-3)
+    assert row[9] == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_thing_that_is_no_reflector_changes_nothing() -> None:
+    row = judged((0.0, 0.0, 0.0), TRIANGLE.centers)
+    more = judged((0.0, 0.0, 0.0), np.vstack((TRIANGLE.centers, (5.0, 4.0))))
+    np.testing.assert_allclose(more[:11], row[:11])
+
+
+MISSED = math.log(1.0 - SEEN)
+WALL = np.zeros((40, 40), dtype=np.bool_)
+WALL[:, 25] = True
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "missed"),
+    [
+        (9.9, 0.5, 1.0),  # within range
+        (10.1, 0.5, 0.0),
+        (0.05, 5.0, 1.0),  # within the field of view, which ends across
+        (-0.05, 5.0, 0.0),
+    ],
+)
+def test_a_reflector_that_should_be_seen_and_is_not_speaks_against_a_pose(x: float, y: float, missed: float) -> None:
+    one_more = ReflectorMap((*TRIANGLE.reflectors, Reflector(id="D", x=x, y=y)))
+    change = judged((0.0, 0.0, 0.0), TRIANGLE.centers, one_more)[9] - judged((0.0, 0.0, 0.0), TRIANGLE.centers)[9]
+    assert change == pytest.approx(missed * MISSED)
+
+
+def test_what_a_wall_hides_or_faces_away_is_not_missed() -> None:
+    one_more = ReflectorMap((*TRIANGLE.reflectors, Reflector(id="D", x=9.0, y=0.5)))
+    without = judged((0.0, 0.0, 0.0), TRIANGLE.centers)[9]
+    # The wall's cells lie at x = 7.5 to 7.8 m.
+    hall = RayCaster(OccupancyGrid(WALL, 0.3, np.array([0.0, -6.0, 0.0])))
+    assert judged((0.0, 0.0, 0.0), TRIANGLE.centers, one_more, walls=hall)[9] == pytest.approx(without)
+    places = build_index(one_more).places
+    for facing, missed in ((math.pi, 1.0), (0.0, 0.0)):
+        facings = np.where(places[:, 3] == 3.0, facing, np.nan)
+        change = judged((0.0, 0.0, 0.0), TRIANGLE.centers, one_more, facings=facings)[9] - without
+        assert change == pytest.approx(missed * MISSED)
+
+
+def test_the_last_good_pose_makes_places_around_it_likelier() -> None:
+    near = judged((0.0, 0.0, 0.0), TRIANGLE.centers, prior=Prior(math.log(1e-3), True, 0.0, 0.0, 0.0, 1.0, 0.09))
+    far = judged((0.0, 0.0, 0.0), TRIANGLE.centers, prior=Prior(math.log(1e-3), True, 50.0, 0.0, 0.0, 1.0, 0.09))
+    even = judged((0.0, 0.0, 0.0), TRIANGLE.centers)
+    peak = 1.0 / ((2.0 * math.pi) ** 1.5 * 0.3)
+    assert near[9] - even[9] == pytest.approx(math.log(0.5 + 0.5 * peak / 1e-3), rel=1e-6)
+    assert far[9] - even[9] == pytest.approx(math.log(0.5), rel=1e-6)
+
+
+def test_probabilities_leave_room_for_none_of_the_hypotheses() -> None:
+    rows = np.zeros((2, ROW))
+    rows[:, 9] = math.log(6.0), math.log(3.0)
+    np.testing.assert_allclose(probabilities(rows), [0.6, 0.3])
+    assert probabilities(rows[:0]).shape == (0,)
+    rows[:, 9] = 2000.0, 1000.0
+    np.testing.assert_allclose(probabilities(rows), [1.0, 0.0])
