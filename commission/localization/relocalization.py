@@ -54,6 +54,8 @@ PERIOD_S = 0.1
 PATIENCE = 0.02
 """Share of the time of the search that lies between two attempts: what was not found in a minute comes no sooner by
 ten attempts a second."""
+LONGEST_PERIOD_S = 2.0
+"""Time between two attempts at most [s]."""
 SEARCH_PERIOD_S = 0.5
 """Time between two searches of all pairs; in between, hypotheses are judged anew [s]."""
 VIEWS = 5
@@ -168,7 +170,8 @@ def sought(before: FilterState, after: FilterState, scan: SeenScan, around: Sear
         track, _ = reach(search.track, before.motion, scan.stamp_ns, scan.following, around.odometry)
     search = _joined(search, track, scan)
     now_ns = scan.stamp_ns
-    if now_ns - search.judged_ns >= max(PERIOD_S * 1e9, PATIENCE * (now_ns - search.since_ns)):
+    waits = max(PERIOD_S * 1e9, min(PATIENCE * (now_ns - search.since_ns), LONGEST_PERIOD_S * 1e9))
+    if now_ns - search.judged_ns >= waits:
         search = _judged(search, now_ns, around)
         best = _confirmed(search)
         if best is not None:
