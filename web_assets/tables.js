@@ -150,20 +150,20 @@
       ...compared.figures.map(([label, cells]) => make("tr", {}, make("td", { textContent: label }),
         ...cells.map(([text, verdict, expected]) => cell(text, verdict, expected))))];
     const whole = (head, body) => make("table", {}, make("thead", {}, make("tr", {}, ...head)), make("tbody", {}, ...body));
-    const half = Math.ceil(rows.length / 2), heads = () => [make("th"), ...names.map(variantHeader)];
+    const half = Math.ceil(rows.length / 2), heads = (has) => [make("th"), ...names.map((name, index) => variantHeader(name, index, has))];
     const places = moments.map(([time, text]) => row([make("td", { textContent: `${time.toFixed(1)} s` }),
       make("td", { textContent: text })], "Go to this moment", () => seek(time)));
     const top = lists.variants.scrollTop, where = whole([make("th", { colSpan: 2, textContent: "They differ most" })], places);
     where.className = "c-moments";
-    lists.variants.replaceChildren(make("div", {}, whole(heads(), rows.slice(0, half)), whole(heads(), rows.slice(half)),
+    lists.variants.replaceChildren(make("div", {}, whole(heads(true), rows.slice(0, half)), whole(heads(false), rows.slice(half)),
       ...(places.length ? [where] : [])));
     lists.variants.scrollTop = top;
   }
 
-  function variantHeader(name, index) {
+  function variantHeader(name, index, hasButtons) {
     const title = make("th", {}, make("b", { textContent: name }));
     title.style.color = compared.colors[index];
-    if (!index) return title;
+    if (!index || !hasButtons) return title;
     const use = make("button", { textContent: "use", title: `Set the parameters of ${name} again (undo takes it back)`,
       onclick: () => ask({ do: "use", letter: name }) });
     const drop = make("button", { textContent: "×", title: `Forget ${name}`, onclick: () => ask({ do: "drop", letter: name }) });

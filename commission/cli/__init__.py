@@ -26,6 +26,7 @@ from commission.cli.predict import Predict
 from commission.cli.problems import Problems
 from commission.cli.serve import Demo, Serve
 from commission.cli.simulate import Simulate
+from commission.cli.sweep import SweepCommand
 from commission.cli.versions import Version
 from commission.errors import CommissionError
 
@@ -44,6 +45,7 @@ COMMANDS: dict[str, type[Command]] = {
     "calibrate": Calibrate,
     "place": Place,
     "problems": Problems,
+    "sweep": SweepCommand,
     "convert": Convert,
     "version": Version,
 }
