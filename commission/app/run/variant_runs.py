@@ -49,7 +49,14 @@ class VariantRuns:
         return known if known is not None and known.inputs.runs[0].inputs.log is shown.inputs.log else None
 
     def carry_out(self, effect: Effect, wanted: RunInput | None, state: AppState) -> None:
-        """Keep the run that is wanted or let one go; other effects are not for variants."""
+        """Keep the run that is wanted or let one go; other effects are not for variants.
+
+        Parameters
+        ----------
+        effect : what is to be done.
+        wanted : what the run is to be made of; none before there is a drive.
+        state : of the page, as it follows.
+        """
         match effect:
             case KeepRun(letter):
                 self.keep(letter, wanted, state)
