@@ -85,7 +85,7 @@ def _line(value: Value) -> str:
 
 def _yaml(result: Calibration) -> str:
     """All figures as YAML: what is proposed by `key=value`, then the table."""
-    from commission.studies.calibration import Verdict
+    from commission.studies.calibration import CalibrationVerdict
 
     proposed = [f"{value.key}={value.proposed:.6g}" for value in result.proposed]
     settings = [text for text in proposed if not text.startswith(("scanners.", "reflectors."))]
@@ -96,7 +96,7 @@ def _yaml(result: Calibration) -> str:
     for value in result.values:
         lines.append(
             f"  - {{key: {_quoted(value.key)}, before: {value.before:.9g}, value: {value.proposed:.9g}, "
-            f"sigma: {value.sigma:.6g}, proposed: {str(value.verdict is Verdict.PROPOSED).lower()}, "
+            f"sigma: {value.sigma:.6g}, proposed: {str(value.verdict is CalibrationVerdict.PROPOSED).lower()}, "
             f"verdict: {_quoted(value.verdict.value)}, reason: {_quoted(value.reason)}, "
             f"stretches: {[[round(begin, 1), round(end, 1)] for begin, end in value.stretches]}}}"
         )

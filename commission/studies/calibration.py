@@ -46,7 +46,7 @@ ODOMETRY = (
 """Noises of odometry, in the order of their variances."""
 
 
-class Verdict(StrEnum):
+class CalibrationVerdict(StrEnum):
     """What becomes of a value."""
 
     PROPOSED = "proposed"
@@ -109,7 +109,7 @@ class Value:
     """What the drive says."""
     sigma: float
     """1-sigma of that; residuals that are correlated in time are allowed for."""
-    verdict: Verdict
+    verdict: CalibrationVerdict
     """What becomes of it."""
     shown: Shown
     """Unit in which people read it."""
@@ -139,7 +139,7 @@ class Calibration:
     @property
     def proposed(self) -> tuple[Value, ...]:
         """Return the values that are proposed."""
-        return tuple(value for value in self.values if value.verdict is Verdict.PROPOSED)
+        return tuple(value for value in self.values if value.verdict is CalibrationVerdict.PROPOSED)
 
 
 def accepted(project: Project, values: Iterable[Value]) -> Project:
@@ -278,14 +278,14 @@ class _Judge:
         base = _noisy(self._inputs.setup, 2.0 * _spread(whole), self._noise)
         kept: list[_Constant] = []
         before = self._scores(base, kept)
-        verdicts: dict[int, tuple[Verdict, str]] = {}
+        verdicts: dict[int, tuple[CalibrationVerdict, str]] = {}
         for index in order:
             each = listed[index]
             if each.hidden:
-                verdicts[index] = Verdict.NOT_SHOWN, each.hidden
+                verdicts[index] = CalibrationVerdict.NOT_SHOWN, each.hidden
                 continue
             if abs(each.shift) < SURE * each.sigma or (each.is_place and not each.is_wrong):
-                verdicts[index] = Verdict.AGREES, ""
+                verdicts[index] = CalibrationVerdict.AGREES, ""
                 continue
             after = self._scores(base, [*kept, each])
             gains = [gain(better, worse) for better, worse in zip(after, before, strict=True)]
@@ -293,9 +293,9 @@ class _Judge:
             reason = f"log-likelihood of a detection in the half that did not make it: {told}"
             if sum(value for value, _ in gains) > 0.0 and all(value > -scatter for value, scatter in gains):
                 kept, before = [*kept, each], after
-                verdicts[index] = Verdict.PROPOSED, "; ".join(filter(None, (each.remark, reason)))
+                verdicts[index] = CalibrationVerdict.PROPOSED, "; ".join(filter(None, (each.remark, reason)))
             else:
-                verdicts[index] = Verdict.WORSE, reason
+                verdicts[index] = CalibrationVerdict.WORSE, reason
         setup = self._inputs.setup
         for each in listed:
             setup = _with(setup, each.key, each.before + each.shift)
@@ -312,7 +312,7 @@ class _Judge:
                 stretches=stretches(each.row),
             )
             for index, each in enumerate(listed)
-            if not each.is_place or verdicts[index][0] in {Verdict.PROPOSED, Verdict.WORSE}
+            if not each.is_place or verdicts[index][0] in {CalibrationVerdict.PROPOSED, CalibrationVerdict.WORSE}
         ]
         return values, setup
 
@@ -508,7 +508,7 @@ def _noise_values(
                 before=before[index],
                 proposed=after[index],
                 sigma=after[index] * relative,
-                verdict=Verdict.PROPOSED if is_shown else Verdict.NOT_SHOWN,
+                verdict=CalibrationVerdict.PROPOSED if is_shown else CalibrationVerdict.NOT_SHOWN,
                 shown=shown[index],
                 reason="" if is_shown else "other noise of the wheels hides it in this drive",
             )

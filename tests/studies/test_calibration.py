@@ -14,7 +14,7 @@ from commission.site.project import Project
 from commission.site.quantity import DEGREES
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
-from commission.studies.calibration import Value, Verdict, accepted
+from commission.studies.calibration import CalibrationVerdict, Value, accepted
 from commission.studies.calibration_fit import CalibrationProblem, fit
 from commission.studies.calibration_model import MeasuredDrive, Point, constant_columns, moments, move, see, track
 from commission.studies.calibration_track import twists_at
@@ -190,7 +190,7 @@ def test_values_are_accepted_one_by_one() -> None:
     project = Project(
         reflectors=ReflectorMap((Reflector(id="R.1", x=1.0, y=2.0),)), scanners=(Scanner(name="front left"),)
     )
-    common = {"before": 0.0, "sigma": 0.01, "verdict": Verdict.PROPOSED, "shown": DEGREES}
+    common = {"before": 0.0, "sigma": 0.01, "verdict": CalibrationVerdict.PROPOSED, "shown": DEGREES}
     turned = Value(key="scanners.front left.mounting.heading", proposed=0.1, **common)
     late = Value(key="scanners.front left.clock_offset", proposed=0.02, **common)
     bias = Value(key="observation.range_bias", proposed=0.03, **common)
