@@ -109,7 +109,8 @@
     worker?.onmessage({ data: { type: "message_batch", messages } });
   };
 
-  const oddly = (odd) => `"${odd}" is not taken; expected digits, a point, a minus in front`;
+  // Of a digit that the field swallows, since it has as many decimals as it takes, the whole reason is kept.
+  const oddly = (odd) => odd.length > 1 ? odd : `"${odd}" is not taken; expected digits, a point, a minus in front`;
   function oddIn(input, data) {
     const letter = /[^\d.,\s+-]/.exec(data);
     if (letter) return letter[0];
@@ -156,6 +157,19 @@
   on("focusin", () => { caretIsKnown = false; });
   on("mouseup", () => { caretIsKnown = true; });
 
+  function lookForSwallowed(input, digit) {
+    const { value: was, selectionStart: from, selectionEnd: to } = input;
+    const decimals = (was.split(/[.,]/)[1] ?? "").length;
+    if (from !== to || !decimals || from <= was.search(/[.,]/)) return;
+    setTimeout(() => {
+      if (input.value !== was) return;
+      const why = `"${was.slice(0, from)}${digit}" has more than the ${decimals} decimals that are taken here`;
+      spoiled.set(input, why);
+      if (draft?.input !== input) begin(input);
+      if (draft) refuse(draft.field, why);
+    });
+  }
+
   on("beforeinput", ({ target, data }) => {
     if (!target.matches?.(FIELDS)) return;
     // viser's input swallows what is no part of a number, and takes a minus to the front from wherever it is typed:
@@ -164,6 +178,7 @@
     if (odd === "-" || odd === "+" || (letters.has(target) && /\d/.test(data ?? ""))) {
       spoiled.set(target, letters.get(target) ?? odd);
     } else if (odd) letters.set(target, odd);
+    if (isNumber(target) && /^\d$/.test(data ?? "")) lookForSwallowed(target, data);
     if (draft?.input !== target) before.set(target, target.value);
     if (!caretIsKnown && isNumber(target)) lookAnew(target);
   });

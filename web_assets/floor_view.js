@@ -70,7 +70,10 @@
   const BUILDS_UP_MS = 10_000;
   let isOdd = false;
   const tellMoved = ({ target }) => {
-    if (target !== viewer()?.canvas || performance.now() > BUILDS_UP_MS || !window.commissionMoved) return;
+    if (target === viewer()?.canvas && performance.now() < BUILDS_UP_MS) window.commissionMovedNow();
+  };
+  window.commissionMovedNow = () => {
+    if (!window.commissionMoved) return;
     isOdd = !isOdd; // only what changes is heard
     window.commissionTell?.(window.commissionMoved, isOdd);
   };

@@ -48,10 +48,15 @@
   async function go(way) {
     for (const part of way.split(" ")) {
       const [kind, name] = part.replaceAll("_", " ").split(":");
-      if (kind === "tab") press(await found("[role=tab]", name));
+      if (kind === "tab") {
+        const tab = await found("[role=tab]", name);
+        press(tab);
+        if (tab) window.commissionKeepTab?.(tab);
+      }
       if (kind === "press") (await found("button:not([data-go])", name))?.click();
       if (kind !== "open") continue;
-      press(await found(".mantine-Paper-root", name)); // nothing but its title: it is closed
+      const head = await found(".mantine-Paper-root", name);
+      if (head?.nextElementSibling?.ariaHidden === "true") press(head); // it is closed
     }
   }
   addEventListener("click", ({ target }) => {

@@ -75,8 +75,10 @@ def test_who_turns_the_wheel_while_the_page_builds_up_keeps_what_was_zoomed_to(
     for _ in range(5):
         page.page.mouse.wheel(0, -300)
         page.page.wait_for_timeout(50)
-    page.page.wait_for_timeout(600)
-    zoomed = float(client.camera.position[2])
+    zoomed = fitted
+    while zoomed == fitted or zoomed != float(client.camera.position[2]):  # the wheel's way takes a while to its end
+        zoomed = float(client.camera.position[2])
+        page.page.wait_for_timeout(600)
     assert zoomed < 0.8 * fitted
     page.page.wait_for_timeout(FITTED_AFTER_MS)
     assert float(client.camera.position[2]) == pytest.approx(zoomed)
@@ -148,3 +150,27 @@ def test_a_letter_that_a_number_does_not_take_is_told(
         arg=letter,
     )
     page.page.keyboard.press("Escape")
+
+
+def test_a_digit_that_a_field_has_no_room_for_is_refused_and_nothing_is_rounded(
+    served: Served, window: Callable[..., OpenPage]
+) -> None:
+    page = window(served.server)
+    page.open()
+    page.open_tab("Tune")
+    field = page.row("Gate").locator("input").last
+    before, state = field.input_value(), served.state.project
+    field.click()
+    page.page.keyboard.press("Control+A")
+    page.page.keyboard.type("99.995")
+    page.page.keyboard.press("Enter")
+    page.page.wait_for_function(
+        "() => document.querySelector('[data-refused]')?.dataset.refused.includes('more than the 2 decimals')"
+    )
+    assert field.input_value() == before
+    assert served.state.project is state
+    field.click()
+    page.page.keyboard.press("Control+A")
+    page.page.keyboard.type("99.9")
+    page.page.keyboard.press("Enter")
+    served.until(lambda: abs(served.state.project.parameters.association.gate_probability - 0.999) < 1e-9)

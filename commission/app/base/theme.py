@@ -15,7 +15,9 @@ Color: TypeAlias = tuple[int, int, int]
 BACKGROUND: Color = (16, 18, 21)
 UNKNOWN: Color = (24, 26, 30)
 FREE: Color = (37, 40, 45)
-WALL: Color = (96, 102, 112)
+WALL: Color = (112, 118, 128)
+# Dark around what lies on any color of the floor: a heatmap is as bright as a reflector.
+CASING: Color = BACKGROUND
 GRID: Color = (50, 53, 59)
 GRID_METER: Color = (62, 66, 73)
 ROUTE: Color = (116, 128, 150)

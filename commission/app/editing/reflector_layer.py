@@ -30,6 +30,7 @@ class ReflectorLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._project = Project()
+        self._casing = add_marks(scene, "/reflectors/casing", theme.CASING, 10)
         self._marks = add_marks(scene, "/reflectors/marks", theme.REFLECTOR, 6)
         self._shapes = add_lines(scene, "/reflectors/shapes", theme.REFLECTOR, 1.5)
 
@@ -37,6 +38,7 @@ class ReflectorLayer(BaseLayer):
         """Draw a dot at each reflector's center, and around it the reflector as large as it is."""
         self._project = project
         reflectors = project.reflectors
+        self._casing.points = lift(reflectors.centers, theme.Height.TRAIL)
         self._marks.points = lift(reflectors.centers, theme.Height.REFLECTOR)
         round_ones, plates = rings(reflectors.centers, reflectors.radii)[~reflectors.is_flat], _plates(reflectors)
         segments = (
@@ -50,8 +52,8 @@ class ReflectorLayer(BaseLayer):
         return _bodies(scene, self._project) if three_d else ()
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
-        """Return the dots and the shapes."""
-        return self._marks, self._shapes
+        """Return the dots, what is dark around them, and the shapes."""
+        return self._casing, self._marks, self._shapes
 
 
 class ReflectorNameLayer(BaseLayer):

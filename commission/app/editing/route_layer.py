@@ -6,7 +6,7 @@ import numpy as np
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import NO_SEGMENTS, lift
+from commission.app.base.drawing import stroke_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
 from commission.app.base.marks import add_lines
@@ -48,6 +48,7 @@ class RouteLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
+        self._casing = add_lines(scene, "/route_casing", theme.CASING, 4.0)
         self._lines = add_lines(scene, "/routes", theme.ROUTE, 1.5)
 
     def show_site(self, project: Project) -> None:
@@ -61,9 +62,9 @@ class RouteLayer(BaseLayer):
                 line = line[(np.arange(len(line)) // DASH) % 2 == 0]
             strokes += [line, _arrows(curve, size)]
         every = np.concatenate(strokes) if strokes else np.empty((0, 2, 2))
-        points = lift(every.reshape(-1, 2), theme.Height.ROUTE).reshape(-1, 2, 3)
-        self._lines.points = points if strokes else NO_SEGMENTS
+        self._casing.points = stroke_segments(every, theme.Height.GRID)
+        self._lines.points = stroke_segments(every, theme.Height.ROUTE)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
-        """Return the lines."""
-        return (self._lines,)
+        """Return the lines, and what is dark around them."""
+        return self._casing, self._lines

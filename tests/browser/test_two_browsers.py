@@ -1,0 +1,60 @@
+"""Two browsers on one site: the one that closes disturbs nobody, the one that reloads is where it was."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from commission.app.run.actions import Play, VirtualDrive
+from tests.app.sites import room
+from tests.browser.page import OpenPage
+from tests.browser.serving import Served
+
+
+def where(page: OpenPage) -> tuple[float, ...]:
+    """Pixels of two places of the floor."""
+    page.page.wait_for_timeout(100)
+    return (*page.pixel_of((3.0, 6.0)), *page.pixel_of((4.0, 6.0)))
+
+
+def test_closing_one_browser_disturbs_nobody_and_a_reload_keeps_tab_folder_and_place(
+    window: Callable[..., OpenPage],
+) -> None:
+    project = room()
+    served = Served(project, source=VirtualDrive(project.routes[0].name))
+    try:
+        served.until(lambda: served.view is not None)
+        served.runtime.post(Play(playing=False))
+        page, other = window(served.server, (1024, 700)), window(served.server, (1024, 700))
+        client = page.open()
+        page.page.wait_for_timeout(4500)  # it is not fitted anew any more
+        page.open_tab("Plan")
+        page.open_tab("Site")
+        page.fold("Vehicle")
+        page.open_tab("Layers")
+        page.page.mouse.move(*page.pixel_of((3.0, 6.0)))
+        for _ in range(4):
+            page.page.mouse.wheel(0, -300)
+        page.page.wait_for_timeout(1500)
+        place = where(page)
+        other.open()
+        other.close()
+        served.until(lambda: len(served.state.browsers) == 1)
+        page.page.wait_for_timeout(500)
+        assert client.client_id in served.state.browsers
+        assert where(page) == place
+        assert page.page.get_by_role("tab", name="Layers", exact=True).get_attribute("aria-selected") == "true"
+        before = set(served.server.get_clients())
+        page.page.reload()
+        page.wait_for_client(before)
+        page.wait_until_drawn()
+        page.row("Wheels apart").wait_for(state="visible")
+        for name in ("Site", "Layers"):
+            assert page.page.get_by_role("tab", name=name, exact=True).get_attribute("aria-selected") == "true"
+        served.until(lambda: where(page) == pytest.approx(place, abs=1.0), seconds=30.0)
+        page.page.wait_for_timeout(3000)
+        assert where(page) == pytest.approx(place, abs=1.0), "and it stays there"
+        assert page.errors == []
+    finally:
+        served.close()
