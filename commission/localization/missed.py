@@ -21,7 +21,7 @@ def is_taken(entry: int, taken: IntArray, count: int) -> bool:
 
     Notes
     -----
-    entry in taken[: count], by definition.
+    No formula: it looks through a list.
     """
     found = False
     for i in range(count):

@@ -67,7 +67,7 @@ def _not_forgotten(things: FloatArray, count: int, seconds: float) -> int:
 
     Notes
     -----
-    No formula.
+    No formula: it moves rows.
     """
     kept = 0
     for i in range(count):
