@@ -89,7 +89,7 @@ class ScanColumns:
         self.has_intensities |= bool(has_intensities.any())
 
 
-class BeamColumns:
+class ExactBeams:
     """Messages of our own that hold what a LaserScan cannot."""
 
     def __init__(self) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 from commission.errors import FileFormatError
 from commission.io.recordings import motion
 from commission.io.recordings.mcap_columns import (
-    BeamColumns,
+    ExactBeams,
     PairColumns,
     RowColumns,
     ScanColumns,
@@ -102,7 +102,7 @@ class McapRecording(WholeRecording):
         """Read everything but scans into columns; raises FileFormatError."""
         moved, referred = RowColumns(3), RowColumns(3)
         topics = scanner_topics(self.scanners)
-        scans = [(ScanColumns(), BeamColumns()) for _ in topics]
+        scans = [(ScanColumns(), ExactBeams()) for _ in topics]
         detected = [PairColumns() for _ in topics]
         takers = {DISPLACEMENTS: moved.take, REFERENCES: referred.take}
         for topic, (ranges, beams), pairs in zip(topics, scans, detected, strict=True):
@@ -143,7 +143,7 @@ class McapRecording(WholeRecording):
         )
 
     def _scans(
-        self, index: McapIndex, scanner: int, found: ScanColumns, exact: BeamColumns
+        self, index: McapIndex, scanner: int, found: ScanColumns, exact: ExactBeams
     ) -> tuple[ScanStore | None, list[str]]:
         """Scans of one scanner, in memory or in the file by their size, and what was mended."""
         # The one stands behind the other: where the file is cut between them, one is left over.
