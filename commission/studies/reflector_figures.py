@@ -21,6 +21,7 @@ from commission.localization.run_columns import RunColumns, RunSegment
 from commission.planning.visibility import VisibilityModel, VisibilityOptions, build_visibility, walls_of
 from commission.progress import Progress, silent
 from commission.site.floor_map import FloorMap
+from commission.site.quantity import FARTHEST
 from commission.site.reflectors import ReflectorMap
 from commission.studies.inputs import StudyInput
 from commission.studies.run import RunResult
@@ -157,9 +158,11 @@ def _expected(
     """(M,) scans of some cycles in which each reflector is in sight."""
     found = np.zeros(count, dtype=np.int64)
     here = slice(*cycles)
-    scanners = columns.detected.scanners[here]
+    scanners, poses = columns.detected.scanners[here], columns.means[here]
+    # An estimate that has run away sees nothing, and lies beyond what can be counted in squares of the floor.
+    on_floor = (np.abs(poses[:, :2]) <= FARTHEST).all(axis=1)
     for index, model in enumerate(models):
-        visible = model.visible_from_poses(columns.means[here][scanners == index])
+        visible = model.visible_from_poses(poses[(scanners == index) & on_floor])
         found += np.bincount(own[visible.indices], minlength=count)
     return found
 
