@@ -17,6 +17,7 @@
   let worker = null; // viser's, which speaks with the program
   let draft = null; // of the field that has the focus: {input, field, uuid, before, said, held}
   let isRestoring = false;
+  let lookAtLast = null; // whether the digit that was typed last was swallowed
   const before = new WeakMap(); // what stood in each input before it was typed into
   // Widgets whose entry is finished: what viser makes of it (a number between its bounds when the field is left, the last
   // key's change 50 ms later) is no other entry. A person who goes on comes with a key or the pointer.
@@ -77,6 +78,7 @@
   }
 
   function finish() {
+    lookAtLast?.();
     const ended = end();
     if (!ended) return;
     // Where another value has come meanwhile, what stood there before is an entry like any other.
@@ -161,13 +163,18 @@
     const { value: was, selectionStart: from, selectionEnd: to } = input;
     const decimals = (was.split(/[.,]/)[1] ?? "").length;
     if (from !== to || !decimals || from <= was.search(/[.,]/)) return;
-    setTimeout(() => {
+    // Enter may come before the timer does: who finishes an entry looks first.
+    const look = () => {
+      if (lookAtLast !== look) return;
+      lookAtLast = null;
       if (input.value !== was) return;
       const why = `"${was.slice(0, from)}${digit}" has more than the ${decimals} decimals that are taken here`;
       spoiled.set(input, why);
       if (draft?.input !== input) begin(input);
       if (draft) refuse(draft.field, why);
-    });
+    };
+    lookAtLast = look;
+    setTimeout(look);
   }
 
   on("beforeinput", ({ target, data }) => {
