@@ -2,7 +2,7 @@
 
 `odometry.csv`, and where they exist `detections.csv`, `scans.npz` (of several scanners `scans_NAME.npz`),
 `reference.csv`, `reference.json` and `truth.json`. A pause in any of them is no error: vehicles stand still, scanners
-are unplugged.
+are unplugged. Neither is disorder, nor a stamp that comes twice, as real logs have them: both are mended and told.
 """
 
 from __future__ import annotations
@@ -17,19 +17,13 @@ import numpy as np
 from commission.errors import FileFormatError
 from commission.geometry.arrays import FloatArray, Growing, IntArray
 from commission.io.csv_table import Block, read_table
+from commission.io.recordings import motion
 from commission.io.recordings.reference_file import REFERENCE_MOUNT, read_reference_mount
 from commission.io.recordings.scan_archive import ScanArchive
 from commission.io.recordings.truth_file import TRUTH, read_truth
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanStore
-from commission.site.records import (
-    ORDER_WITHIN_A_STAMP,
-    Detections,
-    Odometry,
-    Record,
-    ReferencePose,
-    Scan,
-)
+from commission.site.records import ORDER_WITHIN_A_STAMP, Record, Scan
 from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import ONLY_NAME, is_name
 from commission.site.truth import Truth
@@ -46,8 +40,7 @@ SCANNER_COLUMN = "scanner"
 """Optional column of detections."""
 REFERENCE_COLUMNS = ("stamp_ns", "x", "y", "theta")
 
-_STREAMED = 100_000
-_LOADED = 1_000_000
+_AT_ONCE = 1_000_000
 """Bytes of a table read at once."""
 
 
@@ -58,6 +51,9 @@ class _Rows:
     stamps_ns: IntArray
     values: FloatArray
     scanners: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    """Of detections: index of the scanner of each."""
+    lines: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    """Of detections: line of each in its file, from 1."""
 
 
 def scans_file(scanners: tuple[str, ...], index: int) -> str:
@@ -91,7 +87,7 @@ class CsvFolder:
     def _found_scanners(self) -> tuple[str, ...]:
         names = [_name_in(archive.path) for archive in self._archives if archive.path.name != SCANS]
         if (self.path / DETECTIONS).exists():
-            for block in _table(self.path / DETECTIONS, DETECTION_COLUMNS, _STREAMED):
+            for block in _table(self.path / DETECTIONS, DETECTION_COLUMNS):
                 if SCANNER_COLUMN not in block.columns:
                     break
                 names.extend(name for name in dict.fromkeys(block.texts(SCANNER_COLUMN)) if name not in names)
@@ -122,14 +118,22 @@ class CsvFolder:
             at the first row that is wrong; names file, line, column, what was found and what is expected.
         """
         scans = (self._scan_records(index) for index in range(len(self._archives)))
-        streams = (self._odometry(), self._reference(), self._detections(), *scans)
+        streams = (self._tables().records(), *scans)
         return heapq.merge(*streams, key=lambda record: (record.stamp_ns, ORDER_WITHIN_A_STAMP[type(record)]))
 
     def load(self) -> RecordLog:
         """Read everything into columns; raises FileFormatError like `records`."""
-        odometry = _joined(self._odometry_rows(_LOADED), 3)
-        reference = _joined(self._reference_rows(_LOADED), 3)
-        detections = _joined(self._detection_rows(_LOADED), 2)
+        scans, tables = self._loaded_scans(), self._tables()
+        mended = (f"{archive.path.name}: {note}" for archive in self._archives for note in archive.notes)
+        return replace(tables, scans=scans, notes=(*tables.notes, *mended))
+
+    def _tables(self) -> RecordLog:
+        """All but the scans: motion, detections and reference are small, and sorted whole."""
+        rows = _joined(self._odometry_rows(), 3)
+        odometry = motion.composed(rows.stamps_ns, rows.values)
+        rows = _joined(self._reference_rows(), 3)
+        reference = motion.in_order(rows.stamps_ns, rows.values)
+        detections, late = self._sorted_detections(_joined(self._detection_rows(), 2))
         starts = np.flatnonzero(
             np.diff(detections.stamps_ns, prepend=detections.stamps_ns[:1] - 1)
             | np.diff(detections.scanners, prepend=detections.scanners[:1])
@@ -138,18 +142,37 @@ class CsvFolder:
         offsets = np.concatenate([[0], np.cumsum(seen)]).astype(np.int64)
         return RecordLog(
             odometry_stamps_ns=odometry.stamps_ns,
-            displacements=odometry.values,
+            displacements=odometry.rows,
             scanners=self.scanners,
-            scans=self._loaded_scans(),
             detection_stamps_ns=detections.stamps_ns[starts],
             detection_offsets=np.append(offsets[starts], offsets[-1]),
             range_bearing=detections.values[seen],
             detection_scanners=detections.scanners[starts],
             reference_stamps_ns=reference.stamps_ns,
-            reference_poses=reference.values,
+            reference_poses=reference.rows,
             truth=self.truth(),
             reference_mount=self.reference_mount(),
+            notes=(
+                *_mended(ODOMETRY, odometry.disordered, odometry.repeated, "one motion after the other"),
+                *_mended(REFERENCE, reference.disordered, reference.repeated, "left out but for the last of each"),
+                *_mended(DETECTIONS, late, 0, ""),
+            ),
         )
+
+    def _sorted_detections(self, rows: _Rows) -> tuple[_Rows, int]:
+        """Rows scan by scan in order of stamps, and how many came after a later one; raises FileFormatError."""
+        order = np.lexsort((rows.scanners, rows.stamps_ns))
+        found = _Rows(rows.stamps_ns[order], rows.values[order], rows.scanners[order], rows.lines[order])
+        empty = np.isnan(found.values[:, 0])
+        same = (np.diff(found.stamps_ns) == 0) & (np.diff(found.scanners) == 0)
+        mixed = np.flatnonzero(same & (empty[1:] | empty[:-1]))
+        if len(mixed):
+            where = f"line {found.lines[mixed[0] : mixed[0] + 2].max()}, column range"
+            problem = "an empty row and another row have one stamp"
+            raise FileFormatError(
+                self.path / DETECTIONS, where, problem, "one empty row for a scan that saw no reflector"
+            )
+        return found, motion.count_disordered(rows.stamps_ns)
 
     def truth(self) -> Truth | None:
         """Read the constants of a virtual drive; None of a real vehicle. Raises FileFormatError."""
@@ -160,32 +183,6 @@ class CsvFolder:
         path = self.path / REFERENCE_MOUNT
         return read_reference_mount(path) if path.exists() else BASE
 
-    def _odometry(self) -> Iterator[Record]:
-        for rows in self._odometry_rows(_STREAMED):
-            for stamp, values in zip(rows.stamps_ns.tolist(), rows.values, strict=True):
-                yield Odometry(stamp, values)
-
-    def _reference(self) -> Iterator[Record]:
-        for rows in self._reference_rows(_STREAMED):
-            for stamp, values in zip(rows.stamps_ns.tolist(), rows.values, strict=True):
-                yield ReferencePose(stamp, values)
-
-    def _detections(self) -> Iterator[Record]:
-        scan: tuple[int, int] | None = None
-        seen: list[FloatArray] = []
-        for rows in self._detection_rows(_STREAMED):
-            for key, values in zip(
-                zip(rows.stamps_ns.tolist(), rows.scanners.tolist(), strict=True), rows.values, strict=True
-            ):
-                if scan is not None and key != scan:
-                    yield Detections(scan[0], np.array(seen).reshape(-1, 2), scan[1])
-                    seen = []
-                scan = key
-                if np.isfinite(values[0]):
-                    seen.append(values)
-        if scan is not None:
-            yield Detections(scan[0], np.array(seen).reshape(-1, 2), scan[1])
-
     def _scan_records(self, scanner: int) -> Iterator[Record]:
         for block in self._archives[scanner].blocks():
             named = replace(block, scanner=scanner)
@@ -193,83 +190,53 @@ class CsvFolder:
                 scan: Scan = named.scan(index)
                 yield scan
 
-    def _odometry_rows(self, bytes_at_once: int) -> Iterator[_Rows]:
-        last: int | None = None
-        for block in _table(self.path / ODOMETRY, ODOMETRY_COLUMNS, bytes_at_once):
-            stamps = _ascending(block, last, "later than the row before")
-            last = int(stamps[-1])
+    def _odometry_rows(self) -> Iterator[_Rows]:
+        is_empty = True
+        for block in _table(self.path / ODOMETRY, ODOMETRY_COLUMNS):
+            is_empty = False
             columns = [block.numbers("dx", "m"), block.numbers("dy", "m"), block.numbers("dtheta", "rad")]
-            yield _Rows(stamps, np.stack(columns, axis=1))
-        if last is None:
+            yield _Rows(block.stamps(), np.stack(columns, axis=1))
+        if is_empty:
             raise FileFormatError(self.path / ODOMETRY, "", "has no rows", "at least one row of odometry")
 
-    def _reference_rows(self, bytes_at_once: int) -> Iterator[_Rows]:
+    def _reference_rows(self) -> Iterator[_Rows]:
         if not (self.path / REFERENCE).exists():
             return
-        last: int | None = None
-        for block in _table(self.path / REFERENCE, REFERENCE_COLUMNS, bytes_at_once):
-            stamps = _ascending(block, last, "later than the row before")
-            last = int(stamps[-1])
+        for block in _table(self.path / REFERENCE, REFERENCE_COLUMNS):
+            stamps = block.stamps()
             theta = block.numbers("theta", "rad", empty=np.nan)
             yield _Rows(stamps, np.stack([block.numbers("x", "m"), block.numbers("y", "m"), theta], axis=1))
 
-    def _detection_rows(self, bytes_at_once: int) -> Iterator[_Rows]:
+    def _detection_rows(self) -> Iterator[_Rows]:
         if not (self.path / DETECTIONS).exists():
             return
-        last: int | None = None
-        last_empty, last_scanner = False, 0
-        scans = _ScanGroups(self.scanners)
-        for block in _table(self.path / DETECTIONS, DETECTION_COLUMNS, bytes_at_once):
-            stamps = _ascending(block, last, "the stamp of the row before, or a later one", repeated=True)
+        numbers = {name: index for index, name in enumerate(self.scanners)}
+        for block in _table(self.path / DETECTIONS, DETECTION_COLUMNS):
+            stamps = block.stamps()
             values = np.stack(
                 [block.numbers(c, u, empty=np.nan) for c, u in (("range", "m"), ("bearing", "rad"))], axis=1
             )
-            empty = np.isnan(values[:, 0])
-            _check_detections(block, values, empty)
-            scanners = scans.indices(block, stamps)
-            previous_stamps = np.concatenate([stamps[:1] - 1 if last is None else [last], stamps[:-1]])
-            previous_empty = np.concatenate([[last_empty], empty[:-1]])
-            previous_scanners = np.concatenate([[last_scanner], scanners[:-1]])
-            same = (stamps == previous_stamps) & (scanners == previous_scanners)
-            mixed = np.flatnonzero(same & (empty | previous_empty))
-            if len(mixed):
-                found = "an empty row and another row have one stamp"
-                raise block.error(int(mixed[0]), "range", found, "one empty row for a scan that saw no reflector")
-            last, last_empty, last_scanner = int(stamps[-1]), bool(empty[-1]), int(scanners[-1])
-            yield _Rows(stamps, values, scanners)
+            _check_detections(block, values, np.isnan(values[:, 0]))
+            yield _Rows(stamps, values, _scanners_of(block, numbers), np.array(block.lines, dtype=np.int64))
 
 
-class _ScanGroups:
-    """Which scanner each row of detections is of; the rows of one scan stand together."""
+def _scanners_of(block: Block, numbers: dict[str, int]) -> IntArray:
+    """(N,) scanner of each row; raises FileFormatError where a cell is no name of one."""
+    if SCANNER_COLUMN not in block.columns:
+        return np.zeros(len(block), np.int64)
+    names = block.texts(SCANNER_COLUMN)
+    for row, name in enumerate(names):
+        if not is_name(name):
+            raise block.error(row, SCANNER_COLUMN, f"is {name!r}", "the name of a scanner: letters, digits, - and _")
+    return np.array([numbers[name] for name in names], dtype=np.int64)
 
-    def __init__(self, scanners: tuple[str, ...]) -> None:
-        self._index = {name: index for index, name in enumerate(scanners)}
-        self._scan: tuple[int, int] | None = None
-        self._done: set[int] = set()
-        """Scanners whose rows of the newest stamp have ended."""
 
-    def indices(self, block: Block, stamps: IntArray) -> IntArray:
-        """(N,) scanner of each row; raises FileFormatError where the rows of a scan do not stand together."""
-        if SCANNER_COLUMN not in block.columns:
-            return np.zeros(len(stamps), np.int64)
-        names = block.texts(SCANNER_COLUMN)
-        for row, name in enumerate(names):
-            if not is_name(name):
-                raise block.error(
-                    row, SCANNER_COLUMN, f"is {name!r}", "the name of a scanner: letters, digits, - and _"
-                )
-        found = np.array([self._index[name] for name in names], dtype=np.int64)
-        for row, scan in enumerate(zip(stamps.tolist(), found.tolist(), strict=True)):
-            if scan == self._scan:
-                continue
-            if self._scan is None or scan[0] != self._scan[0]:
-                self._done = set()
-            elif scan[1] in self._done:
-                remedy = "the rows of one scan one after the other"
-                raise block.error(row, SCANNER_COLUMN, f"is {names[row]} again after rows of another scanner", remedy)
-            self._done.add(scan[1])
-            self._scan = scan
-        return found
+def _mended(file: str, disordered: int, repeated: int, fate: str) -> Iterator[str]:
+    """Say what was mended in a table."""
+    if disordered:
+        yield f"{file}: {disordered} rows came after a later one and are sorted"
+    if repeated:
+        yield f"{file}: {repeated} rows have a stamp that is taken and are {fate}"
 
 
 def _name_in(path: Path) -> str:
@@ -280,20 +247,9 @@ def _name_in(path: Path) -> str:
     return name
 
 
-def _table(path: Path, columns: tuple[str, ...], bytes_at_once: int) -> Iterator[Block]:
+def _table(path: Path, columns: tuple[str, ...]) -> Iterator[Block]:
     # Other columns are passed over: a recording is often exported from a table that holds more.
-    return read_table(path, columns, (SCANNER_COLUMN,), ignore_unknown=True, bytes_at_once=bytes_at_once)
-
-
-def _ascending(block: Block, last: int | None, expected: str, *, repeated: bool = False) -> IntArray:
-    """Stamps of a block; an error where one is earlier than (or, unless `repeated`, equal to) the one before."""
-    stamps = block.stamps()
-    before = np.concatenate([stamps[:1] - 1 if last is None else [last], stamps[:-1]])
-    wrong = np.flatnonzero(stamps < before if repeated else stamps <= before)
-    if len(wrong):
-        row = int(wrong[0])
-        raise block.error(row, "stamp_ns", f"is {stamps[row]} after {before[row]}", expected)
-    return stamps
+    return read_table(path, columns, (SCANNER_COLUMN,), ignore_unknown=True, bytes_at_once=_AT_ONCE)
 
 
 def _check_detections(block: Block, values: FloatArray, empty: np.ndarray) -> None:
@@ -310,9 +266,11 @@ def _check_detections(block: Block, values: FloatArray, empty: np.ndarray) -> No
 
 
 def _joined(blocks: Iterator[_Rows], width: int) -> _Rows:
-    stamps, values, scanners = Growing(np.int64), Growing(np.float64, width), Growing(np.int64)
+    stamps, values = Growing(np.int64), Growing(np.float64, width)
+    scanners, lines = Growing(np.int64), Growing(np.int64)
     for block in blocks:
         stamps.append(block.stamps_ns)
         values.append(block.values)
         scanners.append(block.scanners)
-    return _Rows(stamps.array(), values.array(), scanners.array())
+        lines.append(block.lines)
+    return _Rows(stamps.array(), values.array(), scanners.array(), lines.array())

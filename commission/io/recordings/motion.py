@@ -67,7 +67,7 @@ def in_order(stamps_ns: IntArray, rows: FloatArray) -> Sorted:
     return Sorted(
         stamps_ns=stamps[is_last],
         rows=rows[order][is_last],
-        disordered=_disordered(stamps_ns),
+        disordered=count_disordered(stamps_ns),
         repeated=int(len(stamps) - is_last.sum()),
     )
 
@@ -85,7 +85,7 @@ def composed(stamps_ns: IntArray, displacements: FloatArray) -> Sorted:
     order = np.argsort(stamps_ns, kind="stable")
     stamps, rows = stamps_ns[order], displacements[order].copy()
     if not (stamps[1:] == stamps[:-1]).any():
-        return Sorted(stamps_ns=stamps, rows=rows, disordered=_disordered(stamps_ns), repeated=0)
+        return Sorted(stamps_ns=stamps, rows=rows, disordered=count_disordered(stamps_ns), repeated=0)
     kept: list[int] = []
     for index in range(len(stamps)):
         if kept and stamps[kept[-1]] == stamps[index]:
@@ -96,7 +96,7 @@ def composed(stamps_ns: IntArray, displacements: FloatArray) -> Sorted:
     return Sorted(
         stamps_ns=stamps[chosen],
         rows=rows[chosen],
-        disordered=_disordered(stamps_ns),
+        disordered=count_disordered(stamps_ns),
         repeated=len(stamps) - len(kept),
     )
 
@@ -180,6 +180,6 @@ def unwrapped(ticks: FloatArray, period: float) -> FloatArray:
     return np.unwrap(ticks, period=period, axis=0)
 
 
-def _disordered(stamps_ns: IntArray) -> int:
+def count_disordered(stamps_ns: IntArray) -> int:
     """How many stamps are earlier than one before them."""
     return int((stamps_ns < np.maximum.accumulate(stamps_ns)).sum()) if len(stamps_ns) else 0

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from commission.errors import FileFormatError
 from commission.geometry.arrays import FloatArray, Growing, IntArray
 from commission.io.reading import cannot_read, check_size
-from commission.io.recordings.scan_file import ScanFile, array_place, joined_scans
+from commission.io.recordings.scan_file import ScanFile, array_place, joined_scans, ordered_rows
 from commission.site.quantity import STAMP_LIMIT
 from commission.site.record_store import ScanLog, ScanStore, everywhere
 
@@ -56,6 +56,8 @@ class ScanColumn:
     """Its shape, rows first."""
     dtype: np.dtype[Any]
     """Type of its numbers."""
+    by_columns: bool = False
+    """Whether it is stored column by column, as Fortran and MATLAB do."""
 
     @property
     def row_bytes(self) -> int:
@@ -89,8 +91,17 @@ class ScanArchive:
                 if f"{name}.npy" in members
             }
             self._check_columns()
+            self._order = self._row_order(archive)
             self.angle_min, self.angle_increment = (self._angles(archive, name) for name in _ANGLES)
             self.beams = self._beams(archive)
+            if self._order is not None:
+                self.angle_min, self.angle_increment = self.angle_min[self._order], self.angle_increment[self._order]
+                self.beams = self.beams[self._order]
+                self.columns |= {
+                    name: replace(column, shape=(len(self._order), *column.shape[1:]))
+                    for name, column in self.columns.items()
+                    if name in {"stamp_ns", *_ROWS}
+                }
         if (self.angle_increment == 0.0).any():
             raise self._error("angle_increment", "is 0", "the step from beam to beam [rad]")
 
@@ -104,24 +115,18 @@ class ScanArchive:
         Raises
         ------
         FileFormatError
-            the archive ends early, stamps do not ascend, or a range is negative.
+            the archive ends early, or a range is negative.
         """
         names = [name for name in ("stamp_ns", *_ROWS) if name in self.columns]
         rows_at_once = max(1, _BYTES_AT_ONCE // sum(self.columns[name].row_bytes for name in names))
-        last_stamp: int | None = None
         with self._open() as archive, ExitStack() as stack:
-            files = {name: stack.enter_context(archive.open(f"{name}.npy")) for name in names}
-            for file in files.values():
-                _read_header(file)
+            files = {name: stack.enter_context(self.rows_of(archive, name)) for name in names}
             for start in range(0, len(self), rows_at_once):
                 count = min(rows_at_once, len(self) - start)
                 arrays = {name: self._rows(files[name], name, count) for name in names}
                 part = slice(start, start + count)
                 arrays |= {"angle_min": self.angle_min[part], "angle_increment": self.angle_increment[part]}
-                block = self.scan_log(arrays | {"beams": self.beams[part]}, start)
-                self._check_order(block, start, last_stamp)
-                last_stamp = int(block.stamps_ns[-1])
-                yield block
+                yield self.scan_log(arrays | {"beams": self.beams[part]}, start)
 
     def load(self, scanner: int = 0) -> ScanStore | None:
         """Check all scans, and keep them in memory or in the file, by their size; None when there are none.
@@ -154,6 +159,39 @@ class ScanArchive:
             scanner=scanner,
         )
 
+    def is_as_stored(self, name: str) -> bool:
+        """Whether the rows of an array lie in the file as they are to be read."""
+        return self._order is None and not self.columns[name].by_columns
+
+    def rows_of(self, zipped: zipfile.ZipFile, name: str) -> IO[bytes]:
+        """Open an array at its first row: the member of the archive, or a temporary file with its rows in order.
+
+        Parameters
+        ----------
+        zipped : the archive, open.
+        name : of the array.
+        """
+        file = zipped.open(f"{name}.npy")
+        shape, _, dtype = _read_header(file)
+        if self.is_as_stored(name):
+            return file
+        with file:
+            return ordered_rows(file, (shape, dtype, self.columns[name].by_columns), self._order)
+
+    def _row_order(self, archive: zipfile.ZipFile) -> IntArray | None:
+        """Rows in the order of their stamps, the first of each stamp; None where they lie so. Says what is mended."""
+        self.notes: tuple[str, ...] = ()
+        stamps = self._small(archive, "stamp_ns", "iu", "int64 (N,) nanoseconds")
+        if len(stamps) < 2 or (stamps[1:] > stamps[:-1]).all():
+            return None
+        _, order = np.unique(stamps, return_index=True)
+        late, again = int((stamps < np.maximum.accumulate(stamps)).sum()), len(stamps) - len(order)
+        self.notes = (
+            *([f"{late} scans came after a later one and are sorted"] if late else ()),
+            *([f"{again} scans have a stamp that is taken and are left out"] if again else ()),
+        )
+        return order.astype(np.int64)
+
     @contextmanager
     def _open(self) -> Generator[zipfile.ZipFile]:
         try:
@@ -181,9 +219,7 @@ class ScanArchive:
                 raise self._error(name, f"is no array ({error})", "a plain numpy array") from error
             if dtype.hasobject:
                 raise self._error(name, "is pickled", "plain numbers; pickles are not read, they could run programs")
-            if fortran_order and len(shape) > 1:
-                raise self._error(name, "is stored column by column", "rows (C order): numpy.ascontiguousarray")
-            column = ScanColumn(name, shape, dtype)
+            column = ScanColumn(name, shape, dtype, by_columns=fortran_order and len(shape) > 1)
             if math.prod(shape) * dtype.itemsize != info.file_size - file.tell():
                 raise self._error(name, f"has another size than its shape {shape} says", "a complete array")
         return column
@@ -294,14 +330,6 @@ class ScanArchive:
             intensities=intensities,
             reflector=reflector,
         )
-
-    def _check_order(self, block: ScanLog, start: int, last_stamp: int | None) -> None:
-        stamps = block.stamps_ns if last_stamp is None else np.concatenate([[last_stamp], block.stamps_ns])
-        wrong = np.flatnonzero(stamps[1:] <= stamps[:-1])
-        if len(wrong):
-            row = start + int(wrong[0]) + (1 if last_stamp is None else 0)
-            found = f"{stamps[wrong[0] + 1]} in row {row} follows {stamps[wrong[0]]}"
-            raise self._error("stamp_ns", found, "stamps that ascend from scan to scan")
 
     def _error(self, name: str, problem: str, remedy: str) -> FileFormatError:
         return FileFormatError(self.path, f"array {name}" if name else "", problem, remedy)

@@ -6,6 +6,8 @@ system removes with the program. Stamps, angles and numbers of beams are in memo
 
 from __future__ import annotations
 
+import math
+import shutil
 import tempfile
 import threading
 import weakref
@@ -125,6 +127,8 @@ def array_place(archive: ScanArchive, zipped: zipfile.ZipFile, name: str) -> Arr
     info = zipped.getinfo(f"{name}.npy")
     column = archive.columns[name]
     size = column.row_bytes * column.shape[0]
+    if not archive.is_as_stored(name):
+        return ArrayPlace(0, archive.rows_of(zipped, name))
     if info.compress_type == zipfile.ZIP_STORED:
         with archive.path.open("rb") as file:
             file.seek(info.header_offset)
@@ -139,6 +143,43 @@ def array_place(archive: ScanArchive, zipped: zipfile.ZipFile, name: str) -> Arr
             unpacked.write(data)
     unpacked.flush()
     return ArrayPlace(0, unpacked)
+
+
+def ordered_rows(
+    packed: IO[bytes], layout: tuple[tuple[int, ...], np.dtype[Any], bool], order: IntArray | None
+) -> IO[bytes]:
+    """Write the rows of an array into a temporary file, in another order or one that lies by columns.
+
+    Parameters
+    ----------
+    packed : at the first number; all are read.
+    layout : shape, type, and whether the numbers lie column by column.
+    order : (K,) rows that are wanted; None: all as they are.
+
+    Returns
+    -------
+    file : at its first row.
+
+    Raises
+    ------
+    OSError
+        there is no room on the disk.
+    """
+    shape, dtype, by_columns = layout
+    with tempfile.TemporaryFile() as unpacked:
+        shutil.copyfileobj(packed, unpacked, _BYTES_AT_ONCE)
+        unpacked.flush()
+        if unpacked.tell() < math.prod(shape) * dtype.itemsize:
+            raise EOFError("it ends early")
+        wanted = np.arange(shape[0]) if order is None else order
+        file = tempfile.TemporaryFile()
+        if len(wanted):
+            rows = np.memmap(unpacked, dtype, "r", shape=shape, order="F" if by_columns else "C")
+            at_once = max(1, _BYTES_AT_ONCE // max(1, math.prod(shape[1:]) * dtype.itemsize))
+            for first in range(0, len(wanted), at_once):
+                file.write(np.ascontiguousarray(rows[wanted[first : first + at_once]]).tobytes())
+        file.seek(0)
+        return file
 
 
 def joined_scans(blocks: Sequence[ScanLog]) -> ScanLog:

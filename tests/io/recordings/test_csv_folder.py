@@ -164,8 +164,6 @@ ODOMETRY_ERRORS = [
         "stamp_ns,dx,dy,dtheta\n0,0,0,0\n1.5,0,0,0\n",
         "line 3, column stamp_ns: is '1.5'; expected a whole number of nano",
     ),
-    ("stamp_ns,dx,dy,dtheta\n9,0,0,0\n3,0,0,0\n", "line 3, column stamp_ns: is 3 after 9; expected later than the row"),
-    ("stamp_ns,dx,dy,dtheta\n9,0,0,0\n9,0,0,0\n", "line 3, column stamp_ns: is 9 after 9; expected later than the row"),
     ("stamp_ns,dx,dy,dtheta\n0,0,0\n", "line 2: has 3 cells; expected 4 cells, one for each of: stamp_ns, dx, dy, d"),
     (f"stamp_ns,dx,dy,dtheta\n{10**30},0,0,0\n", "expected a whole number of nanoseconds"),
     *(
@@ -178,7 +176,6 @@ DETECTION_ERRORS = [
     ("0,,1\n", "line 2, column range: is empty; expected range and bearing, or neither"),
     ("0,-1,0\n", "line 2, column range: is -1; expected more than 0 m"),
     ("0,0,0\n", "line 2, column range: is 0; expected more than 0 m, or an empty range and bearing"),
-    ("5,1,0\n0,1,0\n", "line 3, column stamp_ns: is 0 after 5; expected the stamp of the row before, or a later one"),
     ("0,1,0\n0,,\n", "line 3, column range: an empty row and another row have one stamp"),
     ("0,,\n0,,\n", "line 3, column range: an empty row and another row have one stamp"),
     ("0,1,inf\n", "line 2, column bearing: is inf; expected a finite number [rad]"),
@@ -221,11 +218,8 @@ def test_wrong_table_is_one_line_with_line_and_column(
         ({"ranges": np.ones(6)}, "array ranges: has shape (6,)"),
         ({"ranges": np.full((2, 3), -1.0)}, "array ranges: is -1 in row 0, beam 0; expected 0 m or more"),
         ({"ranges": np.ones((2, 3), dtype=np.int32)}, "array ranges: is int32; expected floats"),
-        ({"ranges": np.asfortranarray(np.ones((2, 3)))}, "array ranges: is stored column by column"),
         ({"ranges": np.array([[1, None, 2]] * 2, dtype=object)}, "array ranges: is pickled"),
         ({"stamp_ns": np.array([5.0, 15.0])}, "array stamp_ns: is float64 (2,); expected int64 (N,) nanoseconds"),
-        ({"stamp_ns": np.array([15, 5])}, "array stamp_ns: 5 in row 1 follows 15; expected stamps that ascend"),
-        ({"stamp_ns": np.array([5, 5])}, "array stamp_ns: 5 in row 1 follows 5; expected stamps that ascend"),
         *(
             (
                 {"stamp_ns": np.array([5, stamp], kind)},
@@ -396,7 +390,6 @@ def test_recording_of_one_scanner_replaces_that_of_two(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        ("0,1,0,a\n0,2,0,b\n0,3,0,a\n", "line 4, column scanner: is a again after rows of another scanner"),
         ("0,1,0,a\n0,,,a\n", "an empty row and another row have one stamp"),
         ("0,1,0,\n", "line 2, column scanner: is ''"),
         ("0,1,0,a/b\n", "line 2, column scanner: is 'a/b'; expected the name of a scanner"),
