@@ -81,6 +81,7 @@ PARAMETERS = {
     "supervisor.rejection_limit": ("Rejected at all [%]", 100.0),
     "supervisor.doubt_ratio": ("Doubt from", 1.0),
     "supervisor.confirmations": ("Confirmed by [detections]", 1.0),
+    "supervisor.find_again": ("Search when lost", None),
     "observation.range_sigma": ("Range 1σ [mm]", 1000.0),
     "observation.bearing_sigma": ("Bearing 1σ [°]", DEGREES),
     "observation.range_bias": ("Range bias [mm]", 1000.0),

@@ -265,7 +265,10 @@ def test_the_badge_shows_the_largest_sigma_in_any_direction_and_both_limits(at: 
     assert_reads(
         beside.replace("&nbsp;", " "), 1000.0 * largest_two_sigma(at), 87.0, DEGREES * two_sigma(at, 2), DEGREES * 0.061
     )
-    assert re.search(r"/ 87 mm .*°$", beside)
+    assert re.search(r"/ 87 mm.*°<", beside)
+    # Behind each stands a bar: how much of the limit that is.
+    shares = [float(share) for share in re.findall(r"width:(\d+)%", beside)]
+    assert shares == pytest.approx([100.0 * largest_two_sigma(at) / 0.087, 100.0 * two_sigma(at, 2) / 0.061], abs=0.51)
 
 
 @pytest.fixture(scope="module")

@@ -142,8 +142,9 @@ class OpenPage:
         self.page.mouse.up(button=button)
 
     def press(self, name: str) -> None:
-        """Press the button of this name."""
-        self.page.get_by_role("button", name=name, exact=True).click()
+        """Press the button of this name in a panel or a bar: those of the floor's card lead to them."""
+        named = self.page.get_by_role("button", name=name, exact=True)
+        named.and_(self.page.locator(":not([data-go])")).click()
 
     def open_tab(self, name: str) -> None:
         """Bring this tab of a panel to the front."""

@@ -116,7 +116,7 @@ def test_recording_is_copied_into_a_csv_folder(tmp_path: Path) -> None:
             "drive",
             "b.csv",
             UsageError,
-            r"recording is not converted into a .* \(.csv, .tsv\); expected a folder, since a recor",
+            r"recording is not converted into a .* \(.csv, .tsv\); expected a folder for the tables of a recor",
         ),
         (
             "hall",

@@ -12,7 +12,7 @@ from commission.app.base.service import Context
 from commission.app.base.state import AppState
 from commission.app.base.view import Followed, LivedPath
 from commission.app.run import service as service_module
-from commission.app.run.actions import Play, VirtualDrive
+from commission.app.run.actions import Play, SourceLoaded, VirtualDrive
 from commission.app.run.drives import Drive
 from commission.app.run.effects import CoverFromHere, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
 from commission.app.run.service import RunService
@@ -103,7 +103,8 @@ def assert_same(one: RunResult, other: RunResult) -> None:
 
 
 def test_a_new_drive_is_there_whole_at_its_start_and_plays(bench: RunBench, project: Project) -> None:
-    assert bench.owner.posted == [Play(playing=True)]
+    driven = VirtualDrive(project.routes[0].name, seed=1)
+    assert bench.owner.posted == [SourceLoaded(driven), Play(playing=True)]
     assert bench.view.time == 0.0
     assert_same(bench.view.result, fresh(bench, (0, project, False)))
 

@@ -25,7 +25,9 @@ def folder(path: Path, **tables: str) -> Path:
 
 def with_scans(path: Path, **arrays: np.ndarray) -> Path:
     angles = {"angle_min": np.float64(-0.1), "angle_increment": np.float64(0.1)}
-    np.savez(folder(path) / "scans.npz", **(angles | {"ranges": RANGES, "stamp_ns": np.array([10, 20, 30, 40])} | arrays))
+    np.savez(
+        folder(path) / "scans.npz", **(angles | {"ranges": RANGES, "stamp_ns": np.array([10, 20, 30, 40])} | arrays)
+    )
     return path
 
 
@@ -79,7 +81,9 @@ def test_detections_out_of_order_are_gathered_scan_by_scan(tmp_path: Path, strea
 
 def test_what_is_in_order_is_told_nothing_of(tmp_path: Path) -> None:
     with_scans(tmp_path)
-    folder(tmp_path, detections="stamp_ns,range,bearing\n0,1,0\n0,2,0\n5,1,0\n", reference="stamp_ns,x,y,theta\n5,1,0,\n")
+    folder(
+        tmp_path, detections="stamp_ns,range,bearing\n0,1,0\n0,2,0\n5,1,0\n", reference="stamp_ns,x,y,theta\n5,1,0,\n"
+    )
     assert load_log(tmp_path).notes == ()
 
 
