@@ -67,9 +67,13 @@
     showChips();
   }
 
+  let asked = null; // plots that were asked for and have not come yet
   function showChips() {
     if (!plots || panel.dataset.view !== "plots") return;
-    const chosen = plots.charts.map(({ title }) => title);
+    const shown = plots.charts.map(({ title }) => title);
+    if (asked && asked.length === shown.length && asked.every((title) => shown.includes(title))) asked = null;
+    // Whoever presses two of them at once means both, though the answer to the first is still on its way.
+    const chosen = asked ?? shown;
     chips.replaceChildren(...plots.titles.map((title) => chip(title, chosen)));
   }
 
@@ -80,7 +84,10 @@
     button.setAttribute("aria-pressed", isOn);
     button.onclick = () => {
       const titles = isOn ? chosen.filter((each) => each !== title) : [...chosen, title];
-      if (titles.length) ask({ do: "charts", titles });
+      if (!titles.length) return;
+      asked = titles;
+      ask({ do: "charts", titles });
+      showChips();
     };
     return button;
   }

@@ -71,8 +71,9 @@ def test_the_badge_is_gray_and_says_since_when_the_program_is_gone(
     badge = page.locator(".c-badge")
     badge.wait_for()
     page.wait_for_function("window.commissionWatch === true")
-    until(lambda: badge.evaluate(SAID) == "none", page)
-    # Without a run the badge is gray of itself; kernels may have to be compiled first.
+    # Without a run the badge is gray of itself. Kernels may have to be compiled first, which keeps the program from
+    # answering now and then.
+    until(lambda: badge.evaluate(SAID) == "none", page, 120.0)
     page.get_by_text("OPERATIONAL", exact=True).wait_for(timeout=120_000)
     assert badge.evaluate(COLOR) != GRAY
 

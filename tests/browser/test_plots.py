@@ -132,6 +132,26 @@ def test_plots_are_chosen_by_each_browser_alone(
     assert "2σ of heading [°]" in other.page.evaluate(f"{SHOWN}.titles")
 
 
+def test_two_plots_that_are_pressed_at_once_are_both_taken(page: OpenPage) -> None:
+    before = page.page.evaluate(f"{SHOWN}.titles.length")
+    pressed = ("2σ of heading", "Position error")
+    page.page.evaluate(
+        "names => names.forEach(name => [...document.querySelectorAll('.c-chips button')]"
+        ".find(each => each.textContent === name).click())",
+        pressed,
+    )
+    on = "[...document.querySelectorAll('.c-chips button[aria-pressed=true]')].map(each => each.textContent)"
+    shown = set(page.page.evaluate(on))
+    page.page.wait_for_timeout(500)
+    assert {title.partition(" [")[0] for title in page.page.evaluate(f"{SHOWN}.titles")} == shown
+    page.page.evaluate(
+        "names => names.forEach(name => [...document.querySelectorAll('.c-chips button')]"
+        ".find(each => each.textContent === name).click())",
+        pressed,
+    )
+    page.page.wait_for_function(f"count => {SHOWN}.titles.length === count", arg=before)
+
+
 def test_the_table_has_the_rows_and_plots_that_are_shown(served: Served, page: OpenPage, tmp_path: Path) -> None:
     for name in ("2σ of heading", "Position error", "Heading error", "2σ of position"):
         page.press(name)
