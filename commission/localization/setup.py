@@ -24,6 +24,7 @@ from commission.localization.reflector_index import Cells, ReflectorIndex, build
 from commission.localization.rejection import RejectionRule, rejection_rule
 from commission.localization.supervisor import SupervisorLimits, supervisor_limits
 from commission.localization.sweep import sweep_of, sweep_rows
+from commission.site.floor_map import FloorMap
 from commission.site.parameters import Parameters
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -52,7 +53,7 @@ def consider_model(known: Uncertainty) -> ConsiderModel:
 
 @dataclass(frozen=True, slots=True)
 class LocalizerSetup:
-    """Reflector map, scanners and parameters of a localizer; kernels read `filter` and `detector`.
+    """Reflector map, scanners, floor map and parameters of a localizer; kernels read `filter` and `detector`.
 
     Where they are equal, every record is processed alike.
     """
@@ -65,6 +66,8 @@ class LocalizerSetup:
     """Tunables of every stage."""
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
     """How well map and mounting are known: what the filter considers."""
+    floor: FloorMap | None = None
+    """Walls of the hall, where the project has them."""
     filter: FilterModel = field(init=False, repr=False, compare=False)
     """Scalars of the filter."""
     constants: Constants | None = field(init=False, repr=False, compare=False)
@@ -151,4 +154,10 @@ class LocalizerSetup:
     @staticmethod
     def of(project: Project) -> LocalizerSetup:
         """Return the setup of a project."""
-        return LocalizerSetup(project.reflectors, project.scanners, project.parameters, project.uncertainty)
+        return LocalizerSetup(
+            project.reflectors,
+            project.scanners,
+            project.parameters,
+            project.uncertainty,
+            floor=project.floor_map,
+        )

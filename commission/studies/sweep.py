@@ -10,13 +10,12 @@ import math
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray, read_only
-from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress, silent
 from commission.site.fields import FieldInfo, field_info, get_field, with_field
 from commission.site.parameters import Parameters
@@ -178,8 +177,7 @@ def _at(inputs: SweepInput, parameters: Parameters, place: Sequence[int]) -> Run
     for axis, index in zip(inputs.axes, place, strict=True):
         parameters = set_number(parameters, axis.key, float(axis.values[index]))
     setup = inputs.run.segments[0].setup
-    changed = LocalizerSetup(setup.reflectors, setup.scanners, parameters, setup.uncertainty)
-    return inputs.run.with_setup(changed)
+    return inputs.run.with_setup(replace(setup, parameters=parameters))
 
 
 def _in_parallel(
