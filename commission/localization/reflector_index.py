@@ -93,3 +93,33 @@ def cell_range(low: float, high: float, per_metre: float, count: int) -> tuple[i
         return 0, -1
     # Compared as floats before the conversion: infinity has no integer. NaN takes every cell.
     return int(first) if first > 0.0 else 0, int(last) if last < count else count - 1
+
+
+@compiled_inline
+def nearest_entry(  # noqa: PLR0917 - a place and the map, array by array
+    x: float, y: float, reach: float, cells: Cells, places: FloatArray, cell_offsets: IntArray
+) -> tuple[int, float]:
+    """Row of the nearest reflector within reach, and its squared distance [m^2]; -1 where there is none.
+
+    Parameters
+    ----------
+    x, y : the place [m], map frame.
+    reach : radius of the search [m].
+    cells, places, cell_offsets : the map, see `ReflectorIndex`.
+
+    Notes
+    -----
+    entry = argmin |place - reflector|, by definition.
+    """
+    px, py = x - cells.origin_x, y - cells.origin_y
+    first_row, last_row = cell_range(py - reach, py + reach, cells.per_metre, cells.rows)
+    first_column, last_column = cell_range(px - reach, px + reach, cells.per_metre, cells.columns)
+    least, best = reach * reach, -1
+    for row in range(first_row, last_row + 1 if last_column >= first_column else first_row):
+        start = cell_offsets[row * cells.columns + first_column]
+        for entry in range(start, cell_offsets[row * cells.columns + last_column + 1]):
+            dx, dy = places[entry, 0] - x, places[entry, 1] - y
+            square = dx * dx + dy * dy
+            if square <= least:
+                least, best = square, entry
+    return best, least

@@ -18,7 +18,7 @@ from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.association import INLIER, OUTLIER_ASSOCIATION
 from commission.localization.observation import ObservationModel, scanner_offset
 from commission.localization.pose_gaussian import PoseGaussian, position_variance
-from commission.localization.reflector_index import Cells, cell_range
+from commission.localization.reflector_index import Cells, nearest_entry
 from commission.site.parameters import SupervisorParameters
 
 CLEARED = 0.5
@@ -189,16 +189,10 @@ def nearest(  # noqa: PLR0917 - a place and the map, array by array
     -----
     d = min |place - reflector|, by definition.
     """
-    px, py = x - cells.origin_x, y - cells.origin_y
-    first_row, last_row = cell_range(py - reach, py + reach, cells.per_metre, cells.rows)
-    first_column, last_column = cell_range(px - reach, px + reach, cells.per_metre, cells.columns)
-    least = math.inf
-    for row in range(first_row, last_row + 1 if last_column >= first_column else first_row):
-        start = cell_offsets[row * cells.columns + first_column]
-        for entry in range(start, cell_offsets[row * cells.columns + last_column + 1]):
-            dx, dy = places[entry, 0] - x, places[entry, 1] - y
-            least = min(least, math.sqrt(dx * dx + dy * dy))
-    return least if least <= reach else math.inf
+    # A little farther, so that what is exactly at `reach` is decided by its distance and not by its rounded square.
+    entry, square = nearest_entry(x, y, reach * (1.0 + 1e-9), cells, places, cell_offsets)
+    distance = math.sqrt(square)
+    return distance if entry >= 0 and distance <= reach else math.inf
 
 
 @compiled_inline

@@ -191,9 +191,15 @@ def _until(log: RecordLog, stamp_ns: int, rows: tuple[int, int]) -> int:
 def _carried(log: RecordLog, setup: LocalizerSetup, state: FilterState, rows: tuple[int, int]) -> FilterState:
     """Take in odometry while a search is on."""
     for row in range(*rows):
-        stamp_ns, displacement = int(log.odometry_stamps_ns[row]), log.displacements[row].tolist()
-        state = searching_odometry(state, stamp_ns, (*displacement,), setup.filter.odometry)
+        stamp_ns = int(log.odometry_stamps_ns[row])
+        state = searching_odometry(state, stamp_ns, _driven(log, setup, row), setup.filter.odometry)
     return state
+
+
+def _driven(log: RecordLog, setup: LocalizerSetup, row: int) -> tuple[float, float, float]:
+    """Displacement of a row of odometry [m, m, rad], with what is known of the wheels."""
+    dx, dy, dtheta = as_driven(log.displacements[row : row + 1], setup.parameters.odometry)[0].tolist()
+    return dx, dy, dtheta
 
 
 def _seen(setup: LocalizerSetup, cycle: CycleStretch, following: NextOdometry) -> SeenScan:
@@ -218,7 +224,7 @@ def _searched(
     stamp_ns, row = int(cycle.detected.stamps_ns[0]), cycle.rows[1]
     following = NOT_YET
     if row < len(log.odometry_stamps_ns) and log.odometry_stamps_ns[row] <= waits_until(state.motion, stamp_ns):
-        following = NextOdometry(True, int(log.odometry_stamps_ns[row]), *log.displacements[row].tolist())
+        following = NextOdometry(True, int(log.odometry_stamps_ns[row]), *_driven(log, setup, row))
     columns, scanner = cycle.columns, int(cycle.detected.scanners[0])
     if state.mode == INITIALIZING:
         if len(columns.settled):

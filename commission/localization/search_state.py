@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import FloatArray, read_only
+from commission.localization.hypothesis_fit import ROW
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.sightings import COLUMNS
-from commission.localization.start import ROW
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -11,7 +11,8 @@ import pytest
 from commission.geometry.angles import difference
 from commission.localization.estimate import Belief, Mode
 from commission.localization.localizer import Localizer
-from commission.localization.rejection import NO_EVIDENCE, Evidence, RejectionRule, rejects_the_world
+from commission.localization.reflector_index import build_index
+from commission.localization.rejection import NO_EVIDENCE, Evidence, RejectionRule, nearest, rejects_the_world
 from commission.localization.setup import LocalizerSetup
 from commission.localization.whole_run import run
 from commission.site.parameters import Parameters, SupervisorParameters
@@ -217,3 +218,21 @@ def test_output_is_withheld_while_lost_and_the_filter_goes_on() -> None:
     assert withheld.mode is Mode.LOST
     assert withheld.output.stamp_ns == columns.stamps_ns[first - 1]
     assert withheld.posterior.stamp_ns == columns.stamps_ns[first + 5]
+
+
+def test_the_nearest_reflector_is_that_of_brute_force_and_none_beyond_reach() -> None:
+    rng = np.random.default_rng(3)
+    reflectors = random_map(rng, 30)
+    index = build_index(reflectors)
+    for x, y in rng.uniform(-3.0, 23.0, (200, 2)):
+        away = min(math.dist((x, y), center) for center in reflectors.centers)
+        # Distances of brute force are rounded otherwise in the last bits.
+        for reach, found in ((away * (1.0 + 1e-14), away), (away * (1.0 - 1e-14), math.inf), (away + 1.0, away)):
+            got = nearest(x, y, reach, index.cells, index.places, index.offsets)
+            assert got == pytest.approx(found, rel=1e-14)
+
+
+def test_a_reflector_exactly_at_reach_is_near() -> None:
+    index = build_index(ReflectorMap((Reflector(id="A", x=3.0, y=4.0),)))
+    for reach, found in ((5.0, 5.0), (math.nextafter(5.0, 0.0), math.inf)):
+        assert nearest(0.0, 0.0, reach, index.cells, index.places, index.offsets) == found

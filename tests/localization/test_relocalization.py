@@ -15,7 +15,7 @@ from commission.localization.search_map import search_map
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, state_unlocated
 from commission.localization.whole_run import run, state_before
-from commission.site.parameters import Parameters, SupervisorParameters
+from commission.site.parameters import OdometryParameters, Parameters, SupervisorParameters
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry, Record
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -123,11 +123,14 @@ def test_a_lost_vehicle_that_may_not_search_is_believed_again_when_its_detection
 
 
 @pytest.mark.parametrize("carried", [False, True])
-@pytest.mark.parametrize("sweep", [0.0, 0.03])
-def test_live_and_whole_run_agree_to_the_last_bit_while_the_vehicle_is_searched(carried: bool, sweep: float) -> None:
+@pytest.mark.parametrize(("sweep", "forward_scale"), [(0.0, 0.0), (0.03, 0.0), (0.03, 0.01)])
+def test_live_and_whole_run_agree_to_the_last_bit_while_the_vehicle_is_searched(
+    carried: bool, sweep: float, forward_scale: float
+) -> None:
     setup = setup_of(4)
     scanner = dataclasses.replace(ALL_ROUND, sweep_duration=sweep)
-    setup = LocalizerSetup(setup.reflectors, (scanner,), setup.parameters)
+    parameters = dataclasses.replace(setup.parameters, odometry=OdometryParameters(forward_scale=forward_scale))
+    setup = LocalizerSetup(setup.reflectors, (scanner,), parameters)
     drive = random_drive(setup, np.random.default_rng(4), Plan(scans=130, reach=8.0, scan_offset_ns=7_000_000))
     records: list[Record] = list(drive.records)
     start: FilterState | None = unlocated(setup)

@@ -12,9 +12,10 @@ from scipy.stats import multivariate_normal
 from commission.geometry.arrays import read_only
 from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
+from commission.localization.hypotheses import probabilities
+from commission.localization.hypothesis_fit import ROW, SEEN, Prior, judge
 from commission.localization.reflector_index import build_index
-from commission.localization.relocalization import probabilities
-from commission.localization.start import CANDIDATES, ROW, SEEN, Prior, candidates, judge, pair_table
+from commission.localization.start import CANDIDATES, candidates, pair_table
 from commission.site.reflectors import Reflector, ReflectorMap
 from tests.localization.drives import random_map
 

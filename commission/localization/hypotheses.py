@@ -1,0 +1,187 @@
+"""Hypotheses of where a vehicle is: judged by all that was seen, ranked, and how likely each of them is.
+
+What was seen is `seen_of_late`'s; whether the first one is believed is `relocalization`'s.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from commission.geometry.arrays import FloatArray, read_only
+from commission.geometry.se2 import compose
+from commission.localization.hypothesis_fit import ROW, Prior, judge
+from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.search_map import SearchMap
+from commission.localization.search_state import Search
+from commission.localization.seen_of_late import certain_things, clutter, pairs_of
+from commission.localization.start import CANDIDATES, HYPOTHESES, SAME_HEADING, SAME_PLACE, candidates
+
+ODDS = 1e5
+"""How much likelier one hypothesis must be than all others together, and than that what is seen is none of the map's
+reflectors: if things stood at random, one of 100,000 places would be believed wrongly."""
+FEWEST_FITS = 3
+"""Things that must fit: two fit wherever two reflectors are as far apart."""
+LEAST_SHARE = 0.5
+"""Share of the things seen of late that must fit."""
+SEARCH_PERIOD_S = 0.5
+"""Time between two searches of all pairs; in between, hypotheses are judged anew [s]."""
+OPTIMISM = 2.0
+"""Factor of the covariance of a hypothesis that is believed: its things have errors in common."""
+LEAST_SIGMAS = (0.03, 0.01)
+"""1-sigma that it begins with at least: position [m], heading [rad]."""
+
+
+def judged_again(search: Search, now_ns: int, around: SearchMap) -> Search:
+    """Judge all hypotheses by all that was seen; look for new ones from time to time."""
+    things = certain_things(search)
+    search = replace(search, judged_ns=now_ns)
+    if len(things) < FEWEST_FITS or len(around.table.distances) == 0:
+        return replace(search, hypotheses=read_only(search.hypotheses[:0]))
+    poses = search.hypotheses[:, :3]
+    if now_ns - search.searched_ns >= SEARCH_PERIOD_S * 1e9 or len(search.hypotheses) == 0:
+        found = np.empty((CANDIDATES, 4))
+        count = candidates(
+            things,
+            pairs_of(things),
+            around.table.distances,
+            around.table.ends,
+            around.cells,
+            around.places,
+            around.offsets,
+            found,
+        )
+        poses = np.concatenate((poses, found[:count, :3]))
+        search = replace(search, searched_ns=now_ns)
+    judged = np.empty((len(poses), ROW))
+    views = search.views.copy()
+    for scanner in np.unique(views[:, 3]):
+        its = views[:, 3] == scanner
+        views[its, 4] = 1.0 / its.sum()
+    judge(
+        read_only(poses),
+        things,
+        search.track.x,
+        search.track.y,
+        clutter(things, search),
+        _prior(search, around),
+        read_only(views),
+        around.eyes,
+        around.walls,
+        around.walled,
+        around.facings,
+        around.cells,
+        around.places,
+        around.offsets,
+        judged,
+    )
+    return replace(search, hypotheses=read_only(_ranked(judged, search)))
+
+
+def _prior(search: Search, around: SearchMap) -> Prior:
+    """Return what is known before anything is seen."""
+    even = -math.log(2.0 * math.pi * around.table.area)
+    if search.around is None:
+        return Prior(even, False, 0.0, 0.0, 0.0, 1.0, 1.0)
+    # The vehicle has moved since, by what odometry says.
+    x, y, theta = compose(
+        (search.around.x, search.around.y, search.around.theta), (search.track.x, search.track.y, search.track.theta)
+    ).tolist()
+    position, heading = search.around.xx + search.drift[0], search.around.tt + search.drift[1]
+    return Prior(even, True, x, y, theta, position, heading)
+
+
+def base_poses(hypotheses: FloatArray, track: PoseGaussian) -> FloatArray:
+    """(H, 3) where the vehicle is by each hypothesis [m, m, rad], map frame.
+
+    Parameters
+    ----------
+    hypotheses : (H, ROW) see `start`.
+    track : pose of base in the frame of odometry.
+    """
+    return compose(hypotheses[:, :3], np.array((track.x, track.y, track.theta)))
+
+
+def _ranked(judged: FloatArray, search: Search) -> FloatArray:
+    """Hypotheses by their evidence, each place once; one that goes on keeps count of its scans."""
+    judged = judged[np.isfinite(judged[:, 9])]
+    judged = judged[np.argsort(-judged[:, 9], kind="stable")]
+    poses = base_poses(judged, search.track)
+    kept: list[int] = []
+    for i in range(len(judged)):
+        if len(kept) == HYPOTHESES:
+            break
+        if not any(_same(poses[i], poses[j]) for j in kept):
+            kept.append(i)
+    ranked = judged[kept]
+    if len(ranked) and _is_alone(ranked, search):
+        old = search.hypotheses
+        again = len(old) > 0 and _same(poses[kept[0]], base_poses(old[:1], search.track)[0])
+        ranked[0, 11] = 1.0 + (old[0, 11] if again else 0.0)
+    return ranked
+
+
+def _same(a: FloatArray, b: FloatArray) -> bool:
+    """Whether two poses are one place."""
+    turn = math.remainder(float(a[2] - b[2]), 2.0 * math.pi)
+    return math.hypot(a[0] - b[0], a[1] - b[1]) < SAME_PLACE and abs(turn) < SAME_HEADING
+
+
+def probabilities(hypotheses: FloatArray) -> FloatArray:
+    """(H,) probability of each hypothesis; what is missing to one is that the vehicle is none of them.
+
+    Parameters
+    ----------
+    hypotheses : (H, ROW) see `start`.
+
+    Notes
+    -----
+    exp(evidence) / (1 + sum exp(evidence)): Bayes, with even odds that what is seen is none of the map's reflectors.
+    """
+    if len(hypotheses) == 0:
+        return np.empty(0)
+    most = max(float(hypotheses[:, 9].max()), 0.0)
+    weights = np.exp(hypotheses[:, 9] - most)
+    return np.asarray(weights / (weights.sum() + math.exp(-most)), dtype=np.float64)
+
+
+def _is_alone(ranked: FloatArray, search: Search) -> bool:
+    """Whether the first hypothesis is far likelier than all others, and than none."""
+    best = float(ranked[0, 9])
+    others = float(np.exp(np.minimum(ranked[1:, 9] - best, 0.0)).sum()) + math.exp(min(-best, 0.0))
+    count = len(certain_things(search))
+    return others * ODDS <= 1.0 and ranked[0, 10] >= max(FEWEST_FITS, LEAST_SHARE * count)
+
+
+def gaussian_of(best: FloatArray, track: PoseGaussian) -> PoseGaussian:
+    """Pose and covariance of base by a hypothesis."""
+    x, y, theta = base_poses(best[np.newaxis], track)[0].tolist()
+    xx, xy, xt, yy, yt, tt = (OPTIMISM * best[3:9]).tolist()
+    position, heading = LEAST_SIGMAS[0] ** 2, LEAST_SIGMAS[1] ** 2
+    return PoseGaussian(x, y, theta, xx + position, xy, xt, yy + position, yt, tt + heading)
+
+
+def spread(search: Search, around: SearchMap) -> PoseGaussian:
+    """Belief of a vehicle that is not located: the likeliest hypothesis, as wide as all of them together."""
+    chances = probabilities(search.hypotheses)
+    if len(chances) == 0 or chances.sum() < 0.5:
+        return around.anywhere
+    poses = base_poses(search.hypotheses, search.track)
+    best = gaussian_of(search.hypotheses[0], search.track)
+    rest = 1.0 - float(chances.sum())
+    dx, dy = poses[:, 0] - poses[0, 0], poses[:, 1] - poses[0, 1]
+    turn = np.array([math.remainder(float(each), 2.0 * math.pi) for each in poses[:, 2] - poses[0, 2]])
+    wide = around.anywhere
+    return PoseGaussian(
+        best.x,
+        best.y,
+        best.theta,
+        best.xx + float((chances * dx * dx).sum()) + rest * wide.xx,
+        best.xy + float((chances * dx * dy).sum()),
+        best.xt + float((chances * dx * turn).sum()),
+        best.yy + float((chances * dy * dy).sum()) + rest * wide.yy,
+        best.yt + float((chances * dy * turn).sum()),
+        best.tt + float((chances * turn * turn).sum()) + rest * wide.tt,
+    )
