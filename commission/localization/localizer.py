@@ -45,7 +45,9 @@ LAST_NS = 2**63 - 1
 def warm_up() -> None:
     """Compile every kernel that a live localizer needs, by feeding it one record of each kind."""
     sweeping = Scanner(sweep_duration=0.01)
-    setup = LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), (sweeping,), Parameters())
+    setup = LocalizerSetup(
+        reflectors=ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), scanners=(sweeping,), parameters=Parameters()
+    )
     localizer = Localizer(setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3)))
     localizer.feed(Odometry(0, np.zeros(3)))
     localizer.feed(Odometry(1, np.zeros(3)))

@@ -51,7 +51,7 @@ def consider_model(known: Uncertainty) -> ConsiderModel:
     return ConsiderModel(known.mounting_position**2, known.mounting_heading**2, known.range_bias**2, known.clock**2)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class LocalizerSetup:
     """Reflector map, scanners, floor map and parameters of a localizer; kernels read `filter` and `detector`.
 
@@ -155,9 +155,9 @@ class LocalizerSetup:
     def of(project: Project) -> LocalizerSetup:
         """Return the setup of a project."""
         return LocalizerSetup(
-            project.reflectors,
-            project.scanners,
-            project.parameters,
-            project.uncertainty,
+            reflectors=project.reflectors,
+            scanners=project.scanners,
+            parameters=project.parameters,
+            uncertainty=project.uncertainty,
             floor=project.floor_map,
         )

@@ -265,7 +265,9 @@ def _chunks(segments: Sequence[RunSegment], begin: int, end: int) -> Iterator[tu
 
 def warm_up() -> None:
     """Compile the loop and the detection of whole logs (the serial one), by running over one scan."""
-    setup = LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), (Scanner(),), Parameters())
+    setup = LocalizerSetup(
+        reflectors=ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), scanners=(Scanner(),), parameters=Parameters()
+    )
     ranges = np.full((1, 4), 1.96, dtype=np.float32)
     flags = np.array([[False, False, True, False]])
     scans = ScanLog.even(np.array([2]), ranges, (-0.02, 0.01), reflector=flags)

@@ -94,7 +94,9 @@ class CalibrationInput(StudyInput):
     @property
     def setup(self) -> LocalizerSetup:
         """What the localizer is given today."""
-        return LocalizerSetup(self.reflectors, self.scanners, self.parameters, self.uncertainty)
+        return LocalizerSetup(
+            reflectors=self.reflectors, scanners=self.scanners, parameters=self.parameters, uncertainty=self.uncertainty
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

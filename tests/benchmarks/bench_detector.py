@@ -54,8 +54,12 @@ def main(count: int = 20_000) -> None:
     posts = ReflectorMap((Reflector(id="A", x=0.0, y=0.0, radius=RADIUS),))
     for beams in (541, 2751):
         log = scans(count, beams)
-        circle = LocalizerSetup(posts, (Scanner(),), Parameters())
-        central = LocalizerSetup(posts, (Scanner(),), Parameters(detector=DetectorParameters(center="central_beam")))
+        circle = LocalizerSetup(reflectors=posts, scanners=(Scanner(),), parameters=Parameters())
+        central = LocalizerSetup(
+            reflectors=posts,
+            scanners=(Scanner(),),
+            parameters=Parameters(detector=DetectorParameters(center="central_beam")),
+        )
         print(
             f"{beams} beams: circle fit {best(log, circle, parallel=False):.2f} us/scan, "
             f"{best(log, circle, parallel=True):.2f} on all cores; "

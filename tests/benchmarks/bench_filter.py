@@ -40,7 +40,7 @@ def hall(count: int) -> LocalizerSetup:
     side = math.sqrt(count / DENSITY)
     places = rng.uniform(-0.5 * side, 0.5 * side, (count, 2))
     reflectors = tuple(Reflector(id=str(i), x=float(x), y=float(y)) for i, (x, y) in enumerate(places))
-    return LocalizerSetup(ReflectorMap(reflectors), (Scanner(),), Parameters())
+    return LocalizerSetup(reflectors=ReflectorMap(reflectors), scanners=(Scanner(),), parameters=Parameters())
 
 
 def drive(setup: LocalizerSetup, cycles: int) -> tuple[RecordLog, Belief]:

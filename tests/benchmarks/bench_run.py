@@ -63,7 +63,7 @@ def main(cycles: int = CYCLES) -> None:
     for gate in (0.9, 0.8, 0.99):
         narrow = Parameters(association=AssociationParameters(gate_probability=gate))
         began = time.perf_counter()
-        moved = LocalizerSetup(setup.reflectors, setup.scanners, narrow)
+        moved = LocalizerSetup(reflectors=setup.reflectors, scanners=setup.scanners, parameters=narrow)
         again = judged_run(result.inputs.with_setup(moved), earlier=result)
         localized = time.perf_counter() - began
         playback.replace(again)

@@ -41,7 +41,7 @@ def drive():
 
 
 def run_over(records, **groups):
-    setup = LocalizerSetup(REFLECTORS, (Scanner(),), Parameters(**groups))
+    setup = LocalizerSetup(reflectors=REFLECTORS, scanners=(Scanner(),), parameters=Parameters(**groups))
     return run(RecordLog.collect(records), setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3)))
 
 
@@ -53,7 +53,7 @@ def rows(path):
 def test_each_segment_names_the_reflectors_of_its_own_map(tmp_path):
     renamed = ReflectorMap(tuple(replace(r, id=f"new {i}") for i, r in enumerate(REFLECTORS.reflectors)))
     segments = tuple(
-        RunSegment(first, LocalizerSetup(reflectors, (Scanner(),), Parameters()))
+        RunSegment(first, LocalizerSetup(reflectors=reflectors, scanners=(Scanner(),), parameters=Parameters()))
         for first, reflectors in enumerate((REFLECTORS, REFLECTORS, renamed))
     )
     start = Belief(0, np.zeros(3), 1e-4 * np.eye(3))

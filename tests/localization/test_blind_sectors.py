@@ -87,7 +87,9 @@ def test_detections_alone_on_the_edge_of_a_sector_are_judged_on_both_sides() -> 
     """A sector from 20 to 60 deg: 19.9 deg is seen, 20.1 is not."""
     setup = blinded(
         LocalizerSetup(
-            random_map(np.random.default_rng(6), 5), setup_of(np.random.default_rng(6)).scanners, Parameters()
+            reflectors=random_map(np.random.default_rng(6), 5),
+            scanners=setup_of(np.random.default_rng(6)).scanners,
+            parameters=Parameters(),
         )
     )
     seen = np.array(

@@ -29,7 +29,9 @@ def considered(
     reflectors: ReflectorMap, uncertainty: Uncertainty = LARGE, count: int = 1, **groups: object
 ) -> LocalizerSetup:
     parameters = Parameters(**{"filter": CONSIDERING, **groups})  # type: ignore[arg-type]
-    return LocalizerSetup(reflectors, (FRONT, REAR)[:count], parameters, uncertainty)
+    return LocalizerSetup(
+        reflectors=reflectors, scanners=(FRONT, REAR)[:count], parameters=parameters, uncertainty=uncertainty
+    )
 
 
 def surveyed(rng: np.random.Generator, reflectors: ReflectorMap) -> ReflectorMap:
@@ -149,7 +151,9 @@ def test_of_another_map_only_what_is_the_same_constant_stays_correlated() -> Non
     every[4] = dataclasses.replace(every[4], sigma=0.001)
     every = [*every[:7], *every[8:], Reflector(id="new", x=1.0, y=1.0)]
     turned = dataclasses.replace(REAR, mounting=np.array([-0.4, -0.2, 2.9]))
-    edited = LocalizerSetup(ReflectorMap(tuple(every)), (turned, FRONT), setup.parameters, LARGE)
+    edited = LocalizerSetup(
+        reflectors=ReflectorMap(tuple(every)), scanners=(turned, FRONT), parameters=setup.parameters, uncertainty=LARGE
+    )
     columns = columns_of(cross, edited.constants)
     assert columns is not None
     assert edited.constants is not None

@@ -38,7 +38,11 @@ INITIAL = Belief(0, np.array([0.0, 0.0, 0.0]), np.diag([1e-4, 1e-4, 1e-4]))
 
 
 def one_reflector(parameters: Parameters | None = None) -> LocalizerSetup:
-    return LocalizerSetup(ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)), (Scanner(),), parameters or Parameters())
+    return LocalizerSetup(
+        reflectors=ReflectorMap((Reflector(id="A", x=2.0, y=0.0),)),
+        scanners=(Scanner(),),
+        parameters=parameters or Parameters(),
+    )
 
 
 def with_close_neighbors(rng: np.random.Generator, reflectors: ReflectorMap) -> ReflectorMap:
@@ -71,7 +75,11 @@ def with_close_neighbors(rng: np.random.Generator, reflectors: ReflectorMap) -> 
 def test_localizer_agrees_with_the_plain_one(plan: Plan, parameters: Parameters) -> None:
     rng = np.random.default_rng(11)
     parameters = dataclasses.replace(parameters, filter=WHITE)
-    setup = LocalizerSetup(with_close_neighbors(rng, random_map(rng, 12)), (Scanner(mounting=MOUNTING),), parameters)
+    setup = LocalizerSetup(
+        reflectors=with_close_neighbors(rng, random_map(rng, 12)),
+        scanners=(Scanner(mounting=MOUNTING),),
+        parameters=parameters,
+    )
     drive = random_drive(setup, rng, plan)
     whole = run(drive.log, setup, drive.initial)
     plain = PlainLocalizer(setup.reflectors, setup.scanners[0], parameters, drive.initial).run(drive.log)
@@ -116,7 +124,9 @@ def test_pose_errors_and_innovations_are_as_large_as_the_filter_says(plan: Plan)
     drives = 40
     for seed in range(drives):
         rng = np.random.default_rng(seed)
-        setup = LocalizerSetup(random_map(rng, 5), (Scanner(mounting=MOUNTING),), parameters)
+        setup = LocalizerSetup(
+            reflectors=random_map(rng, 5), scanners=(Scanner(mounting=MOUNTING),), parameters=parameters
+        )
         drive = random_drive(setup, rng, plan)
         arrays = run(drive.log, setup, drive.initial)
         error = arrays.means[-1] - drive.truth[-1]
@@ -141,7 +151,7 @@ def moved(drive: Drive, setup: LocalizerSetup, T: np.ndarray) -> tuple[Localizer
     )
     G = block(T)
     initial = Belief(0, se2.compose(T, drive.initial.mean), G @ drive.initial.covariance @ G.T)
-    return LocalizerSetup(reflectors, setup.scanners, setup.parameters), initial
+    return LocalizerSetup(reflectors=reflectors, scanners=setup.scanners, parameters=setup.parameters), initial
 
 
 def block(T: np.ndarray) -> np.ndarray:
@@ -152,7 +162,9 @@ def block(T: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("T", [(100.0, -50.0, 0.0), (0.0, 0.0, 2.5), (-30.0, 7.0, -3.1)])
 def test_nothing_changes_when_the_whole_hall_is_moved_or_turned(T: tuple[float, float, float]) -> None:
     rng = np.random.default_rng(21)
-    setup = LocalizerSetup(random_map(rng, 12), (Scanner(mounting=MOUNTING),), Parameters())
+    setup = LocalizerSetup(
+        reflectors=random_map(rng, 12), scanners=(Scanner(mounting=MOUNTING),), parameters=Parameters()
+    )
     drive = random_drive(setup, rng, Plan(clutter=1.0))
     here = run(drive.log, setup, drive.initial)
     pose = np.array(T)
@@ -239,7 +251,7 @@ def test_each_scanner_is_believed_by_its_own_noise_or_else_that_of_the_filter(or
     rear = Scanner(name="rear", detection_range_sigma=0.05, detection_bearing_sigma_deg=math.degrees(0.03))
     parameters = Parameters(observation=ObservationParameters(range_sigma=0.02, bearing_sigma=0.004), filter=WHITE)
     reflectors = ReflectorMap((Reflector(id="A", x=2.0, y=0.0),))
-    localizer = Localizer(LocalizerSetup(reflectors, (front, rear), parameters), INITIAL)
+    localizer = Localizer(LocalizerSetup(reflectors=reflectors, scanners=(front, rear), parameters=parameters), INITIAL)
     by_range, by_bearing = np.array([[-1.0, 0.0, 0.0]]), np.array([[0.0, -0.5, -1.0]])
     expected = np.linalg.inv(INITIAL.covariance)
     for scanner in order:
@@ -320,7 +332,7 @@ def test_records_older_than_what_was_flushed_are_refused() -> None:
 
 
 def test_map_without_reflectors_makes_every_detection_an_outlier() -> None:
-    setup = LocalizerSetup(ReflectorMap(), (Scanner(),), Parameters())
+    setup = LocalizerSetup(reflectors=ReflectorMap(), scanners=(Scanner(),), parameters=Parameters())
     log = RecordLog.collect([Odometry(0, np.zeros(3)), Detections(0, np.array([[2.0, 0.0]]))])
     arrays = run(log, setup, INITIAL)
     assert arrays.status.tolist() == [Status.OUTLIER_ASSOCIATION]

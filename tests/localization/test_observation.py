@@ -143,7 +143,7 @@ def test_drawn_outline_of_the_gate_parts_what_the_localizer_takes_from_what_it_l
     parameters = Parameters(
         association=AssociationParameters(gate_probability=probability), filter=FilterParameters(consider=consider)
     )
-    setup = LocalizerSetup(reflectors, (Scanner(mounting=MOUNTING),), parameters)
+    setup = LocalizerSetup(reflectors=reflectors, scanners=(Scanner(mounting=MOUNTING),), parameters=parameters)
     covariance = np.array([[4e-4, 1e-4, 1e-5], [1e-4, 9e-4, -2e-5], [1e-5, -2e-5, 1e-5]])
     belief = Belief(0, np.array([0.5, -0.5, 0.3]), covariance)
     outlines = validation_outlines(setup, areas_of(setup, belief))
@@ -160,7 +160,9 @@ def test_drawn_outline_of_the_gate_parts_what_the_localizer_takes_from_what_it_l
 def test_drawn_outline_follows_the_gate_once_constants_are_correlated_with_the_pose() -> None:
     reflectors = ReflectorMap((Reflector(id="near", x=4.0, y=1.0, sigma=0.02), Reflector(id="far", x=-3.0, y=11.0)))
     known = Uncertainty(survey=0.03, mounting_position=0.02, mounting_heading=0.01, range_bias=0.05, clock=0.1)
-    setup = LocalizerSetup(reflectors, (Scanner(mounting=MOUNTING),), Parameters(), known)
+    setup = LocalizerSetup(
+        reflectors=reflectors, scanners=(Scanner(mounting=MOUNTING),), parameters=Parameters(), uncertainty=known
+    )
     driven = Localizer(setup, Belief(0, np.array([0.5, -0.5, 0.3]), np.diag([4e-4, 9e-4, 1e-4])))
     stamp, twist = 0, np.array([0.5, 0.0, 0.2])
     for _ in range(20):

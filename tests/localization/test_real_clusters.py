@@ -18,7 +18,9 @@ def detected(folder: Path, model: str) -> DetectionLog:
     project, log = load_project(folder), load_log(folder / "recording")
     detector = replace(project.parameters.detector, expected_beams=model)
     parameters = replace(project.parameters, detector=detector)
-    return detect_log(log.scans[0], LocalizerSetup(project.reflectors, project.scanners, parameters))
+    return detect_log(
+        log.scans[0], LocalizerSetup(reflectors=project.reflectors, scanners=project.scanners, parameters=parameters)
+    )
 
 
 def split_bodies(found: DetectionLog) -> int:

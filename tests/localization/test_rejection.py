@@ -75,7 +75,9 @@ def test_lost_vehicle_is_believed_again_only_well_below_both_limits(near: float,
 def lonely(**supervisor: float) -> Localizer:
     """One that stands still before a single reflector, 5 m ahead."""
     parameters = dataclasses.replace(Parameters(), supervisor=SupervisorParameters(**supervisor))
-    setup = LocalizerSetup(ReflectorMap((Reflector(id="A", x=5.0, y=0.0),)), (Scanner(),), parameters)
+    setup = LocalizerSetup(
+        reflectors=ReflectorMap((Reflector(id="A", x=5.0, y=0.0),)), scanners=(Scanner(),), parameters=parameters
+    )
     localizer = Localizer(setup, Belief(0, np.zeros(3), 1e-6 * np.eye(3)))
     localizer.feed(Odometry(0, np.zeros(3)))
     return localizer
@@ -191,7 +193,7 @@ def test_what_the_detector_filter_rejects_does_not_count() -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_slip_is_said_within_fifteen_cycles_of_danger(degrees: float, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    setup = LocalizerSetup(random_map(rng, 25), (Scanner(),), Parameters())
+    setup = LocalizerSetup(reflectors=random_map(rng, 25), scanners=(Scanner(),), parameters=Parameters())
     drive = random_drive(setup, rng, Plan(scans=200, clutter=1.0, slip=math.radians(degrees)))
     columns = run(drive.log, setup, drive.initial)
     error = columns.means - drive.truth
@@ -203,14 +205,14 @@ def test_slip_is_said_within_fifteen_cycles_of_danger(degrees: float, seed: int)
 @pytest.mark.parametrize("seed", range(6))
 def test_drive_without_a_slip_is_never_lost(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    setup = LocalizerSetup(random_map(rng, 25), (Scanner(),), Parameters())
+    setup = LocalizerSetup(reflectors=random_map(rng, 25), scanners=(Scanner(),), parameters=Parameters())
     drive = random_drive(setup, rng, Plan(scans=200, clutter=1.0))
     assert not (run(drive.log, setup, drive.initial).modes == Mode.LOST).any()
 
 
 def test_output_is_withheld_while_lost_and_the_filter_goes_on() -> None:
     rng = np.random.default_rng(1)
-    setup = LocalizerSetup(random_map(rng, 25), (Scanner(),), Parameters())
+    setup = LocalizerSetup(reflectors=random_map(rng, 25), scanners=(Scanner(),), parameters=Parameters())
     drive = random_drive(setup, rng, Plan(scans=200, clutter=1.0, slip=math.radians(8.0)))
     columns = run(drive.log, setup, drive.initial)
     first = int(np.flatnonzero(columns.modes == Mode.LOST)[0])

@@ -27,7 +27,9 @@ ALL_ROUND = Scanner(field_of_view_deg=(-180.0, 180.0), reflector_range=15.0)
 
 def setup_of(seed: int, count: int = 25, **supervisor: bool) -> LocalizerSetup:
     parameters = Parameters(supervisor=SupervisorParameters(**supervisor))
-    return LocalizerSetup(random_map(np.random.default_rng(seed), count), (ALL_ROUND,), parameters)
+    return LocalizerSetup(
+        reflectors=random_map(np.random.default_rng(seed), count), scanners=(ALL_ROUND,), parameters=parameters
+    )
 
 
 def unlocated(setup: LocalizerSetup) -> FilterState:
@@ -62,7 +64,11 @@ def lattice(side: float) -> ReflectorMap:
 
 
 def test_a_place_that_looks_like_others_is_never_confirmed_and_all_hypotheses_are_kept() -> None:
-    setup = LocalizerSetup(lattice(2.0), (dataclasses.replace(ALL_ROUND, reflector_range=4.5),), Parameters())
+    setup = LocalizerSetup(
+        reflectors=lattice(2.0),
+        scanners=(dataclasses.replace(ALL_ROUND, reflector_range=4.5),),
+        parameters=Parameters(),
+    )
     drive = random_drive(setup, np.random.default_rng(5), Plan(scans=120, reach=4.5, clutter=0.0))
     columns = run(drive.log, setup, unlocated(setup))
     assert (columns.modes == Mode.INITIALIZING).all()
@@ -130,7 +136,7 @@ def test_live_and_whole_run_agree_to_the_last_bit_while_the_vehicle_is_searched(
     setup = setup_of(4)
     scanner = dataclasses.replace(ALL_ROUND, sweep_duration=sweep)
     parameters = dataclasses.replace(setup.parameters, odometry=OdometryParameters(forward_scale=forward_scale))
-    setup = LocalizerSetup(setup.reflectors, (scanner,), parameters)
+    setup = LocalizerSetup(reflectors=setup.reflectors, scanners=(scanner,), parameters=parameters)
     drive = random_drive(setup, np.random.default_rng(4), Plan(scans=130, reach=8.0, scan_offset_ns=7_000_000))
     records: list[Record] = list(drive.records)
     start: FilterState | None = unlocated(setup)

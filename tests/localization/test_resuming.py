@@ -49,7 +49,9 @@ def setup_of(seed: int = 3, count: int = 2, **groups: object) -> LocalizerSetup:
     front = Scanner(mounting=np.array([0.3, 0.1, 0.2]))
     scanners = (front, Scanner(name="rear", mounting=np.array([-0.4, -0.2, 2.8])))[:count]
     parameters = Parameters(**{"supervisor": TIGHT, **groups})  # type: ignore[arg-type]
-    return LocalizerSetup(random_map(np.random.default_rng(seed), 12), scanners, parameters)
+    return LocalizerSetup(
+        reflectors=random_map(np.random.default_rng(seed), 12), scanners=scanners, parameters=parameters
+    )
 
 
 SETUPS = {

@@ -34,7 +34,9 @@ SPEED, TURN_RATE = 1.1, 0.6
 def settled(scanner: Scanner, measured: np.ndarray, bias: float = 0.0) -> np.ndarray:
     """Detections of a scan of a vehicle that drives an arc at a constant speed."""
     parameters = Parameters(observation=ObservationParameters(range_bias=bias))
-    setup = LocalizerSetup(random_map(np.random.default_rng(0), 3), (scanner,), parameters)
+    setup = LocalizerSetup(
+        reflectors=random_map(np.random.default_rng(0), 3), scanners=(scanner,), parameters=parameters
+    )
     motion = AT_REST._replace(started=True, trend_x=SPEED, trend_theta=TURN_RATE)
     found = np.full(measured.shape, np.nan)
     measured.setflags(write=False)
@@ -79,7 +81,7 @@ def test_a_scan_of_one_instant_is_left_as_it_is_and_a_sweep_at_rest_is_mirrored_
 
 def test_a_setup_without_sweeps_copies_no_detection() -> None:
     rng = np.random.default_rng(1)
-    setup = LocalizerSetup(random_map(rng, 12), (FRONT,), Parameters())
+    setup = LocalizerSetup(reflectors=random_map(rng, 12), scanners=(FRONT,), parameters=Parameters())
     drive = random_drive(setup, rng, Plan(scans=5))
     found = run(drive.log, setup, drive.initial)
     assert found.range_bearing is found.detected.range_bearing
@@ -103,7 +105,9 @@ def test_live_is_the_whole_run_to_the_last_bit_at_every_duration(
     scanners: int, duration: float, stamp_of: StampOf, plan: Plan
 ) -> None:
     rng = np.random.default_rng(5)
-    setup = LocalizerSetup(random_map(rng, 12), sweeping(duration, stamp_of, scanners), Parameters())
+    setup = LocalizerSetup(
+        reflectors=random_map(rng, 12), scanners=sweeping(duration, stamp_of, scanners), parameters=Parameters()
+    )
     drive = random_drive(setup, rng, plan)
     columns = run(drive.log, setup, drive.initial)
     localizer = Localizer(setup, drive.initial)
@@ -121,7 +125,9 @@ def test_live_is_the_whole_run_to_the_last_bit_at_every_duration(
 
 def test_an_earlier_run_is_taken_over_with_the_detections_at_their_stamps() -> None:
     rng = np.random.default_rng(6)
-    setup = LocalizerSetup(random_map(rng, 12), sweeping(0.125, StampOf.LAST, 1), Parameters())
+    setup = LocalizerSetup(
+        reflectors=random_map(rng, 12), scanners=sweeping(0.125, StampOf.LAST, 1), parameters=Parameters()
+    )
     drive = random_drive(setup, rng, Plan(scans=60))
     other = replace(setup, scanners=(FRONT,))
     earlier = run(drive.log, setup, drive.initial)
@@ -137,7 +143,9 @@ def test_an_earlier_run_is_taken_over_with_the_detections_at_their_stamps() -> N
 
 def test_motion_of_a_vehicle_is_the_twist_that_odometry_tells() -> None:
     step = se2.exp(np.array([SPEED, 0.0, TURN_RATE]) * 0.05)
-    setup = LocalizerSetup(random_map(np.random.default_rng(0), 3), (FRONT,), Parameters())
+    setup = LocalizerSetup(
+        reflectors=random_map(np.random.default_rng(0), 3), scanners=(FRONT,), parameters=Parameters()
+    )
     rng = np.random.default_rng(2)
     drive = random_drive(setup, rng, Plan(scans=3))
     localizer = Localizer(setup, drive.initial)
@@ -159,7 +167,11 @@ def error_of_heading(scanner: Scanner) -> float:
     around = np.radians(np.arange(0, 360, 3))
     places = 12.0 * np.stack([np.cos(around), np.sin(around)], axis=1)
     reflectors = ReflectorMap(tuple(Reflector(id=str(i), x=x, y=y) for i, (x, y) in enumerate(places.tolist())))
-    setup = LocalizerSetup(reflectors, (scanner,), Parameters(association=AssociationParameters(enabled=False)))
+    setup = LocalizerSetup(
+        reflectors=reflectors,
+        scanners=(scanner,),
+        parameters=Parameters(association=AssociationParameters(enabled=False)),
+    )
     records: list[Record] = [Odometry(0, np.zeros(3))]
     for k in range(1, 201):
         stamp_ns = k * 20_000_000

@@ -43,7 +43,9 @@ def test_a_course_that_is_off_turns_with_the_way_and_back_in_reverse() -> None:
 def test_a_live_vehicle_and_a_whole_run_correct_their_wheels_to_the_last_bit_alike() -> None:
     rng = np.random.default_rng(4)
     reflectors = ReflectorMap(tuple(Reflector(id=f"R{i}", x=3.0 * i, y=2.0 * (-1) ** i) for i in range(4)))
-    setup = LocalizerSetup(reflectors, (Scanner(sweep_duration=0.02),), Parameters(odometry=WRONG))
+    setup = LocalizerSetup(
+        reflectors=reflectors, scanners=(Scanner(sweep_duration=0.02),), parameters=Parameters(odometry=WRONG)
+    )
     records = []
     for step in range(60):
         records.append(Odometry(20_000_000 * step, np.array([0.02, 0.0, 0.01]) + rng.normal(0.0, 1e-3, 3)))
@@ -56,5 +58,9 @@ def test_a_live_vehicle_and_a_whole_run_correct_their_wheels_to_the_last_bit_ali
     live += localizer.flush()
     whole = run(RecordLog.collect(records), setup, start)
     assert np.array_equal(whole.means, [estimate.posterior.mean for estimate in live])
-    plain = run(RecordLog.collect(records), LocalizerSetup(reflectors, setup.scanners, Parameters()), start)
+    plain = run(
+        RecordLog.collect(records),
+        LocalizerSetup(reflectors=reflectors, scanners=setup.scanners, parameters=Parameters()),
+        start,
+    )
     assert np.abs(plain.means[-1] - whole.means[-1]).max() > 1e-3

@@ -36,7 +36,9 @@ def setup_of(rng: np.random.Generator, parameters: Parameters | None = None, sca
         Scanner(mounting=np.array([0.3, 0.1, 0.2])),
         Scanner(name="rear", mounting=np.array([-0.4, -0.2, 2.8]), resolution_deg=0.25, beam_width_deg=0.1),
     )
-    return LocalizerSetup(random_map(rng, 12), both[:scanners], parameters or Parameters())
+    return LocalizerSetup(
+        reflectors=random_map(rng, 12), scanners=both[:scanners], parameters=parameters or Parameters()
+    )
 
 
 def bits(value: object) -> bytes | list[bytes]:

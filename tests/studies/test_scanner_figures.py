@@ -89,6 +89,8 @@ def test_without_any_reference_only_the_residuals_against_the_estimate_are_known
 
 def test_without_reflectors_no_residual_is_known(driven: RunResult) -> None:
     (segment, *_) = driven.inputs.segments
-    bare = LocalizerSetup(ReflectorMap(()), segment.setup.scanners, segment.setup.parameters)
+    bare = LocalizerSetup(
+        reflectors=ReflectorMap(()), scanners=segment.setup.scanners, parameters=segment.setup.parameters
+    )
     run = judged_run(replace(driven.inputs, segments=(replace(segment, setup=bare),)))
     assert all(math.isnan(each.range_residual) and each.accepted == 0 for each in run.scanners)
