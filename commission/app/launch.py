@@ -26,6 +26,7 @@ from commission.app.editing import feature as editing
 from commission.app.exchange import feature as exchange
 from commission.app.failures import feature as failures
 from commission.app.floor_map import feature as floor_map
+from commission.app.layouts import feature as layouts
 from commission.app.live import feature as live
 from commission.app.live.state import LiveState
 from commission.app.page import Page
@@ -57,6 +58,7 @@ FEATURES = (
     failures.FEATURE,
     ambiguity.FEATURE,
     placement.FEATURE,
+    layouts.FEATURE,
     run.FEATURE,
     live.FEATURE,
     tune.FEATURE,

@@ -95,6 +95,8 @@ def layout_figures(
     routes: tuple[str, ...],
     options: PredictionOptions | None = None,
     progress: Progress = silent,
+    *,
+    visibility: VisibilityOptions | None = None,
 ) -> LayoutFigures:
     """Find out what a layout comes to.
 
@@ -105,8 +107,9 @@ def layout_figures(
     routes : names of the routes that count.
     options : how they are predicted.
     progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
+    visibility : what counts as visible; what the project's detector passes when None.
     """
-    walls, seen = walls_of(site.floor_map), VisibilityOptions(detector=site.parameters.detector)
+    walls, seen = walls_of(site.floor_map), visibility or VisibilityOptions(detector=site.parameters.detector)
     models = tuple(build_visibility(reflectors, scanner, walls, seen) for scanner in site.scanners)
     planned = [plan_route(site, name, options, models) for name in routes]
     found: list[RouteFigures] = []
@@ -129,17 +132,21 @@ def layout_figures(
                 failing=max(float(failing[scans, :2].max()), 0.0 if before is None else before.failing),
             )
     poses = [route.drive.poses[0] for route in planned] + [station.pose for station in site.stations]
-    alike = ambiguous_poses(VehicleVisibility(models), np.array(poses), AmbiguityOptions())
-    few = VehicleVisibility(models).visible_from_poses(np.array(poses)).counts() < 2
     progress(1.0, "what the layout comes to")
     return LayoutFigures(
         reflectors=len(reflectors),
         routes=tuple(found),
         stations=tuple(at_stations.values()),
         stopping=len(stopping),
-        ambiguous=int(np.count_nonzero(alike.ambiguous | few)),
+        ambiguous=_ambiguous(VehicleVisibility(models), np.array(poses)) if poses else 0,
         places=len(poses),
     )
+
+
+def _ambiguous(visible: VehicleVisibility, poses: FloatArray) -> int:
+    """Count the poses at which another one sees the same, or fewer than two reflectors are in sight."""
+    alike = ambiguous_poses(visible, poses, AmbiguityOptions())
+    return int(np.count_nonzero(alike.ambiguous | (visible.visible_from_poses(poses).counts() < 2)))
 
 
 def _with_failures(route: PlannedRoute) -> tuple[FloatArray, FloatArray, set[int]]:

@@ -20,12 +20,14 @@ from playwright.sync_api import Browser, sync_playwright
 from commission.app.ambiguity.service import AmbiguityService
 from commission.app.base.actions import Envelope, Sender
 from commission.app.coverage.service import CoverageService
-from commission.app.editing.actions import SelectReflectors
+from commission.app.editing.actions import DeleteSelected, SelectReflectors
 from commission.app.editing.editor import editors_of
 from commission.app.editing.site_tools import MeasureTool, StationTool
 from commission.app.failures.actions import ShowFailure
 from commission.app.failures.service import FailureService
 from commission.app.floor_map.tools import ObstacleTool
+from commission.app.layouts.actions import SetComparison
+from commission.app.layouts.service import LayoutsService
 from commission.app.placement.actions import SetLayout
 from commission.app.placement.service import PlacementService
 from commission.app.prediction.service import PredictionService
@@ -273,6 +275,25 @@ def importing(page: OpenPage, _runtime: Runtime) -> None:
     page.wait_for_text("Nothing has changed yet")
 
 
+def layouts(page: OpenPage, runtime: Runtime) -> None:
+    """A layout is kept, and three of its reflectors are gone: what that does to the floor and the routes."""
+    page.open_tab("Plan")
+    page.fold("Heatmap of the floor")
+    page.fold("Compare layouts")
+    page.press("Keep this layout")
+    ids = tuple(reflector.id for reflector in runtime.state.project.reflectors.reflectors[2:5])
+    me = Sender(next(iter(runtime.state.browsers)))
+    for action in (SelectReflectors(ids), DeleteSelected(), SetComparison("figure", "position_sigma")):
+        runtime.post(Envelope(action, me))
+    until(
+        lambda: (
+            (view := runtime.service(LayoutsService).view) is not None
+            and view.difference is not None
+            and not view.outdated
+        )
+    )
+
+
 def listed(name: str) -> Steps:
     """Events or reflectors of the drive beside the plots; of reflectors the NIS colors the floor."""
 
@@ -312,6 +333,7 @@ PICTURES = (
     Picture("station", "shop_floor", at_station),
     Picture("several", "shop_floor", several),
     Picture("importing", "shop_floor", importing),
+    Picture("page_layouts", "shop_floor", layouts),
 )
 
 

@@ -55,6 +55,14 @@ TOO_LITTLE: Color = (240, 132, 52)
 REFUSED: Color = (255, 122, 110)
 # Variants of a drive, on the floor and in the plots: neither lived nor computed nor true.
 VARIANTS: tuple[Color, Color, Color] = ((255, 128, 214), (168, 230, 92), (250, 170, 120))
+# A layout that was kept beside the one of now: its reflectors, and how much better or worse the floor is now, from
+# little to much. Orange and blue are told apart by color-blind people.
+KEPT: Color = (166, 190, 255)
+WORSE: tuple[Color, Color, Color] = ((140, 92, 52), (204, 112, 42), (255, 148, 40))
+BETTER: tuple[Color, Color, Color] = ((46, 92, 124), (44, 132, 186), (92, 190, 250))
+NO_DIFFERENCE: Color = (66, 70, 78)
+NO_FIX_NEITHER: Color = (104, 108, 116)
+NO_FIX_DARK: Color = (30, 30, 34)
 # What an error comes from: apart from each other, and from the ramp of the share of a limit.
 FROM_NOISE: Color = (138, 148, 164)
 FROM_MAP: Color = (74, 134, 255)

@@ -8,6 +8,7 @@ from viser import GuiApi
 
 from commission.app.base import theme
 from commission.app.base.actions import Action, LookAt
+from commission.app.base.before_after import before_after
 from commission.app.base.inputs import Inputs, Text, WorkBar, enable, show
 from commission.app.base.panel import BasePanel, Post, escaped, posting, table
 from commission.app.base.rows import Rows
@@ -24,7 +25,6 @@ from commission.app.placement.actions import (
     SetLayout,
     TakePreset,
 )
-from commission.app.placement.before_after import before_after
 from commission.app.placement.keep_out_tool import KeepOutTool
 from commission.app.placement.service import LAYOUT
 from commission.app.placement.view import LayoutView

@@ -1,11 +1,12 @@
-"""Before and after of a suggested layout: every figure in its column and unit."""
+"""Two layouts beside each other: every figure in its column and unit."""
 
 from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 
-from commission.app.placement.before_after import before_after
+from commission.app.base.before_after import ComparedLine, before_after
 from commission.planning.layout_figures import LayoutFigures, RouteFigures, StationFigures, Worst
 
 
@@ -29,13 +30,23 @@ def test_every_figure_of_both_layouts_stands_in_its_column_with_its_unit() -> No
         ["", "now", "suggested"],
         ["Reflectors", "25", "11"],
         ["A &lt;b&gt;: worst 2σ"],
-        ["All there [mm, °]", "8.0, 0.80", "12.0, 1.20"],
-        ["Any one failing [mm, °]", "16.0, 1.60", "24.0, 2.40"],
-        ["Fewest in sight", "4", "3"],
+        ["All there [mm]", "8.0", "<i class='c-worse'>12.0</i>"],
+        ["All there [°]", "0.80", "<i class='c-worse'>1.20</i>"],
+        ["Any one failing [mm]", "16.0", "<i class='c-worse'>24.0</i>"],
+        ["Any one failing [°]", "1.60", "<i class='c-worse'>2.40</i>"],
+        ["Fewest in sight", "4", "<i class='c-worse'>3</i>"],
         ["Dock: 2σ, at most 10 mm"],
-        ["All there [mm]", "4.0", "6.0"],
-        ["Any one failing [mm]", "6.0", "9.0"],
+        ["All there [mm]", "4.0", "<i class='c-worse'>6.0</i>"],
+        ["Any one failing [mm]", "6.0", "<i class='c-worse'>9.0</i>"],
         ["All routes, all places"],
-        ["Stop if one fails", "4", "3"],
+        ["Stop if one fails", "4", "<i class='c-better'>3</i>"],
         ["Ambiguous, of 2", "1", "1"],
     ]
+
+
+def test_what_is_written_alike_is_no_difference_and_places_that_are_not_there_are_not_told() -> None:
+    one, other = figures(5, 0.00801, 4), replace(figures(5, 0.00802, 4), places=0)
+    html = before_after(one, other, ("a", "b"), (ComparedLine("More", "1", "2", gain=math.nan),))
+    assert "c-worse" not in html
+    html = before_after(replace(one, places=0), other)
+    assert "Ambiguous" not in html
