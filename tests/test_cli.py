@@ -59,6 +59,17 @@ def test_help_does_not_wait_for_slow_packages():
     assert done.returncode == 0
 
 
+def test_the_page_does_not_wait_for_what_only_some_files_need():
+    script = (
+        "import sys\nimport commission.cli.serve, commission.app.launch\n"
+        "slow = {'scipy.stats', 'scipy.interpolate', 'matplotlib', 'trimesh', 'rosbags', 'ezdxf'} & set(sys.modules)\n"
+        "sys.exit(' '.join(sorted(slow)) or 0)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=60, check=False)
+    assert done.stderr == ""
+    assert done.returncode == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

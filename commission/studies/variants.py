@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit  # pyright: ignore[reportAttributeAccessIssue]
 
 from commission.errors import UsageError
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
@@ -184,7 +184,7 @@ def is_beyond_chance(
     if not math.isfinite(difference):
         return None
     error = float(np.std(parts[1] - parts[0], ddof=1)) / math.sqrt(len(blocks))
-    return abs(difference) > float(student.ppf(0.5 + 0.5 * LEVEL, len(blocks) - 1)) * error + 1e-12 * abs(means[0])
+    return abs(difference) > float(stdtrit(len(blocks) - 1, 0.5 + 0.5 * LEVEL)) * error + 1e-12 * abs(means[0])
 
 
 def _compared(figure: VariantFigure, runs: Sequence[RunResult], blocks: IntArray) -> ComparedFigure:

@@ -150,7 +150,7 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("words", nargs="*", help="run the benchmarks whose names hold one of them; none: all")
     parser.add_argument("--rounds", type=int, default=3, help="how often each is run on both sides")
     parser.add_argument("--tree", type=Path, help="a checkout of the commit; none: one is made and removed")
-    given = parser.parse_args(arguments)
+    given = parser.parse_intermixed_args(arguments)
     if given.tree is not None:
         compare(given.tree.resolve(), given.words, given.rounds)
         return
