@@ -41,6 +41,7 @@ from commission.app.run.state import RunState
 from commission.app.runtime import BrowserCame, BrowserLeft, Runtime
 from commission.app.tune import feature as tune
 from commission.io.findings import Findings
+from commission.io.live.permission import Permission
 from commission.io.project_file import OpenedProject, load_project, open_project
 from commission.site.project import Project
 
@@ -98,6 +99,7 @@ def serve(
     """
     opened = bundled(project) if demo else open_project(project)
     loaded, folder = opened.project, None if demo else opened.folder
+    permission = Permission.of(sources, access.networks, is_shared=access.lets_others_in)
     with ExitStack() as open_things:
         # Ctrl-C may come at any moment from here on, and what is running would keep the program alive.
         token = None if access.token is None else access.token.text
@@ -113,7 +115,7 @@ def serve(
             is_new=opened.is_new,
             reach=reach,
             notes=opened.notes,
-            live=LiveState(sources=sources),
+            live=LiveState(sources=sources, permission=permission),
         )
         open_things.callback(runtime.stop)
         wait_for_interruption = open_things.enter_context(interruption())

@@ -33,6 +33,9 @@ class _Page:
     """Address of a proxy with TLS in front of the page, such as https://agv.example.com; needs a token."""
     files: Annotated[UseAppendAction[tuple[Path, ...]], arg(metavar="DIR")] = ()
     """Folder that browsers of other computers may read from and save to, beside the project's own; repeatable."""
+    connect_to: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="ADDRESS[/BITS]")] = ()
+    """Network in which a browser may name live sources, beside this computer and the private networks; repeatable. What
+    --source names needs none."""
     open: bool = True
     """Whether to open the page in this computer's browser."""
 
@@ -54,6 +57,7 @@ class _Page:
                 token=chosen_token(self.token, self.token_file),
                 public_url=self.public_url,
                 files=tuple(self.files),
+                networks=tuple(self.connect_to),
             )
             serve(project, access, open_browser=self.open, recording=recording, demo=demo, sources=sources)
 

@@ -52,6 +52,8 @@ class Access:
     """Address of a proxy with TLS in front of the page; None when there is none."""
     files: tuple[Path, ...] = ()
     """Folders from which the page may read beside the project's own, when other computers are let in."""
+    networks: tuple[str, ...] = ()
+    """Networks in which a browser may name live sources beside the private ones, each as `ADDRESS/BITS`."""
 
     @property
     def lets_others_in(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 from commission.app.base.actions import Sender
@@ -15,14 +16,20 @@ from commission.io.live.registry import SourceAddress
 
 
 @reduce.register
-def connect(action: Connect, state: AppState, _sender: Sender) -> Outcome:
+def connect(action: Connect, state: AppState, sender: Sender) -> Outcome:
     """Listen to sources."""
     if not action.sources:
         raise UsageError("no source is named; expected one such as json:127.0.0.1:6061, several with commas between")
-    for text in action.sources:
-        SourceAddress.parse(text)
-    asked = LiveState(sources=action.sources, start=action.start, connected=True)
-    return Outcome(state.with_part(asked), (OpenSources(action.sources, action.start),))
+    asked = state.part(LiveState)
+    # What the program itself was started with is not questioned.
+    check = asked.permission.checked if sender.browser is not None else _parsed
+    sources = tuple(map(str, check(action.sources)))
+    asked = replace(asked, sources=sources, start=action.start, connected=True)
+    return Outcome(state.with_part(asked), (OpenSources(sources, action.start),))
+
+
+def _parsed(texts: Iterable[str]) -> tuple[SourceAddress, ...]:
+    return tuple(map(SourceAddress.parse, texts))
 
 
 @reduce.register

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from commission.io.live.permission import NEAR, Permission
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LiveState:
@@ -15,3 +17,5 @@ class LiveState:
     """Pose of base at the first record [m, m, rad]; none: the start of the first route."""
     connected: bool = False
     """Whether they are listened to."""
+    permission: Permission = NEAR
+    """Which sources a browser may name."""

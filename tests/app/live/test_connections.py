@@ -11,7 +11,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from commission.app.base.state import AppState
 from commission.app.live.actions import Connect, Disconnect
+from commission.app.live.effects import OpenSources
 from commission.app.live.live_panel import live_table, start_pose
 from commission.app.live.service import LiveService
 from commission.app.live.state import LiveState
@@ -19,8 +21,9 @@ from commission.app.live.view import LiveView, SourceView
 from commission.app.run.actions import Seek
 from commission.app.run.state import RunState
 from commission.app.tune.actions import SetParameter
-from commission.errors import CommissionError
+from commission.errors import CommissionError, UsageError
 from commission.io.live.checklist import checklist
+from commission.io.live.permission import Permission
 from commission.io.live.registry import SourceAddress
 from commission.io.live.status import SourceState, SourceStatus
 from commission.io.live.virtual_vehicle import send_drive
@@ -28,6 +31,7 @@ from commission.localization import localizer
 from commission.simulation.scenario import records
 from commission.studies import run
 from commission.studies.run import judged_run
+from tests.app.asking import after
 from tests.app.sites import room
 from tests.browser.serving import Served
 
@@ -181,3 +185,16 @@ def test_what_a_sender_says_is_shown_as_text() -> None:
     shown = live_table(LiveView((SourceView(address, SourceStatus(state=SourceState.SILENT, silent_s=3.2), ()),), ()))
     assert "<b>:" not in shown.replace("<b>json", "")
     assert "silent for 3 s" in shown
+
+
+def test_a_browser_may_not_make_the_server_connect_anywhere() -> None:
+    state = AppState(project=room(), saved=room()).with_part(LiveState())
+    anywhere, here = Connect(("cola:169.254.169.254:2112",)), Connect(("cola:localhost:2112",))
+    with pytest.raises(UsageError, match="not for a browser to name"):
+        after(state, anywhere)
+    outcome = after(state, here)
+    assert outcome.effects == (OpenSources(("cola:127.0.0.1:2112",), None),)
+    # What the program was started with is not questioned, and stays allowed.
+    assert after(state, anywhere, browser=None).state.part(LiveState).connected
+    named = Permission.of(anywhere.sources, (), is_shared=True)
+    assert after(state.with_part(LiveState(permission=named)), anywhere).state.part(LiveState).connected
