@@ -13,6 +13,7 @@ import numpy as np
 from commission.geometry.arrays import FloatArray, read_only
 from commission.geometry.se2 import compose
 from commission.localization.hypothesis_fit import ROW, Prior, judge
+from commission.localization.missed import Sights
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.search_map import SearchMap
 from commission.localization.search_state import Search
@@ -35,7 +36,14 @@ LEAST_SIGMAS = (0.03, 0.01)
 
 
 def judged_again(search: Search, now_ns: int, around: SearchMap) -> Search:
-    """Judge all hypotheses by all that was seen; look for new ones from time to time."""
+    """Judge all hypotheses by all that was seen; look for new ones from time to time.
+
+    Parameters
+    ----------
+    search : with the newest scan taken in.
+    now_ns : its stamp [ns].
+    around : the map to search.
+    """
     things = certain_things(search)
     search = replace(search, judged_ns=now_ns)
     if len(things) < FEWEST_FITS or len(around.table.distances) == 0:
@@ -67,11 +75,7 @@ def judged_again(search: Search, now_ns: int, around: SearchMap) -> Search:
         search.track.y,
         clutter(things, search),
         _prior(search, around),
-        read_only(views),
-        around.eyes,
-        around.walls,
-        around.walled,
-        around.facings,
+        Sights(read_only(views), search.ends, around.eyes, around.walls, around.walled, around.facings),
         around.cells,
         around.places,
         around.offsets,

@@ -14,14 +14,13 @@ import numpy as np
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.geometry.ray_kernels import RayTables
-from commission.localization.missed import is_taken, missed_reflectors
+from commission.localization.missed import SEEN, Sights, is_taken, log_missed
 from commission.localization.reflector_index import Cells, nearest_entry
 
 GATE = 11.8
 """Squared distance up to which a thing is a reflector: 99.7 % of chi-square with 2 degrees of freedom."""
-SEEN = 0.8
-"""Probability that a reflector in free sight is detected again and again: people stand before some, some are down."""
+NEGLIGIBLE = 40.0
+"""A hypothesis whose log of the evidence is that far below another one's is not judged to the end."""
 FIT_STEPS = 4
 """Steps of Gauss and Newton; the first associates widely, the last decides."""
 ROW = 12
@@ -75,11 +74,7 @@ def judge(  # noqa: PLR0917 - things, views and the map, array by array
     base_y: float,
     clutter: float,
     prior: Prior,
-    views: FloatArray,
-    eyes: FloatArray,
-    walls: RayTables,
-    walled: bool,
-    facings: FloatArray,
+    sights: Sights,
     cells: Cells,
     places: FloatArray,
     cell_offsets: IntArray,
@@ -94,21 +89,18 @@ def judge(  # noqa: PLR0917 - things, views and the map, array by array
     base_x, base_y : where the vehicle is now in that frame [m]: poses are fitted about that place.
     clutter : density of things that are no reflectors [1 / m^2].
     prior : density of poses.
-    views : (V, 5) scanners in the frame of odometry [m, m, rad], index of the scanner, weight of the view.
-    eyes : (E, 5) scanner, first bearing and width of a stretch of its field of view [rad], smallest and largest range
-        of a reflector [m].
-    walls, walled : what hides reflectors, and whether there is a floor map at all.
-    facings : (N,) direction that a flat reflector faces [rad]; NaN: seen from all sides.
+    sights : views from which reflectors should have been seen, and what hides them.
     cells, places, cell_offsets : the map, see `ReflectorIndex`.
     judged : (H, ROW) out; the covariance is of the vehicle's pose.
 
     Notes
     -----
-    log evidence = sum of log(SEEN N(d; S) / clutter) over things that fit, + sum of log(1 - SEEN) over reflectors that
+    log evidence = sum of log(SEEN N(d; S) / clutter) over things that fit, + `log_missed` of the reflectors that
     should be seen and fit no thing, + log((2 pi)^(3/2) det(P)^(1/2) prior): Laplace's approximation of the
     probability of the things, over that of the same number of things at random places; derived.
     """
     taken = np.empty(len(things), dtype=np.int64)
+    most = -math.inf
     for h in range(len(poses)):
         x, y, t = poses[h, 0], poses[h, 1], poses[h, 2]
         fit = _fit_step(x, y, t, things, base_x, base_y, clutter, 4.0, cells, places, cell_offsets, taken)
@@ -128,8 +120,8 @@ def judge(  # noqa: PLR0917 - things, views and the map, array by array
         c, s = math.cos(t), math.sin(t)
         density = _density(prior, x + c * base_x - s * base_y, y + s * base_x + c * base_y, t)
         evidence = fit.evidence + 1.5 * math.log(2.0 * math.pi) - 0.5 * math.log(det) + math.log(density)
-        missed = missed_reflectors(x, y, t, taken, views, eyes, walls, walled, facings, places)
-        judged[h, 9] = evidence + missed * math.log(1.0 - SEEN)
+        judged[h, 9] = evidence + log_missed(x, y, t, taken, sights, places, most - NEGLIGIBLE - evidence)
+        most = max(most, judged[h, 9])
 
 
 class Fit(NamedTuple):

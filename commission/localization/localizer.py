@@ -21,7 +21,6 @@ from commission.localization.observation import project_detections
 from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import to_belief
 from commission.localization.relocalization import (
-    SeenScan,
     associate_nothing,
     is_sought,
     searching_odometry,
@@ -29,6 +28,7 @@ from commission.localization.relocalization import (
     unlocated,
 )
 from commission.localization.search_map import SearchMap, search_map
+from commission.localization.seen_of_late import SeenScan
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, belief_of, output_of, state_at_start
 from commission.localization.sweep import Sweep, bring_to_stamp
@@ -257,6 +257,8 @@ class Localizer:
                 status=seen.status,
                 scanner=scan.scanner,
                 observation=self._setup.observations[scan.scanner],
+                ranges=lambda: scan if isinstance(scan, Scan) else None,
+                upside_down=self._setup.scanners[scan.scanner].upside_down,
                 following=following,
             )
             self._state = sought(before, cycle.state, scan_seen, self._map)

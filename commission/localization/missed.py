@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.ray_kernels import RayTables, is_line_free
+from commission.localization.beam_ends import HIDDEN, THROUGH, Ends, what_beams_say
+
+SEEN = 0.8
+"""Probability that a reflector in free sight is detected again and again: people stand before some, some are down."""
+THROUGH_SEEN = 0.95
+"""The same where beams went through its place: nobody stands before it. It may have been taken away."""
+BEHIND_SEEN = 0.5
+"""The same where beams end before it and the map has no wall there: somebody is there, or the pose is wrong."""
 
 
 @compiled_inline
@@ -29,55 +38,91 @@ def is_taken(entry: int, taken: IntArray, count: int) -> bool:
     return found
 
 
+class Sights(NamedTuple):
+    """Views from which reflectors should have been seen, and what is known of what hides them; for kernels."""
+
+    views: FloatArray
+    """(V, 5) scanners in the frame of odometry [m, m, rad], index of the scanner, weight of the view."""
+    ends: Ends
+    """(V, BINS) where the beams of each view end, see `beam_ends`."""
+    eyes: FloatArray
+    """(E, 5) scanner, first bearing and width of a stretch of its field of view [rad], smallest and largest range
+    of a reflector [m]."""
+    walls: RayTables
+    """Of the floor map."""
+    walled: bool
+    """Whether there is one."""
+    facings: FloatArray
+    """(N,) direction that a flat reflector faces [rad]; NaN: seen from all sides."""
+
+
 @compiled
-def missed_reflectors(  # noqa: PLR0917 - views and the map, array by array
-    x: float,
-    y: float,
-    t: float,
-    taken: IntArray,
-    views: FloatArray,
-    eyes: FloatArray,
-    walls: RayTables,
-    walled: bool,
-    facings: FloatArray,
-    places: FloatArray,
+def log_missed(  # noqa: PLR0917 - a pose, number by number
+    x: float, y: float, t: float, taken: IntArray, sights: Sights, places: FloatArray, least: float
 ) -> float:
-    """Reflectors that should be seen and are not: each counts by the share of the views that it should be seen in.
+    """Log of the probability that the reflectors which no thing is were not seen from anywhere; not below `least` much.
 
     Parameters
     ----------
     x, y, t : frame of odometry in the map [m, m, rad].
     taken : (C,) row of `places` that each thing is; -1: none.
-    views, eyes, walls, walled, facings, places : as in `judge`.
+    sights : views, and what hides reflectors from them.
+    places : the map, see `ReflectorIndex`.
+    least : it is not summed up further where it is below that already.
 
     Notes
     -----
-    sum of min(1, sum of the weights of the views that see it), by definition.
+    sum over reflectors of sum(w log P) / max(1, sum w) over the views that should see it, w their weights, P by what
+    walls and beams say of it: a mean, by definition.
     """
     c, s = math.cos(t), math.sin(t)
-    missed = 0.0
+    views = sights.views
+    total = 0.0
     for entry in range(len(places)):
+        if total < least:
+            break
         if is_taken(entry, taken, len(taken)):
             continue
-        share = 0.0
+        share, logs = 0.0, 0.0
         for v in range(len(views)):
             vx, vy = x + c * views[v, 0] - s * views[v, 1], y + s * views[v, 0] + c * views[v, 1]
-            dx, dy = places[entry, 0] - vx, places[entry, 1] - vy
-            square = dx * dx + dy * dy
-            facing = facings[entry]
-            if not math.isnan(facing) and -dx * math.cos(facing) - dy * math.sin(facing) < 0.3 * math.sqrt(square):
-                continue
-            if not _is_in_view(dx, dy, square, t + views[v, 2], int(views[v, 3]), eyes):
-                continue
-            if walled:
-                # Up to just before the reflector: it may stand at a wall.
-                distance = math.sqrt(square)
-                part = max(distance - 0.3, 0.0) / distance
-                if not is_line_free(walls, vx, vy, vx + part * dx, vy + part * dy):
-                    continue
-            share += views[v, 4]
-        missed += min(share, 1.0)
-    return missed
+            log_unseen = _log_unseen(v, vx, vy, t + views[v, 2], entry, sights, places)
+            if log_unseen < 0.0:
+                share += views[v, 4]
+                logs += views[v, 4] * log_unseen
+        total += logs / max(share, 1.0)
+    return total
+
+
+@compiled_inline
+def _log_unseen(  # noqa: PLR0917 - a view, number by number
+    view: int, vx: float, vy: float, heading: float, entry: int, sights: Sights, places: FloatArray
+) -> float:
+    """Log of the probability that a scanner at (vx, vy) does not see a reflector; 0 where it cannot.
+
+    Notes
+    -----
+    log(1 - P): P = SEEN, THROUGH_SEEN where the beams went through its place, BEHIND_SEEN where they end before it
+    although no wall of the map is there; by definition.
+    """
+    dx, dy = places[entry, 0] - vx, places[entry, 1] - vy
+    square = dx * dx + dy * dy
+    facing = sights.facings[entry]
+    if not math.isnan(facing) and -dx * math.cos(facing) - dy * math.sin(facing) < 0.3 * math.sqrt(square):
+        return 0.0
+    if not _is_in_view(dx, dy, square, heading, int(sights.views[view, 3]), sights.eyes):
+        return 0.0
+    distance = math.sqrt(square)
+    said = what_beams_say(view, distance, math.atan2(dy, dx) - heading, sights.ends)
+    if said == HIDDEN and not sights.walled:
+        return 0.0
+    if sights.walled and said != THROUGH:
+        # Up to just before the reflector: it may stand at a wall.
+        part = max(distance - 0.3, 0.0) / distance
+        if not is_line_free(sights.walls, vx, vy, vx + part * dx, vy + part * dy):
+            return 0.0
+    seen = THROUGH_SEEN if said == THROUGH else BEHIND_SEEN if said == HIDDEN else SEEN
+    return math.log(1.0 - seen)
 
 
 @compiled_inline

@@ -20,7 +20,6 @@ from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.priors import PriorRows
 from commission.localization.relocalization import (
-    SeenScan,
     associate_nothing,
     is_sought,
     searching_odometry,
@@ -29,12 +28,14 @@ from commission.localization.relocalization import (
 )
 from commission.localization.run_columns import RunColumns
 from commission.localization.search_map import SearchMap, search_map
+from commission.localization.seen_of_late import SeenScan
 from commission.localization.setup import FilterModel, LocalizerSetup
 from commission.localization.state import FilterState
 from commission.localization.supervisor import INITIALIZING, LOST
 from commission.localization.sweep import bring_to_stamp, sweep_at
 from commission.localization.wheel_scale import as_driven
 from commission.site.record_log import RecordLog
+from commission.site.records import Scan
 
 
 class Columns(NamedTuple):
@@ -166,7 +167,8 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
         if is_sought(state, setup.filter.limits) and state.search is None:
             # The scan that told so is the first one of the search.
             search = search or search_map(setup)
-            state = sought(state, state, _seen(setup, _part(stretch, (done - 1, done), (row, row)), NOT_YET), search)
+            newest = _part(stretch, (done - 1, done), (row, row))
+            state = sought(state, state, _seen(log, setup, state, newest, NOT_YET), search)
         if done == count and row == end:
             break
     if len(own) and count and detected.stamps_ns[-1] >= own[0]:
@@ -202,18 +204,36 @@ def _driven(log: RecordLog, setup: LocalizerSetup, row: int) -> tuple[float, flo
     return dx, dy, dtheta
 
 
-def _seen(setup: LocalizerSetup, cycle: CycleStretch, following: NextOdometry) -> SeenScan:
+def _seen(
+    log: RecordLog, setup: LocalizerSetup, state: FilterState, cycle: CycleStretch, following: NextOdometry
+) -> SeenScan:
     """Return what the scan of a single cycle saw."""
     scanner = int(cycle.detected.scanners[0])
-    settled = cycle.columns.settled
+    settled, stamp_ns = cycle.columns.settled, int(cycle.detected.stamps_ns[0])
     return SeenScan(
-        stamp_ns=int(cycle.detected.stamps_ns[0]),
+        stamp_ns=stamp_ns,
         detections=settled if len(settled) else cycle.detected.range_bearing,
         status=cycle.detected.status,
         scanner=scanner,
         observation=setup.observations[scanner],
+        ranges=lambda: None if state.sensor_detects else _scan_at(log, setup, stamp_ns, scanner),
+        upside_down=setup.scanners[scanner].upside_down,
         following=following,
     )
+
+
+def _scan_at(log: RecordLog, setup: LocalizerSetup, stamp_ns: int, scanner: int) -> Scan | None:
+    """Return the scan that a cycle is of; None where the sensor has told its detections alone."""
+    own = log.detection_stamps_ns
+    if len(own) and own[0] <= stamp_ns:
+        return None
+    indices = setup.indices_of(log.scanners)
+    for scans in log.scans:
+        if indices[scans.scanner] == scanner:
+            row = int(np.searchsorted(scans.stamps_ns, stamp_ns))
+            if row < len(scans) and scans.stamps_ns[row] == stamp_ns:
+                return scans.scan(row)
+    return None
 
 
 def _searched(
@@ -240,7 +260,7 @@ def _searched(
         after, _, _ = _tracked(log, setup, state._replace(search=None), cycle._replace(rows=(row, row)))
         if not is_sought(state, setup.filter.limits):
             return after
-    state = sought(state, after, _seen(setup, cycle, following), search)
+    state = sought(state, after, _seen(log, setup, state, cycle, following), search)
     _write_belief(state.belief, 0, columns.means, columns.covariances)
     columns.modes[0] = state.mode
     return state

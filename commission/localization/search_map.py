@@ -8,15 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from commission.geometry.arrays import FloatArray, IntArray, read_only
-from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.ray_kernels import RayTables
-from commission.geometry.raycast import RayCaster
 from commission.localization.odometry import OdometryNoise
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.reflector_index import Cells
 from commission.localization.setup import LocalizerSetup
 from commission.localization.start import MARGIN, DistanceTable, pair_table
 from commission.site.reflectors import ReflectorKind
+from commission.site.walls import walls_of
 
 
 class SearchMap(NamedTuple):
@@ -57,7 +56,6 @@ def search_map(setup: LocalizerSetup) -> SearchMap:
         for first, last in scanner.views.tolist()
     ]
     longest = 2.0 * max((eye[4] for eye in eyes), default=1.0)
-    caster = RayCaster(OccupancyGrid(np.zeros((1, 1), dtype=np.bool_), 1.0))
     return SearchMap(
         pair_table(index.places, longest),
         index.cells,
@@ -65,8 +63,8 @@ def search_map(setup: LocalizerSetup) -> SearchMap:
         index.offsets,
         read_only(facings),
         read_only(np.array(eyes, dtype=np.float64).reshape(-1, 5)),
-        caster.tables,
-        False,
+        walls_of(setup.floor).tables,
+        setup.floor is not None,
         setup.filter.odometry,
         anywhere(index.places),
     )

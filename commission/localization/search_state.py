@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import FloatArray, read_only
+from commission.localization.beam_ends import Ends, no_ends
 from commission.localization.hypothesis_fit import ROW
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.sightings import COLUMNS
@@ -28,6 +29,8 @@ class Search:
     """(C, COLUMNS) what was seen, see `sightings`."""
     views: FloatArray
     """(V, 5) pose of scanners in the frame of odometry, scanner, and time [s]."""
+    ends: Ends
+    """(V, BINS) where the beams of each view end, see `beam_ends`."""
     hypotheses: FloatArray
     """(H, ROW) see `start`, the likeliest first."""
     searched_ns: int
@@ -37,7 +40,7 @@ class Search:
 
     def _content(self) -> tuple[object, ...]:
         """All of it, comparable."""
-        arrays = (each.tobytes() for each in (self.things, self.views, self.hypotheses))
+        arrays = (each.tobytes() for each in (self.things, self.views, self.ends, self.hypotheses))
         scalars = (self.since_ns, self.around, self.track, self.drift, self.searched_ns, self.judged_ns)
         return (*scalars, *arrays)
 
@@ -68,6 +71,7 @@ def new_search(stamp_ns: int, around: PoseGaussian | None = None) -> Search:
         track=NOTHING,
         things=read_only(np.empty((0, COLUMNS))),
         views=read_only(np.empty((0, 5))),
+        ends=read_only(no_ends(0)),
         hypotheses=read_only(np.empty((0, ROW))),
         searched_ns=LONG_AGO_NS,
         judged_ns=LONG_AGO_NS,

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,12 +15,14 @@ from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.geometry.se2 import compose
+from commission.localization.beam_ends import beam_ends
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import NextOdometry
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.search_state import Search
 from commission.localization.sightings import CERTAIN, COLUMNS, MOST_THINGS, join
 from commission.localization.start import PAIRS
+from commission.site.records import Scan
 
 VIEWS = 5
 """Places on the way from which reflectors should have been seen."""
@@ -41,12 +44,23 @@ class SeenScan:
     """Index of the scanner."""
     observation: ObservationModel
     """Its mounting and noise."""
+    ranges: Callable[[], Scan | None]
+    """The scan itself, asked for where it is looked at; None where the sensor alone knows it."""
+    upside_down: bool
+    """Whether the scanner hangs so."""
     following: NextOdometry
     """The odometry record at or after the scan, where it is known."""
 
 
 def joined_scan(search: Search, track: PoseGaussian, scan: SeenScan) -> Search:
-    """Join a scan's detections to the things seen, and remember from where."""
+    """Join a scan's detections to the things seen, and remember from where.
+
+    Parameters
+    ----------
+    search : before the scan.
+    track : pose of base at the scan in the frame of odometry, and what odometry has drifted since the last scan.
+    scan : what was seen.
+    """
     position = search.drift[0] + max(track.xx, track.yy)
     heading = search.drift[1] + track.tt
     seconds = (scan.stamp_ns - search.since_ns) * 1e-9
@@ -65,14 +79,17 @@ def joined_scan(search: Search, track: PoseGaussian, scan: SeenScan) -> Search:
         scan.status,
         scan.observation,
     )
-    views = search.views
-    mine = views[views[:, 3] == scan.scanner]
+    views, ends = search.views, search.ends
+    of_it = views[:, 3] == scan.scanner
+    mine = views[of_it]
     # A scan that saw nothing may be a covered one, of which nobody knows the scanner.
     if len(scan.detections) and (len(mine) == 0 or seconds - mine[-1, 4] >= VIEW_S):
         model = scan.observation
         at = compose((track.x, track.y, track.theta), (model.mount_x, model.mount_y, model.mount_theta))
         mine = np.vstack((mine, (*at, float(scan.scanner), seconds)))[-VIEWS:]
-        views = np.concatenate((views[views[:, 3] != scan.scanner], mine))
+        views = np.concatenate((views[~of_it], mine))
+        newest = beam_ends(scan.ranges(), upside_down=scan.upside_down)
+        ends = np.concatenate((ends[~of_it], np.concatenate((ends[of_it], newest))[-VIEWS:]))
     still = track._replace(xx=0.0, xy=0.0, xt=0.0, yy=0.0, yt=0.0, tt=0.0)
     return replace(
         search,
@@ -80,6 +97,7 @@ def joined_scan(search: Search, track: PoseGaussian, scan: SeenScan) -> Search:
         drift=(position, heading),
         things=read_only(things[:count].copy()),
         views=read_only(views),
+        ends=read_only(ends),
     )
 
 

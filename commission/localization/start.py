@@ -21,8 +21,8 @@ CANDIDATES = 96
 """Poses that pairs suggest and that are judged: those that most things fit."""
 HYPOTHESES = 24
 """Hypotheses that are carried on."""
-TRIED = 24_000
-"""Pairs of reflectors that are tried at most: 20 ms of work."""
+TRIED = 20_000
+"""Pairs of reflectors that are tried at most: 10 ms of work."""
 PAIRS = 24
 """Pairs of things that are looked up at most."""
 MOST_SCORED = 24

@@ -23,11 +23,12 @@ from commission.planning.route_prediction import (
     station_scans,
 )
 from commission.planning.vehicle_visibility import VehicleVisibility
-from commission.planning.visibility import VisibilityOptions, build_visibility, walls_of
+from commission.planning.visibility import VisibilityOptions, build_visibility
 from commission.progress import Progress, silent
 from commission.site.parts import Equipped
 from commission.site.quantity import MILLIMETRES, PLAIN_DEGREES, Shown
 from commission.site.reflectors import ReflectorMap
+from commission.site.walls import walls_of
 
 CORES = os.cpu_count() or 1
 NOTHING = -1

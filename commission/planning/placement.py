@@ -16,11 +16,12 @@ from commission.planning.nominal_drive import nominal_drive
 from commission.planning.route_prediction import plan_route
 from commission.planning.unmet import Unmet
 from commission.planning.vehicle_visibility import VehicleVisibility
-from commission.planning.visibility import VisibilityOptions, build_visibility, walls_of
+from commission.planning.visibility import VisibilityOptions, build_visibility
 from commission.progress import Progress, silent
 from commission.site.layout_brief import CandidateOptions, Demands
 from commission.site.parts import Equipped
 from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.walls import walls_of
 
 __all__ = ["Demands", "Placement", "PlacementOptions", "Progress", "Unmet", "choose", "place"]
 

@@ -26,12 +26,12 @@ from commission.planning import shadow_kernels
 from commission.planning.detection_noise import detection_table
 from commission.planning.shadow_kernels import BLOCK, BitMask, Targets
 from commission.site.checks import at_least, between
-from commission.site.floor_map import FloorMap
 from commission.site.glued import depths_in_walls
 from commission.site.parameters import DetectorParameters
 from commission.site.parts import Sighted
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
+from commission.site.walls import walls_of
 
 # Points are handled in squares of this edge [m]: whether a whole square sees a reflector is often one answer.
 BUCKET = 2.0
@@ -243,13 +243,6 @@ def seen_in_turn(models: Sequence[VisibilityModel], poses: FloatArray, scanners:
         # Of one scanner, poses stand in their order: so do its entries.
         indices[is_of == index] = each.indices
     return VisibleReflectors(offsets, indices)
-
-
-def walls_of(floor_map: FloorMap | None) -> RayCaster:
-    """Prepare the walls of a floor map for rays; without one there are none."""
-    if floor_map is None:
-        return RayCaster(OccupancyGrid(np.zeros((1, 1), dtype=np.bool_), 1.0))
-    return RayCaster(floor_map.occupancy())
 
 
 def build_visibility(

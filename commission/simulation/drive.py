@@ -44,7 +44,7 @@ class DriveOptions:
     """What the drives can do."""
     whole_scans: bool = True
     """Whether every beam is cast. Without those that can meet no reflector a drive takes a third of the time, and what
-    the localizer makes of it is the same to the last bit."""
+    is detected is the same to the last bit; a vehicle that looks for itself does not know what those went through."""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.odometry_rate) and 1.0 <= self.odometry_rate <= 1000.0):

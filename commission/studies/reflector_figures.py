@@ -18,11 +18,12 @@ from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.localization.estimate import Status
 from commission.localization.observation import residuals
 from commission.localization.run_columns import RunColumns, RunSegment
-from commission.planning.visibility import VisibilityModel, VisibilityOptions, build_visibility, walls_of
+from commission.planning.visibility import VisibilityModel, VisibilityOptions, build_visibility
 from commission.progress import Progress, silent
 from commission.site.floor_map import FloorMap
 from commission.site.quantity import FARTHEST
 from commission.site.reflectors import ReflectorMap
+from commission.site.walls import walls_of
 from commission.studies.inputs import StudyInput
 from commission.studies.run import RunResult
 from commission.studies.scanner_figures import BELONGS, sensors_of

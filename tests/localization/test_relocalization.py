@@ -128,16 +128,28 @@ def test_a_lost_vehicle_that_may_not_search_is_believed_again_when_its_detection
     assert not any(checkpoint.state.search for checkpoint in columns.checkpoints)
 
 
-@pytest.mark.parametrize("carried", [False, True])
-@pytest.mark.parametrize(("sweep", "forward_scale"), [(0.0, 0.0), (0.03, 0.0), (0.03, 0.01)])
+@pytest.mark.parametrize(
+    ("carried", "sweep", "forward_scale", "beams"),
+    [
+        (False, 0.0, 0.0, 0),
+        (True, 0.0, 0.0, 0),
+        (False, 0.03, 0.0, 0),
+        (True, 0.03, 0.0, 0),
+        (False, 0.03, 0.01, 0),
+        (True, 0.03, 0.01, 0),
+        (False, 0.0, 0.0, 1440),
+    ],
+)
 def test_live_and_whole_run_agree_to_the_last_bit_while_the_vehicle_is_searched(
-    carried: bool, sweep: float, forward_scale: float
+    carried: bool, sweep: float, forward_scale: float, beams: int
 ) -> None:
     setup = setup_of(4)
     scanner = dataclasses.replace(ALL_ROUND, sweep_duration=sweep)
     parameters = dataclasses.replace(setup.parameters, odometry=OdometryParameters(forward_scale=forward_scale))
     setup = LocalizerSetup(reflectors=setup.reflectors, scanners=(scanner,), parameters=parameters)
-    drive = random_drive(setup, np.random.default_rng(4), Plan(scans=130, reach=8.0, scan_offset_ns=7_000_000))
+    drive = random_drive(
+        setup, np.random.default_rng(4), Plan(scans=130, reach=8.0, scan_offset_ns=7_000_000, beams=beams)
+    )
     records: list[Record] = list(drive.records)
     start: FilterState | None = unlocated(setup)
     if carried:
@@ -157,6 +169,7 @@ def test_live_and_whole_run_agree_to_the_last_bit_while_the_vehicle_is_searched(
         estimates.append(estimate)
     assert localizer.state == whole.final
     assert any(state.search for state in states)
+    assert any(np.isfinite(state.search.ends).any() for state in states if state.search) == (beams > 0)
     assert states[-1].search is None
     for cycle, live in enumerate(estimates):
         there = whole.estimate(cycle)

@@ -12,10 +12,13 @@ from scipy.stats import multivariate_normal
 from commission.geometry.arrays import read_only
 from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.raycast import RayCaster
+from commission.localization.beam_ends import HIDDEN, THROUGH, UNKNOWN, beam_ends, what_beams_say
 from commission.localization.hypotheses import probabilities
-from commission.localization.hypothesis_fit import ROW, SEEN, Prior, judge
+from commission.localization.hypothesis_fit import ROW, Prior, judge
+from commission.localization.missed import BEHIND_SEEN, SEEN, THROUGH_SEEN, Sights
 from commission.localization.reflector_index import build_index
 from commission.localization.start import CANDIDATES, candidates, pair_table
+from commission.site.records import Scan
 from commission.site.reflectors import Reflector, ReflectorMap
 from tests.localization.drives import random_map
 
@@ -117,6 +120,7 @@ def judged(
     prior: Prior = EVEN,
     walls: RayCaster | None = None,
     facings: np.ndarray | None = None,
+    scan: Scan | None = None,
 ) -> np.ndarray:
     index, row = build_index(reflectors), np.empty((1, ROW))
     every = np.full(len(index.places), np.nan)
@@ -127,11 +131,14 @@ def judged(
         0.0,
         0.05,
         prior,
-        read_only(ORIGIN),
-        read_only(AHEAD),
-        NO_WALLS if walls is None else walls.tables,
-        walls is not None,
-        read_only(every if facings is None else facings),
+        Sights(
+            read_only(ORIGIN),
+            beam_ends(scan, upside_down=False),
+            read_only(AHEAD),
+            NO_WALLS if walls is None else walls.tables,
+            walls is not None,
+            read_only(every if facings is None else facings),
+        ),
         index.cells,
         index.places,
         index.offsets,
@@ -191,6 +198,61 @@ def test_what_a_wall_hides_or_faces_away_is_not_missed() -> None:
         facings = np.where(places[:, 3] == 3.0, facing, np.nan)
         change = judged((0.0, 0.0, 0.0), TRIANGLE.centers, one_more, facings=facings)[9] - without
         assert change == pytest.approx(missed * MISSED)
+
+
+def ranges_of(toward: float, end: float, elsewhere: float = 9.0) -> Scan:
+    """A scan that ends somewhere, but in some directions somewhere else."""
+    bearings = np.radians(np.arange(-90.0, 90.0, 0.25))
+    ranges = np.where(np.abs(bearings - toward) < math.radians(10.0), end, elsewhere).astype(np.float32)
+    return Scan(stamp_ns=0, ranges=ranges, angle_min=float(bearings[0]), angle_increment=math.radians(0.25))
+
+
+D = (6.0, 2.0)
+AWAY, TOWARD = math.hypot(*D), math.atan2(2.0, 6.0)
+
+
+@pytest.mark.parametrize(
+    ("end", "seen_in_a_field", "seen_in_a_hall"),
+    [
+        (AWAY - 0.32, 0.0, BEHIND_SEEN),  # ends before it: hidden, and in a hall by what the map does not know
+        (AWAY - 0.28, SEEN, SEEN),
+        (AWAY + 0.48, SEEN, SEEN),
+        (AWAY + 0.52, THROUGH_SEEN, THROUGH_SEEN),  # went through its place
+        (math.nan, SEEN, SEEN),  # nothing came back
+    ],
+)
+def test_beams_say_what_is_hidden_and_what_is_not_there(
+    end: float, seen_in_a_field: float, seen_in_a_hall: float
+) -> None:
+    one_more = ReflectorMap((*TRIANGLE.reflectors, Reflector(id="D", x=D[0], y=D[1])))
+    hall = RayCaster(OccupancyGrid(np.zeros((2, 2), dtype=np.bool_), 1.0))
+    for walls, seen in ((None, seen_in_a_field), (hall, seen_in_a_hall)):
+        scan = ranges_of(TOWARD, end)
+        change = (
+            judged((0.0, 0.0, 0.0), TRIANGLE.centers, one_more, walls=walls, scan=scan)[9]
+            - judged((0.0, 0.0, 0.0), TRIANGLE.centers, walls=walls, scan=scan)[9]
+        )
+        assert change == pytest.approx(math.log(1.0 - seen))
+
+
+def test_a_single_beam_before_a_reflector_hides_it_and_a_mirrored_scanner_looks_the_other_way() -> None:
+    scan = ranges_of(TOWARD, AWAY + 2.0)
+    scan.ranges[np.argmin(np.abs(scan.bearings - TOWARD))] = 3.0
+    for upside_down, bearing in ((False, TOWARD), (True, -TOWARD)):
+        ends = beam_ends(scan, upside_down=upside_down)
+        assert what_beams_say(0, AWAY, bearing, ends) == HIDDEN
+        assert what_beams_say(0, AWAY, -bearing, ends) == THROUGH
+        assert what_beams_say(0, AWAY, bearing + 2.0 * math.pi, ends) == HIDDEN
+        assert what_beams_say(0, AWAY, math.pi, ends) == UNKNOWN
+    assert (beam_ends(None, upside_down=False) == np.inf).all()
+
+
+def test_a_wall_of_the_map_hides_what_beams_seem_to_go_up_to() -> None:
+    one_more = ReflectorMap((*TRIANGLE.reflectors, Reflector(id="D", x=9.0, y=0.5)))
+    hall = RayCaster(OccupancyGrid(WALL, 0.3, np.array([0.0, -6.0, 0.0])))
+    scan = ranges_of(0.0, 7.6)
+    without = judged((0.0, 0.0, 0.0), TRIANGLE.centers, walls=hall, scan=scan)[9]
+    assert judged((0.0, 0.0, 0.0), TRIANGLE.centers, one_more, walls=hall, scan=scan)[9] == pytest.approx(without)
 
 
 def test_the_last_good_pose_makes_places_around_it_likelier() -> None:

@@ -53,7 +53,7 @@ DRIVE_AGAIN = "Driving again in the changed hall"
 PLAYING_REST_S = 0.04
 LONGEST_STEP_S = 0.25
 """Time that the play clock moves at most at once [s]: a long pause of the owner thread is not made up for."""
-READS = ("reflectors", "scanners", "parameters", "uncertainty")
+READS = ("reflectors", "scanners", "parameters", "uncertainty", "floor_map")
 """Parts of the project that the localizer is set up with."""
 
 Prepare: TypeAlias = Callable[[Project, Source, Progress], Drive]
