@@ -5,7 +5,8 @@
 // curve is the smallest and the largest value of each stretch of time: both are drawn, so that nothing hides.
 (() => {
   if (window.commissionPlots) return; // the server sends this script again after each reconnection
-  const LEFT_PX = 42, RIGHT_PX = 10, ABOVE_PX = 16, BELOW_PX = 15, LOWEST_PX = 78, DRAGGED_PX = 4;
+  const LEFT_PX = 42, RIGHT_PX = 10, ABOVE_PX = 16, BELOW_PX = 15, LOWEST_PX = 78, NAMES_PX = 12, DRAGGED_PX = 4;
+  const NARROW_PX = 1270; // window in which the names of plots are shortened, so that all are there to choose
   const FONT = "11px sans-serif", INK = "#e8eaee", AXIS = "#9aa0a8", GRID = "#2f3237", BACK = "#1b1d21";
 
   const panel = document.createElement("div");
@@ -80,6 +81,9 @@
   function chip(title, chosen) {
     const button = document.createElement("button"), isOn = chosen.includes(title);
     button.textContent = title.replace(/ \[.*/, "");
+    // The whole name stays what the button is called; only what is written on it is shorter.
+    button.setAttribute("aria-label", button.textContent);
+    if (innerWidth < NARROW_PX) button.textContent = shortened(button.textContent);
     button.title = `${isOn ? "Hide" : "Show"} ${title}`;
     button.setAttribute("aria-pressed", isOn);
     button.onclick = () => {
@@ -92,18 +96,34 @@
     return button;
   }
 
+  const shortened = (name) => name.replace(/^2σ of /, "2σ ").replace(/ (of all detections|per scan|by the gate)$/, "");
+  addEventListener("resize", showChips);
+
   // ---- drawing
   const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
-  function laidOut(width, height) {
+  function laidOut(pen, width, height) {
     const n = plots.charts.length;
     const rows = clamp(Math.floor(height / LOWEST_PX), 1, n), columns = Math.ceil(n / rows);
     const w = width / columns, h = height / Math.ceil(n / columns);
-    return plots.charts.map((chart, index) => {
+    const found = plots.charts.map((chart, index) => {
       const x = (index % columns) * w, y = Math.floor(index / columns) * h;
       return { chart, values: cursor.values[index] ?? [], left: x + LEFT_PX, right: x + w - RIGHT_PX,
         top: y + ABOVE_PX, bottom: y + h - BELOW_PX, x, y, w, h };
     });
+    // Where names of curves have no room behind a title, all plots give them a line of their own.
+    const isNarrow = found.some((lane) => namesWidth(pen, lane) > w);
+    if (isNarrow) for (const lane of found) lane.top += NAMES_PX;
+    for (const lane of found) lane.isNarrow = isNarrow;
+    return found;
+  }
+
+  // By the widest numbers that come, so that nothing jumps while they change.
+  function namesWidth(pen, { chart }) {
+    pen.font = `600 ${FONT}`;
+    const title = pen.measureText(chart.title).width;
+    pen.font = FONT;
+    return chart.lines.reduce((sum, { label }) => sum + pen.measureText(`${label} 0.000`).width + 9, title + 15);
   }
 
   const xOf = (lane, time) => lane.left + (time - view[0]) / (view[1] - view[0]) * (lane.right - lane.left);
@@ -142,7 +162,7 @@
   }
 
   function timeTicks(lane) {
-    const raw = (view[1] - view[0]) / Math.max((lane.right - lane.left) / 70, 1), power = 10 ** Math.floor(Math.log10(raw));
+    const raw = (view[1] - view[0]) / Math.max((lane.right - lane.left) / 50, 1), power = 10 ** Math.floor(Math.log10(raw));
     const nice = raw < 10 ? [1, 2, 5, 10].map((each) => each * power) : [10, 20, 30, 60, 120, 300, 600, 1200, 1800, 3600, 7200];
     const step = nice.find((each) => each >= raw) ?? 14400, ticks = [];
     for (let time = Math.ceil(view[0] / step) * step; time <= view[1] + 1e-9; time += step) ticks.push(time);
@@ -160,7 +180,7 @@
     pen.setTransform(ratio, 0, 0, ratio, 0, 0);
     pen.fillStyle = BACK;
     pen.fillRect(0, 0, width, height);
-    lanes = laidOut(width, height);
+    lanes = laidOut(pen, width, height);
     for (const lane of lanes) drawLane(pen, lane);
   }
 
@@ -319,28 +339,26 @@
   function drawNames(pen, lane) {
     pen.textAlign = "left";
     pen.textBaseline = "alphabetic";
-    const texts = [[lane.chart.title, INK]];
-    const values = lane.chart.lines.map((_, index) => valueOf(lane, index));
-    pen.font = FONT;
-    // Where there is no room for names, the colors have to do.
-    const room = lane.w - 1.15 * pen.measureText(lane.chart.title).width - 12;
-    const named = lane.chart.lines.map(({ label }, index) => `${label} ${values[index]}`);
-    const isNarrow = pen.measureText(named.join("")).width + 9 * named.length > room;
-    lane.chart.lines.forEach(({ color }, index) => texts.push([(isNarrow ? values : named)[index], color]));
+    const named = lane.chart.lines.map(({ label, color }, index) => [`${label} ${valueOf(lane, index)}`, color]);
     for (const { label, color, steps } of lane.chart.limits) {
       const at = hover ?? cursor.time;
       const [, value] = steps.findLast(([time]) => time <= at) ?? steps[0];
-      texts.push([`- - ${label} ${written(value)}`, color]);
+      named.push([`- - ${label} ${written(value)}`, color]);
     }
-    let x = lane.x + 6;
-    texts.forEach(([text, color], index) => {
-      pen.font = index ? FONT : `600 ${FONT}`;
+    pen.font = `600 ${FONT}`;
+    pen.fillStyle = INK;
+    pen.fillText(lane.chart.title, lane.x + 6, lane.y + 11, lane.w - 8);
+    let x = lane.isNarrow ? lane.x + 6 : lane.x + 15 + pen.measureText(lane.chart.title).width;
+    pen.font = FONT;
+    lane.names = [];
+    for (const [text, color] of named) {
       const width = pen.measureText(text).width;
-      if (x + width > lane.x + lane.w) return;
+      if (x + width > lane.x + lane.w) break;
+      lane.names.push(text);
       pen.fillStyle = color;
-      pen.fillText(text, x, lane.y + 11);
+      pen.fillText(text, x, lane.y + 11 + (lane.isNarrow ? NAMES_PX : 0));
       x += width + 9;
-    });
+    }
   }
 
   // ---- what a person does
@@ -433,6 +451,7 @@
       const lane = lanes.find(({ chart }) => chart.title === title), box = canvas.getBoundingClientRect();
       return lane ? [box.left + xOf(lane, time), box.top + yOf(lane, value)] : null;
     },
+    get namesShown() { return lanes.flatMap(({ names }) => names); },
     drawnLines: () => lanes.flatMap(({ chart }) => chart.lines),
     get shown() { return { view, cursor, titles: lanes.map(({ chart }) => chart.title) }; },
   };

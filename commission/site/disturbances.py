@@ -135,7 +135,7 @@ class ConstantErrors:
     """1-sigma of the share by which all wheels together report too much way."""
     wheel_scale_sigma: Annotated[float, _scale("Each wheel 1σ")] = 0.0
     """1-sigma of the share by which each driven wheel alone reports too much way: left and right differ."""
-    separation_scale_sigma: Annotated[float, _scale("Wheels apart 1σ")] = 0.0
+    separation_scale_sigma: Annotated[float, _scale("Wheel separation 1σ")] = 0.0
     """1-sigma of the share by which the true distance between the wheels is larger than the vehicle's."""
     scanners: tuple[ScannerError, ...] = ()
     """Errors of single scanners that are no chance; what is drawn comes on top."""

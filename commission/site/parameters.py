@@ -122,12 +122,12 @@ class OdometryParameters:
     """Fastest turn of the vehicle: how far it may have turned where odometry is missing is unknown up to it."""
     forward_scale: Annotated[
         float,
-        Quantity(label="Way longer by", shown=PERCENT, bounds=_SCALE, step=0.01, slider=(-10.0, 10.0)),
+        Quantity(label="Distance scale", shown=PERCENT, bounds=_SCALE, step=0.01, slider=(-10.0, 10.0)),
     ] = 0.0
     """Share by which the true way is longer than odometry says: wheels that are larger than the vehicle knows."""
     turn_scale: Annotated[
         float,
-        Quantity(label="Turns larger by", shown=PERCENT, bounds=_SCALE, step=0.01, slider=(-10.0, 10.0)),
+        Quantity(label="Turn scale", shown=PERCENT, bounds=_SCALE, step=0.01, slider=(-10.0, 10.0)),
     ] = 0.0
     """Share by which true turns are larger than odometry says: wheels that are closer together than the vehicle
     knows."""
@@ -163,13 +163,13 @@ class DetectorParameters:
     far_threshold: Annotated[
         float,
         Quantity(
-            label="Intensity far away", shown=PERCENT, bounds=Bounds.between(0.0, 10.0), step=1.0, slider=(0.0, 200.0)
+            label="Intensity, far", shown=PERCENT, bounds=Bounds.between(0.0, 10.0), step=1.0, slider=(0.0, 200.0)
         ),
     ] = 1.0
     """What of `intensity_threshold` it takes at `far_distance` and beyond; less and less on the way there: echoes of
     reflectors fade with the distance."""
     far_distance: Annotated[
-        float, Quantity(label="Far away is", unit="m", bounds=POSITIVE, step=0.5, slider=(1.0, 50.0))
+        float, Quantity(label="Far from", unit="m", bounds=POSITIVE, step=0.5, slider=(1.0, 50.0))
     ] = 10.0
     """Range from which on `far_threshold` holds."""
     min_model_error: Annotated[
@@ -278,7 +278,7 @@ class SupervisorParameters:
     """Distance up to which a rejected detection is near a reflector of the map: that one, seen from a wrong pose."""
     rejection_turn: Annotated[
         float,
-        Quantity(label="Near, turned by", unit="rad", shown=DEGREES, bounds=NOT_NEGATIVE, step=0.5, slider=(0.0, 20.0)),
+        Quantity(label="Near, heading", unit="rad", shown=DEGREES, bounds=NOT_NEGATIVE, step=0.5, slider=(0.0, 20.0)),
     ] = 0.1
     """Angle that adds to that distance with the range: a wrong heading moves far reflectors farther."""
     rejection_harmless: Annotated[

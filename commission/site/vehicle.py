@@ -44,7 +44,7 @@ def _cross(one: _Edge, other: _Edge) -> bool:
 class DifferentialVehicle:
     """Two driven wheels on one axle; base is the middle of the axle."""
 
-    wheel_separation: Annotated[float, Quantity(label="Wheels apart", unit="m", bounds=POSITIVE, decimals=4)] = 0.4
+    wheel_separation: Annotated[float, Quantity(label="Wheel separation", unit="m", bounds=POSITIVE, decimals=4)] = 0.4
     """Distance between the two driven wheels."""
     outline: Annotated[tuple[tuple[float, float], ...], _OUTLINE] = DEFAULT_OUTLINE
     """Corners of the vehicle's outline, base frame."""
@@ -97,7 +97,7 @@ class OmnidirectionalVehicle:
     """Angle alpha_i of each wheel's spoke, base frame."""
     wheel_radius: Annotated[float, Quantity(label="Wheel radius", unit="m", bounds=POSITIVE, decimals=4)] = 0.05
     """Radius r of the wheels."""
-    center_distance: Annotated[float, Quantity(label="Wheels from base", unit="m", bounds=POSITIVE, decimals=4)] = 0.3
+    center_distance: Annotated[float, Quantity(label="Wheel distance", unit="m", bounds=POSITIVE, decimals=4)] = 0.3
     """Distance R from the base to each wheel."""
     outline: Annotated[tuple[tuple[float, float], ...], _OUTLINE] = DEFAULT_OUTLINE
     """Corners of the vehicle's outline, base frame."""

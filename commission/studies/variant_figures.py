@@ -63,7 +63,7 @@ class VariantFigure:
         """Return a value as it is written, with its unit; a dash where it is undefined."""
         if math.isnan(value):
             return "–"
-        return f"{self.shown.of(value):{self.form}}{f' {self.shown.unit}' if self.shown.unit else ''}"
+        return self.shown.text(value, self.form)
 
 
 def _every(run: RunResult, chosen: FloatArray | BoolArray) -> Rows:

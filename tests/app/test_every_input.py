@@ -141,7 +141,7 @@ SCANNER = {
 VEHICLES: dict[str, tuple[Vehicle, Row]] = {
     "vehicle.wheel_separation": (
         DifferentialVehicle(),
-        Row(label="Wheels apart [m]", read=vehicle("wheel_separation"), allowed=(0.001, 1.25), refused=(0.0,)),
+        Row(label="Wheel separation [m]", read=vehicle("wheel_separation"), allowed=(0.001, 1.25), refused=(0.0,)),
     ),
     "vehicle.wheelbase": (
         TricycleVehicle(),
@@ -157,7 +157,7 @@ VEHICLES: dict[str, tuple[Vehicle, Row]] = {
     ),
     "vehicle.center_distance": (
         OmnidirectionalVehicle(),
-        Row(label="Wheels from base [m]", read=vehicle("center_distance"), allowed=(0.001, 0.75), refused=(0.0,)),
+        Row(label="Wheel distance [m]", read=vehicle("center_distance"), allowed=(0.001, 0.75), refused=(0.0,)),
     ),
     "vehicle.height": (
         OmnidirectionalVehicle(),

@@ -49,7 +49,7 @@ def test_closing_one_browser_disturbs_nobody_and_a_reload_keeps_tab_folder_and_p
         page.page.reload()
         page.wait_for_client(before)
         page.wait_until_drawn()
-        page.row("Wheels apart").wait_for(state="visible")
+        page.row("Wheel separation").wait_for(state="visible")
         for name in ("Site", "Layers"):
             assert page.page.get_by_role("tab", name=name, exact=True).get_attribute("aria-selected") == "true"
         served.until(lambda: where(page) == pytest.approx(place, abs=1.0), seconds=30.0)

@@ -148,7 +148,7 @@ LIVE = "<div class='c-live'></div>"
 # floating panel of the time line into a strip at the bottom, and take their space from the floor. Where a rule does not
 # match (another viser), the panels float and everything still works.
 STYLE = f"""<style>
-:root{{--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px;--c-tabs:{TABS_PX}px}}
+:root{{--c-selected-line:rgb{SELECTED_LINE};--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px;--c-tabs:{TABS_PX}px}}
 [data-dock-root]{{height:calc(100% - var(--c-top) - var(--c-bottom))!important;top:var(--c-top);
  overflow:visible!important}}
 [data-dock-region] .mantine-ScrollArea-viewport>div{{padding-right:6px}}
@@ -260,6 +260,15 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 .c-before-after tr:first-child td{{opacity:.65}}
 @media (max-width:1500px){{.c-beside{{white-space:normal;width:88px;min-width:0!important;font-size:11px!important;
  line-height:1.25}}}}
+@media (max-width:1270px){{.c-plots-bar{{gap:6px;padding:0 4px}} .c-plots-bar button{{padding:1px 4px}}
+ .c-chips{{font-size:10.5px}} .c-whole:disabled{{display:none}} .c-plots-end button{{margin-left:2px}}
+ div:has(>div>.c-bottom)>:nth-child(2){{grid-column:1/span 9}}
+ div:has(>div>.c-bottom)>:nth-child(2) button{{padding:0 3px!important;font-size:11px!important}}
+ div:has(>div>.c-bottom)>:nth-child(2) .mantine-Flex-root{{flex-wrap:nowrap!important;gap:3px!important}}
+ div:has(>div>.c-bottom)>:nth-child(3){{grid-column:10/span 2;min-width:70px}}
+ div:has(>div>.c-bottom)>:nth-child(4){{grid-column:12/span 4;padding-left:6px!important}}
+ div:has(>div>.c-bottom)>:nth-child(1){{grid-column:16}}
+ div:has(>div>.c-bottom)>:nth-child(n+5):nth-child(-n+6){{grid-column:17/span 8}}}}
 @media (max-width:1150px){{.c-beside{{width:78px;font-size:10px!important}}
  .c-badge{{font-size:12px!important;padding:3px 7px!important;letter-spacing:.02em!important}}
  .c-top>b{{display:none}} .c-top{{padding:0 6px!important;gap:8px!important}}}}

@@ -62,6 +62,7 @@ class ReflectorTable(BasePanel):
         self._ids: tuple[str, ...] = ()
         self._rows = Rows(gui, tab, post, self._selecting)
         self._drawn: tuple[object, ...] = ()
+        self._selected: tuple[str, ...] = ()
 
     def draw_slowly(self, view: PageView) -> None:
         """Show the reflectors in their order."""
@@ -75,6 +76,7 @@ class ReflectorTable(BasePanel):
         found = [r for r in reflectors.reflectors if sought in f"{r.id} {r.layer} {r.note}".lower()]
         found.sort(key=ORDERS[self._order.value])
         pages = max(1, -(-len(found) // ROWS))
+        self._turn_to(editor.selected, found)
         first = ROWS * (min(self._page.read(), pages) - 1)
         show(self._page.widget, visible=pages > 1)
         self._count.content = (
@@ -84,6 +86,15 @@ class ReflectorTable(BasePanel):
         shown, selected = found[first : first + ROWS], frozenset(editor.selected)
         self._ids = tuple(r.id for r in shown)
         self._rows.show([(row_text(r), theme.SELECTED_LINE if r.id in selected else theme.LINE) for r in shown])
+
+    def _turn_to(self, selected: tuple[str, ...], found: list[Reflector]) -> None:
+        """Turn to the page of what was selected on the floor just now; its row is scrolled to by the page's script."""
+        if selected == self._selected:
+            return
+        self._selected = selected
+        first = next((index for index, each in enumerate(found) if each.id in frozenset(selected)), None)
+        if first is not None and selected[0] not in self._ids:
+            self._page.widget.value = first // ROWS + 1
 
     def _selecting(self, index: int) -> actions.SelectReflectors:
         """Return the action of a row."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -15,14 +14,14 @@ from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing import actions
 from commission.app.editing.editor import ControlPoint, Editor, Point, editor_of
+from commission.app.editing.refusals import in_words_of_the_page
 from commission.app.editing.route_gestures import route_of, segment_of
 from commission.errors import UsageError
 from commission.site.editing import routes as edits
-from commission.site.fields import described, get_field, with_field
+from commission.site.fields import get_field, with_field
 from commission.site.layout_brief import LayoutBrief
 from commission.site.routes import Route, Segment
 from commission.site.scanner import Scanner
-from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle
 
 EQUIPMENT = {"vehicle": "vehicle", "scanners": "scanner"}
 """Parts of a project that are equipment, and what each is called."""
@@ -192,19 +191,6 @@ def opposite(scanner: Scanner, name: str) -> Scanner:
     x, y, heading = scanner.mounting.tolist()
     turned = heading - math.pi if heading > 0.0 else heading + math.pi
     return replace(scanner, name=name, mounting=np.array([-x, -y, turned]))
-
-
-KINDS_OF_EQUIPMENT = (Scanner, DifferentialVehicle, TricycleVehicle, OmnidirectionalVehicle)
-
-
-def in_words_of_the_page(text: str) -> str:
-    """Return a refusal of a scanner or vehicle with fields called as their widgets are, not as files call them."""
-    labels = {name: each[0].label for kind in KINDS_OF_EQUIPMENT for name, each in described(kind)}
-
-    def called(found: re.Match[str]) -> str:
-        return labels.get(found[1], found[0])
-
-    return re.sub(r"\b(?:scanner|vehicle)\.(\w+)", called, text).replace(" deg", "°")
 
 
 @reduce.register

@@ -20,10 +20,25 @@ def state() -> AppState:
 @pytest.mark.parametrize(
     ("name", "value", "told"),
     [
-        ("scanners[0].blind_sectors_deg", ((170.0, 190.0),), "Blind sectors holds [170, 190]"),
+        ("scanners[0].blind_sectors_deg", ((170.0, 190.0),), "Blind sectors have 170 to 190°"),
         ("scanners[0].blind_sectors_deg", ((170.0, 190.0),), "across its end it is two: 170 180, -180 -170"),
         ("scanners[0].mounting[0]", 100_000.0, "Mounted at x"),
+        (
+            "scanners[0].blind_sectors_deg",
+            ((0.0, 10.0), (5.0, 20.0)),
+            "Blind sectors have 0 to 10° and 5 to 20°; expected sectors that do not overlap",
+        ),
+        (
+            "scanners[0].blind_sectors_deg",
+            ((0.0, 10.0), (-400.0, 20.0)),
+            "Blind sectors: first bearing of sector 2 is -400°; expected -360 to 360°",
+        ),
         ("vehicle.outline", ((0.0, 0.0), (1.0, 0.0)), "Outline has 2 corners"),
+        (
+            "vehicle.outline",
+            ((0.0, 0.0), (1.0, 1.0), (1e12, 0.0)),
+            "Outline: x of corner 3 is 1e+12 m; expected at most 1e+09 m",
+        ),
         (
             "vehicle.outline",
             ((0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)),
@@ -38,6 +53,7 @@ def test_a_refusal_calls_the_field_as_its_widget_does(state: AppState, name: str
     assert told.split(" ", maxsplit=1)[0] in text
     assert told in text or name.endswith("]")
     assert "_" not in text
+    assert "[" not in text
     assert "scanner." not in text
     assert "vehicle." not in text
 

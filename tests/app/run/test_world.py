@@ -59,7 +59,7 @@ FIELDS = {
     "constants.clock_offset_sigma": ("Clock 1σ [ms]", 1000.0),
     "constants.forward_scale_sigma": ("Wheels too small 1σ [%]", 100.0),
     "constants.wheel_scale_sigma": ("Each wheel 1σ [%]", 100.0),
-    "constants.separation_scale_sigma": ("Wheels apart 1σ [%]", 100.0),
+    "constants.separation_scale_sigma": ("Wheel separation 1σ [%]", 100.0),
 }
 """Label and factor of the unit of each number's widget."""
 IN_FILE = {"shiny_objects", "tilted_stretches", "covered", "constants.scanners"}

@@ -1,0 +1,94 @@
+"""Nothing is cut off from small windows to large ones, and what is selected on the floor is found in its table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from commission.app.run.actions import Play, Seek, VirtualDrive
+from commission.site.project import Project
+from commission.site.reflectors import Reflector, ReflectorMap
+from tests.app.sites import room
+from tests.browser.page import OpenPage
+from tests.browser.serving import Served
+
+SIZES = ((1024, 700), (1280, 720), (1600, 900), (1920, 1080), (2560, 1440))
+CUT_OFF = """() => {
+  const found = [], shown = (each) => each.checkVisibility({ opacityProperty: true, visibilityProperty: true });
+  const say = (each, why) => found.push(`${why}: ${(each.ariaLabel || each.textContent).trim()}`);
+  const [strip, top] = ['.c-bottom', '.c-top'].map((name) => document.querySelector(name)
+    .closest('[data-floating-window]'));
+  for (const each of [...strip.querySelectorAll('button, .c-clock'), ...top.querySelectorAll('button')]) {
+    const box = each.getBoundingClientRect();
+    if (!shown(each) || !box.width) continue;
+    if (box.left < -1 || box.right > innerWidth + 1 || box.bottom > innerHeight + 1) say(each, 'beyond the window');
+    if (each.scrollWidth > each.clientWidth + 2 && !each.closest('.c-top')) say(each, 'text is cut');
+    const chips = each.closest('.c-chips')?.getBoundingClientRect();
+    if (chips && box.right > chips.right + 1) say(each, 'chip is cut');
+  }
+  const names = ['Reverse', 'Back', 'Pause', 'Step', 'Play'];
+  const play = [...strip.querySelectorAll('button')].filter((each) => names.includes(each.textContent));
+  const lines = new Set(play.map((each) => Math.round(each.getBoundingClientRect().top)));
+  if (play.length !== 5 || lines.size !== 1) found.push(`${play.length} buttons in ${lines.size} lines`);
+  return found;
+}"""
+
+
+def wall_of(count: int) -> Project:
+    """A room with so many reflectors along its walls that their table has several pages."""
+    project = room()
+    places = [(x, y) for y in (0.2, 7.8) for x in np.linspace(0.3, 11.7, count // 2)]
+    more = tuple(Reflector(id=f"W{index + 1}", x=float(x), y=y) for index, (x, y) in enumerate(places))
+    return replace(project, reflectors=ReflectorMap((*project.reflectors.reflectors, *more)))
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    project = wall_of(60)
+    opened = Served(project, source=VirtualDrive(project.routes[0].name))
+    opened.until(lambda: opened.view is not None)
+    opened.runtime.post(Play(playing=False))
+    opened.runtime.post(Seek(5.0))
+    yield opened
+    opened.close()
+
+
+def test_no_button_or_name_is_cut_off_at_any_size(served: Served, window: Callable[..., OpenPage]) -> None:
+    page = window(served.server, SIZES[0])
+    page.open(nodes=["/vehicle"])
+    page.page.wait_for_function("() => document.querySelectorAll('.c-chips button').length > 5")
+    found: dict[Any, list[str]] = {}
+    for width, height in SIZES:
+        page.page.set_viewport_size({"width": width, "height": height})
+        page.page.wait_for_timeout(400)
+        found[width, height] = page.page.evaluate(CUT_OFF)
+        # Each curve has its name beside its value, at every width.
+        names = page.page.evaluate("() => window.commissionPlots.namesShown")
+        assert {"x", "y", "largest", "inliers", "outliers"} <= {name.split(" ")[0] for name in names}, (width, names)
+    assert found == {size: [] for size in SIZES}
+
+
+def test_what_is_selected_on_the_floor_is_scrolled_to_in_its_table_on_whichever_page_it_is(
+    served: Served, window: Callable[..., OpenPage]
+) -> None:
+    page = window(served.server, (1280, 720))
+    page.open(nodes=["/reflectors/marks"])
+    page.open_tab("Reflectors")
+    page.wait_for_text("64 of 64 reflectors, page 1 of 2")
+    for name in ("W50", "W20"):
+        reflector = next(each for each in served.state.project.reflectors.reflectors if each.id == name)
+        page.click_at((reflector.x, reflector.y))
+        row = page.page.get_by_role("button", name=name)
+        row.wait_for(state="visible")
+        page.page.wait_for_function(
+            "name => { const row = [...document.querySelectorAll('button')].find(e => e.textContent.startsWith(name));"
+            " if (!row) return false; const box = row.getBoundingClientRect();"
+            " const at = document.elementFromPoint(box.left + 20, box.top + box.height / 2);"
+            " return row.contains(at); }",
+            arg=f"{name} ",
+        )
+    assert page.errors == []
