@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.site.record_store import ScanLog, ScanStore, stacked
+from commission.site.recorded_start import RecordedStart
 from commission.site.records import (
     ORDER_WITHIN_A_STAMP,
     Detections,
@@ -55,6 +56,8 @@ class RecordLog:
     """Where on the vehicle the reference measures, and how late its clock is."""
     truth: Truth | None = None
     """The constants that were drawn for a virtual drive; None of a real vehicle."""
+    start: RecordedStart | None = None
+    """Where the vehicle was said to be when the recording began; None: nobody says."""
     notes: tuple[str, ...] = ()
     """What a reader mended or left out, one line each; none where the recording is as it should be."""
     scan_order: NDArray[np.int32] = field(init=False, repr=False)

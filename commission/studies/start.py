@@ -31,6 +31,7 @@ class StartOrigin(StrEnum):
     """Who says where the run starts."""
 
     GIVEN = "as given"
+    RECORDED = "as said when it was recorded"
     REFERENCE = "first reference pose"
     ROUTE = "start of the first route"
     DRIVE = "start of the virtual drive"
@@ -80,8 +81,9 @@ def start_of(
 ) -> Start:
     """Return the belief to start a run with.
 
-    It is, in this order: the pose given; the first reference pose, if it has a heading and comes within a second of the
-    first record; the start of the project's first route; else the vehicle looks where it is.
+    It is, in this order: the pose given; what the recording says; the first reference pose, if it has a heading and
+    comes within a second of the first record; the start of the project's first route; else the vehicle looks where it
+    is.
 
     Parameters
     ----------
@@ -98,6 +100,8 @@ def start_of(
     first_ns = _first_stamp(log)
     if pose is not None:
         return Start(belief_at(first_ns, pose, sigmas), StartOrigin.GIVEN)
+    if log.start is not None:
+        return Start(Belief(first_ns, log.start.pose, log.start.covariance), StartOrigin.RECORDED)
     known = np.flatnonzero(
         np.isfinite(log.reference_poses).all(axis=1) & (log.reference_times_ns - first_ns <= NEAR_THE_START_NS)
     )

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
 from commission.app.live.service import LiveService
 from commission.app.run.state import RunState
 from commission.io.live.virtual_vehicle import send_drive
+from commission.io.recordings.base import load_log
 from commission.simulation.scenario import records
+from commission.studies.run import RunInput, judged_run
+from commission.studies.start import start_of
 from tests.app.sites import room
 from tests.browser.page import OpenPage
 from tests.browser.serving import Served
@@ -24,7 +28,7 @@ def served() -> Iterator[Served]:
 
 
 def test_a_person_connects_sees_the_vehicle_drive_and_fall_silent(
-    served: Served, window: Callable[..., OpenPage]
+    served: Served, window: Callable[..., OpenPage], tmp_path: Path
 ) -> None:
     page = window(served.server)
     page.open()
@@ -38,12 +42,21 @@ def test_a_person_connects_sees_the_vehicle_drive_and_fall_silent(
     project = room()
     drive = list(records(project, project.routes[0].name, 1))
     sender = threading.Thread(target=send_drive, args=(drive, addresses, ("scanner",)), kwargs={"speed": 2.0})
+    page.fill("Record to", str(tmp_path / "drive.mcap"))
+    page.press("Record")
+    page.wait_for_text("● Recording 0.0 s")
     sender.start()
     page.wait_for_text("receiving")
     page.wait_for_text("OPERATIONAL")
     page.wait_for_text("Live vehicle")
     assert served.state.part(RunState).live
     sender.join()
+    page.wait_for_text("drive.mcap")
     page.wait_for_text("silent for")
     page.press("Disconnect")
+    page.wait_for_text("Recorded")
     served.until(lambda: served.view is not None and served.view.result.cycles > 50)
+    assert served.view is not None
+    log = load_log(tmp_path / "drive.mcap")
+    again = judged_run(RunInput.of(project, log, start_of(project, log)))
+    assert again.columns.means.tobytes() == served.view.result.columns.means.tobytes()

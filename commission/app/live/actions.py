@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from commission.app.base.actions import Action
 
@@ -20,3 +21,16 @@ class Connect(Action):
 @dataclass(frozen=True, slots=True)
 class Disconnect(Action):
     """Listen no longer; the run so far stays."""
+
+
+@dataclass(frozen=True, slots=True)
+class Record(Action):
+    """Record what the sources say, and what the localizer makes of it, from now on."""
+
+    path: Path | None = None
+    """A file that does not exist, ends in .mcap; none: one in the project's folder, called by the time of day."""
+
+
+@dataclass(frozen=True, slots=True)
+class StopRecording(Action):
+    """Record no longer; the sources are still listened to."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from commission.app.base.effects import Effect
 
@@ -20,3 +21,16 @@ class OpenSources(Effect):
 @dataclass(frozen=True, slots=True)
 class CloseSources(Effect):
     """Listen no longer."""
+
+
+@dataclass(frozen=True, slots=True)
+class OpenRecording(Effect):
+    """Record from now on."""
+
+    path: Path | None
+    """The file; none: one in the project's folder."""
+
+
+@dataclass(frozen=True, slots=True)
+class CloseRecording(Effect):
+    """Record no longer."""

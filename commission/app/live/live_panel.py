@@ -10,12 +10,14 @@ from commission.app.base import theme
 from commission.app.base.actions import Action
 from commission.app.base.inputs import show, write_html
 from commission.app.base.panel import BasePanel, Post, escaped, posting
+from commission.app.base.reach import typed_path
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.live.actions import Connect, Disconnect
+from commission.app.live.actions import Connect, Disconnect, Record, StopRecording
 from commission.app.live.state import LiveState
 from commission.app.live.view import LiveView, SourceView
 from commission.io.live.registry import KINDS
+from commission.io.live.session_recorder import RecordingStatus
 from commission.io.live.status import SourceState, SourceStatus
 from commission.site.quantity import DEGREES, MILLISECONDS, PERCENT
 
@@ -47,6 +49,24 @@ class LivePanel(BasePanel):
         )
         self._disconnect.on_click(posting(post, lambda _event: Disconnect()))
         self._table = gui.add_html("", visible=False)
+        self._path = gui.add_text(
+            "Record to",
+            "",
+            hint="A new file that ends in .mcap, on the computer that serves this page; it opens in Foxglove, ros2 bag "
+            "and here. Empty: one in the folder recordings of the project. Nothing is overwritten.",
+            visible=False,
+        )
+        self._record = gui.add_button(
+            "Record", color="red", hint="Scans, odometry, estimate, detections and mode from now on.", visible=False
+        )
+        self._record.on_click(posting(post, lambda _event: self._recorded()))
+        self._stop = gui.add_button("Stop recording", color="gray", hint="Close the file.", visible=False)
+        self._stop.on_click(posting(post, lambda _event: StopRecording()))
+        self._recording = gui.add_html("", visible=False)
+
+    def _recorded(self) -> Action:
+        """Return what is asked for by the button."""
+        return Record(typed_path(self._path.value) if self._path.value.strip() else None)
 
     def _asked(self) -> Action:
         """Return what the fields ask for; raises ValueError where the pose is none."""
@@ -59,6 +79,13 @@ class LivePanel(BasePanel):
         show(self._disconnect, visible=connected)
         live = view.part(LiveView) if connected else None
         write_html(self._table, "" if live is None else live_table(live))
+        shown = view.part(LiveView)
+        recording = None if shown is None else shown.recording
+        records = connected and recording is not None and not recording.is_over
+        show(self._path, visible=connected and not records)
+        show(self._record, visible=connected and not records)
+        show(self._stop, visible=records)
+        write_html(self._recording, "" if recording is None else recording_html(recording))
 
 
 def start_pose(text: str) -> tuple[float, float, float] | None:
@@ -104,6 +131,15 @@ def _source(source: SourceView) -> str:
     left_out += [f"{status.undecodable} cannot be decoded"] if status.undecodable else []
     notes = "".join(f"<li>{escaped(line)}</li>" for line in (*source.checks, *left_out))
     return f"<div>{head}<br>{figures}{f'<ul style=margin:0>{notes}</ul>' if notes else ''}</div>"
+
+
+def recording_html(recording: RecordingStatus) -> str:
+    """Return how a recording is doing: where, how long, how large, and why it ended early."""
+    head = "Recorded" if recording.is_over else f"<span style='color:{theme.FAIL_COLOR}'>● Recording</span>"
+    figures = f"{recording.duration:.1f} s, {recording.size / 1e6:.1f} MB, {recording.records} records"
+    trouble = f"<div class='c-note'>{escaped(recording.trouble)}</div>" if recording.trouble else ""
+    where = escaped(str(recording.path))
+    return f"<div style='font-size:12px;padding:2px 4px'>{head} {figures}<br>{where}{trouble}</div>"
 
 
 def state_words(status: SourceStatus) -> str:

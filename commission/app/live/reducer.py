@@ -8,8 +8,8 @@ from dataclasses import replace
 from commission.app.base.actions import Sender
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState
-from commission.app.live.actions import Connect, Disconnect
-from commission.app.live.effects import CloseSources, OpenSources
+from commission.app.live.actions import Connect, Disconnect, Record, StopRecording
+from commission.app.live.effects import CloseRecording, CloseSources, OpenRecording, OpenSources
 from commission.app.live.state import LiveState
 from commission.errors import UsageError
 from commission.io.live.registry import SourceAddress
@@ -36,3 +36,19 @@ def _parsed(texts: Iterable[str]) -> tuple[SourceAddress, ...]:
 def disconnect(_action: Disconnect, state: AppState, _sender: Sender) -> Outcome:
     """Listen no longer."""
     return Outcome(state.with_part(replace(state.part(LiveState), connected=False)), (CloseSources(),))
+
+
+@reduce.register
+def record(action: Record, state: AppState, _sender: Sender) -> Outcome:
+    """Record from now on."""
+    if not state.part(LiveState).connected:
+        raise UsageError("nothing is connected to; expected a connection whose records can be recorded")
+    if action.path is None and state.folder is None:
+        raise UsageError("the project is in no folder; expected the path of a new file that ends in .mcap")
+    return Outcome(state, (OpenRecording(action.path),))
+
+
+@reduce.register
+def stop_recording(_action: StopRecording, state: AppState, _sender: Sender) -> Outcome:
+    """Record no longer."""
+    return Outcome(state, (CloseRecording(),))

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import time
+from pathlib import Path
+
 from commission.app.base.actions import Action, Sender
 from commission.app.base.effects import Effect
 from commission.app.base.growing import RunGrew
 from commission.app.base.service import IDLE_S, Context, Due, Service
 from commission.app.base.state import AppState
 from commission.app.live.actions import Connect, Disconnect
-from commission.app.live.effects import CloseSources, OpenSources
+from commission.app.live.effects import CloseRecording, CloseSources, OpenRecording, OpenSources
 from commission.app.live.state import LiveState
 from commission.app.live.view import LiveView, SourceView
 from commission.errors import CommissionError
@@ -17,9 +20,12 @@ from commission.io.live.live_run import LiveRun
 from commission.io.live.registry import SourceAddress
 from commission.io.live.runner import LiveRunner, LiveSnapshot
 from commission.io.live.session import Session
+from commission.io.live.session_recorder import SessionRecorder, new_recording
 
 FOLLOW_S = 0.1
 """Time after which a live run is looked at again [s]."""
+FOLDER = "recordings"
+"""Folder of recordings within the project's."""
 READS = ("reflectors", "scanners", "parameters", "uncertainty")
 """Parts of the project that the localizer is set up with."""
 
@@ -32,7 +38,7 @@ class LiveService(Service):
     context : what it is made with.
     """
 
-    effects = (OpenSources, CloseSources)
+    effects = (OpenSources, CloseSources, OpenRecording, CloseRecording)
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -41,6 +47,7 @@ class LiveService(Service):
         self._latest: LiveSnapshot | None = None
         self._shown: LiveSnapshot | None = None
         self._own: tuple[str, ...] = ()
+        self._recorder: SessionRecorder | None = None
 
     def start(self) -> None:
         """Connect to what the page begins with."""
@@ -48,8 +55,22 @@ class LiveService(Service):
         if asked.sources:
             self.context.post(Connect(asked.sources, asked.start))
 
-    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:  # noqa: ARG002 - the service's
-        """Connect or disconnect; raises SourceError where an address cannot be listened at."""
+    def carry_out(self, effect: Effect, state: AppState, sender: Sender) -> None:
+        """Connect, disconnect or record.
+
+        Raises
+        ------
+        SourceError
+            an address cannot be listened at.
+        UsageError, FileFormatError
+            a recording cannot be made there.
+        """
+        if isinstance(effect, OpenRecording):
+            self._record(effect.path, state, sender)
+            return
+        if isinstance(effect, CloseRecording):
+            self._stop_recording()
+            return
         self._end()
         if isinstance(effect, OpenSources):
             try:
@@ -73,7 +94,32 @@ class LiveService(Service):
         if runner is None:
             return
         self._latest = last = runner.stop()
+        if self._recorder is not None:
+            self._recorder.close()
         self._grow(last, is_over=True)
+
+    def _record(self, path: Path | None, state: AppState, sender: Sender) -> None:
+        """Begin a recording; the one before ends."""
+        runner = self._runner
+        if runner is None:
+            return
+        if path is not None:
+            path = state.reach.checked(path, sender)
+        elif state.folder is not None:
+            path = new_recording(state.folder / FOLDER, time.strftime("%Y%m%d-%H%M%S"))
+        else:
+            return
+        recorder = SessionRecorder(path, state.project.scanners)
+        self._stop_recording()
+        self._recorder = recorder
+        runner.record_to(recorder)
+
+    def _stop_recording(self) -> None:
+        """End the recording that is made; what it was stays shown."""
+        if self._runner is not None:
+            self._runner.record_to(None)
+        if self._recorder is not None:
+            self._recorder.close()
 
     def _publish(self, snapshot: LiveSnapshot) -> None:
         self._latest = snapshot
@@ -114,10 +160,13 @@ class LiveService(Service):
             SourceView(each.address, each.status, checklist(each.address, each.status, self._own))
             for each in shown.sources
         )
-        return (LiveView(sources, tuple(f"{count} {words}" for words, count in shown.told.items())),)
+        told = tuple(f"{count} {words}" for words, count in shown.told.items())
+        return (LiveView(sources, told, None if self._recorder is None else self._recorder.status()),)
 
     def close(self) -> None:
         """Stop listening."""
         runner, self._runner = self._runner, None
         if runner is not None:
             runner.stop()
+        if self._recorder is not None:
+            self._recorder.close()

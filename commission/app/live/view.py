@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from commission.io.live.registry import SourceAddress
+from commission.io.live.session_recorder import RecordingStatus
 from commission.io.live.status import SourceStatus
 
 
@@ -28,3 +29,5 @@ class LiveView:
     """Those that are listened to."""
     told: tuple[str, ...]
     """What was left out or sorted, one line each."""
+    recording: RecordingStatus | None = None
+    """The recording that is made, or was made last."""

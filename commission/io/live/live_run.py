@@ -99,6 +99,14 @@ class LiveRun:
             self._keep(record)
             return estimates
 
+    def belief_before(self, record: Record) -> Belief | None:
+        """Return what is known of the pose before a record that is taken in next; None while odometry still waits."""
+        with self._lock:
+            if self._run is None:
+                return belief_at(record.stamp_ns, self._pose, self._sigmas)
+            belief = belief_of(self._run.state)
+            return belief if belief.stamp_ns >= self._odometry_ns else None
+
     def end(self) -> tuple[Estimate, ...]:
         """Process what waits, since no more comes; returns the estimates that follow."""
         with self._lock:

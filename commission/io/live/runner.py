@@ -13,6 +13,7 @@ from commission.errors import SourceError
 from commission.io.live.live_run import LiveResult, LiveRun
 from commission.io.live.registry import SourceAddress
 from commission.io.live.session import Session
+from commission.io.live.session_recorder import SessionRecorder
 from commission.io.live.status import SourceStatus
 from commission.site.project import Project
 from commission.site.records import Record
@@ -68,6 +69,7 @@ class LiveRunner:
     ) -> None:
         self.session, self.run = session, run
         self._publish, self._keep = publish, keep
+        self._recorder: SessionRecorder | None = None
         self._stopped = threading.Event()
         self._threads = [
             threading.Thread(target=self._localize, name="live localizer", daemon=True),
@@ -89,6 +91,10 @@ class LiveRunner:
                 thread.join(timeout=5.0)
         return self.snapshot()
 
+    def record_to(self, recorder: SessionRecorder | None) -> None:
+        """Record what comes from now on; None: no longer. Closing the file is the caller's."""
+        self._recorder = recorder
+
     def use(self, project: Project) -> None:
         """Localize with another project from the next record on."""
         self.run.use(project)
@@ -106,14 +112,22 @@ class LiveRunner:
                 self._take(record)
         for record in self.session.rest():
             self._take(record)
-        self.run.end()
+        last = self.run.end()
+        if self._recorder is not None:
+            self._recorder.append_estimates(last)
 
     def _take(self, record: Record) -> None:
         """Localize a record; one that cannot be is told to the log, and the next one is taken."""
         try:
-            self.run.take(record)
+            recorder = self._recorder
+            is_first = recorder is not None and not recorder.is_begun
+            belief = self.run.belief_before(record) if is_first else None
+            estimates = self.run.take(record)
             if self._keep is not None:
                 self._keep(record)
+            # What waits in the localizer is not in the belief: a recording begins when nothing does.
+            if recorder is not None and (not is_first or belief is not None):
+                recorder.append(record, estimates, belief)
         except SourceError:
             log.exception("a record of a live source")
 

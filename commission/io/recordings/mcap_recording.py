@@ -23,6 +23,7 @@ from commission.io.recordings.mcap_columns import (
 from commission.io.recordings.mcap_index import McapIndex
 from commission.io.recordings.mcap_reader import MAGIC
 from commission.io.recordings.mcap_scans import McapScans, ScanPlaces
+from commission.io.recordings.recorded_start import recorded_start_of
 from commission.io.recordings.recorder import (
     DISPLACEMENTS,
     METADATA,
@@ -38,6 +39,7 @@ from commission.io.recordings.truth_file import truth_of
 from commission.io.recordings.whole import WholeRecording
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanStore
+from commission.site.recorded_start import RecordedStart
 from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import is_name
 from commission.site.truth import Truth
@@ -98,6 +100,11 @@ class McapRecording(WholeRecording):
         text = self._said.get("reference")
         return BASE if text is None else reference_mount_of(self.path, text)
 
+    def start(self) -> RecordedStart | None:
+        """Return where the vehicle was said to be when the recording began; raises FileFormatError."""
+        text = self._said.get("start")
+        return None if text is None else recorded_start_of(self.path, text)
+
     def load(self) -> RecordLog:
         """Read everything but scans into columns; raises FileFormatError."""
         moved, referred = RowColumns(3), RowColumns(3)
@@ -139,6 +146,7 @@ class McapRecording(WholeRecording):
             reference_poses=reference_poses[rows],
             reference_mount=self.reference_mount(),
             truth=self.truth(),
+            start=self.start(),
             notes=tuple(notes),
         )
 

@@ -20,9 +20,11 @@ from commission.geometry import se2
 from commission.io.atomic import atomic_file, cannot_write
 from commission.io.recordings import ros_encoding as ros
 from commission.io.recordings.mcap_writer import McapWriter
+from commission.io.recordings.recorded_start import recorded_start_text
 from commission.io.recordings.reference_file import reference_mount_text
 from commission.io.recordings.truth_file import truth_text
 from commission.localization.estimate import Estimate
+from commission.site.recorded_start import RecordedStart
 from commission.site.records import Detections, Odometry, Record, Scan
 from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import ONLY_NAME, Scanner
@@ -53,6 +55,7 @@ class Recorder:
     truth : the constants of a virtual drive.
     reference_mount : where the reference measures.
     mounted : the vehicle's scanners, for viewers: where on it their scans are drawn.
+    start : where the vehicle is said to be before the first record.
     chunk_s : what comes within this time is written at once, and lost where the program is killed before [s].
     file : an empty file to write into instead; it is not closed.
 
@@ -70,6 +73,7 @@ class Recorder:
         truth: Truth | None = None,
         reference_mount: ReferenceMount = BASE,
         mounted: Sequence[Scanner] = (),
+        start: RecordedStart | None = None,
         chunk_s: float = 1.0,
         file: IO[bytes] | None = None,
     ) -> None:
@@ -90,7 +94,7 @@ class Recorder:
         self._odometry_ns: int | None = None
         self._mode: str | None = None
         self._is_open = True
-        self._writer.add_metadata(METADATA, self._said(truth, reference_mount))
+        self._writer.add_metadata(METADATA, self._said(truth, reference_mount, start))
         for scanner in mounted:
             self._add_mounting(scanner)
 
@@ -171,13 +175,17 @@ class Recorder:
         """Close the file, whatever happened."""
         self.close()
 
-    def _said(self, truth: Truth | None, reference_mount: ReferenceMount) -> dict[str, str]:
+    def _said(
+        self, truth: Truth | None, reference_mount: ReferenceMount, start: RecordedStart | None
+    ) -> dict[str, str]:
         """What the file says about itself."""
         values = {"version": VERSION, "scanners": json.dumps(self.scanners)}
         if truth is not None:
             values["truth"] = truth_text(truth)
         if reference_mount != BASE:
             values["reference"] = reference_mount_text(reference_mount)
+        if start is not None:
+            values["start"] = recorded_start_text(start)
         return values
 
     def _append_odometry(self, record: Odometry) -> None:

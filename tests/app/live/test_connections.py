@@ -7,18 +7,19 @@ import threading
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from commission.app.base.state import AppState
-from commission.app.live.actions import Connect, Disconnect
+from commission.app.live.actions import Connect, Disconnect, Record
 from commission.app.live.effects import OpenSources
 from commission.app.live.live_panel import live_table, start_pose
 from commission.app.live.service import LiveService
 from commission.app.live.state import LiveState
 from commission.app.live.view import LiveView, SourceView
-from commission.app.run.actions import Seek
+from commission.app.run.actions import ChooseSource, RecordedDrive, Seek
 from commission.app.run.state import RunState
 from commission.app.tune.actions import SetParameter
 from commission.errors import CommissionError, UsageError
@@ -96,6 +97,42 @@ def test_a_vehicle_that_drives_now_is_shown_grows_and_stays_as_a_run_that_can_be
     assert replayed.columns.means.tobytes() == over.result.columns.means.tobytes()
     served.runtime.post(SetParameter("association.gate_probability", 0.6))
     served.until(lambda: served.view is not None and served.view.result is not over.result)
+
+
+def test_what_drives_now_is_recorded_and_opens_as_the_same_run(
+    served: Served, drive: list[object], tmp_path: Path
+) -> None:
+    addresses = connected(served, "sick-safety", "json")
+    path = tmp_path / "live.mcap"
+    served.runtime.post(Record(path))
+    served.until(path.exists)
+    served.runtime.post(Record(path))
+    served.until(lambda: any("never overwritten" in fault for fault in served.state.faults))
+    sending(drive[:600], addresses, speed=4.0).join()
+    served.until(lambda: live_of(served).sources[0].status.state is SourceState.SILENT, 5.0)
+    recording = live_of(served).recording
+    assert recording is not None
+    assert recording.size > 100_000
+    assert recording.duration > 1.0
+    served.runtime.post(Disconnect())
+    served.until(lambda: live_of(served).recording is not None and live_of(served).recording.is_over)  # type: ignore[union-attr]
+    served.until(lambda: served.view is not None)
+    live = served.view
+    assert live is not None
+    served.runtime.post(ChooseSource(RecordedDrive(path)))
+    served.until(lambda: served.view is not None and served.view.result.inputs.log is not live.result.inputs.log)
+    again = served.view
+    assert again is not None
+    assert again.result.columns.means.tobytes() == live.result.columns.means.tobytes()
+    assert again.result.columns.covariances.tobytes() == live.result.columns.covariances.tobytes()
+
+
+def test_a_recording_needs_a_connection_and_a_place(served: Served) -> None:
+    state = AppState(project=room(), saved=room()).with_part(LiveState())
+    with pytest.raises(UsageError, match="nothing is connected"):
+        after(state, Record(Path("x.mcap")))
+    with pytest.raises(UsageError, match="in no folder"):
+        after(state.with_part(LiveState(connected=True)), Record())
 
 
 def test_parameters_that_change_while_it_drives_act_from_then_on(served: Served, drive: list[object]) -> None:
