@@ -79,6 +79,8 @@ class CalibrationFit:
     """Poses and constants."""
     sigmas: FloatArray
     """(p,) 1-sigma of the constants; of correlated residuals the larger one that blocks of time show."""
+    covariances: tuple[FloatArray, FloatArray]
+    """(p, p) of the constants: if residuals were independent, and as blocks of time show it."""
     noise: FloatArray
     """(8,) variances, as in `CalibrationProblem.noise`."""
     noise_sigmas: FloatArray
@@ -97,6 +99,10 @@ class CalibrationFit:
     """Rounds that were made."""
     weights: FloatArray = field(repr=False)
     """(n,) weight of each detection [0..1]; 0: it is of none."""
+
+    def sigma_of(self, share: FloatArray) -> float:
+        """1-sigma of a sum of constants, each taken by its share: (p,)."""
+        return float(np.sqrt(max(share @ each @ share for each in self.covariances)))
 
 
 def fit(problem: CalibrationProblem, progress: Progress = silent) -> CalibrationFit:
@@ -124,14 +130,15 @@ def fit(problem: CalibrationProblem, progress: Progress = silent) -> Calibration
         if rounds > 3 and shift.max(initial=0.0) < SETTLED and np.abs(np.log(noise / noise_before)).max() < SETTLED:
             break
     system = _System.of(problem, point, reflector, noise)
-    sigmas, scores = system.robust_sigmas()
+    covariances, scores = system.covariances()
     residuals = np.full((len(reflector), 2), np.nan)
     ranges, weights = np.full(len(reflector), np.nan), np.zeros(len(reflector))
     rows = reflector >= 0
     residuals[rows], ranges[rows], weights[rows] = system.seen.residuals, system.seen.ranges, system.weights
     return CalibrationFit(
         point=point,
-        sigmas=sigmas,
+        sigmas=np.sqrt(np.maximum(*(np.diag(each) for each in covariances))) * system.free,
+        covariances=covariances,
         noise=noise,
         noise_sigmas=log_sigmas,
         reflector=reflector,
@@ -260,8 +267,8 @@ class _System:
         poses, constants = self.solve(self.by_poses.T @ probes, self.by_constants.T @ probes)
         return self.by_poses @ poses + self.by_constants @ constants
 
-    def robust_sigmas(self) -> tuple[FloatArray, FloatArray]:
-        """1-sigma that allow for residuals that are correlated within a stretch, and what each stretch says.
+    def covariances(self) -> tuple[tuple[FloatArray, FloatArray], FloatArray]:
+        """(p, p) covariances if residuals were independent, and if they are within a stretch, and what each one says.
 
         The scores of stretches of ten seconds are taken for independent (White 1980; clustered): their scatter is the
         variance of the score, whatever is correlated within them.
@@ -278,9 +285,10 @@ class _System:
         inverse = cho_solve(self.schur, np.eye(len(self.free)))
         shifts = scores @ inverse
         centered = shifts - shifts.mean(axis=0)
-        scatter = (centered**2).sum(axis=0) * count / max(count - 1, 1)
-        scatter += inverse**2 @ self.prior_precision
-        return np.sqrt(np.maximum(scatter, self.sigmas**2)) * self.free, shifts
+        scatter = centered.T @ centered * count / max(count - 1, 1)
+        scatter += (inverse * self.prior_precision) @ inverse
+        free = self.free[:, np.newaxis] & self.free
+        return (np.where(free, inverse, 0.0), np.where(free, scatter, 0.0)), shifts
 
     def without_prior(self) -> FloatArray:
         """(p,) 1-sigma of each constant by the drive alone, others with their priors; inf where it shows none."""
