@@ -19,6 +19,7 @@ from commission.cli.calibrate import Calibrate
 from commission.cli.convert import Convert
 from commission.cli.coverage import CoverageCommand
 from commission.cli.inspect import Inspect
+from commission.cli.layouts import Layouts
 from commission.cli.localize import Localize
 from commission.cli.parsing import Command, parse
 from commission.cli.place import Place
@@ -44,6 +45,7 @@ COMMANDS: dict[str, type[Command]] = {
     "ambiguity": Ambiguity,
     "calibrate": Calibrate,
     "place": Place,
+    "layouts": Layouts,
     "problems": Problems,
     "sweep": SweepCommand,
     "convert": Convert,
