@@ -218,3 +218,38 @@ def put_block(cross: FloatArray, work: FloatArray, at: int, entry: int, busy: In
     if busy is not None:
         # Both: a chunk holds whole reflectors.
         busy[column // CHUNK] = RECHECKED
+
+
+@compiled_inline
+def carry_over(cross: FloatArray, transition: FloatArray, busy: IntArray) -> None:
+    """Multiply the covariance with all constants by the transition of a correction.
+
+    Parameters
+    ----------
+    cross : covariance of the pose with the constants, written in place.
+    transition : (3, 3) or wider, whose first three columns count.
+    busy : (M,) see `busy_chunks`.
+
+    Notes
+    -----
+    C = A C: Schmidt 1966. 0 stays 0.
+    """
+    for chunk in range(len(busy)):
+        if busy[chunk] > 0:
+            _carry(cross, transition, CHUNK * chunk, min(CHUNK * (chunk + 1), cross.shape[1]))
+
+
+@compiled_inline
+def mark_busy(busy: IntArray, first: int, last: int) -> None:
+    """Remember that columns from `first` to before `last` were written.
+
+    Parameters
+    ----------
+    busy : (M,) see `busy_chunks`, written.
+    first, last : columns, no more than a chunk of them.
+
+    Notes
+    -----
+    No formula: both chunks that they may lie in.
+    """
+    busy[first // CHUNK] = busy[(last - 1) // CHUNK] = RECHECKED

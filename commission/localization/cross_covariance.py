@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.site.parameters import ContourParameters
 from commission.site.reflectors import Reflector
 from commission.site.scanner import Scanner
 from commission.site.uncertainty import Uncertainty
@@ -70,6 +71,12 @@ def constants_of(
         constants += [("mounting x", *mounting), ("mounting y", *mounting), ("mounting heading", *heading)]
         constants += [("range", scanner.name, uncertainty.range_bias), ("clock", scanner.name, uncertainty.clock)]
     return tuple(constants)
+
+
+def contour_constants(parameters: ContourParameters) -> Constants:
+    """What is considered of contours, behind all other constants: how far the map is off where the vehicle is."""
+    known = (parameters.map_sigma, parameters.map_heading_sigma, parameters.map_correlation)
+    return (("map x", *known), ("map y", *known), ("map heading", *known))
 
 
 def columns_of(cross: CrossCovariance | None, constants: Constants | None) -> FloatArray | None:

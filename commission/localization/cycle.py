@@ -6,6 +6,7 @@ live, replay and simulation agree to the last bit. From a state and a record to 
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -18,11 +19,12 @@ from commission.localization.association import INLIER, NOBODY, Gate, associate
 from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering, considering
 from commission.localization.consider_columns import begin, busy_chunks, put_back, put_block, take_along
 from commission.localization.consider_correction import correct_aimed_with
+from commission.localization.contour import ACCEPTED, USE, ContourModel, ContourScan, observe_contours
 from commission.localization.kalman import correct_aimed
 from commission.localization.observation import ObservationModel
-from commission.localization.odometry import NextOdometry, OdometryNoise, advance, reach
+from commission.localization.odometry import Motion, NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
-from commission.localization.rejection import rejects_the_world, weigh
+from commission.localization.rejection import Evidence, RejectionRule, is_doubtful, rejects_the_world, weigh
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
 from commission.localization.supervisor import FAIL, LOST, OPERATIONAL, supervise
@@ -85,6 +87,9 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     reflectors: IntArray,
     d2: FloatArray,
     following: NextOdometry,
+    contours: ContourModel | None,
+    scan: ContourScan | None,
+    figures: FloatArray | None,
 ) -> Cycle:
     """Process the detections of a scan.
 
@@ -105,11 +110,13 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     reflectors : (n,) out: index into the reflector map, or -1.
     d2 : (n,) out: squared Mahalanobis distance at the prior, NaN for none.
     following : the odometry record at or after the scan, where it is known.
+    contours, scan : contours of the map, and the scan that is matched with them; None: they are not looked at.
+    figures : (COLUMNS,) out, see `contour`; None: as `contours`.
 
     Notes
     -----
     No formula: `reach`, `associate`, `correct` and `supervise` in turn: Sobreira et al. 2016, Algorithms 1, 3 and 4;
-    then the rule by rejections, which overrules it.
+    then the rule by rejections, which overrules it. Contours come after reflectors, from the freshest state.
     """
     prior, motion = reach(state.belief, state.motion, stamp_ns, following, model.odometry)
     given = considering(cross, prior, state.pivot, state.motion, following, model.consider)
@@ -152,6 +159,9 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         status,
         reflectors,
     )
+    posterior = with_contours(
+        posterior, contours, scan, state, motion, following, len(places), model, cross, busy, figures
+    )
     pivot = state.pivot if cross is None else (posterior.x, posterior.y)
     for i in range(first, last):
         if reflectors[i] != NOBODY:
@@ -170,6 +180,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         status,
         model.rejection,
     )
+    evidence = confirmed_by_contours(evidence, prior, model.rejection, figures)
     was_lost = state.mode == LOST
     mode = supervise(FAIL if was_lost else state.mode, posterior, model.limits)
     if evidence.confirmed < model.rejection.confirmations:
@@ -195,6 +206,77 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
             state.cross,
             state.search,
         ),
+    )
+
+
+@compiled_inline
+def with_contours(  # noqa: PLR0917 - the filter's state around one scan
+    belief: PoseGaussian,
+    contours: ContourModel | None,
+    scan: ContourScan | None,
+    before: FilterState,
+    motion: Motion,
+    following: NextOdometry,
+    reflectors: int,
+    model: FilterModel,
+    cross: FloatArray | None,
+    busy: IntArray | None,
+    figures: FloatArray | None,
+) -> PoseGaussian:
+    """Correct a belief by the contours of a scan, where they are looked at.
+
+    Parameters
+    ----------
+    belief : after the reflectors of the scan.
+    contours, scan, figures : as in `process_scan`.
+    before : state before the scan.
+    motion, following : odometry before the scan and after it.
+    reflectors : N of the reflector map.
+    model : of the whole filter.
+    cross, busy : covariance with the constants, about `belief`, or None.
+
+    Notes
+    -----
+    No formula: `observe_contours`.
+    """
+    if contours is None or scan is None or figures is None:
+        return belief
+    dx, dy = belief.x - before.pivot[0], belief.y - before.pivot[1]
+    moved = math.sqrt(dx * dx + dy * dy)
+    return observe_contours(
+        belief, scan, contours, motion, following, moved, reflectors, model.consider, cross, busy, figures
+    )
+
+
+@compiled_inline
+def confirmed_by_contours(
+    evidence: Evidence, prior: PoseGaussian, rule: RejectionRule, figures: FloatArray | None
+) -> Evidence:
+    """Count an accepted match of contours like an accepted reflector, where the pose has to prove right.
+
+    Parameters
+    ----------
+    evidence : after the reflectors of the scan.
+    prior : before the scan.
+    rule : says what is doubtful.
+    figures : of the scan's contours, or None.
+
+    Notes
+    -----
+    confirmed = confirmed + 1 after an accepted match whose prior was not doubtful: derived, as for a detection in
+    `weigh`.
+    """
+    if figures is None:
+        return evidence
+    if figures[USE] != ACCEPTED or is_doubtful(prior, rule):
+        return evidence
+    return Evidence(
+        evidence.stamp_ns,
+        evidence.near_accepted,
+        evidence.near_rejected,
+        evidence.accepted,
+        evidence.rejected,
+        evidence.confirmed + 1.0,
     )
 
 

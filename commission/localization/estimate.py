@@ -78,6 +78,8 @@ class Estimate:
     """Largest squared Mahalanobis distance of an inlier (chi-square, 2 degrees of freedom)."""
     scanner: int = 0
     """Index of the scanner that saw them, in the setup."""
+    contours: FloatArray | None = None
+    """(12,) what became of the contours of the scan, see `contour`; None: they are not looked at."""
 
     def count(self, status: Status) -> int:
         """Return the number of detections of one status."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.localization.contour import COLUMNS
 from commission.localization.detection_log import DetectionLog
 from commission.localization.detector import INLIER
 from commission.localization.estimate import Belief, Estimate, Status
@@ -33,6 +34,7 @@ class Cycles(NamedTuple):
     means: FloatArray
     covariances: FloatArray
     modes: NDArray[np.int8]
+    contours: FloatArray
 
 
 class DetectionRows(NamedTuple):
@@ -72,6 +74,7 @@ class GrowingRun:
             np.empty((n, 3)),
             covariances[1],
             np.empty(n, np.int8),
+            np.zeros((n, COLUMNS)),
         )
         self._offsets: IntArray = np.zeros(n + 1, np.int64)
         self._detections = DetectionRows(
@@ -143,8 +146,10 @@ class GrowingRun:
             expected=rows.expected_beams,
             status=rows.detected,
         )
+        segments = tuple(segment for segment in self._segments if segment.first < max(n, 1))
+        matching = any(segment.setup.contour is not None for segment in segments)
         return RunColumns(
-            segments=tuple(segment for segment in self._segments if segment.first < max(n, 1)),
+            segments=segments,
             checkpoints=tuple(self._checkpoints),
             detected=detected,
             range_bearing=rows.range_bearing,
@@ -155,6 +160,7 @@ class GrowingRun:
             status=rows.status,
             reflector=rows.reflectors,
             d2=rows.d2,
+            contours=cycles.contours if matching else cycles.contours[:0],
             final=self._localizer.state,
         )
 
@@ -172,6 +178,7 @@ class GrowingRun:
         cycles.prior_means[row], cycles.prior_covariances[row] = estimate.prior.mean, estimate.prior.covariance
         cycles.means[row], cycles.covariances[row] = estimate.posterior.mean, estimate.posterior.covariance
         cycles.modes[row] = estimate.mode
+        cycles.contours[row] = 0.0 if estimate.contours is None else estimate.contours
         rejected = estimate.status == Status.OUTLIER_DETECTOR
         found.range_bearing[first:last], found.beams[first:last] = estimate.detections, estimate.beams
         found.measured[first:last] = estimate.measured

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from commission.errors import SourceError
 from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.localization.contour import COLUMNS
+from commission.localization.contour_scans import contour_scan
 from commission.localization.cross_covariance import columns_of, cross_covariance
 from commission.localization.cycle import Cycle, process_odometry, process_scan, room_for_scans
 from commission.localization.detector import DetectedReflectors, detect, status_of_reported
@@ -240,11 +242,12 @@ class Localizer:
         status = seen.status.copy()
         reflector: IntArray = np.empty(count, dtype=np.int64)
         d2 = np.empty(count)
+        figures = None if self._setup.contour is None else np.zeros(COLUMNS)
         if before.mode == Mode.INITIALIZING:
             associate_nothing(status, reflector, d2)
             cycle = unlocated(before, stamp_ns, following, self._setup.filter.odometry)
         else:
-            cycle = self._filtered(scan, detections, following, (status, reflector, d2))
+            cycle = self._filtered(scan, detections, following, (status, reflector, d2), figures)
         self._state = cycle.state
         if not is_sought(before, self._setup.filter.limits):
             self._state = cycle.state._replace(search=None)
@@ -284,6 +287,7 @@ class Localizer:
             d2=d2,
             gate=self._setup.filter.gate.d2,
             scanner=scan.scanner,
+            contours=figures,
         )
 
     def _filtered(
@@ -292,8 +296,9 @@ class Localizer:
         detections: FloatArray,
         following: NextOdometry,
         written: tuple[NDArray[np.int8], IntArray, FloatArray],
+        figures: FloatArray | None,
     ) -> Cycle:
-        """Let the filter process a scan; what becomes of its detections is written."""
+        """Let the filter process a scan; what becomes of its detections and contours is written."""
         constants = self._setup.constants
         cross = columns_of(self._state.cross, constants)
         room = room_for_scans(cross, len(detections))
@@ -314,6 +319,9 @@ class Localizer:
             scan.scanner,
             *written,
             following,
+            self._setup.contour,
+            contour_scan(self._setup, scan if isinstance(scan, Scan) else None, scan.scanner),
+            figures,
         )
         state = cycle.state._replace(cross=cross_covariance(cross, constants), search=self._state.search)
         return Cycle(cycle.prior, state)

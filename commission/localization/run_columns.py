@@ -78,6 +78,8 @@ class RunColumns:
     """(n,) index into the reflector map of its segment; -1: none."""
     d2: FloatArray
     """(n,) squared Mahalanobis distance to that reflector; NaN: none."""
+    contours: FloatArray
+    """(K, 12) what became of the contours of each cycle, see `contour`; (0, 12) where they are not looked at."""
     final: FilterState
     """State after the last record, odometry included."""
     firsts: IntArray = field(init=False, repr=False)
@@ -170,6 +172,7 @@ class RunColumns:
             d2=self.d2[rows],
             gate=setup.filter.gate.d2,
             scanner=int(self.detected.scanners[cycle]),
+            contours=self.contours[cycle] if setup.contour is not None else None,
         )
 
     def _posterior(self, cycle: int) -> Belief:

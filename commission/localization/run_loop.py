@@ -5,6 +5,7 @@ It knows one setup and one state at its beginning; what lies before and after th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,9 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.localization.contour import COLUMNS as CONTOUR_COLUMNS
+from commission.localization.contour import ContourModel
+from commission.localization.contour_scans import ContourScans, contour_scan_at, contour_scans, figures_at
 from commission.localization.cross_covariance import columns_of, cross_covariance
 from commission.localization.cycle import process_odometry, process_scan, room_for_scans
 from commission.localization.detection_log import DetectionLog
@@ -49,16 +53,20 @@ class Columns(NamedTuple):
     d2: FloatArray
     settled: FloatArray
     """(n, 2) detections at the stamp of their scan, upright; (0, 2) where they are what was measured."""
+    contours: FloatArray
+    """(K, 12) what became of the contours of each cycle, see `contour`; (0, 12) where they are not looked at."""
 
 
-def empty_columns(detected: DetectionLog, *, sweeping: bool) -> Columns:
+def empty_columns(detected: DetectionLog, setups: Sequence[LocalizerSetup]) -> Columns:
     """Columns to be written, the detector's verdict in them.
 
     Parameters
     ----------
     detected : what was measured.
-    sweeping : whether any scanner measures other than at once and upright.
+    setups : all that are used: whether any scanner measures other than at once and upright, and contours are looked at.
     """
+    sweeping = any(len(setup.sweep_rows) for setup in setups)
+    matching = any(setup.contour is not None for setup in setups)
     cycles, total = len(detected), len(detected.range_bearing)
     return Columns(
         np.empty((cycles, 3)),
@@ -68,6 +76,7 @@ def empty_columns(detected: DetectionLog, *, sweeping: bool) -> Columns:
         np.empty(total, dtype=np.int64),
         np.empty(total),
         detected.range_bearing.copy() if sweeping else np.empty((0, 2)),
+        np.zeros((cycles if matching else 0, CONTOUR_COLUMNS)),
     )
 
 
@@ -89,6 +98,7 @@ def cut(columns: Columns, detected: DetectionLog, first: int, last: int) -> Colu
         columns.reflectors[rows],
         columns.d2[rows],
         columns.settled[rows] if len(columns.settled) else columns.settled,
+        columns.contours[first:last] if len(columns.contours) else columns.contours,
     )
 
 
@@ -109,6 +119,8 @@ def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: in
     columns.d2[:detections] = earlier.d2[:detections]
     if len(columns.settled):
         columns.settled[:detections] = earlier.range_bearing[:detections]
+    if len(columns.contours) and len(earlier.contours):
+        columns.contours[:cycles] = earlier.contours[:cycles]
 
 
 def odometry_rows(log: RecordLog, stamps_ns: IntArray, first: int, last: int) -> tuple[int, int]:
@@ -130,6 +142,8 @@ def odometry_rows(log: RecordLog, stamps_ns: IntArray, first: int, last: int) ->
 class CycleStretch(NamedTuple):
     """Cycles to go over, and where they are written."""
 
+    first: int
+    """The first of them, in the whole run."""
     rows: tuple[int, int]
     """First row of odometry to be delivered, and the one behind the last."""
     detected: DetectionLog
@@ -182,7 +196,8 @@ def _part(stretch: CycleStretch, cycles: tuple[int, int], rows: tuple[int, int])
         return stretch._replace(rows=rows)
     here = slice(*cycles)
     priors = PriorRows(stretch.priors.means[here], stretch.priors.covariances[here])
-    return CycleStretch(rows, stretch.detected.part(*cycles), cut(stretch.columns, stretch.detected, *cycles), priors)
+    columns, first = cut(stretch.columns, stretch.detected, *cycles), stretch.first + cycles[0]
+    return CycleStretch(first, rows, stretch.detected.part(*cycles), columns, priors)
 
 
 def _until(log: RecordLog, stamp_ns: int, rows: tuple[int, int]) -> int:
@@ -276,6 +291,9 @@ def _tracked(
     cross = columns_of(state.cross, setup.constants)
     settled = stretch.columns.settled
     room = room_for_scans(cross, int(np.diff(detected.offsets).max(initial=0)))
+    own = log.detection_stamps_ns
+    scans = int(np.searchsorted(detected.stamps_ns, own[0])) if len(own) else len(detected)
+    scans = 0 if state.sensor_detects else scans
     after, cycles, delivered = _run(
         read_only(log.odometry_stamps_ns[rows]),
         read_only(as_driven(log.displacements[rows], setup.parameters.odometry)),
@@ -297,6 +315,8 @@ def _tracked(
         state._replace(cross=None),
         stretch.columns,
         stretch.priors,
+        setup.contour,
+        contour_scans(log, setup, (stretch.first, scans), len(detected)),
     )
     # Odometry alone changes nothing of it, nor does another setup before its first scan.
     cross_after = cross_covariance(cross, setup.constants) if len(detected) else state.cross
@@ -325,6 +345,8 @@ def _run(  # noqa: PLR0917 - the columns of the log
     state: FilterState,
     columns: Columns,
     priors: PriorRows,
+    contours: ContourModel | None,
+    scans: ContourScans | None,
 ) -> tuple[FilterState, int, int]:
     """Deliver odometry and scans in the order of their stamps, odometry first, until the vehicle is lost.
 
@@ -333,7 +355,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
     Of the odometry the rows up to `delivered`; the one behind them only tells the motion of scans before it. Where
     there are sweeps, `detections` is a view of the column `settled`, which is written before it is read.
     """
-    means, covariances, modes, status, reflectors, d2, settled = columns
+    means, covariances, modes, status, reflectors, d2, settled, figures = columns
     rows = 0
     for k in range(len(scan_stamps)):
         while rows < delivered and odometry_stamps[rows] <= scan_stamps[k]:
@@ -367,6 +389,9 @@ def _run(  # noqa: PLR0917 - the columns of the log
             reflectors,
             d2,
             following,
+            contours,
+            contour_scan_at(scans, k, observations, sweeps),
+            figures_at(scans, figures, k),
         )
         state = cycle.state
         _write_belief(cycle.prior, k, priors.means, priors.covariances)

@@ -12,7 +12,8 @@ from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.association import Gate, gate_of
 from commission.localization.consider import ConsiderModel
-from commission.localization.cross_covariance import Constants, constants_of, survey_variance
+from commission.localization.contour import ContourModel, contour_model
+from commission.localization.cross_covariance import Constants, constants_of, contour_constants, survey_variance
 from commission.localization.detector_model import DetectorModel, detector_model
 from commission.localization.observation import (
     ObservationModel,
@@ -83,6 +84,9 @@ class LocalizerSetup:
     detectors: tuple[DetectorModel, ...] = field(init=False, repr=False, compare=False)
     """Scalars and tables of the detector, for each scanner."""
 
+    contour: ContourModel | None = field(init=False, repr=False, compare=False)
+    """Contours of the floor map; None: they are not looked at."""
+
     def __post_init__(self) -> None:
         considers, known = self.parameters.filter.consider, self.uncertainty
         index = build_index(self.reflectors, self.survey_sigmas)
@@ -96,6 +100,10 @@ class LocalizerSetup:
         )
         order = index.places[:, 3].astype(np.int64)
         constants = constants_of(self.reflectors.reflectors, order, self.scanners, known) if considers else None
+        contour = contour_model(self.floor, self.scanners, self.parameters.contour)
+        if constants is not None and contour is not None:
+            constants += contour_constants(self.parameters.contour)
+        object.__setattr__(self, "contour", contour)
         object.__setattr__(self, "constants", constants)
         object.__setattr__(self, "index", index)
         object.__setattr__(self, "filter", model)

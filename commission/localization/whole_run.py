@@ -124,9 +124,9 @@ def state_before(run: RunColumns, log: RecordLog, cycle: int) -> FilterState:
     state = checkpoint.state
     for segment, first, last in _chunks(run.segments, checkpoint.cycle, cycle):
         detected = run.detected.part(first, last)
-        columns = empty_columns(detected, sweeping=len(segment.setup.sweep_rows) > 0)
+        columns = empty_columns(detected, (segment.setup,))
         rows = odometry_rows(log, run.stamps_ns, first, last)
-        stretch = CycleStretch(rows, detected, columns, prior_rows(last - first))
+        stretch = CycleStretch(first, rows, detected, columns, prior_rows(last - first))
         state = continued(log, segment.setup, state, stretch)
     return state
 
@@ -192,7 +192,7 @@ def _filtered(
 ) -> RunColumns:
     """Run the filter from the last known checkpoint on; the cycles before it are taken from an earlier run."""
     (begin, state), cycles = known[-1], len(detected)
-    columns = empty_columns(detected, sweeping=any(len(segment.setup.sweep_rows) for segment in segments))
+    columns = empty_columns(detected, [segment.setup for segment in segments])
     if earlier is not None:
         take_over(earlier, columns, begin, int(detected.offsets[begin]))
     checkpoints = list(known)
@@ -200,7 +200,7 @@ def _filtered(
         progress((first - begin) / (cycles - begin), "localizing")
         rows = odometry_rows(log, detected.stamps_ns, first, last)
         part_of = cut(columns, detected, first, last)
-        stretch = CycleStretch(rows, detected.part(first, last), part_of, prior_rows(last - first))
+        stretch = CycleStretch(first, rows, detected.part(first, last), part_of, prior_rows(last - first))
         state = continued(log, segment.setup, state, stretch)
         checkpoints.append(Checkpoint(last, state))
     for column in columns:
@@ -216,6 +216,7 @@ def _filtered(
         status=columns.status,
         reflector=columns.reflectors,
         d2=columns.d2,
+        contours=columns.contours,
         range_bearing=columns.settled if len(columns.settled) else detected.range_bearing,
         final=_final(log, segments[-1].setup, detected.part(cycles, cycles), checkpoints[-1], detected.stamps_ns),
     )
@@ -231,9 +232,10 @@ def _replayed(
         state, written = states[begin], prior_rows(end - begin)
         for segment, first, last in _chunks(segments, begin, end):
             found, here = detected.part(first, last), slice(first - begin, last - begin)
-            columns = empty_columns(found, sweeping=len(segment.setup.sweep_rows) > 0)
+            columns = empty_columns(found, (segment.setup,))
             priors = PriorRows(written.means[here], written.covariances[here])
-            stretch = CycleStretch(odometry_rows(log, detected.stamps_ns, first, last), found, columns, priors)
+            rows = odometry_rows(log, detected.stamps_ns, first, last)
+            stretch = CycleStretch(first, rows, found, columns, priors)
             state = continued(log, segment.setup, state, stretch)
         return PriorRows(read_only(written.means), read_only(written.covariances))
 
@@ -246,7 +248,7 @@ def _final(
     """State after the last record: motion after the last scan is taken in, what is no cycle counts as a record."""
     begin, _ = odometry_rows(log, stamps_ns, last.cycle, last.cycle)
     rows = (begin, len(log.odometry_stamps_ns))
-    stretch = CycleStretch(rows, nothing, empty_columns(nothing, sweeping=False), prior_rows(0))
+    stretch = CycleStretch(last.cycle, rows, nothing, empty_columns(nothing, ()), prior_rows(0))
     final = continued(log, setup, last.state, stretch)
     if len(log) == 0:
         return final

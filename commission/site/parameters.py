@@ -236,6 +236,81 @@ class FilterParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class ContourParameters:
+    """Contours of the floor map that scans are matched with (Perfect Match)."""
+
+    enabled: Annotated[bool, Switch("Contours")] = False
+    """Whether scans are matched with the walls of the floor map, beside reflectors or without any."""
+    method: Annotated[str, Choice("Matched by", ("gauss_newton", "rprop"))] = "gauss_newton"
+    """How the best pose is found: `gauss_newton` in few steps, `rprop` is the paper's."""
+    length: Annotated[
+        float,
+        Quantity(
+            label="Cost flat from", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=10.0, slider=(20.0, 1000.0)
+        ),
+    ] = 0.2
+    """Distance from a contour at which a beam's cost is half of what it may be at most, L: beams that are farther off
+    count less and less."""
+    iterations: Annotated[
+        int,
+        Quantity(
+            label="Iterations",
+            unit="steps",
+            shown=Shown("", 1.0),
+            bounds=Bounds.between(1, 1000),
+            step=1,
+            slider=(5, 100),
+        ),
+    ] = 50
+    """Steps of a match at most: what bounds its time."""
+    smallest_step: Annotated[
+        float,
+        Quantity(label="Ends below", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=0.01, slider=(0.01, 10.0)),
+    ] = 0.0001
+    """A match ends when its step is smaller."""
+    largest_error: Annotated[
+        float,
+        Quantity(label="Matched to", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=10.0, slider=(50.0, 1000.0)),
+    ] = 0.5
+    """Beams farther from a contour are never matched; nearer ones by the histogram of their errors."""
+    beam_sigma: Annotated[
+        float, Quantity(label="Beam 1σ", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=0.5, slider=(1.0, 100.0))
+    ] = 0.02
+    """1-sigma noise of a beam's end across a contour; what matched beams show counts where it is more."""
+    map_sigma: Annotated[
+        float, Quantity(label="Map 1σ", unit="m", shown=MILLIMETRES, bounds=NOT_NEGATIVE, step=0.5, slider=(0.0, 200.0))
+    ] = 0.01
+    """1-sigma error of the map's contours where the vehicle is, along each axis: no number of beams averages it out."""
+    map_heading_sigma: Annotated[
+        float,
+        Quantity(label="Map turned 1σ", unit="rad", shown=DEGREES, bounds=NOT_NEGATIVE, step=0.01, slider=(0.0, 3.0)),
+    ] = 0.002
+    """1-sigma error of the directions of the map's contours where the vehicle is."""
+    map_correlation: Annotated[
+        float, Quantity(label="Map alike over", unit="m", bounds=POSITIVE, step=0.5, slider=(0.5, 100.0))
+    ] = 5.0
+    """Way over which the map's error stays alike: after it, what is left of it is a third."""
+    least_matched: Annotated[
+        float, Quantity(label="Matched at least", shown=PERCENT, bounds=SHARE, step=1.0, slider=(0.0, 100.0))
+    ] = 0.3
+    """Share of a scan's beams that must lie on contours; of fewer, nothing is used."""
+    least_share: Annotated[
+        float, Quantity(label="Direction told by", shown=PERCENT, bounds=SHARE, step=0.5, slider=(0.0, 20.0))
+    ] = 0.05
+    """Share of the matched beams that must tell a direction: along a corridor, no information is taken from walls."""
+    gate_probability: Annotated[
+        float,
+        Quantity(
+            label="Gate", shown=PERCENT, bounds=Bounds.inside(0.0, 1.0), step=0.01, slider=(50.0, 99.99), is_tail=True
+        ),
+    ] = 0.999
+    """Probability that a true match falls inside the validation gate."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, "contour.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SupervisorParameters:
     """When the estimate is no longer good enough to drive on (Algorithm 4)."""
 
@@ -332,3 +407,5 @@ class Parameters:
         default_factory=SupervisorParameters
     )
     """When to stop the vehicle."""
+    contour: Annotated[ContourParameters, Group("Contours")] = field(default_factory=ContourParameters)
+    """What walls say."""
