@@ -37,3 +37,17 @@ def test_marks_stand_out_from_the_floor(drawn: theme.Color, below: theme.Color) 
 @pytest.mark.parametrize("drawn", [theme.ROUTE, theme.REFLECTOR])
 def test_reflectors_and_routes_stand_out_on_walls_and_heatmaps_by_their_casing(drawn: theme.Color) -> None:
     assert contrast(drawn, theme.CASING) >= LEAST
+
+
+@pytest.mark.parametrize("steps", [theme.WORSE, theme.BETTER])
+def test_each_step_of_a_difference_is_brighter_than_the_one_before_and_the_last_stands_out(
+    steps: tuple[theme.Color, ...],
+) -> None:
+    brightness = [luminance(color) for color in (theme.NO_DIFFERENCE, *steps)]
+    assert brightness == sorted(set(brightness))
+    assert contrast(steps[-1], theme.NO_DIFFERENCE) >= LEAST
+
+
+@pytest.mark.parametrize("below", [theme.BACKGROUND, theme.FREE, theme.NO_DIFFERENCE])
+def test_reflectors_of_a_kept_layout_stand_out_from_the_floor(below: theme.Color) -> None:
+    assert contrast(theme.KEPT, below) >= LEAST

@@ -10,7 +10,39 @@ NUMBERS, INPUTS, CHARTS = (
 )
 EVERY = "tests/app/test_every_input.py::"
 
+LAYOUTS = TESTS + "layouts/test_layouts.py::"
+
 PAGE = (
+    Mutant(
+        name="switching forgets the layout of now",
+        file=FOLDER + "layouts/reducer.py",
+        find="kept = part.with_kept(now) if len(now) else part",
+        replace="kept = part",
+        tests=(LAYOUTS + "test_switching_puts_the_kept_layout_up_in_one_step_keeps_the_one_of_now_and_switches_back",),
+    ),
+    Mutant(
+        name="a layout that is worse is called better",
+        file=FOLDER + "base/before_after.py",
+        find="'c-better' if line.gain > 0.0",
+        replace="'c-better' if line.gain < 0.0",
+        tests=(LAYOUTS + "test_the_table_says_of_each_figure_which_layout_is_better",),
+    ),
+    Mutant(
+        name="a fix that is gained counts as lost",
+        file="commission/studies/layouts.py",
+        find="gained=read_only(on & fixed & ~was_fixed)",
+        replace="gained=read_only(on & was_fixed & ~fixed)",
+        tests=(
+            "tests/studies/test_layouts.py::test_where_one_layout_alone_has_a_fix_it_is_gained_or_lost_and_has_no_number",
+        ),
+    ),
+    Mutant(
+        name="corners are counted from zero",
+        file=FOLDER + "editing/refusals.py",
+        find="of {part} {int(index) + 1}",
+        replace="of {part} {int(index)}",
+        tests=(TESTS + "editing/test_refusals.py::test_a_refusal_calls_the_field_as_its_widget_does",),
+    ),
     Mutant(
         name="badge shows one sigma of the position",
         file=FOLDER + "run/badge.py",
