@@ -10,7 +10,7 @@ import pytest
 import viser
 from playwright.sync_api import Browser, sync_playwright
 
-from tests.browser.page import CHROMIUM, FLAGS, WIDE, OpenPage
+from tests.browser.page import CHROMIUM, FLAGS_OF_TESTS, WIDE, OpenPage
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -29,7 +29,7 @@ def browser() -> Iterator[Browser]:
             pytest.fail(reason)
         pytest.skip(reason)
     with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS))
+        chromium = playwright.chromium.launch(executable_path=CHROMIUM, args=list(FLAGS_OF_TESTS))
         yield chromium
         chromium.close()
 
