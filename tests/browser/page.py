@@ -30,10 +30,10 @@ FLAGS_OF_TESTS = (
     *FLAGS,
     # Smoothed edges cost a processor that draws without a graphics card up to three times as long.
     "--webgl-antialiasing-mode=none",
-    # Pages of the browser's own that come with each window; the rest is what playwright leaves out, which this replaces.
+    # Pages of the browser's own that come with each window; the others are those that playwright leaves out.
     "--disable-features=WebUIOmniboxPopup,WebUIOmniboxAimPopup,WebUIOmniboxFullPopup,"
-    "AimEnabled,AvoidCorsURLLoaderRestartOnRedirect,AvoidUnnecessaryBeforeUnloadCheckSync,DestroyProfileOnBrowserClose,"
-    "HttpsFirstBalancedModeAutoEnable,HttpsUpgrades,LensOverlay,MediaRouter,NetworkTimeServiceQuerying,"
+    "AimEnabled,AvoidCorsURLLoaderRestartOnRedirect,AvoidUnnecessaryBeforeUnloadCheckSync,"
+    "DestroyProfileOnBrowserClose,HttpsFirstBalancedModeAutoEnable,HttpsUpgrades,LensOverlay,MediaRouter,NetworkTimeServiceQuerying,"
     "OptimizationHints,PaintHolding,PreconnectToSearch,ThirdPartyStoragePartitioning",
 )
 """With what nobody looks at left out: pictures and benchmarks are drawn as they are for a person."""
