@@ -140,6 +140,10 @@ class Calibration:
     """The same of bearings [rad]."""
     factor: float
     """Multiple of them that the localizer needs, since they are correlated in time."""
+    problem: CalibrationProblem
+    """What was solved."""
+    fit: CalibrationFit
+    """Its solution: poses, and which reflector each detection is of."""
 
     @property
     def proposed(self) -> tuple[Value, ...]:
@@ -200,6 +204,8 @@ def calibrate(inputs: CalibrationInput, progress: Progress = silent) -> Calibrat
         range_residual=float(spread[0]),
         bearing_residual=float(spread[1]),
         factor=factor,
+        problem=problem,
+        fit=whole,
     )
 
 

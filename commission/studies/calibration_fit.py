@@ -372,14 +372,8 @@ def _associated(drive: MeasuredDrive, point: Point, noise: FloatArray) -> IntArr
     if not len(drive.places):
         return np.full(len(drive.cycle), -1, dtype=np.int64)
     layout, k = drive.layout, drive.cycle
-    mounted = drive.mountings + np.stack([point.constants[layout.mounting(i)] for i in range(layout.scanners)])
-    twists = twists_at(track(drive, point.constants), moments(drive, point.constants))
-    moved = se2.compose(point.poses[k], se2.exp(drive.delays[:, np.newaxis] * twists[k]))
-    scanner = se2.compose(moved, mounted[drive.scanners[k]])
-    bias, scale = point.constants[layout.bias], point.constants[layout.range_scale]
-    ranges = (drive.measured[:, 0] - bias) / (1.0 + scale)
+    scanner, seen, ranges = places_of(drive, point)
     direction = scanner[:, 2] + drive.measured[:, 1]
-    seen = scanner[:, :2] + ranges[:, np.newaxis] * np.stack((np.cos(direction), np.sin(direction)), axis=1)
     places = drive.places + point.constants[layout.places :].reshape(-1, 2)
     near: tuple[FloatArray, IntArray] = KDTree(places).query(seen, k=2)  # pyright: ignore[reportAssignmentType]
     distances, found = near
@@ -395,6 +389,31 @@ def _associated(drive: MeasuredDrive, point: Point, noise: FloatArray) -> IntArr
     nearest = np.zeros(len(k), dtype=np.bool_)
     nearest[order[first]] = True
     return np.where(good & nearest, found[:, 0], -1).astype(np.int64)
+
+
+def places_of(drive: MeasuredDrive, point: Point) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Where each detection was seen from, and where it lies.
+
+    Parameters
+    ----------
+    drive : what was measured.
+    point : what is assumed.
+
+    Returns
+    -------
+    scanners : (n, 3) pose of the scanner at the time of each detection [m, m, rad], map frame.
+    places : (n, 2) of what was seen [m], map frame.
+    ranges : (n,) without bias [m].
+    """
+    layout, k = drive.layout, drive.cycle
+    mounted = drive.mountings + np.stack([point.constants[layout.mounting(i)] for i in range(layout.scanners)])
+    twists = twists_at(track(drive, point.constants), moments(drive, point.constants))
+    moved = se2.compose(point.poses[k], se2.exp(drive.delays[:, np.newaxis] * twists[k]))
+    scanners = se2.compose(moved, mounted[drive.scanners[k]])
+    ranges = (drive.measured[:, 0] - point.constants[layout.bias]) / (1.0 + point.constants[layout.range_scale])
+    direction = scanners[:, 2] + drive.measured[:, 1]
+    ray = np.stack((np.cos(direction), np.sin(direction)), axis=1)
+    return scanners, scanners[:, :2] + ranges[:, np.newaxis] * ray, ranges
 
 
 def _noise(
