@@ -120,6 +120,7 @@ def test_reflectors_of_unknown_radius_pass_within_the_radii_that_are_stated(
     incidence=st.one_of(st.none(), st.floats(0.0, 58.0)),
     distance=st.floats(0.5, 20.0),
 )
+@example(divergence=0.3, aperture=0.0, step=0.5, share=1e-12, radius=0.0215, incidence=None, distance=3.0)
 @example(divergence=0.286, aperture=0.02, step=0.25, share=0.2, radius=0.04, incidence=None, distance=1.0)
 @example(divergence=0.86, aperture=0.008, step=0.25, share=0.2, radius=0.05, incidence=None, distance=5.0)
 def test_true_clusters_of_any_scanner_pass(

@@ -67,7 +67,7 @@ def scans_of(
     nominal = beams.step * np.arange(-side, side + 1)
     off = nominal - places[:, np.newaxis] + beams.bearing_sigma * rng.standard_normal((count, len(nominal)))
     along, met = _met(beams, target, off)
-    flags = met.any(axis=-1) if beams.share == 0.0 else met.mean(axis=-1) >= _needed(beams, target) - 1e-9
+    flags = met.any(axis=-1) & (met.mean(axis=-1) >= _needed(beams, target) - 1e-9)
     mean = np.where(met, along, 0.0).sum(axis=-1) / np.maximum(met.sum(axis=-1), 1)
     if target.background is not None:
         # A mixed pixel: each ray returns what it meets, and the scanner reports their mean.
