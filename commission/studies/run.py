@@ -26,6 +26,7 @@ from commission.progress import Progress, part, silent
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.studies.consistency import Consistency, Recent, consistency, recent
+from commission.studies.contour_figures import contour_figures
 from commission.studies.inputs import StudyInput
 from commission.studies.metrics import (
     ErrorStatistics,
@@ -363,6 +364,7 @@ def summary(result: RunResult) -> dict[str, Number]:
         "longest_unseen_s": result.consistency.longest_unseen,
         "microseconds_per_cycle": result.microseconds_per_cycle,
     }
+    entries |= contour_figures(result.columns)
     if result.statistics is not None:
         entries |= {
             "reference_cycles": result.statistics.compared,

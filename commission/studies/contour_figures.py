@@ -1,0 +1,34 @@
+"""What contours of the floor map contributed to a run, in numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from commission.localization.contour import COST, MATCHED, NIS, POINTS, ROWS, USE, ContourUse
+from commission.localization.run_columns import RunColumns
+
+Number = int | float | None
+
+
+def contour_figures(columns: RunColumns) -> dict[str, Number]:
+    """Entries of `summary.json` about contours; none where they are not looked at.
+
+    Returns
+    -------
+    entries : cycles by what became of their contours; share of the beams that were matched and mean cost of a beam
+        [0..1] in the cycles that looked at them; mean NIS of a row of accepted matches, 1 where all is as believed.
+    """
+    figures = columns.contours
+    if not len(figures):
+        return {}
+    use = figures[:, USE]
+    looked, accepted = figures[use != ContourUse.NONE], figures[use == ContourUse.ACCEPTED]
+    beams, rows = float(looked[:, POINTS].sum()), float(accepted[:, ROWS].sum())
+    return {
+        "contour_accepted": len(accepted),
+        "contour_rejected": int(np.count_nonzero(use == ContourUse.REJECTED)),
+        "contour_unmatched": int(np.count_nonzero(use == ContourUse.UNMATCHED)),
+        "contour_matched_fraction": float(looked[:, MATCHED].sum()) / beams if beams else None,
+        "contour_cost_mean": float(looked[:, COST].mean()) if len(looked) else None,
+        "contour_nis_per_row_mean": float(accepted[:, NIS].sum()) / rows if rows else None,
+    }
