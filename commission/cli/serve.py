@@ -89,7 +89,8 @@ class Serve(_Page):
     """Recording to play: a CSV folder. None: choose it on the page, or drive a virtual AGV."""
     source: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME[@SCANNER]:HOST:PORT")] = ()
     """Live source to listen to at once, such as json:127.0.0.1:6061; repeat it for several. NAME is one of json,
-    sick-safety, cola, compact. Datagrams come to HOST, an address of this computer; devices are connected to."""
+    sick-safety, cola, nav350, compact, rosbridge. Datagrams come to HOST, an address of this computer; devices are
+    connected to."""
 
     def run(self) -> None:
         """Serve the project; a recording that is none is an error now, not only on the page."""

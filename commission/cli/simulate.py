@@ -45,10 +45,11 @@ class Simulate:
     force: bool = False
     """Whether a recording that is there already is replaced."""
     live: Annotated[str | None, arg(metavar="PROTOCOL")] = None
-    """Send the drive over the network instead, scans by this protocol: json or sick-safety. What a scanner does not say
-    (odometry, the true pose) goes as JSON beside it."""
+    """Send the drive over the network instead, scans by this protocol: json, sick-safety, cola, nav350, compact or
+    rosbridge. What a scanner does not say (odometry, the true pose) goes as JSON beside it."""
     address: Annotated[str | None, arg(metavar="HOST:PORT")] = None
-    """Where to send to; of several scanners the next ones have the next ports. None: 127.0.0.1 and the usual port."""
+    """Where to send to, or where the device is that is connected to (cola, nav350, rosbridge); of several scanners the
+    next ones have the next ports. None: 127.0.0.1 and the usual port."""
     odometry: Annotated[str, arg(metavar="HOST:PORT")] = "127.0.0.1:6061"
     """Where what the scanner does not say goes."""
     speed: float = 1.0

@@ -44,8 +44,26 @@ KINDS: dict[str, SourceKind] = {
         6060,
         "SICK microScan3, nanoScan3, outdoorScan3",
     ),
-    "cola": SourceKind("cola_driver", "ColaDriver", None, "tcp", 2112, "SICK TiM, LMS, LRS, MRS that speak CoLa B"),
-    "compact": SourceKind("compact_driver", "CompactDriver", None, "udp", 2115, "SICK picoScan, multiScan"),
+    "cola": SourceKind(
+        "cola_driver", "ColaDriver", ("virtual_cola", "VirtualTim"), "tcp", 2112, "SICK TiM, LMS, LRS, MRS (CoLa A, B)"
+    ),
+    "rosbridge": SourceKind(
+        "rosbridge_driver",
+        "RosbridgeDriver",
+        ("virtual_rosbridge", "VirtualRosVehicle"),
+        "websocket",
+        9090,
+        "/scan and /odom of ROS 1 or 2 over rosbridge",
+    ),
+    "nav350": SourceKind("nav350_driver", "NavDriver", ("virtual_nav350", "VirtualNav350"), "tcp", 2111, "SICK NAV350"),
+    "compact": SourceKind(
+        "compact_driver",
+        "CompactDriver",
+        ("virtual_compact", "VirtualPicoScan"),
+        "udp",
+        2115,
+        "SICK picoScan, multiScan",
+    ),
 }
 
 

@@ -38,6 +38,11 @@ def link_of(address: SourceAddress) -> Link:
     """Return what opens the connection of a source."""
     if address.kind.transport == "udp":
         return UdpLink(address.host, address.port)
+    if address.kind.transport == "websocket":
+        # Others do not wait for what reads it.
+        from commission.io.live.websocket_link import WebsocketLink
+
+        return WebsocketLink(address.host, address.port)
     return TcpLink(address.host, address.port)
 
 

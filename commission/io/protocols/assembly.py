@@ -104,6 +104,8 @@ class CompactAssembly(Assembly):
 
     rest = b""
     turn: tuple[compact.CompactModule, ...] = ()
+    segments: int | None = None
+    """Of the last whole turn: the next one is over when it has as many, and not when another one begins."""
 
     def found(self, data: bytes, arrived_ns: int) -> Iterator[Timed]:
         """Deliver what a payload completes; raises DecodeError."""
@@ -126,12 +128,17 @@ class CompactAssembly(Assembly):
                 self.turn = ()
             # A turn that never ends is none.
             self.turn = (*self.turn[-SEGMENT_LIMIT:], module)
+            if len(self.turn) == self.segments:
+                yield from self._whole(arrived_ns)
+                self.turn = ()
 
     def _whole(self, captured: int) -> Iterator[Timed]:
         turn = tuple(sorted(self.turn, key=lambda module: module.segment))
         if [module.segment for module in turn] != list(range(len(turn))):
             self.told[f"turns of {self.name} without all their segments are left out"] += 1
+            self.segments = None
             return
+        self.segments = len(turn)
         layer = compact.level_layer(turn[0])
         begin = int(turn[0].start_us[layer]) * MICROSECOND
         yield begin, captured, lambda stamp, scanner: compact.scan_of(turn, layer, stamp, scanner=scanner)

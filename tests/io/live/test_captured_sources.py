@@ -10,8 +10,7 @@ from typing import Any
 
 import pytest
 
-from commission.errors import UsageError
-from commission.io.live.registry import SourceAddress, device_of, driver_of
+from commission.io.live.registry import SourceAddress, driver_of
 from commission.site.records import Scan
 from tests.conftest import REPOSITORY
 from tests.io.live.virtual import NAMES, Listening, until
@@ -56,11 +55,6 @@ def test_telegrams_of_a_multiscan_make_its_turns(captures: Path) -> None:
             found += [message.record for message in driver.take(part, 10**18) if isinstance(message.record, Scan)]
     assert len(found) > 3
     assert all(scan.intensities is not None for scan in found)
-
-
-def test_a_device_that_cannot_be_played_is_refused() -> None:
-    with pytest.raises(UsageError, match="no virtual cola; expected one of json, sick-safety"):
-        device_of(SourceAddress.parse("cola"), NAMES)
 
 
 def test_the_readmes_sender_is_understood_and_has_twenty_lines() -> None:
