@@ -13,8 +13,12 @@ import zlib
 from collections import Counter
 from collections.abc import Callable
 
+import numpy as np
+
 from commission.errors import DecodeError
-from commission.io.protocols import cola, compact, nav350, safety
+from commission.io.protocols import cola, compact, nav350, rosbridge, safety
+from commission.io.protocols.json_records import decode_message, encode_message
+from commission.io.protocols.message import LiveMessage, OdometryPose
 from commission.site.records import Scan
 from tests.io.protocols.captures import cola_b, fragments, instance, nav_answer
 from tests.io.protocols.test_cola import TEXT, binary
@@ -55,6 +59,22 @@ def compact_telegram() -> bytes:
     return begin + module + zlib.crc32(begin + module).to_bytes(4, "little")
 
 
+def _rosbridge(data: bytes) -> None:
+    found = rosbridge.decode_publication(data)
+    if found is not None:
+        rosbridge.decode_record(*found, {"/scan": 0})
+
+
+def _scan() -> Scan:
+    return Scan(
+        stamp_ns=5_000_000_007,
+        ranges=np.linspace(1.0, 3.0, 20).astype(np.float32),
+        angle_min=-0.5,
+        angle_increment=0.05,
+        intensities=np.arange(20, dtype=np.float32),
+    )
+
+
 SEEDS: dict[str, tuple[bytes, Decode]] = {
     "CoLa B": (binary(channels=2), lambda data: cola.scan_of(cola.decode_lmd(data), 0)),
     "CoLa A": (TEXT, lambda data: cola.scan_of(cola.decode_lmd(data), 0)),
@@ -62,6 +82,16 @@ SEEDS: dict[str, tuple[bytes, Decode]] = {
     "Compact": (compact_telegram(), _compact),
     "safety instance": (instance(40), _safety),
     "safety fragment": (fragments(instance(40), 1)[0], _fragment),
+    "JSON": (
+        encode_message(LiveMessage(_scan(), 5, 6), ("scanner",)),
+        lambda data: decode_message(data, ("scanner",)) and None,
+    ),
+    "rosbridge text": (rosbridge.encode_publication("/scan", _scan(), is_cbor=False), _rosbridge),
+    "rosbridge CBOR": (rosbridge.encode_publication("/scan", _scan(), is_cbor=True), _rosbridge),
+    "rosbridge odometry": (
+        rosbridge.encode_publication("/odom", OdometryPose(7, np.array([1.0, 2.0, 0.3])), is_cbor=True),
+        _rosbridge,
+    ),
     "NAV350": (nav_answer(20), lambda data: nav350.scan_of(nav350.decode_nav(data), 0)),
 }
 """A sound telegram of each kind, and what decodes it."""

@@ -15,7 +15,7 @@ def test_sound_telegram_of_each_kind_is_decoded(name: str) -> None:
 
 
 def test_changed_telegrams_are_decoded_or_refused_and_both_happen() -> None:
-    told = fuzz(7_000, 3)
+    told = fuzz(8_000, 3)
 
     assert {f"{name}: {fate}" for name in SEEDS for fate in ("decoded", "refused")} - {"CoLa frames: refused"} <= set(
         told

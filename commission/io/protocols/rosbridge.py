@@ -178,8 +178,9 @@ def _limit(values: Mapping[str, Any], name: str) -> float:
     return float(min(max(found, -_FAR), _FAR))
 
 
-def _pose(values: Mapping[str, Any]) -> tuple[float, float, float]:
-    """X [m], y [m] and heading [rad] of a Pose."""
+def _pose(found: object) -> tuple[float, float, float]:
+    """Place [m, m] and heading [rad] of a Pose."""
+    values: Mapping[str, Any] = cast(dict[str, Any], found) if isinstance(found, dict) else {}
     position, turned = values.get("position"), values.get("orientation")
     if not isinstance(position, dict) or not isinstance(turned, dict):
         raise DecodeError("a pose has no position or no orientation", 0)
@@ -225,7 +226,7 @@ def _values(found: object, name: str) -> NDArray[np.float32]:
     if not isinstance(found, list | np.ndarray) or len(found) > BEAM_LIMIT:
         raise DecodeError(f"{name} are no array of {BEAM_LIMIT} numbers at most", 0)
     try:
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):
             values = np.array(found, dtype=np.float64).astype(np.float32)
     except (TypeError, ValueError, OverflowError):
         raise DecodeError(f"{name} hold something that is no number", 0) from None

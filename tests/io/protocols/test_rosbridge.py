@@ -172,6 +172,14 @@ def test_a_pose_that_cannot_be_is_refused(orientation: object) -> None:
         decode_record(*found, SCANS)
 
 
+@pytest.mark.parametrize("pose", [{"pose": 97}, {"pose": None}, {"pose": []}, {"position": 3}])
+def test_a_pose_that_is_a_number_is_refused(pose: object) -> None:
+    found = decode_publication(text({"pose": pose}, "/odom"))
+    assert found is not None
+    with pytest.raises(DecodeError, match="no position"):
+        decode_record(*found, SCANS)
+
+
 @settings(max_examples=300, deadline=None)
 @given(st.binary(max_size=200), st.booleans())
 def test_any_bytes_are_refused_or_a_message(data: bytes, is_text: bool) -> None:
