@@ -40,8 +40,8 @@ class Localize:
     """Folder for the results; made when it does not exist."""
     initial_pose: Annotated[str | None, arg(metavar="X,Y,THETA[,SX,SY,STHETA]|auto")] = None
     """Pose of base at the first record and its 1-sigma, map frame [m, m, rad]; auto: it is looked for in the whole map
-    by what is seen. None: the first reference pose, else the start of the project's first route, with 1-sigma 0.02 m
-    and 0.01 rad, else auto."""
+    by what is seen. None: as a recording of the page says, else the first reference pose, else the start of the
+    project's first route, with 1-sigma 0.02 m and 0.01 rad, else auto."""
     reference_antenna: Annotated[str | None, arg(metavar="X,Y[,Z]")] = None
     """Point of the vehicle whose place the reference measures, base frame [m]. None: as the recording's reference.json
     says, else base."""
