@@ -21,6 +21,7 @@ from commission.cli.coverage import CoverageCommand
 from commission.cli.inspect import Inspect
 from commission.cli.layouts import Layouts
 from commission.cli.localize import Localize
+from commission.cli.montecarlo import MonteCarlo
 from commission.cli.parsing import Command, parse
 from commission.cli.place import Place
 from commission.cli.predict import Predict
@@ -48,6 +49,7 @@ COMMANDS: dict[str, type[Command]] = {
     "layouts": Layouts,
     "problems": Problems,
     "sweep": SweepCommand,
+    "montecarlo": MonteCarlo,
     "convert": Convert,
     "version": Version,
 }

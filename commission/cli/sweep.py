@@ -11,6 +11,7 @@ from typing import Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 from commission.cli.parsing import initial_pose
+from commission.cli.terminal import shown_progress
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,14 +57,7 @@ class SweepCommand:
         start = start_of(project, log, given and given.pose, given and given.sigmas)
         inputs = SweepInput(run=RunInput.of(project, log, start), axes=axes, figure=self.figure)
         whole_run.warm_up()
-        result = sweep(inputs, _shown)
+        result = sweep(inputs, shown_progress)
         with out.writing() as folder:
             write_sweep(folder, result)
         sys.stdout.write("\n".join([*told(result), f"Written to   {self.out}"]) + "\n")
-
-
-def _shown(fraction: float, message: str, /) -> None:
-    """Progress on one line of the terminal, where there is one; Ctrl+C stops."""
-    if sys.stderr.isatty():
-        sys.stderr.write(f"\r{fraction:4.0%} {message:<40}" + ("\n" if fraction >= 1.0 else ""))
-        sys.stderr.flush()

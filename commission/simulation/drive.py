@@ -7,6 +7,7 @@ localizer it makes no difference which of the two is called the error.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -90,7 +91,14 @@ class TrueMotion:
         return np.where(on_stamp, self.poses[before + 1], moved)
 
 
-def drive(route: Route, vehicle: Vehicle, rng: np.random.Generator, options: DriveOptions) -> TrueMotion:
+def drive(
+    route: Route,
+    vehicle: Vehicle,
+    rng: np.random.Generator,
+    options: DriveOptions,
+    *,
+    legs: Sequence[Leg] | None = None,
+) -> TrueMotion:
     """Drive a route from rest to rest.
 
     Parameters
@@ -98,6 +106,7 @@ def drive(route: Route, vehicle: Vehicle, rng: np.random.Generator, options: Dri
     route, vehicle : what to follow, and with which kinematics.
     rng : draws the true start pose.
     options : rates, rests and limits.
+    legs : those of the route, where they are known: to find them takes longer than to drive.
 
     Returns
     -------
@@ -108,7 +117,7 @@ def drive(route: Route, vehicle: Vehicle, rng: np.random.Generator, options: Dri
     ProjectError
         when the vehicle cannot follow the route to its end (it steers too little for its curves).
     """
-    legs = legs_of(route, vehicle, options.limits)
+    legs = legs_of(route, vehicle, options.limits) if legs is None else legs
     period = 1e-9 * options.period_ns
     drives = drives_of(vehicle, options.limits, period)
     pose = compose(legs[0].start_pose, rng.standard_normal(3) * options.start_sigma)

@@ -6,6 +6,7 @@ It knows nothing of drives or stamps; people come in as circles.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -49,10 +50,19 @@ class VirtualScanner:
     """(N,) all of the reflective objects."""
     hidden: IntArray
     """(H,) beams in blind sectors."""
+    dirt: FloatArray | None = None
+    """(N,) share of the scans in which each reflective object does not shine; None: all are clean."""
 
     @staticmethod
-    def of(project: Project, scanner: Scanner) -> VirtualScanner:
-        """Prepare walls and reflectors for a scanner; a project without a floor map is an open field."""
+    def of(project: Project, scanner: Scanner, dirt: Mapping[str, float] | None = None) -> VirtualScanner:
+        """Prepare walls and reflectors for a scanner; a project without a floor map is an open field.
+
+        Parameters
+        ----------
+        project : walls, reflectors and disturbances.
+        scanner : one of its scanners.
+        dirt : share of the scans in which a reflector does not shine, by its name; those not named are clean.
+        """
         floor = project.floor_map
         grid = OccupancyGrid(np.zeros((1, 1), np.bool_), 1.0, np.zeros(3)) if floor is None else floor.occupancy()
         wall_depth = 0.0 if floor is None else 0.5 * floor.resolution
@@ -64,9 +74,12 @@ class VirtualScanner:
             scanner=scanner,
             disturbances=project.disturbances,
             hall=hall,
-            beams=_beams(scanner),
+            beams=beams_of_scanner(scanner),
             everything=np.ones(len(hall.radii), np.bool_),
             hidden=_hidden_beams(scanner),
+            dirt=np.array([*(dirt.get(each.id, 0.0) for each in project.reflectors.reflectors), *shiny])
+            if dirt
+            else None,
         )
 
     def scan(
@@ -84,8 +97,8 @@ class VirtualScanner:
         ----------
         T_map_base : (3,) true pose of the vehicle [m, m, rad].
         circles : (K, 3) x, y and radius of legs and other moving things [m], map frame.
-        rng : draws the noise of each beam, where there are detection rates which reflectors shine, then the glints; the
-            number of draws does not depend on the pose.
+        rng : draws the noise of each beam, where there are detection rates or dirt which reflectors shine, then the
+            glints; the number of draws does not depend on the pose.
         whole : False leaves out the beams that can meet no reflector (unless there are glints): what a detector finds
             is the same to the last bit, in a third of the time. A sweep is always whole.
         beam_poses : (B, 3) `T_map_base` at the time of each beam; None takes all beams at one instant. The floor's
@@ -184,11 +197,12 @@ class VirtualScanner:
 
         What was taken for a reflector is taken for one in every scan: the rates are those of reflectors.
         """
-        if not self.scanner.detection_rates:
+        if not self.scanner.detection_rates and self.dirt is None:
             return self.everything
         shining, count = self.everything.copy(), len(self.everything) - len(self.disturbances.shiny_objects)
         distances = np.hypot(*(self.hall.centers[:count] - T_map_scanner[:2]).T)
-        shining[:count] = rng.random(count) < detection_rate(self.scanner.detection_rates, distances)
+        clean = 1.0 if self.dirt is None else 1.0 - self.dirt[:count]
+        shining[:count] = rng.random(count) < detection_rate(self.scanner.detection_rates, distances) * clean
         return shining
 
     def _glint(self, ranges: NDArray[np.float32], flags: BoolArray, rng: np.random.Generator) -> None:
@@ -205,8 +219,13 @@ def _hidden_beams(scanner: Scanner) -> IntArray:
     return np.flatnonzero(within(bearings, scanner.reported_blind_sectors))
 
 
-def _beams(scanner: Scanner) -> ScannerBeams:
-    """Numbers of the scanner for the kernel, whose beams go counter-clockwise seen from above."""
+def beams_of_scanner(scanner: Scanner) -> ScannerBeams:
+    """Numbers of a scanner for the kernels, whose beams go counter-clockwise seen from above.
+
+    Parameters
+    ----------
+    scanner : its field of view, resolution, noise and ranges.
+    """
     last = scanner.angle_min + (scanner.beam_count - 1) * scanner.angle_increment
     return ScannerBeams(
         -last if scanner.upside_down else scanner.angle_min,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -69,6 +69,7 @@ def records(
     seed: int,
     *,
     options: DriveOptions = DEFAULTS,
+    dirt: Mapping[str, float] | None = None,
     progress: Progress = silent,
 ) -> Iterator[Record]:
     """Drive a route and deliver the vehicle's records in order, one scan at a time.
@@ -80,6 +81,7 @@ def records(
     route_name : which route.
     seed : the same seed, project and options give the same records to the last bit.
     options : rates, rests and limits. Scans and odometry share their stamps where the rates divide.
+    dirt : share of the scans in which a reflector does not shine, by its name; where there are intensities, none.
     progress : called at each scan; may raise to cancel.
 
     Yields
@@ -96,13 +98,15 @@ def records(
     """
     truth = draw_truth(project, route_name, seed)
     route, site = project.route(route_name), true_site(project, truth)
-    motion = drive(route, project.vehicle, _rng(seed, START), options)
+    motion = drive(route, project.vehicle, stream_of(seed, START), options)
     slips = project.disturbances.slips_per_100_m
-    displacements = measure(motion, project.vehicle, truth.wheels, slips, _rng(seed, WHEELS))
+    displacements = measure(motion, project.vehicle, truth.wheels, slips, stream_of(seed, WHEELS))
     stamps, scanners = scan_moments(project.scanners, motion.duration_ns)
     poses = motion.poses_at(stamps)
     moments = list(itertools.starmap(_Moment, zip(stamps.tolist(), scanners.tolist(), poses, strict=True)))
-    scans = _scans(project, site, seed, _swept(_told(moments, progress), motion, project), options.whole_scans)
+    virtual = [VirtualScanner.of(site, scanner, dirt) for scanner in site.scanners]
+    swept = _swept(_told(moments, progress), motion, project)
+    scans = _scans(project, virtual, seed, swept, options.whole_scans)
     shown, first = np.unique(stamps, return_index=True)
     yield from heapq.merge(
         _odometry(motion, displacements),
@@ -124,11 +128,12 @@ def virtual_drive(
     seed: int,
     *,
     options: DriveOptions = DEFAULTS,
+    dirt: Mapping[str, float] | None = None,
     progress: Progress = silent,
 ) -> RecordLog:
     """Gather the records of a whole drive, and what is true in it; parameters and errors as in `records`."""
     names = tuple(scanner.name for scanner in project.scanners)
-    log = RecordLog.collect(records(project, route_name, seed, options=options, progress=progress), names)
+    log = RecordLog.collect(records(project, route_name, seed, options=options, dirt=dirt, progress=progress), names)
     return replace(log, truth=draw_truth(project, route_name, seed))
 
 
@@ -165,13 +170,12 @@ def _swept(moments: Iterable[_Moment], motion: TrueMotion, project: Project) -> 
 
 
 def _scans(
-    project: Project, site: Project, seed: int, moments: Iterable[_Moment], whole: bool
+    project: Project, virtual: Sequence[VirtualScanner], seed: int, moments: Iterable[_Moment], whole: bool
 ) -> Iterator[tuple[int, Scan | None]]:
     """Scanner and scan of each moment, None where it is lost; people walk where the project has floor."""
     disturbances, scanners = project.disturbances, project.scanners
-    virtual = [VirtualScanner.of(site, scanner) for scanner in site.scanners]
-    beams, losses = ([_rng(seed, kind, index) for index in range(len(scanners))] for kind in (BEAMS, LOSSES))
-    walkers = _rng(seed, PEOPLE)
+    beams, losses = ([stream_of(seed, kind, index) for index in range(len(scanners))] for kind in (BEAMS, LOSSES))
+    walkers = stream_of(seed, PEOPLE)
     crowd: Crowd | None = None
     if disturbances.people:
         crowd = Crowd(WalkableFloor.of(project), disturbances.people, disturbances.walking_speed, walkers)
@@ -230,8 +234,15 @@ def _told(moments: Sequence[_Moment], progress: Progress) -> Iterator[_Moment]:
         yield moment
 
 
-def _rng(seed: int, stream: int, scanner: int = 0) -> np.random.Generator:
-    """Generator of one stream of a seed; what the first scanner draws does not depend on how many there are."""
+def stream_of(seed: int, stream: int, scanner: int = 0) -> np.random.Generator:
+    """Generator of one stream of a seed; what the first scanner draws does not depend on how many there are.
+
+    Parameters
+    ----------
+    seed : of the drive.
+    stream : START, WHEELS, BEAMS, PEOPLE or LOSSES.
+    scanner : index of the scanner, where each has its own.
+    """
     return np.random.default_rng((seed, stream, scanner) if scanner else (seed, stream))
 
 
