@@ -29,6 +29,7 @@ from commission.cli.problems import Problems
 from commission.cli.serve import Demo, Serve
 from commission.cli.simulate import Simulate
 from commission.cli.sweep import SweepCommand
+from commission.cli.tune import Tune
 from commission.cli.versions import Version
 from commission.errors import CommissionError
 
@@ -45,6 +46,7 @@ COMMANDS: dict[str, type[Command]] = {
     "predict": Predict,
     "ambiguity": Ambiguity,
     "calibrate": Calibrate,
+    "tune": Tune,
     "place": Place,
     "layouts": Layouts,
     "problems": Problems,

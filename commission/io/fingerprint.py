@@ -33,10 +33,35 @@ class Fingerprint:
         names = _names(folder)
         return Fingerprint(folder, tuple((name, _digest(folder / name)) for name in names))
 
+    @property
+    def digest(self) -> str:
+        """SHA-256 of all files and their names: what an exported result says it is of."""
+        return hashlib.sha256(repr(self.digests).encode()).hexdigest()
+
     def changed_files(self) -> tuple[str, ...]:
         """Names of the files that are not as they were: changed, gone, or come."""
         before, now = dict(self.digests), dict(Fingerprint.of(self.folder).digests)
         return tuple(name for name in sorted(before | now) if before.get(name, _ABSENT) != now.get(name, _ABSENT))
+
+
+def recording_digest(path: Path) -> str:
+    """SHA-256 of a recording: of a file its content, of a folder the names and contents of all its files.
+
+    Parameters
+    ----------
+    path : a file or a folder.
+    """
+    if not path.is_dir():
+        return _streamed(path)
+    files = sorted(each for each in path.rglob("*") if each.is_file())
+    named = [(each.relative_to(path).as_posix(), _streamed(each)) for each in files]
+    return hashlib.sha256(repr(named).encode()).hexdigest()
+
+
+def _streamed(path: Path) -> str:
+    """SHA-256 of a file of any size."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _names(folder: Path) -> tuple[str, ...]:
