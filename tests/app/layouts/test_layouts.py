@@ -33,7 +33,7 @@ from commission.errors import UsageError
 from commission.planning.coverage import Lattice
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
-from commission.studies.layouts import FloorDifference, FloorFigure
+from commission.studies.layouts import FloorDifference, FloorFigure, LayoutInput
 from tests.app.asking import after as outcome
 from tests.app.bench import Bench
 from tests.app.sites import room
@@ -133,6 +133,24 @@ def test_an_edit_is_compared_with_the_kept_layout_and_undone_it_is_known_at_once
     assert not bench.jobs.unfinished()
     bench.ask(SetComparison("against", 0))
     assert bench.view is None
+
+
+def test_a_picture_looks_no_result_up_again(bench: Bench[LayoutsService], monkeypatch: pytest.MonkeyPatch) -> None:
+    bench.ask(KeepLayout())
+    bench.edit(moved(bench.state.project))
+    found: LayoutsView = bench.found()
+    bench.service.follow(bench.state)
+    hashed: list[LayoutInput] = []
+
+    def noted(inputs: LayoutInput) -> int:
+        hashed.append(inputs)
+        return id(inputs)
+
+    monkeypatch.setattr(LayoutInput, "__hash__", noted)
+    for _ in range(5):
+        bench.service.follow(bench.state)
+    assert bench.view is found
+    assert hashed == []
 
 
 def test_the_table_says_of_each_figure_which_layout_is_better(bench: Bench[LayoutsService]) -> None:
