@@ -8,7 +8,7 @@ import sys
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
@@ -57,6 +57,11 @@ class Localize:
     rated_project: Annotated[Path | None, arg(metavar="PROJECT2")] = None
     """Folder for the project with these shares as its scanners' detection_rates, and reflector_range out to where one
     is seen; made when it does not exist."""
+    vda5050: Annotated[Path | None, arg(metavar="FILE")] = None
+    """File for state messages of VDA 5050, one JSON object a line: at each change of the mode and each second, with a
+    LOCALIZATION_ERROR exactly while the vehicle is not operational. What a localizer does not know is empty."""
+    vda5050_version: Literal["2.1.0", "3.0.0"] = "2.1.0"
+    """Version of these messages."""
     strict: bool = False
     """Refuse a recording that cannot be what it says (units, clocks, gaps, thresholds) instead of noting it."""
 
@@ -92,7 +97,7 @@ class Localize:
 
         sources = (self.recording, self.project)
         out = result_folder(self.out, "localize", RESULTS, force=self.force, sources=sources)
-        self._refuse_to_rate()
+        self._refuse_to_overwrite()
         project = as_saved = load_project(self.project)
         project = dataclasses.replace(project, parameters=apply_settings(project.parameters, self.set))
         log = self._with_reference(load_log(self.recording, ChannelOptions.parse(self.channel, self.wheels)))
@@ -122,14 +127,10 @@ class Localize:
             write_results(folder, result.columns, summary(result) | more)
             write_events(folder, events(EventsInput(result)))
             write_reflector_figures(folder, reflector_figures(ReflectorFiguresInput.of(result, project.floor_map)))
-        true = [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
-        notes = [f"Note         {finding}" for finding in findings]
-        sys.stdout.write(
-            "\n".join(
-                [*_report(result, cut), *map(rate_told, rates), *rated, *true, *notes, f"Written to   {self.out}"]
-            )
-            + "\n"
-        )
+        lines = [*_report(result, cut), *map(rate_told, rates), *rated]
+        lines += [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
+        lines += [f"Note         {finding}" for finding in findings]
+        sys.stdout.write("\n".join([*lines, *self._messages(project, result), f"Written to   {self.out}"]) + "\n")
 
     def _rates(self, project: Project, result: RunResult) -> tuple[DetectionRate, ...]:
         """Count how often reflectors are seen, where that is asked for."""
@@ -137,10 +138,22 @@ class Localize:
 
         return detection_rates(project, result.columns) if self.detection_rates or self.rated_project else ()
 
-    def _refuse_to_rate(self) -> None:
-        """Raise UsageError where the project with the counted rates cannot be written."""
+    def _messages(self, project: Project, result: RunResult) -> list[str]:
+        """Write the state messages, where that is asked for, and tell how many they are."""
+        if self.vda5050 is None:
+            return []
+        from commission.io.vda5050_states import StateVersion, write_states
+
+        count = write_states(self.vda5050, result, project.name, StateVersion(self.vda5050_version))
+        return [f"VDA 5050     {count} state messages in {self.vda5050}"]
+
+    def _refuse_to_overwrite(self) -> None:
+        """Raise UsageError where the project with the counted rates, or the messages, cannot be written."""
+        from commission.io.overwriting import refuse_files
         from commission.io.project_copy import refuse_to_replace
 
+        if self.vda5050 is not None:
+            refuse_files(self.vda5050, force=self.force)
         if self.rated_project is not None:
             if self.rated_project.resolve() == self.project.resolve():
                 raise UsageError(f"--rated-project is the project itself, {self.project}; expected another folder")

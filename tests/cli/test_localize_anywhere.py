@@ -1,0 +1,39 @@
+"""`localize` of a vehicle that nobody locates: it is looked for, and the messages say from when on it is known."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+
+def test_a_vehicle_that_nobody_locates_is_looked_for_and_says_so_in_messages(
+    commission: Callable[..., tuple[int, str, str]], project: Path, recording: Path, tmp_path: Path
+) -> None:
+    messages = tmp_path / "states.jsonl"
+    options = ("--initial-pose", "auto", "--vda5050", messages)
+    code, told, err = commission("localize", project, recording, "--out", tmp_path / "out", *options)
+    assert (code, err) == (0, "")
+    assert re.search(r"Start +x 0\.\d+ m, y -?0\.0\d+ m, heading .* \(not told: .*; found after \d\.\d s\)", told)
+    with (tmp_path / "out" / "estimates.csv").open(encoding="utf-8", newline="") as file:
+        estimates = list(csv.DictReader(file))
+    modes = [row["mode"] for row in estimates]
+    located = next(index for index, mode in enumerate(modes) if mode != "initializing")
+    assert 0 < located < 20
+    assert modes[-1] == "operational"
+    # Half a metre a second along x, from the first record on.
+    assert float(estimates[located]["x"]) == pytest.approx(0.5 * int(estimates[located]["stamp_ns"]) * 1e-9, abs=0.1)
+    states = [json.loads(line) for line in messages.read_text(encoding="utf-8").splitlines()]
+    assert [state["headerId"] for state in states] == list(range(len(states)))
+    assert states[0]["errors"][0]["errorType"] == "LOCALIZATION_ERROR"
+    assert states[-1]["errors"] == []
+    assert states[-1]["agvPosition"]["mapId"] == "Small hall"
+    assert f"{len(states)} state messages" in told
+    # A file that is there is not overwritten unasked.
+    code, _, err = commission("localize", project, recording, "--out", tmp_path / "out", *options)
+    assert code != 0
+    assert "states.jsonl exists" in err
