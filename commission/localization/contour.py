@@ -22,7 +22,15 @@ from commission.geometry.gaussian import chi_square_gate
 from commission.geometry.se2 import compose_scalars, exp_scalars, inverse_scalars
 from commission.localization.consider import PER_REFLECTOR, PER_SCANNER, ConsiderModel
 from commission.localization.consider_columns import carry_over, mark_busy
-from commission.localization.contour_match import GridPose, MatchRule, Spread, best_start, cost_of, match
+from commission.localization.contour_match import (
+    GridPose,
+    MatchRule,
+    Spread,
+    best_start,
+    cost_of,
+    information_of,
+    match,
+)
 from commission.localization.contour_rows import (
     ContourRows,
     corrected_by_rows,
@@ -366,7 +374,7 @@ def rows_of_match(  # noqa: PLR0917 - a match and its points
     what the matched points show where that is more.
     """
     resolution, length, tables = model.tables.resolution, model.rule.length, model.tables
-    at = cost_of(pose, lever, points, tables, length, threshold, True)
+    at = information_of(pose, lever, points, tables, length, threshold)
     # Of d alone: what a matched point is off, from the cost of a cost function so wide that it is quadratic.
     wide = cost_of(pose, lever, points, tables, FLAT, threshold, False)
     outside = (len(points) - wide.beams) * (1.0 - FLAT * FLAT / (FLAT * FLAT + threshold * threshold))

@@ -158,6 +158,37 @@ def test_a_corridor_says_nothing_of_the_place_along_it(yaw):
     assert abs(across @ (mean_of(after)[:2] - truth[:2])) < 3e-3
 
 
+def test_a_round_hall_says_nothing_of_the_heading():
+    radius, resolution = 6.0, 0.02
+    side = round(2.4 * radius / resolution)
+    places = (np.arange(side) + 0.5) * resolution - 1.2 * radius
+    away = np.hypot(*np.meshgrid(places, places))
+    cells = np.where((away > radius) & (away < radius + 0.2), 100, 0).astype(np.int8)
+    floor = FloorMap(cells, resolution, np.array((-1.2 * radius, -1.2 * radius, 0.0)))
+    given = dataclasses.replace(EXACT, largest_error=0.5)
+    after, figures = observed(
+        floor, belief_at((0.02, 0.0, 0.1), (0.05, 0.05, 0.02)), noisy(floor, np.zeros(3)), given=given
+    )
+    assert (figures[USE], figures[ROWS]) == (ACCEPTED, 2)
+    assert covariance_of(after)[2, 2] == pytest.approx(0.02**2, rel=1e-3)
+
+
+@pytest.mark.parametrize("slope", [0.2, 0.5, 0.785])
+def test_a_corridor_aslant_to_the_cells_says_nothing_of_the_place_along_it(slope):
+    resolution, side = 0.05, 800
+    places = (np.arange(side) + 0.5) * resolution - 20.0
+    x, y = np.meshgrid(places, places)
+    across = np.abs(y * math.cos(slope) - x * math.sin(slope))
+    floor = FloorMap(
+        np.where((across > 1.0) & (across < 1.2), 100, 0).astype(np.int8), resolution, np.array((-20.0, -20.0, 0.0))
+    )
+    truth = np.array((0.1, 0.05, slope))
+    after, figures = observed(floor, belief_at(truth, (0.05, 0.05, 0.02)), noisy(floor, truth))
+    assert (figures[USE], figures[ROWS]) == (ACCEPTED, 2)
+    along = np.array((math.cos(slope), math.sin(slope)))
+    assert along @ covariance_of(after)[:2, :2] @ along == pytest.approx(0.05**2, rel=0.05)
+
+
 def test_the_covariance_of_a_match_is_what_many_matches_scatter():
     floor, wide, nees = room(), (0.05, 0.05, 0.02), []
     for seed in range(200):
