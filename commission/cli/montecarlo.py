@@ -15,6 +15,7 @@ from commission.errors import UsageError
 
 if TYPE_CHECKING:
     from commission.simulation.random_faults import FaultRates
+    from commission.studies.monte_carlo import MonteCarloInput, MonteCarloResult
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +60,9 @@ class MonteCarlo:
     """Whether detections come from shadow maps, or beam by beam. auto: beams where a fault needs them."""
     set: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="GROUP.KEY=VALUE")] = ()
     """A parameter of the localizer in place of the project's, in SI units and radians."""
+    scheduler: Annotated[str | None, arg(metavar="ADDRESS")] = None
+    """Scheduler of a Dask cluster that does the drives, as tcp://HOST:PORT (extra commission[cluster]; workers with one
+    thread each). None: the cores of this machine."""
     force: bool = False
     """Whether files in DIR that this command did not write are overwritten; its own earlier results always are."""
 
@@ -67,7 +71,7 @@ class MonteCarlo:
         from commission.io.monte_carlo_files import DRIVES, PICTURE, SUMMARY, TABLE, write_monte_carlo
         from commission.io.overwriting import result_folder
         from commission.io.project_file import apply_settings, load_project
-        from commission.studies.monte_carlo import Detecting, MonteCarloInput, monte_carlo, told, warm_up
+        from commission.studies.monte_carlo import Detecting, MonteCarloInput, told
 
         names = (DRIVES, TABLE, PICTURE, SUMMARY)
         out = result_folder(self.out, "montecarlo", names, force=self.force, sources=(self.project,))
@@ -84,11 +88,23 @@ class MonteCarlo:
             rates=self._rates(),
             detecting=Detecting(self.detections),
         )
-        warm_up()
-        result = monte_carlo(inputs, shown_progress)
+        result = self._driven(inputs)
         with out.writing() as folder:
             write_monte_carlo(folder, result)
         sys.stdout.write("\n".join([*told(result), f"Written to   {self.out}"]) + "\n")
+
+    def _driven(self, inputs: MonteCarloInput) -> MonteCarloResult:
+        """Drive here, or on a cluster."""
+        from commission.studies.monte_carlo import monte_carlo, warm_up
+
+        if self.scheduler is None:
+            warm_up()
+            return monte_carlo(inputs, shown_progress)
+
+        from commission.io.cluster import cluster
+
+        with cluster(self.scheduler) as workers:
+            return monte_carlo(inputs, shown_progress, workers=workers)
 
     def _rates(self) -> FaultRates:
         """How often each fault happens; raises UsageError for a number out of range."""
