@@ -248,7 +248,7 @@ class ContourParameters:
         Quantity(
             label="Cost flat from", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=10.0, slider=(20.0, 1000.0)
         ),
-    ] = 0.2
+    ] = 0.1
     """Distance from a contour at which a beam's cost is half of what it may be at most, L: beams that are farther off
     count less and less."""
     iterations: Annotated[
