@@ -15,11 +15,11 @@ from commission.simulation.scenario import start_of, virtual_drive
 from commission.site.disturbances import ConstantErrors, ScannerError, ShinyObject
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
-from commission.site.routes import Route, Segment
 from commission.site.uncertainty import Uncertainty
 from commission.studies.calibration import CalibrationInput, calibrate
 from commission.studies.diagnosis import Diagnosis, diagnosis, diagnosis_input
 from commission.studies.start import Start, StartOrigin
+from tests.acceptance.eight import eight
 from tests.conftest import Seeds
 from tests.planning.driven import QUICK
 
@@ -40,12 +40,9 @@ pytestmark = pytest.mark.slow
 
 
 def laboratory(laps: int) -> Project:
-    """The laboratory with a figure of eight driven some times: 54 s and 8 rad of turns each."""
+    """The laboratory with a figure of eight driven some times."""
     project = load_project(bundled_folder("maps") / "laboratory")
-    t = np.linspace(0.0, 2.0 * np.pi * laps, 16 * laps + 1)
-    points = np.column_stack((6.0 + 3.2 * np.sin(t), 4.0 + 2.2 * np.sin(2.0 * t)))
-    route = Route(name="Eight", speed=0.6, segments=(Segment(control_points=points),))
-    return replace(project, routes=(route,), uncertainty=Uncertainty(survey=0.003))
+    return replace(project, routes=(eight(laps),), uncertainty=Uncertainty(survey=0.003))
 
 
 def diagnosed(project: Project, faults: tuple[str, ...], seed: int) -> Diagnosis:

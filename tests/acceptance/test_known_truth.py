@@ -18,10 +18,14 @@ from commission.site.truth import Truth
 from commission.site.uncertainty import Uncertainty
 from commission.studies.calibration import CalibrationInput, calibrate
 from commission.studies.start import Start, StartOrigin
+from tests.acceptance.eight import eight
 from tests.conftest import Seeds
 from tests.planning.driven import QUICK
 
 DRIVES, FEW_DRIVES = 60, 3
+LONG_DRIVES, FEW_LONG_DRIVES = 40, 1
+LAPS = 6
+"""Of the figure of eight: five minutes."""
 NORMAL_95 = 1.96
 
 pytestmark = pytest.mark.slow
@@ -64,9 +68,10 @@ def true_values(project: Project, truth: Truth) -> dict[str, float]:
     }
 
 
-def test_each_calibrated_value_lies_within_its_own_interval(drawn: Project, seeds: Seeds) -> None:
+def outcomes(drawn: Project, seeds: range, most: dict[str, float]) -> dict[str, list[bool]]:
+    """Whether each value of some drives lies within its interval; none may be less sure than `most`."""
     route, inside = drawn.routes[0].name, dict[str, list[bool]]()
-    for seed in seeds(FEW_DRIVES, DRIVES):
+    for seed in seeds:
         log = virtual_drive(drawn, route, seed, options=QUICK)
         begin = start_of(drawn, route)
         start = Start(Belief(0, begin.pose, np.diag(begin.sigmas**2)), StartOrigin.DRIVE)
@@ -76,13 +81,40 @@ def test_each_calibrated_value_lies_within_its_own_interval(drawn: Project, seed
         values = {each.key: each for each in calibrate(CalibrationInput.of(drawn, blind, start)).values}
         for key, true in truth.items():
             inside.setdefault(key, []).append(abs(values[key].proposed - true) < NORMAL_95 * values[key].sigma)
-        # What 74 s with 3.7 rad of turns can show, four reflectors surveyed to 3 mm.
-        assert values["scanners.scanner.mounting.heading"].sigma < np.radians(0.05)
-        assert values["scanners.scanner.clock_offset"].sigma < 0.0045
-        assert values["observation.range_bias"].sigma < 0.0025
-        assert values["odometry.turn_scale"].sigma < 0.02
-    # 24 values of a few drives: with 5 % outside, four or more of them are outside in 3 % of all such tests.
-    assert sum(not each for value in inside.values() for each in value) <= 3
-    if seeds.all:
+        for key, sigma in most.items():
+            assert values[key].sigma < sigma, key
+    return inside
+
+
+def check_shares(inside: dict[str, list[bool]], seeds: Seeds) -> None:
+    """All of them in 90 % of all drives; of a few drives, at most as many outside as 3 % of such tests have."""
+    if not seeds.all:
+        assert sum(not each for value in inside.values() for each in value) <= 3
+    else:
         shares = {key: float(np.mean(each)) for key, each in inside.items()}
         assert min(shares.values()) >= 0.9, shares
+
+
+def test_each_calibrated_value_lies_within_its_own_interval(drawn: Project, seeds: Seeds) -> None:
+    # What 74 s with 3.7 rad of turns can show, four reflectors surveyed to 3 mm.
+    most = {
+        "scanners.scanner.mounting.heading": float(np.radians(0.05)),
+        "scanners.scanner.clock_offset": 0.0045,
+        "observation.range_bias": 0.0025,
+        "odometry.turn_scale": 0.02,
+    }
+    check_shares(outcomes(drawn, seeds(FEW_DRIVES, DRIVES), most), seeds)
+
+
+def test_five_minutes_of_turns_show_mounting_and_clock(drawn: Project, seeds: Seeds) -> None:
+    # The range bias is no better than before: it is the survey of four reflectors that limits it.
+    most = {
+        "scanners.scanner.mounting.x": 0.003,
+        "scanners.scanner.mounting.y": 0.003,
+        "scanners.scanner.mounting.heading": float(np.radians(0.05)),
+        "scanners.scanner.clock_offset": 0.0025,
+        "observation.range_bias": 0.0025,
+        "odometry.turn_scale": 0.003,
+    }
+    turning = replace(drawn, routes=(eight(LAPS),))
+    check_shares(outcomes(turning, seeds(FEW_LONG_DRIVES, LONG_DRIVES), most), seeds)
