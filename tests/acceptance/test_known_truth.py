@@ -25,7 +25,7 @@ from tests.planning.driven import QUICK
 DRIVES, FEW_DRIVES = 60, 3
 LONG_DRIVES, FEW_LONG_DRIVES = 40, 1
 LAPS = 6
-"""Of the figure of eight: five minutes."""
+"""Of the figure of eight: 225 s."""
 NORMAL_95 = 1.96
 
 pytestmark = pytest.mark.slow
@@ -106,7 +106,7 @@ def test_each_calibrated_value_lies_within_its_own_interval(drawn: Project, seed
     check_shares(outcomes(drawn, seeds(FEW_DRIVES, DRIVES), most), seeds)
 
 
-def test_five_minutes_of_turns_show_mounting_and_clock(drawn: Project, seeds: Seeds) -> None:
+def test_four_minutes_of_turns_show_mounting_and_clock(drawn: Project, seeds: Seeds) -> None:
     # The range bias is no better than before: it is the survey of four reflectors that limits it.
     most = {
         "scanners.scanner.mounting.x": 0.003,
