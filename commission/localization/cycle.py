@@ -277,6 +277,7 @@ def confirmed_by_contours(
         evidence.accepted,
         evidence.rejected,
         evidence.confirmed + 1.0,
+        evidence.against,
     )
 
 

@@ -1,7 +1,8 @@
 """Second rule of the supervisor, beside Algorithm 4: a vehicle whose detections fit no reflector is not localized.
 
 The covariance knows nothing of a wheel that slipped or of a wrong association: it stays small while the gate rejects
-what is really there. So the share of rejected detections is watched, over windows that forget. And where the gate was
+what is really there. So the share of rejected detections is watched, over windows that forget; and scans in a row that
+reject nearly all they see, as after a vehicle was carried away, tell it sooner than any window. And where the gate was
 so wide that any reflector would have been accepted, one that was is no proof: more of them must confirm the pose.
 """
 
@@ -23,6 +24,10 @@ from commission.site.parameters import SupervisorParameters
 
 CLEARED = 0.5
 """The rule no longer holds once both shares are below this part of their limits: so the mode does not flicker."""
+FEWEST_AGAINST = 3.0
+"""Rejected detections that a scan holds at least to speak against the pose: of one shiny thing there is one."""
+MOST_FOR = 0.25
+"""Accepted ones for each rejected one that such a scan holds at most: chance lets one or two of eight pass."""
 
 
 class Evidence(NamedTuple):
@@ -38,9 +43,11 @@ class Evidence(NamedTuple):
     """All of them: over the long window."""
     confirmed: float
     """Accepted since the belief was too wide to tell reflectors apart; infinite where it never was."""
+    against: float
+    """Scans in a row that rejected nearly all they saw; those that saw too little to say are passed over."""
 
 
-NO_EVIDENCE = Evidence(0, 0.0, 0.0, 0.0, 0.0, math.inf)
+NO_EVIDENCE = Evidence(0, 0.0, 0.0, 0.0, 0.0, math.inf, 0.0)
 
 
 class RejectionRule(NamedTuple):
@@ -66,6 +73,8 @@ class RejectionRule(NamedTuple):
     """2-sigma before a scan beyond which what is accepted proves nothing."""
     confirmations: float
     """Detections that then have to be accepted."""
+    scans_against: float
+    """Scans in a row that reject nearly all they see, from which on the vehicle is lost."""
 
 
 def rejection_rule(parameters: SupervisorParameters) -> RejectionRule:
@@ -86,6 +95,7 @@ def rejection_rule(parameters: SupervisorParameters) -> RejectionRule:
         doubtful_position=float(parameters.doubt_ratio * parameters.position_limit),
         doubtful_heading=float(parameters.doubt_ratio * parameters.heading_limit),
         confirmations=float(parameters.confirmations if parameters.enabled else 0.0),
+        scans_against=float(parameters.rejection_scans),
     )
 
 
@@ -121,7 +131,8 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     Notes
     -----
     n <- n max(exp(-dt / window), min(1, fewest / n)) + count: exponential forgetting that waits where there is little,
-    derived from a mean over the window.
+    derived from a mean over the window. A scan speaks for the pose where accepted > rejected / 4, and against it where
+    not and rejected >= 3, by definition.
     """
     accepted, rejected, near = 0.0, 0.0, 0.0
     for i in range(first, last):
@@ -138,7 +149,11 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
             if distance > rule.harmless + rule.harmless_turn * measured:
                 rejected += 1.0
                 near += 1.0 if distance <= reach else 0.0
-    confirmed = evidence.confirmed
+    confirmed, against = evidence.confirmed, evidence.against
+    if accepted > MOST_FOR * rejected:
+        against = 0.0
+    elif rejected >= FEWEST_AGAINST:
+        against += 1.0
     if is_doubtful(belief, rule):
         accepted, confirmed = 0.0, 0.0
     seconds = (stamp_ns - evidence.stamp_ns) * 1e-9
@@ -152,6 +167,7 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
         kept * evidence.accepted + accepted,
         kept * evidence.rejected + rejected,
         confirmed + accepted,
+        against,
     )
 
 
@@ -207,12 +223,13 @@ def rejects_the_world(was_lost: bool, evidence: Evidence, rule: RejectionRule) -
 
     Notes
     -----
-    rejected / max(rejected + accepted, fewest) > limit, of those near reflectors or of all, by definition.
+    rejected / max(rejected + accepted, fewest) > limit, of those near reflectors or of all; or so many scans in a row
+    against the pose: by definition.
     """
     if not rule.enabled:
         return False
     near = evidence.near_rejected / max(evidence.near_rejected + evidence.near_accepted, rule.fewest)
     whole = evidence.rejected / max(evidence.rejected + evidence.accepted, rule.fewest_of_all)
     if was_lost:
-        return near >= CLEARED * rule.near_limit or whole >= CLEARED * rule.limit
-    return near > rule.near_limit or whole > rule.limit
+        return near >= CLEARED * rule.near_limit or whole >= CLEARED * rule.limit or evidence.against > 0.0
+    return near > rule.near_limit or whole > rule.limit or evidence.against >= rule.scans_against

@@ -370,6 +370,11 @@ class SupervisorParameters:
         Quantity(label="Rejected at all", shown=PERCENT, bounds=Bounds.inside(0.0, 1.0), step=1.0, slider=(5.0, 95.0)),
     ] = 0.7
     """Share of all rejected detections, false ones among people and shiny things too, beyond which it is lost."""
+    rejection_scans: Annotated[
+        int, Quantity(label="Scans against it", unit="scans", bounds=Bounds.at_least(1.0), step=1, slider=(3, 50))
+    ] = 10
+    """Scans in a row that reject three detections or more, and accept at most a quarter as many, until it is lost: a
+    vehicle that was carried away is told sooner than by any share."""
     doubt_ratio: Annotated[
         float, Quantity(label="Doubt from", bounds=Bounds.at_least(1.0), step=0.1, slider=(1.0, 10.0))
     ] = 2.0

@@ -79,6 +79,7 @@ PARAMETERS = {
     "supervisor.rejection_harmless": ("Harmless up to [%]", 100.0),
     "supervisor.rejection_near_limit": ("Rejected near [%]", 100.0),
     "supervisor.rejection_limit": ("Rejected at all [%]", 100.0),
+    "supervisor.rejection_scans": ("Scans against it [scans]", 1.0),
     "supervisor.doubt_ratio": ("Doubt from", 1.0),
     "supervisor.confirmations": ("Confirmed by [detections]", 1.0),
     "supervisor.find_again": ("Search when lost", None),

@@ -59,6 +59,7 @@ class PlainLocalizer:
         self.was_lost, self.counted_at = False, self.initial.stamp_ns * 1e-9
         self.weights: dict[int | None, list[tuple[float, bool]]] = {1: [], None: []}
         self.confirmed = math.inf
+        self.against = 0
 
     def run(self, log: RecordLog) -> list[dict]:
         self.following = [(stamp * 1e-9, matrix(move)) for stamp, move in zip(*columns(log), strict=True)]
@@ -234,12 +235,19 @@ class PlainLocalizer:
             weights += [(1.0, accepted) for accepted, near in fresh if which is None or near]
             rejected = sum(weight for weight, accepted in weights if not accepted)
             shares.append(rejected / max(sum(weight for weight, _ in weights), fewest) / limit)
+        refused = sum(not accepted for accepted, _ in fresh)
+        taken = sum(kept == "inlier" for kept in status)
+        if 4 * taken > refused:
+            self.against = 0
+        elif refused >= 3:
+            self.against += 1
         self.counted_at = now
         self.confirmed = 0.0 if doubtful else self.confirmed + sum(accepted for accepted, _ in fresh)
         if p.enabled and self.confirmed < p.confirmations:
             self.mode = "fail"
         if p.enabled and p.rejection_enabled:
-            over = max(shares) > 1.0 or (self.was_lost and max(shares) >= 0.5)
+            over = max(shares) > 1.0 or (self.was_lost and (max(shares) >= 0.5 or self.against > 0))
+            over = over or self.against >= p.rejection_scans
             self.mode, self.was_lost = ("lost" if over else self.mode), over
 
     def supervise(self) -> None:

@@ -11,8 +11,16 @@ import pytest
 from commission.geometry.angles import difference
 from commission.localization.estimate import Belief, Mode
 from commission.localization.localizer import Localizer
+from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.reflector_index import build_index
-from commission.localization.rejection import NO_EVIDENCE, Evidence, RejectionRule, nearest, rejects_the_world
+from commission.localization.rejection import (
+    NO_EVIDENCE,
+    Evidence,
+    RejectionRule,
+    nearest,
+    rejects_the_world,
+    weigh,
+)
 from commission.localization.setup import LocalizerSetup
 from commission.localization.whole_run import run
 from commission.site.parameters import Parameters, SupervisorParameters
@@ -36,12 +44,13 @@ RULE = RejectionRule(
     doubtful_position=math.inf,
     doubtful_heading=math.inf,
     confirmations=0.0,
+    scans_against=10.0,
 )
 SECOND = 1_000_000_000
 
 
 def evidence(accepted: float, near: float, rejected: float) -> Evidence:
-    return Evidence(0, accepted, near, accepted, rejected, math.inf)
+    return Evidence(0, accepted, near, accepted, rejected, math.inf, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -70,6 +79,48 @@ def test_vehicle_is_lost_beyond_either_limit(accepted: float, near: float, rejec
 def test_lost_vehicle_is_believed_again_only_well_below_both_limits(near: float, rejected: float, lost: bool) -> None:
     # Half of the limits: 20 % near (25 of 125), 31 % of all (44.9 of 144.9).
     assert rejects_the_world(True, evidence(100.0, near, rejected), RULE) is lost
+
+
+@pytest.mark.parametrize(("against", "was_lost", "lost"), [(9.0, False, False), (10.0, False, True), (1.0, True, True)])
+def test_vehicle_is_lost_by_scans_in_a_row_that_reject_nearly_all(against: float, was_lost: bool, lost: bool) -> None:
+    seen = evidence(1000.0, 0.0, 0.0)._replace(against=against)
+    assert rejects_the_world(was_lost, seen, RULE) is lost
+
+
+@pytest.mark.parametrize(
+    ("accepted", "rejected", "before", "after"),
+    [
+        (0, 3, 4.0, 5.0),
+        (0, 2, 4.0, 4.0),  # too few to say
+        (1, 4, 4.0, 5.0),  # a quarter
+        (1, 3, 4.0, 0.0),
+        (1, 0, 4.0, 0.0),
+        (0, 0, 4.0, 4.0),
+    ],
+)
+def test_a_scan_speaks_against_the_pose_by_what_it_rejects(
+    accepted: int, rejected: int, before: float, after: float
+) -> None:
+    setup = LocalizerSetup(
+        reflectors=ReflectorMap((Reflector(id="A", x=5.0, y=0.0),)), scanners=(Scanner(),), parameters=Parameters()
+    )
+    status = np.array([0] * accepted + [2] * rejected, dtype=np.int8)
+    belief = PoseGaussian(0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 1e-6, 0.0, 1e-6)
+    seen = weigh(
+        NO_EVIDENCE._replace(against=before),
+        SECOND,
+        belief,
+        0,
+        len(status),
+        np.tile([2.0, 1.0], (len(status), 1)),
+        setup.observations[0],
+        setup.index.cells,
+        setup.index.places,
+        setup.index.offsets,
+        status,
+        RULE,
+    )
+    assert seen.against == after
 
 
 def lonely(**supervisor: float) -> Localizer:

@@ -265,4 +265,18 @@ LOCALIZATION = (
         replace="half = 0.25 * vehicle.wheel_separation",
         tests=(TESTS + "test_kinematics.py::test_differential_and_tricycle_wheels_give_back_the_twist",),
     ),
+    Mutant(
+        name="scan against the pose though it accepts as many as it rejects",
+        file=FOLDER + "rejection.py",
+        find="accepted > MOST_FOR * rejected",
+        replace="accepted > rejected",
+        tests=(TESTS + "test_rejection.py::test_a_scan_speaks_against_the_pose_by_what_it_rejects",),
+    ),
+    Mutant(
+        name="lost by one scan too many against the pose",
+        file=FOLDER + "rejection.py",
+        find="evidence.against >= rule.scans_against",
+        replace="evidence.against > rule.scans_against",
+        tests=(TESTS + "test_rejection.py::test_vehicle_is_lost_by_scans_in_a_row_that_reject_nearly_all",),
+    ),
 )
