@@ -154,6 +154,11 @@ class Localize:
 
         if self.vda5050 is not None:
             refuse_files(self.vda5050, force=self.force)
+            for name, folder in (("results", self.out), ("recording", self.recording), ("project", self.project)):
+                if self.vda5050.resolve().is_relative_to(folder.resolve()):
+                    raise UsageError(
+                        f"--vda5050 {self.vda5050} is among the {name} in {folder}; expected another place"
+                    )
         if self.rated_project is not None:
             if self.rated_project.resolve() == self.project.resolve():
                 raise UsageError(f"--rated-project is the project itself, {self.project}; expected another folder")

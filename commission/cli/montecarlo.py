@@ -55,7 +55,8 @@ class MonteCarlo:
     kidnapping: Annotated[float, arg(metavar="PER_HOUR")] = 0.5
     """Times per hour that the vehicle is carried on by 0.2 to 2 m: its wheels stand, and it sees nothing."""
     constants: bool = True
-    """Whether survey, mounting, range bias and clock are off, by the 1-sigmas of the project's `uncertainty`."""
+    """Whether survey, mounting, range bias and clock are drawn by the 1-sigmas of the project's `uncertainty`; if not,
+    they are as its disturbances say."""
     detections: Literal["auto", "shadows", "beams"] = "auto"
     """Whether detections come from shadow maps, or beam by beam. auto: beams where a fault needs them."""
     set: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="GROUP.KEY=VALUE")] = ()

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
+from commission.errors import UsageError
 from commission.geometry.arrays import BoolArray, IntArray, read_only
 from commission.simulation.people import WalkableFloor
 from commission.site.disturbances import ConstantErrors, CoveredPeriod, Disturbances, ShinyObject
@@ -27,6 +28,8 @@ COVERED_S = (2.0, 20.0)
 """Shortest and longest time for which all reflectors are covered [s]."""
 FALSE_RADIUS = 0.05
 """Radius of what is taken for a reflector and is none: a wrapped post, a bare column [m]."""
+MOST_UNCERTAIN = 0.1
+"""Largest 1-sigma that constants are drawn by [m, rad, s]: what a file of disturbances may say."""
 DIRT_SHARE = (0.2, 0.9)
 """Smallest and largest share of scans in which a dirty reflector is not seen."""
 CARRIED_M = (0.2, 2.0)
@@ -128,7 +131,7 @@ def draw_faults(project: Project, rates: FaultRates, seed: int, duration: float)
         shiny_objects=(*own.shiny_objects, *_false(project, rates, seed)),
         covered=(*own.covered, *_covered(rates, seed, duration)),
         slips_per_100_m=rates.slip,
-        constants=_constants(project.uncertainty) if rates.constants else own.constants,
+        constants=_constants(own.constants, project.uncertainty) if rates.constants else own.constants,
     )
     return DrawnFaults(
         project=replace(project, reflectors=ReflectorMap(reflectors), disturbances=disturbances),
@@ -226,18 +229,25 @@ def _covered(rates: FaultRates, seed: int, duration: float) -> tuple[CoveredPeri
     return tuple(CoveredPeriod(*each) for each in zip(starts.tolist(), lengths.tolist(), strict=True))
 
 
-def _constants(known: Uncertainty) -> ConstantErrors:
-    """What is drawn where constants are as well known as the project says."""
-    return ConstantErrors(
+def _constants(own: ConstantErrors, known: Uncertainty) -> ConstantErrors:
+    """Draw by how well the project knows its constants; what else it says of them acts as well.
+
+    More than a file of disturbances may say (0.1 m, rad, s) is refused: constants that are drawn smaller than the
+    project knows them would flatter every figure.
+    """
+    sigmas = (known.survey, known.mounting_position, known.mounting_heading, known.range_bias, known.clock)
+    if max(sigmas) > MOST_UNCERTAIN:
+        raise UsageError(
+            f"the project's uncertainty holds {max(sigmas):g}; expected at most {MOST_UNCERTAIN:g} (m, rad, s) where "
+            "constants are drawn by it, or --no-constants"
+        )
+    return replace(
+        own,
         survey_factor=1.0,
-        survey_sigma=min(known.survey, 0.1),
-        mounting_sigma=(
-            min(known.mounting_position, 0.1),
-            min(known.mounting_position, 0.1),
-            min(known.mounting_heading, 0.1),
-        ),
-        range_bias_sigma=min(known.range_bias, 0.1),
-        clock_offset_sigma=min(known.clock, 0.1),
+        survey_sigma=known.survey,
+        mounting_sigma=(known.mounting_position, known.mounting_position, known.mounting_heading),
+        range_bias_sigma=known.range_bias,
+        clock_offset_sigma=known.clock,
     )
 
 

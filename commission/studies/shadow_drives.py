@@ -103,7 +103,10 @@ class ShadowWorld:
 def with_shiny(project: Project) -> ReflectorMap:
     """Return what raises a reflector flag: the reflectors, then shiny objects as posts, by their number."""
     shiny = project.disturbances.shiny_objects
-    posts = (Reflector(id=f"shiny {n}", x=s.x, y=s.y, radius=s.radius) for n, s in enumerate(shiny, 1))
+    name = "shiny"
+    while any(reflector.id.startswith(name) for reflector in project.reflectors.reflectors):
+        name += "'"
+    posts = (Reflector(id=f"{name} {n}", x=s.x, y=s.y, radius=s.radius) for n, s in enumerate(shiny, 1))
     return ReflectorMap((*project.reflectors.reflectors, *posts))
 
 
@@ -147,10 +150,9 @@ def shadow_drive(
         parts.append(_reported(found, lost, scanner, error_of(truth, scanner.name)))
     shown, first = np.unique(stamps, return_index=True)
     return replace(
-        _log(parts),
+        _log(parts, tuple(scanner.name for scanner in project.scanners)),
         odometry_stamps_ns=read_only(motion.stamps_ns),
         displacements=read_only(displacements),
-        scanners=tuple(scanner.name for scanner in project.scanners),
         reference_stamps_ns=read_only(shown),
         reference_poses=read_only(motion.poses_at(stamps)[first]),
         truth=truth,
@@ -298,7 +300,7 @@ def _reported(found: _DetectedScans, lost: BoolArray, scanner: Scanner, error: S
     return _DetectedScans(stamps[kept], found.counts[kept], range_bearing)
 
 
-def _log(parts: list[_DetectedScans]) -> RecordLog:
+def _log(parts: list[_DetectedScans], names: tuple[str, ...]) -> RecordLog:
     """Detections of all scanners in the order of their stamps; of equal ones the first scanner comes first."""
     stamps = np.concatenate([part.stamps_ns for part in parts])
     counts = np.concatenate([part.counts for part in parts])
@@ -317,4 +319,5 @@ def _log(parts: list[_DetectedScans]) -> RecordLog:
         detection_offsets=read_only(np.concatenate(([0], np.cumsum(counts)))),
         range_bearing=read_only(range_bearing),
         detection_scanners=read_only(scanners),
+        scanners=names,
     )

@@ -37,3 +37,16 @@ def test_a_vehicle_that_nobody_locates_is_looked_for_and_says_so_in_messages(
     code, _, err = commission("localize", project, recording, "--out", tmp_path / "out", *options)
     assert code != 0
     assert "states.jsonl exists" in err
+
+
+@pytest.mark.parametrize("force", [(), ("--force",)])
+def test_messages_are_not_written_over_results_recording_or_project(
+    refused: Callable[..., str], project: Path, recording: Path, tmp_path: Path, force: tuple[str, ...]
+) -> None:
+    out = tmp_path / "out"
+    for path, among in ((out / "summary.json", "results"), (recording / "odometry.csv", "recording"), (project, "")):
+        before = path.read_bytes() if path.is_file() else b""
+        said = refused("localize", project, recording, "--out", out, "--vda5050", path, *force)
+        assert among in said
+        assert (path.read_bytes() if path.is_file() else b"") == before
+    assert not out.exists()

@@ -13,6 +13,7 @@ from commission.simulation.drive import DriveOptions
 from commission.simulation.random_faults import FaultRates, draw_faults
 from commission.simulation.scenario import start_of, virtual_drive
 from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
 from commission.studies.monte_carlo import (
     ERROR_EDGES,
     QUANTILES,
@@ -94,6 +95,32 @@ def test_constants_are_drawn_as_the_project_knows_them() -> None:
     assert (constants.range_bias_sigma, constants.clock_offset_sigma) == (known.range_bias, known.clock)
     without = draw_faults(PROJECT, replace(RATES, constants=False), 1, 60.0)
     assert without.project.disturbances.constants == PROJECT.disturbances.constants
+    # What else the project says of its constants acts in both.
+    said = replace(PROJECT.disturbances.constants, forward_scale_sigma=0.02)
+    site = replace(PROJECT, disturbances=replace(PROJECT.disturbances, constants=said))
+    for rates in (RATES, replace(RATES, constants=False)):
+        assert draw_faults(site, rates, 1, 60.0).project.disturbances.constants.forward_scale_sigma == 0.02
+
+
+def test_constants_that_are_less_known_than_a_drive_can_draw_are_refused() -> None:
+    vague = replace(PROJECT, uncertainty=replace(PROJECT.uncertainty, survey=0.3))
+    with pytest.raises(UsageError, match=r"uncertainty holds 0\.3"):
+        draw_faults(vague, RATES, 1, 60.0)
+    draw_faults(vague, replace(RATES, constants=False), 1, 60.0)
+
+
+def test_a_vehicle_of_two_scanners_drives_without_beams() -> None:
+    first = PROJECT.scanners[0]
+    rear = replace(first, name="rear", mounting=(-0.2, 0.0, 3.1416))
+    posts = replace(PROJECT.reflectors.reflectors[0], id="shiny 1")
+    named = ReflectorMap((posts, *PROJECT.reflectors.reflectors[1:]))
+    site = replace(PROJECT, scanners=(first, rear), reflectors=named)
+    given = MonteCarloInput(
+        project=site, routes=("Out and back",), runs=2, seed=4, rates=RATES, detecting=Detecting.SHADOWS
+    )
+    found = monte_carlo(given, workers=Threads(1))
+    assert len(found.drives) == 2
+    assert all(each.errors.sum() > 0 for each in found.drives)
 
 
 def test_quantiles_are_no_smaller_than_those_of_the_errors_and_at_most_a_bin_larger() -> None:

@@ -52,8 +52,10 @@ class NavDriver(BaseDriver):
         for frame in frames:
             if not frame.startswith((b"sAN mNPOSGetData ", b"sAN mNLMDGetData ")):
                 continue
-            self._is_owed = False
-            yield from self._message(nav350.decode_nav(frame), arrived_ns)
+            result = nav350.decode_nav(frame)
+            # A device that answers with an error is asked again after a pause, like one that does not answer.
+            self._is_owed = bool(result.error)
+            yield from self._message(result, arrived_ns)
 
     def _message(self, result: nav350.NavResult, arrived_ns: int) -> Iterator[LiveMessage]:
         if result.error:

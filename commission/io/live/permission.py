@@ -86,12 +86,19 @@ class Permission:
             host = ipaddress.ip_address(address.host)
         except ValueError:
             raise _refused(address, f"{address.host!r} is a name, which may lead anywhere", "a number") from None
+        if getattr(host, "scope_id", None) is not None:
+            # What follows a "%" may be anything, and would be read as another host where addresses are put together.
+            raise _refused(address, f"{address.host!r} is of one interface", "an address without '%'")
+        host = getattr(host, "ipv4_mapped", None) or host
+        if host.is_unspecified and not listens:
+            raise _refused(address, f"{address.host} stands for this computer", "an address of the vehicle's network")
         if any(host in network for network in LOOPBACK):
             if self.is_shared and not listens:
                 raise _refused(address, "what answers on this computer alone is not for others to try", "a device's")
         elif not any(host in network for network in self.networks):
-            raise _refused(address, f"{host} is in no private network", "an address of the vehicle's network", host)
-        return address
+            found, expected = f"{host} is in no private network", "an address of the vehicle's network"
+            raise _refused(address, found, expected, None if host.is_unspecified else host)
+        return replace(address, host=str(ipaddress.ip_address(address.host)))
 
 
 NEAR = Permission()
@@ -100,7 +107,7 @@ NEAR = Permission()
 
 def _network(text: str) -> Network:
     try:
-        return ipaddress.ip_network(text)
+        return ipaddress.ip_network(text, strict=False)
     except ValueError:
         expected = "expected an address or ADDRESS/BITS such as 169.254.0.0/16"
         raise UsageError(f"--connect-to is {text!r}; {expected}") from None

@@ -20,7 +20,7 @@ class RosbridgeDriver(BaseDriver):
     Parameters
     ----------
     scanners : names of the vehicle's scanners.
-    scanner : which of them is meant where the source names one; else all are.
+    scanner : not read: the topics say which scanner a scan is of.
     """
 
     def __init__(self, scanners: tuple[str, ...], scanner: int) -> None:

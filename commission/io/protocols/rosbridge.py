@@ -159,22 +159,28 @@ def _stamp(message: Mapping[str, Any]) -> int:
         return 0
     seconds, rest = (stamp.get(a, stamp.get(b, 0)) for a, b in (("sec", "secs"), ("nanosec", "nsecs")))
     if not (isinstance(seconds, int) and isinstance(rest, int) and 0 <= seconds < 2**32 and 0 <= rest < 10**9):
-        raise DecodeError(f"the stamp is {str(stamp)[:40]}; expected seconds and nanoseconds", 0)
+        raise DecodeError("the stamp is out of range; expected seconds below 2^32 and nanoseconds below 10^9", 0)
     return seconds * 10**9 + rest
 
 
 def _number(values: Mapping[str, Any], name: str) -> float:
     found = values.get(name)
-    if not isinstance(found, int | float) or not math.isfinite(found) or abs(found) > _FAR:
-        raise DecodeError(f"{name} is {str(found)[:20]}; expected a number", 0)
+    # Compared only: an integer may have thousands of digits, which neither `float` nor `str` takes.
+    if not isinstance(found, int | float) or not -_FAR <= found <= _FAR:
+        raise DecodeError(f"{name} is {_told(found)}; expected a number", 0)
     return float(found)
+
+
+def _told(found: object) -> str:
+    """Return what stands there, for a message."""
+    return "a number that is too large" if isinstance(found, int) and abs(found) > _FAR else str(found)[:20]
 
 
 def _limit(values: Mapping[str, Any], name: str) -> float:
     """Nearest or farthest range [m]: some drivers say that it is infinite, or the largest number there is."""
     found = values.get(name)
-    if not isinstance(found, int | float) or math.isnan(found):
-        raise DecodeError(f"{name} is {str(found)[:20]}; expected a number", 0)
+    if not isinstance(found, int | float) or found != found:  # noqa: PLR0124 - NaN; an integer may be too long for a float
+        raise DecodeError(f"{name} is {_told(found)}; expected a number", 0)
     return float(min(max(found, -_FAR), _FAR))
 
 

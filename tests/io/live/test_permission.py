@@ -37,7 +37,7 @@ def test_devices_in_private_networks_may_be_named(text: str) -> None:
         ("cola:172.15.255.255:2112", "no private network"),
         ("cola:172.32.0.0:2112", "no private network"),
         ("cola:169.254.169.254:2112", "no private network"),
-        ("cola:0.0.0.0:2112", "no private network"),
+        ("cola:0.0.0.0:2112", "stands for this computer"),
         ("json:0.0.0.0:6061", "no private network"),
         ("cola:::ffff:8.8.8.8:2112", "no private network"),
         ("cola:10.0.0.7:1023", "system's services"),
@@ -66,6 +66,26 @@ def test_services_of_this_computer_are_not_for_other_computers_to_try() -> None:
     assert SHARED.checked(["json:127.0.0.1:6061"])
 
 
+@pytest.mark.parametrize(
+    "host", ["fd00::1%x]@127.0.0.1:38915?q=", "fd00::1%eth0", "fd00::1%]#", "::%1", "::ffff:10.0.0.1%?"]
+)
+@pytest.mark.parametrize("kind", ["rosbridge", "cola"])
+def test_nothing_hides_behind_the_number_of_an_address(kind: str, host: str) -> None:
+    for permission in (ALONE, SHARED):
+        with pytest.raises(UsageError):
+            permission.checked([f"{kind}:{host}:9090"])
+
+
+def test_other_names_of_this_computer_are_not_for_others_to_try_whatever_networks_are_let_in() -> None:
+    permission = Permission.of([], ["0.0.0.0/0", "::/0"], is_shared=True)
+    for host in ("0.0.0.0", "::", "::ffff:127.0.0.1", "::ffff:0.0.0.0", "127.0.0.1", "::1"):
+        with pytest.raises(UsageError, match="not for a browser to name"):
+            permission.checked([f"cola:{host}:2112"])
+    with pytest.raises(UsageError) as refused:
+        SHARED.checked(["json:0.0.0.0:6061"])
+    assert "--connect-to" not in str(refused.value)
+
+
 def test_localhost_is_the_address_that_it_stands_for() -> None:
     assert str(ALONE.checked(["cola:localhost:2112"])[0]) == "cola:127.0.0.1:2112"
 
@@ -85,7 +105,9 @@ def test_networks_that_were_named_at_the_start_are_let_in() -> None:
         with pytest.raises(UsageError):
             permission.checked([text])
     with pytest.raises(UsageError, match="ADDRESS/BITS"):
-        Permission.of([], ["10.0.0.1/8"], is_shared=False)
+        Permission.of([], ["10.0.0.1/33"], is_shared=False)
+    # Of an address with bits behind those of its network, the network is meant.
+    assert Permission.of([], ["203.0.113.9/24"], is_shared=False).checked(["cola:203.0.113.10:2112"])
 
 
 def test_so_many_sources_may_be_named_at_once() -> None:

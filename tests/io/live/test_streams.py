@@ -102,7 +102,10 @@ def test_a_nav350_that_does_not_navigate_is_asked_for_its_reflectors() -> None:
     wrong = frame_binary(b"sAN mNPOSGetData " + struct.pack(">HBBBHHHH", 1, 1, 1, 2, 0, 0, 0, 0))
     with pytest.raises(DecodeError, match="wrong mode of operation"):
         list(driver.take(wrong, 0))
-    assert driver.reply(1) == ASK_LANDMARKS
+    # An answer in no time must not become a question in no time.
+    driver.reply(1)
+    assert driver.reply(2) == b""
+    assert driver.reply(1_000_000_001) == ASK_LANDMARKS
     whole = nav_answer(4)
     begin = b"sAN mNLMDGetData " + whole[17:22]
     # The same answer without pose and scan: reflectors alone.
