@@ -153,12 +153,12 @@ class Localize:
         from commission.io.project_copy import refuse_to_replace
 
         if self.vda5050 is not None:
-            refuse_files(self.vda5050, force=self.force)
             for name, folder in (("results", self.out), ("recording", self.recording), ("project", self.project)):
                 if self.vda5050.resolve().is_relative_to(folder.resolve()):
                     raise UsageError(
                         f"--vda5050 {self.vda5050} is among the {name} in {folder}; expected another place"
                     )
+            refuse_files(self.vda5050, force=self.force)
         if self.rated_project is not None:
             if self.rated_project.resolve() == self.project.resolve():
                 raise UsageError(f"--rated-project is the project itself, {self.project}; expected another folder")

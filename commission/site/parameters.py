@@ -301,7 +301,12 @@ class ContourParameters:
     gate_probability: Annotated[
         float,
         Quantity(
-            label="Gate", shown=PERCENT, bounds=Bounds.inside(0.0, 1.0), step=0.01, slider=(50.0, 99.99), is_tail=True
+            label="Accepted to",
+            shown=PERCENT,
+            bounds=Bounds.inside(0.0, 1.0),
+            step=0.01,
+            slider=(50.0, 99.99),
+            is_tail=True,
         ),
     ] = 0.999
     """Probability that a true match falls inside the validation gate."""

@@ -44,7 +44,7 @@ UNITS = {
         "°/s²": DEGREES,
         "°/m": DEGREES,
     },
-    **{"%": 100.0, "%/m": 100.0, "": 1.0, "s": 1.0, "detections": 1.0},
+    **{"%": 100.0, "%/m": 100.0, "": 1.0, "s": 1.0, "detections": 1.0, "scans": 1.0},
 }
 """Number on the page for one SI unit, by the unit that the label names."""
 IN_DEGREES = {"First bearing", "Last bearing", "Resolution", "Beam width", "Steering to"}
@@ -65,6 +65,19 @@ PARAMETERS = {
     "detector.expected_beams": ("Beams expected by", None),
     "detector.center": ("Center from", None),
     "filter.consider": ("Consider constant errors", None),
+    "contour.enabled": ("Contours", None),
+    "contour.method": ("Matched by", None),
+    "contour.length": ("Cost flat from [mm]", 1000.0),
+    "contour.iterations": ("Iterations", 1.0),
+    "contour.smallest_step": ("Ends below [mm]", 1000.0),
+    "contour.largest_error": ("Matched to [mm]", 1000.0),
+    "contour.beam_sigma": ("Beam 1σ [mm]", 1000.0),
+    "contour.map_sigma": ("Map 1σ [mm]", 1000.0),
+    "contour.map_heading_sigma": ("Map turned 1σ [°]", DEGREES),
+    "contour.map_correlation": ("Map alike over [m]", 1.0),
+    "contour.least_matched": ("Matched at least [%]", 100.0),
+    "contour.least_share": ("Direction told by [%]", 100.0),
+    "contour.gate_probability": ("Accepted to [%]", 100.0),
     "supervisor.enabled": ("Supervisor", None),
     "supervisor.position_limit": ("2σ position [mm]", 1000.0),
     "supervisor.position_sigma": ("Position σ", None),

@@ -37,8 +37,9 @@ def scan(number: int, beams: int = 541) -> Scan:
 
 
 def numbers_of(records: Sequence[Record]) -> list[int]:
-    """Numbers of scans."""
-    return [round((float(record.ranges[0]) - 1.0) / 0.01) for record in records if isinstance(record, Scan)]
+    """Numbers of scans; one whose first beam met nothing has none."""
+    firsts = [float(record.ranges[0]) for record in records if isinstance(record, Scan)]
+    return [round((first - 1.0) / 0.01) for first in firsts if np.isfinite(first)]
 
 
 @dataclass
