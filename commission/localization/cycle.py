@@ -19,15 +19,18 @@ from commission.localization.association import INLIER, NOBODY, Gate, associate
 from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering, considering
 from commission.localization.consider_columns import begin, busy_chunks, put_back, put_block, take_along
 from commission.localization.consider_correction import correct_aimed_with
-from commission.localization.contour import ACCEPTED, USE, ContourModel, ContourScan, observe_contours
+from commission.localization.contour import ACCEPTED, REJECTED, ROWS, USE, ContourModel, ContourScan, observe_contours
 from commission.localization.kalman import correct_aimed
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import Motion, NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
-from commission.localization.rejection import Evidence, RejectionRule, is_doubtful, rejects_the_world, weigh
+from commission.localization.rejection import rejects_the_world, weigh
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
 from commission.localization.supervisor import FAIL, LOST, OPERATIONAL, supervise
+
+WHOLE_POSE = 3
+"""Rows of a match that tells place and heading."""
 
 
 class Cycle(NamedTuple):
@@ -178,9 +181,9 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         places,
         cell_offsets,
         status,
+        said_by_contours(figures),
         model.rejection,
     )
-    evidence = confirmed_by_contours(evidence, prior, model.rejection, figures)
     was_lost = state.mode == LOST
     mode = supervise(FAIL if was_lost else state.mode, posterior, model.limits)
     if evidence.confirmed < model.rejection.confirmations:
@@ -249,36 +252,23 @@ def with_contours(  # noqa: PLR0917 - the filter's state around one scan
 
 
 @compiled_inline
-def confirmed_by_contours(
-    evidence: Evidence, prior: PoseGaussian, rule: RejectionRule, figures: FloatArray | None
-) -> Evidence:
-    """Count an accepted match of contours like an accepted reflector, where the pose has to prove right.
+def said_by_contours(figures: FloatArray | None) -> float:
+    """What the contours of a scan say of the pose: 1 for it, -1 against it, 0 nothing.
 
     Parameters
     ----------
-    evidence : after the reflectors of the scan.
-    prior : before the scan.
-    rule : says what is doubtful.
     figures : of the scan's contours, or None.
 
     Notes
     -----
-    confirmed = confirmed + 1 after an accepted match whose prior was not doubtful: derived, as for a detection in
-    `weigh`.
+    No formula: accepted or rejected, where they tell all three of place and heading. In a corridor they tell two,
+    which fit everywhere along it.
     """
-    if figures is None:
-        return evidence
-    if figures[USE] != ACCEPTED or is_doubtful(prior, rule):
-        return evidence
-    return Evidence(
-        evidence.stamp_ns,
-        evidence.near_accepted,
-        evidence.near_rejected,
-        evidence.accepted,
-        evidence.rejected,
-        evidence.confirmed + 1.0,
-        evidence.against,
-    )
+    if figures is None or figures[ROWS] != WHOLE_POSE:
+        return 0.0
+    if figures[USE] == ACCEPTED:
+        return 1.0
+    return -1.0 if figures[USE] == REJECTED else 0.0
 
 
 class Room(NamedTuple):

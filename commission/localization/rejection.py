@@ -28,6 +28,8 @@ FEWEST_AGAINST = 3.0
 """Rejected detections that a scan holds at least to speak against the pose: of one shiny thing there is one."""
 MOST_FOR = 0.25
 """Accepted ones for each rejected one that such a scan holds at most: chance lets one or two of eight pass."""
+PER_MATCH = 3.0
+"""Accepted detections that a match of contours which tells the whole pose counts for."""
 
 
 class Evidence(NamedTuple):
@@ -42,7 +44,8 @@ class Evidence(NamedTuple):
     rejected: float
     """All of them: over the long window."""
     confirmed: float
-    """Accepted since the belief was too wide to tell reflectors apart; infinite where it never was."""
+    """Accepted detections and matches of contours, since the belief was too wide to tell reflectors apart; infinite
+    where it never was."""
     against: float
     """Scans in a row that rejected nearly all they saw; those that saw too little to say are passed over."""
 
@@ -112,9 +115,10 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     places: FloatArray,
     cell_offsets: IntArray,
     status: NDArray[np.int8],
+    contours: float,
     rule: RejectionRule,
 ) -> Evidence:
-    """Count what became of a scan's detections.
+    """Count what became of a scan's detections, and what its contours say.
 
     Parameters
     ----------
@@ -126,13 +130,18 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     model : of the observation.
     cells, places, cell_offsets : the map, see `ReflectorIndex`.
     status : (n,) a `Status` each; what the detector filter rejected does not count.
+    contours : 1 where they match and tell the whole pose, -1 where what they tell so is rejected, else 0.
     rule : windows and limits.
 
     Notes
     -----
     n <- n max(exp(-dt / window), min(1, fewest / n)) + count: exponential forgetting that waits where there is little,
     derived from a mean over the window. A scan speaks for the pose where accepted > rejected / 4, and against it where
-    not and rejected >= 3, by definition.
+    not and rejected >= 3, by definition. Where reflectors speak for it, rejected contours say nothing: the walls have
+    changed. Where they do not, rejected contours speak against it; and contours that match, from a belief that was not
+    doubtful, speak for it: then what is near no reflector is a thing that the map lacks and does not count, but what is
+    rejected near reflectors does, so that many of those still make the vehicle lost. A match counts as three accepted
+    detections, and as one where the pose has to prove right.
     """
     accepted, rejected, near = 0.0, 0.0, 0.0
     for i in range(first, last):
@@ -150,12 +159,17 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
                 rejected += 1.0
                 near += 1.0 if distance <= reach else 0.0
     confirmed, against = evidence.confirmed, evidence.against
-    if accepted > MOST_FOR * rejected:
+    doubtful = is_doubtful(belief, rule)
+    matches = contours > 0.0 and not doubtful
+    if accepted > MOST_FOR * rejected or matches:
         against = 0.0
-    elif rejected >= FEWEST_AGAINST:
+    elif rejected >= FEWEST_AGAINST or contours < 0.0:
         against += 1.0
-    if is_doubtful(belief, rule):
+    if doubtful:
         accepted, confirmed = 0.0, 0.0
+    confirmed += accepted
+    if matches:
+        accepted, rejected, confirmed = accepted + PER_MATCH, near, confirmed + 1.0
     seconds = (stamp_ns - evidence.stamp_ns) * 1e-9
     of_near, of_all = evidence.near_accepted + evidence.near_rejected, evidence.accepted + evidence.rejected
     kept_near = max(math.exp(-seconds / rule.window_s), min(1.0, rule.fewest / max(of_near, 1e-9)))
@@ -166,7 +180,7 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
         kept_near * evidence.near_rejected + near,
         kept * evidence.accepted + accepted,
         kept * evidence.rejected + rejected,
-        confirmed + accepted,
+        confirmed,
         against,
     )
 

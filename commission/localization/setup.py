@@ -34,6 +34,8 @@ from commission.site.uncertainty import Uncertainty
 
 _THRESHOLDS = ("intensity_threshold", "far_threshold", "far_distance")
 """Parameters of the detector that are in no `DetectorModel`: which beams count as reflective is known before it."""
+FEWEST_TO_FIND = 3
+"""Reflectors of the map from which on a lost vehicle can be searched for: a place needs that many that fit."""
 
 
 class FilterModel(NamedTuple):
@@ -90,11 +92,14 @@ class LocalizerSetup:
     def __post_init__(self) -> None:
         considers, known = self.parameters.filter.consider, self.uncertainty
         index = build_index(self.reflectors, self.survey_sigmas)
+        limits = supervisor_limits(self.parameters.supervisor)
+        # A search among fewer could never end; the vehicle is lost until what it sees fits again.
+        limits = limits._replace(find_again=limits.find_again and len(index.places) >= FEWEST_TO_FIND)
         model = FilterModel(
             odometry_noise(self.parameters.odometry),
             index.cells,
             gate_of(self.parameters.association),
-            supervisor_limits(self.parameters.supervisor),
+            limits,
             rejection_rule(self.parameters.supervisor),
             consider_model(known),
         )

@@ -101,26 +101,59 @@ def test_vehicle_is_lost_by_scans_in_a_row_that_reject_nearly_all(against: float
 def test_a_scan_speaks_against_the_pose_by_what_it_rejects(
     accepted: int, rejected: int, before: float, after: float
 ) -> None:
+    assert weighed(accepted, rejected, against=before).against == after
+
+
+@pytest.mark.parametrize(
+    ("accepted", "rejected", "contours", "after"),
+    [
+        (0, 0, -1.0, 5.0),
+        (0, 2, -1.0, 5.0),
+        (1, 0, -1.0, 0.0),  # reflectors speak for it: the walls have changed
+        (1, 4, -1.0, 5.0),
+        (0, 0, 1.0, 0.0),
+        (0, 3, 1.0, 0.0),
+        (0, 0, 0.0, 4.0),
+    ],
+)
+def test_contours_speak_for_or_against_the_pose_where_reflectors_do_not_speak_for_it(
+    accepted: int, rejected: int, contours: float, after: float
+) -> None:
+    assert weighed(accepted, rejected, contours=contours).against == after
+
+
+def test_where_contours_match_only_what_is_rejected_near_reflectors_counts() -> None:
+    far, near = weighed(0, 4, contours=1.0), weighed(0, 4, contours=1.0, place=(4.5, 0.0))
+    assert (far.accepted, far.rejected, far.near_rejected, far.confirmed) == (3.0, 0.0, 0.0, 1.0)
+    assert (near.accepted, near.rejected, near.near_rejected, near.confirmed) == (3.0, 4.0, 4.0, 1.0)
+    doubtful = weighed(0, 4, contours=1.0, variance=100.0)
+    assert (doubtful.accepted, doubtful.rejected, doubtful.confirmed, doubtful.against) == (0.0, 4.0, 0.0, 5.0)
+
+
+def weighed(
+    accepted: int, rejected: int, *, contours: float = 0.0, against: float = 4.0, place=(2.0, 1.0), variance=1e-6
+) -> Evidence:
+    """What one scan leaves, of a vehicle with a single reflector 5 m ahead; `place` is the range and bearing of all."""
     setup = LocalizerSetup(
         reflectors=ReflectorMap((Reflector(id="A", x=5.0, y=0.0),)), scanners=(Scanner(),), parameters=Parameters()
     )
     status = np.array([0] * accepted + [2] * rejected, dtype=np.int8)
-    belief = PoseGaussian(0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 1e-6, 0.0, 1e-6)
-    seen = weigh(
-        NO_EVIDENCE._replace(against=before),
+    belief = PoseGaussian(0.0, 0.0, 0.0, variance, 0.0, 0.0, variance, 0.0, 1e-6)
+    return weigh(
+        NO_EVIDENCE._replace(against=against, confirmed=0.0),
         SECOND,
         belief,
         0,
         len(status),
-        np.tile([2.0, 1.0], (len(status), 1)),
+        np.tile(place, (len(status), 1)),
         setup.observations[0],
         setup.index.cells,
         setup.index.places,
         setup.index.offsets,
         status,
-        RULE,
+        contours,
+        RULE._replace(doubtful_position=1.0),
     )
-    assert seen.against == after
 
 
 def lonely(**supervisor: float) -> Localizer:

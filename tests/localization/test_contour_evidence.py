@@ -1,0 +1,106 @@
+"""What contours say for and against a pose, over whole drives at standstill in halls with no reflector in sight."""
+
+# pyright: basic
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+
+from commission.localization.contour import ACCEPTED, ROWS, USE
+from commission.localization.estimate import Belief, Mode
+from commission.localization.localizer import Localizer
+from commission.localization.setup import LocalizerSetup
+from commission.localization.state import state_at_start
+from commission.site.parameters import ContourParameters, Parameters
+from commission.site.records import Odometry, Scan
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.scanner import Scanner
+from tests.localization.contour_halls import corridor, room, scan_from
+
+BEAMS, PERIOD_NS = 720, 100_000_000
+FULL_TURN = Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=0.5, range=(0.05, 20.0))
+TRUTH = np.array((4.0, 3.6, 0.4))
+KNOWN = np.diag(np.square((0.03, 0.03, 0.01)))
+FAR_AWAY = ReflectorMap((Reflector(id="A", x=-50.0, y=-50.0),))
+
+
+def localizer_in(floor, start, *, reflectors=None, to_confirm=False, **supervisor) -> Localizer:
+    parameters = Parameters(contour=ContourParameters(enabled=True))
+    parameters = dataclasses.replace(parameters, supervisor=dataclasses.replace(parameters.supervisor, **supervisor))
+    setup = LocalizerSetup(
+        reflectors=reflectors or ReflectorMap(), scanners=(FULL_TURN,), parameters=parameters, floor=floor
+    )
+    state = state_at_start(Belief(0, np.array(start, dtype=np.float64), KNOWN))
+    if to_confirm:
+        state = state._replace(mode=int(Mode.FAIL), evidence=state.evidence._replace(confirmed=0.0))
+    return Localizer(setup, state)
+
+
+def stand(localizer, floor, pose, scans, *, first=0, bright=()):
+    """Estimates of a vehicle that stands still; `bright` are ranges and bearings of things that the map lacks."""
+    rng, estimates = np.random.default_rng(first), []
+    ranges, bearings = scan_from(floor, pose, beams=BEAMS)
+    for k in range(first, first + scans):
+        seen, shiny = ranges + 0.01 * rng.standard_normal(BEAMS), np.zeros(BEAMS, dtype=bool)
+        for distance, bearing in bright:
+            where = np.abs(bearings - bearing) * distance < 0.04
+            seen[where], shiny[where] = distance, True
+        seen = np.where(np.isfinite(seen), seen, np.nan).astype(np.float32)
+        localizer.feed(Odometry(k * PERIOD_NS, np.zeros(3)))
+        estimates += localizer.feed(
+            Scan(
+                stamp_ns=k * PERIOD_NS,
+                ranges=seen,
+                angle_min=-math.pi,
+                angle_increment=2.0 * math.pi / BEAMS,
+                reflector=shiny,
+            )
+        )
+    return estimates
+
+
+def test_a_corridor_does_not_confirm_the_place_along_it():
+    floor = corridor()
+    localizer = localizer_in(floor, (25.0, 1.2, 0.0), to_confirm=True, position_limit=0.15)
+    estimates = stand(localizer, floor, (30.0, 1.2, 0.0), 40)
+    assert all(each.contours[USE] == ACCEPTED and each.contours[ROWS] == 2 for each in estimates)
+    assert not any(each.mode == Mode.OPERATIONAL for each in estimates)
+
+
+def test_a_room_confirms_a_pose_after_twenty_scans():
+    floor = room()
+    estimates = stand(localizer_in(floor, TRUTH, to_confirm=True), floor, TRUTH, 25)
+    modes = [each.mode for each in estimates]
+    assert modes.index(Mode.OPERATIONAL) == 19
+
+
+def test_a_vehicle_that_was_carried_away_in_a_room_without_reflectors_is_lost_after_ten_scans():
+    floor = room()
+    localizer = localizer_in(floor, TRUTH)
+    assert stand(localizer, floor, TRUTH, 20)[-1].mode == Mode.OPERATIONAL
+    moved = stand(localizer, floor, np.add(TRUTH, (0.5, 0.3, 0.0)), 40, first=20)
+    modes = [each.mode for each in moved]
+    assert modes.index(Mode.LOST) in (9, 10)
+    assert Mode.OPERATIONAL not in modes[10:]
+    # Carried back, it is believed again: such a map has nothing to search.
+    assert stand(localizer, floor, TRUTH, 10, first=60)[-1].mode == Mode.OPERATIONAL
+
+
+def test_things_that_the_map_lacks_do_not_lose_a_vehicle_whose_contours_match():
+    floor, bright = room(), ((0.8, 0.5), (1.0, 1.5), (0.9, -1.0))
+    for reflectors in (ReflectorMap(), FAR_AWAY):
+        localizer = localizer_in(floor, TRUTH, reflectors=reflectors)
+        estimates = stand(localizer, floor, TRUTH, 60, bright=bright)
+        assert all(len(each.status) == 3 for each in estimates[1:])
+        assert all(each.mode == Mode.OPERATIONAL for each in estimates)
+
+
+def test_a_vehicle_that_was_lost_is_operational_again_once_contours_match():
+    floor = room()
+    localizer = localizer_in(floor, TRUTH, reflectors=FAR_AWAY)
+    moved = stand(localizer, floor, np.add(TRUTH, (0.5, 0.3, 0.0)), 30, bright=((0.8, 0.5), (1.0, 1.5), (0.9, -1.0)))
+    assert moved[-1].mode == Mode.LOST
+    assert stand(localizer, floor, TRUTH, 80, first=30)[-1].mode == Mode.OPERATIONAL
