@@ -73,14 +73,14 @@ def what_beams_say(view: int, distance: float, bearing: float, ends: Ends) -> in
     Notes
     -----
     hidden if any end < distance - BEFORE; through if all ends > distance + BEHIND and something came back, over the
-    directions up to ASIDE / distance + TURNED from the bearing; by definition.
+    directions up to ASIDE / distance + TURNED from the bearing; by definition. Directions without an end say nothing:
+    beams of a degree leave every second one empty.
     """
     half = min(ASIDE / max(distance, ASIDE) + TURNED, 0.5)
     first, last = math.floor((bearing - half) / BIN), math.floor((bearing + half) / BIN)
-    nearest, farthest = math.inf, 0.0
+    nearest = math.inf
     for each in range(first, last + 1):
-        end = float(ends[view, each % BINS])
-        nearest, farthest = min(nearest, end), max(farthest, end)
+        nearest = min(nearest, float(ends[view, each % BINS]))
     if nearest < distance - BEFORE:
         return HIDDEN
-    return THROUGH if nearest > distance + BEHIND and farthest < math.inf else UNKNOWN
+    return THROUGH if math.inf > nearest > distance + BEHIND else UNKNOWN

@@ -247,6 +247,21 @@ def test_a_single_beam_before_a_reflector_hides_it_and_a_mirrored_scanner_looks_
     assert (beam_ends(None, upside_down=False) == np.inf).all()
 
 
+@pytest.mark.parametrize("resolution_deg", [1.0, 0.5, 0.36, 0.25])
+def test_beams_of_any_resolution_that_go_on_behind_a_place_went_through_it(resolution_deg: float) -> None:
+    bearings = np.radians(np.arange(-90.0, 90.0, resolution_deg))
+    for end, expected in ((9.0, THROUGH), (6.0, UNKNOWN), (3.0, HIDDEN), (math.nan, UNKNOWN)):
+        scan = Scan(
+            stamp_ns=0,
+            ranges=np.full(len(bearings), end, dtype=np.float32),
+            angle_min=float(bearings[0]),
+            angle_increment=math.radians(resolution_deg),
+        )
+        ends = beam_ends(scan, upside_down=False)
+        for away, toward in itertools.product((5.9, 5.7), np.radians(np.linspace(-80.0, 80.0, 97))):
+            assert what_beams_say(0, away, toward, ends) == expected, (end, away, toward)
+
+
 def test_a_wall_of_the_map_hides_what_beams_seem_to_go_up_to() -> None:
     one_more = ReflectorMap((*TRIANGLE.reflectors, Reflector(id="D", x=9.0, y=0.5)))
     hall = RayCaster(OccupancyGrid(WALL, 0.3, np.array([0.0, -6.0, 0.0])))
