@@ -58,10 +58,12 @@ class Localize:
     """Folder for the project with these shares as its scanners' detection_rates, and reflector_range out to where one
     is seen; made when it does not exist."""
     vda5050: Annotated[Path | None, arg(metavar="FILE")] = None
-    """File for state messages of VDA 5050, one JSON object a line: at each change of the mode and each second, with a
-    LOCALIZATION_ERROR exactly while the vehicle is not operational. What a localizer does not know is empty."""
+    """File for state messages of VDA 5050, one JSON object a line: at each change of the mode and about each second,
+    with a LOCALIZATION_ERROR exactly while the vehicle is not operational. What a localizer does not know is empty."""
     vda5050_version: Literal["2.1.0", "3.0.0"] = "2.1.0"
     """Version of these messages."""
+    vda5050_map_id: Annotated[str | None, arg(metavar="ID")] = None
+    """Identification of the map in these messages, as the orders have it. None: the project's name."""
     strict: bool = False
     """Refuse a recording that cannot be what it says (units, clocks, gaps, thresholds) instead of noting it."""
 
@@ -144,7 +146,8 @@ class Localize:
             return []
         from commission.io.vda5050_states import StateVersion, write_states
 
-        count = write_states(self.vda5050, result, project.name, StateVersion(self.vda5050_version))
+        map_id = project.name if self.vda5050_map_id is None else self.vda5050_map_id
+        count = write_states(self.vda5050, result, map_id, StateVersion(self.vda5050_version))
         return [f"VDA 5050     {count} state messages in {self.vda5050}"]
 
     def _refuse_to_overwrite(self) -> None:

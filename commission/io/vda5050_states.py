@@ -24,7 +24,7 @@ from commission.localization.estimate import Mode
 from commission.studies.run import RunResult
 
 PERIOD_NS = 1_000_000_000
-"""Time between two messages at most, where the mode stays [ns]; each change of the mode is told at its own scan."""
+"""Time between two messages at least, where the mode stays [ns]; each change of the mode is told at its own scan."""
 ERROR = "LOCALIZATION_ERROR"
 WHY = {
     Mode.FAIL: "the position is too uncertain, or nothing confirms it yet",
@@ -61,7 +61,7 @@ def write_states(path: Path, result: RunResult, map_id: str, version: StateVersi
 
 
 def state_messages(result: RunResult, map_id: str, version: StateVersion = StateVersion.V2) -> Iterator[dict[str, Any]]:
-    """Deliver the state messages of a run: at each change of the mode, else each second.
+    """Deliver the state messages of a run: at each change of the mode, else at the first scan a second later.
 
     Parameters
     ----------
@@ -80,23 +80,24 @@ def state_messages(result: RunResult, map_id: str, version: StateVersion = State
         mode = Mode(int(columns.modes[cycle]))
         x, y, theta = columns.means[cycle].tolist()
         localized = mode is Mode.OPERATIONAL
-        position: dict[str, Any] = {"x": x, "y": y, "theta": wrap_scalar(theta), "mapId": map_id}
-        position["localized" if version is StateVersion.V3 else "positionInitialized"] = localized
-        deviation = float(result.position_two_sigma[cycle])
-        if math.isfinite(deviation):
-            position["deviationRange"] = deviation
+        position: dict[str, Any] = {}
+        if all(map(math.isfinite, (x, y, theta))):
+            position = {"x": x, "y": y, "theta": wrap_scalar(theta), "mapId": map_id}
+            position["localized" if version is StateVersion.V3 else "positionInitialized"] = localized
+            deviation = float(result.position_two_sigma[cycle])
+            position |= {"deviationRange": deviation} if math.isfinite(deviation) else {}
         errors = [] if localized else [{"errorType": ERROR, "errorDescription": WHY[mode], "errorLevel": "FATAL"}]
         yield {
             "headerId": header,
             "timestamp": timestamp(int(columns.stamps_ns[cycle]), version),
             **_unknown(version),
-            ("mobileRobotPosition" if version is StateVersion.V3 else "agvPosition"): position,
+            **({"mobileRobotPosition" if version is StateVersion.V3 else "agvPosition": position} if position else {}),
             "errors": errors,
         }
 
 
 def told_cycles(stamps_ns: IntArray, modes: IntArray) -> IntArray:
-    """(M,) cycles that have a message: the first one, each change of the mode, and each a second after the one before.
+    """(M,) cycles that have a message: the first one, each change of the mode, and the first a second after one.
 
     Parameters
     ----------

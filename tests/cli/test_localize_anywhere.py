@@ -33,6 +33,9 @@ def test_a_vehicle_that_nobody_locates_is_looked_for_and_says_so_in_messages(
     assert states[-1]["errors"] == []
     assert states[-1]["agvPosition"]["mapId"] == "Small hall"
     assert f"{len(states)} state messages" in told
+    named = ("--vda5050", tmp_path / "named.jsonl", "--vda5050-map-id", "floor 1")
+    assert commission("localize", project, recording, "--out", tmp_path / "out", *named)[0] == 0
+    assert '"mapId": "floor 1"' in named[1].read_text(encoding="utf-8").splitlines()[0]
     # A file that is there is not overwritten unasked.
     code, _, err = commission("localize", project, recording, "--out", tmp_path / "out", *options)
     assert code != 0

@@ -94,6 +94,24 @@ def test_the_messages_have_all_that_the_schema_asks_for(shared_data: Path, versi
         assert_fits(message, schema, schema)
 
 
+@pytest.mark.parametrize("version", StateVersion)
+@pytest.mark.parametrize(("column", "value"), [(0, math.nan), (1, math.inf), (2, math.nan)])
+def test_a_position_that_is_no_number_is_left_out(
+    shared_data: Path, tmp_path: Path, version: StateVersion, column: int, value: float
+) -> None:
+    folder = shared_data / "layouts" / "vda5050" / f"schemas_{version.value}" / "json_schemas"
+    schema = json.loads((folder / "state.schema").read_text(encoding="utf-8"))
+    run = made_run()
+    run.columns.means[0, column] = value
+    write_states(tmp_path / "states.jsonl", run, "hall", version)
+    first, *others = (json.loads(each) for each in (tmp_path / "states.jsonl").read_text("utf-8").splitlines())
+    assert first == {
+        key: each for key, each in next(state_messages(made_run(), "hall", version)).items() if "Position" not in key
+    }
+    assert others == list(state_messages(made_run(), "hall", version))[1:]
+    assert_fits(first, schema, schema)
+
+
 TYPES = {"object": dict, "array": list, "string": str, "number": float, "integer": int, "boolean": bool}
 
 
@@ -123,6 +141,9 @@ def test_a_message_comes_at_each_change_and_each_second() -> None:
     modes[5:7] = 2
     assert told_cycles(stamps, modes).tolist() == [0, 4, 5, 7, 11, 15, 19]
     assert told_cycles(stamps[:0], modes[:0]).tolist() == []
+    # Scans farther apart than a second's share: the first one a second later.
+    slow = np.arange(0, 4_000_000_000, 700_000_000)
+    assert told_cycles(slow, np.zeros(len(slow), dtype=np.int64)).tolist() == [0, 2, 4]
     assert told_cycles(np.array([0, 9_000_000_000, 9_000_000_000]), modes[:3]).tolist() == [0, 1]
 
 
