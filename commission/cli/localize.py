@@ -81,7 +81,7 @@ class Localize:
 
         from commission.errors import SourceError
         from commission.io.overwriting import result_folder
-        from commission.io.project_file import apply_settings, load_project
+        from commission.io.project_file import load_project
         from commission.io.recordings.base import load_log
         from commission.io.recordings.channels import ChannelOptions
         from commission.io.results import RESULTS, write_events, write_reflector_figures, write_results
@@ -101,7 +101,7 @@ class Localize:
         out = result_folder(self.out, "localize", RESULTS, force=self.force, sources=sources)
         self._refuse_to_overwrite()
         project = as_saved = load_project(self.project)
-        project = dataclasses.replace(project, parameters=apply_settings(project.parameters, self.set))
+        project = self._with_settings(project)
         log = self._with_reference(load_log(self.recording, ChannelOptions.parse(self.channel, self.wheels)))
         if not has_motion(log):
             found = "holds no odometry: between scans nobody knows where the vehicle went"
@@ -181,6 +181,15 @@ class Localize:
         notes = [] if kept is None else [f"Note         unsaved edits of the project that was there are kept in {kept}"]
         told = map(rated_told, as_saved.scanners, scanners)
         return [*told, *notes, f"Rated        {self.rated_project}"]
+
+    def _with_settings(self, project: Project) -> Project:
+        """Return the project with the parameters that are set; raises UsageError where its floor cannot serve them."""
+        from commission.io.project_file import apply_settings
+
+        parameters = apply_settings(project.parameters, self.set)
+        if parameters.contour.enabled and project.floor_map is None:
+            raise UsageError(f"contour.enabled is true and {self.project} has no floor map; expected one with walls")
+        return dataclasses.replace(project, parameters=parameters)
 
     def _with_reference(self, log: RecordLog) -> RecordLog:
         """Return the log with a reference that measures where the options say."""

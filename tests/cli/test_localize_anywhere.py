@@ -53,3 +53,10 @@ def test_messages_are_not_written_over_results_recording_or_project(
         assert among in said
         assert (path.read_bytes() if path.is_file() else b"") == before
     assert not out.exists()
+
+
+def test_contours_without_a_floor_map_are_refused(
+    refused: Callable[..., str], project: Path, recording: Path, tmp_path: Path
+) -> None:
+    words = ("localize", project, recording, "--out", tmp_path / "out", "--set", "contour.enabled=true")
+    assert "has no floor map" in refused(*words)
