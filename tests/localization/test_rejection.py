@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -131,7 +132,13 @@ def test_where_contours_match_only_what_is_rejected_near_reflectors_counts() -> 
 
 
 def weighed(
-    accepted: int, rejected: int, *, contours: float = 0.0, against: float = 4.0, place=(2.0, 1.0), variance=1e-6
+    accepted: int,
+    rejected: int,
+    *,
+    contours: float = 0.0,
+    against: float = 4.0,
+    place: tuple[float, float] = (2.0, 1.0),
+    variance: float = 1e-6,
 ) -> Evidence:
     """What one scan leaves, of a vehicle with a single reflector 5 m ahead; `place` is the range and bearing of all."""
     setup = LocalizerSetup(
@@ -156,7 +163,7 @@ def weighed(
     )
 
 
-def lonely(**supervisor: float) -> Localizer:
+def lonely(**supervisor: Any) -> Localizer:
     """One that stands still before a single reflector, 5 m ahead."""
     parameters = dataclasses.replace(Parameters(), supervisor=SupervisorParameters(**supervisor))
     setup = LocalizerSetup(
