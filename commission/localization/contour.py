@@ -369,9 +369,9 @@ def rows_of_match(  # noqa: PLR0917 - a match and its points
 
     Notes
     -----
-    P_match = 2 s^2 / L^2 (d^2 sum E / dX^2)^-1 along each direction that is told: the cost's second derivative
-    (Sobreira et al. 2015, section 3), scaled so that it is that of d^2 / (2 s^2) near 0; s is the noise of a beam, or
-    what the matched points show where that is more.
+    P_match = 2 s^2 / L^2 (sum E'' n n^T)^-1 along each direction that is told, n as in `information_of`: the cost's
+    second derivative (Sobreira et al. 2015, section 3) but for the curvature of the distance itself, scaled so that it
+    is that of d^2 / (2 s^2) near 0; s is the noise of a beam, or what the matched points show where that is more.
     """
     resolution, length, tables = model.tables.resolution, model.rule.length, model.tables
     at = information_of(pose, lever, points, tables, length, threshold)

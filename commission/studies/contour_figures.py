@@ -6,6 +6,7 @@ import numpy as np
 
 from commission.localization.contour import COST, MATCHED, NIS, POINTS, ROWS, USE, ContourUse
 from commission.localization.run_columns import RunColumns
+from commission.studies.plausibility import Finding
 
 Number = int | float | None
 
@@ -32,3 +33,25 @@ def contour_figures(columns: RunColumns) -> dict[str, Number]:
         "contour_cost_mean": float(looked[:, COST].mean()) if len(looked) else None,
         "contour_nis_per_row_mean": float(accepted[:, NIS].sum()) / rows if rows else None,
     }
+
+
+def contour_findings(columns: RunColumns) -> tuple[Finding, ...]:
+    """Say when contours are to be matched and no scan was: without a word the run would look as if they counted.
+
+    Parameters
+    ----------
+    columns : the run; its first setup says whether contours are to be matched.
+
+    Returns
+    -------
+    findings : one or none.
+    """
+    setup = columns.segments[0].setup
+    if not setup.parameters.contour.enabled or (columns.contours[:, USE] != ContourUse.NONE).any():
+        return ()
+    if setup.floor is None:
+        probably, remedy = "the project has no floor map", "load one with walls, or set contour.enabled=false"
+    else:
+        probably, remedy = "the recording holds no whole scans", "record them, or set contour.enabled=false"
+    found = "contours are to be matched and none of the scans was"
+    return (Finding(found=found, probably=probably, remedy=remedy),)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from commission.progress import Progress, part, silent
 from commission.studies.consistency_findings import noise_findings
+from commission.studies.contour_figures import contour_findings
 from commission.studies.misfit import MisfitInput, misfit
 from commission.studies.plausibility import Finding, PlausibilityInput, plausibility
 from commission.studies.run import RunResult
@@ -43,4 +44,5 @@ def run_findings(result: RunResult, progress: Progress = silent) -> tuple[Findin
     before = plausibility(recording_input(result), part(progress, 0.0, JUDGED_BEFORE))
     found = misfit(inputs, part(progress, JUDGED_BEFORE, 1.0))
     # A factor of the noise says little where the setup itself is another one.
-    return (*before, *found, *(noise_findings(result.columns) if not found else ()))
+    noise = noise_findings(result.columns) if not found else ()
+    return (*before, *found, *noise, *contour_findings(result.columns))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from commission.localization.contour import COST, MATCHED, NIS, POINTS, ROWS, USE, ContourUse
-from commission.studies.contour_figures import contour_figures
+from commission.studies.contour_figures import contour_figures, contour_findings
 
 
 def columns_of(*rows) -> Any:
@@ -48,3 +48,21 @@ def test_a_run_that_never_looked_has_counts_and_no_means():
     assert found["contour_accepted"] == 0
     assert found["contour_matched_fraction"] is None
     assert found["contour_nis_per_row_mean"] is None
+
+
+@pytest.mark.parametrize(
+    ("enabled", "uses", "floor", "said"),
+    [
+        (True, (), None, "no floor map"),
+        (True, (ContourUse.NONE, ContourUse.NONE), "a floor", "no whole scans"),
+        (True, (ContourUse.NONE, ContourUse.UNMATCHED), "a floor", None),
+        (False, (), None, None),
+    ],
+)
+def test_contours_that_are_asked_for_and_never_matched_are_told(enabled, uses, floor, said):
+    columns = columns_of(*((use, 5, 0, 0.0, 0.0, 0) for use in uses))
+    setup = SimpleNamespace(parameters=SimpleNamespace(contour=SimpleNamespace(enabled=enabled)), floor=floor)
+    columns.segments = (SimpleNamespace(setup=setup),)
+    found = contour_findings(columns)
+    assert len(found) == (said is not None)
+    assert said is None or said in str(found[0])
