@@ -16,6 +16,7 @@ from typing import NoReturn
 from commission.app.base.logs import SHOW_TRACEBACK, one_line_each
 from commission.cli.ambiguity import Ambiguity
 from commission.cli.calibrate import Calibrate
+from commission.cli.clock import Clock
 from commission.cli.convert import Convert
 from commission.cli.coverage import CoverageCommand
 from commission.cli.inspect import Inspect
@@ -46,6 +47,7 @@ COMMANDS: dict[str, type[Command]] = {
     "predict": Predict,
     "ambiguity": Ambiguity,
     "calibrate": Calibrate,
+    "clock": Clock,
     "tune": Tune,
     "place": Place,
     "layouts": Layouts,

@@ -86,7 +86,7 @@ def calibrate(inputs: CalibrationInput, progress: Progress = silent) -> Calibrat
     progress(0.0, "first run")
     run = first_run(log, setup, belief)
     problem = problem_of(log, setup, run)
-    whole, noise = _estimate(problem, part(progress, 0.05, 0.5))
+    whole, noise = estimate(problem, part(progress, 0.05, 0.5))
     halves = _halves(problem, whole, part(progress, 0.5, 0.75))
     progress(0.75, "judging")
     judge = ConstantsJudge(inputs, problem, halves, noise)
@@ -113,8 +113,13 @@ def calibrate(inputs: CalibrationInput, progress: Progress = silent) -> Calibrat
     )
 
 
-def _estimate(problem: CalibrationProblem, progress: Progress) -> tuple[CalibrationFit, FloatArray]:
+def estimate(problem: CalibrationProblem, progress: Progress) -> tuple[CalibrationFit, FloatArray]:
     """Fit a drive twice: as if residuals were independent, then with the weight that correlation leaves them.
+
+    Parameters
+    ----------
+    problem : drive and prior.
+    progress : told of each round; may raise to cancel.
 
     Returns
     -------

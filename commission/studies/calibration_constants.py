@@ -17,6 +17,10 @@ from commission.studies.calibration_values import CalibrationInput
 
 SHOWN_SHARE = 0.8
 """A constant whose 1-sigma is more than this share of its prior's is not shown by the drive."""
+CLOCK_SHARE = 0.7
+"""The same of a clock: what is hardly surer than before is no finding, unless it is far beyond doubt (`PLAIN`)."""
+PLAIN = 5.0
+"""A clock that is off by so many 1-sigma is shown, however little the project's own says."""
 MOVED = 3.0
 """A reflector is wrong from so many 1-sigma on, and from so many of its survey."""
 COARSE_S = 0.05
@@ -130,8 +134,22 @@ def _hidden(kind: str, problem: CalibrationProblem, whole: CalibrationFit, row: 
     prior, sigma = float(problem.prior[row]), float(whole.sigmas[row])
     if prior == 0.0:
         return "the project's uncertainty takes it for exact"
+    if kind == "clock_offset" and hides_clock(prior, sigma, float(whole.point.constants[row])):
+        return NEEDS[kind]
     # A project that is contradicted has a wider prior.
     return NEEDS[kind] if whole.information[row] > prior * SHOWN_SHARE * 2.0 and sigma > SHOWN_SHARE * prior else ""
+
+
+def hides_clock(prior: float, sigma: float, shift: float) -> bool:
+    """Whether a drive does not show a clock.
+
+    Parameters
+    ----------
+    prior : 1-sigma before the drive [s].
+    sigma : 1-sigma after it [s]; more than before where a shift lies in the heavy tail of the prior.
+    shift : what the drive says more than the project [s].
+    """
+    return sigma > CLOCK_SHARE * prior and abs(shift) < PLAIN * sigma
 
 
 def _places(inputs: CalibrationInput, problem: CalibrationProblem, whole: CalibrationFit) -> list[CalibratedConstant]:

@@ -47,6 +47,7 @@ from commission.app.floor_map.floor_map_panel import FloorMapPanel
 from commission.app.floor_map.pen import MapPen
 from commission.app.floor_map.tool_fields import MapToolFields
 from commission.app.floor_map.tools import WallTool
+from commission.app.live.actions import SetClock
 from commission.app.run.actions import ChooseSource, SetDisturbance, VirtualDrive
 from commission.app.tune.actions import SetParameter, SetUncertainty
 from commission.errors import CommissionError
@@ -302,11 +303,11 @@ def name_of(action: Action) -> str:
 
 
 def named_widgets(bench: PageBench) -> Iterator[tuple[Action, Any]]:
-    """What each number posts, with its widget; without parameters and the virtual world."""
+    """What each number posts, with its widget; without parameters, the virtual world and clocks by hand."""
     for widget in bench.widgets:
         if is_number(widget) and widget._impl.update_cb:
             (posted,) = bench.change(widget, another(widget))
-            if not isinstance(posted, SetParameter | SetUncertainty | SetDisturbance | Report):
+            if not isinstance(posted, SetParameter | SetUncertainty | SetDisturbance | SetClock | Report):
                 yield posted, widget
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from commission.app.base.actions import Action
+from commission.studies.clock import ClockOffset
+from commission.studies.run import RunInput
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,3 +36,34 @@ class Record(Action):
 @dataclass(frozen=True, slots=True)
 class StopRecording(Action):
     """Record no longer; the sources are still listened to."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetClock(Action):
+    """Say what a scanner's clock shows more than the vehicle's."""
+
+    name: str
+    """The scanner's."""
+    value: object
+    """The offset [s]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FindClocks(Action):
+    """Find the offsets of the scanners' clocks by the motion of the drive that is on the page."""
+
+    drive: RunInput
+    """What has been driven."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClocksFound(Action):
+    """The offsets are found."""
+
+    found: tuple[ClockOffset, ...]
+    """One for each scanner."""
+
+
+@dataclass(frozen=True, slots=True)
+class UseClocks(Action):
+    """Set the clocks to what motion says, where it says it: one undo step."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from commission.app.base.effects import Effect
+from commission.studies.run import RunInput
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,3 +35,11 @@ class OpenRecording(Effect):
 @dataclass(frozen=True, slots=True)
 class CloseRecording(Effect):
     """Record no longer."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StudyClocks(Effect):
+    """Find the offsets of the scanners' clocks in the background."""
+
+    drive: RunInput
+    """What has been driven."""

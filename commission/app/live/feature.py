@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from commission.app.base.feature import RUN, Docked, Feature
-from commission.app.live import reducer
+from commission.app.live import clock_reducer, reducer
+from commission.app.live.clock_panel import ClockPanel
+from commission.app.live.clock_service import ClockService
 from commission.app.live.live_panel import LivePanel
 from commission.app.live.service import LiveService
 
 FEATURE = Feature(
     name="live",
-    reducers=(reducer,),
-    services=(LiveService,),
+    reducers=(reducer, clock_reducer),
+    services=(LiveService, ClockService),
     panels=(
         Docked(
             make=lambda at: LivePanel(at.gui, at.post, at.state), tab=RUN, rank=3, folder="Live vehicle", is_open=True
         ),
+        Docked(make=lambda at: ClockPanel(at.gui, at.post, at.state), tab=RUN, rank=4),
     ),
 )
 """A vehicle that drives now."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from commission.io.live.permission import NEAR, Permission
+from commission.studies.clock import ClockOffset
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,3 +20,11 @@ class LiveState:
     """Whether they are listened to."""
     permission: Permission = NEAR
     """Which sources a browser may name."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClockState:
+    """What the motion of a drive said of the scanners' clocks."""
+
+    found: tuple[ClockOffset, ...] = ()
+    """One for each scanner; none before it was asked for."""

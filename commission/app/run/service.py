@@ -10,6 +10,7 @@ import numpy as np
 
 from commission import compiled
 from commission.app.base.actions import Action, Envelope, Report, Sender
+from commission.app.base.drive_now import DriveNow
 from commission.app.base.effects import Effect
 from commission.app.base.growing import RunGrew
 from commission.app.base.jobs import Job, Lane
@@ -354,11 +355,12 @@ class RunService(Service):
         return DrivenHall.AS_DRIVEN if World.of(self._project, self._source) == self._world else DrivenHall.OTHER
 
     def parts(self, *, slowly: bool) -> tuple[object, ...]:
-        """Return the run as it is now, the place that cameras follow, and what is driven so far."""
+        """Return the run as it is now, the place that cameras follow, what is driven so far, and its records."""
         view = self.view(whole=slowly)
         if view is None:
             return ()
         result, here = view.result, slice(view.lived)
         lived = LivedPath(result.columns.means[here], result.two_sigma[here], result.position_two_sigma[here])
+        drive = DriveNow(result.inputs, result.inputs.log.first_ns + round(view.time * 1e9), view.segment.setup)
         found = (each for each in (self._instruments.found, self._variants.compared_over(result)) if each is not None)
-        return view, Followed((float(view.pose[0]), float(view.pose[1]))), lived, *found
+        return view, Followed((float(view.pose[0]), float(view.pose[1]))), lived, drive, *found

@@ -1,0 +1,62 @@
+"""What is asked of the clocks of the scanners. Pure; importing it registers the handlers with `reduce`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from commission.app.base.actions import Sender
+from commission.app.base.reducer import Outcome, reduce
+from commission.app.base.state import AppState, Edit, edited
+from commission.app.live.actions import ClocksFound, FindClocks, SetClock, UseClocks
+from commission.app.live.effects import StudyClocks
+from commission.app.live.state import ClockState
+from commission.errors import UsageError
+from commission.site.fields import with_field
+from commission.site.project import Project
+from commission.studies.clock import ClockVerdict
+
+
+@reduce.register
+def set_clock(action: SetClock, state: AppState, sender: Sender) -> Outcome:
+    """Set one scanner's clock by hand."""
+    project = _with_clocks(state.project, {action.name: action.value})
+    if project is state.project:
+        return Outcome(state)
+    return Outcome(edited(state, project, Edit("set a clock", sender, f"clock {action.name}")))
+
+
+@reduce.register
+def find_clocks(action: FindClocks, state: AppState, _sender: Sender) -> Outcome:
+    """Find the clocks in the background; what was found before is of another drive."""
+    return Outcome(state.with_part(ClockState()), (StudyClocks(action.drive),))
+
+
+@reduce.register
+def clocks_found(action: ClocksFound, state: AppState, _sender: Sender) -> Outcome:
+    """Show what was found."""
+    return Outcome(state.with_part(ClockState(action.found)))
+
+
+@reduce.register
+def use_clocks(_action: UseClocks, state: AppState, sender: Sender) -> Outcome:
+    """Set all clocks that the drive shows."""
+    shown = {
+        each.scanner: each.offset for each in state.part(ClockState).found if each.verdict is not ClockVerdict.NOT_SHOWN
+    }
+    if not shown:
+        raise UsageError("no clock was shown by the drive; expected one that was found by motion")
+    project = _with_clocks(state.project, shown)
+    return Outcome(state if project is state.project else edited(state, project, Edit("set clocks by motion", sender)))
+
+
+def _with_clocks(project: Project, offsets: Mapping[str, object]) -> Project:
+    """Return the project with the clocks [s] of some scanners; the same one where nothing changes."""
+    scanners = tuple(
+        with_field(each, "clock_offset", offsets[each.name], "scanner") if each.name in offsets else each
+        for each in project.scanners
+    )
+    before = [each.clock_offset for each in project.scanners]
+    if [each.clock_offset for each in scanners] == before:
+        return project
+    return replace(project, scanners=scanners)

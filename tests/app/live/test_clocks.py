@@ -1,0 +1,84 @@
+"""Clocks of the scanners on the page: by hand, by motion, what they come to; an undo step each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+from commission.app.base.drive_now import DriveNow
+from commission.app.base.state import AppState
+from commission.app.base.view import view_of
+from commission.app.live.actions import ClocksFound, FindClocks, SetClock, UseClocks
+from commission.app.live.clock_panel import clocks_html
+from commission.app.live.state import ClockState
+from commission.app.run.actions import Play, VirtualDrive
+from commission.errors import UsageError
+from commission.studies.clock import ClockOffset, ClockVerdict
+from commission.studies.run import RunInput
+from commission.studies.start import Start, StartOrigin
+from tests.app.asking import after
+from tests.app.sites import room
+from tests.browser.serving import Served
+from tests.studies.recorded import PROJECT, SECOND, drive, start
+
+
+def offset(verdict: ClockVerdict = ClockVerdict.FOUND, value: float = 0.03) -> ClockOffset:
+    return ClockOffset(
+        scanner="scanner", before=0.0, offset=value, sigma=0.0009, verdict=verdict, reason="a reason" * (value > 1)
+    )
+
+
+def page(project=PROJECT) -> AppState:
+    return AppState(project=project, saved=project)
+
+
+def test_a_clock_is_set_by_hand_in_one_undo_step() -> None:
+    state = after(page(), SetClock("scanner", 0.02)).state
+    assert state.project.scanners[0].clock_offset == 0.02
+    assert len(state.undo) == 1
+    with pytest.raises(ValueError, match="clock_offset"):
+        after(page(), SetClock("scanner", 11.0))
+
+
+def test_what_motion_says_is_used_where_it_says_anything() -> None:
+    found = after(page(), ClocksFound((offset(),))).state
+    assert after(found, UseClocks()).state.project.scanners[0].clock_offset == 0.03
+    hidden = after(page(), ClocksFound((offset(ClockVerdict.NOT_SHOWN),))).state
+    with pytest.raises(UsageError, match="no clock was shown"):
+        after(hidden, UseClocks())
+
+
+def test_the_panel_says_what_a_clock_comes_to_at_the_speed_of_now() -> None:
+    project = replace(PROJECT, scanners=(replace(PROJECT.scanners[0], clock_offset=0.01),))
+    log = drive(20.0)
+    inputs = RunInput.of(project, log, Start(start(), StartOrigin.GIVEN))
+    state = page(project).with_part(ClockState((offset(),)))
+    html = clocks_html(view_of(state, DriveNow(inputs, 7 * SECOND, inputs.segments[0].setup)))
+    # By hand it goes at 0.1889 rad/s times 5.493 m = 1.037 m/s then: 10.4 mm in ten milliseconds, 20.7 in twenty.
+    assert "+10.0 ms allowed for: 10.4 mm at 1.04 m/s now" in html
+    assert "By motion: +30.0 ± 0.9 ms (1σ), found; not allowed for: +20.0 ms: 20.7 mm at 1.04 m/s now" in html
+
+
+@pytest.fixture
+def served() -> Iterator[Served]:
+    project = room()
+    opened = Served(project, source=VirtualDrive(project.routes[0].name))
+    opened.until(lambda: opened.view is not None)
+    opened.runtime.post(Play(playing=False))
+    yield opened
+    opened.close()
+
+
+def test_the_drive_on_the_page_says_what_it_shows_of_its_clock(served: Served) -> None:
+    view = served.view
+    assert view is not None
+    served.runtime.post(FindClocks(view.result.inputs))
+    served.until(lambda: bool(served.state.part(ClockState).found) or bool(served.state.faults))
+    (found,) = served.state.part(ClockState).found
+    assert found.scanner == "scanner"
+    assert abs(found.offset) < 4.0 * found.sigma
+    # A drive of twenty seconds.
+    assert found.verdict is not ClockVerdict.FOUND
+    assert found.reason
