@@ -32,6 +32,7 @@ from commission.cli.simulate import Simulate
 from commission.cli.sweep import SweepCommand
 from commission.cli.tune import Tune
 from commission.cli.versions import Version
+from commission.cli.vision import Vision
 from commission.errors import CommissionError
 
 EXIT_ERROR = 2
@@ -54,6 +55,7 @@ COMMANDS: dict[str, type[Command]] = {
     "problems": Problems,
     "sweep": SweepCommand,
     "montecarlo": MonteCarlo,
+    "vision": Vision,
     "convert": Convert,
     "version": Version,
 }

@@ -19,6 +19,7 @@ from commission.io.journal_place import FILE_NAME as JOURNAL
 from commission.io.project_file import FILE_NAME as PROJECT
 from commission.io.project_file import load_project
 from commission.io.reading import read_text
+from commission.io.recordings.contour_file import CONTOUR
 from commission.io.recordings.csv_folder import DETECTIONS, ODOMETRY, REFERENCE, SCANS
 from commission.io.recordings.reference_file import REFERENCE_MOUNT
 from commission.io.recordings.truth_file import TRUTH
@@ -26,7 +27,9 @@ from commission.io.recordings.truth_file import TRUTH
 MANIFEST = ".commission.result"
 """File in a folder of results that says which command made which files: the same one may make them again."""
 _RECORDING = re.compile(
-    "|".join((*map(re.escape, (ODOMETRY, DETECTIONS, SCANS, REFERENCE, REFERENCE_MOUNT, TRUTH)), r"scans_.*\.npz"))
+    "|".join(
+        (*map(re.escape, (ODOMETRY, DETECTIONS, SCANS, REFERENCE, REFERENCE_MOUNT, TRUTH, CONTOUR)), r"scans_.*\.npz")
+    )
 )
 _MANIFEST_LIMIT = 100_000
 
