@@ -88,7 +88,8 @@ def shape_vector(first: FloatArray, now: FloatArray, *, with_shear: bool = True)
     with_shear : as in `shape_matrix`.
     """
     moved = (now - first).T.ravel()
-    return np.linalg.lstsq(shape_matrix(first, with_shear=with_shear), moved, rcond=None)[0]
+    solved = np.linalg.lstsq(shape_matrix(first, with_shear=with_shear), moved, rcond=None)[0]
+    return np.asarray(solved, dtype=np.float64)
 
 
 def motion_of(shape: FloatArray, turned: float) -> CameraMotion:
