@@ -87,7 +87,7 @@ def _told(result: VisionResult) -> list[str]:
     seconds = (result.stamps_ns[-1] - result.stamps_ns[0]) * 1e-9
     lines = [
         f"Motion       {result.way:.3f} m in {len(result.stamps_ns)} frames and {seconds:.1f} s; "
-        f"points are seen to {1e3 * result.noise:.3g} thousandths of the focal length (1 sigma)"
+        f"points are seen to {PERCENT.text(result.noise, '.2g')} of the focal length (1 sigma)"
     ]
     for label, name in (("Difference", "difference"), ("Equation 6-12", "closed_form_difference")):
         ahead, left, share = (

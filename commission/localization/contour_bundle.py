@@ -137,7 +137,7 @@ def solve(seen: FloatArray, guess: Guess, motion_of: MotionOf) -> Bundle:
     contour = seen[0].copy()
     frames, further, shared = guess.frames.copy(), guess.further.copy(), guess.shared.copy()
     converged, noise = False, 1.0
-    system = _System(seen, guess, motion_of)
+    system = _BundleSystem(seen, guess, motion_of)
     for round_number in range(ROUNDS):
         noise = system.noise(contour, frames, further, shared)
         step = system.step(contour, frames, further, shared, noise)
@@ -171,7 +171,7 @@ def solve(seen: FloatArray, guess: Guess, motion_of: MotionOf) -> Bundle:
 
 
 @dataclass(frozen=True, slots=True)
-class _Step:
+class _BundleStep:
     """A step of Gauss-Newton and the covariance of where it leads."""
 
     whole: FloatArray
@@ -192,7 +192,7 @@ class _Step:
 
 
 def _moved(  # noqa: PLR0917 - the four kinds of numbers
-    contour: FloatArray, frames: FloatArray, further: FloatArray, shared: FloatArray, step: _Step, scale: float
+    contour: FloatArray, frames: FloatArray, further: FloatArray, shared: FloatArray, step: _BundleStep, scale: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """All numbers after a share of a step."""
     count = 2 * len(contour)
@@ -204,7 +204,7 @@ def _moved(  # noqa: PLR0917 - the four kinds of numbers
     )
 
 
-class _System:
+class _BundleSystem:
     """The normal equations of one problem."""
 
     def __init__(self, seen: FloatArray, guess: Guess, motion_of: MotionOf) -> None:
@@ -232,7 +232,7 @@ class _System:
 
     def step(
         self, contour: FloatArray, frames: FloatArray, further: FloatArray, shared: FloatArray, noise: float
-    ) -> _Step:
+    ) -> _BundleStep:
         """Solve the normal equations, the frames eliminated."""
         guess, count = self._guess, 2 * len(contour)
         own, common = self._jacobians(contour, frames, further, shared)
@@ -259,7 +259,7 @@ class _System:
         whole = covariance @ b
         moved = np.einsum("kfg,kg->kf", inverses, sides - crossed @ whole)
         spread = inverses + gain @ covariance @ np.swapaxes(gain, 1, 2)
-        return _Step(whole, moved, covariance, spread)
+        return _BundleStep(whole, moved, covariance, spread)
 
     def _jacobians(
         self, contour: FloatArray, frames: FloatArray, further: FloatArray, shared: FloatArray

@@ -22,6 +22,7 @@ from commission.localization.egomotion import why_degenerate
 from commission.localization.estimate import Mode
 from commission.localization.run_columns import RunColumns
 from commission.site.contour_track import ContourTrack
+from commission.site.quantity import MILLIMETRES, PLAIN_DEGREES
 from commission.studies.inputs import StudyInput
 from commission.studies.metrics import reference_at
 from commission.studies.vision_fit import SLANT_SIGMA, Tied, closed_forms, fit_alone, fit_tied, planar_motion, to_planar
@@ -237,15 +238,16 @@ def _findings(inputs: VisionInput, known: BoolArray, tied: Tied, alone: Bundle) 
             f"points lie {late / early:.0f} times farther from where the contour should be at the end than at the "
             "beginning: it is not planar, or the tracker lost it"
         )
-    slant = np.degrees(np.arctan(np.hypot(*tied.bundle.shared[:2])))
-    if slant > 3.0 * math.degrees(SLANT_SIGMA):
+    slant = math.atan(math.hypot(*tied.bundle.shared[:2].tolist()))
+    if slant > 3.0 * SLANT_SIGMA:
         found.append(
-            f"the contour's plane is slanted by {slant:.0f} deg; the closed form takes it for facing the camera"
+            f"the contour's plane is slanted by {PLAIN_DEGREES.text(slant)}; the closed form takes it for facing the camera"
         )
     if tied.sigmas[0] > 0.1 or tied.sigmas[1] > 0.1:
-        turned = math.degrees(float(np.ptp(difference(inputs.poses[known][:, 2], inputs.poses[known][0, 2]))))
+        turned = float(np.ptp(difference(inputs.poses[known][:, 2], inputs.poses[known][0, 2])))
+        worst = float(max(tied.sigmas[0], tied.sigmas[1]))
         found.append(
-            f"the camera's place is told to {1e3 * max(tied.sigmas[0], tied.sigmas[1]):.0f} mm only (1 sigma); "
-            f"the drive turns by {turned:.1f} deg, more tells it better"
+            f"the camera's place is told to {MILLIMETRES.text(worst)} only (1 sigma); "
+            f"the drive turns by {PLAIN_DEGREES.text(turned, '.1f')}, more tells it better"
         )
     return tuple(found)

@@ -59,7 +59,14 @@ def _begin(first: FloatArray) -> FloatArray:
 
 
 def fit_alone(seen: FloatArray, first: FloatArray, tied: Bundle | None) -> Bundle:
-    """Fit the contour alone; plane and tilt as they were found with the laser, or as the paper takes them."""
+    """Fit the contour alone; plane and tilt as they were found with the laser, or as the paper takes them.
+
+    Parameters
+    ----------
+    seen : (K, N, 2) control points [focal lengths].
+    first : (K, 4) turn and T / Z_0 to begin with.
+    tied : what the laser told; None: nothing.
+    """
     information = np.zeros((len(seen), 4, 4))
     information[0] = EXACT * np.eye(4)
     shared = np.zeros(4) if tied is None else tied.shared
@@ -134,7 +141,14 @@ def planar_motion(alone: Bundle, depth: float) -> tuple[FloatArray, FloatArray]:
 
 
 def fit_tied(seen: FloatArray, poses: FloatArray, covariances: FloatArray, first: FloatArray) -> Tied:
-    """Fit constants, contour and the laser's errors to each other."""
+    """Fit constants, contour and the laser's errors to each other.
+
+    Parameters
+    ----------
+    seen : (K, N, 2) control points [focal lengths].
+    poses, covariances : (K, 3), (K, 3, 3) pose of base by laser [m, m, rad], map frame, and its covariance.
+    first : (K, 4) turn and T / Z_0 to begin with.
+    """
     information = np.zeros((len(seen), 4, 4))
     information[:, :3, :3] = np.linalg.inv(covariances)
     further_information = np.zeros((7, 7))
