@@ -241,7 +241,8 @@ def _findings(inputs: VisionInput, known: BoolArray, tied: Tied, alone: Bundle) 
     slant = math.atan(math.hypot(*tied.bundle.shared[:2].tolist()))
     if slant > 3.0 * SLANT_SIGMA:
         found.append(
-            f"the contour's plane is slanted by {PLAIN_DEGREES.text(slant)}; the closed form takes it for facing the camera"
+            f"the contour's plane is slanted by {PLAIN_DEGREES.text(slant)}; "
+            "the closed form takes it for facing the camera"
         )
     if tied.sigmas[0] > 0.1 or tied.sigmas[1] > 0.1:
         turned = float(np.ptp(difference(inputs.poses[known][:, 2], inputs.poses[known][0, 2])))
