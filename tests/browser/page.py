@@ -130,6 +130,11 @@ class OpenPage:
         self.page.evaluate("window.__viserMutable.requestRender()")
         self.page.wait_for_function(f"frame => ({_FRAME}) > frame", arg=frame)
 
+    def forget_refusals(self) -> None:
+        """Leave the field that is typed into, and take back what was said at the fields, for the next test to see."""
+        self.page.keyboard.press("Escape")
+        self.page.evaluate("document.querySelectorAll('[data-refused]').forEach(e => delete e.dataset.refused)")
+
     def pixel_of(self, point_map: Sequence[float]) -> tuple[float, float]:
         """Where a point of the scene is seen, from the window's upper left corner [pixels]."""
         x, y = self.page.evaluate(_PIXEL_OF, [*point_map, 0.0][:3])

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Callable, Iterator
 
 import pytest
+from playwright.sync_api import Browser
 
 from commission.app.run.actions import Play, VirtualDrive
 from tests.app.sites import room
@@ -22,6 +23,22 @@ def served() -> Iterator[Served]:
     opened.runtime.post(Play(playing=False))
     yield opened
     opened.close()
+
+
+@pytest.fixture(scope="module")
+def opened(browser: Browser, served: Served) -> Iterator[OpenPage]:
+    """One window for all tests but those of its opening, which is what takes longest."""
+    page = OpenPage(browser, served.server)
+    page.open()
+    yield page
+    page.close()
+
+
+@pytest.fixture
+def page(opened: OpenPage) -> OpenPage:
+    """The window, without what it said to the test before."""
+    opened.forget_refusals()
+    return opened
 
 
 def test_without_a_run_the_page_says_what_to_do_and_offers_nothing_that_does_nothing(
@@ -41,11 +58,9 @@ def test_without_a_run_the_page_says_what_to_do_and_offers_nothing_that_does_not
 
 
 @pytest.mark.parametrize("size", [(1024, 700), (1280, 720), (1600, 900)])
-def test_name_and_numbers_beside_the_badge_are_seen_whole_at_every_width(
-    served: Served, window: Callable[..., OpenPage], size: tuple[int, int]
-) -> None:
-    page = window(served.server, size)
-    page.open()
+def test_name_and_numbers_beside_the_badge_are_seen_whole_at_every_width(page: OpenPage, size: tuple[int, int]) -> None:
+    page.page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.wait_until_drawn()
     name = page.page.locator(".c-top span").first
     assert name.inner_text() == "Room"
     cut = "e => e.getBoundingClientRect().right > e.parentElement.getBoundingClientRect().right + 0.5"
@@ -88,10 +103,8 @@ def test_who_turns_the_wheel_while_the_page_builds_up_keeps_what_was_zoomed_to(
     ("typed", "told"), [("1e-1", '"e" is not taken'), ("1e2", '"e" is not taken'), ("1-1", '"-" is not taken')]
 )
 def test_an_entry_with_letters_inside_is_refused_and_what_held_before_stays(
-    served: Served, window: Callable[..., OpenPage], typed: str, told: str
+    served: Served, page: OpenPage, typed: str, told: str
 ) -> None:
-    page = window(served.server)
-    page.open()
     page.open_tab("Tune")
     field = page.row("Range jump").locator("input").last
     before, state = field.input_value(), served.state.project
@@ -107,11 +120,7 @@ def test_an_entry_with_letters_inside_is_refused_and_what_held_before_stays(
     assert served.state.project is state
 
 
-def test_what_is_pasted_into_a_number_and_is_none_is_refused_whole(
-    served: Served, window: Callable[..., OpenPage]
-) -> None:
-    page = window(served.server)
-    page.open()
+def test_what_is_pasted_into_a_number_and_is_none_is_refused_whole(served: Served, page: OpenPage) -> None:
     page.open_tab("Tune")
     field = page.row("Range jump").locator("input").last
     before, state = field.input_value(), served.state.project
@@ -134,11 +143,7 @@ def test_what_is_pasted_into_a_number_and_is_none_is_refused_whole(
 
 
 @pytest.mark.parametrize("letter", ["e", "a", "%"])
-def test_a_letter_that_a_number_does_not_take_is_told(
-    served: Served, window: Callable[..., OpenPage], letter: str
-) -> None:
-    page = window(served.server)
-    page.open()
+def test_a_letter_that_a_number_does_not_take_is_told(page: OpenPage, letter: str) -> None:
     page.open_tab("Tune")
     row = page.row("Range jump")
     field = row.locator("input").last
@@ -152,11 +157,7 @@ def test_a_letter_that_a_number_does_not_take_is_told(
     page.page.keyboard.press("Escape")
 
 
-def test_a_digit_that_a_field_has_no_room_for_is_refused_and_nothing_is_rounded(
-    served: Served, window: Callable[..., OpenPage]
-) -> None:
-    page = window(served.server)
-    page.open()
+def test_a_digit_that_a_field_has_no_room_for_is_refused_and_nothing_is_rounded(served: Served, page: OpenPage) -> None:
     page.open_tab("Tune")
     field = page.row("Gate").locator("input").last
     before, state = field.input_value(), served.state.project

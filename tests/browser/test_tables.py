@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
+from playwright.sync_api import Browser
 
 from commission.app.base.panel import clock
 from commission.app.editing.editor import editors_of
@@ -49,12 +50,14 @@ def found_in(served: Served) -> Found:
     return found
 
 
-@pytest.fixture
-def page(served: Served, window: Callable[..., OpenPage]) -> OpenPage:
-    opened = window(served.server)
+@pytest.fixture(scope="module")
+def page(browser: Browser, served: Served) -> Iterator[OpenPage]:
+    """One window for all tests: opening one is what takes longest."""
+    opened = OpenPage(browser, served.server)
     opened.open(nodes=["/vehicle"])
     opened.page.wait_for_function("() => /Events [1-9]/.test(document.querySelector('.c-views').innerText)")
-    return opened
+    yield opened
+    opened.close()
 
 
 def view(page: OpenPage, name: str) -> None:
@@ -87,6 +90,8 @@ def test_events_of_a_kind_can_be_left_out(served: Served, page: OpenPage) -> Non
     page.press(f"blind {blind}")
     assert len(cells(page, EVENTS, 1)) == every - blind
     assert "blind" not in cells(page, EVENTS, 2)
+    page.press(f"blind {blind}")
+    assert len(cells(page, EVENTS, 1)) == every
 
 
 def test_heads_sort_both_ways_and_what_is_unknown_comes_last(served: Served, page: OpenPage) -> None:

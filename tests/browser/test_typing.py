@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import pytest
-from playwright.sync_api import Locator
+from playwright.sync_api import Browser, Locator
 
 from commission.app.base.actions import Envelope
 from commission.app.base.viser_private import widget_of
 from commission.app.runtime import Message, Runtime
+from commission.app.tune.actions import ResetParameters
 from tests.app.sites import room
 from tests.browser.page import OpenPage
 from tests.browser.serving import Served
@@ -53,18 +54,40 @@ def heard(monkeypatch: pytest.MonkeyPatch) -> Heard:
     return said
 
 
-@pytest.fixture
-def served(heard: Heard) -> Iterator[Served]:
-    assert heard.envelopes == []
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
     opened = Served(room())
     yield opened
     opened.close()
 
 
+@pytest.fixture(scope="module")
+def opened(browser: Browser, served: Served) -> Iterator[OpenPage]:
+    """One window for all tests: opening one is what takes longest."""
+    page = OpenPage(browser, served.server)
+    page.open()
+    yield page
+    page.close()
+
+
+@pytest.fixture(scope="module")
+def other(browser: Browser, served: Served) -> Iterator[OpenPage]:
+    """A second browser; its tests are the last, since each window that is open has to be drawn."""
+    page = OpenPage(browser, served.server)
+    page.open()
+    page.open_tab("Tune")
+    yield page
+    page.close()
+
+
 @pytest.fixture
-def page(served: Served, window: Callable[..., OpenPage]) -> OpenPage:
-    opened = window(served.server)
-    opened.open()
+def page(opened: OpenPage, served: Served, heard: Heard) -> OpenPage:
+    """The window with the project as it was opened, and without what was said to the test before."""
+    opened.forget_refusals()
+    served.runtime.post(ResetParameters())
+    served.until(lambda: served.state.project.parameters == room().parameters, 10.0)
+    opened.page.wait_for_timeout(1_100)  # what a test does at once would be the same step
+    heard.envelopes.clear()
     return opened
 
 
@@ -85,6 +108,7 @@ def test_a_number_acts_when_it_is_finished_and_not_with_its_first_digit(
     page: OpenPage, served: Served, heard: Heard
 ) -> None:
     page.open_tab("Tune")
+    steps = len(served.state.undo)
     entry = typed_into(page, "Gate", "97.5")
     page.page.wait_for_timeout(300)
     assert heard.fields() == []
@@ -93,13 +117,14 @@ def test_a_number_acts_when_it_is_finished_and_not_with_its_first_digit(
     served.until(lambda: gate(served) == pytest.approx(0.975), 10.0)
     page.page.wait_for_timeout(300)
     assert len(heard.fields()) == 1
-    assert len(served.state.undo) == 1
+    assert len(served.state.undo) == steps + 1
     assert page.row("Gate").get_attribute("data-draft") is None
     assert page.errors == []
 
 
 def test_escape_shows_again_what_held_and_nothing_has_happened(page: OpenPage, served: Served, heard: Heard) -> None:
     page.open_tab("Tune")
+    undo = served.state.undo
     for text in ("97.5", "9", "-", ""):
         entry = typed_into(page, "Gate", text)
         if not text:
@@ -111,7 +136,7 @@ def test_escape_shows_again_what_held_and_nothing_has_happened(page: OpenPage, s
     entry.press("Tab")
     page.page.wait_for_timeout(250)
     assert heard.fields() == []
-    assert served.state.undo == ()
+    assert served.state.undo == undo
 
 
 @pytest.mark.parametrize("text", ["120", "1", "0.5"])
@@ -119,6 +144,7 @@ def test_a_number_beyond_its_bounds_is_refused_at_the_field_and_never_clamped(
     page: OpenPage, served: Served, text: str
 ) -> None:
     page.open_tab("Tune")
+    undo = served.state.undo
     entry = typed_into(page, "Gate", text)
     entry.press("Tab")
     page.page.wait_for_function(
@@ -127,7 +153,7 @@ def test_a_number_beyond_its_bounds_is_refused_at_the_field_and_never_clamped(
     )
     page.page.wait_for_function("field => field.value === '95'", arg=entry.element_handle())
     assert gate(served) == pytest.approx(0.95)
-    assert served.state.undo == ()
+    assert served.state.undo == undo
     assert served.state.faults == ()
 
 
@@ -146,7 +172,7 @@ def test_a_click_elsewhere_finishes_the_entry_before_it_does_anything(
 ) -> None:
     page.open_tab("Tune")
     page.fill("Gate", "99")
-    served.until(lambda: len(served.state.undo) == 1, 10.0)
+    served.until(lambda: gate(served) == pytest.approx(0.99), 10.0)
     page.page.wait_for_timeout(1_100)  # what follows at once would be the same step
     typed_into(page, "Gate", "97.5")
     heard.envelopes.clear()
@@ -160,47 +186,13 @@ def test_a_text_that_is_refused_does_not_stay_in_its_field(page: OpenPage, serve
     page.open_tab("Site")
     page.fold("Vehicle")
     entry = page.row("Outline").locator("input")
-    before = entry.input_value()
+    before, undo = entry.input_value(), served.state.undo
     typed_into(page, "Outline", "1 2").press("Enter")
     page.page.wait_for_function("() => document.querySelector('[data-refused]') !== null")
     page.page.wait_for_function("([field, text]) => field.value === text", arg=[entry.element_handle(), before])
     page.page.wait_for_timeout(300)
     assert len(heard.fields()) == 1
-    assert served.state.undo == ()
-
-
-def test_what_held_before_can_be_entered_where_another_value_has_come(
-    page: OpenPage, served: Served, window: Callable[..., OpenPage]
-) -> None:
-    other = window(served.server)
-    other.open()
-    for one in (page, other):
-        one.open_tab("Tune")
-    typed_into(page, "Gate", "9")
-    other.fill("Gate", "92")
-    served.until(lambda: gate(served) == pytest.approx(0.92), 10.0)
-    page.page.wait_for_timeout(300)
-    typed_into(page, "Gate", "95").press("Enter")
-    served.until(lambda: gate(served) == pytest.approx(0.95), 10.0)
-
-
-def test_nothing_is_written_into_a_field_that_is_typed_into(
-    page: OpenPage, served: Served, window: Callable[..., OpenPage]
-) -> None:
-    other = window(served.server)
-    other.open()
-    for one in (page, other):
-        one.open_tab("Tune")
-    entry = typed_into(page, "Gate", "97")
-    other.fill("Gate", "99")
-    served.until(lambda: gate(served) == pytest.approx(0.99), 10.0)
-    page.page.wait_for_timeout(400)
-    assert entry.input_value() == "97"
-    page.page.keyboard.type(".5")
-    assert entry.input_value() == "97.5"
-    entry.press("Escape")
-    page.page.wait_for_function("field => field.value === '99'", arg=entry.element_handle())
-    assert gate(served) == pytest.approx(0.99)
+    assert served.state.undo == undo
 
 
 @pytest.mark.parametrize("tab", ["Site", "Plan", "Run", "Tune"])
@@ -253,3 +245,29 @@ def test_a_text_that_seeks_in_a_list_tells_of_every_key(page: OpenPage, served: 
     typed_into(page, "Find", "no such reflector")
     page.wait_for_text(f"0 of {count} reflectors")
     assert page.errors == []
+
+
+def test_what_held_before_can_be_entered_where_another_value_has_come(
+    page: OpenPage, other: OpenPage, served: Served
+) -> None:
+    page.open_tab("Tune")
+    typed_into(page, "Gate", "9")
+    other.fill("Gate", "92")
+    served.until(lambda: gate(served) == pytest.approx(0.92), 10.0)
+    page.page.wait_for_timeout(300)
+    typed_into(page, "Gate", "95").press("Enter")
+    served.until(lambda: gate(served) == pytest.approx(0.95), 10.0)
+
+
+def test_nothing_is_written_into_a_field_that_is_typed_into(page: OpenPage, other: OpenPage, served: Served) -> None:
+    page.open_tab("Tune")
+    entry = typed_into(page, "Gate", "97")
+    other.fill("Gate", "99")
+    served.until(lambda: gate(served) == pytest.approx(0.99), 10.0)
+    page.page.wait_for_timeout(400)
+    assert entry.input_value() == "97"
+    page.page.keyboard.type(".5")
+    assert entry.input_value() == "97.5"
+    entry.press("Escape")
+    page.page.wait_for_function("field => field.value === '99'", arg=entry.element_handle())
+    assert gate(served) == pytest.approx(0.99)
