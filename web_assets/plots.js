@@ -7,7 +7,7 @@
   if (window.commissionPlots) return; // the server sends this script again after each reconnection
   const LEFT_PX = 42, RIGHT_PX = 10, ABOVE_PX = 16, BELOW_PX = 15, LOWEST_PX = 78, NAMES_PX = 12, DRAGGED_PX = 4;
   const NARROW_PX = 1270; // window in which the names of plots are shortened, so that all are there to choose
-  const FONT = "11px sans-serif", INK = "#e8eaee", AXIS = "#9aa0a8", GRID = "#2f3237", BACK = "#1b1d21";
+  const FONT = "11px sans-serif", INK = "#e7e9ee", AXIS = "#9aa0a8", GRID = "#303338", BACK = "#1b1d21";
 
   const panel = document.createElement("div");
   panel.className = "c-plots";

@@ -4,7 +4,7 @@
   if (window.commissionTables || !window.commissionPlots) return; // the server sends this script again
   window.commissionTables = true;
   const { ask, seek, views, body, panel, listeners, chips, showChips } = window.commissionPlots;
-  const COLORS = { fail: "#ff5252", lost: "#ff5252", recovered: "#40c896" };
+  const COLORS = { fail: "#ff5252", lost: "#ff5252", recovered: "#40c898" };
   let compared = null; // variants
   let found = null, hidden = new Set(), sorted = { column: 0, isDown: false };
 

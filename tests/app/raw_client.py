@@ -31,13 +31,18 @@ class RawClient:
     ----------
     server : a started one.
     is_silent : whether to send no camera, and so to stay what is not a browser yet.
+    headers : of its request, besides those that each has.
     """
 
-    def __init__(self, server: viser.ViserServer, *, is_silent: bool = False) -> None:
+    def __init__(
+        self, server: viser.ViserServer, *, is_silent: bool = False, headers: dict[str, str] | None = None
+    ) -> None:
         address = f"ws://127.0.0.1:{server.get_port()}"
         protocol = Subprotocol(f"viser-v{viser.__version__}")
         self.server = server
-        self._connection: ClientConnection = connect(address, subprotocols=[protocol], max_size=None)
+        self._connection: ClientConnection = connect(
+            address, subprotocols=[protocol], max_size=None, additional_headers=headers
+        )
         self.heard: list[dict[str, Any]] = []
         """Every message so far, except for the arrays in them."""
         if not is_silent:

@@ -14,16 +14,17 @@ from commission.app.base.extent import extent_of
 from commission.app.base.floor_picture import FloorPicture
 from commission.app.base.layer import BaseLayer
 from commission.app.base.marks import add_floor_picture, add_lines
+from commission.app.base.paints import Plan
 from commission.app.base.view import PageView
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
 
 MAP_COLORS: dict[int, theme.Color] = {
-    UNIQUE: (39, 74, 92),
-    TOO_FEW: (120, 104, 150),
-    SOME: (224, 168, 60),
-    EVERY: (228, 92, 60),
+    UNIQUE: Plan.UNIQUE.dark,
+    TOO_FEW: Plan.TOO_FEW.dark,
+    SOME: Plan.SOME.dark,
+    EVERY: Plan.EVERY.dark,
 }
 SHARPNESS = 4
 """Points of the picture for each spot and axis."""

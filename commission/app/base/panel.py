@@ -84,8 +84,8 @@ def write_label(button: GuiButtonHandle, text: str) -> None:
 
 
 def escaped(text: object) -> str:
-    """Return text of a file or a person as html shows it, never as html reads it."""
-    return html.escape(str(text), quote=True)
+    """Return text of a file or a person as html shows it, never as html reads it; a name is no color either."""
+    return html.escape(str(text), quote=True).replace("#", "&#35;")
 
 
 def table(rows: Iterable[tuple[str, str]]) -> str:

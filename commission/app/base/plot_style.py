@@ -7,10 +7,11 @@ from typing import TypedDict
 from viser import uplot
 
 from commission.app.base import theme
+from commission.app.base.paints import Run, Surface
 
-TURQUOISE, ORANGE = "#4dc4ff", "#ffb454"
-INK = "#e8eaee"
-LIMIT = theme.css(theme.POSE)
+TURQUOISE, ORANGE = theme.css(Run.FIRST_CURVE.dark), theme.css(Run.SECOND_CURVE.dark)
+INK = theme.css(Run.WHOLE_CURVE.dark)
+LIMIT = theme.css(theme.OVER_LIMIT)
 HEIGHT_PX = 150
 ROOM_PX = 44
 """Room for the numbers beside a vertical axis: five figures and a comma."""
@@ -54,7 +55,7 @@ def _axis(size: int) -> uplot.Axis:
     return {
         "size": size,
         "font": "10px sans-serif",
-        "stroke": "#9aa0a8",
-        "grid": {"stroke": "#2f3237", "width": 1},
-        "ticks": {"stroke": "#3a3d43", "width": 1, "size": 4},
+        "stroke": theme.css(Surface.AXIS.dark),
+        "grid": {"stroke": theme.css(Surface.AXIS_GRID.dark), "width": 1},
+        "ticks": {"stroke": theme.css(Surface.AXIS_TICK.dark), "width": 1, "size": 4},
     }

@@ -24,6 +24,7 @@ import websockets.asyncio.server as websocket_server
 from commission.app.base import viser_private
 from commission.app.base.connection import LARGEST_MESSAGE, Door
 from commission.app.base.gate import AccessGate
+from commission.app.base.relight import light_message, wants_light
 from commission.app.base.seam import Seam
 from commission.app.base.transfers import Transfers
 from commission.errors import ServerError
@@ -204,6 +205,7 @@ def _prove(server: PageServer, door: Door, listening: socket.socket) -> None:
     if not door.is_used or viser_private.listening_port(server) != listening.getsockname()[1]:
         raise ServerError(f"viser {viser.__version__} does not listen behind our gate; expected viser 1.1")
     viser_private.make_robust(server)
+    viser_private.repaint(server, wants_light, light_message)
     server.transfers = Transfers(server)
     door.open(server, Seam(server))
     status = _status_for_a_stranger(listening)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from commission.app.base.theme import INLIER, LEFT_PX, RIGHT_PX, SELECTED, TRAIL, css
+from commission.app.base.paints import Surface, Worded
+from commission.app.base.theme import LEFT_PX, RIGHT_PX, css
 
 NO_RUN_PX = 34
 """Height of the strip below the floor while there is no run [pixels]."""
@@ -15,27 +16,31 @@ div:has(>div>.c-top)>div:has(.c-badge){{order:-1}}
 .c-beside{{white-space:nowrap!important;width:auto!important;min-width:118px!important;
  line-height:1.25;font-size:11px!important}}
 .c-since{{min-width:34px;font-size:12px;font-variant-numeric:tabular-nums}}
-.c-share{{display:block;height:3px;border-radius:2px;background:#4a4f57;overflow:hidden}}
+.c-share{{display:block;height:3px;border-radius:2px;background:{css(Surface.SHARE.dark)};overflow:hidden}}
 .c-share i{{display:block;height:3px}}
 [role=tab][data-lacks]::before{{content:"";display:inline-block;width:7px;height:7px;border-radius:50%;
- margin-right:6px;border:1.5px solid {css(SELECTED)};box-sizing:border-box}}
+ margin-right:6px;border:1.5px solid {css(Worded.LACKING.dark)};box-sizing:border-box}}
 [role=tab][data-lacks=""]::before{{width:4px;height:8px;border-radius:0;border-width:0 2px 2px 0;
- border-color:{css(TRAIL)};transform:rotate(42deg) translateY(-1px)}}
+ border-color:{css(Worded.DONE.dark)};transform:rotate(42deg) translateY(-1px)}}
 [role=tab][data-count]:not([data-count=""])::after{{content:attr(data-count) / "";margin-left:5px;padding:0 5px;
- border-radius:7px;background:{css(SELECTED)};color:#16181b;font-size:10.5px;font-weight:700}}
-.c-lacks{{margin:2px 6px 4px;padding:3px 8px;border-left:3px solid {css(SELECTED)};font-size:12px;line-height:1.35}}
+ border-radius:7px;background:{css(Worded.LACKING.dark)};color:{css(Worded.ON_LACKING.dark)};font-size:10.5px;
+ font-weight:700}}
+.c-lacks{{margin:2px 6px 4px;padding:3px 8px;border-left:3px solid {css(Worded.LACKING.dark)};font-size:12px;
+ line-height:1.35}}
 .c-card{{position:fixed;z-index:2;left:calc({LEFT_PX}px + (100vw - {LEFT_PX + RIGHT_PX}px) / 2);top:50%;
  transform:translate(-50%,-60%);width:min(390px,100vw - {LEFT_PX + RIGHT_PX + 24}px);box-sizing:border-box;
- padding:14px 18px;border-radius:5px;background:#24272c;border:1px solid #4a4f57;font-size:13px}}
+ padding:14px 18px;border-radius:5px;background:{css(Surface.CARD.dark)};
+ border:1px solid {css(Surface.CARD_EDGE.dark)};font-size:13px}}
 .c-card ol{{list-style:none;margin:0;padding:0;counter-reset:task}}
 .c-card li{{counter-increment:task;padding:8px 0 0 26px;position:relative;line-height:1.35}}
 .c-card li::before{{content:counter(task);position:absolute;left:0;top:9px;width:18px;height:18px;line-height:18px;
- border-radius:50%;text-align:center;font-size:11px;background:#3a3e45}}
+ border-radius:50%;text-align:center;font-size:11px;background:{css(Surface.BADGE.dark)}}}
 .c-card li.c-done::before{{content:"";background:none;width:5px;height:10px;left:5px;border-radius:0;
- border:solid {css(TRAIL)};border-width:0 2px 2px 0;transform:rotate(42deg)}}
-.c-card button{{background:#2f5f9f;color:#fff;border:none;border-radius:3px;padding:3px 10px;font:inherit;
+ border:solid {css(Worded.DONE.dark)};border-width:0 2px 2px 0;transform:rotate(42deg)}}
+.c-card button{{background:{css(Worded.PRESS.dark)};color:#fff;border:none;border-radius:3px;padding:3px 10px;
+ font:inherit;
  cursor:pointer}}
-.c-card button:disabled{{background:#3a3e45;color:#aab0b9;cursor:default}}
+.c-card button:disabled{{background:{css(Surface.DISABLED.dark)};color:{css(Surface.ON_DISABLED.dark)};cursor:default}}
 .c-card li span{{display:block;font-size:11.5px;opacity:.75;padding-top:2px}}
 .c-card-line{{top:calc(var(--c-top) + 44px);transform:translateX(-50%);width:auto;
  max-width:calc(100vw - {LEFT_PX + RIGHT_PX + 12}px); padding:4px 8px;font-size:11.5px}}
@@ -45,10 +50,15 @@ div:has(>div>.c-top)>div:has(.c-badge){{order:-1}}
 .c-card-line li.c-done::before{{top:4px;left:7px;width:4px;height:8px}}
 .c-card-line button{{padding:1px 7px}}
 .c-card-line .c-done button{{background:none;color:inherit;opacity:.75}}
-.c-card-line li span{{display:inline;padding-left:6px;color:{css(INLIER)};opacity:1}}
+.c-card-line li span{{display:inline;padding-left:6px;color:{css(Worded.NOTE.dark)};opacity:1}}
 div:has(>div>.c-bottom):has(.c-no-run)>div:not(:has(>.c-no-run)){{display:none}}
 div:has(>div>.c-bottom):has(.c-no-run)>:nth-child(4){{grid-column:1/span 24!important;
  padding:5px 0 0 var(--c-tabs)!important}}
 :root:has(.c-no-run):not(:has([role=tab][title=Route][aria-selected=true])){{--c-bottom:{NO_RUN_PX}px!important}}
 .c-no-run{{opacity:1!important}}
+.c-daylight{{position:fixed;z-index:1;right:{RIGHT_PX + 14}px;bottom:calc(var(--c-bottom) + 10px);width:26px;
+ height:26px;padding:0;border-radius:3px;border:1px solid {css(Surface.EDGE_QUIET.dark)};
+ background:{css(Surface.CARD.dark)};color:inherit;font-size:15px;line-height:1;cursor:pointer}}
+.c-daylight:is(:hover,:focus-visible){{border-color:{css(Worded.BRAND.dark)}}}
+@media print{{.c-daylight{{display:none}}}}
 </style>"""

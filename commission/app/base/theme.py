@@ -1,79 +1,93 @@
-"""Colors and style of the page: one place for both the scene and the panels. The legend is made from it, too.
+"""Colors by the name of what they are for, and the style of the page: both are said in the dark theme.
 
-The colors follow Sobreira et al. 2016, Fig. 12, as far as a dark page allows: the paper's dark blue reflectors are a
-lighter blue here, its dark scan points are grey, because both would vanish on a dark floor.
+What each color means, and what it is in the light theme, is in `paints`; `relight` puts that in its place.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TypeAlias
 
-Color: TypeAlias = tuple[int, int, int]
+from commission.app.base.paints import Color, Floor, Plan, Run, Surface, Worded
 
-BACKGROUND: Color = (16, 18, 21)
-UNKNOWN: Color = (24, 26, 30)
-FREE: Color = (37, 40, 45)
-WALL: Color = (112, 118, 128)
+BACKGROUND = Floor.BACKGROUND.dark
+UNKNOWN = Floor.UNKNOWN.dark
+FREE = Floor.FREE.dark
+WALL = Floor.WALL.dark
+WALL_3D = Floor.WALL_3D.dark
 # Dark around what lies on any color of the floor: a heatmap is as bright as a reflector.
-CASING: Color = BACKGROUND
-GRID: Color = (50, 53, 59)
-GRID_METER: Color = (62, 66, 73)
-ROUTE: Color = (116, 128, 150)
-STATION: Color = (92, 214, 220)
-REFLECTOR: Color = (48, 108, 255)
-GATE: Color = (96, 176, 255)
-POSE: Color = (255, 82, 82)
-INLIER: Color = (255, 214, 10)
-OFFSET: Color = (150, 132, 52)
-OUTLIER_ASSOCIATION: Color = (255, 59, 48)
-OUTLIER_DETECTOR: Color = (196, 74, 60)
-SCAN: Color = (190, 197, 206)
-FURTHER_SCAN: Color = (206, 172, 140)
-VEHICLE: Color = (236, 239, 244)
-FIELD: Color = (150, 160, 120)
-FAR_FIELD: Color = (78, 84, 64)
-TRAIL: Color = (64, 200, 150)
-REFERENCE: Color = (196, 140, 255)
-SELECTED: Color = (255, 159, 28)
-LINE: Color = (38, 41, 46)
-SELECTED_LINE: Color = (124, 76, 10)
-CHOSEN_LINE: Color = (34, 66, 108)
-WARNING_LINE: Color = (98, 70, 18)
-ERROR_LINE: Color = (112, 34, 32)
-DEPENDENT: Color = (255, 92, 205)
-OVER_LIMIT: Color = (255, 59, 48)
-RECOVERY: Color = (64, 200, 150)
-RISK: Color = (255, 140, 40)
-SUGGESTED: Color = (92, 240, 214)
-TAKEN_DOWN: Color = (255, 138, 101)
-FIRST_TWIN: Color = (120, 220, 255)
-SECOND_TWIN: Color = (255, 120, 220)
-KEEP_OUT: Color = (222, 150, 70)
-TOO_LITTLE: Color = (240, 132, 52)
-REFUSED: Color = (255, 122, 110)
+CASING = BACKGROUND
+RIM = Floor.RIM.dark
+GRID_METER = Floor.GRID_METER.dark
+ROUTE = Floor.ROUTE.dark
+STATION = Floor.STATION.dark
+REFLECTOR = Floor.REFLECTOR.dark
+PREVIEW = Floor.PREVIEW.dark
+GATE = Run.GATE.dark
+POSE = Run.POSE.dark
+HEADING = Run.HEADING.dark
+INLIER = Run.INLIER.dark
+OFFSET = Run.OFFSET.dark
+OUTLIER_ASSOCIATION = Run.OUTLIER.dark
+OUTLIER_DETECTOR = Run.OUTLIER_DETECTOR.dark
+SCAN = Run.SCAN.dark
+FURTHER_SCAN = Run.FURTHER_SCAN.dark
+VEHICLE = Floor.VEHICLE.dark
+TRUCK = Floor.TRUCK.dark
+FIELD = Run.FIELD.dark
+FAR_FIELD = Run.FAR_FIELD.dark
+TRAIL = Run.TRAIL.dark
+REFERENCE = Run.REFERENCE.dark
+CLOUD = Run.CLOUD.dark
+NOT_KNOWN = Run.NOT_KNOWN.dark
+EDIT = Run.EDIT.dark
+SELECTED = Floor.SELECTED.dark
+LINE = Surface.LINE.dark
+SELECTED_LINE = Surface.SELECTED_LINE.dark
+CHOSEN_LINE = Surface.CHOSEN_LINE.dark
+WARNING_LINE = Surface.WARNING_LINE.dark
+ERROR_LINE = Surface.ERROR_LINE.dark
+DEPENDENT = Plan.DEPENDENT.dark
+OVER_LIMIT = Plan.OVER_LIMIT.dark
+RECOVERY = Plan.RECOVERY.dark
+RISK = Plan.RISK.dark
+SUGGESTED = Plan.SUGGESTED.dark
+TAKEN_DOWN = Plan.TAKEN_DOWN.dark
+FIRST_TWIN = Plan.FIRST_TWIN.dark
+SECOND_TWIN = Plan.SECOND_TWIN.dark
+KEEP_OUT = Plan.KEEP_OUT.dark
+TOO_LITTLE = Plan.TOO_LITTLE.dark
+REFUSED = Worded.REFUSED.dark
+DOUBTFUL = Worded.DOUBTFUL.dark
+BETTER_NUMBER = Worded.BETTER.dark
+WORSE_NUMBER = Worded.WORSE.dark
 # Variants of a drive, on the floor and in the plots: neither lived nor computed nor true.
-VARIANTS: tuple[Color, Color, Color] = ((255, 128, 214), (168, 230, 92), (250, 170, 120))
+VARIANTS = Run.VARIANT_A.dark, Run.VARIANT_B.dark, Run.VARIANT_C.dark
 # A layout that was kept beside the one of now: its reflectors, and how much better or worse the floor is now, from
 # little to much. Orange and blue are told apart by color-blind people.
-KEPT: Color = (166, 190, 255)
-WORSE: tuple[Color, Color, Color] = ((140, 92, 52), (204, 112, 42), (255, 148, 40))
-BETTER: tuple[Color, Color, Color] = ((46, 92, 124), (44, 132, 186), (92, 190, 250))
-NO_DIFFERENCE: Color = (66, 70, 78)
-NO_FIX_NEITHER: Color = (104, 108, 116)
-NO_FIX_DARK: Color = (30, 30, 34)
+KEPT = Plan.KEPT.dark
+WORSE = Plan.WORSE_1.dark, Plan.WORSE_2.dark, Plan.WORSE_3.dark
+BETTER = Plan.BETTER_1.dark, Plan.BETTER_2.dark, Plan.BETTER_3.dark
+NO_DIFFERENCE = Plan.NO_DIFFERENCE.dark
+NO_FIX_NEITHER = Plan.NO_FIX_NEITHER.dark
+NO_FIX_DARK = Plan.NO_FIX_DARK.dark
 # What an error comes from: apart from each other, and from the ramp of the share of a limit.
-FROM_NOISE: Color = (138, 148, 164)
-FROM_MAP: Color = (74, 134, 255)
-FROM_MOUNTING: Color = (222, 110, 206)
-FROM_RANGE: Color = (255, 190, 70)
-FROM_CLOCK: Color = (60, 200, 180)
+FROM_NOISE = Plan.FROM_NOISE.dark
+FROM_MAP = Plan.FROM_MAP.dark
+FROM_MOUNTING = Plan.FROM_MOUNTING.dark
+FROM_RANGE = Plan.FROM_RANGE.dark
+FROM_CLOCK = Plan.FROM_CLOCK.dark
+BRAND = Worded.BRAND.dark
 
-OPERATIONAL_COLOR = "#1c7c3c"
-FAIL_COLOR = "#c5221f"
-IDLE_COLOR = "#4a4f57"
-BRAND: Color = (60, 120, 200)
+
+def css(color: Color) -> str:
+    """Return a color as CSS writes it."""
+    return f"#{color[0]:02x}{color[1]:02x}{color[2]:02x}"
+
+
+OPERATIONAL_COLOR = css(Run.OPERATIONAL.dark)
+FAIL_COLOR = css(Run.FAIL.dark)
+IDLE_COLOR = css(Run.IDLE.dark)
 
 
 class Height:
@@ -123,11 +137,6 @@ class Legend:
     """Its shape in the scene."""
 
 
-def css(color: Color) -> str:
-    """Return a color as CSS writes it."""
-    return f"#{color[0]:02x}{color[1]:02x}{color[2]:02x}"
-
-
 TOP_BAR_PX = 44
 BOTTOM_PX = 248
 FOLDED_PX = 46
@@ -155,8 +164,9 @@ STYLE = f"""<style>
 [data-floating-window]:has(.c-bottom),[data-floating-window]:has(.c-top){{position:fixed!important;left:0!important;
  right:0!important;width:100vw!important;max-width:none!important;border-radius:0!important;box-shadow:none!important}}
 [data-floating-window]:has(.c-bottom){{top:auto!important;bottom:0!important;height:var(--c-bottom)!important;
- border-top:1px solid #3a3a3a}}
-[data-floating-window]:has(.c-top){{top:0!important;height:var(--c-top)!important;border-bottom:1px solid #3a3a3a}}
+ border-top:1px solid {css(Surface.EDGE.dark)}}}
+[data-floating-window]:has(.c-top){{top:0!important;height:var(--c-top)!important;
+ border-bottom:1px solid {css(Surface.EDGE.dark)}}}
 [data-floating-window]:has(.c-bottom) :is([data-dock-griphandle],[data-dock-resize])
  {{display:none!important}}
 [data-floating-window]:has(.c-bottom) [data-dock-group]{{position:relative}}
@@ -190,12 +200,12 @@ div:has(>.c-carried){{display:none!important}}
 .c-plots-bar{{display:flex;align-items:center;gap:10px;height:24px;padding:0 8px;overflow:hidden;white-space:nowrap}}
 .c-plots-bar button{{background:none;border:1px solid transparent;border-radius:3px;color:inherit;font:inherit;
  padding:1px 7px;cursor:pointer;opacity:.7}}
-.c-plots-bar button:hover,.c-plots-bar button:focus-visible{{opacity:1;border-color:#555}}
+.c-plots-bar button:hover,.c-plots-bar button:focus-visible{{opacity:1;border-color:{css(Surface.EDGE_HOVER.dark)}}}
 .c-plots-bar button:disabled{{opacity:.3;cursor:default;border-color:transparent}}
 .c-chips{{flex:1;min-width:0;overflow:hidden;font-size:11px}}
-.c-plots-bar [aria-pressed=true]{{opacity:1;background:#2c3036}}
+.c-plots-bar [aria-pressed=true]{{opacity:1;background:{css(Surface.PRESSED.dark)}}}
 .c-plots-bar [aria-pressed=false]{{opacity:.5}}
-.c-plots-end button{{border-color:#44484f;margin-left:4px;font-size:11px}}
+.c-plots-end button{{border-color:{css(Surface.EDGE_QUIET.dark)};margin-left:4px;font-size:11px}}
 .c-plots-body{{flex:1;min-height:0;position:relative;overflow:hidden}}
 .c-list-view{{position:absolute;inset:0;overflow:auto;padding:0 8px;display:none}}
 .c-plots[data-view=events] .c-events,.c-plots[data-view=reflectors] .c-reflectors,
@@ -203,25 +213,26 @@ div:has(>.c-carried){{display:none!important}}
 .c-plots:not([data-view=plots]) :is(canvas,.c-whole,.c-png){{display:none!important}}
 .c-list-view table{{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums}}
 .c-events table{{width:auto;min-width:480px}}
-.c-list-view th{{position:sticky;top:0;background:#242424;text-align:right;font-weight:400;white-space:nowrap;
+.c-list-view th{{position:sticky;top:0;background:{css(Surface.HEAD.dark)};text-align:right;font-weight:400;
+ white-space:nowrap;
  padding:1px 8px}}
 .c-list-view th button{{background:none;border:none;color:inherit;font:inherit;cursor:pointer;padding:0;opacity:.75}}
 .c-list-view th button:is(:hover,:focus-visible){{opacity:1;text-decoration:underline}}
 .c-list-view th .c-color{{padding-left:5px;color:{css(SELECTED)}}}
-.c-list-view td{{padding:1px 8px;text-align:right;white-space:nowrap;border-top:1px solid #2f3237}}
+.c-list-view td{{padding:1px 8px;text-align:right;white-space:nowrap;border-top:1px solid {css(Surface.RULE.dark)}}}
 .c-list-view :is(td,th):first-child,.c-events :is(td,th){{text-align:left}}
 .c-list-view tbody tr{{cursor:pointer}}
-.c-list-view tbody tr:is(:hover,:focus-visible){{background:#2c3036;outline:none}}
+.c-list-view tbody tr:is(:hover,:focus-visible){{background:{css(Surface.PRESSED.dark)};outline:none}}
 .c-variants>div{{display:flex;gap:22px;align-items:flex-start}}
 .c-variants table{{width:auto;flex:none}}
 .c-variants tbody tr{{cursor:default}}
 .c-variants .c-moments tbody tr{{cursor:pointer}}
 .c-moments td{{text-align:left}}
-.c-better{{color:#58d68d;font-style:normal}}
-.c-worse{{color:#ff7a6e;font-style:normal}}
-.c-different{{color:#ffd34d;font-style:normal}}
+.c-better{{color:{css(BETTER_NUMBER)};font-style:normal}}
+.c-worse{{color:{css(WORSE_NUMBER)};font-style:normal}}
+.c-different{{color:{css(Worded.DIFFERENT.dark)};font-style:normal}}
 .c-variants td small{{opacity:.6;padding-left:5px}}
-.c-variants .c-setting td{{color:#b9c0ca;font-style:italic}}
+.c-variants .c-setting td{{color:{css(Worded.SETTING.dark)};font-style:italic}}
 .c-variants th button{{padding-left:7px}}
 .c-floor-scale i{{display:inline-block;width:16px;height:9px}}
 .c-plots-body canvas{{display:block;position:absolute;inset:0;cursor:crosshair;touch-action:none}}
@@ -283,13 +294,13 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 [data-refused]::after{{content:attr(data-refused);flex-basis:100%;color:{css(REFUSED)};font-size:11.5px;
  line-height:1.3;padding-top:2px;overflow-wrap:anywhere}}
 .c-status{{position:fixed;z-index:1;display:flex;align-items:center;gap:8px;padding:2px 8px;border-radius:3px;
- background:rgba(16,18,21,.8);color:{css(SCAN)};font-size:12px;pointer-events:none;white-space:pre;
+ background:rgba(16,18,21,.8);color:{css(Worded.STATUS.dark)};font-size:12px;pointer-events:none;white-space:pre;
  font-variant-numeric:tabular-nums}}
-.c-ruler{{height:6px;border:1.5px solid {css(VEHICLE)};border-top:none}}
+.c-ruler{{height:6px;border:1.5px solid {css(Worded.STATUS.dark)};border-top:none}}
 .c-length{{font-weight:400}}
 .c-place:not(:empty){{padding-left:10px}}
 .c-scale{{position:fixed;left:{LEFT_PX + 16}px;top:calc(var(--c-top) + 10px);padding:1px 8px;border-radius:3px;
- background:rgba(16,18,21,.8);color:{css(INLIER)};font-size:12px;pointer-events:none;white-space:nowrap}}
+ background:rgba(16,18,21,.8);color:{css(Worded.NOTE.dark)};font-size:12px;pointer-events:none;white-space:nowrap}}
 [data-dock-region=right] [role=tab]{{padding:0 .62em!important}}
 [data-shows~=c-association] [data-dock-scroll]>div:has(.c-association){{flex-grow:2!important}}
 .c-association{{padding:0 12px 0 4px}}
@@ -301,28 +312,29 @@ div:has(>div>.c-bottom):has(.c-no-run) button{{opacity:.35;pointer-events:none}}
 :root:has(.c-no-run) .c-plots{{display:none}}
 div:has(>.c-tail){{display:none}}
 .c-tail-plain{{opacity:0;pointer-events:none}}
-.c-tail-slider{{position:absolute;top:2px;margin:0;height:16px;color-scheme:dark;accent-color:{css(BRAND)};
+.c-tail-slider{{position:absolute;top:2px;margin:0;height:16px;accent-color:{css(BRAND)};
  cursor:pointer}}
-.c-tail-tick{{position:absolute;top:2px;width:2px;margin-left:-1px;height:16px;background:{css(SELECTED)};pointer-events:none}}
+.c-tail-tick{{position:absolute;top:2px;width:2px;margin-left:-1px;height:16px;background:{css(SELECTED)};
+ pointer-events:none}}
 .c-a-head{{font-size:12.5px;display:flex;gap:6px;padding:0 2px}}
 .c-a-head span{{margin-left:auto;white-space:nowrap;opacity:.7;font-variant-numeric:tabular-nums}}
 .c-a-verdict{{font-size:12px;padding:0 2px 3px;font-variant-numeric:tabular-nums}}
 .c-a-picture{{display:block;width:100%;max-width:420px;margin:auto;background:{css(BACKGROUND)};fill:none;
  border-radius:3px}}
 .c-a-picture *{{vector-effect:non-scaling-stroke}}
-.c-a-fine{{stroke:#22252b;stroke-width:1}}
-.c-a-line{{stroke:#353a43;stroke-width:1}}
-.c-a-ray{{stroke:#6b7482;stroke-width:1;stroke-dasharray:2 4}}
+.c-a-fine{{stroke:{css(Surface.FINE.dark)};stroke-width:1}}
+.c-a-line{{stroke:{css(Surface.COARSE.dark)};stroke-width:1}}
+.c-a-ray{{stroke:{css(Surface.RAY.dark)};stroke-width:1;stroke-dasharray:2 4}}
 .c-a-gate{{stroke:{css(GATE)};stroke-width:1.6}}
 .c-a-rival{{stroke:{css(GATE)};stroke-width:1;opacity:.45}}
 .c-a-ring{{stroke-width:1.6}}
 .c-a-cloud{{stroke-width:2.4;stroke-linecap:round;opacity:.75}}
-.c-a-spread{{stroke:#c3ccd8;stroke-width:1.2;stroke-dasharray:4 3}}
+.c-a-spread{{stroke:{css(Run.SPREAD.dark)};stroke-width:1.2;stroke-dasharray:4 3}}
 .c-a-vector{{stroke-width:1.4}}
 .c-a-detection,.c-a-mean,.c-a-other{{stroke-width:1.8}}
-.c-a-after{{stroke:#e8eaee;stroke-width:1.3}}
-.c-a-bar{{stroke:{css(VEHICLE)};stroke-width:1.5}}
-.c-a-word,.c-a-length{{fill:#d5dae2;font-size:11px;font-variant-numeric:tabular-nums}}
+.c-a-after{{stroke:{css(Run.AFTER.dark)};stroke-width:1.3}}
+.c-a-bar{{stroke:{css(Worded.WORD.dark)};stroke-width:1.5}}
+.c-a-word,.c-a-length{{fill:{css(Worded.WORD.dark)};font-size:11px;font-variant-numeric:tabular-nums}}
 .c-a-length{{font-weight:600}}
 .c-a-rows{{padding:0 14px 2px 6px}}
 .c-a-legend{{padding-top:4px}}

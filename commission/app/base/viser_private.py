@@ -9,7 +9,7 @@ import asyncio
 import json
 import logging
 import uuid
-from collections.abc import Callable
+from collections.abc import AsyncGenerator, Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextvars import ContextVar
 from dataclasses import replace
@@ -167,6 +167,46 @@ def make_robust(server: ViserServer) -> None:
         buffer._warned_push_after_done = True
 
     server._websock_server.on_client_connect(prepare)
+
+
+def repaint(server: ViserServer, is_due: Callable[[str | None], bool], paint: Callable[[Any], Any]) -> None:
+    """Paint what some browsers get otherwise, from their connection on.
+
+    Parameters
+    ----------
+    server : a started one to which no browser has connected yet.
+    is_due : decides by the cookies of a browser.
+    paint : from a message to the one that is sent in its place; the message itself is for the others, too.
+    """
+    socket = server._websock_server
+
+    def watch(buffer: Any) -> None:
+        plain = buffer.window_generator
+
+        def windows(client_id: int, *args: Any, **options: Any) -> AsyncGenerator[Sequence[Any], None]:
+            found = plain(client_id, *args, **options)
+            connection = socket._live_connections.get(client_id)
+            request = None if connection is None else connection.request
+            return _painted(found, paint) if request and is_due(request.headers.get("Cookie")) else found
+
+        buffer.window_generator = windows
+
+    watch(socket.get_message_buffer())
+    socket.on_client_connect(lambda connection: watch(connection.get_message_buffer()))
+
+
+async def _painted(
+    windows: AsyncGenerator[Sequence[Any], None], paint: Callable[[Any], Any]
+) -> AsyncGenerator[Sequence[Any], None]:
+    """Windows of messages as one browser gets them; pictures beside the loop, since a floor map takes its time."""
+    try:
+        async for window in windows:
+            if any(isinstance(message, _messages.ImageMessage) for message in window):
+                yield await asyncio.to_thread(lambda window=window: [paint(message) for message in window])
+            else:
+                yield [paint(message) for message in window]
+    finally:
+        await windows.aclose()
 
 
 def _report_of_loop(_loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:

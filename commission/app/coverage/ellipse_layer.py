@@ -27,7 +27,7 @@ class FixEllipseLayer(BaseLayer):
         # A dark rim, since the heatmap has every lightness.
         self._rim, self._lines = (
             add_lines(scene, f"/plan/ellipses/{name}", color, width)
-            for name, color, width in (("rim", (0, 0, 0), 4.0), ("line", theme.VEHICLE, 1.8))
+            for name, color, width in (("rim", theme.RIM, 4.0), ("line", theme.PREVIEW, 1.8))
         )
         self._shown: EllipseView | None = None
 

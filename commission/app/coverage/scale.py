@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from commission.app.base.paints import Plan
 from commission.app.base.ramp import colors
 from commission.app.coverage.settings import Figure
 from commission.geometry.arrays import BoolArray, FloatArray
@@ -25,7 +26,7 @@ MOST_BOUNDS = 9
 NICE = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)
 HATCH = 3
 """Width of a stripe, in points of the lattice."""
-NO_FIX_COLORS = ((228, 92, 60), (58, 22, 22))
+NO_FIX_COLORS = Plan.NO_FIX.dark, Plan.NO_FIX_HATCH.dark
 COUNTS = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0)
 CHANCES = (50.0, 70.0, 80.0, 90.0, 95.0, 98.0, 99.0, 99.9)
 

@@ -46,7 +46,7 @@ class Overlay(BasePanel):
     def __init__(self, scene: SceneApi, post: Post, browser: int) -> None:
         self._scene, self._browser = scene, browser
         self._selected = add_lines(scene, "/editing/selected", theme.SELECTED, 2.0)
-        self._preview = add_lines(scene, "/editing/preview", theme.VEHICLE, 1.5)
+        self._preview = add_lines(scene, "/editing/preview", theme.PREVIEW, 1.5)
         self._points = add_points(scene, "/editing/points", theme.SELECTED, 0.1)
         self._labels: list[LabelHandle] = []
         self._handle = scene.add_transform_controls(

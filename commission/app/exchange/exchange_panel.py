@@ -164,7 +164,7 @@ def _state(exchange: Exchange) -> str:
         reading = exchange.reading
         return _padded(f"Reading <b>{escaped(reading.source.title)}</b> {reading.fraction:.0%}")
     if exchange.problem:
-        return _padded(f"<span style='color:#ff8a80'>{escaped(exchange.problem)}</span>")
+        return _padded(f"<span style='color:{theme.css(theme.REFUSED)}'>{escaped(exchange.problem)}</span>")
     return ""
 
 

@@ -27,7 +27,7 @@ class ImportOverlay(BasePanel):
 
     def __init__(self, scene: SceneApi, browser: int) -> None:
         self._browser = browser
-        self._lines = add_lines(scene, "/exchange/import", theme.VEHICLE, 1.5)
+        self._lines = add_lines(scene, "/exchange/import", theme.PREVIEW, 1.5)
         self._shown: tuple[Pending | None, Project | None] = (None, None)
 
     def draw(self, view: PageView) -> None:

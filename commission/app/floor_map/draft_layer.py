@@ -10,14 +10,15 @@ from commission.app.base import theme
 from commission.app.base.drawing import lift, polyline_segments
 from commission.app.base.layer import BaseLayer
 from commission.app.base.marks import add_lines, add_points
+from commission.app.base.paints import Floor
 from commission.app.base.view import PageView
 from commission.app.floor_map.draft import MapDraft, MapLoading
 from commission.io.image_map import Picture
 
 LONGEST_SIDE = 1600
 """Pixels of the picture that is drawn: a larger one is thinned, so that the threshold's slider stays quick."""
-PAPER: theme.Color = (58, 62, 70)
-INK: theme.Color = (214, 219, 227)
+PAPER = Floor.DRAFT_PAPER.dark
+INK = Floor.DRAFT_INK.dark
 
 
 def preview(picture: Picture, threshold: float, *, light_walls: bool) -> NDArray[np.uint8]:

@@ -7,6 +7,7 @@ from typing import Any
 from viser import GuiApi, GuiEvent
 
 from commission.app.base import actions as page_actions
+from commission.app.base import theme
 from commission.app.base.inputs import write_html
 from commission.app.base.panel import BasePanel, Post, escaped, from_browser, posting
 from commission.app.base.reach import typed_path
@@ -95,7 +96,7 @@ class MapTroublePanel(BasePanel):
     def draw_slowly(self, view: PageView) -> None:
         """Follow what the browser asks for."""
         text = view.state.of_browser(self._browser, MapTrouble).text
-        style = "font-size:12px;padding:2px 8px;color:#ff8a80;overflow-wrap:anywhere"
+        style = f"font-size:12px;padding:2px 8px;color:{theme.css(theme.REFUSED)};overflow-wrap:anywhere"
         write_html(self._said, text and f"<div style='{style}'>No floor map: {escaped(text)}</div>")
 
 

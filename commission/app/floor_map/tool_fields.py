@@ -136,7 +136,13 @@ def alignment_text(tool: AlignTool) -> str:
     if found is None:
         missing = f"click {LETTERS[len(tool.known)]}" if len(tool.known) < 2 else "they are too close to each other"
         return f"{table(clicked)}<div class='c-note'>Points: {missing}</div>"
-    color = "#ff8a80" if found.share > WRONG else "#ffb74d" if found.share > DOUBTFUL else "inherit"
+    color = (
+        theme.css(theme.REFUSED)
+        if found.share > WRONG
+        else theme.css(theme.DOUBTFUL)
+        if found.share > DOUBTFUL
+        else "inherit"
+    )
     difference = f"{MILLIMETRES.text(found.residual, '+.0f')} ({PERCENT.text(found.share, '.2f')})"
     residual = f"<span style='color:{color}'>{difference}</span>"
     rows = [

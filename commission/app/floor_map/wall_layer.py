@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import SceneApi, SceneNodeHandle
 
+from commission.app.base import theme
 from commission.app.base.drawing import yaw_quaternion
 from commission.app.base.layer import BaseLayer
 from commission.geometry.arrays import BoolArray
@@ -18,7 +19,6 @@ from commission.site.project import Project
 WALL_HEIGHT = 1.0
 LONGEST_SIDE = 800
 MOST_BOXES = 20_000
-COLOR = (118, 124, 134)
 
 
 def merged_boxes(occupied: BoolArray) -> NDArray[np.int64]:
@@ -89,7 +89,7 @@ class WallLayer(BaseLayer):
                 batched_wxyzs=np.tile([1.0, 0.0, 0.0, 0.0], (len(boxes), 1)),
                 batched_positions=centers,
                 batched_scales=sizes,
-                batched_colors=COLOR,
+                batched_colors=theme.WALL_3D,
                 flat_shading=True,
                 lod="off",
                 cast_shadow=False,

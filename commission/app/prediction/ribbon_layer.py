@@ -50,7 +50,7 @@ class RibbonLayer(BaseLayer):
         super().__init__(scene)
         # A dark rim keeps the ribbon apart from a heatmap in the same colors. One node for each color: colors of
         # single vertices come out lighter in the browser than the same color of a whole node.
-        self._rim = self._lines("rim", (0, 0, 0), RIM)
+        self._rim = self._lines("rim", theme.RIM, RIM)
         self._ribbon = tuple(self._lines(f"ribbon/{index}", color, WIDTH) for index, color in enumerate(palette()))
         self._shown: RoutePrediction | None = None
 

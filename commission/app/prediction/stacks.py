@@ -44,7 +44,7 @@ def stacked(track: Stacked, axis: TrackAxis) -> str:
     levels = [level for level in (0.0, step, 2.0 * step) if level <= top]
     parts = [each for level in levels for each in tick(TALL * (1.0 - level / top), number_text(level))]
     parts += _bars(axis, track, TALL / top)
-    red = theme.css(theme.POSE)
+    red = theme.css(theme.OVER_LIMIT)
     if is_near:
         parts.append(line(TALL * (1.0 - track.limit / top), red, "5 4"))
     else:

@@ -12,13 +12,14 @@ import numpy as np
 
 from commission.app.base import theme
 from commission.app.base.numbers import number_text
+from commission.app.base.paints import Run, Surface
 from commission.app.base.panel import escaped
 from commission.geometry.arrays import FloatArray
 
 WIDTH, LEFT = 270, 30
 BELOW, ABOVE = 100.0, 2.0
 """How far a logarithmic axis reaches below and above the limit, as factors: a good drive lies far below it."""
-INK, GRID = "#9aa0a8", "#3a3d43"
+INK, GRID = theme.css(Surface.AXIS.dark), theme.css(Surface.AXIS_TICK.dark)
 TALL, LOW = 60.0, 34.0
 """Height of the bars of a track, and of one that matters less [pixels]."""
 LABELS_PX = 12
@@ -87,12 +88,14 @@ def limited(track: Limited, axis: TrackAxis) -> str:
     ticks = [10.0**power for power in range(math.ceil(low), math.floor(high) + 1)]
     parts = [part for level in ticks for part in tick(float(y(np.array(level))), f"{level:g}")]
     parts += _bars(axis, y(track.levels), TALL)
-    parts.append(line(float(y(np.array(track.limit))), theme.css(theme.POSE), "5 4"))
+    parts.append(line(float(y(np.array(track.limit))), theme.css(theme.OVER_LIMIT), "5 4"))
     parts.append(_steps(axis, y(track.errors), theme.css(theme.REFERENCE)))
     if track.driven is not None:
         metres, values = track.driven
         points = " ".join(f"{px:.1f},{py:.1f}" for px, py in zip(axis.x(metres), y(values), strict=True))
-        parts.append(f"<polyline points='{points}' fill='none' stroke='#fff' stroke-width='1.2'/>")
+        parts.append(
+            f"<polyline points='{points}' fill='none' stroke='{theme.css(Run.WHOLE_CURVE.dark)}' stroke-width='1.2'/>"
+        )
     return svg(track.title, TALL, axis, parts)
 
 

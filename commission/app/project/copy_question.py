@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from viser import GuiApi
 
-from commission.app.base import actions
+from commission.app.base import actions, theme
 from commission.app.base.inputs import show, write_html
 from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.view import PageView
@@ -34,7 +34,7 @@ class CopyQuestionPanel(BasePanel):
         """Follow what the browser asks for."""
         self._asked = asked = view.state.of_browser(self._browser, CopyQuestion).asked
         text = "" if asked is None else f"{escaped(asked.folder)} holds {escaped(asked.holds)}. Replace it?"
-        style = "font-size:12px;padding:2px 8px;color:#ff8a80;overflow-wrap:anywhere"
+        style = f"font-size:12px;padding:2px 8px;color:{theme.css(theme.REFUSED)};overflow-wrap:anywhere"
         write_html(self._text, text and f"<div style='{style}'>{text}</div>")
         for answer in self._answers:
             show(answer, visible=asked is not None)

@@ -32,7 +32,7 @@ FEWEST_PX = 7.0
 ARM_PX = 6.0
 """Half of the cross of a detection."""
 RIVALS_TOLD = 3
-CLOUD_COLOR = theme.css((128, 150, 176))
+CLOUD_COLOR = theme.css(theme.CLOUD)
 VERDICTS = {
     Status.INLIER: "inlier",
     Status.OUTLIER_DETECTOR: "rejected by its beams",

@@ -6,6 +6,7 @@ from viser import GuiApi
 
 from commission.app.base import theme
 from commission.app.base.inputs import write_html
+from commission.app.base.paints import Surface
 from commission.app.base.panel import BasePanel, clock, escaped
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
@@ -46,7 +47,7 @@ def operational_since(view: PageView) -> str:
 def _share(value: float, limit: float) -> str:
     """Return a value as a bar against its limit: full where it reaches it."""
     share = min(value / limit, 1.0)
-    color = theme.FAIL_COLOR if share >= 1.0 else theme.css(theme.SCAN)
+    color = theme.FAIL_COLOR if share >= 1.0 else theme.css(Surface.SHARE_BAR.dark)
     return f"<span class='c-share'><i style='width:{share:.0%};background:{color}'></i></span>"
 
 

@@ -18,7 +18,6 @@ from commission.studies.reflector_figures import ReflectorFigures
 
 CLASSES = 6
 """Colors of the floor's reflectors, and one more where nothing is known."""
-UNKNOWN: theme.Color = (120, 124, 132)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,7 +170,7 @@ def palette() -> tuple[theme.Color, ...]:
     """Color of each class, the last one of what is unknown."""
     # Without the darkest two, which would not be seen on a dark floor.
     ramp = ((int(red), int(green), int(blue)) for red, green, blue in colors(CLASSES + 2)[2:])
-    return (*ramp, UNKNOWN)
+    return (*ramp, theme.NOT_KNOWN)
 
 
 def bounds_of(values: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from typing import Any
 
 from viser import GuiApi
 
-from commission.app.base import viser_private
+from commission.app.base import theme, viser_private
 from commission.app.base.panel import BasePanel, Post, posting
 from commission.app.base.view import PageView
 from commission.app.run.asked import action_of
@@ -24,7 +24,7 @@ from commission.app.run.variant_table import variants_message
 from commission.app.run.view import RunView
 from commission.studies.variants import VariantsResult
 
-EDIT = "#c08bff"
+EDIT = theme.css(theme.EDIT)
 """Where an edit acts from, or reflectors are covered."""
 
 

@@ -7,6 +7,7 @@ from typing import Any, Literal
 from viser import GuiApi
 
 from commission.app.base import actions, theme
+from commission.app.base.paints import Surface
 from commission.app.base.panel import BasePanel, Post, clock, posting
 from commission.app.base.view import PageView
 from commission.app.run.actions import Play, Restart, Seek, SetSpeed, StepScan
@@ -51,7 +52,7 @@ def strip(run: RunView | None) -> str:
         f"<div class='c-strip' data-episodes='{len(run.lived_episodes)}' data-coming='{len(run.coming_episodes)}' "
         f"data-edits='{len(run.edits)}'>"
         "<svg width='100%' height='8' viewBox='0 0 100 8' preserveAspectRatio='none' "
-        f"style='display:block;background:#33363c'>{''.join(parts)}</svg></div>"
+        f"style='display:block;background:{theme.css(Surface.TIME_LINE.dark)}'>{''.join(parts)}</svg></div>"
     )
 
 

@@ -12,7 +12,7 @@ from commission.app.base.ramp import colors
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.studies.consistency import Recent
 
-NOTHING_SEEN: theme.Color = (120, 124, 132)
+NOTHING_SEEN = theme.NOT_KNOWN
 """Where nothing was detected in the last second."""
 
 

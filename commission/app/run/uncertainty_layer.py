@@ -22,11 +22,15 @@ class UncertaintyLayer(BaseLayer):
 
     name = "Pose covariance"
     rank = 200
-    legend = (theme.Legend("2σ of the estimated pose", theme.POSE, theme.Mark.RING),)
+    legend = (
+        theme.Legend("2σ of the estimated position", theme.POSE, theme.Mark.RING),
+        theme.Legend("2σ of the estimated heading", theme.HEADING, theme.Mark.LINE),
+    )
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._lines = add_lines(scene, "/vehicle/covariance", theme.POSE, 2.0)
+        self._rays = add_lines(scene, "/vehicle/heading_spread", theme.HEADING, 2.0)
 
     def draw(self, view: PageView) -> None:
         """Draw ellipse and rays."""
@@ -42,13 +46,9 @@ class UncertaintyLayer(BaseLayer):
         spread = min(SIGMAS * state.magnify * float(np.sqrt(run.covariance[2, 2])), np.pi)
         ends = RAY * np.array([(np.cos(spread), np.sin(-spread)), (np.cos(spread), np.sin(spread))])
         rays = np.stack([np.zeros((2, 2)), ends], axis=1)
-        self._lines.points = np.concatenate(
-            [
-                outline_segments(ellipse, theme.Height.POSE),
-                lift(rays.reshape(-1, 2), theme.Height.POSE).reshape(-1, 2, 3),
-            ]
-        )
+        self._lines.points = outline_segments(ellipse, theme.Height.POSE)
+        self._rays.points = lift(rays.reshape(-1, 2), theme.Height.POSE).reshape(-1, 2, 3)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the lines."""
-        return (self._lines,)
+        return self._lines, self._rays

@@ -146,7 +146,7 @@ class VehicleLayer(BaseLayer):
                 "/vehicle/body",
                 np.asarray(hull.vertices, np.float32),
                 np.asarray(hull.faces, np.uint32),
-                color=(232, 150, 40),
+                color=theme.TRUCK,
                 flat_shading=True,
             ),
         )

@@ -1,13 +1,45 @@
-"""What is drawn on the floor can be told from what it lies on: contrast after WCAG 2.1, computed here."""
+"""Colors of the page: each has one meaning, and what is drawn can be told from what it lies on.
+
+Contrast after WCAG 2.1 and distance after CIE 1976 are computed here, from the standards.
+"""
 
 from __future__ import annotations
 
+import re
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
 import pytest
 
+import commission
 from commission.app.base import theme
+from commission.app.base.paints import PAINTS, Floor, Paint, Plan, Run
+from commission.io.bundled import bundled_folder
 
 LEAST = 3.0
 """What WCAG 2.1, 1.4.11, asks of graphical objects."""
+TOLD_APART = 12.0
+"""Distance of colors that are told apart beside each other: 2.3 is just noticed (Mahy et al. 1994)."""
+THEMES = ("dark", "light")
+ON_A_DRIVE = (
+    Floor.WALL,
+    Floor.STATION,
+    Floor.REFLECTOR,
+    Floor.SELECTED,
+    Floor.VEHICLE,
+    Run.GATE,
+    Run.POSE,
+    Run.HEADING,
+    Run.INLIER,
+    Run.OUTLIER,
+    Run.OUTLIER_DETECTOR,
+    Run.SCAN,
+    Run.TRAIL,
+    Run.REFERENCE,
+    Plan.OVER_LIMIT,
+)
+"""What a person has to tell apart while a vehicle drives. The route is a thin line, told from a wall by its shape."""
 
 
 def luminance(color: theme.Color) -> float:
@@ -21,33 +53,97 @@ def contrast(one: theme.Color, other: theme.Color) -> float:
     return (bright + 0.05) / (dark + 0.05)
 
 
+def lab(color: theme.Color) -> np.ndarray:
+    """CIE 1976 L*a*b* of an sRGB color under D65."""
+    linear = np.array([v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in np.array(color) / 255.0])
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    shares = to_xyz @ linear / (0.9505, 1.0, 1.089)
+    x, y, z = np.where(shares > 0.008856, np.cbrt(shares), 7.787 * shares + 16.0 / 116.0)
+    return np.array([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)])
+
+
 def test_black_and_white_have_the_contrast_that_the_standard_names() -> None:
     assert contrast((0, 0, 0), (255, 255, 255)) == pytest.approx(21.0)
     assert contrast((119, 119, 119), (255, 255, 255)) == pytest.approx(4.48, abs=0.01)
 
 
-@pytest.mark.parametrize("below", [theme.BACKGROUND, theme.UNKNOWN, theme.FREE])
+@pytest.mark.parametrize("shown", THEMES)
+def test_no_two_meanings_share_a_color(shown: str) -> None:
+    meanings: dict[theme.Color, set[str]] = {}
+    for paint in PAINTS.values():
+        meanings.setdefault(getattr(paint, shown), set()).add(paint.meaning)
+    shared = {color: found for color, found in meanings.items() if len(found) > 1}
+    assert shared == {}
+
+
+def test_no_meaning_has_two_colors() -> None:
+    assert len({paint.meaning for paint in PAINTS.values()}) == len(PAINTS)
+
+
+@pytest.mark.parametrize("shown", THEMES)
+def test_what_a_drive_shows_is_told_apart(shown: str) -> None:
+    near = {
+        (one.meaning, other.meaning): round(distance, 1)
+        for one, other in combinations(ON_A_DRIVE, 2)
+        if (distance := float(np.linalg.norm(lab(getattr(one, shown)) - lab(getattr(other, shown))))) < TOLD_APART
+    }
+    assert near == {}
+
+
+@pytest.mark.parametrize("shown", THEMES)
+@pytest.mark.parametrize("below", [Floor.BACKGROUND, Floor.UNKNOWN, Floor.FREE])
 @pytest.mark.parametrize(
-    "drawn", [theme.WALL, theme.ROUTE, theme.REFLECTOR, theme.GATE, theme.INLIER, theme.OUTLIER_ASSOCIATION, theme.SCAN]
+    "drawn",
+    [
+        *(Floor.WALL, Floor.ROUTE, Floor.REFLECTOR, Floor.STATION, Floor.SELECTED, Floor.VEHICLE),
+        *(Run.GATE, Run.POSE, Run.HEADING, Run.INLIER, Run.OUTLIER, Run.SCAN, Run.TRAIL, Run.REFERENCE),
+        *(Plan.SUGGESTED, Plan.OVER_LIMIT, Plan.KEPT),
+    ],
+    ids=lambda paint: paint.meaning,
 )
-def test_marks_stand_out_from_the_floor(drawn: theme.Color, below: theme.Color) -> None:
-    assert contrast(drawn, below) >= LEAST
+def test_marks_stand_out_from_the_floor(drawn: Paint, below: Paint, shown: str) -> None:
+    assert contrast(getattr(drawn, shown), getattr(below, shown)) >= LEAST
 
 
-@pytest.mark.parametrize("drawn", [theme.ROUTE, theme.REFLECTOR])
-def test_reflectors_and_routes_stand_out_on_walls_and_heatmaps_by_their_casing(drawn: theme.Color) -> None:
-    assert contrast(drawn, theme.CASING) >= LEAST
+@pytest.mark.parametrize("shown", THEMES)
+@pytest.mark.parametrize("drawn", [Floor.ROUTE, Floor.REFLECTOR])
+def test_reflectors_and_routes_stand_out_on_walls_and_heatmaps_by_their_casing(drawn: Paint, shown: str) -> None:
+    assert theme.CASING == Floor.BACKGROUND.dark
+    assert contrast(getattr(drawn, shown), getattr(Floor.BACKGROUND, shown)) >= LEAST
 
 
-@pytest.mark.parametrize("steps", [theme.WORSE, theme.BETTER])
-def test_each_step_of_a_difference_is_brighter_than_the_one_before_and_the_last_stands_out(
-    steps: tuple[theme.Color, ...],
-) -> None:
-    brightness = [luminance(color) for color in (theme.NO_DIFFERENCE, *steps)]
-    assert brightness == sorted(set(brightness))
-    assert contrast(steps[-1], theme.NO_DIFFERENCE) >= LEAST
+@pytest.mark.parametrize("shown", THEMES)
+@pytest.mark.parametrize(
+    "steps", [(Plan.WORSE_1, Plan.WORSE_2, Plan.WORSE_3), (Plan.BETTER_1, Plan.BETTER_2, Plan.BETTER_3)]
+)
+def test_each_step_of_a_difference_stands_out_more_than_the_one_before(steps: tuple[Paint, ...], shown: str) -> None:
+    ground = getattr(Plan.NO_DIFFERENCE, shown)
+    contrasts = [contrast(getattr(step, shown), ground) for step in steps]
+    assert contrasts == sorted(set(contrasts))
+    assert contrasts[-1] >= LEAST
 
 
-@pytest.mark.parametrize("below", [theme.BACKGROUND, theme.FREE, theme.NO_DIFFERENCE])
-def test_reflectors_of_a_kept_layout_stand_out_from_the_floor(below: theme.Color) -> None:
-    assert contrast(theme.KEPT, below) >= LEAST
+def test_reflectors_of_a_kept_layout_stand_out_where_nothing_differs() -> None:
+    assert contrast(Plan.KEPT.dark, Plan.NO_DIFFERENCE.dark) >= LEAST
+    assert contrast(Plan.KEPT.light, Plan.NO_DIFFERENCE.light) >= LEAST
+
+
+def test_every_color_of_a_script_has_a_meaning() -> None:
+    known = {theme.css(paint.dark) for paint in PAINTS.values()}
+    scripts = sorted(bundled_folder("web_assets").glob("*.js"))
+    found = {(path.name, each) for path in scripts for each in re.findall(r"#[0-9a-f]{6}\b", path.read_text())}
+    assert len(found) > 5
+    assert {each for each in found if each[1] not in known} == set()
+
+
+def test_no_color_is_written_beside_the_table_of_paints() -> None:
+    written = re.compile(r"#[0-9a-f]{6}\b|: (?:theme\.)?Color = \(\d")
+    app = Path(commission.__file__).parent / "app"
+    lines = {
+        f"{path.name}: {line.strip()}"
+        for path in app.rglob("*.py")
+        if path.name != "paints.py"
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if written.search(line)
+    }
+    assert lines == set()
