@@ -64,7 +64,9 @@
       chart.drawn.sort((one, other) => (other.variant ?? false) - (one.variant ?? false));
     }
     view = plots.span;
-    find(".c-whole").disabled = view[0] <= 0 && view[1] >= plots.duration;
+    const whole = find(".c-whole");
+    whole.disabled = view[0] <= 0 && view[1] >= plots.duration;
+    whole.title = whole.disabled ? "Not now: the whole drive is shown" : "Show the whole drive (double click in a plot)";
     showChips();
   }
 

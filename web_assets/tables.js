@@ -133,7 +133,8 @@
   function drawVariants() {
     if (!compared) return;
     const keep = make("button", { textContent: "Keep", disabled: !compared.free, className: "c-keep",
-      title: "Keep this run as the next variant, and try something else beside it", onclick: () => ask({ do: "keep" }) });
+      title: compared.free ? "Keep this run as the next variant, and try something else beside it"
+        : "Not now: three variants are kept; forget one first", onclick: () => ask({ do: "keep" }) });
     chips.append(keep);
     const { names, moments } = compared;
     if (!names.length) return lists.variants.replaceChildren(

@@ -219,7 +219,7 @@ class Quantity:
         if isinstance(value, int) and self.scale == 1.0:
             return value
         number = float(value) * self.scale
-        plain = round(number, _decimals(self.step))
+        plain = round(number, decimals_of(self.step))
         return plain if math.isclose(plain, number, rel_tol=AS_IN_A_FILE) else float(f"{number:.6g}")
 
     def of_page(self, number: float) -> float:
@@ -228,11 +228,11 @@ class Quantity:
 
     def text(self, value: float) -> str:
         """Return a value as the page writes it: number, with the decimals of its step, and unit."""
-        return joined(f"{value * self.scale:.{_decimals(self.step)}f}", self.shown_unit)
+        return joined(f"{value * self.scale:.{decimals_of(self.step)}f}", self.shown_unit)
 
     def change_text(self, before: float, after: float) -> str:
         """Return how a value changes, `1.250 → 1.275 m`; empty: by less than the last digit."""
-        old, new = (f"{value * self.scale:.{_decimals(self.step)}f}" for value in (before, after))
+        old, new = (f"{value * self.scale:.{decimals_of(self.step)}f}" for value in (before, after))
         return "" if old == new else f"{old} → {joined(new, self.shown_unit)}"
 
     def brief(self, value: float) -> str:
@@ -306,7 +306,7 @@ Description: TypeAlias = Quantity | Switch | Choice | Words | Group
 """What stands beside a field that the engineer edits."""
 
 
-def _decimals(step: float) -> int:
+def decimals_of(step: float) -> int:
     """Decimals that a step has: 3 for 0.005, none for 20."""
     exponent = Decimal(repr(step)).normalize().as_tuple().exponent
     return max(0, -exponent) if isinstance(exponent, int) else 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import typing
 from collections.abc import Iterable
 from dataclasses import replace
@@ -12,7 +13,7 @@ from viser import GuiApi, GuiInputHandle, GuiNumberHandle, GuiSliderHandle
 
 from commission.app.base import viser_private
 from commission.site.fields import FieldInfo, field_info, get_field
-from commission.site.quantity import LARGEST, Choice, Quantity, Switch
+from commission.site.quantity import LARGEST, Choice, Quantity, Switch, decimals_of
 
 
 def add_widget(gui: GuiApi, info: FieldInfo, value: Any, note: str = "") -> GuiInputHandle[Any]:
@@ -66,9 +67,24 @@ def held(info: FieldInfo, value: Any) -> Any:
     if info.quantity.none:
         return info.quantity.none if value is None else f"{info.quantity.on_page(value):g}"
     if isinstance(value, tuple | list | np.ndarray):
-        return tuple(float(info.quantity.on_page(float(each))) for each in typing.cast("Iterable[Any]", value))
+        return tuple(
+            _tidy(info.quantity, float(info.quantity.on_page(float(each))))
+            for each in typing.cast("Iterable[Any]", value)
+        )
     number = info.quantity.on_page(value)
-    return round(number) if info.kind is int else float(number)
+    return round(number) if info.kind is int else _tidy(info.quantity, float(number))
+
+
+def _tidy(quantity: Quantity, number: float) -> float:
+    """Number of the page without digits that only its unit brings in: 0.1 rad is 5.72958° and not 5.729577951308232.
+
+    Six digits, and of large numbers a thousandth of a step: far below what anybody enters. What is not entered is not
+    changed by how it is shown.
+    """
+    if not number or not math.isfinite(number):
+        return number
+    six = 5 - math.floor(math.log10(abs(number)))
+    return round(number, max(six, decimals_of(quantity.step) + 3))
 
 
 def meant(info: FieldInfo, content: Any) -> Any:

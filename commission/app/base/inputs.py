@@ -209,20 +209,20 @@ def write_html(widget: Any, content: str) -> None:
     show(widget, visible=bool(content))
 
 
-def enable(button: GuiButtonHandle, why_not: str) -> None:
-    """Let a button be pressed, or say on it, when it is pointed at, why it cannot be.
+def enable(widget: GuiButtonHandle | GuiInputHandle[Any], why_not: str) -> None:
+    """Let a button be pressed or a field be filled, or say on it, when it is pointed at, why it cannot be.
 
     Parameters
     ----------
-    button : with the hint of what it does.
-    why_not : one line; empty: it can be pressed.
+    widget : with the hint of what it does.
+    why_not : one line; empty: it can be used.
     """
-    if button.disabled is not bool(why_not):
-        button.disabled = bool(why_not)
-    does = (button.hint or "").split(NOT_NOW)[0]
+    if widget.disabled is not bool(why_not):
+        widget.disabled = bool(why_not)
+    does = (widget.hint or "").split(NOT_NOW)[0]
     hint = f"{does}{NOT_NOW}{why_not}." if why_not else does
-    if button.hint != hint:
-        button.hint = hint
+    if widget.hint != hint:
+        widget.hint = hint
 
 
 def show(widget: Any, *, visible: bool) -> None:

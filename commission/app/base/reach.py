@@ -64,6 +64,21 @@ class Reach:
             raise UsageError(f"{path}: is out of reach; expected a path in the folders that are shared: {names}")
         return target
 
+    def lists(self, path: Path, sender: Sender) -> bool:
+        """Whether a browser may see that something is there: it, after all links, is in reach.
+
+        Parameters
+        ----------
+        path : a file or folder, existing or not; what is in a folder is asked for by itself.
+        sender : who asks.
+        """
+        if self.folders is None or sender.browser is None:
+            return True
+        try:
+            return self._holds(_resolved(typed_path(str(path))))
+        except UsageError:
+            return False
+
     def _holds(self, path: Path) -> bool:
         return self.folders is not None and any(path.is_relative_to(folder) for folder in self.folders)
 

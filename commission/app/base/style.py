@@ -60,5 +60,34 @@ div:has(>div>.c-bottom):has(.c-no-run)>:nth-child(4){{grid-column:1/span 24!impo
  height:26px;padding:0;border-radius:3px;border:1px solid {css(Surface.EDGE_QUIET.dark)};
  background:{css(Surface.CARD.dark)};color:inherit;font-size:15px;line-height:1;cursor:pointer}}
 .c-daylight:is(:hover,:focus-visible){{border-color:{css(Worded.BRAND.dark)}}}
+.c-browse{{position:absolute;right:2px;top:2px;bottom:2px;width:24px;border:none;border-radius:3px;cursor:pointer;
+ background:{css(Surface.PRESSED.dark)};color:inherit;font:inherit;font-size:12px;line-height:1}}
+.c-browse:is(:hover,:focus-visible){{background:{css(Worded.PRESS.dark)};color:#fff}}
+:has(>.c-browse)>input{{padding-right:28px!important}}
+.c-files{{position:fixed;z-index:400;left:50%;top:50%;transform:translate(-50%,-50%);width:min(560px,100vw - 32px);
+ max-height:min(560px,100vh - 64px);display:flex;flex-direction:column;border-radius:5px;font-size:13px;
+ background:{css(Surface.CARD.dark)};border:1px solid {css(Surface.CARD_EDGE.dark)};
+ box-shadow:0 6px 24px rgba(0,0,0,.35)}}
+.c-files[hidden]{{display:none}}
+.c-files[data-waits]{{opacity:.7}}
+.c-files-head{{padding:10px 14px 6px;overflow-wrap:anywhere}}
+.c-files-list{{flex:1;overflow:auto;padding:0 8px}}
+.c-files-title{{padding:5px 6px 2px;font-size:11.5px;opacity:.7}}
+.c-files-problem{{padding:6px;color:{css(Worded.REFUSED.dark)};overflow-wrap:anywhere}}
+.c-file{{display:flex;gap:12px;width:100%;padding:3px 6px;border:none;border-radius:3px;background:none;color:inherit;
+ font:inherit;text-align:left;cursor:pointer}}
+.c-file span{{flex:1;overflow-wrap:anywhere}}
+.c-file small{{opacity:.7;white-space:nowrap;font-variant-numeric:tabular-nums}}
+.c-folder span{{font-weight:600}}
+.c-folder span::after{{content:" /";opacity:.6}}
+.c-file:is(:hover,:focus-visible){{background:{css(Surface.PRESSED.dark)};outline:none}}
+.c-files-foot{{display:flex;justify-content:flex-end;gap:8px;padding:8px 14px 10px}}
+.c-files-foot button{{padding:3px 12px;border-radius:3px;border:1px solid {css(Surface.CARD_EDGE.dark)};background:none;
+ color:inherit;font:inherit;cursor:pointer}}
+.c-files-foot .c-files-take{{background:{css(Worded.PRESS.dark)};color:#fff}}
+.c-drop{{position:fixed;z-index:300;left:50%;bottom:calc(var(--c-bottom) + 46px);transform:translateX(-50%);
+ max-width:min(520px,100vw - 32px);padding:8px 14px;border-radius:4px;font-size:13px;pointer-events:none;
+ background:{css(Surface.CARD.dark)};border:1px solid {css(Worded.LACKING.dark)}}}
+.c-drop[hidden]{{display:none}}
 @media print{{.c-daylight{{display:none}}}}
 </style>"""

@@ -150,6 +150,18 @@ RIGHT_PX = 290
 WIDE = "<div class='c-wide'></div>"
 """An html element that lets the widget behind it, which has no label, take the label's room, too."""
 
+
+def path_mark(kind: str) -> str:
+    """Return an html element that lets the text field behind it look into folders (web_assets/files.js).
+
+    Parameters
+    ----------
+    kind : whose files of before are offered: `recording`, `map`, `file` or `folder`; of the first and the last a folder
+        can be chosen.
+    """
+    return f"<div class='c-path' data-path='{kind}'></div>"
+
+
 LIVE = "<div class='c-live'></div>"
 """An html element that lets the text field behind it tell of every key: one that seeks, and changes nothing."""
 
@@ -249,7 +261,7 @@ div:has(>div>.c-bottom)>:nth-child(5) [style*="7.25em"]{{display:none}}
 div:has(>div>.c-route){{display:grid;grid-template-columns:repeat(3,minmax(0,1fr));padding-top:2px!important}}
 div:has(>div>.c-route)>:nth-child(1){{grid-column:span 3;padding-left:var(--c-tabs)}}
 .c-route{{font-size:12px;height:44px;display:flex;align-items:center;white-space:nowrap;overflow:hidden}}
-div:has(>:is(.c-wide,.c-live)){{display:none}}
+div:has(>:is(.c-wide,.c-live,.c-path)){{display:none}}
 div:has(>.c-wide)+*>.mantine-Flex-root>[style*="flex-shrink: 0"]{{display:none}}
 div:has(>.c-tools)+* .mantine-Button-root{{padding:0 4px!important;font-size:11px!important;min-width:0!important;
  flex:1 1 auto!important}}

@@ -61,6 +61,7 @@ class ExchangePanel(BasePanel):
             endings=ENDINGS,
             note="Reflectors: CSV, SICK .imk. Routes: VDMA LIF, VDA 5050. A project: .zip.",
         )
+        gui.add_html(theme.path_mark("file"))
         path = gui.add_text("Server file", "", hint="Path, on the computer that serves this page, of such a file.")
         read = gui.add_button("Read it", color="gray", hint="Show what the file would change.")
         read.on_click(posting(post, lambda _event: self._named(path.value)))

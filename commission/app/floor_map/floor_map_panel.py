@@ -36,6 +36,7 @@ class FloorMapPanel(BasePanel):
         self._shown: MapLoading | None = None
         with gui.add_folder("Floor map", expand_by_default=project.floor_map is None):
             kinds = gui.add_html(KINDS)
+            mark = gui.add_html(theme.path_mark("map"))
             path = gui.add_text("Map file", "", hint="Path of a file on the computer that serves this page.")
             opened = gui.add_button("Open", hint="Read the file of this path.")
 
@@ -53,7 +54,7 @@ class FloorMapPanel(BasePanel):
                 endings=tuple(f".{ending}" for ending in ENDINGS),
                 note="Of a ROS map the .yaml and its image, one after the other.",
             )
-            self._source = (kinds, path, opened)
+            self._source = (kinds, mark, path, opened)
             self._bar = gui.add_progress_bar(0.0, visible=False, animated=True)
             self._cancel = gui.add_button("Cancel", color="gray", visible=False, hint="Stop reading; nothing changes.")
             self._cancel.on_click(posting(post, lambda _event: actions.StopMapJob()))

@@ -115,8 +115,7 @@ class MapToolFields(BasePanel):
             point = tool.known[index] if known else NOWHERE
             for widget, value in zip(widgets, (point.name, held(PLANT, point.plant)), strict=True):
                 write(widget, value)
-                if widget.disabled is known:
-                    widget.disabled = not known
+                enable(widget, "" if known else f"click point {LETTERS[index]} on the floor first")
         write(self._moves, EVERYTHING if tool.everything else MAP_ONLY)
         self._said.content = f"<div style='padding:2px 6px'>{alignment_text(tool)}</div>"
         found = tool.alignment()

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from commission.app.base.feature import PLAN, RUN, SITE, TUNE, Docked, Feature, Tab
-from commission.app.project import reducer
+from commission.app.project import browsing, reducer
+from commission.app.project.browse_panel import BrowsePanel
+from commission.app.project.browse_service import BrowseService
 from commission.app.project.copy_question import CopyQuestionPanel
 from commission.app.project.guide_panel import GuidePanel, LackingPanel
 from commission.app.project.project_fields import ProjectFields
@@ -19,14 +21,15 @@ def _lacking(tab: Tab) -> Docked:
 
 FEATURE = Feature(
     name="project",
-    reducers=(reducer,),
-    services=(ProjectFolder,),
+    reducers=(reducer, browsing),
+    services=(ProjectFolder, BrowseService),
     panels=(
         Docked(make=lambda at: TitlePanel(at.gui, at.state), tab=None, rank=0),
         Docked(make=lambda at: ProjectButtons(at.gui, at.post), tab=None, rank=30),
         Docked(make=lambda at: SitePanel(at.gui, at.state.project), tab=SITE, rank=0),
         Docked(make=lambda at: ProjectFields(at.gui, at.post, at.state.project), tab=SITE, rank=10, folder="Project"),
         Docked(make=lambda at: CopyQuestionPanel(at.gui, at.post, at.browser), tab=SITE, rank=10, own=True),
+        Docked(make=lambda at: BrowsePanel(at.gui, at.post, at.browser), tab=None, rank=96, own=True),
         Docked(make=lambda at: GuidePanel(at.gui, at.browser), tab=None, rank=95, own=True),
         *(_lacking(tab) for tab in (SITE, PLAN, RUN, TUNE)),
     ),

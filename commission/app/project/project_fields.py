@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from viser import GuiApi
 
-from commission.app.base import actions
+from commission.app.base import actions, theme
 from commission.app.base.panel import BasePanel, Post, posting, write
 from commission.app.base.reach import typed_path
 from commission.app.base.view import PageView
@@ -19,6 +19,7 @@ class ProjectFields(BasePanel):
         self._shown: Project | None = None
         self._name = gui.add_text("Name", project.name, hint="As the bar at the top shows it.")
         self._name.on_update(posting(post, lambda event: RenameProject(str(event.target.value))))
+        gui.add_html(theme.path_mark("folder"))
         folder = gui.add_text("Copy into", "", hint="Path of a folder on the computer that serves this page.")
         save = gui.add_button(
             "Save a copy", color="gray", hint="Write the project there; from then on it is kept there."

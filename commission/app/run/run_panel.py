@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from viser import GuiApi
 
-from commission.app.base import actions
+from commission.app.base import actions, theme
 from commission.app.base.field_widget import Entry
 from commission.app.base.inputs import enable
 from commission.app.base.panel import BasePanel, Post, escaped, posting
@@ -62,7 +62,9 @@ class RunPanel(BasePanel):
         source = state.part(RunState).source
         drive = source if isinstance(source, VirtualDrive) else None
         with self._gui.add_folder("Virtual drive"):
-            self._route = self._gui.add_dropdown("Route", names, initial_value=drive.route if drive else None)
+            self._route = self._gui.add_dropdown(
+                "Route", names, initial_value=drive.route if drive else None, hint="The one that is driven."
+            )
             first = drive or VirtualDrive("")
             if first.people is None:
                 first = replace(first, people=state.project.disturbances.people)
@@ -80,6 +82,7 @@ class RunPanel(BasePanel):
         source = state.part(RunState).source
         shown = str(source.path) if isinstance(source, RecordedDrive) else ""
         with self._gui.add_folder("Recording"):
+            self._gui.add_html(theme.path_mark("recording"))
             path = self._gui.add_text(
                 "Folder", shown, hint="Path, on the computer that serves this page, of a recording."
             )
@@ -100,9 +103,9 @@ class RunPanel(BasePanel):
         names = _routes(state)
         if self._route.options != names:
             self._route.options = names
-        if self._route.disabled is not (names == NO_ROUTE):
-            self._route.disabled = names == NO_ROUTE
-        enable(self._drive, "the project has no route; draw one with the tool Route" if names == NO_ROUTE else "")
+        why_not = "the project has no route; draw one with the tool Route" if names == NO_ROUTE else ""
+        for widget in (self._route, self._drive):
+            enable(widget, why_not)
 
     def draw_slowly(self, view: PageView) -> None:
         """Show what runs and what is being prepared."""

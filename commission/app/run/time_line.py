@@ -7,6 +7,7 @@ from typing import Any, Literal
 from viser import GuiApi
 
 from commission.app.base import actions, theme
+from commission.app.base.inputs import enable
 from commission.app.base.paints import Surface
 from commission.app.base.panel import BasePanel, Post, clock, posting
 from commission.app.base.view import PageView
@@ -68,7 +69,8 @@ class TimeLine(BasePanel):
         )
         self._speed.on_update(posting(post, lambda event: SetSpeed(float(str(event.target.value).rstrip("x")))))
         self._clock = gui.add_html(NO_RUN)
-        self._slider = gui.add_slider("", 0.0, 1.0, 0.01, 0.0, disabled=True)
+        self._slider = gui.add_slider("", 0.0, 1.0, 0.01, 0.0, hint="Goes to a moment of the drive [s].")
+        enable(self._slider, "there is no run; choose a route or a recording in the step Run")
         self._slider.on_update(posting(post, lambda event: Seek(float(event.target.value))))
         self._strip = gui.add_html(strip(None))
         self._shown = ("", "")
@@ -88,8 +90,7 @@ class TimeLine(BasePanel):
         run = view.part(RunView)
         if run is None:
             return
-        if self._slider.disabled:
-            self._slider.disabled = False
+        enable(self._slider, "")
         if self._slider.max != run.duration and run.duration > 0.0:
             self._slider.max = run.duration
         shown_time = round(min(run.time, run.duration), 2)

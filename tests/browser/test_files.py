@@ -1,0 +1,82 @@
+"""Files as a person finds them: a look into the server's folders, what was opened of late, a file that is dropped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from commission.app.run.actions import Play, VirtualDrive
+from commission.app.run.state import RunState
+from commission.io.project_file import load_project, save_project
+from tests.app.sites import room
+from tests.browser.page import OpenPage
+from tests.browser.serving import Served
+
+TABLE = "id;x;y;radius\nNew;2.5;2.5;0.04\n"
+DROP = """([name, text]) => {
+  const dropped = new DataTransfer();
+  dropped.items.add(new File([text], name));
+  for (const kind of ["dragover", "drop"])
+    window.dispatchEvent(new DragEvent(kind, { dataTransfer: dropped, bubbles: true, cancelable: true }));
+}"""
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    folder = tmp_path_factory.mktemp("served") / "hall"
+    project = room()
+    save_project(project, folder)
+    (folder / "drives" / "empty").mkdir(parents=True)
+    (folder / "list.csv").write_text(TABLE)
+    opened = Served(load_project(folder), folder, source=VirtualDrive(project.routes[0].name))
+    opened.until(lambda: opened.view is not None)
+    opened.runtime.post(Play(playing=False))
+    yield opened
+    opened.close()
+
+
+def test_files_are_found_by_looking_and_a_failed_open_changes_nothing(
+    served: Served, window: Callable[..., OpenPage]
+) -> None:
+    page = window(served.server)
+    page.open()
+    page.open_tab("Run")
+    source = served.state.part(RunState).source
+    assert source is not None
+    files = page.page.get_by_role("dialog", name="Files on the server")
+
+    page.page.get_by_label("Browse for Folder").click()
+    files.get_by_role("button", name="drives").click()
+    files.get_by_role("button", name="empty").click()
+    files.get_by_text("nothing in this folder").wait_for()
+    files.get_by_role("button", name="Choose this folder").click()
+    files.wait_for(state="hidden")
+    chosen = str(served.state.folder / "drives" / "empty") if served.state.folder else ""
+    assert page.value_of("Folder") == chosen
+    page.press("Open")
+    page.wait_until_told("empty")
+    assert served.state.part(RunState).source == source
+    assert f"route {source.route}" in page.text().replace("\n", " ")  # type: ignore[union-attr]
+
+    before = set(served.server.get_clients())
+    page.page.reload()
+    page.wait_for_client(before)
+    page.wait_until_drawn()
+    page.page.get_by_label("Browse for Folder").click()
+    files.get_by_text("Recent").wait_for()
+    files.get_by_role("button", name=chosen).wait_for()
+    page.page.keyboard.press("Escape")
+    files.wait_for(state="hidden")
+
+    project = served.state.project
+    page.page.evaluate(DROP, ["dropped.csv", TABLE])
+    page.wait_for_text("Nothing has changed yet")
+    assert served.state.project is project, "shown before, not after"
+    page.press("Cancel")
+    page.page.evaluate(DROP, ["drive.mcap", "x"])
+    page.wait_for_text("drive.mcap is a recording")
+    page.page.evaluate(DROP, ["letter.docx", "x"])
+    page.wait_for_text("letter.docx is neither a floor map")
+    assert served.state.project is project
+    assert page.errors == []
