@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 from commission.cli.parsing import initial_pose
+from commission.cli.terminal import shown_progress
 from commission.errors import UsageError
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ class Calibrate:
         project = dataclasses.replace(as_saved, parameters=apply_settings(as_saved.parameters, self.set))
         log = load_log(self.recording, ChannelOptions.parse(self.channel, self.wheels))
         start = start_of(project, log, given and given.pose, given and given.sigmas)
-        result = calibrate(CalibrationInput.of(project, log, start))
+        result = calibrate(CalibrationInput.of(project, log, start), shown_progress)
         written: list[str] = []
         if self.out is not None:
             write_text(self.out, _yaml(result))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
+from commission.cli.terminal import shown_progress
 from commission.errors import UsageError
 from commission.site.quantity import MILLIMETRES, PERCENT
 
@@ -40,6 +41,7 @@ class Layouts:
         from commission.io.reflector_tables import read_reflectors
         from commission.planning.layout_figures import compared
         from commission.planning.route_prediction import PredictionOptions
+        from commission.progress import part
         from commission.studies.layouts import FloorFigure, LayoutInput, floor_difference, layout
 
         project = load_project(self.project)
@@ -48,8 +50,8 @@ class Layouts:
             options = PredictionOptions(blocked_per_m=self.blocked_per_m)
         except ValueError as error:
             raise UsageError(str(error)) from None
-        first = layout(LayoutInput.of(project, None, options))
-        other = layout(LayoutInput.of(project, reflectors, options))
+        first = layout(LayoutInput.of(project, None, options), part(shown_progress, 0.0, 0.5))
+        other = layout(LayoutInput.of(project, reflectors, options), part(shown_progress, 0.5, 1.0))
         lines = [f"{name[:20]:<20} {change}" for name, change in compared(first.figures, other.figures)]
         difference = None
         if project.floor_map is not None:

@@ -15,7 +15,11 @@ from commission.errors import UsageError
 
 if TYPE_CHECKING:
     from commission.simulation.random_faults import FaultRates
-    from commission.studies.monte_carlo import MonteCarloInput, MonteCarloResult
+    from commission.studies.monte_carlo_figures import MonteCarloInput, MonteCarloResult
+
+
+RATES = ("people", "glints", "covered", "false", "moved", "moved_sigma", "missing", "dirt", "slip", "kidnapping")
+"""Options that are rates of faults."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +37,7 @@ class MonteCarlo:
     seed: int = 1
     """Seed of all drives, 0 or more: the same seed gives the same result, bit by bit, whoever does the drives."""
     faults: bool = True
-    """Whether anything goes wrong that is not the noise of sensors and wheels; without, all rates below are 0."""
+    """Whether anything goes wrong that is not the noise of sensors and wheels; without, no rate below may be given."""
     people: Annotated[int | None, arg(metavar="N")] = None
     """People walking about; they need beams. None: as many as the project says."""
     glints: Annotated[float | None, arg(metavar="PER_SCAN")] = None
@@ -72,8 +76,10 @@ class MonteCarlo:
         from commission.io.monte_carlo_files import DRIVES, PICTURE, SUMMARY, TABLE, write_monte_carlo
         from commission.io.overwriting import result_folder
         from commission.io.project_file import apply_settings, load_project
-        from commission.studies.monte_carlo import Detecting, MonteCarloInput, told
+        from commission.studies.monte_carlo_figures import Detecting, MonteCarloInput
+        from commission.studies.monte_carlo_words import told
 
+        rates = self._rates()
         names = (DRIVES, TABLE, PICTURE, SUMMARY)
         out = result_folder(self.out, "montecarlo", names, force=self.force, sources=(self.project,))
         project = load_project(self.project)
@@ -86,7 +92,7 @@ class MonteCarlo:
             or tuple(each.name for each in project.routes),
             runs=self.runs,
             seed=self.seed,
-            rates=self._rates(),
+            rates=rates,
             detecting=Detecting(self.detections),
         )
         result = self._driven(inputs)
@@ -112,6 +118,10 @@ class MonteCarlo:
         from commission.simulation.random_faults import FaultRates
 
         if not self.faults:
+            given = [name for name in RATES if getattr(self, name) != getattr(FaultRates(), name)]
+            if given:
+                words = ", ".join(f"--{name.replace('_', '-')}" for name in given)
+                raise UsageError(f"{words} with --no-faults, which leaves no fault; expected one or the other")
             return FaultRates.none()
         try:
             return FaultRates(

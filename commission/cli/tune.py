@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, UseAppendAction, arg
 
 from commission.cli.parsing import initial_pose
+from commission.cli.terminal import shown_progress
 
 if TYPE_CHECKING:
     from commission.io.tune_files import TuneResult
@@ -47,7 +48,8 @@ class Tune:
         from commission.io.project_file import apply_settings, load_project
         from commission.io.recordings.base import load_log
         from commission.io.recordings.channels import ChannelOptions
-        from commission.io.tune_files import FILES, TuneResult, write_tuned
+        from commission.io.tune_files import FILES, FITTED, TuneResult, write_tuned
+        from commission.progress import part
         from commission.studies.calibration import CalibrationInput, accepted, calibrate
         from commission.studies.diagnosis import diagnosis, diagnosis_input
         from commission.studies.run import RunInput, judged_run
@@ -61,21 +63,24 @@ class Tune:
         project = dataclasses.replace(project, parameters=apply_settings(project.parameters, self.set))
         log = load_log(self.recording, ChannelOptions.parse(self.channel, self.wheels))
         start = start_of(project, log, given and given.pose, given and given.sigmas)
-        found = calibrate(CalibrationInput.of(project, log, start))
+        found = calibrate(CalibrationInput.of(project, log, start), part(shown_progress, 0.0, 0.7))
         tuned = accepted(project, found.proposed)
-        runs = tuple(judged_run(RunInput.of(each, log, start)) for each in (project, tuned))
+        runs = tuple(
+            judged_run(RunInput.of(each, log, start), part(shown_progress, begin, begin + 0.1))
+            for each, begin in ((project, 0.7), (tuned, 0.8))
+        )
         result = TuneResult(
             project=tuned,
             project_digest=project_digest,
             recording_digest=digest,
             variant="calibrated",
             calibration=found,
-            diagnosis=diagnosis(diagnosis_input(project, found, project.floor_map)),
+            diagnosis=diagnosis(diagnosis_input(project, found, project.floor_map, part(shown_progress, 0.9, 1.0))),
             compared=variants(VariantsInput(names=("project", "calibrated"), runs=runs)),
         )
         with out.writing() as folder:
             write_tuned(folder, result)
-        sys.stdout.write("\n".join([*_told(result), f"Written to   {self.out}"]) + "\n")
+        sys.stdout.write("\n".join([*_told(result), f"Note         {FITTED}", f"Written to   {self.out}"]) + "\n")
 
 
 def _told(result: TuneResult) -> list[str]:

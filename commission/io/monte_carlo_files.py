@@ -12,7 +12,7 @@ from typing import Any
 
 from commission.io.atomic import write_text
 from commission.io.stanford_picture import picture_of
-from commission.studies.monte_carlo import QUANTILES, DriveFigures, MonteCarloResult
+from commission.studies.monte_carlo_figures import QUANTILES, DriveFigures, MonteCarloResult
 from commission.studies.stanford import CELLS_PER_LIMIT, StanfordDiagram
 
 DRIVES, TABLE, PICTURE, SUMMARY = "drives.csv", "stanford.csv", "stanford.png", "summary.json"
@@ -104,6 +104,8 @@ def summary(result: MonteCarloResult) -> dict[str, Any]:
         "hazardous_drives": result.hazardous_drives,
         "hazardous_drives_at_most": result.hazardous_bound,
     }
+    if result.notes:
+        entries["notes"] = list(result.notes)
     if diagram is not None:
         entries["position_limit_m"] = diagram.limit
         entries["stanford"] = asdict(diagram.regions)

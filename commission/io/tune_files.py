@@ -26,6 +26,11 @@ PARAMETERS, ROS, TABLE, COMPARISON, REFLECTORS, SUMMARY = (
     *("comparison.csv", "reflectors.csv", "summary.json"),
 )
 """Names of the files."""
+FITTED = (
+    "the comparison is over the drive that the values were fitted to, and flatters them; compare on another drive: "
+    "localize PROJECT OTHER, with and without them"
+)
+"""What is said beside the figures of both."""
 FILES = (PARAMETERS, ROS, TABLE, COMPARISON, REFLECTORS, SUMMARY)
 
 
@@ -192,6 +197,7 @@ def _summary(result: TuneResult) -> dict[str, Any]:
     clusters = result.diagnosis.clusters
     return {
         **result.origin,
+        "comparison": FITTED,
         "findings": list(result.diagnosis.lines),
         "proposed": {
             each.key: {"before": each.before, "value": each.proposed, "sigma": each.sigma, "reason": each.reason}

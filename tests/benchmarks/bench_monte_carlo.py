@@ -13,7 +13,8 @@ from pathlib import Path
 
 from commission.io.project_file import load_project
 from commission.simulation.random_faults import FaultRates
-from commission.studies.monte_carlo import Detecting, MonteCarloInput, monte_carlo, warm_up
+from commission.studies.monte_carlo import monte_carlo, warm_up
+from commission.studies.monte_carlo_figures import Detecting, MonteCarloInput
 from commission.studies.workers import Threads
 
 WAREHOUSE = Path(__file__).parents[2] / "maps" / "warehouse"

@@ -44,6 +44,7 @@ def test_its_files_agree_with_each_other(
     ("words", "problem"),
     [
         (("--runs", "0"), "--runs is 0; expected 1 to 100000"),
+        (("--no-faults", "--moved", "0.1", "--people", "2"), "--people, --moved with --no-faults"),
         (("--moved", "2"), "--moved is 2; expected a share of 0 to 1"),
         (("--route", "Nowhere"), "Nowhere"),
         (("--people", "2", "--detections", "shadows"), "which show no people"),

@@ -18,8 +18,13 @@ RESULTS = {
     "coverage": ("coverage.npz", "coverage.csv", "coverage.png", "summary.json", "ellipses.csv"),
     "predict": ("prediction.csv", "summary.json", "dependents.csv", "failures.csv"),
     "ambiguity": ("ambiguity.npz", "ambiguous_pairs.csv", "neighbors.csv", "summary.json"),
+    "montecarlo": ("drives.csv", "stanford.csv", "stanford.png", "summary.json"),
 }
-USUAL = {"coverage": ("--spacing", "1"), "ambiguity": ("--spacing", "2", "--headings", "2")}
+USUAL = {
+    "coverage": ("--spacing", "1"),
+    "ambiguity": ("--spacing", "2", "--headings", "2"),
+    "montecarlo": ("--runs", "1", "--people", "0", "--glints", "0"),
+}
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -52,6 +57,21 @@ def test_files_that_a_command_did_not_write_are_overwritten_only_when_asked(
     if file == "summary.json":
         assert commission(*words(name, project, recording), "--out", tmp_path / "out", "--force")[0] == 0
         assert (tmp_path / "out" / file).read_bytes() != b"mine"
+
+
+@pytest.mark.parametrize("file", ["parameters.yaml", "comparison.csv", "summary.json"])
+def test_what_tune_did_not_write_is_refused_before_it_calibrates(refused, project, recording, tmp_path, file):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / file).write_text("mine")
+    said = refused("tune", project, recording, "--out", tmp_path / "out")
+    assert f"out holds {file}, which tune did not write; expected another folder, or --force to overwrite" in said
+    assert contents(tmp_path / "out") == {file: b"mine"}
+
+
+def test_a_comparison_of_layouts_writes_nothing(commission, project, tmp_path):
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert commission("layouts", project, project)[0] == 0
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == before
 
 
 def test_results_of_another_command_are_named_as_such(refused, commission, project, tmp_path):

@@ -20,7 +20,8 @@ from commission.errors import UsageError
 from commission.io import cluster as cluster_module
 from commission.io.cluster import cluster
 from commission.simulation.random_faults import FaultRates
-from commission.studies.monte_carlo import MonteCarloInput, MonteCarloResult, monte_carlo
+from commission.studies.monte_carlo import monte_carlo
+from commission.studies.monte_carlo_figures import MonteCarloInput, MonteCarloResult
 from tests.conftest import REPOSITORY
 from tests.simulation.halls import hall
 

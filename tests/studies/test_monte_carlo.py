@@ -14,15 +14,16 @@ from commission.simulation.random_faults import FaultRates, draw_faults
 from commission.simulation.scenario import start_of, virtual_drive
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
-from commission.studies.monte_carlo import (
+from commission.studies.monte_carlo import monte_carlo
+from commission.studies.monte_carlo_figures import (
     ERROR_EDGES,
     QUANTILES,
     Detecting,
     MonteCarloInput,
-    monte_carlo,
+    floor_notes,
     quantiles_of,
-    told,
 )
+from commission.studies.monte_carlo_words import told
 from commission.studies.run import RunInput, judged_run, summary
 from commission.studies.start import Start, StartOrigin, belief_at
 from commission.studies.workers import Threads
@@ -45,14 +46,16 @@ def test_the_same_seed_gives_the_same_result_in_any_number_of_threads() -> None:
         assert (a.seed, a.operational_fraction, a.position_rmse, a.anees) == (
             b.seed, b.operational_fraction, b.position_rmse, b.anees
         )  # fmt: skip
-        assert np.array_equal(a.errors, b.errors)
-        assert a.stanford is not None and b.stanford is not None
-        assert np.array_equal(a.stanford.counts, b.stanford.counts)
     assert len({each.seed for each in one.drives}) == 7
     assert told(one) == told(three)
-    diagram = one.stanford
-    assert diagram is not None
-    assert diagram.regions.total == diagram.counts.sum() == sum(each.errors.sum() for each in one.drives)
+    assert np.array_equal(one.counts.errors, three.counts.errors)
+    assert np.array_equal(one.counts.errors_operational, three.counts.errors_operational)
+    diagram, other = one.stanford, three.stanford
+    assert diagram is not None and other is not None
+    assert np.array_equal(diagram.counts, other.counts)
+    assert diagram.regions.total == diagram.counts.sum() == one.counts.errors.sum()
+    # The last scan of a drive may lie behind its last true pose.
+    assert 0 <= one.column("cycles").sum() - diagram.regions.total <= len(one.drives)
     assert diagram.verdicts.hazardous == one.column("hazardous").sum()
 
 
@@ -169,3 +172,18 @@ def test_a_rate_out_of_range_is_refused(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"--{name} is {value:g}; expected a"):
         replace(FaultRates(), **{name: value})
     assert getattr(replace(FaultRates(), **{name: 1.0}), name) == 1.0
+
+
+def test_where_no_floor_can_be_walked_on_it_says_what_does_not_occur() -> None:
+    floor = PROJECT.floor_map
+    assert floor is not None
+    assert floor_notes(PROJECT, FaultRates(people=2)) == ()
+    walls = replace(PROJECT, floor_map=replace(floor, cells=np.full_like(floor.cells, 100)))
+    (note,) = floor_notes(walls, FaultRates(people=2))
+    assert note.startswith("the floor map has no free floor that is wide enough to walk on")
+    assert note.endswith("people and false things do not occur")
+    (note,) = floor_notes(replace(PROJECT, floor_map=None), FaultRates(people=0))
+    assert note.startswith("there is no floor map: false things are on an open field")
+    assert floor_notes(walls, FaultRates.none()) == ()
+    found = monte_carlo(replace(inputs(1, FaultRates(people=0, glints=0.0)), project=walls))
+    assert any("false things do not occur" in line for line in told(found))
