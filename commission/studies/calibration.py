@@ -82,14 +82,18 @@ def calibrate(inputs: CalibrationInput, progress: Progress = silent) -> Calibrat
     UsageError
         the vehicle is lost in the first run, so that nothing can be said.
     """
-    setup, log, belief = inputs.setup, inputs.log, inputs.start.belief
-    progress(0.0, "first run")
-    run = first_run(log, setup, belief)
+    log, belief = inputs.log, inputs.start.belief
+    run = first_run(log, inputs.setup, belief, part(progress, 0.0, 0.05))
+    # As the first run was made: a vehicle that is not lost is not searched for where a worse value loses it.
+    believed = replace(
+        inputs, parameters=replace(inputs.parameters, supervisor=run.segments[0].setup.parameters.supervisor)
+    )
+    setup = believed.setup
     problem = problem_of(log, setup, run)
     whole, noise = estimate(problem, part(progress, 0.05, 0.5))
     halves = _halves(problem, whole, part(progress, 0.5, 0.75))
     progress(0.75, "judging")
-    judge = ConstantsJudge(inputs, problem, halves, noise)
+    judge = ConstantsJudge(believed, problem, halves, noise, run.detected)
     values, found_setup = judge.constants(whole)
     progress(0.9, "noise")
     spread = residual_spread(whole)

@@ -24,6 +24,7 @@ from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
 from commission.localization.sweep import sweep_of
 from commission.localization.wheel_scale import as_driven
+from commission.progress import Progress, silent
 from commission.site.record_log import RecordLog
 from commission.studies.calibration_fit import CalibrationProblem
 from commission.studies.calibration_model import MeasuredDrive, Point, moments, track
@@ -43,14 +44,18 @@ RANGE_SCALE_PRIOR = 0.003
 """1-sigma of the share by which ranges are too long."""
 
 
-def first_run(log: RecordLog, setup: LocalizerSetup, start: Belief) -> RunColumns:
+def first_run(log: RecordLog, setup: LocalizerSetup, start: Belief, progress: Progress = silent) -> RunColumns:
     """Localize with the noise of a detection that accepts most of them.
+
+    A vehicle that is lost with too little noise is not searched for, which takes a hundred times as long, unless it is
+    lost with every noise: it may have been carried.
 
     Parameters
     ----------
     log : the recording.
     setup : what the project says.
     start : belief before the first record.
+    progress : told how far it is; may raise to cancel.
 
     Raises
     ------
@@ -58,17 +63,30 @@ def first_run(log: RecordLog, setup: LocalizerSetup, start: Belief) -> RunColumn
         the vehicle is lost with any of them: a calibration needs to know where it is, roughly.
     """
     detected = extract_detections(log, setup)
-    runs = [whole_run.run(log, _noisier(setup, factor), start, detected=detected) for factor in FIRST_NOISE]
     passed = max(int(np.count_nonzero(detected.status == INLIER)), 1)
-    accepted = [int(np.count_nonzero(run.status == Status.INLIER)) for run in runs]
-    # More noise accepts a little more anyway: only where less of it loses the way is it needed.
-    best = next(index for index, count in enumerate(accepted) if count >= 0.97 * max(accepted))
-    if accepted[best] < max(LEAST_ACCEPTED * passed, FEWEST_DETECTIONS):
-        raise UsageError(
-            f"{accepted[best]} of {passed} detections fit the reflectors; expected at least half of them and "
-            f"{FEWEST_DETECTIONS}: say where the drive begins, or look into the findings of `localize`"
-        )
-    return runs[best]
+    wanted, most = max(LEAST_ACCEPTED * passed, FEWEST_DETECTIONS), 0
+    tries = (searching(setup, False), *((setup,) if setup.parameters.supervisor.find_again else ()))
+    for index, tried in enumerate(tries):
+        runs: list[RunColumns] = []
+        for number, factor in enumerate(FIRST_NOISE):
+            progress((index + number / len(FIRST_NOISE)) / len(tries), "first run")
+            runs.append(whole_run.run(log, _noisier(tried, factor), start, detected=detected))
+        accepted = [int(np.count_nonzero(run.status == Status.INLIER)) for run in runs]
+        # More noise accepts a little more anyway: only where less of it loses the way is it needed.
+        best = next(index for index, count in enumerate(accepted) if count >= 0.97 * max(accepted))
+        if accepted[best] >= wanted:
+            return runs[best]
+        most = max(most, accepted[best])
+    raise UsageError(
+        f"{most} of {passed} detections fit the reflectors; expected at least half of them and "
+        f"{FEWEST_DETECTIONS}: say where the drive begins, or look into the findings of `localize`"
+    )
+
+
+def searching(setup: LocalizerSetup, wanted: bool) -> LocalizerSetup:
+    """Return the setup with or without a search where the vehicle is lost."""
+    supervisor = replace(setup.parameters.supervisor, find_again=wanted)
+    return replace(setup, parameters=replace(setup.parameters, supervisor=supervisor))
 
 
 def _noisier(setup: LocalizerSetup, factor: float) -> LocalizerSetup:

@@ -21,6 +21,9 @@ from commission.site.uncertainty import Uncertainty
 from commission.studies.inputs import StudyInput
 from commission.studies.start import Start
 
+MOUNTING = ("mounting.x", "mounting.y", "mounting.heading")
+"""Figures of a mounting, in the order of its numbers."""
+
 
 class CalibrationVerdict(StrEnum):
     """What becomes of a value."""
@@ -119,6 +122,30 @@ def with_value(setup: LocalizerSetup, key: str, value: float) -> LocalizerSetup:
     return replace(setup, parameters=replace(setup.parameters, **{group: replace(owner, **{name: value})}))
 
 
+def value_in(setup: LocalizerSetup, key: str) -> float | None:
+    """Return what a setup says of a figure; None where it has no such scanner or reflector.
+
+    Parameters
+    ----------
+    setup : of the localizer.
+    key : see `Value.key`.
+    """
+    group, _, name = key.partition(".")
+    if group == "reflectors":
+        of, _, axis = name.rpartition(".")
+        places = (float(getattr(each, axis)) for each in setup.reflectors.reflectors if each.id == of)
+        return next(places, None)
+    if group == "scanners":
+        for scanner in setup.scanners:
+            field = name.removeprefix(f"{scanner.name}.")
+            if field in MOUNTING:
+                return float(scanner.mounting[MOUNTING.index(field)])
+            if field == "clock_offset":
+                return scanner.clock_offset
+        return None
+    return float(getattr(getattr(setup.parameters, group), name))
+
+
 def _scanner_with(scanner: Scanner, name: str, value: float) -> Scanner:
     """Return the scanner with one figure changed if it is the one that is named."""
     if not name.startswith(f"{scanner.name}."):
@@ -127,6 +154,6 @@ def _scanner_with(scanner: Scanner, name: str, value: float) -> Scanner:
     if field == "clock_offset":
         return replace(scanner, clock_offset=value)
     mounting = scanner.mounting.copy()
-    axis = ("mounting.x", "mounting.y", "mounting.heading").index(field)
+    axis = MOUNTING.index(field)
     mounting[axis] = float(wrap(value)) if axis == 2 else value
     return replace(scanner, mounting=frozen(mounting, (3,), "mounting"))

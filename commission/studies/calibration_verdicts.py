@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from commission.geometry.arrays import FloatArray
+from commission.localization.detection_log import DetectionLog
 from commission.localization.setup import LocalizerSetup
 from commission.studies.calibration_constants import CalibratedConstant, calibrated_constants
-from commission.studies.calibration_drive import first_run
 from commission.studies.calibration_fit import CalibrationFit, CalibrationProblem
 from commission.studies.calibration_judging import Score, gain, score
 from commission.studies.calibration_noise import noisy, residual_spread
@@ -28,6 +28,7 @@ class ConstantsJudge:
     inputs, problem : what the project says, and what was solved.
     halves : constants by the first half of the drive alone, and by the second.
     noise : (6,) variances of odometry.
+    detected : detections of the recording.
     """
 
     def __init__(
@@ -36,9 +37,10 @@ class ConstantsJudge:
         problem: CalibrationProblem,
         halves: tuple[FloatArray, FloatArray],
         noise: FloatArray,
+        detected: DetectionLog,
     ) -> None:
         self._inputs, self._problem, self._halves, self._noise = inputs, problem, halves, noise
-        self._detected = first_run(inputs.log, inputs.setup, inputs.start.belief).detected
+        self._detected = detected
 
     def constants(self, whole: CalibrationFit) -> tuple[list[Value], LocalizerSetup]:
         """Judge every constant, the surest first; return the values and a setup in which all of them are as found."""
@@ -59,8 +61,8 @@ class ConstantsJudge:
                 continue
             after = self._scores(base, [*kept, each])
             gains = [gain(better, worse) for better, worse in zip(after, before, strict=True)]
-            told = ", ".join(f"{value:+.4f}" for value, _ in gains)
-            reason = f"log-likelihood of a detection in the half that did not make it: {told}"
+            told = " and ".join(f"{value:+.4f}" for value, _ in gains)
+            reason = f"log-likelihood per detection of each half, localized by what the other says: {told}"
             if sum(value for value, _ in gains) > 0.0 and all(value > -scatter for value, scatter in gains):
                 kept, before = [*kept, each], after
                 verdicts[index] = CalibrationVerdict.PROPOSED, "; ".join(filter(None, (each.remark, reason)))

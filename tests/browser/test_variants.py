@@ -10,6 +10,7 @@ import pytest
 from commission.app.run.actions import Play, Seek, VirtualDrive
 from commission.app.run.charts import color_of
 from commission.app.run.service import RunService
+from commission.app.tune.calibration_service import CalibrationService
 from commission.studies.variants import VariantsResult
 from tests.app.sites import room
 from tests.browser.page import OpenPage
@@ -103,7 +104,47 @@ def test_a_kept_variant_stays_beside_a_moved_gate_and_undo_brings_it_back(
     page.fill("Gate", "60")
     page.page.get_by_label("Use A").click()
     served.until(lambda: served.state.project.parameters.association.gate_probability == 0.95, 10.0)
+
+    calibrated(served, page)
+
     page.page.get_by_label("Forget A").click()
     page.wait_for_text("Keep the run as it is now")
     served.until(lambda: served.view is not None and served.view.kept == (), 10.0)
     assert page.errors == []
+
+
+def calibrated(served: Served, page: OpenPage) -> None:
+    """Calibrate by the drive, accept two of five figures beside the variant, and take them back."""
+    page.fold("Calibration")
+    page.press("Calibrate by this drive")
+    page.wait_for_text("5 figures proposed, 0 accepted.")
+    assert "mounting x needs turning on the spot" in page.text()
+    before = served.state.project
+    variant = figures(page)["NIS of all near a reflector"][1]
+    page.press("Accept Range 1σ")
+    page.wait_for_text("5 figures proposed, 1 accepted.")
+    page.press("Accept Bearing 1σ")
+    page.wait_for_text("5 figures proposed, 2 accepted.")
+    page.wait_for_text("Bearing 1σ accepted")
+
+    view = served.runtime.service(CalibrationService).view
+    assert view is not None
+    proposed = {each.key: each.proposed for each in view.calibration.proposed}
+    observation = served.state.project.parameters.observation
+    assert observation.range_sigma == proposed["observation.range_sigma"]
+    assert observation.bearing_sigma == proposed["observation.bearing_sigma"]
+    assert served.state.project.parameters.odometry == before.parameters.odometry
+    served.until(lambda: (run := served.view) is not None and run.result.consistency.nis_before_gate_mean > 1.0, 10.0)
+    assert served.view is not None
+    now = f"{served.view.result.consistency.nis_before_gate_mean:.2f}"
+    page.page.wait_for_function(
+        "text => [...document.querySelectorAll('.c-variants tr')]"
+        ".some(row => row.innerText.startsWith('NIS of all') && row.children[1].innerText.startsWith(text))",
+        arg=now,
+    )
+    assert figures(page)["NIS of all near a reflector"][1] == variant
+
+    for left in (1, 0):
+        page.page.get_by_role("button", name="Undo").first.click()
+        page.wait_for_text(f"5 figures proposed, {left} accepted.")
+    assert served.state.project is before

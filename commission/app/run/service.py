@@ -15,6 +15,7 @@ from commission.app.base.effects import Effect
 from commission.app.base.growing import RunGrew
 from commission.app.base.jobs import Job, Lane
 from commission.app.base.service import IDLE_S, Context, Due, Service
+from commission.app.base.shown_run import LearnedFromDrive, RunShown
 from commission.app.base.state import AppState
 from commission.app.base.view import Followed, LivedPath
 from commission.app.run import drives
@@ -116,6 +117,8 @@ class RunService(Service):
         self._source: Source | None = None
         # What was true in the drive that is there, and in the one that is being simulated in its place.
         self._world: World | None = None
+        # What the project says of that world since it has learned from the drive: it is the same hall.
+        self._told: tuple[World, ...] = ()
         self._coming: World | None = None
         self._again: RecordLog | None = None
         # The live run that is on the page, and the start of the one that something else was chosen instead of.
@@ -129,9 +132,12 @@ class RunService(Service):
         if source is not None:
             self.context.post(ChooseSource(source))
 
-    def project_changed(self, action: Action, before: AppState, after: AppState) -> None:  # noqa: ARG002 - the service's
+    def project_changed(self, action: Action, before: AppState, after: AppState) -> None:
         """Run again with what is different: from the start, or from here on where that is asked for."""
         self._project = after.project
+        if isinstance(action, LearnedFromDrive) and self._is_driven(World.of(before.project, self._source)):
+            told = World.of(after.project, self._source)
+            self._told = (*self._told, *(() if told is None else (told,)))
         if self._wanted is None or self._live is not None or self._drives_again(after):
             # A live run goes on with the change: its localizer is told by who feeds it.
             return
@@ -175,7 +181,7 @@ class RunService(Service):
         asked = state.part(RunState)
         keeps = asked.only_the_map or asked.from_here_on
         world = None if keeps else World.of(state.project, self._source)
-        if world is None or world == self._world:
+        if world is None or self._is_driven(world):
             if self._coming is not None:
                 # What was changed and is as before: the localizer has not followed in between.
                 self._jobs.cancel(DRIVE_AGAIN)
@@ -196,9 +202,13 @@ class RunService(Service):
             )
         return True
 
+    def _is_driven(self, world: World | None) -> bool:
+        """Whether a world is that of the drive on the page, as it was made or by what was learned from it."""
+        return world is not None and (world == self._world or world in self._told)
+
     def _begin_again(self, drive: Drive) -> None:
         """Localize the drive that was simulated in place of the one that is there; what was covered is, again."""
-        self._world, self._coming, self._again = self._coming, None, drive.log
+        self._world, self._told, self._coming, self._again = self._coming, (), None, drive.log
         wanted, before = RunInput.of(self._project, drive.log, drive.start), self._wanted
         stamps = cycle_stamps(drive.log)
         for segment in () if before is None else before.segments:
@@ -261,22 +271,25 @@ class RunService(Service):
             self._jobs.cancel(DRIVE_AGAIN)
             self._jobs.cancel(LOCALIZE)
             self._source = self._world = self._coming = None
+            self._told = ()
             self.playback = playback = Playback(grown.result)
             playback.seek(grown.result.duration)
             self.context.post(ShowLive())
+            self.context.post(RunShown(None))
         else:
             playback.grow(grown.result)
         self._wanted, self._live = grown.result.inputs, None if grown.is_over else grown
         if grown.is_over:
             self._instruments.take(grown.result, self._project.floor_map)
             self._variants.take(grown.result)
+            self.context.post(RunShown(grown.result))
 
     def _begin(self, drive: Drive, source: Source, world: World | None) -> Action:
         """Localize a new drive; the run before stays on the page until that is done."""
         self._jobs.cancel(DRIVE_AGAIN)
         if self._live is not None:
             self._left, self._live = self._live.result.inputs.start, None
-        self._source, self._world, self._coming = source, world, None
+        self._source, self._world, self._told, self._coming = source, world, (), None
         self._localize(RunInput.of(self._project, drive.log, drive.start))
         return SourceLoaded(source)
 
@@ -305,6 +318,7 @@ class RunService(Service):
         playback = self.playback
         self._instruments.take(result, self._project.floor_map)
         self._variants.take(result)
+        self.context.post(RunShown(result))
         if playback is not None and playback.result.inputs.log is result.inputs.log:
             playback.replace(result)
             return None
@@ -352,7 +366,7 @@ class RunService(Service):
             return DrivenHall.DRIVING_AGAIN
         if self._world is None:
             return DrivenHall.RECORDED
-        return DrivenHall.AS_DRIVEN if World.of(self._project, self._source) == self._world else DrivenHall.OTHER
+        return DrivenHall.AS_DRIVEN if self._is_driven(World.of(self._project, self._source)) else DrivenHall.OTHER
 
     def parts(self, *, slowly: bool) -> tuple[object, ...]:
         """Return the run as it is now, the place that cameras follow, what is driven so far, and its records."""

@@ -9,6 +9,7 @@ import pytest
 from commission.app.base.actions import PROGRAM, Action
 from commission.app.base.effects import Effect
 from commission.app.base.service import Context
+from commission.app.base.shown_run import RunShown
 from commission.app.base.state import AppState
 from commission.app.base.view import Followed, LivedPath
 from commission.app.run import service as service_module
@@ -104,7 +105,10 @@ def assert_same(one: RunResult, other: RunResult) -> None:
 
 def test_a_new_drive_is_there_whole_at_its_start_and_plays(bench: RunBench, project: Project) -> None:
     driven = VirtualDrive(project.routes[0].name, seed=1)
-    assert bench.owner.posted == [SourceLoaded(driven), Play(playing=True)]
+    loaded, playing, shown = bench.owner.posted
+    assert (loaded, playing) == (SourceLoaded(driven), Play(playing=True))
+    assert isinstance(shown, RunShown)
+    assert shown.result is bench.view.result
     assert bench.view.time == 0.0
     assert_same(bench.view.result, fresh(bench, (0, project, False)))
 
