@@ -30,6 +30,7 @@ from commission.cli.problems import Problems
 from commission.cli.serve import Demo, Serve
 from commission.cli.simulate import Simulate
 from commission.cli.sweep import SweepCommand
+from commission.cli.triangulate import Triangulate
 from commission.cli.tune import Tune
 from commission.cli.versions import Version
 from commission.cli.vision import Vision
@@ -56,6 +57,7 @@ COMMANDS: dict[str, type[Command]] = {
     "sweep": SweepCommand,
     "montecarlo": MonteCarlo,
     "vision": Vision,
+    "triangulate": Triangulate,
     "convert": Convert,
     "version": Version,
 }

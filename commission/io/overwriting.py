@@ -19,6 +19,7 @@ from commission.io.journal_place import FILE_NAME as JOURNAL
 from commission.io.project_file import FILE_NAME as PROJECT
 from commission.io.project_file import load_project
 from commission.io.reading import read_text
+from commission.io.recordings.bearing_file import BEARINGS
 from commission.io.recordings.contour_file import CONTOUR
 from commission.io.recordings.csv_folder import DETECTIONS, ODOMETRY, REFERENCE, SCANS
 from commission.io.recordings.reference_file import REFERENCE_MOUNT
@@ -28,7 +29,10 @@ MANIFEST = ".commission.result"
 """File in a folder of results that says which command made which files: the same one may make them again."""
 _RECORDING = re.compile(
     "|".join(
-        (*map(re.escape, (ODOMETRY, DETECTIONS, SCANS, REFERENCE, REFERENCE_MOUNT, TRUTH, CONTOUR)), r"scans_.*\.npz")
+        (
+            *map(re.escape, (ODOMETRY, DETECTIONS, SCANS, REFERENCE, REFERENCE_MOUNT, TRUTH, CONTOUR, BEARINGS)),
+            r"scans_.*\.npz",
+        )
     )
 )
 _MANIFEST_LIMIT = 100_000

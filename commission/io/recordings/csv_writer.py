@@ -9,6 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from commission.io.atomic import cannot_write, staged
+from commission.io.recordings.bearing_file import BEARINGS
 from commission.io.recordings.contour_file import CONTOUR
 from commission.io.recordings.csv_folder import (
     DETECTION_COLUMNS,
@@ -73,6 +74,7 @@ def write_recording(
             REFERENCE_MOUNT,
             TRUTH,
             CONTOUR,
+            BEARINGS,
             *(path.name for path in folder.glob(NAMED_SCANS)),
         ):
             if name not in names:
