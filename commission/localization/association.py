@@ -14,16 +14,17 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.geometry.directions import UnitVector, composed, turn_to
+from commission.geometry.directions import UnitVector, composed
 from commission.geometry.gaussian import chi_square_gate
-from commission.localization.consider import BLOCKS, Considering, innovation_with, seen_with
+from commission.localization.consider import BLOCKS, Considering
 from commission.localization.consider_columns import take_out
 from commission.localization.estimate import Status
-from commission.localization.kalman import innovation, squared_distance
+from commission.localization.filter_kinds import EKF, innovation_by
+from commission.localization.kalman import squared_distance
 from commission.localization.observation import ObservationModel, expect_at
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.reflector_index import Cells, cell_range
-from commission.localization.search import Viewpoint, reach_of, search_radius2, viewpoint
+from commission.localization.search import Viewpoint, radius2_by, reach_of, viewpoint
 from commission.site.parameters import AssociationParameters
 
 INLIER = int(Status.INLIER)
@@ -39,18 +40,22 @@ class Gate(NamedTuple):
     enabled: bool
     d2: float
     """Largest squared Mahalanobis distance of an inlier."""
+    kind: int = EKF
+    """Of the filter, whose innovations are judged: see `filter_kinds`."""
 
 
-def gate_of(parameters: AssociationParameters) -> Gate:
-    """Return the gate for two degrees of freedom, range and bearing."""
-    return Gate(bool(parameters.enabled), chi_square_gate(parameters.gate_probability, 2))
+def gate_of(parameters: AssociationParameters, kind: int = EKF) -> Gate:
+    """Return the gate for two degrees of freedom, range and bearing, of the innovations of a kind of filter."""
+    return Gate(bool(parameters.enabled), chi_square_gate(parameters.gate_probability, 2), kind)
 
 
 @compiled_inline
 def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
+    kind: int,
     belief: PoseGaussian,
     facing: UnitVector,
     measured_range: float,
+    ray: UnitVector,
     aim: UnitVector,
     x: float,
     y: float,
@@ -64,9 +69,10 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
 
     Parameters
     ----------
+    kind : of the filter.
     belief, facing : the detection is judged at it; the direction of its heading.
     measured_range : range bias already taken off [m].
-    aim : the bearing, as a direction of the map.
+    ray, aim : the bearing as a direction, of the map and of base.
     x, y : the reflector's center [m], map frame.
     surveyed_variance : of the reflector's place, each axis [m^2].
     view, model : scanner's place, and model of the observation.
@@ -78,12 +84,24 @@ def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
     """
     dx, dy = x - (belief.x + view.offset_x), y - (belief.y + view.offset_y)
     e = expect_at(dx, dy, math.nan, view.offset_x, view.offset_y)
-    turn = turn_to(-e.range_x, -e.range_y, aim)
-    if given is None or work is None:
-        v = innovation(belief, e, measured_range, turn, surveyed_variance, model)
-    else:
-        seen = seen_with(facing, e, surveyed_variance, given, work, BLOCKS)
-        v = innovation_with(belief, e, measured_range, turn, model, seen)
+    v = innovation_by(
+        kind,
+        belief,
+        facing,
+        measured_range,
+        ray,
+        aim,
+        e,
+        x,
+        y,
+        surveyed_variance,
+        view.offset_x,
+        view.offset_y,
+        model,
+        given,
+        work,
+        BLOCKS,
+    )
     return squared_distance(v), v.s_rr * v.schur * (1.0 / (model.range_variance * model.bearing_variance))
 
 
@@ -124,6 +142,7 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     belief: PoseGaussian,
     facing: UnitVector,
     measured_range: float,
+    ray: UnitVector,
     aim: UnitVector,
     view: Viewpoint,
     reach: Viewpoint,
@@ -148,7 +167,7 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     ----------
     belief, facing : the detection is judged at it; the direction of its heading.
     measured_range : range bias already taken off [m].
-    aim : the bearing, as a direction of the map.
+    ray, aim : the bearing as a direction, of the map and of base.
     view, reach, model : scanner's place, bounds of the search (`reach_of`), and model of the observation.
     gate : of the association filter.
     cells, places, cell_offsets : the map, see `ReflectorIndex`.
@@ -158,12 +177,12 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
     -----
     argmin over reflectors of d2 + ln(det S), see `cost`: Sobreira et al. 2016, Algorithm 3, line 4.
     """
-    px = belief.x + view.offset_x + measured_range * aim.cos - cells.origin_x
-    py = belief.y + view.offset_y + measured_range * aim.sin - cells.origin_y
+    px = belief.x + view.offset_x + measured_range * ray.cos - cells.origin_x
+    py = belief.y + view.offset_y + measured_range * ray.sin - cells.origin_y
     best, best_d2, best_spread = NOBODY, math.nan, math.nan
     bound, root, surveyed = gate.d2, math.sqrt(gate.d2), cells.largest_variance if given is None else 0.0
     while True:
-        radius2 = search_radius2(root, measured_range, reach, model, surveyed)
+        radius2 = radius2_by(gate.kind, root, measured_range, reach, model, surveyed)
         # Nearly always the usual cells hold it: they are known before the radius is.
         first_row, last_row = cell_range(py - USUAL_RADIUS, py + USUAL_RADIUS, cells.per_metre, cells.rows)
         first_column, last_column = cell_range(px - USUAL_RADIUS, px + USUAL_RADIUS, cells.per_metre, cells.columns)
@@ -181,7 +200,9 @@ def likeliest(  # noqa: PLR0917 - a measurement, number by number, and the map
                 if cross is not None and given is not None and work is not None:
                     take_out(work, BLOCKS, cross, entry, given)
                 variance = places[entry, 2]
-                d2, spread = score(belief, facing, measured_range, aim, x, y, variance, view, model, given, work)
+                d2, spread = score(
+                    gate.kind, belief, facing, measured_range, ray, aim, x, y, variance, view, model, given, work
+                )
                 # Mostly there is no other one to compare with, and no logarithm to take.
                 if d2 + spread < math.inf and (
                     best == NOBODY or is_likelier(d2, spread, best_d2, best_spread, places[entry, 3] < places[best, 3])
@@ -254,11 +275,13 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
         if status[i] != INLIER:
             continue
         measured = detections[i, 0] - model.range_bias
+        aim = UnitVector(aims[i - first, 0], aims[i - first, 1])
         best, best_d2 = likeliest(
             belief,
             facing,
             measured,
-            composed(facing, UnitVector(aims[i - first, 0], aims[i - first, 1])),
+            composed(facing, aim),
+            aim,
             view,
             reach,
             model,

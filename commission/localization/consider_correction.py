@@ -26,6 +26,7 @@ from commission.localization.consider import (
 from commission.localization.kalman import (
     Corrected,
     Gain,
+    Innovation,
     correct,
     corrected_covariance,
     gain,
@@ -76,21 +77,62 @@ def correct_aimed_with(  # noqa: PLR0917 - a measurement and a reflector, number
     d = seen_with(facing, e, surveyed_variance, given, work, at)
     v = innovation_with(belief, e, measured_range, turn, model, d)
     k = gain(v)
-    hd_rr = e.range_x * d.xr + e.range_y * d.yr + e.range_theta * d.tr
-    hd_rb = e.range_x * d.xb + e.range_y * d.yb + e.range_theta * d.tb
-    hd_br = e.bearing_x * d.xr + e.bearing_y * d.yr + e.bearing_theta * d.tr
-    hd_bb = e.bearing_x * d.xb + e.bearing_y * d.yb + e.bearing_theta * d.tb
-    n_rb = d.rb + hd_rb + hd_br
-    xx, xy, xt, yy, yt, tt = corrected_covariance(
-        belief, e, k, v.range_noise + d.rr + 2.0 * hd_rr, v.bearing_noise + d.bb + 2.0 * hd_bb
-    )
-    _correct_cross(work, width, e, k)
-    _add_constants(work, at, e, k, d, surveyed_variance, given.variances)
+    xx, xy, xt, yy, yt, tt = covariance_with(belief, e, k, v, d, 0.0, surveyed_variance, given, work, width, at)
     heading = k.tr * v.range + k.tb * v.bearing
     after = PoseGaussian(
         belief.x + k.xr * v.range + k.xb * v.bearing,
         belief.y + k.yr * v.range + k.yb * v.bearing,
         wrap_scalar(belief.theta + heading),
+        xx,
+        xy,
+        xt,
+        yy,
+        yt,
+        tt,
+    )
+    return Corrected(after, turned_by(facing, heading))
+
+
+@compiled_inline
+def covariance_with(  # noqa: PLR0917 - a detection and the constants, number by number
+    belief: PoseGaussian,
+    e: Expected,
+    k: Gain,
+    v: Innovation,
+    d: Seen,
+    cross_noise: float,
+    surveyed_variance: float,
+    given: Considering,
+    work: FloatArray,
+    width: int,
+    at: int,
+) -> tuple[float, float, float, float, float, float]:
+    """Upper triangle of the covariance after a detection; that with the constants is corrected in place.
+
+    Parameters
+    ----------
+    belief : before it.
+    e, k, v : its Jacobian, the gain and the innovation.
+    d : what the constants have to do with it.
+    cross_noise : covariance of the noise of range and bearing [m rad].
+    surveyed_variance : of the reflector's place, each axis [m^2].
+    given, work, width, at : as in `correct_aimed_with`.
+
+    Notes
+    -----
+    A P A^T + K N K^T - D K^T - K D^T, C = A C - K J P_p: see `correct_aimed_with`.
+    """
+    hd_rr = e.range_x * d.xr + e.range_y * d.yr + e.range_theta * d.tr
+    hd_rb = e.range_x * d.xb + e.range_y * d.yb + e.range_theta * d.tb
+    hd_br = e.bearing_x * d.xr + e.bearing_y * d.yr + e.bearing_theta * d.tr
+    hd_bb = e.bearing_x * d.xb + e.bearing_y * d.yb + e.bearing_theta * d.tb
+    n_rb = d.rb + hd_rb + hd_br + cross_noise
+    xx, xy, xt, yy, yt, tt = corrected_covariance(
+        belief, e, k, v.range_noise + d.rr + 2.0 * hd_rr, v.bearing_noise + d.bb + 2.0 * hd_bb
+    )
+    _correct_cross(work, width, e, k)
+    _add_constants(work, at, e, k, d, surveyed_variance, given.variances)
+    return (
         xx + 2.0 * (n_rb * k.xr * k.xb - d.xr * k.xr - d.xb * k.xb),
         xy + n_rb * (k.xr * k.yb + k.xb * k.yr) - d.xr * k.yr - d.xb * k.yb - k.xr * d.yr - k.xb * d.yb,
         xt + n_rb * (k.xr * k.tb + k.xb * k.tr) - d.xr * k.tr - d.xb * k.tb - k.xr * d.tr - k.xb * d.tb,
@@ -98,7 +140,6 @@ def correct_aimed_with(  # noqa: PLR0917 - a measurement and a reflector, number
         yt + n_rb * (k.yr * k.tb + k.yb * k.tr) - d.yr * k.tr - d.yb * k.tb - k.yr * d.tr - k.yb * d.tb,
         tt + 2.0 * (n_rb * k.tr * k.tb - d.tr * k.tr - d.tb * k.tb),
     )
-    return Corrected(after, turned_by(facing, heading))
 
 
 @compiled_inline

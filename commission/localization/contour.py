@@ -38,6 +38,7 @@ from commission.localization.contour_rows import (
     told_directions,
 )
 from commission.localization.contour_tables import ContourTables, contour_tables
+from commission.localization.invariant import about_elsewhere, carry_along
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import Motion, NextOdometry, trend, velocity
 from commission.localization.pose_gaussian import PoseGaussian
@@ -244,6 +245,7 @@ def observe_contours(  # noqa: PLR0917 - the filter's state around one scan
     cross: FloatArray | None,
     busy: IntArray | None,
     figures: FloatArray,
+    invariant: bool,
 ) -> PoseGaussian:
     """Match the contours of a scan and correct a belief by what they say.
 
@@ -260,6 +262,7 @@ def observe_contours(  # noqa: PLR0917 - the filter's state around one scan
         constants then count as noise, as they do for reflectors.
     busy : see `busy_chunks`.
     figures : (COLUMNS,) out: what became of it.
+    invariant : whether the covariance is that of a right-invariant error.
 
     Notes
     -----
@@ -319,6 +322,12 @@ def observe_contours(  # noqa: PLR0917 - the filter's state around one scan
     figures[USE] = ACCEPTED
     transition = np.empty((3, 3))
     corrected = corrected_by_rows(belief, columns, considered, rows, transition)
+    if invariant:
+        # A match is a pose, so that the mean needs no exponential; the covariance is about where the mean was.
+        way_x, way_y = corrected.x - belief.x, corrected.y - belief.y
+        corrected = about_elsewhere(corrected, way_x, way_y)
+        carry_along(columns, columns.shape[1], way_x, way_y)
+        carry_along(transition, 3, way_x, way_y)
     if cross is not None and busy is not None:
         carry_over(cross, transition, busy)
         for row in range(3):

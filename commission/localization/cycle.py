@@ -18,9 +18,8 @@ from commission.geometry.directions import UnitVector, direction_of
 from commission.localization.association import INLIER, NOBODY, Gate, associate
 from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering, considering
 from commission.localization.consider_columns import begin, busy_chunks, put_back, put_block, take_along
-from commission.localization.consider_correction import correct_aimed_with
 from commission.localization.contour import ACCEPTED, REJECTED, ROWS, USE, ContourModel, ContourScan, observe_contours
-from commission.localization.kalman import correct_aimed
+from commission.localization.filter_kinds import INVARIANT, correct_by
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import Motion, NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
@@ -247,7 +246,18 @@ def with_contours(  # noqa: PLR0917 - the filter's state around one scan
     dx, dy = belief.x - before.pivot[0], belief.y - before.pivot[1]
     moved = math.sqrt(dx * dx + dy * dy)
     return observe_contours(
-        belief, scan, contours, motion, following, moved, reflectors, model.consider, cross, busy, figures
+        belief,
+        scan,
+        contours,
+        motion,
+        following,
+        moved,
+        reflectors,
+        model.consider,
+        cross,
+        busy,
+        figures,
+        model.gate.kind == INVARIANT,
     )
 
 
@@ -349,7 +359,8 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
     detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
     aims : see `prepare`.
     observation : mounting and noise of the scanner.
-    gate : of the association filter: with it no two detections are of one reflector.
+    gate : of the association filter, which says of what kind the filter is; with it no two detections are of one
+        reflector.
     places : the map, see `ReflectorIndex`.
     cross : covariance of the pose with the constants, written in place; None: none is considered.
     given, work, busy : of the scan, where constants are considered, else None.
@@ -359,7 +370,7 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
 
     Notes
     -----
-    No formula: `correct_aimed` or `correct_aimed_with` for each in turn, from the freshest state; constants that the
+    No formula: `correct_by` the kind of the filter for each in turn, from the freshest state; constants that the
     scan does not see are carried over it at the end, in one go.
     """
     belief = prior
@@ -369,7 +380,9 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
                 entry, distance = entries[i], detections[i, 0] - observation.range_bias
                 aim = UnitVector(aims[i - first, 0], aims[i - first, 1])
                 x, y, variance = places[entry, 0], places[entry, 1], places[entry, 2]
-                belief, facing = correct_aimed(belief, facing, distance, aim, x, y, variance, observation)
+                belief, facing = correct_by(
+                    gate.kind, belief, facing, distance, aim, x, y, variance, observation, None, None, 0, 0
+                )
         return belief
     width = BLOCKS
     for i in range(first, last):
@@ -386,8 +399,8 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
         aims[i - first, 2] = at
         aim = UnitVector(aims[i - first, 0], aims[i - first, 1])
         x, y, variance = places[entry, 0], places[entry, 1], places[entry, 2]
-        belief, facing = correct_aimed_with(
-            belief, facing, distance, aim, x, y, variance, observation, given, work, width, at
+        belief, facing = correct_by(
+            gate.kind, belief, facing, distance, aim, x, y, variance, observation, given, work, width, at
         )
     put_back(cross, work, len(places), scanner, busy)
     for i in range(first, last):

@@ -264,6 +264,33 @@ def corrected_covariance(
 
 
 @compiled_inline
+def with_cross_noise(
+    covariance: tuple[float, float, float, float, float, float], k: Gain, cross_noise: float
+) -> tuple[float, float, float, float, float, float]:
+    """Upper triangle of a corrected covariance where the noise of range and bearing is correlated.
+
+    Parameters
+    ----------
+    covariance : without that.
+    k : gain.
+    cross_noise : covariance of both [m rad].
+
+    Notes
+    -----
+    K [[0, r], [r, 0]] K^T on top: the rest of K R K^T.
+    """
+    xx, xy, xt, yy, yt, tt = covariance
+    return (
+        xx + 2.0 * cross_noise * k.xr * k.xb,
+        xy + cross_noise * (k.xr * k.yb + k.xb * k.yr),
+        xt + cross_noise * (k.xr * k.tb + k.xb * k.tr),
+        yy + 2.0 * cross_noise * k.yr * k.yb,
+        yt + cross_noise * (k.yr * k.tb + k.yb * k.tr),
+        tt + 2.0 * cross_noise * k.tr * k.tb,
+    )
+
+
+@compiled_inline
 def covariance_with_expected(p: PoseGaussian, e: Expected) -> tuple[float, float, float, float, float, float]:
     """Covariance of x, y and heading with the expected range, then with the expected bearing.
 

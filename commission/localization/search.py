@@ -11,8 +11,14 @@ from typing import NamedTuple
 from commission.compiled import compiled_inline
 from commission.geometry.directions import UnitVector
 from commission.localization.consider import Considering
+from commission.localization.filter_kinds import EKF, INVARIANT
 from commission.localization.observation import SMALLEST_RANGE, ObservationModel, offset_facing
 from commission.localization.pose_gaussian import PoseGaussian, larger_eigenvalue
+
+POINTS_APART = 3.0**0.5
+"""Sigma points lie as many sigmas from the mean."""
+LEAST_REST = 0.05
+"""Where less is left of a heading, a reflector may be anywhere."""
 
 
 class Viewpoint(NamedTuple):
@@ -113,6 +119,37 @@ def search_radius2(
     distance = abs(measured_range)
     # The margin covers the rounding of everything above.
     return (depth * depth + distance * (distance + depth) * chord2) * (1.0 + 1e-8) + 1e-12
+
+
+@compiled_inline
+def radius2_by(  # noqa: PLR0917 - a distance and what bounds it, number by number
+    kind: int, d: float, measured_range: float, view: Viewpoint, model: ObservationModel, largest_variance: float
+) -> float:
+    """Square of the distance within which to search for reflectors, for a kind of filter [m^2].
+
+    Parameters
+    ----------
+    kind : of the filter.
+    d, measured_range, view, model, largest_variance : as in `search_radius2`.
+
+    Notes
+    -----
+    `search_radius2`, of `POINTS_APART` times the sigmas where points are as far apart. Right-invariant: a distance u
+    on the floor has at most the sigma s + h (r + u) + n of position, heading and noise, so that u <= d (s + h r + n) /
+    (1 - d h); derived.
+    """
+    if kind == EKF:
+        return search_radius2(d, measured_range, view, model, largest_variance)
+    if kind != INVARIANT:
+        apart = POINTS_APART * (1.0 + 1.0 / d)
+        wider = Viewpoint(view.offset_x, view.offset_y, apart * view.position_sigma, apart * view.heading_sigma)
+        return search_radius2(d, measured_range, wider, model, largest_variance)
+    distance, rest = abs(measured_range), 1.0 - d * view.heading_sigma
+    if rest < LEAST_REST:
+        return math.inf
+    noise2 = max(model.range_variance, distance * distance * model.bearing_variance) + largest_variance
+    radius = d * (view.position_sigma + view.heading_sigma * distance + math.sqrt(noise2)) / rest
+    return radius * radius * (1.0 + 1e-8) + 1e-12
 
 
 @compiled_inline

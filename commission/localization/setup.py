@@ -15,6 +15,7 @@ from commission.localization.consider import ConsiderModel
 from commission.localization.contour import ContourModel, contour_model
 from commission.localization.cross_covariance import Constants, constants_of, contour_constants, survey_variance
 from commission.localization.detector_model import DetectorModel, detector_model
+from commission.localization.filter_kinds import filter_kind
 from commission.localization.observation import (
     ObservationModel,
     observation_model,
@@ -98,7 +99,7 @@ class LocalizerSetup:
         model = FilterModel(
             odometry_noise(self.parameters.odometry),
             index.cells,
-            gate_of(self.parameters.association),
+            gate_of(self.parameters.association, filter_kind(self.parameters.filter)),
             limits,
             rejection_rule(self.parameters.supervisor),
             consider_model(known),

@@ -29,6 +29,9 @@ from commission.site.quantity import (
     Switch,
 )
 
+FILTER_KINDS = ("ekf", "ukf", "ckf", "invariant")
+"""Kinds of filter: extended (the paper's), unscented, cubature, right-invariant extended Kalman filter."""
+
 _SCALE = Bounds.between(-0.5, 0.5)
 """Wheels that are off by more are other wheels."""
 
@@ -228,6 +231,9 @@ class AssociationParameters:
 class FilterParameters:
     """How detections correct the pose."""
 
+    kind: Annotated[str, Choice("Corrected by", FILTER_KINDS)] = "ekf"
+    """Filter: `ekf` is the paper's, `ukf` and `ckf` use sigma points, `invariant` takes an error of the pose for a
+    motion of the plane: consistent also where one reflector comes in sight after a long way without any."""
     consider: Annotated[bool, Switch("Consider constant errors")] = True
     """Whether errors of map, mounting, range and clock (the project's uncertainty) are known not to average out."""
 

@@ -64,6 +64,7 @@ PARAMETERS = {
     "detector.range_jump": ("Range jump [mm]", 1000.0),
     "detector.expected_beams": ("Beams expected by", None),
     "detector.center": ("Center from", None),
+    "filter.kind": ("Corrected by", None),
     "filter.consider": ("Consider constant errors", None),
     "contour.enabled": ("Contours", None),
     "contour.method": ("Matched by", None),

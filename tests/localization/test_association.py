@@ -87,6 +87,7 @@ def test_nearby_search_equals_a_plain_search_over_all_reflectors(seed: int, enab
             facing,
             float(z[0]),
             direction_of(belief.theta + model.mount_theta + float(z[1])),
+            direction_of(model.mount_theta + float(z[1])),
             view,
             view,
             model,

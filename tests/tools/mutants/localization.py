@@ -150,8 +150,8 @@ LOCALIZATION = (
     Mutant(
         name="every correction starts from the prediction, as Algorithm 1 is printed",
         file=FOLDER + "cycle.py",
-        find="belief, facing = correct_aimed(belief, facing",
-        replace="belief, facing = correct_aimed(prior, facing",
+        find="gate.kind, belief, facing, distance, aim, x, y, variance, observation, None",
+        replace="gate.kind, prior, facing, distance, aim, x, y, variance, observation, None",
         tests=(PLAIN,),
     ),
     Mutant(

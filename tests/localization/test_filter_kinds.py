@@ -1,0 +1,156 @@
+"""Every kind of filter corrects as its paper has it, with and without considered constants, live as over whole runs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from commission.geometry.directions import direction_of
+from commission.localization.consider import BLOCKS, Considering, ConsiderModel
+from commission.localization.filter_kinds import FILTER_KINDS, correct_by
+from commission.localization.localizer import Localizer
+from commission.localization.observation import ObservationModel
+from commission.localization.pose_gaussian import PoseGaussian, covariance_of, mean_of
+from commission.localization.whole_run import run
+from commission.site.parameters import FilterParameters, Parameters
+from tests.localization import plain_filters
+from tests.localization.drives import Plan, random_drive
+from tests.localization.plain_observation import Array, observed
+from tests.localization.test_whole_run import assert_same_estimate, setup_of
+
+MOUNTING = np.array([0.4, -0.2, 0.3])
+SIGMAS = (0.02, 0.004)
+MODEL = ObservationModel(*MOUNTING.tolist(), SIGMAS[0] ** 2, SIGMAS[1] ** 2, 0.0)
+R = np.diag(np.square(SIGMAS))
+every_kind = pytest.mark.parametrize("kind", FILTER_KINDS)
+
+
+def belief_of(mean: Array, cov: Array) -> PoseGaussian:
+    numbers = (*mean, cov[0, 0], cov[0, 1], cov[0, 2], cov[1, 1], cov[1, 2], cov[2, 2])
+    return PoseGaussian(*(float(each) for each in numbers))
+
+
+def corrected(kind: str, belief: PoseGaussian, z: Array, place: Array, constants=(None, None, 0, 0)):
+    aim = direction_of(MODEL.mount_theta + float(z[1]))
+    where = (float(place[0]), float(place[1]), 0.0)
+    number = FILTER_KINDS.index(kind)
+    return correct_by(number, belief, direction_of(belief.theta), float(z[0]), aim, *where, MODEL, *constants).belief
+
+
+def drawn(seed: int) -> tuple[Array, Array, Array, Array]:
+    """A belief that went astray on its way, the detection of a reflector, and its place."""
+    rng = np.random.default_rng(seed)
+    spread = np.exp(rng.uniform([-6, -6, -6], [0.5, 0.5, -1.5]))
+    root = rng.normal(size=(3, 3)) * spread[:, np.newaxis]
+    mean, cov = rng.uniform([-5, -5, -3], [5, 5, 3]), root @ root.T + np.diag(1e-6 * spread**2)
+    true = mean + np.linalg.cholesky(cov) @ rng.normal(size=3)
+    place = true[:2] + rng.uniform(4.0, 20.0) * np.array(direction_of(float(rng.uniform(-math.pi, math.pi))))
+    return mean, cov, observed(true, MOUNTING, place[np.newaxis])[0] + rng.normal(size=2) * SIGMAS, place
+
+
+@every_kind
+@settings(max_examples=100)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_correction_is_that_of_the_textbook(kind: str, seed: int) -> None:
+    mean, cov, z, place = drawn(seed)
+    belief = belief_of(mean, cov)
+    after = corrected(kind, belief, z, place)
+    expected_mean, expected_cov = plain_filters.KINDS[kind](mean, cov, z, place, MOUNTING, R)
+    sigmas = np.sqrt(np.diag(cov))
+    off = mean_of(after) - expected_mean
+    off[2] = math.remainder(off[2], 2.0 * math.pi)
+    # Derivatives by differences are good to 1e-8 or so; a belief may be 10,000 times wider than the noise.
+    assert np.abs(off / sigmas).max() < 1e-4
+    assert np.abs((covariance_of(after) - expected_cov) / np.outer(sigmas, sigmas)).max() < 1e-5
+    assert np.linalg.eigvalsh(covariance_of(after) / np.outer(sigmas, sigmas)).min() > -1e-10
+
+
+@every_kind
+def test_what_agrees_with_the_belief_corrects_it_alike_whatever_the_kind(kind: str) -> None:
+    mean, cov = np.array([1.0, 2.0, 0.5]), np.diag([1e-4, 2e-4, 1e-6])
+    place = np.array([8.0, 5.0])
+    z = observed(mean, MOUNTING, place[np.newaxis])[0]
+    own, paper = (corrected(each, belief_of(mean, cov), z, place) for each in (kind, "ekf"))
+    assert mean_of(own) == pytest.approx(mean_of(paper), abs=1e-5)
+    assert covariance_of(own) == pytest.approx(covariance_of(paper), rel=2e-3, abs=1e-10)
+
+
+@every_kind
+def test_considered_constants_correct_like_schmidts_filter_of_the_whole_state(kind: str) -> None:
+    # Constants add to range and bearing by their own Jacobian; with it and the pose's (of a tiny innovation, where all
+    # kinds have the same), one dense Kalman filter whose constants have no gain.
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        mean, place = rng.uniform([-5, -5, -3], [5, 5, 3]), rng.uniform(8.0, 15.0, 2)
+        root = rng.normal(size=(3, 3)) * [[1e-3], [1e-3], [1e-4]]
+        cov = root @ root.T
+        work = [[3e-7], [3e-7], [3e-8]] * rng.normal(size=(3, BLOCKS + 2))
+        known = ConsiderModel(4e-6, 1e-6, 9e-6, 1e-4)
+        considering = Considering(known, 0.0, 0.0, 0.4, 0.1, 0.2)
+        z = observed(mean, MOUNTING, place[np.newaxis])[0] + 1e-4 * rng.normal(size=2)
+        numbers = work.copy()
+        after = corrected(kind, belief_of(mean, cov), z, place, (considering, numbers, BLOCKS + 2, BLOCKS))
+        reference = work.copy()
+        paper = corrected("ekf", belief_of(mean, cov), z, place, (considering, reference, BLOCKS + 2, BLOCKS))
+        assert mean_of(after) == pytest.approx(mean_of(paper), abs=2e-6)
+        sigmas = np.sqrt(np.diag(cov))
+        off = (covariance_of(after) - covariance_of(paper)) / np.outer(sigmas, sigmas)
+        assert np.abs(off).max() < 2e-3
+        # Each constant has a 1-sigma of some millimetres or milliradians.
+        assert np.abs((numbers - reference) / sigmas[:, np.newaxis]).max() < 1e-5
+
+
+@every_kind
+@pytest.mark.parametrize("consider", [True, False], ids=["constants considered", "white noise alone"])
+def test_whole_run_equals_the_live_localizer_to_the_last_bit(kind: str, consider: bool) -> None:
+    rng = np.random.default_rng(3)
+    parameters = Parameters(filter=FilterParameters(kind=kind, consider=consider))
+    setup = setup_of(rng, parameters, 2)
+    drive = random_drive(setup, rng, Plan(scans=150, scan_offset_ns=7_000_000))
+    arrays, localizer = run(drive.log, setup, drive.initial), Localizer(setup, drive.initial)
+    estimates = [estimate for record in drive.log.records() for estimate in localizer.feed(record)]
+    estimates += localizer.flush()
+    for cycle, estimate in enumerate(estimates):
+        assert_same_estimate(estimate, arrays.estimate(cycle))
+    assert localizer.state == arrays.final
+    errors = np.hypot(*(arrays.means - drive.truth)[:, :2].T)
+    # As all kinds do where several reflectors are in sight: they differ by the square of the innovations.
+    assert 0.002 < math.sqrt(float(np.mean(errors**2))) < 0.03
+
+
+def test_kinds_differ_and_an_unknown_one_is_refused() -> None:
+    rng = np.random.default_rng(3)
+    setup = setup_of(rng)
+    drive = random_drive(setup, rng, Plan(scans=50))
+    ways = [
+        run(drive.log, replace(setup, parameters=Parameters(filter=FilterParameters(kind=kind))), drive.initial).means
+        for kind in FILTER_KINDS
+    ]
+    assert len({way.tobytes() for way in ways}) == len(FILTER_KINDS)
+    with pytest.raises(ValueError, match=r"filter.kind is 'kalman'; expected 'ekf' or 'ukf' or 'ckf' or 'invariant'"):
+        FilterParameters(kind="kalman")
+
+
+def test_seeing_one_reflector_again_and_again_never_tells_a_turn_about_it() -> None:
+    # The variance along the turn about the reflector must not fall: one reflector cannot tell it. With range and
+    # bearing of one reflector, a vehicle knows where it is but for that turn.
+    mean, place = np.array([0.0, 0.0, 0.0]), np.array([10.0, 3.0])
+    cov = np.array([[0.04, 0.0, 0.0], [0.0, 0.5, 0.02], [0.0, 0.02, 0.01]])
+    left: dict[str, float] = {}
+    for kind in ("ekf", "invariant"):
+        rng, belief = np.random.default_rng(1), belief_of(mean, cov)
+        true = np.array([0.1, 0.6, 0.08])
+        for _ in range(200):
+            z = observed(true, MOUNTING, place[np.newaxis])[0] + rng.normal(size=2) * SIGMAS
+            belief = corrected(kind, belief, z, place)
+        left[kind] = covariance_of(belief)[2, 2]
+    # By hand: information of place and heading, of the turn about the reflector alone: 1 / (t^T P^-1 t).
+    turn = np.array([3.0, -10.0, 1.0])
+    told = 1.0 / (turn @ np.linalg.solve(cov, turn))
+    assert left["invariant"] == pytest.approx(told, rel=0.02)
+    assert left["ekf"] < 0.9 * told
