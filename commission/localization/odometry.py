@@ -44,6 +44,8 @@ class OdometryNoise(NamedTuple):
     """Of an unknown speed that is anything up to the limit: limit^2 / 3, along each axis."""
     turning_per_s2: float = 0.0
     """Of an unknown turn rate up to its limit."""
+    curved: float = 0.0
+    """1 where an error of the pose is a motion of the plane: errors of the heading then add up along an arc; else 0."""
 
 
 class Motion(NamedTuple):
@@ -218,7 +220,9 @@ def predict(  # noqa: PLR0917 - a displacement, number by number
     Notes
     -----
     P = F P F^T + Q with F = [[1, 0, -my], [0, 1, mx], [0, 0, 1]] and (mx, my) the motion in the map: Sobreira et al.
-    2016, equation 1 and Algorithm 1, lines 3 and 4; Q derived as said above.
+    2016, equation 1 and Algorithm 1, lines 3 and 4; Q derived as said above. Right-invariant, with q the variance of
+    the heading error: 1/4 E[[a, b] [a, b]^T] + 1/12 E[[b, [b, a]] a^T] and its transpose on top, where a ~ P and
+    b = (0, 0, q): Barfoot and Furgale 2014, equation 56, of what counts after a long way.
     """
     facing = direction_of(belief.theta)
     mx, my = facing.cos * dx - facing.sin * dy, facing.sin * dx + facing.cos * dy
@@ -250,6 +254,10 @@ def predict(  # noqa: PLR0917 - a displacement, number by number
         xy += axis * c * s
         yy += axis * s * s
     theta = wrap_scalar(belief.theta + dtheta)
+    arcs = noise.curved * heading
+    xx += arcs * (belief.yy / 4.0 - belief.xx / 6.0)
+    xy -= arcs * belief.xy * 5.0 / 12.0
+    yy += arcs * (belief.xx / 4.0 - belief.yy / 6.0)
     return PoseGaussian(belief.x + mx, belief.y + my, theta, xx, xy, xt, yy, yt, belief.tt + heading)
 
 

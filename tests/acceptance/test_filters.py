@@ -8,6 +8,7 @@ holds it. With `--acceptance` 400 drives each, a few in the test command.
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -64,6 +65,7 @@ def setup_of(kind: str, blind: float, odometry: OdometryParameters) -> Localizer
     return LocalizerSetup(reflectors=ReflectorMap((alone,)), scanners=(Scanner(),), parameters=parameters)
 
 
+@functools.cache
 def drive(blind: float, odometry: OdometryParameters, seed: int) -> tuple[RecordLog, Belief, np.ndarray]:
     """Straight on: what is measured, where the filter begins, and the true poses of the scans."""
     rng = np.random.default_rng(seed)
@@ -79,7 +81,7 @@ def drive(blind: float, odometry: OdometryParameters, seed: int) -> tuple[Record
         ]
     )
     half = np.array([0.5 * STEP, 0.0, 0.0])
-    moves = np.array([se2.compose(se2.compose(half, error), half) for error in errors])
+    moves = se2.compose(se2.compose(half, errors), half)
     moves[:, 1] += rng.normal(size=steps) * math.sqrt(STEP / 12.0) * odometry.heading_per_sqrt_m * STEP
     stamps = PERIOD_NS * np.arange(steps + 1, dtype=np.int64)
     seen = np.arange(round(blind / STEP), steps + 1)
@@ -131,8 +133,10 @@ def test_the_right_invariant_filter_is_consistent_after_one_reflector_whatever_t
         figures = table["invariant", blind]
         # A mean of a few drives scatters: two standard errors of it.
         margin = 0.0 if seeds.all else 2.0 * max(figures.spread, math.sqrt(2.0 / 3.0 / FEW_DRIVES))
-        assert 0.8 - margin < figures.first < 1.2 + margin, (blind, figures)
-        assert 0.8 - margin < figures.last < 1.2 + margin, (blind, figures)
+        # Over 120 m the error along the way is that of an arc, skewed: no covariance holds it.
+        most = 1.2 if blind < 100.0 else 1.7
+        assert 0.8 - margin < figures.first < most + margin, (blind, figures)
+        assert 0.8 - margin < figures.last < most + margin, (blind, figures)
 
 
 def test_others_are_overconfident_after_sixty_metres_and_the_extended_one_most(

@@ -10,14 +10,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from commission.geometry import se2
 from commission.geometry.directions import direction_of
 from commission.localization.consider import BLOCKS, Considering, ConsiderModel
 from commission.localization.filter_kinds import FILTER_KINDS, correct_by
 from commission.localization.localizer import Localizer
 from commission.localization.observation import ObservationModel
+from commission.localization.odometry import odometry_noise, predict
 from commission.localization.pose_gaussian import PoseGaussian, covariance_of, mean_of
 from commission.localization.whole_run import run
-from commission.site.parameters import FilterParameters, Parameters
+from commission.site.parameters import FilterParameters, OdometryParameters, Parameters
 from tests.localization import plain_filters
 from tests.localization.drives import Plan, random_drive
 from tests.localization.plain_observation import Array, observed
@@ -154,3 +156,30 @@ def test_seeing_one_reflector_again_and_again_never_tells_a_turn_about_it() -> N
     told = 1.0 / (turn @ np.linalg.solve(cov, turn))
     assert left["invariant"] == pytest.approx(told, rel=0.02)
     assert left["ekf"] < 0.9 * told
+
+
+def test_spread_of_a_long_way_is_that_of_the_motions_that_may_have_happened() -> None:
+    # 120 m straight on in steps of one metre: the covariance of the twists of 4,000 drawn ways, about where the vehicle
+    # is believed to be. Without the terms of the arc, the variance along the way is less than half of it.
+    rng, ways, sigmas = np.random.default_rng(2), 4000, np.array([0.01, 0.003, 0.006])
+    parameters = OdometryParameters(
+        **dict(zip(("forward_per_sqrt_m", "lateral_per_sqrt_m", "heading_per_sqrt_m"), sigmas.tolist(), strict=True)),
+        forward_per_sqrt_s=0.0,
+        heading_per_sqrt_s=0.0,
+    )
+    spread: dict[float, Array] = {}
+    for curved in (0.0, 1.0):
+        belief = PoseGaussian(*9 * [0.0])
+        for _ in range(120):
+            belief = predict(belief, 1.0, 0.0, 0.0, 1.0, odometry_noise(parameters)._replace(curved=curved))
+        spread[curved] = covariance_of(belief)
+    poses, half = np.zeros((ways, 3)), np.array([0.25, 0.0, 0.0])
+    for _ in range(240):
+        errors = math.sqrt(0.5) * sigmas * rng.normal(size=(ways, 3))
+        poses = se2.compose(poses, se2.compose(se2.compose(half, errors), half))
+    off = np.column_stack((poses[:, :2] - [120.0, 0.0], poses[:, 2]))
+    drawn_spread = np.cov(se2.log(off).T)
+    for i in range(3):
+        # A variance of 4,000 draws is known to 2.2 %, of a skewed one less well.
+        assert spread[1.0][i, i] == pytest.approx(drawn_spread[i, i], rel=0.12)
+    assert spread[0.0][0, 0] < 0.7 * drawn_spread[0, 0]
