@@ -207,36 +207,23 @@ def correct_invariant(  # noqa: PLR0917 - a measurement and a reflector, number 
     X = exp(K v) X, P as in `corrected_covariance`, then F P F^T with F of the way of the mean, since P is about it:
     Barrau and Bonnabel 2017, section III; linearized anew while that turns the belief, as in `relinearized`.
     """
-    turned, shift = facing, Shift(0.0, 0.0, 0.0, 0.0, 0.0)
-    for _ in range(MOST_ROUNDS):
+    turned, shift, rounds = facing, Shift(0.0, 0.0, 0.0, 0.0, 0.0), 0
+    while True:
         offset_x, offset_y = offset_facing(turned, model)
-        seen = landing(
-            belief.x + shift.x + offset_x,
-            belief.y + shift.y + offset_y,
-            composed(turned, aim),
-            measured_range,
-            reflector_x,
-            reflector_y,
-            belief.x,
-            belief.y,
-            0.0,
-        )
+        from_x, from_y = belief.x + shift.x + offset_x, belief.y + shift.y + offset_y
+        ray = composed(turned, aim)
+        seen = landing(from_x, from_y, ray, measured_range, reflector_x, reflector_y, belief.x, belief.y, 0.0)
         e = seen.expected
         if given is None or work is None:
             v = innovation(belief, e, measured_range, seen.turn, surveyed_variance, model)
         else:
-            v = innovation_with(
-                belief,
-                e,
-                measured_range,
-                seen.turn,
-                model,
-                seen_with(turned, e, surveyed_variance, given, work, at),
-            )
+            d = seen_with(turned, e, surveyed_variance, given, work, at)
+            v = innovation_with(belief, e, measured_range, seen.turn, model, d)
         k = gain(v)
         along, across = relinearized(e, seen, measured_range, shift)
         before, shift = shift.turn, shift_of(k, along, across)
-        if abs(shift.turn - before) < SMALL_TURN:
+        rounds += 1
+        if abs(shift.turn - before) < SMALL_TURN or rounds == MOST_ROUNDS:
             break
         turned = turned_by(facing, shift.turn)
     if given is None or work is None:
@@ -246,21 +233,9 @@ def correct_invariant(  # noqa: PLR0917 - a measurement and a reflector, number 
         xx, xy, xt, yy, yt, tt = covariance_with(belief, e, k, v, d, 0.0, surveyed_variance, given, work, width, at)
         carry_along(work, width, shift.x, shift.y)
     about = about_elsewhere(PoseGaussian(belief.x, belief.y, belief.theta, xx, xy, xt, yy, yt, tt), shift.x, shift.y)
-    theta = wrap_scalar(belief.theta + shift.turn)
-    return Corrected(
-        PoseGaussian(
-            about.x + shift.x,
-            about.y + shift.y,
-            theta,
-            about.xx,
-            about.xy,
-            about.xt,
-            about.yy,
-            about.yt,
-            about.tt,
-        ),
-        turned_by(facing, shift.turn),
-    )
+    x, y, theta = about.x + shift.x, about.y + shift.y, wrap_scalar(belief.theta + shift.turn)
+    after = PoseGaussian(x, y, theta, about.xx, about.xy, about.xt, about.yy, about.yt, about.tt)
+    return Corrected(after, turned_by(facing, shift.turn))
 
 
 @compiled_inline
