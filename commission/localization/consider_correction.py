@@ -120,7 +120,7 @@ def covariance_with(  # noqa: PLR0917 - a detection and the constants, number by
 
     Notes
     -----
-    A P A^T + K N K^T - D K^T - K D^T, C = A C - K J P_p: see `correct_aimed_with`.
+    A P A^T + K N K^T - D K^T - K D^T, C = A C - K J P_p: Schmidt 1966, see `correct_aimed_with`.
     """
     hd_rr = e.range_x * d.xr + e.range_y * d.yr + e.range_theta * d.tr
     hd_rb = e.range_x * d.xb + e.range_y * d.yb + e.range_theta * d.tb

@@ -28,7 +28,7 @@ def center_of(kind: int) -> float:
 
     Notes
     -----
-    beta of the unscented filter, 0 of the cubature one, by definition.
+    weight = beta of the unscented filter, 0 of the cubature one, by definition.
     """
     return UNSCENTED_CENTER if kind == UKF else 0.0
 

@@ -115,8 +115,7 @@ def landing_innovation(  # noqa: PLR0917 - a measurement and a reflector, number
 
     Notes
     -----
-    `landing` with the lever halfway: the chord of a turn is at right angles to the line to its middle, so that the
-    residual is linear in the turn up to its third power.
+    v + H xi = O(xi_theta^3), derived: `landing` with the lever halfway, as the chord of a turn is at right angles to the line to its middle, of a circle.
     """
     seen = landing(belief.x + offset_x, belief.y + offset_y, ray, measured_range, x, y, belief.x, belief.y, 0.5)
     e = seen.expected
@@ -168,7 +167,7 @@ def relinearized(e: Expected, seen: Landing, measured_range: float, shift: Shift
 
     Notes
     -----
-    v + H xi: the Gauss-Newton step of an iterated filter: Goffin, Bonnabel, Brüls and Sacré 2024; Jazwinski 1970,
+    r = v + H xi: the Gauss-Newton step of an iterated filter: Goffin, Bonnabel, Brüls and Sacré 2024; Jazwinski 1970,
     section 8.3.
     """
     along = e.range_x * shift.along_x + e.range_y * shift.along_y + e.range_theta * shift.turn

@@ -277,7 +277,7 @@ def with_cross_noise(
 
     Notes
     -----
-    K [[0, r], [r, 0]] K^T on top: the rest of K R K^T.
+    P + K [[0, r], [r, 0]] K^T, the rest of K R K^T, by definition.
     """
     xx, xy, xt, yy, yt, tt = covariance
     return (

@@ -153,7 +153,7 @@ def widened_by(v: Innovation, line: Fitted, model: ObservationModel) -> Innovati
 
     Notes
     -----
-    S + (P_zz - H P H^T), factored again as L D L^T; see `fitted`.
+    S + (P_zz - H P H^T), factored again as L D L^T, by definition; see `fitted`.
     """
     s_rr = v.s_rr + line.rr
     s_rb = v.w * v.s_rr + line.rb
