@@ -115,7 +115,8 @@ def landing_innovation(  # noqa: PLR0917 - a measurement and a reflector, number
 
     Notes
     -----
-    v + H xi = O(xi_theta^3), derived: `landing` with the lever halfway, as the chord of a turn is at right angles to the line to its middle, of a circle.
+    v + H xi = O(xi_theta^3), derived: `landing` with the lever halfway, since the chord of a turn is at right angles
+    to the line from the center to its middle.
     """
     seen = landing(belief.x + offset_x, belief.y + offset_y, ray, measured_range, x, y, belief.x, belief.y, 0.5)
     e = seen.expected
