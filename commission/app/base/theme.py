@@ -194,6 +194,8 @@ div:has(>div>.c-top){{display:flex;align-items:center;height:var(--c-top);paddin
 div:has(>div>.c-top)>div{{padding:0!important;margin:0!important}}
 div:has(>div>.c-top)>:first-child{{flex:1;min-width:0}}
 div:has(>div>.c-top) button{{height:26px!important;padding:0 10px!important;font-size:12px!important}}
+div:has(>div>.c-top) .mantine-Flex-root{{flex-wrap:nowrap!important}}
+div:has(>div>.c-top) .mantine-Button-label{{overflow:hidden;text-overflow:ellipsis}}
 div:has(>div>.c-bottom){{display:grid;grid-template-columns:repeat(24,minmax(0,1fr));align-items:center;
  padding-top:2px!important}}
 div:has(>div>.c-bottom)>:nth-child(-n+5){{grid-row:1}}
@@ -292,7 +294,8 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
  div:has(>div>.c-bottom)>:nth-child(4){{grid-column:12/span 4;padding-left:6px!important}}
  div:has(>div>.c-bottom)>:nth-child(1){{grid-column:16}}
  div:has(>div>.c-bottom)>:nth-child(n+5):nth-child(-n+6){{grid-column:17/span 8}}}}
-@media (max-width:1150px){{.c-beside{{width:78px;font-size:10px!important}}
+@media (max-width:1150px){{div:has(>div>.c-top) .mantine-Button-label{{max-width:84px}}
+ .c-beside{{width:78px;font-size:10px!important}}
  .c-badge{{font-size:12px!important;padding:3px 7px!important;letter-spacing:.02em!important}}
  .c-top>b{{display:none}} .c-top{{padding:0 6px!important;gap:8px!important}}}}
 .c-list{{margin:1px 0 2px;padding-left:15px;font-size:12px;line-height:1.4;overflow-wrap:anywhere;

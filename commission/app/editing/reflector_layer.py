@@ -7,9 +7,9 @@ from viser import LabelHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import lift, outline_segments, rings, stroke_segments
-from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
 from commission.app.base.marks import add_lines, add_marks
+from commission.app.editing.name_places import reflector_names
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorKind, ReflectorMap
@@ -61,7 +61,7 @@ class ReflectorNameLayer(BaseLayer):
 
     name = "Reflector names"
     rank = 140
-    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
+    reads: tuple[str, ...] = ("floor_map", "reflectors", "routes", "stations")
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
@@ -70,22 +70,23 @@ class ReflectorNameLayer(BaseLayer):
     def show_site(self, project: Project) -> None:
         """Write each name beside its reflector; labels that stay are moved, not made anew."""
         shown = project.reflectors.reflectors if len(project.reflectors) <= MOST_LABELS else ()
-        offset = extent_of(project).mark_size()
         names = {reflector.id for reflector in shown}
         for name in [name for name in self._labels if name not in names]:
             self._labels.pop(name).remove()
-        for reflector in shown:
-            position = (reflector.x + offset, reflector.y + offset, theme.Height.LABEL)
+        for reflector, place in zip(shown, reflector_names(project, shown), strict=True):
+            position = (*place.at, theme.Height.LABEL)
             label = self._labels.get(reflector.id)
             if label is not None:
                 label.position = position
+                if label.anchor != place.anchor:
+                    label.anchor = place.anchor
                 continue
             self._labels[reflector.id] = self.scene.add_label(
                 f"/reflector_names/{reflector.id.encode().hex()}",
                 reflector.id,
                 position=position,
                 font_screen_scale=0.7,
-                anchor="bottom-left",
+                anchor=place.anchor,
             )
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:

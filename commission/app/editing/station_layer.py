@@ -11,10 +11,11 @@ from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
+from commission.app.editing.name_places import STATION_NAME_BELOW, station_text
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
-from commission.site.stations import ACCURACY, Station
+from commission.site.stations import Station
 
 MOST_LABELS = 60
 MARK = np.array([(1.6, 0.0), (0.6, 1.0), (-1.0, 1.0), (-1.0, -1.0), (0.6, -1.0)])
@@ -62,12 +63,12 @@ class StationLayer(BaseLayer):
         for name in self._labels.keys() - {station.name for station in shown}:
             self._labels.pop(name).remove()
         for station in shown:
-            self._write(station, 2.0 * MARK_SIZE * size)
+            self._write(station, STATION_NAME_BELOW * size)
 
     def _write(self, station: Station, below: float) -> None:
         """Write name and accuracy under a station."""
         position = (station.x, station.y - below, theme.Height.LABEL)
-        text = f"{station.name}  {ACCURACY.brief(station.required_accuracy)}"
+        text = station_text(station)
         label = self._labels.get(station.name)
         if label is None:
             self._labels[station.name] = self.scene.add_label(

@@ -35,12 +35,14 @@ def title(state: AppState) -> str:
     stands, files = escaped(standing(state)), state.part(FilesState)
     # Where edits might be lost, that is read before the name is.
     is_urgent = bool(files.holder or files.kept_in or files.foreign) or not files.is_protected
-    name_gives, least = ("min-width:2em;overflow:hidden;text-overflow:ellipsis", "8em") if is_urgent else ("", "0")
+    cut = "overflow:hidden;text-overflow:ellipsis"
+    name_gives, least = (f"min-width:2em;{cut}", "8em") if is_urgent else (cut, "0")
     return (
         "<div class='c-top' style='display:flex;align-items:center;padding:0 14px;gap:14px;font-size:13px;"
         "white-space:nowrap;overflow:hidden'>"
-        f"<b>Commission</b><span style='opacity:.85;{name_gives}'>{escaped(state.project.name)}</span>"
-        f"<span style='opacity:.55;min-width:{least};overflow:hidden;text-overflow:ellipsis' title='{stands}'>"
+        f"<b>Commission</b><span style='opacity:.85;{name_gives}' title='{escaped(state.project.name)}'>"
+        f"{escaped(state.project.name)}</span>"
+        f"<span style='opacity:.55;flex-shrink:9999;min-width:{least};{cut}' title='{stands}'>"
         f"{stands}</span></div>"
     )
 
