@@ -20,12 +20,13 @@ from commission.localization.consider import BLOCKS, Considering
 from commission.localization.consider_columns import take_out
 from commission.localization.estimate import Status
 from commission.localization.filter_kinds import EKF, innovation_by
+from commission.localization.joint import CAREFUL, EXCLUSIVE, MOST_JOINTLY, decide_together
 from commission.localization.kalman import squared_distance
 from commission.localization.observation import ObservationModel, expect_at
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.reflector_index import Cells, cell_range
 from commission.localization.search import Viewpoint, radius2_by, reach_of, viewpoint
-from commission.site.parameters import AssociationParameters
+from commission.site.parameters import ASSOCIATION_METHODS, AssociationParameters
 
 INLIER = int(Status.INLIER)
 OUTLIER_ASSOCIATION = int(Status.OUTLIER_ASSOCIATION)
@@ -42,11 +43,18 @@ class Gate(NamedTuple):
     """Largest squared Mahalanobis distance of an inlier."""
     kind: int = EKF
     """Of the filter, whose innovations are judged: see `filter_kinds`."""
+    method: int = EXCLUSIVE
+    """How detections that have to do with each other are decided on: see `methods`."""
+    joint: tuple[float, ...] = MOST_JOINTLY * (math.inf,)
+    """Largest joint squared Mahalanobis distance of one detection, of two, and so on."""
 
 
 def gate_of(parameters: AssociationParameters, kind: int = EKF) -> Gate:
     """Return the gate for two degrees of freedom, range and bearing, of the innovations of a kind of filter."""
-    return Gate(bool(parameters.enabled), chi_square_gate(parameters.gate_probability, 2), kind)
+    probability = parameters.gate_probability
+    joint = tuple(chi_square_gate(probability, 2 * (count + 1)) for count in range(MOST_JOINTLY))
+    method = ASSOCIATION_METHODS.index(parameters.method)
+    return Gate(bool(parameters.enabled), chi_square_gate(probability, 2), kind, method, joint)
 
 
 @compiled_inline
@@ -265,7 +273,8 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
 
     A reflector is one cluster in a scan. Where two inliers claim the same one, the paper uses both; here the nearer
     one in the Mahalanobis sense stays and the other becomes an outlier of the association filter, because one of them
-    is a false reflector beside the true one. With the filter disabled both stay, as in the paper.
+    is a false reflector beside the true one. With the filter disabled both stay, as in the paper. Other methods:
+    `decide_together`.
     """
     view = viewpoint(belief, facing, model)
     reach = reach_of(view, cells.largest_variance, given)
@@ -298,9 +307,33 @@ def associate(  # noqa: PLR0917 - outputs are written into the arrays of the who
         if best == NOBODY or (gate.enabled and not best_d2 <= gate.d2):
             status[i] = OUTLIER_ASSOCIATION
             continue
-        if not gate.enabled:
+        if not gate.enabled or gate.method != EXCLUSIVE:
             continue
         for other in range(first, i):
             if status[other] == INLIER and entries[other] == best:
                 status[i if d2[other] <= best_d2 else other] = OUTLIER_ASSOCIATION
                 break
+    if gate.enabled and gate.method >= CAREFUL:
+        decide_together(
+            gate.method,
+            gate.kind,
+            gate.joint,
+            belief,
+            facing,
+            view,
+            reach,
+            first,
+            last,
+            detections,
+            aims,
+            model,
+            cells,
+            places,
+            cell_offsets,
+            cross,
+            given,
+            work,
+            status,
+            entries,
+            d2,
+        )

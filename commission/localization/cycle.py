@@ -20,6 +20,7 @@ from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering,
 from commission.localization.consider_columns import begin, busy_chunks, put_back, put_block, take_along
 from commission.localization.contour import ACCEPTED, REJECTED, ROWS, USE, ContourModel, ContourScan, observe_contours
 from commission.localization.filter_kinds import INVARIANT, correct_by
+from commission.localization.joint import NEAREST
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import Motion, NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
@@ -359,7 +360,7 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
     detections : (n, 2) measured range [m] and bearing [rad], scanner frame.
     aims : see `prepare`.
     observation : mounting and noise of the scanner.
-    gate : of the association filter, which says of what kind the filter is; with it no two detections are of one
+    gate : of the association filter, which says of what kind the filter is, and whether two detections may be of one
         reflector.
     places : the map, see `ReflectorIndex`.
     cross : covariance of the pose with the constants, written in place; None: none is considered.
@@ -389,7 +390,8 @@ def corrected(  # noqa: PLR0917 - the scan's detections and the map, array by ar
         if status[i] != INLIER:
             continue
         entry, distance = entries[i], detections[i, 0] - observation.range_bias
-        earlier = i if gate.enabled else _earlier(i, first, status, entries)
+        alone = gate.enabled and gate.method != NEAREST
+        earlier = i if alone else _earlier(i, first, status, entries)
         if earlier == i:
             at = width
             take_along(work, at, cross, entry)

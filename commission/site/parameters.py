@@ -32,6 +32,9 @@ from commission.site.quantity import (
 FILTER_KINDS = ("ekf", "ukf", "ckf", "invariant")
 """Kinds of filter: extended (the paper's), unscented, cubature, right-invariant extended Kalman filter."""
 
+ASSOCIATION_METHODS = ("exclusive", "nearest", "careful", "joint")
+"""Ways to decide which reflector a detection belongs to; `nearest` is the paper's."""
+
 _SCALE = Bounds.between(-0.5, 0.5)
 """Wheels that are off by more are other wheels."""
 
@@ -222,6 +225,9 @@ class AssociationParameters:
         ),
     ] = 0.95
     """Probability that a true detection falls inside the validation gate, P_G."""
+    method: Annotated[str, Choice("Associated by", ASSOCIATION_METHODS)] = "exclusive"
+    """How: `nearest` lets several detections be of one reflector (the paper), `exclusive` keeps the nearest of them,
+    `careful` leaves out all that contradict each other, `joint` takes the most that fit together (JCBB)."""
 
     def __post_init__(self) -> None:
         check_fields(self, "association.")

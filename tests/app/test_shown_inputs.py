@@ -55,6 +55,7 @@ BEARING_OF_SCANNER = "Bearing 1σ"
 PARAMETERS = {
     "association.enabled": ("Association filter", None),
     "association.gate_probability": ("Gate [%]", 100.0),
+    "association.method": ("Associated by", None),
     "detector.enabled": ("Detector filter", None),
     "detector.intensity_threshold": ("Intensity from", 1.0),
     "detector.far_threshold": ("Intensity, far [%]", 100.0),
