@@ -8,6 +8,7 @@ Twelve reflectors of a hall of 20 by 20 m; 20 % of them have something that shin
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,6 +46,7 @@ class Rates:
     """Detections of reflectors that are not accepted as such."""
 
 
+@functools.cache
 def drive(seed: int) -> tuple[LocalizerSetup, RecordLog, Belief, np.ndarray]:
     """A circle; the reflector of each detection, or -1."""
     rng = np.random.default_rng(seed)

@@ -11,6 +11,7 @@ import math
 import sys
 import time
 import warnings
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,7 +23,8 @@ from commission.localization.observation import jacobians, range_bearing
 from commission.localization.odometry import odometry_noise
 from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
-from commission.site.parameters import Parameters
+from commission.site.fields import with_field
+from commission.site.parameters import ASSOCIATION_METHODS, FILTER_KINDS, Parameters
 from commission.site.record_log import RecordLog
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
@@ -153,6 +155,23 @@ def main(cycles: int = CYCLES) -> None:
             f"{100 * inliers:.1f} % inliers, means {1000 * gap:.2f} mm apart"
         )
     print(f"2000 reflectors against 20: {times[2000] / times[20]:.2f} times")
+    compare_kinds(cycles // 10)
+
+
+def compare_kinds(cycles: int) -> None:
+    """Print how long each kind of filter and each way to associate takes, against what is usual, in turns."""
+    usual = hall(200)
+    log, initial = drive(usual, cycles)
+    others = {f"filter.kind={kind}": with_field(usual.parameters, "filter.kind", kind) for kind in FILTER_KINDS}
+    for method in ASSOCIATION_METHODS:
+        others[f"association.method={method}"] = with_field(usual.parameters, "association.method", method)
+    times = {name: math.inf for name in others}
+    for _ in range(3):
+        for name, parameters in others.items():
+            times[name] = min(times[name], project_seconds(log, replace(usual, parameters=parameters), initial)[0])
+    first = next(iter(times.values()))
+    for name, seconds in times.items():
+        print(f"{name}: {seconds / cycles * 1e6:6.3f} us/cycle, {seconds / first:.2f} times ekf")
 
 
 if __name__ == "__main__":
