@@ -2,8 +2,8 @@
 
 Twelve reflectors of a hall of 20 by 20 m; 20 % of them have something that shines as they do 0.08 to 0.4 m beside them,
 30 % of all detections are clutter anywhere, and ranges are 20 mm too long, which the filter knows up to its sigma of
-20 mm. The gate is 99.9 %: a gate of 95 % rejects one true detection in 20 by itself. With `--acceptance` 20 drives of
-1,000 scans each.
+20 mm. The gate is 97 %: with the bias as its sigma says, 2 % of true detections are outside. With
+`--acceptance` 20 drives of 1,000 scans each.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from tests.conftest import Seeds
 
 DRIVES, FEW_DRIVES, SCANS = 20, 2, 1000
 REFLECTORS, BIAS, REACH, SEEN = 12, 0.02, 15.0, 0.85
-PERIOD_NS = 40_000_000
+PERIOD_NS, GATE = 40_000_000, 0.97
 GOOD = OdometryParameters(forward_per_sqrt_m=0.01, lateral_per_sqrt_m=0.003, heading_per_sqrt_m=0.006)
 
 pytestmark = pytest.mark.slow
@@ -95,7 +95,7 @@ def rates(method: str, drives: range) -> Rates:
     wrong_cycles = wrong = accepted_in_all = rejected = true = 0
     for seed in drives:
         setup, log, initial, names = drive(seed)
-        association = AssociationParameters(method=method, gate_probability=0.999)
+        association = AssociationParameters(method=method, gate_probability=GATE)
         own = LocalizerSetup(
             reflectors=setup.reflectors,
             scanners=setup.scanners,
@@ -120,11 +120,13 @@ def table(seeds: Seeds) -> dict[str, Rates]:
 
 
 def test_no_wrong_pair_is_accepted_in_99_of_100_cycles_and_few_true_ones_are_rejected(table: dict[str, Rates]) -> None:
-    for method in ("exclusive", "joint"):
+    for method in ("exclusive", "careful", "joint"):
         assert table[method].wrong_cycles < 0.01
         assert table[method].rejected < 0.05
-    assert table["careful"].wrong_cycles <= min(each.wrong_cycles for each in table.values())
-    assert table["nearest"].wrong_cycles >= table["exclusive"].wrong_cycles
+
+
+def test_two_detections_of_one_reflector_are_what_goes_wrong_most(table: dict[str, Rates]) -> None:
+    assert table["nearest"].wrong_cycles > 2.0 * table["exclusive"].wrong_cycles
 
 
 def print_table(drives: int = DRIVES) -> None:
