@@ -243,3 +243,14 @@ def test_a_damaged_map_is_read_or_refused_in_words(
         read_smap(path)
     except CommissionError as error:
         assert "expected" in str(error)
+
+
+def test_headings_in_degrees_are_taken_for_degrees_and_told(tmp_path: Path) -> None:
+    content = plant()
+    content["advancedPointList"] = [
+        {"className": "ActionPoint", "instanceName": f"AP{number}", "pos": {"x": 1.0, "y": 2.0}, "dir": heading}
+        for number, heading in enumerate((90.0, -45.0))
+    ]
+    found = read(tmp_path, content)
+    assert [each.heading for each in found.stations] == pytest.approx([math.pi / 2, -math.pi / 4])
+    assert "dir reaches 90, beyond a turn in radians: all are taken for degrees" in "\n".join(found.warnings)

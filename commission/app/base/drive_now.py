@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from commission.localization.setup import LocalizerSetup
+from commission.localization.run_columns import RunColumns
 from commission.studies.run import RunInput
 
 
@@ -16,5 +16,5 @@ class DriveNow:
     """Its records, its start, and what they were localized with."""
     stamp_ns: int
     """The cursor, by the clock of the records [ns]."""
-    setup: LocalizerSetup
-    """What the scan at the cursor was localized with."""
+    columns: RunColumns
+    """What the localizer made of it."""

@@ -65,6 +65,7 @@ PROBLEMS = Tab(Side.RIGHT_BELOW, "Problems", 30)
 ASSOCIATION = Tab(Side.RIGHT_BELOW, "Association", 40)
 TIME = Tab(Side.BOTTOM, "Time", 10)
 ROUTE = Tab(Side.BOTTOM, "Route", 20)
+SENSOR = Tab(Side.BOTTOM, "Sensor", 30)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

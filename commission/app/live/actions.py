@@ -67,3 +67,11 @@ class ClocksFound(Action):
 @dataclass(frozen=True, slots=True)
 class UseClocks(Action):
     """Set the clocks to what motion says, where it says it: one undo step."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetThreshold(Action):
+    """Choose the intensity from which a beam counts as reflective."""
+
+    value: object
+    """The intensity [sensor's unit]."""

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from commission.app.base.feature import RUN, Docked, Feature
-from commission.app.live import clock_reducer, reducer
+from commission.app.base.feature import RUN, SENSOR, Docked, Feature
+from commission.app.live import clock_reducer, reducer, sensor_reducer
 from commission.app.live.clock_panel import ClockPanel
 from commission.app.live.clock_service import ClockService
 from commission.app.live.live_panel import LivePanel
+from commission.app.live.sensor_panel import SensorPanel
 from commission.app.live.service import LiveService
 
 FEATURE = Feature(
     name="live",
-    reducers=(reducer, clock_reducer),
+    reducers=(reducer, clock_reducer, sensor_reducer),
     services=(LiveService, ClockService),
     panels=(
         Docked(
             make=lambda at: LivePanel(at.gui, at.post, at.state), tab=RUN, rank=3, folder="Live vehicle", is_open=True
         ),
         Docked(make=lambda at: ClockPanel(at.gui, at.post, at.state), tab=RUN, rank=4),
+        Docked(make=lambda at: SensorPanel(at.gui, at.post), tab=SENSOR, own=True),
     ),
 )
 """A vehicle that drives now."""

@@ -375,6 +375,6 @@ class RunService(Service):
             return ()
         result, here = view.result, slice(view.lived)
         lived = LivedPath(result.columns.means[here], result.two_sigma[here], result.position_two_sigma[here])
-        drive = DriveNow(result.inputs, result.inputs.log.first_ns + round(view.time * 1e9), view.segment.setup)
+        drive = DriveNow(result.inputs, result.inputs.log.first_ns + round(view.time * 1e9), result.columns)
         found = (each for each in (self._instruments.found, self._variants.compared_over(result)) if each is not None)
         return view, Followed((float(view.pose[0]), float(view.pose[1]))), lived, drive, *found

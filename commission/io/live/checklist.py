@@ -31,6 +31,8 @@ def checklist(address: SourceAddress, status: SourceStatus, own: tuple[str, ...]
     """
     if status.state in (SourceState.RECEIVING, SourceState.STOPPED):
         return ()
+    if status.state is SourceState.FAILED:
+        return (status.trouble, "disconnect and connect again; the log says where it was")
     is_datagram = address.kind.transport == "udp"
     if not is_datagram:
         return _of_device(address, status)

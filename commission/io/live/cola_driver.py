@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from commission.io.live.driver import ScannerDriver
 from commission.io.protocols.assembly import ColaAssembly
 from commission.io.protocols.cola_encoder import frame_binary, frame_text
-from commission.io.protocols.message import LiveMessage
 
 ASK = frame_binary(b"sEN LMDscandata \x01"), frame_text(b"sEN LMDscandata 1")
 """The subscription in CoLa B and in CoLa A: a device understands the one that it is set to."""
@@ -21,22 +18,17 @@ class ColaDriver(ScannerDriver):
     assembly = ColaAssembly
     _asked = 0
     _asked_ns: int | None = None
-    _is_heard = False
 
     def greeting(self) -> bytes:
         """Ask for scans in CoLa B."""
         return ASK[0]
 
-    def take(self, data: bytes, arrived_ns: int) -> Iterator[LiveMessage]:
-        """Deliver the scans that a piece completes; raises DecodeError."""
-        self._is_heard = True
-        yield from super().take(data, arrived_ns)
-
     def reply(self, now_ns: int) -> bytes:
         """Ask in the other dialect while nothing has been answered."""
         if self._asked_ns is None:
             self._asked_ns = now_ns
-        if self._is_heard or now_ns - self._asked_ns < ASK_AGAIN_NS:
+        # Only an answer counts: noise, or the refusal of the other dialect, is none.
+        if self._assembly.answers or now_ns - self._asked_ns < ASK_AGAIN_NS:
             return b""
         self._asked, self._asked_ns = 1 - self._asked, now_ns
         return ASK[self._asked]

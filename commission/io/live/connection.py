@@ -5,6 +5,7 @@ Sockets are bound to the address that was asked for and no other; what is kept i
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections import Counter, OrderedDict
 from collections.abc import Callable
@@ -116,6 +117,15 @@ class Connection:
         return self._tally.status(self._clock.now_ns(), self._told)
 
     def _run(self, deliver: Callable[[Arrival], bool], opened: Opened | None) -> None:
+        """Receive until it is stopped; where a fault of this program ends that, the source has failed and says so."""
+        try:
+            self._receive(deliver, opened)
+        finally:
+            if not self._stopped.is_set():
+                self._tally.trouble = f"receiving ended by a fault of this program: {sys.exception()!r}"
+                self._tally.state = SourceState.FAILED
+
+    def _receive(self, deliver: Callable[[Arrival], bool], opened: Opened | None) -> None:
         """Receive until it is stopped; connect again when the connection ends."""
         tries = 0
         while not self._stopped.is_set():

@@ -53,6 +53,14 @@ class BaseDriver:
         self.scanner = scanner
         self.told: Counter[str] = Counter()
 
+    def restrict(self, *, scans_only: bool) -> None:
+        """Be the source of one named scanner; what says so itself anyway has nothing to do.
+
+        Parameters
+        ----------
+        scans_only : whether odometry comes from another source of the same server, and would come twice.
+        """
+
     def greeting(self) -> bytes:
         """Return nothing."""
         return b""

@@ -125,13 +125,14 @@ def device_of(address: SourceAddress, scanners: tuple[str, ...]) -> Any:
     return getattr(importlib.import_module(f"commission.io.live.{module}"), name)(address, scanners)
 
 
-def driver_of(address: SourceAddress, scanners: tuple[str, ...]) -> Callable[[], Driver]:
+def driver_of(address: SourceAddress, scanners: tuple[str, ...], *, scans_only: bool = False) -> Callable[[], Driver]:
     """Return what makes a driver of a source, anew for each conversation.
 
     Parameters
     ----------
     address : which one.
     scanners : names of the vehicle's scanners.
+    scans_only : whether odometry comes from another source of the same server.
 
     Raises
     ------
@@ -144,4 +145,11 @@ def driver_of(address: SourceAddress, scanners: tuple[str, ...]) -> Callable[[],
     index = 0 if address.scanner is None else scanners.index(address.scanner)
     module = importlib.import_module(f"commission.io.live.{address.kind.module}")
     driver: Any = getattr(module, address.kind.driver)
-    return lambda: driver(scanners, index)
+
+    def make() -> Driver:
+        made = driver(scanners, index)
+        if address.scanner is not None:
+            made.restrict(scans_only=scans_only)
+        return made
+
+    return make

@@ -9,7 +9,7 @@ from commission.io.protocols.message import LiveMessage
 from commission.io.protocols.rosbridge import decode_publication, decode_record, subscription
 from commission.io.recordings.recorder import scanner_topics
 
-ODOMETRY, REFERENCE = "/odom", "/reference"
+SCAN, ODOMETRY, REFERENCE = "/scan", "/odom", "/reference"
 ASK_AGAIN_NS = 2_000_000_000
 """Time without a message after which topics are subscribed to again: they may be there only now [ns]."""
 
@@ -20,23 +20,30 @@ class RosbridgeDriver(BaseDriver):
     Parameters
     ----------
     scanners : names of the vehicle's scanners.
-    scanner : not read: the topics say which scanner a scan is of.
+    scanner : which of them this source is, once `restrict` says that it is one; else the topics say it.
     """
 
     def __init__(self, scanners: tuple[str, ...], scanner: int) -> None:
         super().__init__(scanners, scanner)
         self._scans = {topic: index for index, topic in enumerate(scanner_topics(scanners))}
+        self._others = REFERENCE, ODOMETRY
         self._stamps: dict[str, int | None] = {}
         self._heard_ns: int | None = None
 
+    def restrict(self, *, scans_only: bool) -> None:
+        """Take the scans of one scanner alone: of its own topic, or of /scan where the server has no other."""
+        self._scans = {topic: index for topic, index in self._scans.items() if index == self.scanner}
+        self._scans[SCAN] = self.scanner
+        self._others = () if scans_only else self._others
+
     def greeting(self) -> bytes:
         """Subscribe; one request in each line."""
-        return "\n".join(map(subscription, (REFERENCE, ODOMETRY, *self._scans))).encode()
+        return "\n".join(map(subscription, (*self._others, *self._scans))).encode()
 
     def take(self, data: bytes, arrived_ns: int) -> Iterator[LiveMessage]:
         """Deliver the record of a publication; raises DecodeError."""
         found = decode_publication(data)
-        if found is None or found[0] not in (*self._scans, ODOMETRY, REFERENCE):
+        if found is None or found[0] not in (*self._scans, *self._others):
             return
         self._heard_ns = arrived_ns
         message = decode_record(*found, self._scans)

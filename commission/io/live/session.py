@@ -17,7 +17,9 @@ QUEUE_LIMIT = 4_096
 """Records that wait to be taken; of more, the newest are dropped and counted."""
 
 
-def connection_of(address: SourceAddress, scanners: tuple[str, ...], clock: HostClock) -> Connection:
+def connection_of(
+    address: SourceAddress, scanners: tuple[str, ...], clock: HostClock, *, scans_only: bool = False
+) -> Connection:
     """Return the connection of a source, not started.
 
     Parameters
@@ -25,13 +27,14 @@ def connection_of(address: SourceAddress, scanners: tuple[str, ...], clock: Host
     address : which one, and where.
     scanners : names of the vehicle's scanners.
     clock : the host's.
+    scans_only : whether odometry comes from another source of the same server.
 
     Raises
     ------
     UsageError
         the vehicle has no such scanner.
     """
-    return Connection(address, driver_of(address, scanners), link_of(address), clock)
+    return Connection(address, driver_of(address, scanners, scans_only=scans_only), link_of(address), clock)
 
 
 def link_of(address: SourceAddress) -> Link:
@@ -77,7 +80,16 @@ class Session:
         patience_ns : how long a record waits for one with an earlier stamp [ns].
         """
         clock = HostClock()
-        return Session([connection_of(address, scanners, clock) for address in addresses], patience_ns, clock)
+        servers = [(address.name, address.host, address.port) for address in addresses]
+        # Two scanners of one server: the first source brings its odometry.
+        return Session(
+            [
+                connection_of(address, scanners, clock, scans_only=servers.index(server) < number)
+                for number, (address, server) in enumerate(zip(addresses, servers, strict=True))
+            ],
+            patience_ns,
+            clock,
+        )
 
     def start(self) -> None:
         """Start all sources; where one cannot be, none is, and its SourceError passes through."""

@@ -20,6 +20,8 @@ Timed = tuple[int | None, int, Callable[[int, int], Scan | None]]
 SEGMENT_LIMIT = 64
 """Segments of a turn; a multiScan sends 12."""
 NAV_ANSWER = b"sAN mNPOSGetData "
+COLA_ANSWERS = b"sSN ", b"sEA ", b"sRA ", b"sAN "
+"""Begins of telegrams that a device sends when it understands; sFA is its refusal."""
 
 
 class Assembly:
@@ -28,6 +30,8 @@ class Assembly:
     def __init__(self, name: str, told: Counter[str]) -> None:
         self.name = name
         self.told = told
+        self.answers = 0
+        """Telegrams of a device that understands what it is asked, whether or not they hold a scan."""
 
     def take(self, data: bytes, arrived_ns: int) -> Iterator[Timed]:
         """Deliver what a payload completes; what cannot be decoded is counted."""
@@ -49,6 +53,7 @@ class ColaAssembly(Assembly):
     def found(self, data: bytes, arrived_ns: int) -> Iterator[Timed]:
         """Deliver what a payload completes; raises DecodeError."""
         frames, self.rest = cola.split_frames(self.rest + data)
+        self.answers += sum(frame.startswith(COLA_ANSWERS) for frame in frames)
         for frame in frames:
             if cola.is_scan(frame):
                 telegram = cola.decode_lmd(frame)

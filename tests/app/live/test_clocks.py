@@ -16,7 +16,7 @@ from commission.app.live.state import ClockState
 from commission.app.run.actions import Play, VirtualDrive
 from commission.errors import UsageError
 from commission.studies.clock import ClockOffset, ClockVerdict
-from commission.studies.run import RunInput
+from commission.studies.run import RunInput, judged_run
 from commission.studies.start import Start, StartOrigin
 from tests.app.asking import after
 from tests.app.sites import room
@@ -55,7 +55,7 @@ def test_the_panel_says_what_a_clock_comes_to_at_the_speed_of_now() -> None:
     log = drive(20.0)
     inputs = RunInput.of(project, log, Start(start(), StartOrigin.GIVEN))
     state = page(project).with_part(ClockState((offset(),)))
-    html = clocks_html(view_of(state, DriveNow(inputs, 7 * SECOND, inputs.segments[0].setup)))
+    html = clocks_html(view_of(state, DriveNow(inputs, 7 * SECOND, judged_run(inputs).columns)))
     # By hand it goes at 0.1889 rad/s times 5.493 m = 1.037 m/s then: 10.4 mm in ten milliseconds, 20.7 in twenty.
     assert "+10.0 ms allowed for: 10.4 mm at 1.04 m/s now" in html
     assert "By motion: +30.0 ± 0.9 ms (1σ), found; not allowed for: +20.0 ms: 20.7 mm at 1.04 m/s now" in html
