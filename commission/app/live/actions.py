@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from commission.app.base.actions import Action
+from commission.app.base.drive_now import DriveNow
 from commission.studies.clock import ClockOffset
 from commission.studies.run import RunInput
 
@@ -31,6 +32,16 @@ class Record(Action):
 
     path: Path | None = None
     """A file that does not exist, ends in .mcap; none: one in the project's folder, called by the time of day."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RecordDrive(Action):
+    """Write the drive that is on the page, with what the localizer makes of it."""
+
+    drive: DriveNow
+    """The drive."""
+    path: Path | None = None
+    """As in `Record`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from commission.app.base.drive_now import DriveNow
 from commission.app.base.effects import Effect
 from commission.studies.run import RunInput
 
@@ -43,3 +44,13 @@ class StudyClocks(Effect):
 
     drive: RunInput
     """What has been driven."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class WriteDrive(Effect):
+    """Write a drive in the background."""
+
+    drive: DriveNow
+    """The drive."""
+    path: Path | None
+    """The file; none: one in the project's folder."""

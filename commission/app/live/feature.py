@@ -6,6 +6,7 @@ from commission.app.base.feature import RUN, SENSOR, Docked, Feature
 from commission.app.live import clock_reducer, reducer, sensor_reducer
 from commission.app.live.clock_panel import ClockPanel
 from commission.app.live.clock_service import ClockService
+from commission.app.live.drive_writer import DriveWriter
 from commission.app.live.live_panel import LivePanel
 from commission.app.live.sensor_panel import SensorPanel
 from commission.app.live.service import LiveService
@@ -13,7 +14,7 @@ from commission.app.live.service import LiveService
 FEATURE = Feature(
     name="live",
     reducers=(reducer, clock_reducer, sensor_reducer),
-    services=(LiveService, ClockService),
+    services=(LiveService, ClockService, DriveWriter),
     panels=(
         Docked(
             make=lambda at: LivePanel(at.gui, at.post, at.state), tab=RUN, rank=3, folder="Live vehicle", is_open=True

@@ -8,12 +8,13 @@ from viser import GuiApi
 
 from commission.app.base import theme
 from commission.app.base.actions import Action
+from commission.app.base.drive_now import DriveNow
 from commission.app.base.inputs import show, write_html
 from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.reach import typed_path
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.live.actions import Connect, Disconnect, Record, StopRecording
+from commission.app.live.actions import Connect, Disconnect, Record, RecordDrive, StopRecording
 from commission.app.live.state import LiveState
 from commission.app.live.view import LiveView, SourceView
 from commission.io.live.registry import KINDS
@@ -60,13 +61,23 @@ class LivePanel(BasePanel):
             "Record", color="red", hint="Scans, odometry, estimate, detections and mode from now on.", visible=False
         )
         self._record.on_click(posting(post, lambda _event: self._recorded()))
+        self._whole = gui.add_button(
+            "Record this drive",
+            color="gray",
+            hint="The drive on the page from end to end: scans, odometry, estimate, detections and mode.",
+            visible=False,
+        )
+        self._whole.on_click(posting(post, lambda _event: self._recorded()))
+        self._drive: DriveNow | None = None
+        self._connected = False
         self._stop = gui.add_button("Stop recording", color="gray", hint="Close the file.", visible=False)
         self._stop.on_click(posting(post, lambda _event: StopRecording()))
         self._recording = gui.add_html("", visible=False)
 
     def _recorded(self) -> Action:
         """Return what is asked for by the button."""
-        return Record(typed_path(self._path.value) if self._path.value.strip() else None)
+        path = typed_path(self._path.value) if self._path.value.strip() else None
+        return Record(path) if self._connected or self._drive is None else RecordDrive(self._drive, path)
 
     def _asked(self) -> Action:
         """Return what the fields ask for; raises ValueError where the pose is none."""
@@ -82,7 +93,9 @@ class LivePanel(BasePanel):
         shown = view.part(LiveView)
         recording = None if shown is None else shown.recording
         records = connected and recording is not None and not recording.is_over
-        show(self._path, visible=connected and not records)
+        self._connected, self._drive = connected, view.part(DriveNow)
+        show(self._whole, visible=not connected and self._drive is not None)
+        show(self._path, visible=not records and (connected or self._drive is not None))
         show(self._record, visible=connected and not records)
         show(self._stop, visible=records)
         write_html(self._recording, "" if recording is None else recording_html(recording))

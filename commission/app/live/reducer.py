@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from pathlib import Path
 
 from commission.app.base.actions import Sender
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState
-from commission.app.live.actions import Connect, Disconnect, Record, StopRecording
-from commission.app.live.effects import CloseRecording, CloseSources, OpenRecording, OpenSources
+from commission.app.live.actions import Connect, Disconnect, Record, RecordDrive, StopRecording
+from commission.app.live.effects import CloseRecording, CloseSources, OpenRecording, OpenSources, WriteDrive
 from commission.app.live.state import LiveState
 from commission.errors import UsageError
 from commission.io.live.registry import SourceAddress
@@ -43,9 +44,21 @@ def record(action: Record, state: AppState, _sender: Sender) -> Outcome:
     """Record from now on."""
     if not state.part(LiveState).connected:
         raise UsageError("nothing is connected to; expected a connection whose records can be recorded")
-    if action.path is None and state.folder is None:
-        raise UsageError("the project is in no folder; expected the path of a new file that ends in .mcap")
+    _check_place(action.path, state)
     return Outcome(state, (OpenRecording(action.path),))
+
+
+@reduce.register
+def record_drive(action: RecordDrive, state: AppState, _sender: Sender) -> Outcome:
+    """Write the drive on the page."""
+    _check_place(action.path, state)
+    return Outcome(state, (WriteDrive(action.drive, action.path),))
+
+
+def _check_place(path: Path | None, state: AppState) -> None:
+    """Refuse a recording that has no place."""
+    if path is None and state.folder is None:
+        raise UsageError("the project is in no folder; expected the path of a new file that ends in .mcap")
 
 
 @reduce.register

@@ -152,16 +152,17 @@ class SessionRecorder:
             self._trouble = self._trouble or str(error)
 
 
-def new_recording(folder: Path, stamp: str) -> Path:
+def new_recording(folder: Path, stamp: str, what: str = "live") -> Path:
     """Return the path of a recording that is not there yet.
 
     Parameters
     ----------
     folder : where recordings are.
     stamp : what it is called by: when it begins.
+    what : with what its name begins.
     """
-    path, number = folder / f"live-{stamp}{MCAP}", 1
+    path, number = folder / f"{what}-{stamp}{MCAP}", 1
     while path.exists():
         number += 1
-        path = folder / f"live-{stamp}-{number}{MCAP}"
+        path = folder / f"{what}-{stamp}-{number}{MCAP}"
     return path
