@@ -45,7 +45,7 @@ class SensorInput(StudyInput):
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Cluster:
+class SeenCluster:
     """What the localizer took for one body in this scan."""
 
     range: float
@@ -78,7 +78,7 @@ class SensorView:
     """(B,) intensity from which each beam counts as reflective [sensor's unit]."""
     reflective: BoolArray
     """(B,) whether each does."""
-    clusters: tuple[Cluster, ...]
+    clusters: tuple[SeenCluster, ...]
     """In the order of their bearings; empty where the scan is no cycle of the run."""
     expected: tuple[tuple[str, float, float], ...]
     """Reflectors that the scanner faces: id, range [m] and bearing [rad] from the belief before the scan."""
@@ -134,14 +134,14 @@ def _cycle_of(inputs: SensorInput, stamp_ns: int) -> int:
     return int(first + found[0]) if len(found) else -1
 
 
-def _clusters(inputs: SensorInput, scan: Scan, cycle: int) -> tuple[Cluster, ...]:
+def _clusters(inputs: SensorInput, scan: Scan, cycle: int) -> tuple[SeenCluster, ...]:
     """Return what the localizer made of the scan."""
     columns, setup = inputs.columns, inputs.setup
     used = columns.segment(cycle).setup
     rows = slice(int(columns.offsets[cycle]), int(columns.offsets[cycle + 1]))
     ids = [reflector.id for reflector in used.reflectors.reflectors]
     model, step = setup.detectors[inputs.scanner], scan.angle_increment
-    found: list[Cluster] = []
+    found: list[SeenCluster] = []
     for (distance, bearing), beams, status, reflector in zip(
         columns.detected.range_bearing[rows].tolist(),
         columns.detected.beams[rows].tolist(),
@@ -151,7 +151,7 @@ def _clusters(inputs: SensorInput, scan: Scan, cycle: int) -> tuple[Cluster, ...
     ):
         kinds = [passing_widths(distance, step, kind, model) for kind in range(len(model.radii))]
         found.append(
-            Cluster(
+            SeenCluster(
                 range=distance,
                 bearing=bearing,
                 beams=beams,

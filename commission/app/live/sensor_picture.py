@@ -13,8 +13,8 @@ from commission.app.base import theme
 from commission.app.base.panel import escaped
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Status
-from commission.site.quantity import DEGREES
-from commission.studies.sensor_view import Cluster, SensorView
+from commission.site.quantity import DEGREES, PERCENT
+from commission.studies.sensor_view import SeenCluster, SensorView
 
 SIDE = 1000.0
 """Side of the pictures before they are stretched."""
@@ -90,7 +90,7 @@ def intensity_picture(view: SensorView, threshold: float, inbox: str) -> str:
     grid = "".join(
         f"<path class='c-s-grid' d='M{SIDE * (at - low) / (high - low):.1f} 0V{SIDE:g}'/>" for at in steps(low, high)
     )
-    line = 100.0 * (1.0 - float(height(np.array(threshold), top)))
+    line = PERCENT.of(1.0 - float(height(np.array(threshold), top)))
     handle = (
         f"<i class='c-s-line' style='--c-at:{line:.3f}%' title='Drag: intensity from which a beam is reflective'>"
         f"<b>{threshold:.4g}</b></i>"
@@ -98,7 +98,7 @@ def intensity_picture(view: SensorView, threshold: float, inbox: str) -> str:
         else ""
     )
     words = "".join(
-        f"<span class='c-s-x' style='left:{100.0 * (at - low) / (high - low):.2f}%'>{at:g}°</span>"
+        f"<span class='c-s-x' style='left:{PERCENT.of((at - low) / (high - low)):.2f}%'>{at:g}°</span>"
         for at in steps(low, high)
     )
     return (
@@ -124,7 +124,7 @@ def _scale(top: float) -> str:
     """The numbers at the upper edge, at half and at a quarter of the height."""
     shares = (1.0, 0.5, 0.25)
     return "".join(
-        f"<span class='c-s-y' style='top:{100.0 * (1.0 - share):g}%'>{top * share * share:.3g}</span>"
+        f"<span class='c-s-y' style='top:{PERCENT.of(1.0 - share):g}%'>{top * share * share:.3g}</span>"
         for share in shares
     )
 
@@ -160,7 +160,7 @@ def _dots(x: FloatArray, y: FloatArray) -> str:
     return "".join(f"M{at:.1f} {to:.0f}h0" for at, to in zip(x.tolist(), y.tolist(), strict=True))
 
 
-def _mark(view: SensorView, each: Cluster, low: float, high: float, top: float) -> str:
+def _mark(view: SensorView, each: SeenCluster, low: float, high: float, top: float) -> str:
     """A dot over the strongest beam of a cluster, in the color of what became of it."""
     peak = 1.0 if view.scan.intensities is None else each.peak
     if math.isnan(peak):
@@ -173,7 +173,7 @@ def _mark(view: SensorView, each: Cluster, low: float, high: float, top: float) 
     )
 
 
-def told(each: Cluster) -> str:
+def told(each: SeenCluster) -> str:
     """Return a cluster in words."""
     window = "" if each.window is None else f" ({each.window[0]} to {each.window[1]} pass)"
     who = f", {each.reflector}" if each.reflector else ""
@@ -186,7 +186,7 @@ def _names(view: SensorView, low: float, high: float) -> str:
     """Reflectors of the map at the bearings where they should be."""
     written: dict[str, float] = {}
     for name, _, bearing in sorted(view.expected, key=lambda each: each[1]):
-        at = 100.0 * (float(DEGREES.of(bearing)) - low) / (high - low)
+        at = PERCENT.of((float(DEGREES.of(bearing)) - low) / (high - low))
         # Of reflectors in one direction the nearest has its name.
         if 0.0 <= at <= 100.0 and all(abs(at - other) > NAME_PERCENT for other in written.values()):
             written[name] = at
