@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from commission.app.base.logs import SHOW_TRACEBACK, one_line_each
+from commission.cli.align import Align
 from commission.cli.ambiguity import Ambiguity
 from commission.cli.calibrate import Calibrate
 from commission.cli.clock import Clock
@@ -59,6 +60,7 @@ COMMANDS: dict[str, type[Command]] = {
     "vision": Vision,
     "triangulate": Triangulate,
     "convert": Convert,
+    "align": Align,
     "version": Version,
 }
 

@@ -86,8 +86,16 @@ class SetAligned(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class SetSurveyed(Action):
+    """Align by a table of points in the plant, named as reflectors and stations are, in place of two clicked ones."""
+
+    table: str
+    """Pasted rows of name, x, y; empty: by the clicked ones again."""
+
+
+@dataclass(frozen=True, slots=True)
 class AlignMap(Action):
-    """Move and turn the floor map by the two points."""
+    """Move and turn the floor map by the points."""
 
 
 @dataclass(frozen=True, slots=True)

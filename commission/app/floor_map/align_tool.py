@@ -17,7 +17,8 @@ from commission.app.editing.gestures import marked_place
 from commission.app.editing.tool import Label, Tool
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
-from commission.site.editing.alignment import DOUBTFUL, Alignment, KnownPoint, align, aligned
+from commission.site.editing.alignment import DOUBTFUL, Alignment, KnownPoint, align, aligned, moved_onto
+from commission.site.editing.plant_fit import PlantPair, fit_points
 from commission.site.quantity import COORDINATE, MILLIMETRES, PERCENT, Quantity, Words
 
 LETTERS = "AB"
@@ -43,6 +44,9 @@ class AlignTool(Tool):
     """At most two: A and B."""
     everything: bool = False
     """Whether reflectors, routes and stations go with the map."""
+
+    surveyed: tuple[PlantPair, ...] = ()
+    """Reflectors and stations that were surveyed in the plant; where there are any, they count and A and B do not."""
 
     name = "Align"
 
@@ -88,6 +92,18 @@ class AlignTool(Tool):
         return tuple((letter, point.at) for letter, point in zip(LETTERS, self.known, strict=False))
 
 
+def _by_surveyed(state: AppState, sender: Sender, pairs: tuple[PlantPair, ...]) -> Outcome:
+    """Return what follows from moving everything by surveyed points, which go along with the map."""
+    found = fit_points(pairs)
+    project = moved_onto(state.project, found.T_plant_map, everything=True)
+    after = edited(with_tool(state, sender, None), project, Edit(f"align to {len(pairs)} points", sender))
+    text = (
+        f"aligned to {len(pairs)} points: RMS {MILLIMETRES.text(found.rms, '.1f')}, at most "
+        f"{MILLIMETRES.text(float(found.offs.max()), '.1f')}; a drive that was loaded before is in the old coordinates"
+    )
+    return Outcome(after, (Tell(text, failed=False), PlaceCamera(Camera.FIT, everywhere=True)))
+
+
 def align_tool_of(state: AppState, sender: Sender) -> AlignTool:
     """Return the tool that a browser aligns by; raises UsageError when it uses another one."""
     tool = editor_of(state, sender.browser).tool
@@ -99,6 +115,8 @@ def align_tool_of(state: AppState, sender: Sender) -> AlignTool:
 def align_map(state: AppState, sender: Sender) -> Outcome:
     """Return what follows from moving and turning the map: one undo step, and everybody sees it whole."""
     tool = align_tool_of(state, sender)
+    if tool.surveyed:
+        return _by_surveyed(state, sender, tool.surveyed)
     if len(tool.known) < 2:
         raise UsageError(f"{len(tool.known)} points were clicked; expected A and B")
     a, b = (KnownPoint(point.at, point.plant) for point in tool.known)

@@ -30,6 +30,8 @@ from commission.app.floor_map.tools import CalibrateTool
 from commission.errors import UsageError
 from commission.io.image_map import Picture
 from commission.io.mesh import Model
+from commission.io.plant_points import surveyed_points
+from commission.site.editing.plant_fit import PlantPair, fit_points, pairs_of
 from commission.site.fields import with_field
 from commission.site.project import Project
 from commission.site.quantity import MILLIMETRES
@@ -161,6 +163,21 @@ def set_aligned(action: actions.SetAligned, state: AppState, sender: Sender) -> 
     if not isinstance(tool, AlignTool):
         return Outcome(state)
     return Outcome(with_tool(state, sender, replace(tool, everything=action.everything)))
+
+
+@reduce.register
+def set_surveyed(action: actions.SetSurveyed, state: AppState, sender: Sender) -> Outcome:
+    tool = editor_of(state, sender.browser).tool
+    if not isinstance(tool, AlignTool):
+        return Outcome(state)
+    pairs: tuple[PlantPair, ...] = ()
+    told: tuple[Tell, ...] = ()
+    if action.table.strip():
+        pairs, unknown = pairs_of(state.project, surveyed_points(action.table))
+        fit_points(pairs)
+        if unknown:
+            told = (Tell(f"no reflector or station is called {', '.join(unknown[:5])}; left out", failed=False),)
+    return Outcome(with_tool(state, sender, replace(tool, surveyed=pairs)), told)
 
 
 @reduce.register

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
+import numpy as np
 from viser import GuiApi, GuiEvent
 
 from commission.app.base import actions as page_actions
 from commission.app.base import theme
 from commission.app.base.field_widget import add_widget, held, labelled, meant
 from commission.app.base.inputs import Inputs, enable, show
-from commission.app.base.panel import BasePanel, Post, posting, table, write
+from commission.app.base.panel import BasePanel, Post, escaped, posting, table, write
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing.actions import ChooseTool
@@ -21,6 +22,7 @@ from commission.app.floor_map.align_tool import LETTERS, AlignTool, NamedPoint
 from commission.app.floor_map.pen import MapPen
 from commission.app.floor_map.tools import EraseTool, ObstacleTool, WallTool
 from commission.site.editing.alignment import DOUBTFUL, WRONG
+from commission.site.editing.plant_fit import PlantFit, fit_points
 from commission.site.fields import field_info, get_field
 from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
 
@@ -36,6 +38,8 @@ KEYS: tuple[tuple[str, Literal["X", "L", "O"], Tool], ...] = (
 """What a key does."""
 NOWHERE = NamedPoint((0.0, 0.0), (0.0, 0.0))
 PLANT, NAME = field_info(NOWHERE, "plant"), field_info(NOWHERE, "name")
+MOST_POINTS = 12
+"""Surveyed points whose residuals are listed, the worst first."""
 LONGEST_NAME = 40
 """Letters of a point's name that are kept."""
 
@@ -79,6 +83,14 @@ class MapToolFields(BasePanel):
             self._moves.on_update(
                 posting(self._post, lambda event: actions.SetAligned(event.target.value == EVERYTHING))
             )
+            self._surveyed = gui.add_text(
+                "Surveyed points",
+                "",
+                multiline=True,
+                hint="Rows of name, x, y in the plant from a table: names are those of reflectors and stations. "
+                "Where there are any, everything is moved by them, and A and B do not count.",
+            )
+            self._surveyed.on_update(posting(self._post, lambda event: actions.SetSurveyed(event.target.value)))
             self._said = gui.add_html("")
             self._align = gui.add_button("Move and turn", hint="The map keeps its scale; can be undone.")
             self._align.on_click(posting(self._post, lambda _event: actions.AlignMap()))
@@ -118,6 +130,9 @@ class MapToolFields(BasePanel):
                 enable(widget, "" if known else f"click point {LETTERS[index]} on the floor first")
         write(self._moves, EVERYTHING if tool.everything else MAP_ONLY)
         self._said.content = f"<div style='padding:2px 6px'>{alignment_text(tool)}</div>"
+        if tool.surveyed:
+            enable(self._align, "")
+            return
         found = tool.alignment()
         why_not = "two points and their places in the plant are needed" if found is None else ""
         if found is not None and found.share > WRONG:
@@ -127,6 +142,8 @@ class MapToolFields(BasePanel):
 
 def alignment_text(tool: AlignTool) -> str:
     """Return what the points say, as html."""
+    if tool.surveyed:
+        return surveyed_text(fit_points(tool.surveyed))
     clicked = [
         (f"{letter} on the map", f"{point.at[0]:.3f}, {point.at[1]:.3f} m")
         for letter, point in zip(LETTERS, tool.known, strict=False)
@@ -156,4 +173,26 @@ def alignment_text(tool: AlignTool) -> str:
         note = f"More than {PERCENT.text(WRONG, 'g')}: a wrong point, number or scale."
     elif found.share > DOUBTFUL:
         note = f"More than {PERCENT.text(DOUBTFUL, 'g')}: look at the points and their numbers."
+    return f"{table(rows)}<div class='c-note'>{note}</div>"
+
+
+def surveyed_text(found: PlantFit) -> str:
+    """Return by how much each surveyed point is missed, the worst first, as html."""
+    order = np.argsort(-found.offs, kind="stable")[:MOST_POINTS]
+    rows = [
+        ("Points", str(len(found.pairs))),
+        ("RMS", MILLIMETRES.text(found.rms, ".1f")),
+        ("Turns by", DEGREES.text(float(found.T_plant_map[2]), ".3f")),
+        ("Distances, plant / map", f"{found.scale:.5f}"),
+        *(
+            (
+                f"{escaped(found.pairs[index].name)} off by",
+                f"{MILLIMETRES.number(found.residuals[index, 0], '+.1f')}, "
+                f"{MILLIMETRES.text(found.residuals[index, 1], '+.1f')}",
+            )
+            for index in order.tolist()
+        ),
+    ]
+    striking = found.striking
+    note = f"Stands out: {', '.join(map(escaped, striking))}. Look at it, or leave it out." if striking else ""
     return f"{table(rows)}<div class='c-note'>{note}</div>"

@@ -115,8 +115,20 @@ def aligned(project: Project, alignment: Alignment, *, everything: bool) -> Proj
         )
     if project.floor_map is None:
         raise UsageError("the project has no floor map to move; expected one")
-    T = alignment.T_plant_map
-    moved = replace(project, floor_map=with_moved_map(project.floor_map, T))
+    return moved_onto(project, alignment.T_plant_map, everything=everything)
+
+
+def moved_onto(project: Project, T: FloatArray, *, everything: bool) -> Project:
+    """Move and turn the floor map, where there is one, and what is on it.
+
+    Parameters
+    ----------
+    project : the site.
+    T : (3,) `T_plant_map`: pose of the map's frame in the plant's [m, m, rad].
+    everything : as in `aligned`.
+    """
+    floor_map = project.floor_map
+    moved = replace(project, floor_map=None if floor_map is None else with_moved_map(floor_map, T))
     if not everything:
         return moved
     return replace(
