@@ -27,6 +27,8 @@ SURE = 0.001
 """1-sigma up to which an offset is found: it is then right to twice of it [s]."""
 VAGUE = 0.01
 """1-sigma from which on a drive says nothing of a clock that is of use [s]."""
+AGREES = 2.0
+"""1-sigmas up to which an offset agrees with what is allowed for."""
 MOST_TIMES = 20
 """Drives longer by more than this factor are not advised."""
 
@@ -55,6 +57,10 @@ class ClockOffset:
     """What that is good for."""
     reason: str
     """Why, and what would show it better."""
+
+    def differs_from(self, allowed: float) -> bool:
+        """Whether the drive says of a clock [s] that it is another one: by more than 2-sigma, and shown at all."""
+        return self.verdict is not ClockVerdict.NOT_SHOWN and abs(self.offset - allowed) > AGREES * self.sigma
 
 
 def clock_offsets(inputs: CalibrationInput, progress: Progress = silent) -> tuple[ClockOffset, ...]:

@@ -88,8 +88,9 @@ class ClockPanel(BasePanel):
             self._build(view.state)
         self._inputs.follow(view.state)
         found = view.state.part(ClockState).found
-        usable = [each for each in found if each.verdict is not ClockVerdict.NOT_SHOWN]
-        show(self._use, visible=any(clock_of(view.state, each.scanner) != each.offset for each in usable))
+        clocks = {scanner.name: scanner.clock_offset for scanner in view.state.project.scanners}
+        usable = (each.differs_from(clocks[each.scanner]) for each in found if each.scanner in clocks)
+        show(self._use, visible=any(usable))
         write_html(self._html, clocks_html(view))
 
 
@@ -131,7 +132,8 @@ def _motion(each: ClockOffset, allowed: float, speed: float, usual: float) -> st
     if each.verdict is ClockVerdict.NOT_SHOWN:
         return f"<div>By motion: {each.verdict}<div class='c-note'>{escaped(each.reason)}</div></div>"
     left = each.offset - allowed
-    more = f"; not allowed for: {MILLISECONDS.text(left, '+.1f')}{_effect(left, speed, usual)}" if left else ""
+    agrees = "" if each.differs_from(allowed) else ", agrees with what is allowed for"
+    more = agrees or f"; not allowed for: {MILLISECONDS.text(left, '+.1f')}{_effect(left, speed, usual)}"
     note = f"<div class='c-note'>{escaped(each.reason)}</div>" if each.reason else ""
     value = f"{MILLISECONDS.number(each.offset, '+.1f')} ± {MILLISECONDS.text(each.sigma, '.1f')}"
     return f"<div>By motion: {value} (1σ), {each.verdict}{more}{note}</div>"

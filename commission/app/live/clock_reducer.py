@@ -14,7 +14,6 @@ from commission.app.live.state import ClockState
 from commission.errors import UsageError
 from commission.site.fields import with_field
 from commission.site.project import Project
-from commission.studies.clock import ClockVerdict
 
 
 @reduce.register
@@ -40,12 +39,15 @@ def clocks_found(action: ClocksFound, state: AppState, _sender: Sender) -> Outco
 
 @reduce.register
 def use_clocks(_action: UseClocks, state: AppState, sender: Sender) -> Outcome:
-    """Set all clocks that the drive shows."""
+    """Set all clocks of which the drive says that they are others."""
+    clocks = {scanner.name: scanner.clock_offset for scanner in state.project.scanners}
     shown = {
-        each.scanner: each.offset for each in state.part(ClockState).found if each.verdict is not ClockVerdict.NOT_SHOWN
+        each.scanner: each.offset
+        for each in state.part(ClockState).found
+        if each.scanner in clocks and each.differs_from(clocks[each.scanner])
     }
     if not shown:
-        raise UsageError("no clock was shown by the drive; expected one that was found by motion")
+        raise UsageError("the drive shows no clock that is another one; expected one that differs by more than 2-sigma")
     project = _with_clocks(state.project, shown)
     return Outcome(state if project is state.project else edited(state, project, Edit("set clocks by motion", sender)))
 

@@ -46,8 +46,13 @@ def test_what_motion_says_is_used_where_it_says_anything() -> None:
     found = after(page(), ClocksFound((offset(),))).state
     assert after(found, UseClocks()).state.project.scanners[0].clock_offset == 0.03
     hidden = after(page(), ClocksFound((offset(ClockVerdict.NOT_SHOWN),))).state
-    with pytest.raises(UsageError, match="no clock was shown"):
+    with pytest.raises(UsageError, match="no clock that is another one"):
         after(hidden, UseClocks())
+    # 1.7 ms to 0.9 ms are no other clock than 0.
+    near = after(page(), ClocksFound((offset(value=0.0017),))).state
+    with pytest.raises(UsageError, match="no clock that is another one"):
+        after(near, UseClocks())
+    assert "agrees with what is allowed for" in clocks_html(view_of(near))
 
 
 def test_the_panel_says_what_a_clock_comes_to_at_the_speed_of_now() -> None:
