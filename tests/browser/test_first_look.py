@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from playwright.sync_api import Browser
 
+from commission.app.base.theme import LEFT_PX, RIGHT_PX
 from commission.app.run.actions import Play, VirtualDrive
 from tests.app.sites import room
 from tests.browser.page import OpenPage
@@ -175,3 +176,22 @@ def test_a_digit_that_a_field_has_no_room_for_is_refused_and_nothing_is_rounded(
     page.page.keyboard.type("99.9")
     page.page.keyboard.press("Enter")
     served.until(lambda: abs(served.state.project.parameters.association.gate_probability - 0.999) < 1e-9)
+
+
+def test_a_hint_stands_beside_the_panel_and_covers_none_of_its_fields(
+    served: Served, window: Callable[..., OpenPage]
+) -> None:
+    page = window(served.server, (1280, 720))
+    page.open()
+    page.open_tab("Run")
+    page.row("Seed").locator("input").hover()
+    hint = page.page.get_by_role("tooltip")
+    hint.wait_for()
+    page.page.wait_for_timeout(300)
+    box = hint.bounding_box()
+    assert box is not None
+    assert box["x"] >= LEFT_PX
+    assert box["x"] + box["width"] <= 1280 - RIGHT_PX
+    field = page.row("Seed").bounding_box()
+    assert field is not None
+    assert abs(box["y"] + 0.5 * box["height"] - field["y"]) < 80, "at the height of what it explains"

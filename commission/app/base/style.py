@@ -89,5 +89,8 @@ div:has(>div>.c-bottom):has(.c-no-run)>:nth-child(4){{grid-column:1/span 24!impo
  max-width:min(520px,100vw - 32px);padding:8px 14px;border-radius:4px;font-size:13px;pointer-events:none;
  background:{css(Surface.CARD.dark)};border:1px solid {css(Worded.LACKING.dark)}}}
 .c-drop[hidden]{{display:none}}
+:root[data-hints=left] .mantine-Tooltip-tooltip{{left:{LEFT_PX + 8}px!important;right:auto!important}}
+:root[data-hints=right] .mantine-Tooltip-tooltip{{left:auto!important;right:{RIGHT_PX + 8}px!important}}
+:root:is([data-hints=left],[data-hints=right]) .mantine-Tooltip-arrow{{display:none}}
 @media print{{.c-daylight{{display:none}}}}
 </style>"""
