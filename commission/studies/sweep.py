@@ -1,15 +1,13 @@
 """One or two parameters over ranges: a figure of the whole drive for each value, all from one set of detections.
 
-Runs are independent, and their kernels hold no lock, so that threads use all cores. Nothing is drawn or written here.
+Runs are independent: this machine's cores do them, or a cluster. Nothing is drawn or written here.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,8 +18,9 @@ from commission.progress import Progress, silent
 from commission.site.fields import FieldInfo, field_info, get_field, with_field
 from commission.site.parameters import Parameters
 from commission.studies.inputs import StudyInput
-from commission.studies.run import RunInput, judged_run
+from commission.studies.run import RunInput, RunResult, judged_run
 from commission.studies.variant_figures import BY_KEY, VariantFigure
+from commission.studies.workers import Threads, Workers
 
 MOST_AXES = 2
 MOST_VALUES = 1000
@@ -120,16 +119,27 @@ class SweepResult:
         return BY_KEY[self.inputs.figure]
 
 
-def sweep(inputs: SweepInput, progress: Progress = silent, *, workers: int | None = None) -> SweepResult:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Given:
+    """What all runs read."""
+
+    inputs: SweepInput
+    """What is swept."""
+    first: RunResult | None
+    """The run as in the project, whose detections serve the others; none where memory is not shared."""
+
+
+def sweep(inputs: SweepInput, progress: Progress = silent, *, workers: Workers | None = None) -> SweepResult:
     """Localize a drive with each value.
 
     Parameters
     ----------
     inputs : drive, axes and figure.
     progress : told how far it is; may raise to cancel: runs that have not begun never do.
-    workers : threads; as many as cores when None.
+    workers : who does it; this machine's cores when None. Figures but cycle times are the same to the last bit.
     """
     figure, parameters = BY_KEY[inputs.figure], inputs.run.segments[0].setup.parameters
+    workers = workers or Threads()
     progress(0.0, "as in the project")
     first = judged_run(inputs.run)
     if figure.of_errors and first.statistics is None:
@@ -138,13 +148,9 @@ def sweep(inputs: SweepInput, progress: Progress = silent, *, workers: int | Non
         )
     shape = tuple(len(axis.values) for axis in inputs.axes)
     values = np.full(shape, math.nan)
-    places = iter(itertools.product(*map(range, shape)))
-
-    def value_at(place: tuple[int, ...]) -> float:
-        run = judged_run(_at(inputs, parameters, place), earlier=first)
-        return figure.value(run)
-
-    for done, (place, value) in enumerate(_in_parallel(value_at, places, workers or os.cpu_count() or 1), 1):
+    given = _Given(inputs, first if workers.shares_memory else None)
+    places = itertools.product(*map(range, shape))
+    for done, (place, value) in enumerate(workers.each(_value_at, given, places), 1):
         values[place] = value
         progress(FIRST_SHARE + (1.0 - FIRST_SHARE) * done / values.size, f"{done} of {values.size} runs")
     return SweepResult(
@@ -153,6 +159,14 @@ def sweep(inputs: SweepInput, progress: Progress = silent, *, workers: int | Non
         operating=tuple(float(get_field(parameters, axis.key)) for axis in inputs.axes),
         at_operating=figure.value(first),
     )
+
+
+def _value_at(given: _Given, place: tuple[int, ...], progress: Progress) -> float:
+    """The figure at one place."""
+    inputs = given.inputs
+    parameters = inputs.run.segments[0].setup.parameters
+    run = judged_run(_at(inputs, parameters, place), progress, earlier=given.first)
+    return BY_KEY[inputs.figure].value(run)
 
 
 def set_number(parameters: Parameters, key: str, value: float) -> Parameters:
@@ -178,25 +192,6 @@ def _at(inputs: SweepInput, parameters: Parameters, place: Sequence[int]) -> Run
         parameters = set_number(parameters, axis.key, float(axis.values[index]))
     setup = inputs.run.segments[0].setup
     return inputs.run.with_setup(replace(setup, parameters=parameters))
-
-
-def _in_parallel(
-    work: Callable[[tuple[int, ...]], float], places: Iterator[tuple[int, ...]], workers: int
-) -> Iterator[tuple[tuple[int, ...], float]]:
-    """Give each place and its value as soon as it is known; no more runs wait than there are threads.
-
-    A thread holds a whole run: what waits would hold memory for nothing, and could not be stopped.
-    """
-    with ThreadPoolExecutor(workers) as pool:
-        under_way: dict[Future[float], tuple[int, ...]] = {
-            pool.submit(work, place): place for place in itertools.islice(places, workers)
-        }
-        while under_way:
-            for future in wait(under_way, return_when=FIRST_COMPLETED).done:
-                place = under_way.pop(future)
-                yield place, future.result()
-                if (following := next(places, None)) is not None:
-                    under_way[pool.submit(work, following)] = following
 
 
 def told(result: SweepResult) -> list[str]:

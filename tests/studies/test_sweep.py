@@ -12,6 +12,7 @@ from commission.localization.setup import LocalizerSetup
 from commission.studies.run import RunInput, judged_run, summary
 from commission.studies.start import Start, StartOrigin
 from commission.studies.sweep import SweepAxis, SweepInput, sweep, told
+from commission.studies.workers import Threads
 from tests.studies.recorded import PROJECT, drive, start
 
 PARAMETERS = PROJECT.parameters
@@ -46,7 +47,7 @@ def test_each_value_is_the_figure_of_a_run_with_it(run: RunInput) -> None:
 
 def test_threads_change_nothing(run: RunInput) -> None:
     inputs = SweepInput(run=run, axes=(axis("association.gate_probability=0.99..0.5:7"),), figure="rejected_fraction")
-    one, four = (sweep(inputs, workers=count).values for count in (1, 4))
+    one, four = (sweep(inputs, workers=Threads(count)).values for count in (1, 4))
     assert np.array_equal(one, four)
     assert (np.diff(one) > 0.0).all()
 
@@ -61,7 +62,7 @@ def test_a_sweep_that_is_cancelled_begins_no_further_run(run: RunInput) -> None:
 
     inputs = SweepInput(run=run, axes=(axis("association.gate_probability=0.5..0.9:200"),), figure="rejected_fraction")
     with pytest.raises(JobCancelled):
-        sweep(inputs, progress, workers=2)
+        sweep(inputs, progress, workers=Threads(2))
     assert len(calls) == 4
     assert calls == sorted(calls)
 
