@@ -27,7 +27,7 @@ class Tune:
     """Recording: a CSV folder, a ROS bag or a capture, as in `localize`."""
     out: Annotated[Path, arg(metavar="DIR")]
     """Folder for parameters.yaml, ros_parameters.yaml, parameters.csv (for a controller), comparison.csv,
-    reflectors.csv and summary.json; made when it does not exist."""
+    reflectors.csv, residuals.html (plots) and summary.json; made when it does not exist."""
     initial_pose: Annotated[str | None, arg(metavar="X,Y,THETA[,SX,SY,STHETA]")] = None
     """Pose of base at the first record and its 1-sigma, map frame [m, m, rad]. None: as in `localize`."""
     set: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="GROUP.KEY=VALUE")] = ()
@@ -52,6 +52,7 @@ class Tune:
         from commission.progress import part
         from commission.studies.calibration import CalibrationInput, accepted, calibrate
         from commission.studies.diagnosis import diagnosis, diagnosis_input
+        from commission.studies.residual_study import ResidualInput, residual_study
         from commission.studies.run import RunInput, judged_run
         from commission.studies.start import start_of
         from commission.studies.variants import VariantsInput, variants
@@ -76,6 +77,7 @@ class Tune:
             variant="calibrated",
             calibration=found,
             diagnosis=diagnosis(diagnosis_input(project, found, project.floor_map, part(shown_progress, 0.9, 1.0))),
+            residuals=residual_study(ResidualInput(run=runs[0], floor_map=project.floor_map)),
             compared=variants(VariantsInput(names=("project", "calibrated"), runs=runs)),
         )
         with out.writing() as folder:
@@ -85,7 +87,10 @@ class Tune:
 
 def _told(result: TuneResult) -> list[str]:
     """What is wrong, what is proposed, and how the figures differ, a line each."""
+    from commission.studies.residual_words import residual_lines
+
     lines = [f"Found        {line}" for line in result.diagnosis.lines] or ["Found        nothing that is wrong"]
+    lines += [f"Residuals    {line}" for line in residual_lines(result.residuals)]
     for value in result.calibration.proposed:
         before, after, sigma = (value.shown.text(each, ".4g") for each in (value.before, value.proposed, value.sigma))
         lines.append(f"Proposed     {value.key}: {before} -> {after} ± {sigma}")

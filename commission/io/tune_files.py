@@ -14,16 +14,19 @@ from pathlib import Path
 from typing import Any
 
 from commission.io.atomic import write_text
+from commission.io.residual_charts import page_of
 from commission.site.fields import field_info, get_field, walk_fields
 from commission.site.parameters import Parameters
 from commission.site.project import Project
 from commission.studies.calibration import Calibration
 from commission.studies.diagnosis import Diagnosis
+from commission.studies.residual_study import ResidualStudy
+from commission.studies.residual_words import residual_lines
 from commission.studies.variants import VariantsResult
 
-PARAMETERS, ROS, TABLE, COMPARISON, REFLECTORS, SUMMARY = (
+PARAMETERS, ROS, TABLE, COMPARISON, REFLECTORS, RESIDUALS, SUMMARY = (
     *("parameters.yaml", "ros_parameters.yaml", "parameters.csv"),
-    *("comparison.csv", "reflectors.csv", "summary.json"),
+    *("comparison.csv", "reflectors.csv", "residuals.html", "summary.json"),
 )
 """Names of the files."""
 FITTED = (
@@ -31,7 +34,7 @@ FITTED = (
     "localize PROJECT OTHER, with and without them"
 )
 """What is said beside the figures of both."""
-FILES = (PARAMETERS, ROS, TABLE, COMPARISON, REFLECTORS, SUMMARY)
+FILES = (PARAMETERS, ROS, TABLE, COMPARISON, REFLECTORS, RESIDUALS, SUMMARY)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -52,6 +55,8 @@ class TuneResult:
     """What is wrong with the site."""
     compared: VariantsResult
     """The project as it is against the variant."""
+    residuals: ResidualStudy
+    """Residuals of the drive with the project as it is."""
 
     @property
     def origin(self) -> dict[str, str]:
@@ -73,6 +78,9 @@ def write_tuned(folder: Path, result: TuneResult) -> None:
         TABLE: _table(result),
         COMPARISON: _comparison(result.compared),
         REFLECTORS: _reflectors(result.diagnosis),
+        RESIDUALS: page_of(
+            result.residuals, residual_lines(result.residuals), [*map(": ".join, result.origin.items())]
+        ),
         SUMMARY: json.dumps(_summary(result), indent=2) + "\n",
     }
     for name, text in texts.items():
@@ -204,6 +212,7 @@ def _summary(result: TuneResult) -> dict[str, Any]:
             for each in result.calibration.proposed
         },
         "not_shown": {each.key: each.reason for each in result.calibration.values if each.verdict.name == "NOT_SHOWN"},
+        "residuals": list(residual_lines(result.residuals)),
         "things": [{"x": each.x, "y": each.y, "count": each.count, "near": each.near} for each in clusters],
         "notes": list(result.calibration.notes),
     }

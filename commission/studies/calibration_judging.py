@@ -12,19 +12,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commission.geometry import se2
 from commission.geometry.angles import wrap
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.localization import whole_run
 from commission.localization.detection_log import DetectionLog
 from commission.localization.detector import INLIER
 from commission.localization.estimate import Belief
-from commission.localization.observation import residuals
 from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
 from commission.site.parameters import AssociationParameters, FilterParameters
 from commission.site.record_log import RecordLog
 from commission.site.reflectors import ReflectorMap
+from commission.studies.innovations import innovations
 
 FARTHEST_D2 = 25.0
 """A detection counts no more than this: false ones weigh the same under every value."""
@@ -101,35 +100,10 @@ def score(log: RecordLog, setup: LocalizerSetup, start: Belief, detected: Detect
 
 def _innovations(run: RunColumns, setup: LocalizerSetup) -> tuple[FloatArray, FloatArray]:
     """(n,) squared Mahalanobis distance and log det S of each detection; NaN where it has no reflector."""
-    priors = run.priors.rows()
-    counts = np.diff(run.offsets)
-    of = np.repeat(run.detected.scanners, counts)
-    mountings = np.array([each.mounting for each in setup.scanners])
-    T = np.repeat(priors.means, counts, axis=0)
-    sensors = se2.compose(T, mountings[of])
-    nobody = run.reflector < 0
-    if not len(setup.reflectors) or not len(of):
-        return np.full(len(of), math.nan), np.full(len(of), math.nan)
-    centers = setup.reflectors.centers[np.where(nobody, 0, run.reflector)]
-    bias = setup.parameters.observation.range_bias
-    nu, distance = residuals(sensors, centers, run.range_bearing - (bias, 0.0))
-    distance = np.maximum(distance, 1e-3)
-    u = (centers - sensors[:, :2]) / distance[:, np.newaxis]
-    arm = sensors[:, :2] - T[:, :2]
-    H = np.zeros((len(of), 2, 3))
-    H[:, 0, :2] = -u
-    H[:, 1, 0], H[:, 1, 1] = u[:, 1] / distance, -u[:, 0] / distance
-    H[:, 0, 2] = u[:, 0] * arm[:, 1] - u[:, 1] * arm[:, 0]
-    H[:, 1, 2] = -(u[:, 0] * arm[:, 0] + u[:, 1] * arm[:, 1]) / distance - 1.0
-    S = H @ np.repeat(priors.covariances, counts, axis=0) @ np.swapaxes(H, 1, 2)
-    noise = setup.observation_rows[of, 3:5]
-    known = setup.uncertainty
-    place = known.survey**2 + known.mounting_position**2 if setup.parameters.filter.consider else 0.0
-    S[:, 0, 0] += noise[:, 0] + place + (known.range_bias**2 if place else 0.0)
-    S[:, 1, 1] += noise[:, 1] + place / distance**2 + (known.mounting_heading**2 if place else 0.0)
+    found = innovations(run, setup)
+    nu, S, nobody = found.residuals, found.covariances, np.isnan(found.residuals[:, 0])
     det = S[:, 0, 0] * S[:, 1, 1] - S[:, 0, 1] ** 2
     d2 = (S[:, 1, 1] * nu[:, 0] ** 2 - 2.0 * S[:, 0, 1] * nu[:, 0] * nu[:, 1] + S[:, 0, 0] * nu[:, 1] ** 2) / det
-    d2[nobody] = math.nan
     return d2, np.where(nobody, math.nan, np.log(det))
 
 

@@ -85,3 +85,15 @@ def test_files_of_others_stay_unless_it_is_asked_for(
     said = refused("tune", project, recording, "--out", tmp_path / "out")
     assert "holds parameters.yaml, which tune did not write" in said
     assert (tmp_path / "out" / "parameters.yaml").read_text() == "mine"
+
+
+def test_residuals_are_said_and_drawn(tuned: tuple[Path, str]) -> None:
+    folder, told = tuned
+    lines = json.loads((folder / "summary.json").read_text())["residuals"]
+    assert any(line.startswith("your range sigma") for line in lines)
+    page = (folder / "residuals.html").read_text()
+    for line in lines:
+        assert f"Residuals    {line}" in told
+        assert line in page
+    assert "chi-square" in page
+    assert page.count("<svg") > 4
