@@ -37,6 +37,12 @@ OPTIONS = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--host", "127.0.0
 """Of each worker."""
 INPUTS = MonteCarloInput(project=hall(), routes=("Out and back",), runs=10, seed=3, rates=FaultRates())
 
+SWEPT = SweepInput(
+    run=RunInput.of(PROJECT, drive(10.0), Start(start(), StartOrigin.GIVEN)),
+    axes=(SweepAxis.parse("association.gate_probability=0.5..0.99:5", PROJECT.parameters),),
+    figure="rejected_fraction",
+)
+
 
 def started(*words: str) -> subprocess.Popen[str]:
     environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
@@ -97,6 +103,7 @@ def test_a_cluster_gives_the_same_result_also_when_a_worker_is_killed(
     with cluster(address) as found:
         assert found.count == 2
         assert same(monte_carlo(INPUTS, workers=found), local)
+        assert np.array_equal(sweep(SWEPT, workers=found).values, sweep(SWEPT).values)
 
         def kill_one(_fraction: float, message: str, /) -> None:
             if message.startswith("2 of"):
@@ -105,26 +112,6 @@ def test_a_cluster_gives_the_same_result_also_when_a_worker_is_killed(
         assert same(monte_carlo(INPUTS, kill_one, workers=found), local)
     assert workers[0].wait(10.0) == -signal.SIGKILL
     assert workers[1].poll() is None
-
-
-def test_a_sweep_on_the_cluster_is_that_of_threads_also_when_the_other_worker_is_killed(
-    scheduler: tuple[str, list[subprocess.Popen[str]]],
-) -> None:
-    address, workers = scheduler
-    run = RunInput.of(PROJECT, drive(10.0), Start(start(), StartOrigin.GIVEN))
-    axis = SweepAxis.parse("association.gate_probability=0.5..0.99:8", PROJECT.parameters)
-    inputs = SweepInput(run=run, axes=(axis,), figure="rejected_fraction")
-    local = sweep(inputs)
-    # In place of the one that was killed before; the other one goes in the middle of the sweep.
-    workers.append(started("dask_worker", address, *OPTIONS))
-    with cluster(address) as found:
-
-        def kill_one(_fraction: float, message: str, /) -> None:
-            if message.startswith("2 of"):
-                workers[1].send_signal(signal.SIGKILL)
-
-        assert np.array_equal(sweep(inputs, kill_one, workers=found).values, local.values)
-    assert workers[1].wait(10.0) == -signal.SIGKILL
 
 
 def test_another_version_on_a_worker_is_refused(
