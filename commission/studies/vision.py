@@ -21,6 +21,7 @@ from commission.localization.contour_bundle import Bundle
 from commission.localization.egomotion import why_degenerate
 from commission.localization.estimate import Mode
 from commission.localization.run_columns import RunColumns
+from commission.progress import Progress, silent
 from commission.site.contour_track import ContourTrack
 from commission.site.quantity import MILLIMETRES, PLAIN_DEGREES
 from commission.studies.inputs import StudyInput
@@ -136,8 +137,13 @@ def summary(result: VisionResult) -> dict[str, float | int | list[str] | None]:
     return {**finite, "findings": list(result.findings)}
 
 
-def vision(inputs: VisionInput) -> VisionResult:
+def vision(inputs: VisionInput, progress: Progress = silent) -> VisionResult:
     """Estimate the camera's constants and its motion, and compare it with the laser's.
+
+    Parameters
+    ----------
+    inputs : control points, and the poses of the run.
+    progress : told which fit is under way; may raise to cancel.
 
     Raises
     ------
@@ -147,6 +153,7 @@ def vision(inputs: VisionInput) -> VisionResult:
     known: BoolArray = np.all(np.isfinite(inputs.poses), axis=1)
     seen, poses, covariances = inputs.track.points[known], inputs.poses[known], inputs.covariances[known]
     _refuse(inputs.track, seen, poses)
+    progress(0.0, "tying the contour to the laser")
     first = closed_forms(seen, poses)
     tied = fit_tied(seen, poses, covariances, first)
     way = float(np.hypot(*(tied.laser[:, :2] - tied.laser[0, :2]).T).max())
@@ -156,6 +163,7 @@ def vision(inputs: VisionInput) -> VisionResult:
             f"the drive tells no depth of the contour ({depth:.2f} ± {tied.sigmas[3]:.2f} m); "
             "expected motion towards or along it"
         )
+    progress(0.7, "moving by the contour alone")
     alone = fit_alone(seen, first, tied.bundle)
     camera, spread = planar_motion(alone, depth)
     places = se2.compose(poses[0], tied.bundle.further[:3])

@@ -61,6 +61,8 @@ class Run:
     FAR_FIELD = Paint("reach of the scan", (78, 84, 64), (186, 192, 172))
     TRAIL = Paint("trail of the estimate", (64, 200, 150), (0, 134, 94))
     REFERENCE = Paint("reference, and the error to it", (196, 140, 255), (134, 76, 190))
+    CAMERA_BY_LASER = Paint("camera by the laser", (122, 168, 250), (26, 92, 196))
+    CAMERA_BY_CONTOUR = Paint("camera by its contour", (255, 182, 96), (184, 98, 0))
     CLOUD = Paint("earlier innovations", (128, 150, 176), (104, 126, 154))
     SPREAD = Paint("mean and spread of innovations", (195, 204, 216), (78, 88, 102))
     AFTER = Paint("after the correction", (232, 234, 238), (36, 40, 46))

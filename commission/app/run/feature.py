@@ -7,6 +7,8 @@ from commission.app.run import reducer, variant_reducer
 from commission.app.run.accumulated_layer import AccumulatedLayer
 from commission.app.run.association_panel import AssociationPanel
 from commission.app.run.badge import Badge
+from commission.app.run.camera_layer import CameraLayer
+from commission.app.run.camera_panel import CameraPanel
 from commission.app.run.detection_layer import DetectionLayer
 from commission.app.run.edits_panel import EditsPanel
 from commission.app.run.figure_layer import FigureLayer
@@ -40,6 +42,7 @@ FEATURE = Feature(
         TrailLayer,
         VariantLayer,
         ConsistencyLayer,
+        CameraLayer,
         ReferenceLayer,
         FigureLayer,
     ),
@@ -49,6 +52,7 @@ FEATURE = Feature(
         Docked(make=lambda at: AssociationPanel(at.gui, at.post, at.browser), tab=ASSOCIATION, own=True),
         Docked(make=lambda at: RunPanel(at.gui, at.post, at.state), tab=RUN),
         Docked(make=lambda at: SummaryPanel(at.gui), tab=RUN, rank=5),
+        Docked(make=lambda at: CameraPanel(at.gui), tab=RUN, rank=7),
         Docked(make=lambda at: EditsPanel(at.gui, at.post, at.state), tab=RUN, rank=10),
         Docked(make=lambda at: WorldPanel(at.gui, at.post, at.state), tab=RUN, rank=20, folder="Virtual world"),
         Docked(make=lambda at: EditsPanel(at.gui, at.post, at.state), tab=TUNE, rank=-10),

@@ -20,6 +20,7 @@ from commission.app.base.state import AppState
 from commission.app.base.view import Followed, LivedPath
 from commission.app.run import drives
 from commission.app.run.actions import ChooseSource, Play, RecordedDrive, ShowLive, Source, SourceLoaded
+from commission.app.run.camera_tracks import CameraTracks
 from commission.app.run.drives import Drive
 from commission.app.run.effects import (
     CoverFromHere,
@@ -110,6 +111,7 @@ class RunService(Service):
         self._prepare, self._compile = prepare, compile_all
         self._jobs = context.jobs
         self._instruments = Instruments(context)
+        self._camera = CameraTracks(context)
         self._variants = VariantRuns(context)
         self._followed_at = context.clock()
         self._project = context.state.project
@@ -273,6 +275,7 @@ class RunService(Service):
             self._source = self._world = self._coming = None
             self._told = ()
             self.playback = playback = Playback(grown.result)
+            self._camera.take(grown.result, None)
             playback.seek(grown.result.duration)
             self.context.post(ShowLive())
             self.context.post(RunShown(None))
@@ -317,6 +320,7 @@ class RunService(Service):
         """Show a run: over the same drive, or one in its place, where the cursor is; a new one plays from its start."""
         playback = self.playback
         self._instruments.take(result, self._project.floor_map)
+        self._camera.take(result, self._source)
         self._variants.take(result)
         self.context.post(RunShown(result))
         if playback is not None and playback.result.inputs.log is result.inputs.log:
@@ -376,5 +380,6 @@ class RunService(Service):
         result, here = view.result, slice(view.lived)
         lived = LivedPath(result.columns.means[here], result.two_sigma[here], result.position_two_sigma[here])
         drive = DriveNow(result.inputs, result.inputs.log.first_ns + round(view.time * 1e9), result.columns)
-        found = (each for each in (self._instruments.found, self._variants.compared_over(result)) if each is not None)
-        return view, Followed((float(view.pose[0]), float(view.pose[1]))), lived, drive, *found
+        found = self._instruments.found, self._variants.compared_over(result), self._camera.found
+        some = (each for each in found if each is not None)
+        return view, Followed((float(view.pose[0]), float(view.pose[1]))), lived, drive, *some
