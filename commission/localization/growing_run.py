@@ -15,6 +15,7 @@ from commission.localization.estimate import Belief, Estimate, Status
 from commission.localization.localizer import Localizer
 from commission.localization.priors import KeptPriors, PriorRows
 from commission.localization.run_columns import Checkpoint, RunColumns, RunSegment
+from commission.localization.search_state import SearchMoment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState
 from commission.localization.whole_run import CHECKPOINT_CYCLES
@@ -64,6 +65,7 @@ class GrowingRun:
         self._segments = [RunSegment(0, setup)]
         self._checkpoints = [Checkpoint(0, self._localizer.state)]
         self._count = 0
+        self._searches: list[SearchMoment] = []
         n = FIRST_ROWS
         covariances = (np.empty((n, 3, 3)), np.empty((n, 3, 3)))
         self._cycles = Cycles(
@@ -97,16 +99,20 @@ class GrowingRun:
         """State after the newest record."""
         return self._localizer.state
 
-    def begin_segment(self, setup: LocalizerSetup) -> None:
+    def begin_segment(self, setup: LocalizerSetup, *, locate: bool = False) -> None:
         """Use another setup from the next record on; the state stays, and the columns say where it began.
+
+        Where the vehicle is to be located, its pose is thrown away.
 
         Before what was pushed after the newest cycle is pulled, the columns are those of a whole run with this segment;
         odometry that has been taken in since was taken in as it was.
         """
         self._localizer.replace_setup(setup)
+        if locate:
+            self._localizer.locate()
         if self._segments[-1].first == self._count:
-            self._segments.pop()
-        self._segments.append(RunSegment(self._count, setup))
+            locate |= self._segments.pop().locate
+        self._segments.append(RunSegment(self._count, setup, locate=locate))
 
     def feed(self, record: Record) -> tuple[Estimate, ...]:
         """Take in one record; arguments, result and errors are those of `Localizer.feed`."""
@@ -122,6 +128,9 @@ class GrowingRun:
         estimate = self._localizer.pull()
         if estimate is not None:
             self._append(estimate)
+            search = self._localizer.state.search
+            if search is not None:
+                self._searches.append(SearchMoment(self._count - 1, search.hypotheses, search.track))
             if self._count % CHECKPOINT_CYCLES == 0:
                 self._checkpoints.append(Checkpoint(self._count, self._localizer.state))
         return estimate
@@ -161,6 +170,7 @@ class GrowingRun:
             reflector=rows.reflectors,
             d2=rows.d2,
             contours=cycles.contours if matching else cycles.contours[:0],
+            searches=tuple(self._searches),
             final=self._localizer.state,
         )
 

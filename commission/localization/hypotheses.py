@@ -6,7 +6,7 @@ What was seen is `seen_of_late`'s; whether the first one is believed is `relocal
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,9 +14,9 @@ from commission.geometry.arrays import FloatArray, read_only
 from commission.geometry.se2 import compose
 from commission.localization.hypothesis_fit import ROW, Prior, judge
 from commission.localization.missed import Sights
-from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.pose_gaussian import PoseGaussian, to_belief
 from commission.localization.search_map import SearchMap
-from commission.localization.search_state import Search
+from commission.localization.search_state import Search, SearchMoment
 from commission.localization.seen_of_late import certain_things, clutter, pairs_of
 from commission.localization.start import CANDIDATES, HYPOTHESES, SAME_HEADING, SAME_PLACE, candidates
 
@@ -149,6 +149,42 @@ def probabilities(hypotheses: FloatArray) -> FloatArray:
     most = max(float(hypotheses[:, 9].max()), 0.0)
     weights = np.exp(hypotheses[:, 9] - most)
     return np.asarray(weights / (weights.sum() + math.exp(-most)), dtype=np.float64)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Hypothesis:
+    """A place where the vehicle may be."""
+
+    pose: FloatArray
+    """(3,) of base [m, m, rad], map frame."""
+    covariance: FloatArray
+    """(3, 3) of it, as it would be believed."""
+    probability: float
+    """By all that was seen [0..1]; what is missing to one over all is that it is none of them."""
+    fits: int
+    """Things seen of late that fit a reflector there."""
+    agreed: int
+    """Attempts in a row in which it was the only one left."""
+
+
+def hypotheses_of(moment: SearchMoment) -> tuple[Hypothesis, ...]:
+    """Return the hypotheses at a moment of a search, the likeliest first.
+
+    Parameters
+    ----------
+    moment : see `RunColumns.search`.
+    """
+    beliefs = [to_belief(gaussian_of(row, moment.track), 0) for row in moment.hypotheses]
+    return tuple(
+        Hypothesis(
+            pose=belief.mean,
+            covariance=belief.covariance,
+            probability=float(probability),
+            fits=int(row[10]),
+            agreed=int(row[11]),
+        )
+        for belief, probability, row in zip(beliefs, probabilities(moment.hypotheses), moment.hypotheses, strict=True)
+    )
 
 
 def _is_alone(ranked: FloatArray, search: Search) -> bool:

@@ -24,6 +24,7 @@ from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import to_belief
 from commission.localization.relocalization import (
     associate_nothing,
+    forgotten,
     is_sought,
     searching_odometry,
     sought,
@@ -116,6 +117,10 @@ class Localizer:
     def replace_setup(self, setup: LocalizerSetup) -> None:
         """Use other parameters (or another map) for what is processed from now on; the state stays."""
         self._setup, self._map = setup, None
+
+    def locate(self) -> None:
+        """Throw the pose away: from the next scan on the vehicle looks where it is."""
+        self._state = forgotten(self._state, self._setup)
 
     def feed(self, record: Record) -> tuple[Estimate, ...]:
         """Take in one record, and process what can be processed now: `push`, then every `pull`.

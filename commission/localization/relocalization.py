@@ -21,9 +21,10 @@ from commission.localization.hypotheses import gaussian_of, judged_again, spread
 from commission.localization.odometry import NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.rejection import NO_EVIDENCE
-from commission.localization.search_map import SearchMap
+from commission.localization.search_map import SearchMap, anywhere
 from commission.localization.search_state import NOTHING, Search, new_search
 from commission.localization.seen_of_late import SeenScan, joined_scan
+from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState
 from commission.localization.supervisor import SupervisorLimits
 
@@ -73,6 +74,25 @@ def searching_odometry(
     if state.mode == Mode.INITIALIZING:
         moved = moved._replace(belief=state.belief)
     return moved._replace(cross=cross, search=replace(search, track=track))
+
+
+def forgotten(state: FilterState, setup: LocalizerSetup) -> FilterState:
+    """Return the state of a vehicle whose pose is thrown away: it looks where it is, and withholds its output.
+
+    Parameters
+    ----------
+    state : before.
+    setup : its reflectors say how large the floor is.
+    """
+    belief = anywhere(setup.index.places)
+    return state._replace(
+        belief=belief,
+        mode=int(Mode.INITIALIZING),
+        evidence=NO_EVIDENCE._replace(stamp_ns=state.belief_ns),
+        pivot=(belief.x, belief.y),
+        cross=None,
+        search=new_search(state.belief_ns),
+    )
 
 
 def unlocated(state: FilterState, stamp_ns: int, following: NextOdometry, noise: OdometryNoise) -> Cycle:

@@ -5,6 +5,7 @@ Whoever makes them (`whole_run` at once, `growing_run` while the vehicle drives)
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -17,6 +18,7 @@ from commission.localization.detection_log import DetectionLog
 from commission.localization.estimate import Belief, Estimate, Mode, Status
 from commission.localization.observation import project_detections
 from commission.localization.priors import Priors
+from commission.localization.search_state import SearchMoment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, belief_of, output_of
 
@@ -31,6 +33,8 @@ class RunSegment:
     """Reflector map, scanner and parameters."""
     covered: bool = False
     """Whether all reflectors are covered: nothing is detected."""
+    locate: bool = False
+    """Whether the pose is thrown away where it begins: the vehicle looks where it is."""
 
     def __post_init__(self) -> None:
         if self.first < 0:
@@ -82,6 +86,8 @@ class RunColumns:
     """(K, 12) what became of the contours of each cycle, see `contour`; (0, 12) where they are not looked at."""
     final: FilterState
     """State after the last record, odometry included."""
+    searches: tuple[SearchMoment, ...] = ()
+    """Hypotheses after each cycle at which the vehicle looked where it is, in the order of time."""
     firsts: IntArray = field(init=False, repr=False)
     """(S,) first cycle of each segment."""
 
@@ -120,6 +126,11 @@ class RunColumns:
     def segment(self, cycle: int) -> RunSegment:
         """Return the segment of a cycle."""
         return self.segments[int(np.searchsorted(self.firsts, cycle, side="right")) - 1]
+
+    def search(self, cycle: int) -> SearchMoment | None:
+        """Return the hypotheses after a cycle; None where the vehicle does not look where it is."""
+        at = bisect_left(self.searches, cycle, key=lambda moment: moment.cycle)
+        return self.searches[at] if at < len(self.searches) and self.searches[at].cycle == cycle else None
 
     def counts(self, status: Status) -> IntArray:
         """(K,) detections of one status in each cycle."""

@@ -32,6 +32,7 @@ from commission.localization.relocalization import (
 )
 from commission.localization.run_columns import RunColumns
 from commission.localization.search_map import SearchMap, search_map
+from commission.localization.search_state import SearchMoment
 from commission.localization.seen_of_late import SeenScan
 from commission.localization.setup import FilterModel, LocalizerSetup
 from commission.localization.state import FilterState
@@ -152,6 +153,8 @@ class CycleStretch(NamedTuple):
     """Rows of its cycles and detections."""
     priors: PriorRows
     """Where its priors are written."""
+    searches: list[SearchMoment] | None = None
+    """Where hypotheses are written; None: nowhere."""
 
 
 def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch: CycleStretch) -> FilterState:
@@ -183,6 +186,9 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
             search = search or search_map(setup)
             newest = _part(stretch, (done - 1, done), (row, row))
             state = sought(state, state, _seen(log, setup, state, newest, NOT_YET), search)
+        if cycles and state.search is not None and stretch.searches is not None:
+            found = state.search
+            stretch.searches.append(SearchMoment(stretch.first + done - 1, found.hypotheses, found.track))
         if done == count and row == end:
             break
     if len(own) and count and detected.stamps_ns[-1] >= own[0]:
@@ -197,7 +203,7 @@ def _part(stretch: CycleStretch, cycles: tuple[int, int], rows: tuple[int, int])
     here = slice(*cycles)
     priors = PriorRows(stretch.priors.means[here], stretch.priors.covariances[here])
     columns, first = cut(stretch.columns, stretch.detected, *cycles), stretch.first + cycles[0]
-    return CycleStretch(first, rows, stretch.detected.part(*cycles), columns, priors)
+    return CycleStretch(first, rows, stretch.detected.part(*cycles), columns, priors, stretch.searches)
 
 
 def _until(log: RecordLog, stamp_ns: int, rows: tuple[int, int]) -> int:

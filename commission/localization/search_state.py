@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,6 +52,17 @@ class Search:
     def __hash__(self) -> int:
         """Equal ones have the same."""
         return hash(self._content())
+
+
+class SearchMoment(NamedTuple):
+    """Hypotheses as they stand after one cycle of a search."""
+
+    cycle: int
+    """Which cycle of the run."""
+    hypotheses: FloatArray
+    """(H, ROW) see `Search`."""
+    track: PoseGaussian
+    """Pose of base in the frame of odometry at that cycle."""
 
 
 NOTHING = PoseGaussian(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -22,6 +22,7 @@ from commission.localization.detection_log import (
 from commission.localization.detector import passing_widths
 from commission.localization.estimate import Belief
 from commission.localization.priors import PriorRows, ReplayedPriors, prior_rows
+from commission.localization.relocalization import forgotten
 from commission.localization.run_columns import Checkpoint, RunColumns, RunSegment, firsts_of
 from commission.localization.run_loop import CycleStretch, continued, cut, empty_columns, odometry_rows, take_over
 from commission.localization.setup import LocalizerSetup
@@ -127,8 +128,13 @@ def state_before(run: RunColumns, log: RecordLog, cycle: int) -> FilterState:
         columns = empty_columns(detected, (segment.setup,))
         rows = odometry_rows(log, run.stamps_ns, first, last)
         stretch = CycleStretch(first, rows, detected, columns, prior_rows(last - first))
-        state = continued(log, segment.setup, state, stretch)
+        state = continued(log, segment.setup, _entered(segment, first, state), stretch)
     return state
+
+
+def _entered(segment: RunSegment, cycle: int, state: FilterState) -> FilterState:
+    """State with which a stretch of a segment begins: without a pose where it is thrown away there."""
+    return forgotten(state, segment.setup) if segment.locate and segment.first == cycle else state
 
 
 def _segment(segments: Sequence[RunSegment], cycle: int) -> RunSegment:
@@ -140,7 +146,8 @@ def _first_difference(a: Sequence[RunSegment], b: Sequence[RunSegment], cycles: 
     """First cycle that two lists of segments treat differently; `cycles` when there is none."""
     for first in sorted({segment.first for segment in (*a, *b)}):
         one, other = _segment(a, first), _segment(b, first)
-        if one.covered != other.covered or one.setup != other.setup:
+        locate = any(each.locate and each.first == first for each in (one, other)) and one != other
+        if locate or one.covered != other.covered or one.setup != other.setup:
             return min(first, cycles)
     return cycles
 
@@ -196,12 +203,13 @@ def _filtered(
     if earlier is not None:
         take_over(earlier, columns, begin, int(detected.offsets[begin]))
     checkpoints = list(known)
+    searches = [] if earlier is None else [moment for moment in earlier.searches if moment.cycle < begin]
     for segment, first, last in _chunks(segments, begin, cycles):
         progress((first - begin) / (cycles - begin), "localizing")
         rows = odometry_rows(log, detected.stamps_ns, first, last)
         part_of = cut(columns, detected, first, last)
-        stretch = CycleStretch(first, rows, detected.part(first, last), part_of, prior_rows(last - first))
-        state = continued(log, segment.setup, state, stretch)
+        stretch = CycleStretch(first, rows, detected.part(first, last), part_of, prior_rows(last - first), searches)
+        state = continued(log, segment.setup, _entered(segment, first, state), stretch)
         checkpoints.append(Checkpoint(last, state))
     for column in columns:
         column.setflags(write=False)
@@ -217,6 +225,7 @@ def _filtered(
         reflector=columns.reflectors,
         d2=columns.d2,
         contours=columns.contours,
+        searches=tuple(searches),
         range_bearing=columns.settled if len(columns.settled) else detected.range_bearing,
         final=_final(log, segments[-1].setup, detected.part(cycles, cycles), checkpoints[-1], detected.stamps_ns),
     )
@@ -236,7 +245,7 @@ def _replayed(
             priors = PriorRows(written.means[here], written.covariances[here])
             rows = odometry_rows(log, detected.stamps_ns, first, last)
             stretch = CycleStretch(first, rows, found, columns, priors)
-            state = continued(log, segment.setup, state, stretch)
+            state = continued(log, segment.setup, _entered(segment, first, state), stretch)
         return PriorRows(read_only(written.means), read_only(written.covariances))
 
     return ReplayedPriors(tuple(states), len(detected), replay)

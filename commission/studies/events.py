@@ -49,6 +49,8 @@ class EventKind(StrEnum):
     """Too many detections fit no reflector."""
     SEARCHING = "not located"
     """Nobody has said where the vehicle is: it looks for itself."""
+    LOCATE = "locate"
+    """Someone has thrown the pose away: the vehicle looks where it is."""
     FOUND = "found"
     """Of all places in the map, one is left; the output is still withheld until detections confirm it."""
     JUMP = "jump"
@@ -150,7 +152,9 @@ def _modes(run: RunResult) -> Iterator[RunEvent]:
             continue
         if mode is Mode.INITIALIZING:
             searched_from = time
-            yield RunEvent(kind=EventKind.SEARCHING, time=time)
+            segment = run.columns.segment(cycle)
+            asked = segment.locate and segment.first == cycle
+            yield RunEvent(kind=EventKind.LOCATE if asked else EventKind.SEARCHING, time=time)
             continue
         if before[cycle] == Mode.INITIALIZING or (before[cycle] == Mode.LOST and _searches(run, cycle)):
             yield RunEvent(kind=EventKind.FOUND, time=time, lasts=time - searched_from)
@@ -329,6 +333,8 @@ def told(event: RunEvent) -> str:
             text = f"by {MILLIMETRES.text(event.position)}, {DEGREES.text(event.heading, '.2f')}"
         case EventKind.SEARCHING:
             text = "looks for its place in the map"
+        case EventKind.LOCATE:
+            text = "asked for: the pose is thrown away, the vehicle looks for its place in the map"
         case EventKind.FOUND:
             text = f"after {event.lasts:.2f} s, the only place left in {CONFIRMATIONS} attempts"
         case EventKind.BLIND:

@@ -90,18 +90,29 @@ class RunInput(StudyInput):
         """
         return self._changed(first, lambda segment: replace(segment, covered=covered))
 
+    def with_locate(self, first: int) -> RunInput:
+        """Return the input of the same run whose pose is thrown away before a cycle, so that the vehicle looks for it.
+
+        Parameters
+        ----------
+        first : that cycle.
+        """
+        return self._changed(first, lambda segment: replace(segment, locate=segment.locate or segment.first == first))
+
     def segment(self, cycle: int) -> RunSegment:
         """Return the segment of a cycle."""
         return next(segment for segment in reversed(self.segments) if segment.first <= cycle)
 
     def _changed(self, first: int, change: Callable[[RunSegment], RunSegment]) -> RunInput:
         """Change all segments from a cycle on; where one no longer differs from the one before, they are one."""
-        split = (*(s for s in self.segments if s.first < first), replace(self.segment(first), first=first))
+        here = self.segment(first)
+        here = here if here.first == first else replace(here, first=first, locate=False)
+        split = (*(s for s in self.segments if s.first < first), here)
         later = (segment for segment in self.segments if segment.first > first)
         changed = [change(segment) if segment.first >= first else segment for segment in (*split, *later)]
         kept = [changed[0]]
         for segment in changed[1:]:
-            if (segment.setup, segment.covered) != (kept[-1].setup, kept[-1].covered):
+            if segment.locate or (segment.setup, segment.covered) != (kept[-1].setup, kept[-1].covered):
                 kept.append(segment)
         return replace(self, segments=tuple(kept))
 

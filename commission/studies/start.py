@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from commission.errors import UsageError
 from commission.geometry.angles import wrap
-from commission.geometry.arrays import frozen
+from commission.geometry.arrays import FloatArray, frozen
 from commission.localization.estimate import Belief
 from commission.localization.pose_gaussian import from_belief, to_belief
 from commission.localization.search_map import anywhere
@@ -62,8 +62,18 @@ def unknown_start(project: Project, log: RecordLog) -> Start:
     project : its reflectors say how large the floor is.
     log : the recording; not empty, else UsageError.
     """
-    floor = anywhere(project.reflectors.centers)
-    return Start(to_belief(floor, _first_stamp(log)), StartOrigin.SEARCH)
+    return unknown_start_at(_first_stamp(log), project.reflectors.centers)
+
+
+def unknown_start_at(stamp_ns: int, centers: FloatArray) -> Start:
+    """Return the start of a vehicle that looks where it is.
+
+    Parameters
+    ----------
+    stamp_ns : of the first record [ns].
+    centers : (N, 2) places of the reflectors [m], map frame: they say how large the floor is.
+    """
+    return Start(to_belief(anywhere(centers), stamp_ns), StartOrigin.SEARCH)
 
 
 def _first_stamp(log: RecordLog) -> int:

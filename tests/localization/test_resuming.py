@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from commission.errors import JobCancelled
 from commission.localization import growing_run, whole_run
 from commission.localization.detection_log import cycle_stamps, extract_detections
-from commission.localization.estimate import Estimate, Status
+from commission.localization.estimate import Estimate, Mode, Status
 from commission.localization.growing_run import GrowingRun
 from commission.localization.localizer import Localizer
 from commission.localization.run_columns import RunColumns, RunSegment
@@ -342,3 +342,35 @@ def test_cycles_of_a_flush_are_checkpoints_like_others(monkeypatch: pytest.Monke
     before = len(growing)
     assert len(growing.flush()) == len(growing) - before == 1
     assert growing.columns().checkpoints[-1] == (len(growing), growing.state)
+
+
+def test_a_growing_run_whose_pose_is_thrown_away_is_the_whole_run_and_tells_its_hypotheses(drive: Drive) -> None:
+    segments = (RunSegment(0, SETUPS["drive"]), RunSegment(9, SETUPS["drive"], locate=True))
+    growing = GrowingRun(segments[0].setup, drive.initial)
+    for record in drive.log.records():
+        growing.push(record)
+        while growing.pull() is not None:
+            if len(growing) == 9:
+                growing.begin_segment(SETUPS["drive"], locate=True)
+    growing.flush()
+    columns, whole = growing.columns(), run_segments(drive.log, segments, drive.initial)
+    assert_same(columns, whole)
+    assert columns.segments == segments
+    assert (whole.modes[:9] != Mode.INITIALIZING).all()
+    assert whole.modes[9] == Mode.INITIALIZING
+    told = [(moment.cycle, moment.hypotheses.tobytes()) for moment in whole.searches]
+    assert told == [(moment.cycle, moment.hypotheses.tobytes()) for moment in columns.searches]
+    assert told[0][0] == 9
+    assert whole.search(9) is whole.searches[0]
+    assert whole.search(8) is None
+    # Another gate behind it is computed from there on, and is the same as computed at once.
+    later = (*segments, RunSegment(30, SETUPS["narrow gate"]))
+    resumed = run_segments(drive.log, later, drive.initial, earlier=whole)
+    assert_same(resumed, run_segments(drive.log, later, drive.initial))
+    assert resumed.searches[0].cycle == 9
+    assert state_before(resumed, drive.log, 12) == state_before(whole, drive.log, 12)
+    # To look where it is at another time is another run.
+    assert_same(
+        run_segments(drive.log, segments[:1], drive.initial, earlier=whole),
+        run(drive.log, SETUPS["drive"], drive.initial),
+    )

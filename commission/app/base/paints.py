@@ -63,6 +63,7 @@ class Run:
     REFERENCE = Paint("reference, and the error to it", (196, 140, 255), (134, 76, 190))
     CAMERA_BY_LASER = Paint("camera by the laser", (122, 168, 250), (26, 92, 196))
     CAMERA_BY_CONTOUR = Paint("camera by its contour", (255, 182, 96), (184, 98, 0))
+    HYPOTHESIS = Paint("a place where the vehicle may be", (255, 190, 240), (168, 0, 150))
     CLOUD = Paint("earlier innovations", (128, 150, 176), (104, 126, 154))
     SPREAD = Paint("mean and spread of innovations", (195, 204, 216), (78, 88, 102))
     AFTER = Paint("after the correction", (232, 234, 238), (36, 40, 46))

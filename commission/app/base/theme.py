@@ -40,6 +40,7 @@ TRAIL = Run.TRAIL.dark
 REFERENCE = Run.REFERENCE.dark
 CAMERA_BY_LASER = Run.CAMERA_BY_LASER.dark
 CAMERA_BY_CONTOUR = Run.CAMERA_BY_CONTOUR.dark
+HYPOTHESIS = Run.HYPOTHESIS.dark
 CLOUD = Run.CLOUD.dark
 NOT_KNOWN = Run.NOT_KNOWN.dark
 EDIT = Run.EDIT.dark
@@ -304,6 +305,10 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
  font-variant-numeric:tabular-nums}}
 @media (max-height:800px){{:root{{--c-bottom:{LOW_BOTTOM_PX}px}}
  div:has(>div>.c-route)>:nth-child(n+2){{zoom:.78}}}}
+.c-hypotheses{{padding:2px 6px;font-size:12px}}
+.c-hypotheses table{{width:100%;border-collapse:collapse;font-variant-numeric:tabular-nums;white-space:nowrap}}
+.c-hypotheses th{{font-weight:400;opacity:.7;text-align:right;padding:0 0 0 5px;font-size:11px}}
+.c-hypotheses td{{text-align:right;padding:1px 0 1px 5px}}
 .c-note{{font-size:11.5px;opacity:.7;line-height:1.35}}
 [data-draft] :is(input,textarea):focus{{border-color:{css(SELECTED)}!important;box-shadow:0 0 0 1px {css(SELECTED)}}}
 [data-refused]{{flex-wrap:wrap}}

@@ -18,12 +18,18 @@ class Connect(Action):
     sources: tuple[str, ...]
     """Each as `NAME[@SCANNER]:HOST:PORT`; one at least."""
     start: tuple[float, float, float] | None = None
-    """Pose of base now: x [m], y [m], heading [rad], map frame; none: the start of the first route."""
+    """Pose of base now: x [m], y [m], heading [rad], map frame; none: the start of the first route,
+    without one it looks where it is."""
 
 
 @dataclass(frozen=True, slots=True)
 class Disconnect(Action):
     """Listen no longer; the run so far stays."""
+
+
+@dataclass(frozen=True, slots=True)
+class LocateVehicle(Action):
+    """Throw the pose of the vehicle that drives now away: it looks where it is."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,11 @@ class CloseSources(Effect):
 
 
 @dataclass(frozen=True, slots=True)
+class LocateNow(Effect):
+    """Let the vehicle that drives now look where it is."""
+
+
+@dataclass(frozen=True, slots=True)
 class OpenRecording(Effect):
     """Record from now on."""
 

@@ -14,7 +14,7 @@ from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.reach import typed_path
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.live.actions import Connect, Disconnect, Record, RecordDrive, StopRecording
+from commission.app.live.actions import Connect, Disconnect, LocateVehicle, Record, RecordDrive, StopRecording
 from commission.app.live.state import LiveState
 from commission.app.live.view import LiveView, SourceView
 from commission.io.live.registry import KINDS
@@ -41,7 +41,8 @@ class LivePanel(BasePanel):
         self._start = gui.add_text(
             "Start at [m, m, deg]",
             "" if asked.start is None else _pose_text(asked.start),
-            hint="Pose of base now: x, y, heading. Empty: the start of the first route.",
+            hint="Pose of base now: x, y, heading. Empty: the start of the first route; without a route the vehicle "
+            "looks where it is.",
         )
         self._connect = gui.add_button("Connect", hint="Listen to the sources and localize what they say.")
         self._connect.on_click(posting(post, lambda _event: self._asked()))
@@ -49,6 +50,14 @@ class LivePanel(BasePanel):
             "Disconnect", color="gray", hint="Listen no longer; the run so far stays.", visible=False
         )
         self._disconnect.on_click(posting(post, lambda _event: Disconnect()))
+        self._locate = gui.add_button(
+            "Locate the vehicle",
+            color="gray",
+            hint="Throw the pose away: the vehicle looks where it is by the reflectors that it sees, without output "
+            "until one place is left.",
+            visible=False,
+        )
+        self._locate.on_click(posting(post, lambda _event: LocateVehicle()))
         self._table = gui.add_html("", visible=False)
         self._path = gui.add_text(
             "Record to",
@@ -88,6 +97,7 @@ class LivePanel(BasePanel):
         """Show how the sources are doing."""
         connected = view.state.part(LiveState).connected
         show(self._disconnect, visible=connected)
+        show(self._locate, visible=connected)
         live = view.part(LiveView) if connected else None
         write_html(self._table, "" if live is None else live_table(live))
         shown = view.part(LiveView)

@@ -9,8 +9,8 @@ from pathlib import Path
 from commission.app.base.actions import Sender
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState
-from commission.app.live.actions import Connect, Disconnect, Record, RecordDrive, StopRecording
-from commission.app.live.effects import CloseRecording, CloseSources, OpenRecording, OpenSources, WriteDrive
+from commission.app.live.actions import Connect, Disconnect, LocateVehicle, Record, RecordDrive, StopRecording
+from commission.app.live.effects import CloseRecording, CloseSources, LocateNow, OpenRecording, OpenSources, WriteDrive
 from commission.app.live.state import LiveState
 from commission.errors import UsageError
 from commission.io.live.registry import SourceAddress
@@ -37,6 +37,14 @@ def _parsed(texts: Iterable[str]) -> tuple[SourceAddress, ...]:
 def disconnect(_action: Disconnect, state: AppState, _sender: Sender) -> Outcome:
     """Listen no longer."""
     return Outcome(state.with_part(replace(state.part(LiveState), connected=False)), (CloseSources(),))
+
+
+@reduce.register
+def locate_vehicle(_action: LocateVehicle, state: AppState, _sender: Sender) -> Outcome:
+    """Throw its pose away."""
+    if not state.part(LiveState).connected:
+        raise UsageError("nothing is connected to; expected a connection to the vehicle that is to be located")
+    return Outcome(state, (LocateNow(),))
 
 
 @reduce.register

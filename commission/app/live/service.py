@@ -11,7 +11,7 @@ from commission.app.base.growing import RunGrew
 from commission.app.base.service import IDLE_S, Context, Due, Service
 from commission.app.base.state import AppState
 from commission.app.live.actions import Connect, Disconnect
-from commission.app.live.effects import CloseRecording, CloseSources, OpenRecording, OpenSources
+from commission.app.live.effects import CloseRecording, CloseSources, LocateNow, OpenRecording, OpenSources
 from commission.app.live.state import LiveState
 from commission.app.live.view import LiveView, SourceView
 from commission.errors import CommissionError
@@ -38,7 +38,7 @@ class LiveService(Service):
     context : what it is made with.
     """
 
-    effects = (OpenSources, CloseSources, OpenRecording, CloseRecording)
+    effects = (OpenSources, CloseSources, LocateNow, OpenRecording, CloseRecording)
 
     def __init__(self, context: Context) -> None:
         super().__init__(context)
@@ -67,6 +67,10 @@ class LiveService(Service):
         """
         if isinstance(effect, OpenRecording):
             self._record(effect.path, state, sender)
+            return
+        if isinstance(effect, LocateNow):
+            if self._runner is not None:
+                self._runner.locate()
             return
         if isinstance(effect, CloseRecording):
             self._stop_recording()

@@ -143,6 +143,11 @@ class Cover(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class Locate(Action):
+    """Throw the pose away from the cursor on: the vehicle looks where it is."""
+
+
+@dataclass(frozen=True, slots=True)
 class SetDisturbance(Action):
     """Change one number of what a virtual drive suffers."""
 

@@ -59,6 +59,11 @@ class CoverFromHere(Effect):
 
 
 @dataclass(frozen=True, slots=True)
+class LocateFromHere(Effect):
+    """Let the vehicle look where it is from the cursor on."""
+
+
+@dataclass(frozen=True, slots=True)
 class RunAfresh(Effect):
     """Run the whole drive with the setup of now, nothing covered, and go to its start."""
 

@@ -13,6 +13,7 @@ from commission.app.run.detection_layer import DetectionLayer
 from commission.app.run.edits_panel import EditsPanel
 from commission.app.run.figure_layer import FigureLayer
 from commission.app.run.gate_layer import GateLayer
+from commission.app.run.hypothesis_layer import HypothesisLayer
 from commission.app.run.now_panel import NowPanel
 from commission.app.run.plots import Plots
 from commission.app.run.run_panel import RunPanel
@@ -39,6 +40,7 @@ FEATURE = Feature(
         AccumulatedLayer,
         VehicleLayer,
         UncertaintyLayer,
+        HypothesisLayer,
         TrailLayer,
         VariantLayer,
         ConsistencyLayer,

@@ -14,8 +14,10 @@ from commission.app.run.view import Accumulated, RunView
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.estimate import Belief, Estimate, Mode, Status
+from commission.localization.hypotheses import Hypothesis, hypotheses_of
 from commission.localization.observation import project_detections, range_bearing
 from commission.localization.run_columns import Checkpoint, RunColumns
+from commission.localization.search_state import SearchMoment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState
 from commission.localization.sweep import points_at_stamp
@@ -78,6 +80,7 @@ class Playback:
         """Show another run over the same drive; the cursor stays."""
         self._result = result
         self._near: tuple[Checkpoint, ...] = ()
+        self._searched: tuple[SearchMoment, tuple[Hypothesis, ...]] | None = None
         self._inliers, self._outliers = (
             _Cloud(result.columns, chosen)
             for chosen in (result.columns.status == Status.INLIER, result.columns.status != Status.INLIER)
@@ -137,6 +140,7 @@ class Playback:
             areas=areas,
             gates=_gates(estimate, segment.setup, areas),
             accumulated=self._accumulated(lived) if whole else None,
+            hypotheses=self._hypotheses(lived),
         )
 
     def _areas(self, lived: int, estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
@@ -149,6 +153,15 @@ class Playback:
             wheels, usual_ns = setup.parameters.odometry, before.motion.usual_ns
             twist = _twist_over(self._result.inputs.log, estimate.stamp_ns, usual_ns, wheels)
         return validation_ellipses(setup, estimate.prior, scanner=estimate.scanner, before=before, twist=twist)
+
+    def _hypotheses(self, lived: int) -> tuple[Hypothesis, ...]:
+        """Where the vehicle may be after the newest cycle; the same value as long as nothing of it has changed."""
+        moment = self._result.columns.search(lived - 1)
+        if moment is None:
+            return ()
+        if self._searched is None or self._searched[0] is not moment:
+            self._searched = moment, hypotheses_of(moment)
+        return self._searched[1]
 
     def _state_before(self, cycle: int) -> FilterState:
         """State before a cycle; while the vehicle drives on, from the one before it."""

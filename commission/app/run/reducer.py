@@ -17,6 +17,7 @@ from commission.app.run.effects import (
     CoverFromHere,
     DriveAgain,
     LoadSource,
+    LocateFromHere,
     MakeCurves,
     MoveByScans,
     MoveTo,
@@ -111,6 +112,12 @@ def repeat(action: actions.Repeat, state: AppState, _sender: Sender) -> Outcome:
 def cover(action: actions.Cover, state: AppState, _sender: Sender) -> Outcome:
     """Cover or uncover the reflectors."""
     return Outcome(state, (CoverFromHere(action.covered),))
+
+
+@reduce.register
+def locate(_action: actions.Locate, state: AppState, _sender: Sender) -> Outcome:
+    """Throw the pose away."""
+    return Outcome(state, (LocateFromHere(),))
 
 
 @reduce.register

@@ -8,12 +8,22 @@ from viser import GuiApi
 
 from commission.app.base import actions, theme
 from commission.app.base.field_widget import Entry
-from commission.app.base.inputs import enable
+from commission.app.base.inputs import enable, show, write_html
 from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.reach import typed_path
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.run.actions import ChooseSource, ColorTrail, Cover, RecordedDrive, Repeat, Restart, VirtualDrive
+from commission.app.run.actions import (
+    ChooseSource,
+    ColorTrail,
+    Cover,
+    Locate,
+    RecordedDrive,
+    Repeat,
+    Restart,
+    VirtualDrive,
+)
+from commission.app.run.hypotheses import hypotheses_html
 from commission.app.run.state import RunState
 from commission.app.run.trail_colors import TrailBy
 from commission.app.run.view import RunView
@@ -30,6 +40,15 @@ class RunPanel(BasePanel):
         self._now = gui.add_html("")
         self._progress = gui.add_progress_bar(0.0, visible=False, animated=True)
         self._shown = ""
+        self._locate = gui.add_button(
+            "Locate",
+            hint="From the cursor on: throw the pose away. The vehicle looks where it is by the reflectors that it "
+            "sees, without output until one place is left.",
+            color="gray",
+            visible=False,
+        )
+        self._locate.on_click(posting(post, lambda _event: Locate()))
+        self._hypotheses = gui.add_html("", visible=False)
         self._add_drive(post, state)
         self._add_recording(post, state)
         with gui.add_folder("During the run"):
@@ -119,6 +138,9 @@ class RunPanel(BasePanel):
         if jobs:
             self._progress.value = PERCENT.of(min(max(jobs[0].fraction, 0.0), 1.0))
         run = view.part(RunView)
+        # While a vehicle drives now, it is located beside its connection.
+        show(self._locate, visible=run is not None and not view.state.part(RunState).live)
+        write_html(self._hypotheses, hypotheses_html(run))
         if run is not None and self._cover.value is not run.covered:
             self._cover.value = run.covered
         if self._repeat.value is not view.state.part(RunState).repeat:

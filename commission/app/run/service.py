@@ -26,6 +26,7 @@ from commission.app.run.effects import (
     CoverFromHere,
     DriveAgain,
     LoadSource,
+    LocateFromHere,
     MakeCurves,
     MoveByScans,
     MoveTo,
@@ -92,6 +93,7 @@ class RunService(Service):
         MoveByScans,
         PlayOn,
         CoverFromHere,
+        LocateFromHere,
         RunAfresh,
         DriveAgain,
         MakeCurves,
@@ -160,11 +162,11 @@ class RunService(Service):
                 playback.seek(seconds)
             case MoveByScans(scans) if playback is not None:
                 playback.step(scans)
-            case CoverFromHere() | RunAfresh() if self._live is not None:
+            case CoverFromHere() | LocateFromHere() | RunAfresh() if self._live is not None:
                 told = Report("the vehicle drives now: what is past stays as it was", failed=False)
                 self.context.post(Envelope(told, sender))
-            case CoverFromHere(covered):
-                self._cover(self._cursor(), sender, covered=covered)
+            case CoverFromHere() | LocateFromHere():
+                self._act_from_here(effect, sender)
             case PlayOn(backward) if playback is not None:
                 if playback.at_start if backward else playback.at_end:
                     playback.seek(playback.result.duration if backward else 0.0)
@@ -218,6 +220,7 @@ class RunService(Service):
             first = int(np.searchsorted(stamps, began_ns))
             if first < len(stamps):
                 wanted = wanted.with_cover(first, covered=segment.covered)
+                wanted = wanted.with_locate(first) if segment.locate else wanted
         self._localize(wanted)
 
     def _stay(self, job: Job | None = None) -> Action | None:
@@ -253,15 +256,19 @@ class RunService(Service):
             failed=lambda job: Envelope(Report(f"{job.name}: {job.error}", listed=f"{job.name} failed"), sender),
         )
 
-    def _cover(self, first: int, sender: Sender, *, covered: bool) -> None:
-        """Cover or uncover the reflectors from a cycle on."""
+    def _act_from_here(self, effect: CoverFromHere | LocateFromHere, sender: Sender) -> None:
+        """Cover or uncover the reflectors, or throw the pose away, from the cursor on."""
+        first = self._cursor()
         if self._wanted is None:
             return
         if self._is_over(first):
-            told = Report("the drive is over; reflectors can be covered before its end", failed=False)
+            told = Report("the drive is over; nothing happens behind its end: go back first", failed=False)
             self.context.post(Envelope(told, sender))
             return
-        self._localize(self._wanted.with_cover(first, covered=covered))
+        if isinstance(effect, CoverFromHere):
+            self._localize(self._wanted.with_cover(first, covered=effect.covered))
+        else:
+            self._localize(self._wanted.with_locate(first))
 
     def _show_grown(self, grown: RunGrew) -> None:
         """Show a live run as far as it has come; one that is over is a run as any other."""

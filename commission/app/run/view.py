@@ -8,6 +8,7 @@ from typing import TypeAlias
 
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Estimate, Mode
+from commission.localization.hypotheses import Hypothesis
 from commission.localization.run_columns import RunSegment
 from commission.studies.run import RunResult
 
@@ -82,6 +83,8 @@ class RunView:
     """(R, n, 2) outlines of the validation areas of the reflectors in view [m], map frame."""
     accumulated: Accumulated | None
     """Every detection so far; none in views that are drawn at the full rate."""
+    hypotheses: tuple[Hypothesis, ...] = ()
+    """Where it may be, the likeliest first, while it looks where it is; else none."""
     hall: DrivenHall = DrivenHall.RECORDED
     """Whether the drive is one in the project's hall."""
     kept: tuple[KeptRun, ...] = ()

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray, read_only
 from commission.io.live.spooled_scans import SpooledScans
 from commission.localization.estimate import Belief, Estimate, Mode
@@ -25,7 +24,7 @@ from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
 from commission.studies.run import RunInput, RunResult, judge
-from commission.studies.start import Start, StartOrigin, belief_at, route_start
+from commission.studies.start import Start, StartOrigin, belief_at, route_start, unknown_start_at
 
 UNKNOWN_SPEED = 1.0
 """Speed that a vehicle of which nothing is heard may have, where the project has no route that says one [m/s]."""
@@ -54,25 +53,18 @@ class LiveRun:
     Parameters
     ----------
     project : reflectors, scanners, parameters; `use` takes another one.
-    pose : (3,) pose of base at the first record [m, m, rad], map frame; None: the start of the first route.
+    pose : (3,) pose of base at the first record [m, m, rad], map frame; None: the start of the first route, and where
+        the project has none, the vehicle looks where it is.
     sigmas : (3,) 1-sigma of it [m, m, rad]; None: the usual ones.
-
-    Raises
-    ------
-    UsageError
-        nothing says where the vehicle starts.
     """
 
     def __init__(
         self, project: Project, pose: Sequence[float] | None = None, sigmas: Sequence[float] | None = None
     ) -> None:
-        if pose is None and not project.routes:
-            raise UsageError(
-                "nothing says where the vehicle is: no route in the project; expected an initial pose X,Y,THETA in "
-                "metres and radians"
-            )
         self._origin = StartOrigin.ROUTE if pose is None else StartOrigin.GIVEN
-        self._pose = tuple(route_start(project.routes[0]) if pose is None else pose)
+        if pose is None:
+            pose = route_start(project.routes[0]) if project.routes else None
+        self._pose = None if pose is None else tuple(pose)
         self._sigmas = sigmas
         self._speed = max((route.speed for route in project.routes), default=UNKNOWN_SPEED)
         self._setup = LocalizerSetup.of(project)
@@ -103,7 +95,7 @@ class LiveRun:
         """Return what is known of the pose before a record that is taken in next; None while odometry still waits."""
         with self._lock:
             if self._run is None:
-                return belief_at(record.stamp_ns, self._pose, self._sigmas)
+                return self._start_at(record.stamp_ns).belief
             belief = belief_of(self._run.state)
             return belief if belief.stamp_ns >= self._odometry_ns else None
 
@@ -119,6 +111,13 @@ class LiveRun:
             self._setup = setup
             if self._run is not None:
                 self._run.begin_segment(setup)
+
+    def locate(self) -> None:
+        """Throw the pose away: from the next scan on the vehicle looks where it is."""
+        with self._lock:
+            self._pose = None
+            if self._run is not None:
+                self._run.begin_segment(self._setup, locate=True)
 
     def so_far(self, now_ns: int | None = None) -> LiveResult:
         """Return the run so far; its figures are those of a recording of the same drive.
@@ -157,8 +156,14 @@ class LiveRun:
 
     def _begun(self, record: Record) -> GrowingRun:
         """Return the run that begins with a record."""
-        self._start = Start(belief_at(record.stamp_ns, self._pose, self._sigmas), self._origin)
-        return GrowingRun(self._setup, self._start.belief)
+        self._start = self._start_at(record.stamp_ns)
+        return GrowingRun(self._setup, self._start.state())
+
+    def _start_at(self, stamp_ns: int) -> Start:
+        """Return where the vehicle starts, if it does at a time [ns]."""
+        if self._pose is None:
+            return unknown_start_at(stamp_ns, self._setup.reflectors.centers)
+        return Start(belief_at(stamp_ns, self._pose, self._sigmas), self._origin)
 
     def _keep(self, record: Record) -> None:
         """Remember a record: small ones in memory, scans in a file."""

@@ -99,6 +99,10 @@ class LiveRunner:
         """Localize with another project from the next record on."""
         self.run.use(project)
 
+    def locate(self) -> None:
+        """Throw the pose away: from the next scan on the vehicle looks where it is."""
+        self.run.locate()
+
     def snapshot(self) -> LiveSnapshot:
         """Return how it goes now."""
         sources = tuple(SourceNow(source.address, source.status()) for source in self.session.sources)

@@ -15,7 +15,7 @@ from commission.app.base.view import Followed, LivedPath
 from commission.app.run import service as service_module
 from commission.app.run.actions import Play, SourceLoaded, VirtualDrive
 from commission.app.run.drives import Drive
-from commission.app.run.effects import CoverFromHere, LoadSource, MoveByScans, MoveTo, PlayOn, RunAfresh
+from commission.app.run.effects import CoverFromHere, LoadSource, LocateFromHere, MoveByScans, MoveTo, PlayOn, RunAfresh
 from commission.app.run.service import RunService
 from commission.app.run.state import RunState
 from commission.app.run.view import RunView
@@ -26,6 +26,7 @@ from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress
 from commission.site.fields import with_field
 from commission.site.project import Project
+from commission.studies.events import EventKind, EventsInput, events, told
 from commission.studies.run import RunInput, RunResult, judged_run
 from tests.app.owning import Owner
 
@@ -180,6 +181,29 @@ def test_covered_from_the_cursor_on_it_fails_and_uncovered_it_recovers(bench: Ru
     # An edit from the start is made in the same world.
     bench.edit(gate(0.6))
     assert [segment.covered for segment in bench.view.result.inputs.segments] == [False, True, False]
+
+
+def test_located_from_the_cursor_on_it_looks_where_it_is_and_a_later_edit_keeps_that(bench: RunBench) -> None:
+    bench.do(MoveTo(1.45), LocateFromHere())
+    first = bench.view.lived
+    modes = bench.view.result.columns.modes
+    assert (modes[:first] == Mode.OPERATIONAL).all()
+    assert modes[first] == Mode.INITIALIZING
+    bench.do(MoveByScans(5))
+    assert bench.view.mode is Mode.INITIALIZING
+    (best, *_) = bench.view.hypotheses
+    reference = bench.view.result.reference_places(np.array([bench.view.newest]))[0]
+    assert np.hypot(*(best.pose[:2] - reference)) < 0.1
+    assert best.probability > 0.9
+    listed = events(EventsInput(bench.view.result)).events
+    (event,) = [each for each in listed if each.kind is EventKind.LOCATE]
+    assert event.time == pytest.approx(bench.view.result.times[first])
+    assert "asked for" in told(event)
+    bench.edit(gate(0.9))
+    assert bench.view.result.columns.modes[first] == Mode.INITIALIZING
+    assert [segment.locate for segment in bench.view.result.inputs.segments] == [False, True]
+    bench.do(RunAfresh())
+    assert Mode.INITIALIZING not in bench.view.result.columns.modes
 
 
 def test_afresh_the_drive_has_one_setup_and_nothing_covered(bench: RunBench) -> None:

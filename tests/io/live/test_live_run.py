@@ -22,10 +22,12 @@ from commission.io.live.virtual_vehicle import addresses_of, send_drive
 from commission.io.project_file import load_project
 from commission.io.recordings.base import load_log
 from commission.io.recordings.csv_writer import write_recording
+from commission.localization.estimate import Mode
 from commission.simulation.scenario import records
 from commission.site.project import Project
 from commission.site.records import Detections, Odometry, Record, Scan
 from commission.studies.run import RunInput, RunResult, judged_run
+from commission.studies.start import StartOrigin
 from tests.io.live.virtual import ALL, scan, until
 
 SPEED = 4.0
@@ -216,3 +218,23 @@ def test_scans_are_read_back_from_their_file_and_the_oldest_forgotten() -> None:
     assert np.isnan(store.scan(14).ranges).all()
     assert store.block(20, 23).ranges.shape == (3, 541)
     assert len(store.block(3, 3)) == 0
+
+
+def test_a_vehicle_of_which_nobody_says_where_it_starts_is_found_and_again_after_its_pose_is_thrown_away(
+    warehouse: Project, drive: list[Record]
+) -> None:
+    live = LiveRun(replace(warehouse, routes=()))
+    estimates = []
+    for record in drive:
+        estimates += live.take(record)
+        if len(estimates) == 50:
+            live.locate()
+    found = live.so_far().result
+    assert found is not None
+    assert found.inputs.start.origin is StartOrigin.SEARCH
+    modes = found.columns.modes
+    assert modes[0] == modes[50] == Mode.INITIALIZING
+    assert modes[49] == modes[-1] == Mode.OPERATIONAL
+    assert [segment.locate for segment in found.columns.segments] == [False, True]
+    driving = modes == Mode.OPERATIONAL
+    assert found.position_errors[driving].max() < 0.1
