@@ -23,6 +23,7 @@ from commission.cli.coverage import CoverageCommand
 from commission.cli.inspect import Inspect
 from commission.cli.layouts import Layouts
 from commission.cli.localize import Localize
+from commission.cli.monitor import MonitorCommand
 from commission.cli.montecarlo import MonteCarlo
 from commission.cli.parsing import Command, parse
 from commission.cli.place import Place
@@ -52,6 +53,7 @@ COMMANDS: dict[str, type[Command]] = {
     "calibrate": Calibrate,
     "clock": Clock,
     "tune": Tune,
+    "monitor": MonitorCommand,
     "place": Place,
     "layouts": Layouts,
     "problems": Problems,

@@ -101,6 +101,8 @@ class ReflectorDiagnosis:
     """Their standard deviation [m]."""
     suspicion: Suspicion | None = None
     """What may be wrong; None: nothing."""
+    off: tuple[float, float] = (0.0, 0.0)
+    """How far from its place it, or what stands beside it, is seen, where it is suspected [m]."""
     text: str = ""
     """The same in words."""
 
@@ -247,15 +249,16 @@ def _reflectors(inputs: DiagnosisInput, clusters: tuple[OutlierCluster, ...]) ->
     own = np.bincount(found.fit.reflector[found.fit.reflector >= 0], minlength=len(figures))
     beside = {each.near: each for each in reversed(clusters) if each.near}
     for index, name in enumerate(figures.names):
-        suspicion, text = None, ""
+        suspicion, text, off = None, "", np.zeros(2)
         thing, moved = beside.get(name), _moved(found, index)
         if thing is not None and own[index] >= OWN_SHARE * thing.count:
             suspicion, text = Suspicion.DOUBLE, f"{name} is double: {thing.text}"
+            off = np.array([thing.x, thing.y]) - figures.places[index]
         elif thing is not None:
             off = np.array([thing.x, thing.y]) - figures.places[index]
             suspicion, text = Suspicion.MOVED, _moved_text(name, off)
         elif moved is not None:
-            suspicion, text = Suspicion.MOVED, _moved_text(name, moved)
+            suspicion, text, off = Suspicion.MOVED, _moved_text(name, moved), moved
         elif known[index] and shares[index] < DIRTY_SHARE * usual:
             missing = shares[index] < MISSING_SHARE * usual
             suspicion = Suspicion.MISSING if missing else Suspicion.DIRTY
@@ -270,6 +273,7 @@ def _reflectors(inputs: DiagnosisInput, clusters: tuple[OutlierCluster, ...]) ->
             across_mean=float(figures.across_mean[index]),
             across_spread=float(figures.across_spread[index]),
             suspicion=suspicion,
+            off=(float(off[0]), float(off[1])),
             text=text,
         )
 
