@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from commission.site.record_log import RecordLog
     from commission.studies.consistency import Consistency
     from commission.studies.detection_rates import DetectionRate
+    from commission.studies.integrity import Protection
     from commission.studies.run import RunResult
     from commission.studies.sections import Section
 
@@ -84,11 +85,18 @@ class Localize:
         from commission.io.project_file import load_project
         from commission.io.recordings.base import load_log
         from commission.io.recordings.channels import ChannelOptions
-        from commission.io.results import RESULTS, write_events, write_reflector_figures, write_results
+        from commission.io.results import (
+            RESULTS,
+            write_events,
+            write_protection,
+            write_reflector_figures,
+            write_results,
+        )
         from commission.localization import whole_run
         from commission.site.truth import truth_lines
         from commission.studies.detection_rates import rate_entries, rate_told
         from commission.studies.events import EventsInput, events
+        from commission.studies.integrity import protection, protection_entries
         from commission.studies.plausibility import PlausibilityInput, has_motion, plausibility
         from commission.studies.reflector_figures import ReflectorFiguresInput, reflector_figures
         from commission.studies.run import RunInput, judged_run, summary
@@ -106,8 +114,8 @@ class Localize:
         if not has_motion(log):
             found = "holds no odometry: between scans nobody knows where the vehicle went"
             raise SourceError(f"{self.recording} {found}; expected odometry, in a bag by --channel odometry=TOPIC")
-        pose, sigmas = given and given.pose, given and given.sigmas
-        start = unknown_start(project, log) if searched else start_of(project, log, pose, sigmas)
+        told = given and given.pose, given and given.sigmas
+        start = unknown_start(project, log) if searched else start_of(project, log, *told)
         if self.strict:
             for finding in plausibility(PlausibilityInput.of(project, log)):
                 raise SourceError(f"{self.recording}: {finding}")
@@ -117,19 +125,20 @@ class Localize:
         cut = sections(result.columns, project.stations)
         findings = [*log.notes, *(str(finding) for finding in run_findings(result))]
 
-        more = {
+        levels, rates = protection(result.columns), self._rates(project, result)
+        more = protection_entries(result, levels) | {
             "scanners": figures_entries(result.scanners),
             "sections": section_entries(cut),
             "findings": findings,
+            **({"detection_rates": rate_entries(rates)} if rates else {}),
         }
-        rates = self._rates(project, result)
-        more |= {"detection_rates": rate_entries(rates)} if rates else {}
         rated = self._rate(as_saved, project, result, rates)
         with out.writing() as folder:
             write_results(folder, result.columns, summary(result) | more)
             write_events(folder, events(EventsInput(result)))
             write_reflector_figures(folder, reflector_figures(ReflectorFiguresInput.of(result, project.floor_map)))
-        lines = [*_report(result, cut), *map(rate_told, rates), *rated]
+            write_protection(folder, result, levels)
+        lines = [*_report(result, cut), _protected(result, levels), *map(rate_told, rates), *rated]
         lines += [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
         lines += [f"Note         {finding}" for finding in findings]
         sys.stdout.write("\n".join([*lines, *self._messages(project, result), f"Written to   {self.out}"]) + "\n")
@@ -254,6 +263,22 @@ def _report(result: RunResult, cut: Sequence[Section]) -> list[str]:
         f"Danger       {errors.wrong_while_operational} of {errors.compared} cycles operational with an error "
         f"beyond {MILLIMETRES.text(limit)}",
     ]
+
+
+def _protected(result: RunResult, levels: Protection) -> str:
+    """How large the error can be at most, how often that is within the limits, and how often the error was beyond."""
+    from commission.studies.integrity import protection_entries
+
+    told = protection_entries(result, levels)
+    median, p95 = (
+        "none" if value is None else MILLIMETRES.text(value, ".1f")
+        for value in (told["protection_position_median_m"], told["protection_position_p95_m"])
+    )
+    beyond = f"; error beyond it in {told['beyond_protection']} cycles" if "beyond_protection" in told else ""
+    return (
+        f"Protection   position {median} median, {p95} at 95 %, at a risk of {levels.given.risk:g} per cycle; within "
+        f"the limits {PERCENT.text(told['protected_fraction'] or 0.0, '.1f')}{beyond}"
+    )
 
 
 def _nis(fits: Consistency) -> str:

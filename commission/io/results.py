@@ -13,18 +13,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.io.atomic import atomic_file, write_text
+from commission.io.atomic import atomic_file, write_bytes, write_text
+from commission.io.stanford_picture import picture_of
 from commission.localization.estimate import Mode, Status
 from commission.localization.run_columns import RunColumns
 from commission.studies.events import EventsResult, told
+from commission.studies.integrity import Protection
 from commission.studies.reflector_figures import ReflectorFigures
+from commission.studies.run import RunResult
+from commission.studies.stanford import stanford
 
 ESTIMATES = "estimates.csv"
 DETECTIONS = "detections.csv"
 SUMMARY = "summary.json"
 EVENTS = "events.csv"
 REFLECTORS = "reflectors.csv"
-RESULTS = (ESTIMATES, DETECTIONS, SUMMARY, EVENTS, REFLECTORS)
+PROTECTION = "protection.csv"
+STANFORD = "stanford.png"
+RESULTS = (ESTIMATES, DETECTIONS, SUMMARY, EVENTS, REFLECTORS, PROTECTION, STANFORD)
+"""All of them; the last one where there is a reference."""
 
 ESTIMATE_COLUMNS = (
     *("stamp_ns", "x", "y", "theta", "var_x", "cov_xy", "cov_xtheta", "var_y", "cov_ytheta", "var_theta"),
@@ -44,6 +51,9 @@ REFLECTOR_COLUMNS = (
     *("along_mean", "along_spread", "across_mean", "across_spread", "nis", "last_seen_s"),
 )
 """Scans and detections counted, metres; empty where nothing is known."""
+
+PROTECTION_COLUMNS = ("stamp_ns", "position", "heading", "reflector_id")
+"""Metres and radians; empty where the vehicle is lost or not located, and where no reflector would be worst."""
 
 UPPER_TRIANGLE = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 ROWS_AT_ONCE = 50_000
@@ -98,6 +108,28 @@ def write_reflector_figures(folder: Path, figures: ReflectorFigures) -> None:
         strict=True,
     )
     _write_table(folder / REFLECTORS, REFLECTOR_COLUMNS, iter([rows]))
+
+
+def write_protection(folder: Path, result: RunResult, levels: Protection) -> None:
+    """Write `protection.csv`, and `stanford.png` where the run has a reference.
+
+    Parameters
+    ----------
+    folder : made when missing.
+    result, levels : a run and its protection levels.
+    """
+    names = (*levels.reflector, "")
+    rows = zip(
+        result.columns.stamps_ns.tolist(),
+        map(_or_empty, levels.position.tolist()),
+        map(_or_empty, levels.heading.tolist()),
+        (names[index] for index in levels.worst.tolist()),
+        strict=True,
+    )
+    _write_table(folder / PROTECTION, PROTECTION_COLUMNS, iter([rows]))
+    diagram = stanford(result, levels.position)
+    if diagram is not None:
+        write_bytes(folder / STANFORD, picture_of(diagram))
 
 
 def _or_empty(value: float) -> float | str:

@@ -410,6 +410,25 @@ class SupervisorParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class IntegrityParameters:
+    """What the protection level is reckoned with."""
+
+    risk: Annotated[
+        float,
+        Quantity(label="Integrity risk", shown=PERCENT, bounds=Bounds.inside(0.0, 0.5), step=0.0001, decimals=9),
+    ] = 1e-5
+    """Share of the cycles in which the error may be larger than the protection level, where one reflector misleads."""
+    fault_probability: Annotated[
+        float,
+        Quantity(label="Misleading", shown=PERCENT, bounds=Bounds.inside(0.0, 1.0), step=0.01, decimals=7),
+    ] = 1e-3
+    """Probability that a reflector in sight misleads: moved since the survey, or another thing taken for it."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, "integrity.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Parameters:
     """All tunables of the localizer."""
 
@@ -431,3 +450,5 @@ class Parameters:
     """When to stop the vehicle."""
     contour: Annotated[ContourParameters, Group("Contours")] = field(default_factory=ContourParameters)
     """What walls say."""
+    integrity: Annotated[IntegrityParameters, Group("Protection level")] = field(default_factory=IntegrityParameters)
+    """How sure a bound of the error has to be."""

@@ -77,12 +77,13 @@ class StanfordDiagram:
     """(41, 41) cycles by error, then by protection level, in steps of 1/20 of the limit; the last: beyond."""
 
 
-def stanford(result: RunResult) -> StanfordDiagram | None:
+def stanford(result: RunResult, levels: FloatArray | None = None) -> StanfordDiagram | None:
     """Count the cycles of a run by region.
 
     Parameters
     ----------
     result : a run; only its cycles that have a reference are counted.
+    levels : (K,) protection levels of the position [m]; None: the 2-sigma that the supervisor holds against its limit.
 
     Returns
     -------
@@ -91,8 +92,8 @@ def stanford(result: RunResult) -> StanfordDiagram | None:
     Notes
     -----
     Walter, Hansen and Enge 1999 (the Stanford chart of WAAS); the regions are those of Tossaint et al. 2007, The
-    Stanford-ESA integrity diagram, Navigation 54(2), section 2, for one quantity: the horizontal error. The protection
-    level here is the 2-sigma that the supervisor holds against its limit. That is no bound of 1e-7: along the longer
+    Stanford-ESA integrity diagram, Navigation 54(2), section 2, for one quantity: the horizontal error. The 2-sigma
+    that the supervisor holds against its limit is no bound of 1e-7 (`integrity` has one): along the longer
     axis alone a consistent filter exceeds it in 4.6 % of the cycles, and with an ellipse that is a circle, of which the
     distance is taken, in exp(-2) = 13.5 %. Misleading cycles are therefore expected, hazardous ones are not.
     """
@@ -101,7 +102,8 @@ def stanford(result: RunResult) -> StanfordDiagram | None:
         return None
     limits = limits_along(result.columns)[known, 0]
     operational = (result.columns.modes == Mode.OPERATIONAL)[known]
-    return counted(result.position_errors[known], result.position_two_sigma[known], limits, operational)
+    levels = result.position_two_sigma if levels is None else levels
+    return counted(result.position_errors[known], levels[known], limits, operational)
 
 
 def counted(errors: FloatArray, levels: FloatArray, limits: FloatArray, operational: BoolArray) -> StanfordDiagram:

@@ -80,6 +80,8 @@ PARAMETERS = {
     "contour.least_matched": ("Matched at least [%]", 100.0),
     "contour.least_share": ("Direction told by [%]", 100.0),
     "contour.gate_probability": ("Accepted to [%]", 100.0),
+    "integrity.risk": ("Integrity risk [%]", 100.0),
+    "integrity.fault_probability": ("Misleading [%]", 100.0),
     "supervisor.enabled": ("Supervisor", None),
     "supervisor.position_limit": ("2σ position [mm]", 1000.0),
     "supervisor.position_sigma": ("Position σ", None),

@@ -14,7 +14,7 @@ from commission.io.project_file import load_project
 from commission.io.project_lock import ProjectLock
 
 RESULTS = {
-    "localize": ("estimates.csv", "detections.csv", "summary.json"),
+    "localize": ("estimates.csv", "detections.csv", "protection.csv", "summary.json"),
     "coverage": ("coverage.npz", "coverage.csv", "coverage.png", "summary.json", "ellipses.csv"),
     "predict": ("prediction.csv", "summary.json", "dependents.csv", "failures.csv"),
     "ambiguity": ("ambiguity.npz", "ambiguous_pairs.csv", "neighbors.csv", "summary.json"),

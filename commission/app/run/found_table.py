@@ -14,6 +14,7 @@ from commission.app.base.ramp import colors
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.site.quantity import MILLIMETRES, PERCENT
 from commission.studies.events import EventsResult, told
+from commission.studies.integrity import Protection
 from commission.studies.reflector_figures import ReflectorFigures
 
 CLASSES = 6
@@ -28,6 +29,8 @@ class Found:
     """What happened."""
     figures: ReflectorFigures
     """What each reflector contributed."""
+    levels: Protection | None = None
+    """Protection levels of its cycles."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

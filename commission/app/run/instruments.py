@@ -13,6 +13,7 @@ from commission.app.run.state import PlotWindow
 from commission.progress import Progress, part
 from commission.site.floor_map import FloorMap
 from commission.studies.events import EventsInput, events
+from commission.studies.integrity import protection
 from commission.studies.reflector_figures import ReflectorFiguresInput, reflector_figures
 from commission.studies.run import RunResult
 
@@ -31,7 +32,7 @@ class Instruments:
         """What was found on the newest drive for which that is done; none before the first."""
 
     def take(self, result: RunResult, floor_map: FloorMap | None) -> None:
-        """Find what happened on a drive, and what each reflector contributed.
+        """Find what happened on a drive, what each reflector contributed, and how large its error can be at most.
 
         Parameters
         ----------
@@ -42,7 +43,8 @@ class Instruments:
 
         def look(progress: Progress) -> Found:
             happened = events(EventsInput(result), part(progress, 0.0, 0.4))
-            return Found(happened, reflector_figures(figures, part(progress, 0.4, 1.0)))
+            levels = protection(result.columns, progress=part(progress, 0.4, 0.6))
+            return Found(happened, reflector_figures(figures, part(progress, 0.6, 1.0)), levels)
 
         self._jobs.start("Events and reflectors", look, then=self._keep, is_shown=False)
 

@@ -8,9 +8,10 @@ import numpy as np
 from viser import GuiApi
 
 from commission.app.base.inputs import show
-from commission.app.base.panel import BasePanel, table
+from commission.app.base.panel import BasePanel, escaped, table
 from commission.app.base.view import PageView
 from commission.app.editing.editor import editor_of
+from commission.app.run.found_table import Found
 from commission.app.run.summary_panel import known, share
 from commission.app.run.view import RunView
 from commission.localization.detector import passing_widths
@@ -31,8 +32,8 @@ MOST_REJECTED = 4
 """Rejected clusters of a scan that are explained."""
 
 
-def rows(run: RunView) -> list[tuple[str, str]]:
-    """Return what the panel shows, line by line."""
+def rows(run: RunView, found: Found | None = None) -> list[tuple[str, str]]:
+    """Return what the panel shows, line by line; protection levels as soon as they are known of this run."""
     x, y, heading = run.pose
     shown = [
         ("Mode", MODES[run.mode]),
@@ -53,6 +54,7 @@ def rows(run: RunView) -> list[tuple[str, str]]:
         ("2σ position / limit", MILLIMETRES.against(largest, limits.position_limit)),
         ("2σ along x, along y", f"{MILLIMETRES.number(sigma_x, '.1f')}, {MILLIMETRES.text(sigma_y, '.1f')}"),
         ("2σ heading / limit", DEGREES.against(sigma_heading, limits.heading_limit, (".2f", ".1f"))),
+        *_protection(run, found),
         ("Inliers", str(estimate.count(Status.INLIER))),
         (
             "Outliers by beams, gate",
@@ -67,6 +69,22 @@ def rows(run: RunView) -> list[tuple[str, str]]:
     ]
     truth = result.inputs.log.truth
     return shown if truth is None else [*shown, *((f"True {what}", text) for what, text in truth_told(truth))]
+
+
+def _protection(run: RunView, found: Found | None) -> list[tuple[str, str]]:
+    """How large the error can be at most, and which reflector's failure would make it so."""
+    if found is None or found.levels is None or found.events.inputs.run is not run.result:
+        return []
+    levels, newest = found.levels, run.newest
+    limits = run.segment.setup.parameters.supervisor
+    position, heading, worst = levels.position[newest], levels.heading[newest], int(levels.worst[newest])
+    if not math.isfinite(position):
+        return [("Protection level", "none: not located")]
+    return [
+        ("Protection level / limit", MILLIMETRES.against(position, limits.position_limit)),
+        ("Protection, heading / limit", DEGREES.against(heading, limits.heading_limit, (".2f", ".1f"))),
+        ("Decided by", "noise alone" if worst < 0 else f"{escaped(levels.reflector[worst])}, if it misleads"),
+    ]
 
 
 def rejected_by_beams(run: RunView) -> list[tuple[str, str]]:
@@ -123,5 +141,5 @@ class NowPanel(BasePanel):
         show(self._html, visible=is_shown)
         run = view.part(RunView)
         if run is not None and is_shown:
-            shown = table([*rows(run), *rejected_by_beams(run)])
+            shown = table([*rows(run, view.part(Found)), *rejected_by_beams(run)])
             self._html.content = f"<div class='c-now' style='padding:2px 14px 2px 6px'>{shown}</div>"
