@@ -43,6 +43,7 @@ from commission.app.tune import feature as tune
 from commission.io.findings import Findings
 from commission.io.live.permission import Permission
 from commission.io.project_file import OpenedProject, load_project, open_project
+from commission.io.vda5050_states import StateFile
 from commission.site.project import Project
 
 log = logging.getLogger(__name__)
@@ -80,6 +81,7 @@ def serve(
     recording: Path | None = None,
     demo: bool = False,
     sources: tuple[str, ...] = (),
+    states: StateFile | None = None,
 ) -> None:
     """Serve the page until the program is interrupted.
 
@@ -91,6 +93,7 @@ def serve(
     recording : what to play; none: choose on the page.
     demo : whether the project is a bundled one, which is never written to; its first route is driven at once.
     sources : live ones that are listened to at once, each as `NAME[@SCANNER]:HOST:PORT`.
+    states : where messages of the state of a live vehicle are written.
 
     Raises
     ------
@@ -115,7 +118,7 @@ def serve(
             is_new=opened.is_new,
             reach=reach,
             notes=opened.notes,
-            live=LiveState(sources=sources, permission=permission),
+            live=LiveState(sources=sources, permission=permission, states=states),
         )
         open_things.callback(runtime.stop)
         wait_for_interruption = open_things.enter_context(interruption())

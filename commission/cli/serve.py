@@ -6,11 +6,14 @@ import contextlib
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
 from commission.errors import UsageError
+
+if TYPE_CHECKING:
+    from commission.io.vda5050_states import StateFile
 
 DEFAULT_PORT = 8080
 LAST_PORT = 65535
@@ -40,7 +43,13 @@ class _Page:
     """Whether to open the page in this computer's browser."""
 
     def serve(
-        self, project: Path, recording: Path | None = None, *, demo: bool = False, sources: tuple[str, ...] = ()
+        self,
+        project: Path,
+        recording: Path | None = None,
+        *,
+        demo: bool = False,
+        sources: tuple[str, ...] = (),
+        states: StateFile | None = None,
     ) -> None:
         """Serve the page until it is interrupted."""
         if not 0 <= self.port <= LAST_PORT:
@@ -59,7 +68,9 @@ class _Page:
                 files=tuple(self.files),
                 networks=tuple(self.connect_to),
             )
-            serve(project, access, open_browser=self.open, recording=recording, demo=demo, sources=sources)
+            serve(
+                project, access, open_browser=self.open, recording=recording, demo=demo, sources=sources, states=states
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,6 +103,13 @@ class Serve(_Page):
     sick-safety, cola, nav350, compact, rosbridge. Datagrams come to HOST, an address of this computer; devices are
     connected to."""
 
+    vda5050: Annotated[Path | None, arg(metavar="FILE")] = None
+    """New file for state messages of VDA 5050 of the live vehicle, written while it drives, one JSON object a line."""
+    vda5050_version: Literal["2.1.0", "3.0.0"] = "2.1.0"
+    """Version of these messages."""
+    vda5050_map_id: Annotated[str | None, arg(metavar="ID")] = None
+    """Identification of the map in these messages, as the orders have it. None: the project's name."""
+
     def run(self) -> None:
         """Serve the project; a recording that is none is an error now, not only on the page."""
         if self.recording is not None:
@@ -103,4 +121,12 @@ class Serve(_Page):
 
             for text in self.source:
                 SourceAddress.parse(text)
-        self.serve(self.project, self.recording, sources=tuple(self.source))
+        states = None
+        if self.vda5050 is not None:
+            from commission.io.vda5050_states import StateFile, StateVersion
+
+            if self.vda5050.exists():
+                raise UsageError(f"{self.vda5050} exists; expected a new file for the state messages")
+            version = StateVersion(self.vda5050_version)
+            states = StateFile(path=self.vda5050, map_id=self.vda5050_map_id, version=version)
+        self.serve(self.project, self.recording, sources=tuple(self.source), states=states)

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import itertools
 import json
+import logging
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from enum import StrEnum
 from pathlib import Path
@@ -17,11 +19,16 @@ from typing import Any
 
 import numpy as np
 
+from commission.errors import UsageError
 from commission.geometry.angles import wrap_scalar
-from commission.geometry.arrays import IntArray
-from commission.io.atomic import atomic_file
-from commission.localization.estimate import Mode
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.io.atomic import atomic_file, cannot_write
+from commission.localization.estimate import Estimate, Mode
+from commission.localization.supervisor import position_two_sigma
+from commission.site.parameters import SupervisorParameters
 from commission.studies.run import RunResult
+
+log = logging.getLogger(__name__)
 
 PERIOD_NS = 1_000_000_000
 """Time between two messages at least, where the mode stays [ns]; each change of the mode is told at its own scan."""
@@ -77,23 +84,97 @@ def state_messages(result: RunResult, map_id: str, version: StateVersion = State
     """
     columns = result.columns
     for header, cycle in enumerate(told_cycles(columns.stamps_ns, columns.modes.astype(np.int64)).tolist()):
-        mode = Mode(int(columns.modes[cycle]))
-        x, y, theta = columns.means[cycle].tolist()
-        localized = mode is Mode.OPERATIONAL
-        position: dict[str, Any] = {}
-        if all(map(math.isfinite, (x, y, theta))):
-            position = {"x": x, "y": y, "theta": wrap_scalar(theta), "mapId": map_id}
-            position["localized" if version is StateVersion.V3 else "positionInitialized"] = localized
-            deviation = float(result.position_two_sigma[cycle])
-            position |= {"deviationRange": deviation} if math.isfinite(deviation) else {}
-        errors = [] if localized else [{"errorType": ERROR, "errorDescription": WHY[mode], "errorLevel": "FATAL"}]
-        yield {
-            "headerId": header,
-            "timestamp": timestamp(int(columns.stamps_ns[cycle]), version),
-            **_unknown(version),
-            **({"mobileRobotPosition" if version is StateVersion.V3 else "agvPosition": position} if position else {}),
-            "errors": errors,
-        }
+        mode, stamp_ns = Mode(int(columns.modes[cycle])), int(columns.stamps_ns[cycle])
+        pose = columns.means[cycle], float(result.position_two_sigma[cycle])
+        yield _message((header, stamp_ns), mode, pose, (map_id, version))
+
+
+def _message(
+    head: tuple[int, int], mode: Mode, pose: tuple[FloatArray, float], of: tuple[str, StateVersion]
+) -> dict[str, Any]:
+    """Return a message of number and stamp [ns], mode, pose (3,) with its deviation [m], map and version."""
+    (header, stamp_ns), (mean, deviation), (map_id, version) = head, pose, of
+    x, y, theta = mean.tolist()
+    localized = mode is Mode.OPERATIONAL
+    position: dict[str, Any] = {}
+    if all(map(math.isfinite, (x, y, theta))):
+        position = {"x": x, "y": y, "theta": wrap_scalar(theta), "mapId": map_id}
+        position["localized" if version is StateVersion.V3 else "positionInitialized"] = localized
+        position |= {"deviationRange": deviation} if math.isfinite(deviation) else {}
+    errors = [] if localized else [{"errorType": ERROR, "errorDescription": WHY[mode], "errorLevel": "FATAL"}]
+    return {
+        "headerId": header,
+        "timestamp": timestamp(stamp_ns, version),
+        **_unknown(version),
+        **({"mobileRobotPosition" if version is StateVersion.V3 else "agvPosition": position} if position else {}),
+        "errors": errors,
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StateFile:
+    """Where state messages go while a vehicle drives, and what they say of the map."""
+
+    path: Path
+    """A file that does not exist."""
+    map_id: str | None = None
+    """Identification of the map, as the orders have it; None: the project's name."""
+    version: StateVersion = StateVersion.V2
+    """Of the messages."""
+
+
+class StateStream:
+    """State messages that are written while a vehicle drives, as those of the finished run; called by one thread.
+
+    Parameters
+    ----------
+    given : the file, which is made now.
+    project_name : what the map is called where nothing else is said.
+
+    Raises
+    ------
+    UsageError
+        the file exists: messages are never overwritten.
+    FileFormatError
+        it cannot be written.
+    """
+
+    def __init__(self, given: StateFile, project_name: str) -> None:
+        try:
+            self._file = given.path.open("xb", buffering=0)
+        except FileExistsError:
+            raise UsageError(f"{given.path} exists; expected a new file for the state messages") from None
+        except OSError as error:
+            raise cannot_write(given.path, error) from error
+        self.path = given.path
+        self._of = project_name if given.map_id is None else given.map_id, given.version
+        self._count, self._mode, self._told_ns = 0, -1, 0
+
+    def append(self, estimates: Iterable[Estimate], supervisor: SupervisorParameters) -> None:
+        """Write what is to be told of the newest cycles; a full disk ends the messages and no more.
+
+        Parameters
+        ----------
+        estimates : of the newest cycles, in their order.
+        supervisor : by which the deviation is reckoned.
+        """
+        for estimate in estimates:
+            if estimate.mode == self._mode and estimate.stamp_ns < self._told_ns + PERIOD_NS:
+                continue
+            belief = estimate.posterior
+            deviation = float(position_two_sigma(belief.covariance[np.newaxis], supervisor)[0])
+            head, pose = (self._count, int(estimate.stamp_ns)), (belief.mean, deviation)
+            line = json.dumps(_message(head, estimate.mode, pose, self._of), ensure_ascii=False, allow_nan=False)
+            try:
+                self._file.write(line.encode() + b"\n")
+            except (OSError, ValueError):
+                log.exception("a state message")
+                return
+            self._count, self._mode, self._told_ns = self._count + 1, int(estimate.mode), int(estimate.stamp_ns)
+
+    def close(self) -> None:
+        """End the file."""
+        self._file.close()
 
 
 def told_cycles(stamps_ns: IntArray, modes: IntArray) -> IntArray:

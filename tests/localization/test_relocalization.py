@@ -9,6 +9,7 @@ import pytest
 
 from commission.geometry import se2
 from commission.localization.estimate import Mode, Status
+from commission.localization.hypotheses import hypotheses_of
 from commission.localization.localizer import Localizer
 from commission.localization.run_columns import RunColumns
 from commission.localization.search_map import search_map
@@ -203,3 +204,37 @@ def test_a_vehicle_that_sees_nothing_keeps_looking() -> None:
     columns = run(RecordLog.collect(records), setup, unlocated(setup))
     assert (columns.modes == Mode.INITIALIZING).all()
     np.testing.assert_allclose(columns.covariances[-1], np.diag(np.diag(columns.covariances[0])))
+
+
+def two_halls_alike(seed: int) -> ReflectorMap:
+    """A hall, and 40 m beside it one whose southern reflectors stand alike; in the north of that one there is none."""
+    rng = np.random.default_rng((seed, 3))
+    south = rng.uniform((3.0, 0.0), (17.0, 10.5), (9, 2))
+    north = rng.uniform((3.0, 13.5), (17.0, 20.0), (7, 2))
+    places = [*south, *north, *(south + np.array((40.0, 0.0)))]
+    return ReflectorMap(tuple(Reflector(id=f"R{i}", x=float(x), y=float(y)) for i, (x, y) in enumerate(places)))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_place_that_repeats_is_named_as_ambiguous_and_resolved_by_driving_never_wrongly(seed: int) -> None:
+    setup = LocalizerSetup(
+        reflectors=two_halls_alike(seed),
+        scanners=(dataclasses.replace(ALL_ROUND, reflector_range=6.5),),
+        parameters=Parameters(),
+    )
+    plan = Plan(scans=200, reach=6.5, clutter=0.3, speed=1.6)
+    drive = random_drive(setup, np.random.default_rng(seed), plan)
+    columns = run(drive.log, setup, unlocated(setup))
+    located = int(np.flatnonzero(columns.modes != Mode.INITIALIZING)[0])
+    # In the south, both halls are listed, 40 m apart, each with half of the probability, and none is believed.
+    moment = columns.search(20)
+    assert moment is not None
+    one, other = hypotheses_of(moment)[:2]
+    assert one.pose[0] - other.pose[0] == pytest.approx(np.sign(one.pose[0] - other.pose[0]) * 40.0, abs=0.1)
+    assert min(one.probability, other.probability) > 0.3
+    assert one.agreed == other.agreed == 0
+    assert located > 50
+    # Reflectors of the north, which only one of them has, tell them apart.
+    assert drive.truth[located, 1] > 7.0
+    assert (errors(columns, drive)[located:] < 0.15).all()
+    assert columns.modes[-1] == Mode.OPERATIONAL

@@ -21,6 +21,7 @@ from commission.io.live.registry import SourceAddress
 from commission.io.live.runner import LiveRunner, LiveSnapshot
 from commission.io.live.session import Session
 from commission.io.live.session_recorder import SessionRecorder, new_recording
+from commission.io.vda5050_states import StateStream
 
 FOLLOW_S = 0.1
 """Time after which a live run is looked at again [s]."""
@@ -48,6 +49,7 @@ class LiveService(Service):
         self._shown: LiveSnapshot | None = None
         self._own: tuple[str, ...] = ()
         self._recorder: SessionRecorder | None = None
+        self._states: StateStream | None = None
 
     def start(self) -> None:
         """Connect to what the page begins with."""
@@ -87,7 +89,12 @@ class LiveService(Service):
     def _open(self, effect: OpenSources, state: AppState) -> None:
         names = tuple(scanner.name for scanner in state.project.scanners)
         session = Session.of([SourceAddress.parse(text) for text in effect.sources], names)
-        runner = LiveRunner(session, LiveRun(state.project, effect.start), self._publish)
+        wanted = state.part(LiveState).states
+        if wanted is not None and self._states is None:
+            # One file for all connections: numbers of messages go on.
+            self._states = StateStream(wanted, state.project.name)
+        run = LiveRun(state.project, effect.start)
+        runner = LiveRunner(session, run, self._publish, states=self._states)
         runner.start()
         self._own = own_addresses()
         self._runner = runner
@@ -174,3 +181,5 @@ class LiveService(Service):
             runner.stop()
         if self._recorder is not None:
             self._recorder.close()
+        if self._states is not None:
+            self._states.close()

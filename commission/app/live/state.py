@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from commission.io.live.permission import NEAR, Permission
+from commission.io.vda5050_states import StateFile
 from commission.studies.clock import ClockOffset
 
 
@@ -18,6 +19,8 @@ class LiveState:
     """Pose of base at the first record [m, m, rad]; none: the start of the first route."""
     connected: bool = False
     """Whether they are listened to."""
+    states: StateFile | None = None
+    """Where messages of the vehicle's state are written while it drives; none: nowhere."""
     permission: Permission = NEAR
     """Which sources a browser may name."""
 

@@ -20,6 +20,7 @@ from commission.localization.estimate import Belief, Estimate, Mode
 from commission.localization.growing_run import GrowingRun
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import belief_of
+from commission.site.parameters import SupervisorParameters
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
@@ -79,6 +80,11 @@ class LiveRun:
         self._seen = _StampedRows(2)
         self._newest_ns = self._odometry_ns = 0
         self._spent = 0.0
+
+    @property
+    def supervisor(self) -> SupervisorParameters:
+        """Limits of the supervisor, as they are now."""
+        return self._setup.parameters.supervisor
 
     def take(self, record: Record) -> tuple[Estimate, ...]:
         """Take in one record in its order; returns the estimates that follow."""

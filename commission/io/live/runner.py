@@ -15,6 +15,7 @@ from commission.io.live.registry import SourceAddress
 from commission.io.live.session import Session
 from commission.io.live.session_recorder import SessionRecorder
 from commission.io.live.status import SourceStatus
+from commission.io.vda5050_states import StateStream
 from commission.site.project import Project
 from commission.site.records import Record
 
@@ -58,6 +59,7 @@ class LiveRunner:
     run : not begun.
     publish : takes a snapshot some times in a second, from a thread of its own.
     keep : takes each record in its order, for a recorder.
+    states : takes the messages of the vehicle's state; closing it is the caller's.
     """
 
     def __init__(
@@ -66,10 +68,12 @@ class LiveRunner:
         run: LiveRun,
         publish: Callable[[LiveSnapshot], None],
         keep: Callable[[Record], None] | None = None,
+        states: StateStream | None = None,
     ) -> None:
         self.session, self.run = session, run
         self._publish, self._keep = publish, keep
         self._recorder: SessionRecorder | None = None
+        self._states = states
         self._stopped = threading.Event()
         self._threads = [
             threading.Thread(target=self._localize, name="live localizer", daemon=True),
@@ -117,6 +121,8 @@ class LiveRunner:
         for record in self.session.rest():
             self._take(record)
         last = self.run.end()
+        if self._states is not None:
+            self._states.append(last, self.run.supervisor)
         if self._recorder is not None:
             self._recorder.append_estimates(last)
 
@@ -127,6 +133,8 @@ class LiveRunner:
             is_first = recorder is not None and not recorder.is_begun
             belief = self.run.belief_before(record) if is_first else None
             estimates = self.run.take(record)
+            if self._states is not None:
+                self._states.append(estimates, self.run.supervisor)
             if self._keep is not None:
                 self._keep(record)
             # What waits in the localizer is not in the belief: a recording begins when nothing does.

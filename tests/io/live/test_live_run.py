@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
 from commission.io.bundled import bundled_folder
 from commission.io.live.live_run import LiveRun
@@ -22,6 +24,7 @@ from commission.io.live.virtual_vehicle import addresses_of, send_drive
 from commission.io.project_file import load_project
 from commission.io.recordings.base import load_log
 from commission.io.recordings.csv_writer import write_recording
+from commission.io.vda5050_states import StateFile, StateStream, StateVersion, state_messages
 from commission.localization.estimate import Mode
 from commission.simulation.scenario import records
 from commission.site.project import Project
@@ -238,3 +241,33 @@ def test_a_vehicle_of_which_nobody_says_where_it_starts_is_found_and_again_after
     assert [segment.locate for segment in found.columns.segments] == [False, True]
     driving = modes == Mode.OPERATIONAL
     assert found.position_errors[driving].max() < 0.1
+
+
+def test_state_messages_while_it_drives_are_those_of_the_finished_run(
+    warehouse: Project, drive: list[Record], tmp_path: Path
+) -> None:
+    live = LiveRun(replace(warehouse, routes=()))
+    path = tmp_path / "states.jsonl"
+    stream = StateStream(StateFile(path=path, version=StateVersion.V3), warehouse.name)
+    for record in drive:
+        stream.append(live.take(record), live.supervisor)
+        assert path.read_bytes().endswith(b"\n") or not path.read_bytes()
+    told_at = path.read_text().count("\n")
+    stream.append(live.end(), live.supervisor)
+    stream.close()
+    result = live.so_far().result
+    assert result is not None
+    expected = list(state_messages(result, warehouse.name, StateVersion.V3))
+    written = [json.loads(line) for line in path.read_text().splitlines()]
+    deviations = [
+        [message["mobileRobotPosition"].pop("deviationRange") for message in each] for each in (written, expected)
+    ]
+    # Of one covariance at a time, numpy rounds a square root otherwise than of many.
+    assert deviations[0] == pytest.approx(deviations[1], rel=1e-12)
+    assert written == expected
+    assert told_at >= SECONDS
+    localized = [message["mobileRobotPosition"]["localized"] for message in expected]
+    assert localized[0] is False
+    assert localized[-1] is True
+    with pytest.raises(UsageError, match="exists; expected a new file"):
+        StateStream(StateFile(path=path), "again")
