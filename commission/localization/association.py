@@ -19,7 +19,7 @@ from commission.geometry.gaussian import chi_square_gate
 from commission.localization.consider import BLOCKS, Considering
 from commission.localization.consider_columns import take_out
 from commission.localization.estimate import Status
-from commission.localization.filter_kinds import EKF, innovation_by
+from commission.localization.filter_kinds import innovation_by
 from commission.localization.joint import CAREFUL, EXCLUSIVE, MOST_JOINTLY, decide_together
 from commission.localization.kalman import squared_distance
 from commission.localization.observation import ObservationModel, expect_at
@@ -41,15 +41,15 @@ class Gate(NamedTuple):
     enabled: bool
     d2: float
     """Largest squared Mahalanobis distance of an inlier."""
-    kind: int = EKF
-    """Of the filter, whose innovations are judged: see `filter_kinds`."""
+    kind: int | None = None
+    """Of the filter, None for `ekf`, whose innovations are judged: see `filter_kinds`."""
     method: int = EXCLUSIVE
     """How detections that have to do with each other are decided on: see `methods`."""
     joint: tuple[float, ...] = MOST_JOINTLY * (math.inf,)
     """Largest joint squared Mahalanobis distance of one detection, of two, and so on."""
 
 
-def gate_of(parameters: AssociationParameters, kind: int = EKF) -> Gate:
+def gate_of(parameters: AssociationParameters, kind: int | None = None) -> Gate:
     """Return the gate for two degrees of freedom, range and bearing, of the innovations of a kind of filter."""
     probability = parameters.gate_probability
     joint = tuple(chi_square_gate(probability, 2 * (count + 1)) for count in range(MOST_JOINTLY))
@@ -59,7 +59,7 @@ def gate_of(parameters: AssociationParameters, kind: int = EKF) -> Gate:
 
 @compiled_inline
 def score(  # noqa: PLR0917 - a measurement and a reflector, number by number
-    kind: int,
+    kind: int | None,
     belief: PoseGaussian,
     facing: UnitVector,
     measured_range: float,

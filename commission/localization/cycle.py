@@ -19,7 +19,7 @@ from commission.localization.association import INLIER, NOBODY, Gate, associate
 from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering, considering
 from commission.localization.consider_columns import begin, busy_chunks, put_back, put_block, take_along
 from commission.localization.contour import ACCEPTED, REJECTED, ROWS, USE, ContourModel, ContourScan, observe_contours
-from commission.localization.filter_kinds import INVARIANT, correct_by
+from commission.localization.filter_kinds import correct_by, is_invariant
 from commission.localization.joint import NEAREST
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import Motion, NextOdometry, OdometryNoise, advance, reach
@@ -258,7 +258,7 @@ def with_contours(  # noqa: PLR0917 - the filter's state around one scan
         cross,
         busy,
         figures,
-        model.gate.kind == INVARIANT,
+        is_invariant(model.gate.kind),
     )
 
 

@@ -14,12 +14,27 @@ from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.sigma_points import UNSCENTED_CENTER, correct_by_points, fitted, fitted_innovation
 from commission.site.parameters import FILTER_KINDS, FilterParameters
 
-EKF, UKF, CKF, INVARIANT = range(len(FILTER_KINDS))
+_, UKF, CKF, INVARIANT = range(len(FILTER_KINDS))
 
 
-def filter_kind(parameters: FilterParameters) -> int:
-    """Return the number of a kind, for kernels."""
-    return FILTER_KINDS.index(parameters.kind)
+def filter_kind(parameters: FilterParameters) -> int | None:
+    """Return the number of a kind, for kernels; None for `ekf`.
+
+    None is a type of its own: kernels are compiled for it without the other kinds, which beside it cost a fifth of the
+    time of a cycle.
+    """
+    return FILTER_KINDS.index(parameters.kind) or None
+
+
+@compiled_inline
+def is_invariant(kind: int | None) -> bool:
+    """Whether a kind takes an error of the pose for a motion of the plane.
+
+    Notes
+    -----
+    No formula: it compares.
+    """
+    return False if kind is None else kind == INVARIANT
 
 
 @compiled_inline
@@ -35,7 +50,7 @@ def center_of(kind: int) -> float:
 
 @compiled_inline
 def innovation_by(  # noqa: PLR0917 - a measurement and a reflector, number by number
-    kind: int,
+    kind: int | None,
     belief: PoseGaussian,
     facing: UnitVector,
     measured_range: float,
@@ -56,7 +71,7 @@ def innovation_by(  # noqa: PLR0917 - a measurement and a reflector, number by n
 
     Parameters
     ----------
-    kind : of the filter.
+    kind : of the filter; None: `ekf`.
     belief, facing : before the correction, and the direction of its heading.
     measured_range : range bias already taken off [m].
     ray, aim : the bearing as a direction, of the map and of base.
@@ -70,7 +85,7 @@ def innovation_by(  # noqa: PLR0917 - a measurement and a reflector, number by n
     -----
     No formula: that of the kind.
     """
-    if kind == EKF:
+    if kind is None:
         turn = turn_to(-expected.range_x, -expected.range_y, ray)
         if given is None or work is None:
             return innovation(belief, expected, measured_range, turn, surveyed_variance, model)
@@ -86,7 +101,7 @@ def innovation_by(  # noqa: PLR0917 - a measurement and a reflector, number by n
 
 @compiled_inline
 def correct_by(  # noqa: PLR0917 - a measurement and a reflector, number by number
-    kind: int,
+    kind: int | None,
     belief: PoseGaussian,
     facing: UnitVector,
     measured_range: float,
@@ -104,7 +119,7 @@ def correct_by(  # noqa: PLR0917 - a measurement and a reflector, number by numb
 
     Parameters
     ----------
-    kind : of the filter.
+    kind : of the filter; None: `ekf`.
     belief, facing : before the correction, and the direction of its heading.
     measured_range : range bias already taken off [m].
     aim : measured bearing as a direction, in base.
@@ -116,7 +131,7 @@ def correct_by(  # noqa: PLR0917 - a measurement and a reflector, number by numb
     -----
     No formula: that of the kind.
     """
-    if kind == EKF:
+    if kind is None:
         if given is None or work is None:
             return correct_aimed(belief, facing, measured_range, aim, x, y, surveyed_variance, model)
         return correct_aimed_with(

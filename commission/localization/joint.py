@@ -17,7 +17,7 @@ from commission.geometry.directions import UnitVector, composed, turn_to
 from commission.localization.consider import BLOCKS, PER_SCANNER, Considering, scanner_jacobian, seen_with
 from commission.localization.consider_columns import take_out
 from commission.localization.estimate import Status
-from commission.localization.filter_kinds import INVARIANT, innovation_by
+from commission.localization.filter_kinds import innovation_by, is_invariant
 from commission.localization.invariant import landing
 from commission.localization.kalman import squared_distance
 from commission.localization.observation import ObservationModel, expect_at
@@ -82,7 +82,7 @@ def _no_rivals(detections: int) -> Rivals:
 @compiled
 def decide_together(  # noqa: PLR0917 - the scan's detections and the map, array by array
     method: int,
-    kind: int,
+    kind: int | None,
     gates: tuple[float, ...],
     belief: PoseGaussian,
     facing: UnitVector,
@@ -188,7 +188,7 @@ def _take_off(found: Rivals, group: IntArray, entry: int) -> None:
 def _list_rivals(  # noqa: PLR0917 - a measurement, number by number, and the map
     found: Rivals,
     m: int,
-    kind: int,
+    kind: int | None,
     gate_d2: float,
     belief: PoseGaussian,
     facing: UnitVector,
@@ -246,7 +246,7 @@ def _list_rivals(  # noqa: PLR0917 - a measurement, number by number, and the ma
             r = _insert(found, m, entry, squared_distance(v), squared_distance(v) + math.log(v.s_rr * v.schur))
             if r < 0:
                 continue
-            if kind == INVARIANT:
+            if is_invariant(kind):
                 from_x, from_y = belief.x + view.offset_x, belief.y + view.offset_y
                 seen = landing(from_x, from_y, ray, measured_range, x, y, belief.x, belief.y, 0.5)
                 e, turn = seen.expected, seen.turn

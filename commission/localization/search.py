@@ -11,7 +11,7 @@ from typing import NamedTuple
 from commission.compiled import compiled_inline
 from commission.geometry.directions import UnitVector
 from commission.localization.consider import Considering
-from commission.localization.filter_kinds import EKF, INVARIANT
+from commission.localization.filter_kinds import is_invariant
 from commission.localization.observation import SMALLEST_RANGE, ObservationModel, offset_facing
 from commission.localization.pose_gaussian import PoseGaussian, larger_eigenvalue
 
@@ -123,7 +123,7 @@ def search_radius2(
 
 @compiled_inline
 def radius2_by(  # noqa: PLR0917 - a distance and what bounds it, number by number
-    kind: int, d: float, measured_range: float, view: Viewpoint, model: ObservationModel, largest_variance: float
+    kind: int | None, d: float, measured_range: float, view: Viewpoint, model: ObservationModel, largest_variance: float
 ) -> float:
     """Square of the distance within which to search for reflectors, for a kind of filter [m^2].
 
@@ -138,9 +138,9 @@ def radius2_by(  # noqa: PLR0917 - a distance and what bounds it, number by numb
     on the floor has at most the sigma s + h (r + u) + n of position, heading and noise, so that u <= d (s + h r + n) /
     (1 - d h); derived.
     """
-    if kind == EKF:
+    if kind is None:
         return search_radius2(d, measured_range, view, model, largest_variance)
-    if kind != INVARIANT:
+    if not is_invariant(kind):
         apart = POINTS_APART * (1.0 + 1.0 / d)
         wider = Viewpoint(view.offset_x, view.offset_y, apart * view.position_sigma, apart * view.heading_sigma)
         return search_radius2(d, measured_range, wider, model, largest_variance)

@@ -15,7 +15,7 @@ from commission.localization.consider import ConsiderModel
 from commission.localization.contour import ContourModel, contour_model
 from commission.localization.cross_covariance import Constants, constants_of, contour_constants, survey_variance
 from commission.localization.detector_model import DetectorModel, detector_model
-from commission.localization.filter_kinds import INVARIANT, filter_kind
+from commission.localization.filter_kinds import filter_kind, is_invariant
 from commission.localization.observation import (
     ObservationModel,
     observation_model,
@@ -98,7 +98,7 @@ class LocalizerSetup:
         limits = limits._replace(find_again=limits.find_again and len(index.places) >= FEWEST_TO_FIND)
         kind = filter_kind(self.parameters.filter)
         model = FilterModel(
-            odometry_noise(self.parameters.odometry)._replace(curved=float(kind == INVARIANT)),
+            odometry_noise(self.parameters.odometry)._replace(curved=float(is_invariant(kind))),
             index.cells,
             gate_of(self.parameters.association, kind),
             limits,

@@ -41,7 +41,7 @@ def mapped(*places: tuple[float, float]) -> ReflectorIndex:
 
 
 def associated(
-    method: str, index: ReflectorIndex, detections: np.ndarray, belief: PoseGaussian = SURE, kind: int = 0
+    method: str, index: ReflectorIndex, detections: np.ndarray, belief: PoseGaussian = SURE, kind: int | None = None
 ) -> tuple[list[int], np.ndarray]:
     """Reflector of each detection, -1 where it is rejected, and d2."""
     count = len(detections)

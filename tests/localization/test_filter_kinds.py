@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from commission.geometry import se2
 from commission.geometry.directions import direction_of
 from commission.localization.consider import BLOCKS, Considering, ConsiderModel
-from commission.localization.filter_kinds import FILTER_KINDS, correct_by
+from commission.localization.filter_kinds import FILTER_KINDS, correct_by, filter_kind
 from commission.localization.localizer import Localizer
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import odometry_noise, predict
@@ -40,7 +40,7 @@ def belief_of(mean: Array, cov: Array) -> PoseGaussian:
 def corrected(kind: str, belief: PoseGaussian, z: Array, place: Array, constants=(None, None, 0, 0)):
     aim = direction_of(MODEL.mount_theta + float(z[1]))
     where = (float(place[0]), float(place[1]), 0.0)
-    number = FILTER_KINDS.index(kind)
+    number = filter_kind(FilterParameters(kind=kind))
     return correct_by(number, belief, direction_of(belief.theta), float(z[0]), aim, *where, MODEL, *constants).belief
 
 
