@@ -26,6 +26,14 @@ KEYS_WITH_REFERENCE = [
     ),
     *("anees", "anees_position", "wrong_while_operational"),
 ]
+PROTECTION_KEYS = [
+    "integrity_risk",
+    "protection_position_median_m",
+    "protection_position_p95_m",
+    "protection_heading_p95_rad",
+    "protected_fraction",
+]
+PROTECTION_KEYS_WITH_REFERENCE = ["stanford", "beyond_protection", "beyond_heading_protection"]
 ESTIMATES = "stamp_ns,x,y,theta,var_x,cov_xy,cov_xtheta,var_y,cov_ytheta,var_theta,mode,inliers,outliers"
 DETECTIONS = "stamp_ns,range,bearing,x,y,status,reflector_id,d2,scanner,beams,expected_beams"
 
@@ -40,7 +48,16 @@ def test_the_results_are_those_of_the_recording(commission, project, recording, 
     code, told, err = commission("localize", project, recording, "--out", out)
     assert (code, err) == (0, "")
     summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
-    assert list(summary) == [*KEYS, *KEYS_WITH_REFERENCE, "scanners", "sections", "findings"]
+    assert list(summary) == [
+        *KEYS,
+        *KEYS_WITH_REFERENCE,
+        *PROTECTION_KEYS,
+        *PROTECTION_KEYS_WITH_REFERENCE,
+        *("scanners", "sections", "findings"),
+    ]
+    assert sum(summary["stanford"].values()) == summary["reference_cycles"]
+    assert summary["beyond_protection"] == summary["beyond_heading_protection"] == 0
+    assert summary["position_max_m"] < summary["protection_position_median_m"] < 0.1
     assert summary["cycles"] == 61
     assert summary["duration_s"] == pytest.approx(12.0)
     assert summary["inliers"] + summary["outliers_association"] == 61 * 5
@@ -77,10 +94,12 @@ def test_without_a_reference_the_errors_are_left_out_and_the_route_says_where_it
     assert "errors are unknown" in told
     assert list(json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))) == [
         *KEYS,
+        *PROTECTION_KEYS,
         "scanners",
         "sections",
         "findings",
     ]
+    assert not (tmp_path / "out" / "stanford.png").exists()
 
 
 @pytest.mark.parametrize("form", [["--initial-pose", "-0.1,0.1,-0.01"], ["--initial-pose=-0.1,0.1,-0.01,0.2,0.2,0.1"]])
