@@ -365,16 +365,16 @@ div:has(>.c-tail){{display:none}}
 .c-s-head{{font-size:12px;line-height:26px;padding-left:calc(var(--c-tabs) + 70px);white-space:nowrap;overflow:hidden;
  text-overflow:ellipsis;font-variant-numeric:tabular-nums}}
 .c-s-plots{{flex:1;min-height:0;display:grid;grid-template-columns:5fr 2fr;gap:12px;padding-bottom:15px}}
-.c-s-plot{{position:relative;background:{css(BACKGROUND)};border-radius:3px;font-size:11px;color:#9aa0a8}}
+.c-s-plot{{position:relative;background:{css(BACKGROUND)};border-radius:3px;font-size:11px;color:{css(Surface.AXIS.dark)}}}
 .c-s-plot svg{{position:absolute;inset:0;width:100%;height:100%;fill:none}}
 .c-s-plot svg *{{vector-effect:non-scaling-stroke}}
 .c-s-none{{display:flex;align-items:center;justify-content:center;font-size:12px;padding:8px;text-align:center}}
-.c-s-grid{{stroke:#2f3237;stroke-width:1}}
-.c-s-curve{{stroke:#6b7482;stroke-width:1}}
-.c-s-lit{{stroke:#e8eaee;stroke-width:1.6}}
-.c-s-far{{stroke:{css(POSE)};stroke-width:2;stroke-linecap:round;opacity:.6}}
+.c-s-grid{{stroke:{css(Surface.AXIS_GRID.dark)};stroke-width:1}}
+.c-s-curve{{stroke:{css(Surface.RAY.dark)};stroke-width:1}}
+.c-s-lit{{stroke:{css(SCAN)};stroke-width:1.6}}
+.c-s-far{{stroke:{css(OVER_LIMIT)};stroke-width:2;stroke-linecap:round;opacity:.6}}
 .c-s-mark{{stroke-width:8;stroke-linecap:round}}
-.c-s-band{{fill:{css(POSE)};fill-opacity:.16;stroke:{css(POSE)};stroke-width:1}}
+.c-s-band{{fill:{css(GATE)};fill-opacity:.16;stroke:{css(GATE)};stroke-width:1}}
 .c-s-passed,.c-s-failed{{stroke-width:3;stroke-linecap:round;opacity:.55;stroke:{css(GATE)}}}
 .c-s-failed{{stroke:{css(OUTLIER_DETECTOR)};opacity:.9}}
 .c-s-plot span{{position:absolute;pointer-events:none;white-space:nowrap;font-variant-numeric:tabular-nums}}
@@ -384,10 +384,10 @@ div:has(>.c-tail){{display:none}}
 .c-s-y{{left:3px;line-height:13px}}
 .c-s-title{{right:5px;top:1px}}
 .c-s-name{{bottom:0;transform:translateX(-50%);color:{css(GATE)};font-size:10px;line-height:12px;padding-bottom:1px;
- text-shadow:0 0 3px #000,0 0 3px #000}}
+ text-shadow:0 0 3px {css(BACKGROUND)},0 0 3px {css(BACKGROUND)}}}
 .c-s-line{{position:absolute;left:0;right:0;top:calc(var(--c-at) - 6px);height:12px;cursor:ns-resize;touch-action:none}}
-.c-s-line::before{{content:"";position:absolute;left:0;right:0;top:5px;border-top:2px solid {css(POSE)}}}
-.c-s-line b{{position:absolute;right:6px;bottom:8px;color:{css(POSE)};font-style:normal;font-size:12px}}
+.c-s-line::before{{content:"";position:absolute;left:0;right:0;top:5px;border-top:2px solid {css(OVER_LIMIT)}}}
+.c-s-line b{{position:absolute;right:6px;bottom:8px;color:{css(OVER_LIMIT)};font-style:normal;font-size:12px}}
 .c-holds-threshold .c-s-line{{top:calc(var(--c-held) - 6px)}}
 .c-holds-threshold .c-s-line b{{font-size:0}}
 .c-holds-threshold .c-s-line b::after{{content:var(--c-held-value);font-size:12px}}
