@@ -85,7 +85,7 @@ def write_label(button: GuiButtonHandle, text: str) -> None:
 
 def escaped(text: object) -> str:
     """Return text of a file or a person as html shows it, never as html reads it; a name is no color either."""
-    return html.escape(str(text), quote=True).replace("#", "&#35;")
+    return "&#35;".join(html.escape(part, quote=True) for part in str(text).split("#"))
 
 
 def table(rows: Iterable[tuple[str, str]]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import io
 from collections.abc import Callable
 
@@ -30,9 +31,11 @@ def test_every_paint_gets_its_light_color_wherever_it_is_written() -> None:
 def test_words_that_look_like_a_color_stay_as_they_are() -> None:
     from commission.app.base.panel import escaped
 
-    name = theme.css(Floor.REFLECTOR.dark)
+    name = f'{theme.css(Floor.REFLECTOR.dark)} <O\'Neill> & "co"'
     said = light_text(f"<b>{escaped(name)}</b>")
     assert said == f"<b>{escaped(name)}</b>"
+    assert html.unescape(escaped(name)) == name
+    assert not set(escaped(name)) & set("<>'\"")
 
 
 @pytest.mark.parametrize("count", [6, 9, 16])
