@@ -90,7 +90,7 @@ def test_the_badge_is_gray_and_says_since_when_the_program_is_gone(
 
     if end is signal.SIGSTOP:
         os.kill(process.pid, signal.SIGCONT)
-        until(lambda: badge.evaluate(SAID) == "none", page)
+        until(lambda: badge.evaluate(SAID) == "none", page, 90.0)  # all of the page is sent and drawn again
         assert badge.evaluate(COLOR) != GRAY
     page.close()
 
