@@ -11,7 +11,8 @@
   // Fields that are being typed into have had their say before (entries.js); an open list closes by itself.
   function escape(event) {
     const field = event.target.closest?.("input, textarea, select");
-    if (!field || field.getAttribute("aria-expanded") === "true" || document.querySelector("[role=dialog]")) return;
+    if (!field || field.getAttribute("aria-expanded") === "true") return;
+    if (document.querySelector("[role=dialog]:not([hidden])")) return; // it closes by itself
     field.blur();
     event.stopImmediatePropagation();
     press("Escape", "Escape");
