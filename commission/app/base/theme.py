@@ -146,7 +146,7 @@ FOLDED_PX = 46
 """Height of the bottom strip when its plots are folded away [pixels]."""
 LOW_BOTTOM_PX = 200
 """The same where the window is low."""
-TABS_PX = 138
+TABS_PX = 154
 LEFT_PX = 300
 RIGHT_PX = 290
 
@@ -204,7 +204,9 @@ div:has(>div>.c-bottom){{display:grid;grid-template-columns:repeat(24,minmax(0,1
 div:has(>div>.c-bottom)>:nth-child(-n+5){{grid-row:1}}
 div:has(>div>.c-bottom)>:nth-child(1){{grid-column:13}}
 div:has(>div>.c-bottom)>:nth-child(2){{grid-column:1/span 7;padding-left:var(--c-tabs)!important}}
-div:has(>div>.c-bottom)>:nth-child(2) button{{padding:0 5px!important}}
+div:has(>div>.c-bottom)>:nth-child(2) button{{padding:0 3px!important}}
+[data-dock-strip]:has([role=tab]:nth-child(3):last-child) [role=tab]{{padding-left:6px!important;
+ padding-right:6px!important}}
 div:has(>div>.c-bottom)>:nth-child(3){{grid-column:8/span 2}}
 div:has(>div>.c-bottom)>:nth-child(4){{grid-column:10/span 3}}
 div:has(>div>.c-bottom)>:nth-child(5){{grid-column:14/span 11}}
