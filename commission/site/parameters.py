@@ -415,12 +415,26 @@ class IntegrityParameters:
 
     risk: Annotated[
         float,
-        Quantity(label="Integrity risk", shown=PERCENT, bounds=Bounds.inside(0.0, 0.5), step=0.0001, decimals=9),
+        Quantity(
+            label="Integrity risk",
+            shown=PERCENT,
+            bounds=Bounds.inside(0.0, 0.5),
+            step=0.0001,
+            slider=(0.0001, 1.0),
+            decimals=9,
+        ),
     ] = 1e-5
     """Share of the cycles in which the error may be larger than the protection level, where one reflector misleads."""
     fault_probability: Annotated[
         float,
-        Quantity(label="Misleading", shown=PERCENT, bounds=Bounds.inside(0.0, 1.0), step=0.01, decimals=7),
+        Quantity(
+            label="Misleading",
+            shown=PERCENT,
+            bounds=Bounds.inside(0.0, 1.0),
+            step=0.01,
+            slider=(0.01, 10.0),
+            decimals=7,
+        ),
     ] = 1e-3
     """Probability that a reflector in sight misleads: moved since the survey, or another thing taken for it."""
 

@@ -146,7 +146,7 @@ FOLDED_PX = 46
 """Height of the bottom strip when its plots are folded away [pixels]."""
 LOW_BOTTOM_PX = 200
 """The same where the window is low."""
-TABS_PX = 154
+TABS_PX = 138
 LEFT_PX = 300
 RIGHT_PX = 290
 
@@ -204,9 +204,9 @@ div:has(>div>.c-bottom){{display:grid;grid-template-columns:repeat(24,minmax(0,1
 div:has(>div>.c-bottom)>:nth-child(-n+5){{grid-row:1}}
 div:has(>div>.c-bottom)>:nth-child(1){{grid-column:13}}
 div:has(>div>.c-bottom)>:nth-child(2){{grid-column:1/span 7;padding-left:var(--c-tabs)!important}}
-div:has(>div>.c-bottom)>:nth-child(2) button{{padding:0 3px!important}}
-[data-dock-strip]:has([role=tab]:nth-child(3):last-child) [role=tab]{{padding-left:6px!important;
- padding-right:6px!important}}
+div:has(>div>.c-bottom)>:nth-child(2) button{{padding:0 5px!important}}
+[data-dock-strip]:has([role=tab]:nth-child(3):last-child) [role=tab]{{padding-left:3px!important;
+ padding-right:3px!important}}
 div:has(>div>.c-bottom)>:nth-child(3){{grid-column:8/span 2}}
 div:has(>div>.c-bottom)>:nth-child(4){{grid-column:10/span 3}}
 div:has(>div>.c-bottom)>:nth-child(5){{grid-column:14/span 11}}
@@ -290,7 +290,7 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 .c-before-after tr:first-child td{{opacity:.65}}
 @media (max-width:1500px){{.c-beside{{white-space:normal;width:88px;min-width:0!important;font-size:11px!important;
  line-height:1.25}}}}
-@media (max-width:1270px){{.c-plots-bar{{gap:6px;padding:0 4px}} .c-plots-bar button{{padding:1px 4px}}
+@media (max-width:1290px){{.c-plots-bar{{gap:6px;padding:0 4px}} .c-plots-bar button{{padding:1px 4px}}
  .c-chips{{font-size:10.5px}} .c-whole:disabled{{display:none}} .c-plots-end button{{margin-left:2px}}
  div:has(>div>.c-bottom)>:nth-child(2){{grid-column:1/span 9}}
  div:has(>div>.c-bottom)>:nth-child(2) button{{padding:0 3px!important;font-size:11px!important}}
