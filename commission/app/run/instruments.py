@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from commission.app.base.actions import Envelope, Sender
 from commission.app.base.jobs import Lane
 from commission.app.base.service import Context
@@ -32,7 +34,7 @@ class Instruments:
         """What was found on the newest drive for which that is done; none before the first."""
 
     def take(self, result: RunResult, floor_map: FloorMap | None) -> None:
-        """Find what happened on a drive, what each reflector contributed, and how large its error can be at most.
+        """Find what happened on a drive and what each reflector contributed; then how large its error can be at most.
 
         Parameters
         ----------
@@ -43,13 +45,24 @@ class Instruments:
 
         def look(progress: Progress) -> Found:
             happened = events(EventsInput(result), part(progress, 0.0, 0.4))
-            levels = protection(result.columns, progress=part(progress, 0.4, 0.6))
-            return Found(happened, reflector_figures(figures, part(progress, 0.6, 1.0)), levels)
+            return Found(happened, reflector_figures(figures, part(progress, 0.4, 1.0)))
 
         self._jobs.start("Events and reflectors", look, then=self._keep, is_shown=False)
 
     def _keep(self, found: Found) -> None:
+        """Show what was found, and compute the levels: on a drive of hours they take longer than all the rest."""
         self.found = found
+        self._jobs.start(
+            "Protection levels",
+            lambda progress: replace(found, levels=protection(found.events.inputs.run.columns, progress=progress)),
+            then=lambda whole: self._complete(found, whole),
+            lane=Lane.PATIENT,
+            is_shown=False,
+        )
+
+    def _complete(self, found: Found, whole: Found) -> None:
+        if self.found is found:
+            self.found = whole
 
     def save(self, result: RunResult, window: PlotWindow, sender: Sender) -> None:
         """Write what a browser's plots show, and let it save that.
