@@ -8,7 +8,7 @@ import sys
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, UseAppendAction, arg
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from commission.site.record_log import RecordLog
     from commission.studies.consistency import Consistency
     from commission.studies.detection_rates import DetectionRate
-    from commission.studies.integrity import Protection
     from commission.studies.run import RunResult
     from commission.studies.sections import Section
 
@@ -114,8 +113,11 @@ class Localize:
         if not has_motion(log):
             found = "holds no odometry: between scans nobody knows where the vehicle went"
             raise SourceError(f"{self.recording} {found}; expected odometry, in a bag by --channel odometry=TOPIC")
-        told = given and given.pose, given and given.sigmas
-        start = unknown_start(project, log) if searched else start_of(project, log, *told)
+        start = (
+            unknown_start(project, log)
+            if searched
+            else start_of(project, log, given and given.pose, given and given.sigmas)
+        )
         if self.strict:
             for finding in plausibility(PlausibilityInput.of(project, log)):
                 raise SourceError(f"{self.recording}: {finding}")
@@ -126,7 +128,8 @@ class Localize:
         findings = [*log.notes, *(str(finding) for finding in run_findings(result))]
 
         levels, rates = protection(result.columns), self._rates(project, result)
-        more = protection_entries(result, levels) | {
+        protected = protection_entries(result, levels)
+        more = protected | {
             "scanners": figures_entries(result.scanners),
             "sections": section_entries(cut),
             "findings": findings,
@@ -138,10 +141,10 @@ class Localize:
             write_events(folder, events(EventsInput(result)))
             write_reflector_figures(folder, reflector_figures(ReflectorFiguresInput.of(result, project.floor_map)))
             write_protection(folder, result, levels)
-        lines = [*_report(result, cut), _protected(result, levels), *map(rate_told, rates), *rated]
-        lines += [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
-        lines += [f"Note         {finding}" for finding in findings]
-        sys.stdout.write("\n".join([*lines, *self._messages(project, result), f"Written to   {self.out}"]) + "\n")
+        true = [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
+        lines = [*_report(result, cut), _protected(protected), *map(rate_told, rates), *rated, *true]
+        lines += [*(f"Note         {finding}" for finding in findings), *self._messages(project, result)]
+        sys.stdout.write("\n".join([*lines, f"Written to   {self.out}"]) + "\n")
 
     def _rates(self, project: Project, result: RunResult) -> tuple[DetectionRate, ...]:
         """Count how often reflectors are seen, where that is asked for."""
@@ -265,19 +268,16 @@ def _report(result: RunResult, cut: Sequence[Section]) -> list[str]:
     ]
 
 
-def _protected(result: RunResult, levels: Protection) -> str:
+def _protected(told: dict[str, Any]) -> str:
     """How large the error can be at most, how often that is within the limits, and how often the error was beyond."""
-    from commission.studies.integrity import protection_entries
-
-    told = protection_entries(result, levels)
     median, p95 = (
         "none" if value is None else MILLIMETRES.text(value, ".1f")
         for value in (told["protection_position_median_m"], told["protection_position_p95_m"])
     )
     beyond = f"; error beyond it in {told['beyond_protection']} cycles" if "beyond_protection" in told else ""
     return (
-        f"Protection   position {median} median, {p95} at 95 %, at a risk of {levels.given.risk:g} per cycle; within "
-        f"the limits {PERCENT.text(told['protected_fraction'] or 0.0, '.1f')}{beyond}"
+        f"Protection   position {median} median, {p95} at 95 %, at a risk of {told['integrity_risk']:g} per cycle; "
+        f"within the limits {PERCENT.text(told['protected_fraction'] or 0.0, '.1f')}{beyond}"
     )
 
 
