@@ -205,8 +205,7 @@ div:has(>div>.c-bottom)>:nth-child(-n+5){{grid-row:1}}
 div:has(>div>.c-bottom)>:nth-child(1){{grid-column:13}}
 div:has(>div>.c-bottom)>:nth-child(2){{grid-column:1/span 7;padding-left:var(--c-tabs)!important}}
 div:has(>div>.c-bottom)>:nth-child(2) button{{padding:0 5px!important}}
-[data-dock-strip]:has([role=tab]:nth-child(3):last-child) [role=tab]{{padding-left:3px!important;
- padding-right:3px!important}}
+[data-floating-window]:has(.c-bottom) [role=tab]{{padding-left:3px!important;padding-right:3px!important}}
 div:has(>div>.c-bottom)>:nth-child(3){{grid-column:8/span 2}}
 div:has(>div>.c-bottom)>:nth-child(4){{grid-column:10/span 3}}
 div:has(>div>.c-bottom)>:nth-child(5){{grid-column:14/span 11}}

@@ -18,6 +18,8 @@ from commission.studies.sensor_view import SeenCluster, SensorView
 
 SIDE = 1000.0
 """Side of the pictures before they are stretched."""
+FLAGS_TOP = 2.0
+"""Upper edge where sensors flag reflectors: a flag is 1, and what is written above has its room."""
 FILLED = 0.92
 """Share of the height up to which what is largest reaches."""
 NICE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
@@ -78,7 +80,12 @@ def intensity_picture(view: SensorView, threshold: float, inbox: str) -> str:
     values = _strengths(view)
     bearings = DEGREES.of(scan.bearings)
     low, high = float(bearings.min()), float(bearings.max())
-    top = upper_end(max(float(values.max(initial=0.0)), threshold if view.has_intensities else 1.0))
+    flags = scan.intensities is None
+    top = (
+        FLAGS_TOP
+        if flags
+        else upper_end(max(float(values.max(initial=0.0)), threshold if view.has_intensities else 1.0))
+    )
     x = SIDE * (bearings - low) / max(high - low, 1e-9)
     y, limits = SIDE * (1.0 - height(values, top)), SIDE * (1.0 - height(view.thresholds, top))
     lit = view.reflective
@@ -104,7 +111,7 @@ def intensity_picture(view: SensorView, threshold: float, inbox: str) -> str:
     return (
         f"<div class='c-s-plot c-s-intensity' data-top='{top:.6g}' data-inbox='{inbox}'>"
         f"<svg viewBox='0 0 {SIDE:g} {SIDE:g}' preserveAspectRatio='none'>{grid}{curve}{far}{marks}</svg>"
-        f"{_names(view, low, high)}{words}{_scale(top)}{handle}"
+        f"{_names(view, low, high)}{words}{'' if flags else _scale(top)}{handle}"
         f"<span class='c-s-title'>{_title(view)}</span></div>"
     )
 
