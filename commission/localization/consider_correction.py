@@ -8,9 +8,8 @@ from __future__ import annotations
 import math
 
 from commission.compiled import compiled_inline
-from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray
-from commission.geometry.directions import UnitVector, composed, direction_of, turn_to, turned_by
+from commission.geometry.directions import UnitVector, composed, direction_of, turn_to
 from commission.localization.consider import (
     CLOCK,
     MOUNT_HEADING,
@@ -30,6 +29,7 @@ from commission.localization.kalman import (
     correct,
     corrected_covariance,
     gain,
+    moved_by,
 )
 from commission.localization.observation import Expected, ObservationModel, expect_at, offset_facing
 from commission.localization.pose_gaussian import PoseGaussian
@@ -77,20 +77,8 @@ def correct_aimed_with(  # noqa: PLR0917 - a measurement and a reflector, number
     d = seen_with(facing, e, surveyed_variance, given, work, at)
     v = innovation_with(belief, e, measured_range, turn, model, d)
     k = gain(v)
-    xx, xy, xt, yy, yt, tt = covariance_with(belief, e, k, v, d, 0.0, surveyed_variance, given, work, width, at)
-    heading = k.tr * v.range + k.tb * v.bearing
-    after = PoseGaussian(
-        belief.x + k.xr * v.range + k.xb * v.bearing,
-        belief.y + k.yr * v.range + k.yb * v.bearing,
-        wrap_scalar(belief.theta + heading),
-        xx,
-        xy,
-        xt,
-        yy,
-        yt,
-        tt,
-    )
-    return Corrected(after, turned_by(facing, heading))
+    covariance = covariance_with(belief, e, k, v, d, 0.0, surveyed_variance, given, work, width, at)
+    return moved_by(belief, facing, k, v, covariance)
 
 
 @compiled_inline

@@ -185,18 +185,36 @@ def correct_aimed(  # noqa: PLR0917 - a measurement and a reflector, number by n
     turn = turn_to(-e.range_x, -e.range_y, composed(facing, aim))
     v = innovation(belief, e, measured_range, turn, surveyed_variance, model)
     k = gain(v)
-    xx, xy, xt, yy, yt, tt = corrected_covariance(belief, e, k, v.range_noise, v.bearing_noise)
+    covariance = corrected_covariance(belief, e, k, v.range_noise, v.bearing_noise)
+    return moved_by(belief, facing, k, v, covariance)
+
+
+@compiled_inline
+def moved_by(
+    belief: PoseGaussian,
+    facing: UnitVector,
+    k: Gain,
+    v: Innovation,
+    covariance: tuple[float, float, float, float, float, float],
+) -> Corrected:
+    """Belief after a detection.
+
+    Parameters
+    ----------
+    belief, facing : before it, and the direction of its heading.
+    k, v : gain and innovation.
+    covariance : upper triangle of the one after it, row by row.
+
+    Notes
+    -----
+    x = x + K v: Sobreira et al. 2016, Algorithm 1, line 16.
+    """
     heading = k.tr * v.range + k.tb * v.bearing
     after = PoseGaussian(
         belief.x + k.xr * v.range + k.xb * v.bearing,
         belief.y + k.yr * v.range + k.yb * v.bearing,
         wrap_scalar(belief.theta + heading),
-        xx,
-        xy,
-        xt,
-        yy,
-        yt,
-        tt,
+        *covariance,
     )
     return Corrected(after, turned_by(facing, heading))
 

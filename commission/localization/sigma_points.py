@@ -25,6 +25,7 @@ from commission.localization.kalman import (
     corrected_covariance,
     gain,
     innovation,
+    moved_by,
     with_cross_noise,
 )
 from commission.localization.observation import SMALLEST_RANGE, Expected, ObservationModel
@@ -251,20 +252,8 @@ def correct_by_points(  # noqa: PLR0917 - a measurement and a reflector, number 
     e, k = line.expected, gain(v)
     if given is None or work is None:
         covariance = corrected_covariance(belief, e, k, v.range_noise, v.bearing_noise)
-        xx, xy, xt, yy, yt, tt = with_cross_noise(covariance, k, line.rb)
+        covariance = with_cross_noise(covariance, k, line.rb)
     else:
         d = seen_with(facing, e, surveyed_variance, given, work, at)
-        xx, xy, xt, yy, yt, tt = covariance_with(belief, e, k, v, d, line.rb, surveyed_variance, given, work, width, at)
-    heading = k.tr * v.range + k.tb * v.bearing
-    after = PoseGaussian(
-        belief.x + k.xr * v.range + k.xb * v.bearing,
-        belief.y + k.yr * v.range + k.yb * v.bearing,
-        wrap_scalar(belief.theta + heading),
-        xx,
-        xy,
-        xt,
-        yy,
-        yt,
-        tt,
-    )
-    return Corrected(after, turned_by(facing, heading))
+        covariance = covariance_with(belief, e, k, v, d, line.rb, surveyed_variance, given, work, width, at)
+    return moved_by(belief, facing, k, v, covariance)
