@@ -229,7 +229,7 @@ def beams_picture(view: SensorView) -> str:
     )
     return (
         f"<div class='c-s-plot c-s-beams'><svg viewBox='0 0 {SIDE:g} {SIDE:g}' preserveAspectRatio='none'>"
-        f"{band}{dots}{now}</svg><span class='c-s-top'>{most:g}</span><span class='c-s-x' style='left:50%'>"
+        f"{band}{dots}{now}</svg><span class='c-s-top'>{most:g} beams</span><span class='c-s-x' style='left:50%'>"
         f"{0.5 * reach:g} m</span><span class='c-s-x c-s-end'>{reach:g} m</span>"
         "<span class='c-s-title'>beams over range, drive so far; band: passes</span></div>"
     )
