@@ -263,9 +263,10 @@ def test_csv_folder_becomes_mcap_and_mcap_the_same_csv_folder(tmp_path: Path, ca
     assert names == sorted(path.name for path in (tmp_path / "two").iterdir())
     for name in names:
         if name.endswith(".npz"):
-            one, two = np.load(tmp_path / "one" / name), np.load(tmp_path / "two" / name)
-            for array in one.files:
-                np.testing.assert_array_equal(one[array], two[array])
+            with np.load(tmp_path / "one" / name) as one, np.load(tmp_path / "two" / name) as two:
+                assert sorted(one.files) == sorted(two.files)
+                for array in one.files:
+                    np.testing.assert_array_equal(one[array], two[array])
         else:
             assert (tmp_path / "one" / name).read_text() == (tmp_path / "two" / name).read_text()
     assert run("convert", str(tmp_path / "one"), str(tmp_path / "drive.mcap")) == 2

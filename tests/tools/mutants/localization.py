@@ -31,8 +31,8 @@ LOCALIZATION = (
     Mutant(
         name="gate of one degree of freedom",
         file=FOLDER + "association.py",
-        find="chi_square_gate(parameters.gate_probability, 2)",
-        replace="chi_square_gate(parameters.gate_probability, 1)",
+        find="chi_square_gate(probability, 2), kind",
+        replace="chi_square_gate(probability, 1), kind",
         tests=(TESTS + "test_association.py::test_gate_of_the_parameters_is_that_of_two_degrees_of_freedom", PLAIN),
     ),
     Mutant(

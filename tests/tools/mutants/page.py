@@ -251,7 +251,7 @@ PAGE = (
     Mutant(
         name="fractions cut off a field of whole numbers",
         file=FOLDER + "base/field_widget.py",
-        find="on_page(value)\n    return round(number) if info.kind is int else float(number)",
+        find="on_page(value)\n    return round(number) if info.kind is int else _tidy(info.quantity, float(number))",
         replace="on_page(value)\n    return round(number)",
         tests=(INPUTS + "test_every_number_posts_what_its_label_says_and_is_shown_as_it_was_typed",),
     ),
