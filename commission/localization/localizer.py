@@ -45,6 +45,10 @@ LAST_NS = 2**63 - 1
 """No record is newer [ns]."""
 
 
+WARM_UP_NS, WARM_UP_SCANS = 1_000_000_000, 25
+"""Time of the search that compiles its kernels [ns], and scans in it."""
+
+
 def warm_up() -> None:
     """Compile every kernel that a live localizer needs, by feeding it one record of each kind."""
     sweeping = Scanner(sweep_duration=0.01)
@@ -67,7 +71,22 @@ def warm_up() -> None:
     )
     localizer.feed(Detections(3, np.array([[2.0, 0.0]])))
     localizer.flush()
+    _warm_up_search()
     as_driven(np.zeros((1, 3)), OdometryParameters(forward_scale=0.01))
+
+
+def _warm_up_search() -> None:
+    """Compile what looks for a vehicle that is lost: else the scan with which it is lost waits for that."""
+    places = np.array([[2.0, 0.0], [3.0, 1.5], [1.0, -2.0], [-1.5, 1.0]])
+    reflectors = ReflectorMap(tuple(Reflector(id=f"R{i}", x=x, y=y) for i, (x, y) in enumerate(places.tolist())))
+    setup = LocalizerSetup(reflectors=reflectors, scanners=(Scanner(),), parameters=Parameters())
+    localizer = Localizer(setup, Belief(0, np.zeros(3), 1e-4 * np.eye(3)))
+    localizer.locate()
+    seen = np.column_stack((np.hypot(*places.T), np.arctan2(places[:, 1], places[:, 0])))
+    for stamp_ns in range(0, WARM_UP_NS, WARM_UP_NS // WARM_UP_SCANS):
+        localizer.feed(Odometry(stamp_ns, np.array([0.001, 0.0, 0.0])))
+        localizer.feed(Detections(stamp_ns, seen))
+    localizer.flush()
 
 
 class Localizer:

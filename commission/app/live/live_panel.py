@@ -17,6 +17,7 @@ from commission.app.base.view import PageView
 from commission.app.live.actions import Connect, Disconnect, LocateVehicle, Record, RecordDrive, StopRecording
 from commission.app.live.state import LiveState
 from commission.app.live.view import LiveView, SourceView
+from commission.io.live.accounts import RecordAccount, counted
 from commission.io.live.registry import KINDS
 from commission.io.live.session_recorder import RecordingStatus
 from commission.io.live.status import SourceState, SourceStatus
@@ -99,8 +100,10 @@ class LivePanel(BasePanel):
         show(self._disconnect, visible=connected)
         show(self._locate, visible=connected)
         live = view.part(LiveView) if connected else None
-        write_html(self._table, "" if live is None else live_table(live))
         shown = view.part(LiveView)
+        # What became of the records is said of the run that is over, too.
+        over = "" if shown is None or not shown.account.received else account_html(shown.account, "Last connection: ")
+        write_html(self._table, over if live is None else live_table(live))
         recording = None if shown is None else shown.recording
         records = connected and recording is not None and not recording.is_over
         self._connected, self._drive = connected, view.part(DriveNow)
@@ -138,7 +141,20 @@ def _pose_text(pose: tuple[float, float, float]) -> str:
 def live_table(live: LiveView) -> str:
     """Return the sources as html: state, rate, loss, latency, and what to look at."""
     told = "".join(f"<div class='c-note'>{escaped(line)}</div>" for line in live.told)
-    return f"<div style='font-size:12px;padding:2px 4px'>{''.join(map(_source, live.sources))}{told}</div>"
+    sources, account = "".join(map(_source, live.sources)), account_html(live.account)
+    return f"<div style='font-size:12px;padding:2px 4px'>{sources}{account}{told}</div>"
+
+
+def account_html(account: RecordAccount, what: str = "") -> str:
+    """Return what became of the records, as html: a loss stands out.
+
+    Parameters
+    ----------
+    account : of a connection.
+    what : said before it.
+    """
+    color = f" style='color:{theme.FAIL_COLOR}'" if account.lost else ""
+    return f"<div{color}>{what}{escaped(account.text)}</div>"
 
 
 def _source(source: SourceView) -> str:
@@ -150,6 +166,8 @@ def _source(source: SourceView) -> str:
         f"latency {_milliseconds(status.latency_s)}, jitter {_milliseconds(status.jitter_s)}"
     )
     left_out = [f"{count} {words}" for words, count in (status.told or {}).items()]
+    left_out += [f"{counted(kind, count)} came too late, left out" for kind, count in source.too_late.items()]
+    left_out += [f"{status.overrun} dropped: this computer is too slow"] if status.overrun else []
     left_out += [f"{status.duplicates} came twice"] if status.duplicates else []
     left_out += [f"{status.undecodable} cannot be decoded"] if status.undecodable else []
     notes = "".join(f"<li>{escaped(line)}</li>" for line in (*source.checks, *left_out))

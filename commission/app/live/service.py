@@ -168,11 +168,12 @@ class LiveService(Service):
         if shown is None:
             return ()
         sources = tuple(
-            SourceView(each.address, each.status, checklist(each.address, each.status, self._own))
+            SourceView(each.address, each.status, checklist(each.address, each.status, self._own), each.too_late)
             for each in shown.sources
         )
         told = tuple(f"{count} {words}" for words, count in shown.told.items())
-        return (LiveView(sources, told, None if self._recorder is None else self._recorder.status()),)
+        recording = None if self._recorder is None else self._recorder.status()
+        return (LiveView(sources, told, recording, shown.account),)
 
     def close(self) -> None:
         """Stop listening."""

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
+from commission.io.live.accounts import RecordAccount
 from commission.io.live.registry import SourceAddress
 from commission.io.live.session_recorder import RecordingStatus
 from commission.io.live.status import SourceStatus
+from commission.site.records import Record
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,6 +22,8 @@ class SourceView:
     """How it is doing."""
     checks: tuple[str, ...]
     """What to look at, where it says nothing."""
+    too_late: Mapping[type[Record], int] = field(default_factory=dict[type[Record], int])
+    """Its records that came too late and are left out, by kind."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,6 +33,8 @@ class LiveView:
     sources: tuple[SourceView, ...]
     """Those that are listened to."""
     told: tuple[str, ...]
-    """What was left out or sorted, one line each."""
+    """What was mended, one line each."""
     recording: RecordingStatus | None = None
     """The recording that is made, or was made last."""
+    account: RecordAccount = field(default_factory=RecordAccount)
+    """What became of the records."""

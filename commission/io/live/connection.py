@@ -25,6 +25,8 @@ RETRY_S = (0.1, 0.2, 0.5, 1.0, 2.0)
 """Times before connecting again, the last one for ever [s]."""
 SENDER_LIMIT = 8
 """Senders to one address that are remembered at once."""
+REST_NS = 1_000_000_000
+"""Time after the end in which what had arrived is still received [ns]."""
 LET_GO_NS = 1_000_000_000
 """Time after which another computer may be the scanner that was silent [ns]."""
 
@@ -66,6 +68,11 @@ class LiveSource(Protocol):
         """Return how it is doing."""
         ...
 
+    @property
+    def is_behind(self) -> bool:
+        """Whether something has arrived that was not delivered yet."""
+        ...
+
 
 class Connection:
     """A live source.
@@ -88,6 +95,9 @@ class Connection:
         self._conversations = 0
         self._is_one_scanner = False
         self._host: tuple[str, int] = "", 0
+        self._opened: Opened | None = None
+        self._is_busy = False
+        self._end_ns = 0
 
     def start(self, deliver: Callable[[Arrival], bool]) -> None:
         """Begin to receive; see `LiveSource`."""
@@ -116,6 +126,13 @@ class Connection:
         """Return how it is doing; from any thread."""
         return self._tally.status(self._clock.now_ns(), self._told)
 
+    @property
+    def is_behind(self) -> bool:
+        """Whether something has arrived that was not delivered yet; from any thread."""
+        opened = self._opened
+        # In this order: what has been taken from the system makes it busy before it is taken.
+        return (opened is not None and opened.unread) or self._is_busy
+
     def _run(self, deliver: Callable[[Arrival], bool], opened: Opened | None) -> None:
         """Receive until it is stopped; where a fault of this program ends that, the source has failed and says so."""
         try:
@@ -133,9 +150,12 @@ class Connection:
                 opened = opened or self._link.open()
                 with opened:
                     tries = 0
+                    self._opened = opened
                     self._converse(opened, deliver)
             except (OSError, SourceError) as error:
                 self._tally.trouble = str(error) or type(error).__name__
+            finally:
+                self._opened, self._is_busy = None, False
             opened = None
             if not self._stopped.is_set():
                 self._tally.state = SourceState.CONNECTING
@@ -149,8 +169,10 @@ class Connection:
         if not self._link.listens:
             conversations[None] = self._begun()
             opened.send(conversations[None].driver.greeting())
-        while not self._stopped.is_set():
-            piece = opened.receive()
+        while self._goes_on(opened):
+            self._is_busy = False
+            self._is_busy = opened.arrives()
+            piece = opened.receive() if self._is_busy else None
             arrived_ns = self._clock.now_ns()
             if piece is None:
                 for talk in conversations.values():
@@ -173,6 +195,13 @@ class Connection:
                 self._tally.undecodable += 1
                 self._tally.trouble = str(error)
             opened.send(talk.driver.reply(arrived_ns))
+
+    def _goes_on(self, opened: Opened) -> bool:
+        """Whether there is something to receive: until it is stopped, and then what had arrived by then."""
+        if not self._stopped.is_set():
+            self._end_ns = self._clock.now_ns() + REST_NS
+            return True
+        return opened.unread and self._clock.now_ns() < self._end_ns
 
     def _is_foreign(self, piece: Piece, arrived_ns: int) -> bool:
         """Whether a datagram is of another computer than the scanner that sends: two would be taken for one."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import selectors
 import socket
 from dataclasses import replace
 from types import TracebackType
@@ -32,8 +33,17 @@ class Piece(NamedTuple):
 class Opened(Protocol):
     """An open connection; a context manager that closes it."""
 
+    @property
+    def unread(self) -> bool:
+        """Whether something has arrived that was not received yet; asked by any thread."""
+        ...
+
+    def arrives(self) -> bool:
+        """Wait for a moment; returns whether something is there. Raises OSError or SourceError at its end."""
+        ...
+
     def receive(self) -> Piece | None:
-        """Return what arrives within a moment; None where nothing does. Raises OSError or SourceError at its end."""
+        """Return what is there; None where nothing is. Raises OSError or SourceError at its end."""
         ...
 
     def send(self, data: bytes) -> None:
@@ -69,6 +79,20 @@ class _Closing:
 
     def __init__(self, opened: socket.socket) -> None:
         self.socket = opened
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(opened, selectors.EVENT_READ)
+
+    @property
+    def unread(self) -> bool:
+        """Whether the system has something for it; of one that is being closed, nothing."""
+        try:
+            return bool(self._selector.select(0.0))
+        except (OSError, ValueError, RuntimeError):
+            return False
+
+    def arrives(self) -> bool:
+        """Wait for a moment, without taking what arrives."""
+        return bool(self._selector.select(LOOK_UP_S))
 
     def __enter__(self) -> Self:
         return self
@@ -76,6 +100,7 @@ class _Closing:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._selector.close()
         self.socket.close()
 
 
@@ -137,18 +162,24 @@ class _Stream(_Closing):
         super().__init__(opened)
         self._moments = 0
 
+    def arrives(self) -> bool:
+        """Wait for a moment; raises SourceError after a long silence."""
+        if super().arrives():
+            self._moments = 0
+            return True
+        self._moments += 1
+        if self._moments * LOOK_UP_S > LONGEST_SILENCE_S:
+            raise SourceError(f"nothing came for {LONGEST_SILENCE_S:g} s; it is connected to anew")
+        return False
+
     def receive(self) -> Piece | None:
         """Return what has arrived."""
         try:
             data = self.socket.recv(PIECE_BYTES)
         except TimeoutError:
-            self._moments += 1
-            if self._moments * LOOK_UP_S > LONGEST_SILENCE_S:
-                raise SourceError(f"nothing came for {LONGEST_SILENCE_S:g} s; it is connected to anew") from None
             return None
         if not data:
             raise SourceError("the device has closed the connection")
-        self._moments = 0
         return Piece(data)
 
     def send(self, data: bytes) -> None:

@@ -24,6 +24,7 @@ from commission.site.parameters import SupervisorParameters
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+from commission.site.walls import walls_of
 from commission.studies.run import RunInput, RunResult, judge
 from commission.studies.start import Start, StartOrigin, belief_at, route_start, unknown_start_at
 
@@ -86,13 +87,18 @@ class LiveRun:
         """Limits of the supervisor, as they are now."""
         return self._setup.parameters.supervisor
 
+    def prepare(self) -> None:
+        """Get ready: the first scan of a search else waits for walls of a large floor to be made ready for rays."""
+        walls_of(self._setup.floor)
+
     def take(self, record: Record) -> tuple[Estimate, ...]:
         """Take in one record in its order; returns the estimates that follow."""
         with self._lock:
             # A run without a cycle is empty, and yet the one that was begun.
             run = self._run = self._begun(record) if self._run is None else self._run
             before = time.perf_counter()
-            estimates = run.feed(record)
+            # No estimate depends on a reference, and one may come when later records have been taken.
+            estimates = () if isinstance(record, ReferencePose) else run.feed(record)
             self._spent += time.perf_counter() - before
             self._keep(record)
             return estimates

@@ -6,10 +6,11 @@ import logging
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from commission.errors import SourceError
+from commission.io.live.accounts import RecordAccount
 from commission.io.live.live_run import LiveResult, LiveRun
 from commission.io.live.registry import SourceAddress
 from commission.io.live.session import Session
@@ -36,6 +37,8 @@ class SourceNow:
     """Which one."""
     status: SourceStatus
     """As it is now."""
+    too_late: Mapping[type[Record], int]
+    """Its records that came too late and are left out, by kind."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,7 +50,9 @@ class LiveSnapshot:
     run: LiveResult
     """The run so far."""
     told: dict[str, int]
-    """What was left out or sorted, and how often."""
+    """What was mended, and how often."""
+    account: RecordAccount
+    """What became of the records."""
 
 
 class LiveRunner:
@@ -75,6 +80,7 @@ class LiveRunner:
         self._recorder: SessionRecorder | None = None
         self._states = states
         self._stopped = threading.Event()
+        self._taken = self._refused = 0
         self._threads = [
             threading.Thread(target=self._localize, name="live localizer", daemon=True),
             threading.Thread(target=self._tell, name="live figures", daemon=True),
@@ -109,12 +115,22 @@ class LiveRunner:
 
     def snapshot(self) -> LiveSnapshot:
         """Return how it goes now."""
-        sources = tuple(SourceNow(source.address, source.status()) for source in self.session.sources)
-        told: Counter[str] = Counter(self.session.sorter.told)
+        sorter = self.session.sorter
+        told, late = Counter[str](sorter.told), Counter[tuple[int, type[Record]]](sorter.too_late)
+        sources = tuple(
+            SourceNow(source.address, source.status(), {kind: n for (of, kind), n in late.items() if of == number})
+            for number, source in enumerate(self.session.sources)
+        )
+        kinds = Counter[type[Record]]()
+        for (_, kind), count in late.items():
+            kinds[kind] += count
+        account = RecordAccount.of([each.status for each in sources], self._taken, kinds, self._refused)
         now_ns = None if self._stopped.is_set() else self.session.clock.now_ns()
-        return LiveSnapshot(sources, self.run.so_far(now_ns), {words: count for words, count in told.items() if count})
+        mended = {words: count for words, count in told.items() if count}
+        return LiveSnapshot(sources, self.run.so_far(now_ns), mended, account)
 
     def _localize(self) -> None:
+        self.run.prepare()
         while not self._stopped.is_set():
             for record, _ in self.session.records(WAIT_S):
                 self._take(record)
@@ -133,6 +149,7 @@ class LiveRunner:
             is_first = recorder is not None and not recorder.is_begun
             belief = self.run.belief_before(record) if is_first else None
             estimates = self.run.take(record)
+            self._taken += 1
             if self._states is not None:
                 self._states.append(estimates, self.run.supervisor)
             if self._keep is not None:
@@ -141,6 +158,7 @@ class LiveRunner:
             if recorder is not None and (not is_first or belief is not None):
                 recorder.append(record, estimates, belief)
         except SourceError:
+            self._refused += 1
             log.exception("a record of a live source")
 
     def _tell(self) -> None:

@@ -13,6 +13,10 @@ from commission.io.live.registry import SourceAddress, driver_of
 from commission.io.live.sorter import PATIENCE_NS, Sorter
 from commission.site.records import Record
 
+BEHIND_NS = 2_000_000_000
+"""Time for which this computer may be behind with what has arrived before it is waited for no longer [ns]."""
+LOOK_AGAIN_S = 0.002
+"""Time after which it is looked again whether it still is [s]."""
 QUEUE_LIMIT = 4_096
 """Records that wait to be taken; of more, the newest are dropped and counted."""
 
@@ -68,6 +72,7 @@ class Session:
         self.clock = clock or HostClock()
         self.sorter = Sorter(patience_ns)
         self._queue: Queue[tuple[int, Arrival]] = Queue(QUEUE_LIMIT)
+        self._read_until_ns = self._newest_ns = 0
 
     @staticmethod
     def of(addresses: Sequence[SourceAddress], scanners: tuple[str, ...], patience_ns: int = PATIENCE_NS) -> Session:
@@ -128,20 +133,40 @@ class Session:
         """
         due_ns = self.sorter.next_due_ns()
         if due_ns is not None:
-            wait_s = min(wait_s, max(due_ns - self.clock.now_ns(), 0) * 1e-9)
-        newest_ns = 0
+            left_s = (due_ns - self.clock.now_ns()) * 1e-9
+            wait_s = min(wait_s, left_s if left_s > 0.0 else LOOK_AGAIN_S)
+        now_ns = self._read_until(self.clock.now_ns())
+        self._push(wait_s)
+        for record in self.sorter.due(now_ns):
+            yield record, self._newest_ns
+
+    def _read_until(self, now_ns: int) -> int:
+        """Return the time up to which everything that arrived is in the queue, or should be by now [ns].
+
+        Patience is for what the network has not brought yet. What has arrived and waits for a busy computer to read it
+        is no reason to go on without it.
+        """
+        if any(source.is_behind for source in self.sources):
+            now_ns = max(self._read_until_ns, now_ns - BEHIND_NS)
+        self._read_until_ns = now_ns
+        return now_ns
+
+    def _push(self, wait_s: float) -> None:
+        """Wait for an arrival, and sort all there are."""
         try:
-            number, arrival = self._queue.get(timeout=wait_s) if wait_s > 0.0 else self._queue.get_nowait()
-            while True:
-                newest_ns = arrival.arrived_ns
-                self.sorter.push(number, arrival.record, arrival.arrived_ns, arrival.conversation)
-                for record in self.sorter.due(self.clock.now_ns()):
-                    yield record, newest_ns
+            number, arrival = self._queue.get(timeout=wait_s)
+            # What floods it is sorted in portions: `due` bounds what waits.
+            for _ in range(QUEUE_LIMIT):
+                self._sort(number, arrival)
                 number, arrival = self._queue.get_nowait()
+            self._sort(number, arrival)
         except Empty:
             pass
-        for record in self.sorter.due(self.clock.now_ns()):
-            yield record, newest_ns
+
+    def _sort(self, number: int, arrival: Arrival) -> None:
+        """Push one arrival of a source."""
+        self._newest_ns = arrival.arrived_ns
+        self.sorter.push(number, arrival.record, arrival.arrived_ns, arrival.conversation)
 
     def rest(self) -> Iterator[Record]:
         """Deliver everything that is there, since no more comes."""
@@ -150,5 +175,5 @@ class Session:
                 number, arrival = self._queue.get_nowait()
             except Empty:
                 break
-            self.sorter.push(number, arrival.record, arrival.arrived_ns, arrival.conversation)
+            self._sort(number, arrival)
         yield from self.sorter.rest()

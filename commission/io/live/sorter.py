@@ -34,6 +34,7 @@ FASTEST, JUMP = 20.0, 0.5
 class _Waiting(NamedTuple):
     key: tuple[int, int, int]
     number: int
+    source: int
     arrived_ns: int
     record: Sent
     conversation: int
@@ -61,7 +62,7 @@ class _Channel:
 
 
 class Sorter:
-    """Puts records into the order in which a recording of them is read.
+    """Puts records into the order in which a recording of them is read; references keep an order of their own.
 
     Parameters
     ----------
@@ -71,12 +72,15 @@ class Sorter:
     def __init__(self, patience_ns: int = PATIENCE_NS) -> None:
         self.patience_ns = patience_ns
         self.told: Counter[str] = Counter()
-        """What was left out or mended, in fixed words."""
+        """What was mended, in fixed words."""
+        self.too_late: Counter[tuple[int, type[Record]]] = Counter()
+        """Records that were left out, by number of their source and kind."""
         self._waiting: list[_Waiting] = []
         self._number = 0
         self._channels: dict[tuple[int, int, int], _Channel] = {}
         self._newest: tuple[int, int, int] = (-1, 0, 0)
         self._last: tuple[int, int, int] = (-1, 0, 0)
+        self._last_reference_ns = -1
         self._pose: tuple[int, OdometryPose] | None = None
         self._carried: FloatArray | None = None
 
@@ -97,7 +101,7 @@ class Sorter:
             # The localizer reads no reference: nothing waits for one.
             channel = self._channels.setdefault((source, *key[1:]), _Channel())
             channel.take(record.stamp_ns, arrived_ns)
-        heapq.heappush(self._waiting, _Waiting(key, self._number, arrived_ns, record, conversation))
+        heapq.heappush(self._waiting, _Waiting(key, self._number, source, arrived_ns, record, conversation))
         self._number += 1
 
     def due(self, now_ns: int) -> Iterator[Record]:
@@ -128,14 +132,22 @@ class Sorter:
     def _released(self, waiting: _Waiting) -> Iterator[Record]:
         """Return a record whose turn it is, unless a later one has gone before."""
         record = waiting.record
+        if isinstance(record, ReferencePose):
+            # It waits for nothing and nothing for it: only another reference makes one late.
+            if record.stamp_ns > self._last_reference_ns:
+                self._last_reference_ns = record.stamp_ns
+                yield record
+            else:
+                self.too_late[waiting.source, ReferencePose] += 1
+            return
         is_late = waiting.key <= self._last
+        if is_late:
+            self.too_late[waiting.source, _kind(record)] += 1
         if isinstance(record, OdometryPose):
             if is_late:
-                self.told["records came too late and are left out"] += 1
                 return
             record = self._moved(record, waiting.conversation)
         elif is_late:
-            self.told["records came too late and are left out"] += 1
             if isinstance(record, Odometry):
                 # What the vehicle moved is not forgotten: it belongs to the next record.
                 carried = np.zeros(3) if self._carried is None else self._carried
@@ -163,9 +175,13 @@ class Sorter:
 
 def _key(record: Sent) -> tuple[int, int, int]:
     """Order of delivery: stamp, kind, scanner."""
-    kind = Odometry if isinstance(record, OdometryPose) else type(record)
     scanner = record.scanner if isinstance(record, Scan | Detections) else 0
-    return record.stamp_ns, ORDER_WITHIN_A_STAMP[kind], scanner
+    return record.stamp_ns, ORDER_WITHIN_A_STAMP[_kind(record)], scanner
+
+
+def _kind(record: Sent) -> type[Record]:
+    """Return the kind of record that comes of it."""
+    return Odometry if isinstance(record, OdometryPose) else type(record)
 
 
 def stamped(record: Sent, stamp_ns: int) -> Sent:

@@ -22,6 +22,12 @@ class _Messages:
     def __init__(self, opened: ClientConnection) -> None:
         self._opened = opened
         self._moments = 0
+        self._piece: Piece | None = None
+
+    @property
+    def unread(self) -> bool:
+        """Whether a message waits: not told, since the library takes it from the system by a thread of its own."""
+        return False
 
     def __enter__(self) -> Self:
         return self
@@ -31,19 +37,25 @@ class _Messages:
     ) -> None:
         self._opened.close()
 
-    def receive(self) -> Piece | None:
-        """Return one message."""
+    def arrives(self) -> bool:
+        """Wait for one message for a moment."""
         try:
             data = self._opened.recv(timeout=LOOK_UP_S)
         except TimeoutError:
             self._moments += 1
             if self._moments * LOOK_UP_S > LONGEST_SILENCE_S:
                 raise SourceError(f"nothing came for {LONGEST_SILENCE_S:g} s; it is connected to anew") from None
-            return None
+            return False
         except WebSocketException as error:
             raise SourceError(f"the server has closed the connection ({error})") from error
         self._moments = 0
-        return Piece(data.encode() if isinstance(data, str) else data)
+        self._piece = Piece(data.encode() if isinstance(data, str) else data)
+        return True
+
+    def receive(self) -> Piece | None:
+        """Return the message that has arrived."""
+        piece, self._piece = self._piece, None
+        return piece
 
     def send(self, data: bytes) -> None:
         """Send each line as a text message."""

@@ -15,7 +15,7 @@ import pytest
 from commission.app.base.state import AppState
 from commission.app.live.actions import Connect, Disconnect, Record
 from commission.app.live.effects import OpenSources
-from commission.app.live.live_panel import live_table, start_pose
+from commission.app.live.live_panel import account_html, live_table, start_pose
 from commission.app.live.service import LiveService
 from commission.app.live.state import LiveState
 from commission.app.live.view import LiveView, SourceView
@@ -24,6 +24,7 @@ from commission.app.run.service import RunService
 from commission.app.run.state import RunState
 from commission.app.tune.actions import SetParameter
 from commission.errors import CommissionError, UsageError
+from commission.io.live.accounts import RecordAccount
 from commission.io.live.checklist import checklist
 from commission.io.live.permission import Permission
 from commission.io.live.registry import SourceAddress
@@ -31,6 +32,7 @@ from commission.io.live.status import SourceState, SourceStatus
 from commission.io.live.virtual_vehicle import send_drive
 from commission.localization import localizer
 from commission.simulation.scenario import records
+from commission.site.records import Odometry
 from commission.studies import run
 from commission.studies.run import judged_run
 from tests.app.asking import after
@@ -94,6 +96,8 @@ def test_a_vehicle_that_drives_now_is_shown_grows_and_stays_as_a_run_that_can_be
     over = served.view
     assert over is not None
     assert over.time == pytest.approx(0.5)
+    account = live_of(served).account
+    assert account.received == account.taken + account.lost == len(drive)
     replayed = judged_run(over.result.inputs)
     assert replayed.columns.means.tobytes() == over.result.columns.means.tobytes()
     served.runtime.post(SetParameter("association.gate_probability", 0.6))
@@ -224,6 +228,18 @@ def test_what_a_sender_says_is_shown_as_text() -> None:
     shown = live_table(LiveView((SourceView(address, SourceStatus(state=SourceState.SILENT, silent_s=3.2), ()),), ()))
     assert "<b>:" not in shown.replace("<b>json", "")
     assert "silent for 3 s" in shown
+
+
+def test_what_was_lost_is_shown_with_its_cause_beside_the_source_and_in_all() -> None:
+    address = SourceAddress.parse("json:6061")
+    status = SourceStatus(state=SourceState.RECEIVING, records=50, overrun=2)
+    source = SourceView(address, status, (), {Odometry: 1})
+    account = RecordAccount.of([status], 47, {Odometry: 1})
+    shown = live_table(LiveView((source,), (), account=account))
+    assert "1 odometry record came too late, left out" in shown
+    assert "2 dropped: this computer is too slow" in shown
+    assert "50 records received, 3 lost" in shown
+    assert "none lost" in account_html(RecordAccount(received=50, taken=50), "Last connection: ")
 
 
 def test_a_browser_may_not_make_the_server_connect_anywhere() -> None:

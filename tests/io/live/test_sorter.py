@@ -76,7 +76,7 @@ def test_a_record_that_comes_too_late_is_left_out_and_counted() -> None:
     assert len(list(sorter.due(100 * MS + PATIENCE_NS))) == 1
     sorter.push(1, seen(99), 210 * MS)
     assert list(sorter.due(400 * MS)) == []
-    assert sorter.told["records came too late and are left out"] == 1
+    assert sorter.too_late == {(1, Detections): 1}
 
 
 def test_the_motion_of_odometry_that_came_too_late_is_not_forgotten() -> None:
@@ -137,5 +137,5 @@ def test_whatever_comes_is_delivered_in_order_and_once(coming: list[tuple[int, i
         found += sorter.due(arrived * MS)
     found += sorter.rest()
     assert keys(found) == sorted(set(keys(found)))
-    late = sorter.told["records came too late and are left out"]
+    late = sorter.too_late.total()
     assert len(found) + late == len(coming)
