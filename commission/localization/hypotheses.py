@@ -19,6 +19,7 @@ from commission.localization.search_map import SearchMap
 from commission.localization.search_state import Search, SearchMoment
 from commission.localization.seen_of_late import certain_things, clutter, pairs_of
 from commission.localization.start import CANDIDATES, HYPOTHESES, SAME_HEADING, SAME_PLACE, candidates
+from commission.localization.wall_evidence import NO_BEAMS, wall_beams
 
 ODDS = 1e5
 """How much likelier one hypothesis must be than all others together, and than that what is seen is none of the map's
@@ -68,6 +69,7 @@ def judged_again(search: Search, now_ns: int, around: SearchMap) -> Search:
     for scanner in np.unique(views[:, 3]):
         its = views[:, 3] == scanner
         views[its, 4] = 1.0 / its.sum()
+    beams = wall_beams(search.views, search.ends, search.things) if around.walled else NO_BEAMS
     judge(
         read_only(poses),
         things,
@@ -75,7 +77,7 @@ def judged_again(search: Search, now_ns: int, around: SearchMap) -> Search:
         search.track.y,
         clutter(things, search),
         _prior(search, around),
-        Sights(read_only(views), search.ends, around.eyes, around.walls, around.walled, around.facings),
+        Sights(read_only(views), search.ends, around.eyes, around.walls, around.walled, around.facings, beams),
         around.cells,
         around.places,
         around.offsets,
@@ -142,13 +144,15 @@ def probabilities(hypotheses: FloatArray) -> FloatArray:
 
     Notes
     -----
-    exp(evidence) / (1 + sum exp(evidence)): Bayes, with even odds that what is seen is none of the map's reflectors.
+    exp(evidence) / (exp(n) + sum exp(evidence)): Bayes, with even odds that what is seen is none of the map's
+    reflectors; n is what counts among places alone of the likeliest one's.
     """
     if len(hypotheses) == 0:
         return np.empty(0)
-    most = max(float(hypotheses[:, 9].max()), 0.0)
+    none = float(hypotheses[np.argmax(hypotheses[:, 9]), 12])
+    most = max(float(hypotheses[:, 9].max()), none)
     weights = np.exp(hypotheses[:, 9] - most)
-    return np.asarray(weights / (weights.sum() + math.exp(-most)), dtype=np.float64)
+    return np.asarray(weights / (weights.sum() + math.exp(none - most)), dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -190,7 +194,8 @@ def hypotheses_of(moment: SearchMoment) -> tuple[Hypothesis, ...]:
 def _is_alone(ranked: FloatArray, search: Search) -> bool:
     """Whether the first hypothesis is far likelier than all others, and than none."""
     best = float(ranked[0, 9])
-    others = float(np.exp(np.minimum(ranked[1:, 9] - best, 0.0)).sum()) + math.exp(min(-best, 0.0))
+    none = float(ranked[0, 12])
+    others = float(np.exp(np.minimum(ranked[1:, 9] - best, 0.0)).sum()) + math.exp(min(none - best, 0.0))
     count = len(certain_things(search))
     return others * ODDS <= 1.0 and ranked[0, 10] >= max(FEWEST_FITS, LEAST_SHARE * count)
 

@@ -16,6 +16,7 @@ from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.missed import SEEN, Sights, is_taken, log_missed
 from commission.localization.reflector_index import Cells, nearest_entry
+from commission.localization.wall_evidence import MOST_FOR, log_walls
 
 GATE = 11.8
 """Squared distance up to which a thing is a reflector: 99.7 % of chi-square with 2 degrees of freedom."""
@@ -23,9 +24,10 @@ NEGLIGIBLE = 40.0
 """A hypothesis whose log of the evidence is that far below another one's is not judged to the end."""
 FIT_STEPS = 4
 """Steps of Gauss and Newton; the first associates widely, the last decides."""
-ROW = 12
+ROW = 13
 """Numbers of a hypothesis: x, y, heading of the frame of odometry in the map, its covariance (xx, xy, xt, yy, yt, tt),
-log of the evidence, things that fit a reflector, and in how many scans in a row it was the only one left."""
+log of the evidence, things that fit a reflector, in how many scans in a row it was the only one left, and which part of
+the evidence counts among places alone."""
 
 
 class Prior(NamedTuple):
@@ -96,8 +98,8 @@ def judge(  # noqa: PLR0917 - things, views and the map, array by array
     Notes
     -----
     log evidence = sum of log(SEEN N(d; S) / clutter) over things that fit, + `log_missed` of the reflectors that
-    should be seen and fit no thing, + log((2 pi)^(3/2) det(P)^(1/2) prior): Laplace's approximation of the
-    probability of the things, over that of the same number of things at random places; derived.
+    should be seen and fit no thing, + `log_walls`, + log((2 pi)^(3/2) det(P)^(1/2) prior): Laplace's approximation of
+    the probability of the things, over that of the same number of things at random places; derived.
     """
     taken = np.empty(len(things), dtype=np.int64)
     most = -math.inf
@@ -111,7 +113,7 @@ def judge(  # noqa: PLR0917 - things, views and the map, array by array
             widen = 4.0 if step < 2 else 1.0
             fit = _fit_step(x, y, t, things, base_x, base_y, clutter, widen, cells, places, cell_offsets, taken)
         judged[h, 0], judged[h, 1], judged[h, 2] = x, y, wrap_scalar(t)
-        judged[h, 9], judged[h, 10], judged[h, 11] = -math.inf, fit.fits, 0.0
+        judged[h, 9], judged[h, 10], judged[h, 11], judged[h, 12] = -math.inf, fit.fits, 0.0, 0.0
         xx, xy, xt, yy, yt, tt, det = _inverse3(fit.xx, fit.xy, fit.xt, fit.yy, fit.yt, fit.tt)
         if fit.fits < 2 or not det > 0.0:
             continue
@@ -120,6 +122,9 @@ def judge(  # noqa: PLR0917 - things, views and the map, array by array
         c, s = math.cos(t), math.sin(t)
         density = _density(prior, x + c * base_x - s * base_y, y + s * base_x + c * base_y, t)
         evidence = fit.evidence + 1.5 * math.log(2.0 * math.pi) - 0.5 * math.log(det) + math.log(density)
+        walls = log_walls(x, y, t, sights.beams, sights.walls)
+        evidence += walls
+        judged[h, 12] = max(walls - MOST_FOR, 0.0)
         judged[h, 9] = evidence + log_missed(x, y, t, taken, sights, places, most - NEGLIGIBLE - evidence)
         most = max(most, judged[h, 9])
 

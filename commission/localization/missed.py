@@ -9,6 +9,7 @@ from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.ray_kernels import RayTables, is_line_free
 from commission.localization.beam_ends import HIDDEN, THROUGH, Ends, what_beams_say
+from commission.localization.wall_evidence import NO_BEAMS
 
 SEEN = 0.8
 """Probability that a reflector in free sight is detected again and again: people stand before some, some are down."""
@@ -54,6 +55,8 @@ class Sights(NamedTuple):
     """Whether there is one."""
     facings: FloatArray
     """(N,) direction that a flat reflector faces [rad]; NaN: seen from all sides."""
+    beams: FloatArray = NO_BEAMS
+    """(B, 4) whose ends are compared with the walls, see `wall_beams`; none without a floor map."""
 
 
 @compiled

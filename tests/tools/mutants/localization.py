@@ -15,6 +15,22 @@ RECOVERY = "test_supervisor.py::test_recovers_only_when_every_two_sigma_is_below
 
 LOCALIZATION = (
     Mutant(
+        name="a beam that goes through a wall counts as one that ends at it",
+        file=FOLDER + "wall_evidence.py",
+        find="farthest < length - AT_WALL",
+        replace="farthest < length - 100.0",
+        tests=(TESTS + "test_wall_evidence.py::test_a_beam_counts_by_the_wall_it_ends_at_before_or_behind",),
+    ),
+    Mutant(
+        name="walls speak without limit against that the vehicle is nowhere on the map",
+        file=FOLDER + "hypotheses.py",
+        find="none = float(hypotheses[np.argmax(hypotheses[:, 9]), 12])",
+        replace="none = 0.0",
+        tests=(
+            TESTS + "test_wall_evidence.py::test_walls_speak_more_for_one_place_of_several_than_against_none_of_them",
+        ),
+    ),
+    Mutant(
         name="likelihood with half of ln det S",
         file=FOLDER + "association.py",
         find="d2 + math.log(spread)",
