@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,17 @@ def pytest_configure(config: pytest.Config) -> None:
     """Leave the other tests out when all seeds are asked for."""
     if config.getoption("acceptance") and config.args_source is pytest.Config.ArgsSource.TESTPATHS:
         config.args = [str(REPOSITORY / "tests" / place) for place in WITH_SEEDS]
+
+
+def few_of(all_of: Sequence[Any], few: Collection[Any]) -> list[Any]:
+    """Parameters of a test that runs with those of `few` alone in the test command, and with all of them else."""
+    return [
+        each if each in few else pytest.param(*_together(each), marks=pytest.mark.with_all_seeds) for each in all_of
+    ]
+
+
+def _together(parameters: Any) -> tuple[Any, ...]:
+    return parameters if isinstance(parameters, tuple) else (parameters,)
 
 
 WITH_SEEDS = ("acceptance", "planning/test_placement_small_cases.py")
@@ -67,6 +79,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if config.getoption("acceptance"):
         for item in items:
             item.add_marker(pytest.mark.timeout(LONGEST_WITH_ALL_SEEDS_S))
+    else:
+        left_out = [item for item in items if item.get_closest_marker("with_all_seeds")]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in left_out]
     if hasattr(config, "workerinput"):
         items.sort(key=lambda item: not item.path.relative_to(REPOSITORY).as_posix().startswith(LONGEST_FIRST))
 

@@ -19,7 +19,7 @@ from commission.site.parameters import FilterParameters
 from commission.site.project import Project
 from commission.site.uncertainty import Uncertainty
 from tests.acceptance.judged import judge
-from tests.conftest import Seeds
+from tests.conftest import Seeds, few_of
 from tests.planning.driven import QUICK
 
 DRIVES = 40
@@ -66,7 +66,7 @@ def outcomes(project: Project, seeds: range) -> tuple[Outcome, Outcome]:
     return outcome(True), outcome(False)
 
 
-@pytest.mark.parametrize("site", FEW_DRIVES)
+@pytest.mark.parametrize("site", few_of(tuple(FEW_DRIVES), ("laboratory", "shop_floor")))
 @pytest.mark.parametrize("survey", [0.0, 0.003, 0.01])
 def test_a_filter_that_considers_constants_is_as_sure_as_it_may_be(site: str, survey: float, seeds: Seeds) -> None:
     project, numbers = drawn(site, survey), seeds(FEW_DRIVES[site], DRIVES)

@@ -95,6 +95,7 @@ def test_a_real_robot_is_followed_to_three_centimetres(woods, as_the_tubes_show)
     assert summary["position_rmse_m"] == pytest.approx(math.sqrt(sum(e * e for e in errors) / len(errors)), rel=1e-9)
 
 
+@pytest.mark.with_all_seeds
 def test_a_filter_that_believes_in_a_perfect_course_is_too_sure(woods, tmp_path):
     # The independent filter: 0.0667 m RMS, 0.143 m at most, ANEES 77: real wheels have a slip angle.
     summary = localize(woods, tmp_path, *PERFECT_COURSE, *TUBES)
@@ -112,6 +113,7 @@ def test_the_robot_is_never_called_operational_half_a_metre_off(woods, tmp_path,
         assert any("lost" in finding for finding in summary["findings"])
 
 
+@pytest.mark.with_all_seeds
 def test_with_the_sigmas_of_the_file_and_a_perfect_course_the_robot_is_lost_and_says_so(woods, tmp_path):
     """The covariance cannot see a wrong association; that the filter rejects what is there, the supervisor can.
 

@@ -14,7 +14,7 @@ from commission.simulation.drive import DriveOptions
 from commission.simulation.scenario import virtual_drive
 from commission.site.record_log import RecordLog
 from tests.acceptance.judged import Judged, judge
-from tests.conftest import Seeds
+from tests.conftest import Seeds, few_of
 
 DRIVES = 20
 FEW_DRIVES = 3
@@ -34,7 +34,7 @@ def thinned(log: RecordLog, every: int) -> RecordLog:
     return replace(log, odometry_stamps_ns=log.odometry_stamps_ns[kept], displacements=displacements)
 
 
-@pytest.fixture(scope="module", params=["laboratory", "shop_floor"])
+@pytest.fixture(scope="module", params=few_of(("laboratory", "shop_floor"), ("laboratory",)))
 def drives(request: pytest.FixtureRequest, repository: Path, seeds: Seeds) -> dict[int, list[Judged]]:
     """The drives of a site by odometry rate [1/s], scans at 25 Hz."""
     project = load_project(repository / "maps" / request.param)

@@ -52,6 +52,7 @@ def test_the_shop_floor_needs_fewer_reflectors_than_drawn_by_hand_to_be_as_accur
     check(placed, demands, seeds(2, DRIVES))
 
 
+@pytest.mark.with_all_seeds
 def test_the_warehouse_needs_less_than_half_of_those_drawn_by_hand_to_keep_within_limits(
     repository: Path, seeds: Seeds
 ) -> None:

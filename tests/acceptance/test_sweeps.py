@@ -42,6 +42,7 @@ def laboratory(repository: Path) -> Project:
     return load_project(repository / "maps" / "laboratory")
 
 
+@pytest.mark.with_all_seeds
 def test_a_sweep_of_125_ms_costs_less_than_half_a_millimetre(warehouse: Project, seeds: Seeds) -> None:
     cases = fields_of(0.125)
     once, as_old = (swept(warehouse, cases[name], seeds(1, 3), neglect=False).corrected for name in INSTANTS)
@@ -63,6 +64,7 @@ def test_a_sweep_of_40_ms_at_25_scans_per_second_costs_less_than_half_a_millimet
     assert found.neglected > 2.0 * found.corrected
 
 
+@pytest.mark.with_all_seeds
 def test_an_exact_filter_pays_as_much_for_sweeps_that_are_stamped_with_their_last_beam(
     warehouse: Project, seeds: Seeds
 ) -> None:
