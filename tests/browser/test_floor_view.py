@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from playwright.sync_api import Browser
 
 from commission.app.base import cameras
 from commission.app.run.actions import ChooseSource, Play, VirtualDrive
@@ -27,11 +28,13 @@ def served() -> Iterator[Served]:
     opened.close()
 
 
-@pytest.fixture
-def page(served: Served, window: Callable[..., OpenPage]) -> OpenPage:
-    opened = window(served.server)
+@pytest.fixture(scope="module")
+def page(browser: Browser, served: Served) -> Iterator[OpenPage]:
+    """One window for all tests, in their order."""
+    opened = OpenPage(browser, served.server)
     opened.open(nodes=["/grid/lines"])
-    return opened
+    yield opened
+    opened.close()
 
 
 def settle(page: OpenPage) -> None:
@@ -86,7 +89,6 @@ def test_the_wheel_zooms_to_the_pointer(page: OpenPage) -> None:
 
 
 def test_the_middle_button_moves_the_floor(page: OpenPage) -> None:
-    page.page.wait_for_timeout(FITTED_AFTER_MS)
     at, before = np.array(page.pixel_of(PLACE)), metre(page)
     page.page.mouse.move(*at)
     page.page.mouse.down(button="middle")

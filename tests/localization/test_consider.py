@@ -47,7 +47,7 @@ def surveyed(rng: np.random.Generator, reflectors: ReflectorMap) -> ReflectorMap
 @pytest.mark.parametrize(
     ("plan", "count", "groups"),
     [
-        (Plan(scans=2000, clutter=0.3, reach=7.0, odometry_ns=40_000_000), 1, {}),
+        (Plan(scans=500, clutter=0.3, reach=7.0, odometry_ns=40_000_000), 1, {}),
         (Plan(scans=60, clutter=1.0, scan_offset_ns=7_000_000), 2, {}),
         (Plan(scans=60, odometry_ns=100_000_000, scan_ns=30_000_000), 1, {}),
         (
