@@ -2,21 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
-from playwright.sync_api import Locator
+from playwright.sync_api import Browser, Locator
 
+from commission.app.base.actions import Undo
 from tests.app.sites import room
 from tests.browser.page import OpenPage
 from tests.browser.serving import Served
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
     opened = Served(room())
     yield opened
     opened.close()
+
+
+@pytest.fixture(scope="module")
+def opened(browser: Browser, served: Served) -> Iterator[OpenPage]:
+    """One window for all tests: opening one is what takes longest."""
+    page = OpenPage(browser, served.server)
+    page.open()
+    page.open_tab("Tune")
+    yield page
+    page.close()
+
+
+@pytest.fixture
+def page(opened: OpenPage, served: Served) -> OpenPage:
+    """The window with the project as it was saved."""
+    while served.state.undo:
+        steps = len(served.state.undo)
+        served.runtime.post(Undo())
+        served.until(lambda steps=steps: len(served.state.undo) < steps, 10.0)
+    return opened
 
 
 def box_of(found: Locator) -> dict[str, float]:
@@ -30,11 +51,8 @@ def gate_of(served: Served) -> float:
 
 
 def test_the_gate_has_a_scale_logarithmic_in_what_is_missing_and_its_number_stays_in_percent(
-    served: Served, window: Callable[..., OpenPage]
+    served: Served, page: OpenPage
 ) -> None:
-    page = window(served.server)
-    page.open()
-    page.open_tab("Tune")
     slider = page.row("Gate").locator(".c-tail-slider")
     slider.wait_for()
     box = box_of(slider)
@@ -60,11 +78,8 @@ def test_the_gate_has_a_scale_logarithmic_in_what_is_missing_and_its_number_stay
 
 @pytest.mark.parametrize("label", ["Gate", "Range jump"])
 def test_a_slow_drag_acts_live_and_is_one_undo_step_and_the_next_one_another(
-    served: Served, window: Callable[..., OpenPage], label: str
+    served: Served, page: OpenPage, label: str
 ) -> None:
-    page = window(served.server)
-    page.open()
-    page.open_tab("Tune")
     kind = ".c-tail-slider" if label == "Gate" else ".mantine-Slider-track"
     slider = page.row(label).locator(kind)
     slider.scroll_into_view_if_needed()
@@ -95,11 +110,8 @@ def test_a_slow_drag_acts_live_and_is_one_undo_step_and_the_next_one_another(
 
 
 def test_a_tick_says_where_the_saved_project_has_it_and_the_hint_what_may_be_entered(
-    served: Served, window: Callable[..., OpenPage]
+    served: Served, page: OpenPage
 ) -> None:
-    page = window(served.server)
-    page.open()
-    page.open_tab("Tune")
     row = page.row("Range jump")
     row.scroll_into_view_if_needed()
     saved = box_of(row.locator(".mantine-Slider-mark"))
