@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from playwright.sync_api import Browser
 
 from commission.app.base import theme
 from commission.app.base.panel import clock
@@ -38,15 +39,34 @@ def served() -> Iterator[Served]:
     opened.close()
 
 
-@pytest.fixture
-def page(served: Served, window: Callable[..., OpenPage]) -> OpenPage:
-    opened = window(served.server)
-    opened.open(nodes=["/vehicle"])
+def at_one_second(served: Served, opened: OpenPage) -> OpenPage:
     opened.page.wait_for_function(f"() => {SHOWN}.titles.length === 6")
     served.runtime.post(Seek(1.0))
     served.until(lambda: run_of(served).time == pytest.approx(1.0))
     opened.page.wait_for_function(f"() => {SHOWN}.cursor.time === 1")
     return opened
+
+
+@pytest.fixture(scope="module")
+def shared(browser: Browser, served: Served) -> Iterator[OpenPage]:
+    opened = OpenPage(browser, served.server)
+    opened.open(nodes=["/vehicle"])
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def page(served: Served, shared: OpenPage) -> OpenPage:
+    """The window of all tests that leave it as they found it: opening one is what takes longest."""
+    return at_one_second(served, shared)
+
+
+@pytest.fixture
+def own(served: Served, window: Callable[..., OpenPage]) -> OpenPage:
+    """A window for a test that chooses its plots."""
+    opened = window(served.server)
+    opened.open(nodes=["/vehicle"])
+    return at_one_second(served, opened)
 
 
 def run_of(served: Served) -> RunView:
@@ -117,50 +137,48 @@ def test_a_drag_zooms_all_plots_and_a_double_click_shows_the_whole_run_again(ser
     page.page.wait_for_function(f"() => {SHOWN}.view[0] === 0")
 
 
-def test_plots_are_chosen_by_each_browser_alone(
-    served: Served, page: OpenPage, window: Callable[..., OpenPage]
-) -> None:
+def test_plots_are_chosen_by_each_browser_alone(served: Served, own: OpenPage, window: Callable[..., OpenPage]) -> None:
     other = window(served.server, SMALL)
     other.open(nodes=["/vehicle"])
     other.page.wait_for_function(f"() => {SHOWN}.titles.length === 6")
-    page.press("2σ of heading")
-    page.page.wait_for_function(f"() => {SHOWN}.titles.length === 5")
-    page.press("Rejected by the gate")
-    page.page.wait_for_function(f"() => {SHOWN}.titles.includes('Rejected by the gate [%]')")
+    own.press("2σ of heading")
+    own.page.wait_for_function(f"() => {SHOWN}.titles.length === 5")
+    own.press("Rejected by the gate")
+    own.page.wait_for_function(f"() => {SHOWN}.titles.includes('Rejected by the gate [%]')")
     other.page.wait_for_timeout(500)
     assert len(other.page.evaluate(f"{SHOWN}.titles")) == 6
     assert "2σ of heading [°]" in other.page.evaluate(f"{SHOWN}.titles")
 
 
-def test_two_plots_that_are_pressed_at_once_are_both_taken(page: OpenPage) -> None:
-    before = page.page.evaluate(f"{SHOWN}.titles.length")
+def test_two_plots_that_are_pressed_at_once_are_both_taken(own: OpenPage) -> None:
+    before = own.page.evaluate(f"{SHOWN}.titles.length")
     pressed = ("2σ of heading", "Position error")
-    page.page.evaluate(
+    own.page.evaluate(
         "names => names.forEach(name => [...document.querySelectorAll('.c-chips button')]"
         ".find(each => each.textContent === name).click())",
         pressed,
     )
     on = "[...document.querySelectorAll('.c-chips button[aria-pressed=true]')].map(each => each.textContent)"
-    shown = set(page.page.evaluate(on))
-    page.page.wait_for_timeout(500)
-    assert {title.partition(" [")[0] for title in page.page.evaluate(f"{SHOWN}.titles")} == shown
-    page.page.evaluate(
+    shown = set(own.page.evaluate(on))
+    own.page.wait_for_timeout(500)
+    assert {title.partition(" [")[0] for title in own.page.evaluate(f"{SHOWN}.titles")} == shown
+    own.page.evaluate(
         "names => names.forEach(name => [...document.querySelectorAll('.c-chips button')]"
         ".find(each => each.textContent === name).click())",
         pressed,
     )
-    page.page.wait_for_function(f"count => {SHOWN}.titles.length === count", arg=before)
+    own.page.wait_for_function(f"count => {SHOWN}.titles.length === count", arg=before)
 
 
-def test_the_table_has_the_rows_and_plots_that_are_shown(served: Served, page: OpenPage, tmp_path: Path) -> None:
+def test_the_table_has_the_rows_and_plots_that_are_shown(served: Served, own: OpenPage, tmp_path: Path) -> None:
     for name in ("2σ of heading", "Position error", "Heading error", "2σ of position"):
-        page.press(name)
-    page.page.wait_for_function(f"() => {SHOWN}.titles.length === 2")
-    dragged(page, COUNTS, 4.0, 5.0, 2.0)
-    page.page.wait_for_function("() => !document.querySelector('.c-whole').disabled")
-    begin, end = span_of(page)
-    with page.page.expect_download() as download:
-        page.press("CSV")
+        own.press(name)
+    own.page.wait_for_function(f"() => {SHOWN}.titles.length === 2")
+    dragged(own, COUNTS, 4.0, 5.0, 2.0)
+    own.page.wait_for_function("() => !document.querySelector('.c-whole').disabled")
+    begin, end = span_of(own)
+    with own.page.expect_download() as download:
+        own.press("CSV")
     download.value.save_as(tmp_path / "curves.csv")
     with (tmp_path / "curves.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
