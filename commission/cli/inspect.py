@@ -5,9 +5,13 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, UseAppendAction, arg
+
+if TYPE_CHECKING:
+    from commission.site.project import Project
+    from commission.site.record_log import RecordLog
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,6 +24,9 @@ class Inspect:
     project: Annotated[Path | None, arg(metavar="PROJECT")] = None
     """Project whose scanner and threshold the recording is held against. None: those of a new project."""
 
+    shiny: bool = False
+    """Localize the recording by the project, and list what is as bright as a reflector and none of its map: where, how
+    often, intensity against threshold. `monitor` says what of it is a reflector that was moved or added."""
     strict: bool = False
     """End with an error where something looks wrong."""
     channel: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="KIND=TOPIC")] = ()
@@ -44,7 +51,23 @@ class Inspect:
         true = [] if log.truth is None else [f"True         {line}" for line in truth_lines(log.truth)]
         given = None if self.project is None else load_project(self.project)
         found = plausibility(PlausibilityInput.alone(log) if given is None else PlausibilityInput.of(given, log))
+        bright = self._shiny(given, log) if self.shiny else []
         notes = [f"Note         {finding}" for finding in (*log.notes, *found)]
-        sys.stdout.write("\n".join([*lines, *true, *notes]) + "\n")
+        sys.stdout.write("\n".join([*lines, *true, *bright, *notes]) + "\n")
         if self.strict and found:
             raise SourceError(f"{self.recording}: {len(found)} things look wrong; the first: {found[0]}")
+
+    @staticmethod
+    def _shiny(project: Project | None, log: RecordLog) -> list[str]:
+        """Return a line for each shiny thing; raises UsageError without a project."""
+        from commission.errors import UsageError
+        from commission.localization.setup import LocalizerSetup
+        from commission.studies.run import RunInput, judged_run
+        from commission.studies.shiny import ShinyInput, shiny_things
+        from commission.studies.start import start_of
+
+        if project is None:
+            raise UsageError("--shiny needs a map to know what is a reflector; expected --project PROJECT")
+        columns = judged_run(RunInput.of(project, log, start_of(project, log))).columns
+        found = shiny_things(ShinyInput(log=log, columns=columns, setup=LocalizerSetup.of(project)))
+        return [f"Shiny        {each.text}" for each in found] or ["Shiny        nothing but reflectors of the map"]

@@ -158,14 +158,21 @@ def _clusters(inputs: SensorInput, scan: Scan, cycle: int) -> tuple[SeenCluster,
                 window=(min(low for low, _ in kinds), max(high for _, high in kinds)) if kinds and beams else None,
                 status=Status(status),
                 reflector=ids[reflector] if reflector >= 0 else "",
-                peak=_peak(scan, bearing, beams),
+                peak=peak_of(scan, bearing, beams),
             )
         )
     return tuple(sorted(found, key=lambda each: each.bearing))
 
 
-def _peak(scan: Scan, bearing: float, beams: int) -> float:
-    """Largest intensity of the beams of a cluster [sensor's unit]."""
+def peak_of(scan: Scan, bearing: float, beams: int) -> float:
+    """Return the largest intensity of the beams of a cluster [sensor's unit]; NaN where there is none.
+
+    Parameters
+    ----------
+    scan : that it is in.
+    bearing : of its center, as the scanner reports it [rad].
+    beams : its width; 0: the sensor itself detected.
+    """
     if scan.intensities is None or not beams:
         return math.nan
     middle = (bearing - scan.angle_min) / scan.angle_increment
