@@ -17,6 +17,8 @@ class RecordedStart:
     """(3,) `T_map_base`: x [m], y [m], theta [rad]."""
     covariance: FloatArray
     """(3, 3) of it, symmetric and positive definite."""
+    sought: bool = False
+    """Whether the vehicle looked where it is: pose and covariance are then as wide as the floor."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", frozen(self.pose, (3,), "pose"))

@@ -111,7 +111,8 @@ def start_of(
     if pose is not None:
         return Start(belief_at(first_ns, pose, sigmas), StartOrigin.GIVEN)
     if log.start is not None:
-        return Start(Belief(first_ns, log.start.pose, log.start.covariance), StartOrigin.RECORDED)
+        origin = StartOrigin.SEARCH if log.start.sought else StartOrigin.RECORDED
+        return Start(Belief(first_ns, log.start.pose, log.start.covariance), origin)
     known = np.flatnonzero(
         np.isfinite(log.reference_poses).all(axis=1) & (log.reference_times_ns - first_ns <= NEAR_THE_START_NS)
     )

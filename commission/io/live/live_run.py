@@ -111,6 +111,12 @@ class LiveRun:
             belief = belief_of(self._run.state)
             return belief if belief.stamp_ns >= self._odometry_ns else None
 
+    @property
+    def is_sought(self) -> bool:
+        """Whether the vehicle looks where it is."""
+        with self._lock:
+            return self._pose is None if self._run is None else self._run.state.search is not None
+
     def end(self) -> tuple[Estimate, ...]:
         """Process what waits, since no more comes; returns the estimates that follow."""
         with self._lock:

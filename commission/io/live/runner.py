@@ -148,6 +148,7 @@ class LiveRunner:
             recorder = self._recorder
             is_first = recorder is not None and not recorder.is_begun
             belief = self.run.belief_before(record) if is_first else None
+            sought = is_first and self.run.is_sought
             estimates = self.run.take(record)
             self._taken += 1
             if self._states is not None:
@@ -156,7 +157,7 @@ class LiveRunner:
                 self._keep(record)
             # What waits in the localizer is not in the belief: a recording begins when nothing does.
             if recorder is not None and (not is_first or belief is not None):
-                recorder.append(record, estimates, belief)
+                recorder.append(record, estimates, belief, sought=sought)
         except SourceError:
             self._refused += 1
             log.exception("a record of a live source")

@@ -81,7 +81,9 @@ class SessionRecorder:
         """Whether a record is in it."""
         return self._recorder is not None
 
-    def append(self, record: Record, estimates: Iterable[Estimate], before: Belief | None) -> None:
+    def append(
+        self, record: Record, estimates: Iterable[Estimate], before: Belief | None, *, sought: bool = False
+    ) -> None:
         """Append a record and what followed from it; a file that cannot be written ends the recording and no more.
 
         Parameters
@@ -89,6 +91,7 @@ class SessionRecorder:
         record : in its order.
         estimates : that the localizer gave when it was fed the record.
         before : what was known of the pose before the record; read of the first one, where odometry begins.
+        sought : whether the vehicle looked where it is then.
         """
         with self._lock:
             if self._is_over:
@@ -97,7 +100,7 @@ class SessionRecorder:
                 if self._recorder is None:
                     names = tuple(scanner.name for scanner in self._scanners)
                     mounted = self._scanners
-                    start = None if before is None else RecordedStart(before.mean, before.covariance)
+                    start = None if before is None else RecordedStart(before.mean, before.covariance, sought)
                     self._recorder = Recorder(self.path, names, mounted=mounted, start=start, file=self._file)
                     if before is not None and before.stamp_ns < record.stamp_ns:
                         # Else the first displacement would have no begin.

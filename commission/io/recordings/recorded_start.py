@@ -25,11 +25,14 @@ class StartDocument:
     """x [m], y [m], theta [rad] of base, map frame."""
     covariance: tuple[tuple[float, ...], ...]
     """Its 3 x 3 covariance."""
+    sought: bool = False
+    """Whether the vehicle looked where it is."""
 
 
 def recorded_start_text(start: RecordedStart) -> str:
     """Return a start as text; what is read from it is the same to the last bit."""
-    return json.dumps({"schema": SCHEMA, "pose": start.pose.tolist(), "covariance": start.covariance.tolist()})
+    text = {"schema": SCHEMA, "pose": start.pose.tolist(), "covariance": start.covariance.tolist()}
+    return json.dumps(text | ({"sought": True} if start.sought else {}))
 
 
 def recorded_start_of(path: Path, text: str) -> RecordedStart:
@@ -40,7 +43,7 @@ def recorded_start_of(path: Path, text: str) -> RecordedStart:
     refuse_other_versions(document, values.get("schema", SCHEMA), SCHEMA)
     keys = convert(document, StartDocument)
     try:
-        return RecordedStart(keys.pose, keys.covariance)  # pyright: ignore[reportArgumentType]
+        return RecordedStart(keys.pose, keys.covariance, keys.sought)  # pyright: ignore[reportArgumentType]
     except ValueError as error:
         found, _, expected = str(error).partition("; expected ")
         raise FileFormatError(path, "start", found, expected) from error

@@ -14,6 +14,7 @@ from commission.progress import Progress, silent
 from commission.site.recorded_start import RecordedStart
 from commission.site.scanner import Scanner
 from commission.studies.run import RunInput
+from commission.studies.start import StartOrigin
 
 MCAP = ".mcap"
 TELL_EVERY = 500
@@ -45,7 +46,7 @@ def write_run(
         raise UsageError(f"{path} is no name for a recording; expected one that ends in {MCAP}")
     refuse_files(path, force=False)
     log, belief = inputs.log, inputs.start.belief
-    start = RecordedStart(belief.mean, belief.covariance)
+    start = RecordedStart(belief.mean, belief.covariance, inputs.start.origin is StartOrigin.SEARCH)
     cycle, count = 0, len(log)
     with atomic_file(path) as file:
         recorder = Recorder(

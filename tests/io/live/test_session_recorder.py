@@ -6,6 +6,7 @@ import itertools
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from commission.io.live.session_recorder import SessionRecorder, new_recording
 from commission.io.project_file import load_project
 from commission.io.recordings.base import load_log
 from commission.io.recordings.recorded_start import recorded_start_of, recorded_start_text
+from commission.localization.estimate import Mode
 from commission.simulation.scenario import records
 from commission.site.project import Project
 from commission.site.recorded_start import RecordedStart
@@ -86,6 +88,34 @@ def test_a_recording_that_began_on_the_way_starts_where_the_vehicle_was(
     assert len(again.columns) > 50
     # The supervisor and what was remembered begin anew; the pose does not.
     np.testing.assert_allclose(again.columns.means, behind, atol=2e-3)
+
+
+@pytest.mark.parametrize("first", [0, 5])
+def test_a_recording_that_begins_while_the_vehicle_looks_where_it_is_looks_again(
+    first: int, warehouse: Project, drive: list[Record], tmp_path: Path
+) -> None:
+    run, recorder = LiveRun(replace(warehouse, routes=())), SessionRecorder(tmp_path / "x.mcap", warehouse.scanners)
+    for number, record in enumerate(drive):
+        belief, sought = run.belief_before(record), run.is_sought
+        estimates = run.take(record)
+        if recorder.is_begun or (number >= first and belief is not None):
+            recorder.append(record, estimates, belief, sought=sought)
+    run.end()
+    recorder.close()
+    live = run.so_far().result
+    log = load_log(tmp_path / "x.mcap")
+    # The project has a route, and yet the recording says that nobody knew where it was.
+    start = start_of(warehouse, log)
+    assert start.origin is StartOrigin.SEARCH
+    again = judged_run(RunInput.of(warehouse, log, start))
+    assert live is not None
+    assert again.columns.modes[0] == Mode.INITIALIZING
+    assert again.columns.modes[-1] == Mode.OPERATIONAL
+    if first == 0:
+        for name in ("stamps_ns", "means", "covariances", "modes", "status", "reflector"):
+            assert getattr(again.columns, name).tobytes() == getattr(live.columns, name).tobytes(), name
+    else:
+        np.testing.assert_allclose(again.columns.means[-1], live.columns.means[-1], atol=2e-3)
 
 
 def test_what_the_localizer_made_of_it_stands_beside_the_raw_data(
