@@ -7,6 +7,7 @@ from pathlib import Path
 
 from commission.app.base.actions import Action
 from commission.app.base.drive_now import DriveNow
+from commission.studies.arrival import ArrivalOffset
 from commission.studies.clock import ClockOffset
 from commission.studies.run import RunInput
 
@@ -84,6 +85,14 @@ class ClocksFound(Action):
 @dataclass(frozen=True, slots=True)
 class UseClocks(Action):
     """Set the clocks to what motion says, where it says it: one undo step."""
+
+
+@dataclass(frozen=True, slots=True)
+class UseArrivalClocks(Action):
+    """Set the clocks to what arrival says, where it says that they are others: one undo step."""
+
+    found: tuple[ArrivalOffset, ...]
+    """What it says."""
 
 
 @dataclass(frozen=True, slots=True)

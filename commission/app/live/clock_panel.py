@@ -13,13 +13,16 @@ from commission.app.base.inputs import Inputs, show, write_html
 from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.live.actions import FindClocks, SetClock, UseClocks
+from commission.app.live.actions import FindClocks, SetClock, UseArrivalClocks, UseClocks
 from commission.app.live.state import ClockState
 from commission.app.live.view import LiveView
 from commission.errors import UsageError
 from commission.site.quantity import MILLIMETRES, MILLISECONDS
+from commission.studies.arrival import ArrivalOffset
 from commission.studies.clock import ClockOffset, ClockVerdict, displacement, speed_at
 
+LONG = 10.0
+"""Time from which on an offset is told in seconds [s]."""
 STANDING = 0.02
 """Speed below which the effect is told for another one [m/s]."""
 REMARK = "What this scanner's clock shows more than the vehicle's: positive where scans are stamped late."
@@ -50,6 +53,14 @@ class ClockPanel(BasePanel):
                 "Use what motion says", color="gray", hint="Sets the clocks that the drive shows.", visible=False
             )
             self._use.on_click(posting(post, lambda _event: UseClocks()))
+            self._take = gui.add_button(
+                "Use what arrival says",
+                color="gray",
+                hint="Sets the clocks of scanners whose scans are stamped as they arrive, and so later than odometry.",
+                visible=False,
+            )
+            self._take.on_click(posting(post, lambda _event: UseArrivalClocks(self._arrival)))
+            self._arrival: tuple[ArrivalOffset, ...] = ()
             self._html = gui.add_html("")
 
     def _build(self, state: AppState) -> None:
@@ -91,6 +102,12 @@ class ClockPanel(BasePanel):
         clocks = {scanner.name: scanner.clock_offset for scanner in view.state.project.scanners}
         usable = (each.differs_from(clocks[each.scanner]) for each in found if each.scanner in clocks)
         show(self._use, visible=any(usable))
+        live = view.part(LiveView)
+        self._arrival = () if live is None else live.clocks
+        show(
+            self._take,
+            visible=any(each.scanner in clocks and each.differs_from(clocks[each.scanner]) for each in self._arrival),
+        )
         write_html(self._html, clocks_html(view))
 
 
@@ -113,6 +130,9 @@ def clocks_html(view: PageView) -> str:
         )
         if scanner.name in found:
             lines.append(_motion(found[scanner.name], scanner.clock_offset, speed, usual))
+        arrived = None if live is None else next((each for each in live.clocks if each.scanner == scanner.name), None)
+        if arrived is not None:
+            lines.append(_by_arrival(arrived, scanner.clock_offset, speed, usual))
     if live is not None:
         lines += [_arrival(str(each.address), each.status.latency_s) for each in live.sources]
     return f"<div style='font-size:12px;padding:2px 4px'>{''.join(lines)}</div>"
@@ -137,6 +157,21 @@ def _motion(each: ClockOffset, allowed: float, speed: float, usual: float) -> st
     note = f"<div class='c-note'>{escaped(each.reason)}</div>" if each.reason else ""
     value = f"{MILLISECONDS.number(each.offset, '+.1f')} ± {MILLISECONDS.text(each.sigma, '.1f')}"
     return f"<div>By motion: {value} (1σ), {each.verdict}{more}{note}</div>"
+
+
+def _by_arrival(each: ArrivalOffset, allowed: float, speed: float, usual: float) -> str:
+    """Say what arrival told of a clock."""
+    sigma = MILLISECONDS.text(each.sigma, ".1f")
+    if each.offset is None:
+        own = each.clocks or 0.0
+        size = MILLISECONDS.number(own, "+.1f") if abs(own) < LONG else f"{own:+.4f} s"
+        told = f"its clock shows {size} ± {sigma} (1σ) more than the vehicle's, drift {1e6 * each.drift:+.0f} µs/s"
+        return f"<div>By arrival: {told}; this connection takes that out</div>"
+    left = each.offset - allowed
+    more = f"; not allowed for: {MILLISECONDS.text(left, '+.1f')}{_effect(left, speed, usual)}"
+    agrees = more if each.differs_from(allowed) else ", agrees with what is allowed for"
+    late = MILLISECONDS.number(each.offset, "+.1f")
+    return f"<div>By arrival: scans are stamped {late} ± {sigma} (1σ) later than odometry{agrees}</div>"
 
 
 def _arrival(address: str, latency_s: float) -> str:

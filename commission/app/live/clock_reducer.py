@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from commission.app.base.actions import Sender
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
-from commission.app.live.actions import ClocksFound, FindClocks, SetClock, UseClocks
+from commission.app.live.actions import ClocksFound, FindClocks, SetClock, UseArrivalClocks, UseClocks
 from commission.app.live.effects import StudyClocks
 from commission.app.live.state import ClockState
 from commission.errors import UsageError
 from commission.site.fields import with_field
 from commission.site.project import Project
+from commission.studies.arrival import ArrivalOffset
+from commission.studies.clock import ClockOffset
 
 
 @reduce.register
@@ -40,16 +42,27 @@ def clocks_found(action: ClocksFound, state: AppState, _sender: Sender) -> Outco
 @reduce.register
 def use_clocks(_action: UseClocks, state: AppState, sender: Sender) -> Outcome:
     """Set all clocks of which the drive says that they are others."""
+    return _used(state, state.part(ClockState).found, ("the drive", Edit("set clocks by motion", sender)))
+
+
+@reduce.register
+def use_arrival_clocks(action: UseArrivalClocks, state: AppState, sender: Sender) -> Outcome:
+    """Set all clocks of which arrival says that they are others."""
+    return _used(state, action.found, ("arrival", Edit("set clocks by arrival", sender)))
+
+
+def _used(state: AppState, found: Sequence[ClockOffset] | Sequence[ArrivalOffset], by: tuple[str, Edit]) -> Outcome:
+    """Set what is found of clocks; raises UsageError where none is another one than the project says."""
     clocks = {scanner.name: scanner.clock_offset for scanner in state.project.scanners}
     shown = {
         each.scanner: each.offset
-        for each in state.part(ClockState).found
+        for each in found
         if each.scanner in clocks and each.differs_from(clocks[each.scanner])
     }
     if not shown:
-        raise UsageError("the drive shows no clock that is another one; expected one that differs by more than 2-sigma")
+        raise UsageError(f"{by[0]} shows no clock that is another one; expected one that differs by more than 2-sigma")
     project = _with_clocks(state.project, shown)
-    return Outcome(state if project is state.project else edited(state, project, Edit("set clocks by motion", sender)))
+    return Outcome(state if project is state.project else edited(state, project, by[1]))
 
 
 def _with_clocks(project: Project, offsets: Mapping[str, object]) -> Project:

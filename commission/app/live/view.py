@@ -10,6 +10,7 @@ from commission.io.live.registry import SourceAddress
 from commission.io.live.session_recorder import RecordingStatus
 from commission.io.live.status import SourceStatus
 from commission.site.records import Record
+from commission.studies.arrival import ArrivalOffset
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,3 +39,5 @@ class LiveView:
     """The recording that is made, or was made last."""
     account: RecordAccount = field(default_factory=RecordAccount)
     """What became of the records."""
+    clocks: tuple[ArrivalOffset, ...] = ()
+    """What arrival says of the scanners' clocks."""

@@ -18,8 +18,9 @@ from commission.io.live.driver import Driver
 from commission.io.live.links import Link, Opened, Piece
 from commission.io.live.registry import SourceAddress
 from commission.io.live.sorter import stamped
-from commission.io.live.status import Numbers, SourceState, SourceStatus, Tally
+from commission.io.live.status import ODOMETRY, Arrivals, Numbers, SourceState, SourceStatus, Tally
 from commission.io.protocols.message import LiveMessage, Sent
+from commission.site.records import Detections, ReferencePose, Scan
 
 RETRY_S = (0.1, 0.2, 0.5, 1.0, 2.0)
 """Times before connecting again, the last one for ever [s]."""
@@ -71,6 +72,10 @@ class LiveSource(Protocol):
     @property
     def is_behind(self) -> bool:
         """Whether something has arrived that was not delivered yet."""
+        ...
+
+    def times(self) -> dict[int, Arrivals]:
+        """Return when records of each kind (index of the scanner, or ODOMETRY) were measured and arrived."""
         ...
 
 
@@ -132,6 +137,10 @@ class Connection:
         opened = self._opened
         # In this order: what has been taken from the system makes it busy before it is taken.
         return (opened is not None and opened.unread) or self._is_busy
+
+    def times(self) -> dict[int, Arrivals]:
+        """Return when the last records of each kind were measured and arrived; from any thread."""
+        return self._tally.times()
 
     def _run(self, deliver: Callable[[Arrival], bool], opened: Opened | None) -> None:
         """Receive until it is stopped; where a fault of this program ends that, the source has failed and says so."""
@@ -221,6 +230,7 @@ class Connection:
         self._is_one_scanner = driver.is_one_scanner
         self._conversations += 1
         self._tally.connects += 1
+        self._tally.forget_times()
         return _Conversation(driver, self._conversations)
 
     def _deliver(
@@ -232,14 +242,25 @@ class Connection:
         if talk.place.begun_again != before:
             self._conversations += 1
             talk.number, talk.numbers = self._conversations, Numbers()
+            self._tally.forget_times()
         lost = talk.numbers.taken(message.sequence)
         if lost is None:
             self._tally.duplicates += 1
             return
         self._tally.lost = max(self._tally.lost + lost, 0)
         self._tally.arrived(arrived_ns, None if message.device_ns is None else arrived_ns - stamp_ns)
+        kind = _kind(message.record)
+        if kind is not None:
+            self._tally.timed(kind, message.device_ns, arrived_ns)
         if not deliver(Arrival(stamped(message.record, stamp_ns), arrived_ns, talk.number)):
             self._tally.overrun += 1
+
+
+def _kind(record: Sent) -> int | None:
+    """Index of the scanner that a record is of, or ODOMETRY; None of a reference."""
+    if isinstance(record, Scan | Detections):
+        return record.scanner
+    return None if isinstance(record, ReferencePose) else ODOMETRY
 
 
 class _Conversation:

@@ -83,6 +83,11 @@ class LiveRun:
         self._spent = 0.0
 
     @property
+    def scanner_names(self) -> tuple[str, ...]:
+        """Names of the scanners that it began with."""
+        return self._names
+
+    @property
     def supervisor(self) -> SupervisorParameters:
         """Limits of the supervisor, as they are now."""
         return self._setup.parameters.supervisor

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections import Counter
@@ -19,6 +20,7 @@ from commission.io.live.status import SourceStatus
 from commission.io.vda5050_states import StateStream
 from commission.site.project import Project
 from commission.site.records import Record
+from commission.studies.arrival import ArrivalOffset
 
 log = logging.getLogger(__name__)
 
@@ -26,6 +28,8 @@ TELL_S = 0.1
 """Time from one snapshot to the next [s]."""
 TELLING_SHARE = 0.1
 """Share of its time that telling may take: of a run of hours, figures come less often."""
+CLOCKS_S = 2.0
+"""Time from one look at what arrival says of the clocks to the next [s]."""
 WAIT_S = 0.1
 
 
@@ -53,6 +57,8 @@ class LiveSnapshot:
     """What was mended, and how often."""
     account: RecordAccount
     """What became of the records."""
+    clocks: tuple[ArrivalOffset, ...] = ()
+    """What arrival says of the scanners' clocks."""
 
 
 class LiveRunner:
@@ -81,6 +87,7 @@ class LiveRunner:
         self._states = states
         self._stopped = threading.Event()
         self._taken = self._refused = 0
+        self._clocks: tuple[ArrivalOffset, ...] = ()
         self._threads = [
             threading.Thread(target=self._localize, name="live localizer", daemon=True),
             threading.Thread(target=self._tell, name="live figures", daemon=True),
@@ -127,7 +134,7 @@ class LiveRunner:
         account = RecordAccount.of([each.status for each in sources], self._taken, kinds, self._refused)
         now_ns = None if self._stopped.is_set() else self.session.clock.now_ns()
         mended = {words: count for words, count in told.items() if count}
-        return LiveSnapshot(sources, self.run.so_far(now_ns), mended, account)
+        return LiveSnapshot(sources, self.run.so_far(now_ns), mended, account, self._clocks)
 
     def _localize(self) -> None:
         self.run.prepare()
@@ -163,8 +170,11 @@ class LiveRunner:
             log.exception("a record of a live source")
 
     def _tell(self) -> None:
+        looked = -math.inf
         while not self._stopped.is_set():
             before = time.perf_counter()
+            if before - looked > CLOCKS_S:
+                looked, self._clocks = before, self.session.clocks(self.run.scanner_names)
             self._publish(self.snapshot())
             spent = time.perf_counter() - before
             self._stopped.wait(max(TELL_S, spent / TELLING_SHARE))

@@ -11,7 +11,9 @@ from commission.io.live.connection import Arrival, Connection, LiveSource
 from commission.io.live.links import Link, TcpLink, UdpLink
 from commission.io.live.registry import SourceAddress, driver_of
 from commission.io.live.sorter import PATIENCE_NS, Sorter
+from commission.io.live.status import ODOMETRY, Arrivals
 from commission.site.records import Record
+from commission.studies.arrival import ArrivalOffset, arrival_offset
 
 BEHIND_NS = 2_000_000_000
 """Time for which this computer may be behind with what has arrived before it is waited for no longer [ns]."""
@@ -167,6 +169,23 @@ class Session:
         """Push one arrival of a source."""
         self._newest_ns = arrival.arrived_ns
         self.sorter.push(number, arrival.record, arrival.arrived_ns, arrival.conversation)
+
+    def clocks(self, names: Sequence[str]) -> tuple[ArrivalOffset, ...]:
+        """Return what arrival says of the scanners' clocks; nothing of one that too little came of, or no odometry.
+
+        Parameters
+        ----------
+        names : of the vehicle's scanners.
+        """
+        kinds: dict[int, Arrivals] = {}
+        for source in self.sources:
+            for kind, times in source.times().items():
+                kinds.setdefault(kind, times)
+        driven = kinds.pop(ODOMETRY, None)
+        if driven is None:
+            return ()
+        found = (arrival_offset(names[kind], kinds[kind], driven) for kind in sorted(kinds) if kind < len(names))
+        return tuple(each for each in found if each is not None)
 
     def rest(self) -> Iterator[Record]:
         """Deliver everything that is there, since no more comes."""

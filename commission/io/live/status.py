@@ -7,8 +7,13 @@ from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
+
+Arrivals: TypeAlias = tuple[NDArray[np.int64] | None, NDArray[np.int64]]
+"""Times by a device's clock, None where it says none, and times of arrival [ns]."""
 
 RECENT_NS = 2_000_000_000
 """Time over which rate, latency and jitter are taken [ns]."""
@@ -17,6 +22,10 @@ SILENT_AFTER_S = 1.0
 SEEN = 256
 """Numbers of messages that are remembered: one that comes again is a duplicate."""
 RECENT_LIMIT = 4_096
+ARRIVALS = 1_500
+"""Arrivals of each kind that are kept for its clock: a minute of scans."""
+ODOMETRY = -1
+"""Kind of arrivals that is odometry; of scans and detections it is the scanner's index."""
 LARGEST_GAP = 100_000
 """Numbers that are further apart are those of a sender that counts anew."""
 
@@ -112,6 +121,7 @@ class Tally:
         self.undecodable = self.overrun = self.connects = 0
         self.trouble = ""
         self.last_ns: int | None = None
+        self._times: dict[int, deque[tuple[int | None, int]]] = {}
 
     def arrived(self, arrived_ns: int, late_ns: int | None) -> None:
         """Count a record.
@@ -126,6 +136,35 @@ class Tally:
             self.last_ns = arrived_ns
             self.state = SourceState.RECEIVING
             self._arrivals.append((arrived_ns, float("nan") if late_ns is None else late_ns * 1e-9))
+
+    def timed(self, kind: int, device_ns: int | None, arrived_ns: int) -> None:
+        """Keep when a record was measured and when it arrived.
+
+        Parameters
+        ----------
+        kind : index of its scanner, or ODOMETRY.
+        device_ns : time by its sender's clock [ns]; None where it says none.
+        arrived_ns : time of arrival [ns].
+        """
+        with self._lock:
+            self._times.setdefault(kind, deque(maxlen=ARRIVALS)).append((device_ns, arrived_ns))
+
+    def forget_times(self) -> None:
+        """Begin anew: another clock is behind what comes."""
+        with self._lock:
+            self._times.clear()
+
+    def times(self) -> dict[int, Arrivals]:
+        """Return when the last records of each kind were measured, None where their sender says no time, and came."""
+        with self._lock:
+            kept = {kind: list(rows) for kind, rows in self._times.items()}
+        return {
+            kind: (
+                None if any(device is None for device, _ in rows) else np.array([row[0] for row in rows], np.int64),
+                np.array([row[1] for row in rows], np.int64),
+            )
+            for kind, rows in kept.items()
+        }
 
     def status(self, now_ns: int, told: Counter[str]) -> SourceStatus:
         """Return the source as it is at a time [ns]."""

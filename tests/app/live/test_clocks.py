@@ -10,11 +10,13 @@ import pytest
 from commission.app.base.drive_now import DriveNow
 from commission.app.base.state import AppState
 from commission.app.base.view import view_of
-from commission.app.live.actions import ClocksFound, FindClocks, SetClock, UseClocks
+from commission.app.live.actions import ClocksFound, FindClocks, SetClock, UseArrivalClocks, UseClocks
 from commission.app.live.clock_panel import clocks_html
 from commission.app.live.state import ClockState
+from commission.app.live.view import LiveView
 from commission.app.run.actions import Play, VirtualDrive
 from commission.errors import UsageError
+from commission.studies.arrival import ArrivalOffset
 from commission.studies.clock import ClockOffset, ClockVerdict
 from commission.studies.run import RunInput, judged_run
 from commission.studies.start import Start, StartOrigin
@@ -64,6 +66,29 @@ def test_the_panel_says_what_a_clock_comes_to_at_the_speed_of_now() -> None:
     # By hand it goes at 0.1889 rad/s times 5.493 m = 1.037 m/s then: 10.4 mm in ten milliseconds, 20.7 in twenty.
     assert "+10.0 ms allowed for: 10.4 mm at 1.04 m/s now" in html
     assert "By motion: +30.0 ± 0.9 ms (1σ), found; not allowed for: +20.0 ms: 20.7 mm at 1.04 m/s now" in html
+
+
+def arrival(clocks: float | None, late: float | None) -> ArrivalOffset:
+    return ArrivalOffset(scanner="scanner", clocks=clocks, offset=late, sigma=0.0003, drift=2e-5)
+
+
+def test_what_arrival_says_stands_beside_motion_with_its_effect_and_is_used_where_scans_are_stamped_late() -> None:
+    late = arrival(None, 0.012)
+    live = LiveView((), (), clocks=(late,))
+    html = clocks_html(view_of(page(), live))
+    # The fastest route of the site is driven at 1 m/s: 12 mm in twelve milliseconds.
+    speed = max(route.speed for route in PROJECT.routes) if PROJECT.routes else 1.0
+    assert "scans are stamped +12.0 ± 0.3 ms (1σ) later than odometry; not allowed for: +12.0 ms" in html
+    assert f"{12.0 * speed:.1f} mm at {speed:.2f} m/s" in html
+    used = after(page(), UseArrivalClocks((late,))).state
+    assert used.project.scanners[0].clock_offset == 0.012
+    assert len(used.undo) == 1
+    assert "agrees with what is allowed for" in clocks_html(view_of(used, live))
+    own = arrival(0.0372, None)
+    html = clocks_html(view_of(page(), LiveView((), (), clocks=(own,))))
+    assert "its clock shows +37.2 ± 0.3 ms (1σ) more than the vehicle's, drift +20 µs/s" in html
+    with pytest.raises(UsageError, match="arrival shows no clock that is another one"):
+        after(page(), UseArrivalClocks((own,)))
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from commission.io.live.connection import Arrival
 from commission.io.live.registry import SourceAddress
 from commission.io.live.session import BEHIND_NS, Session, connection_of
 from commission.io.live.sorter import PATIENCE_NS, Sorter
-from commission.io.live.status import SourceState, SourceStatus
+from commission.io.live.status import Arrivals, SourceState, SourceStatus
 from commission.io.protocols.message import Sent
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
 from tests.io.live.virtual import NAMES, Sending, until
@@ -38,6 +38,9 @@ class Reading:
 
     def status(self) -> SourceStatus:
         return SourceStatus(state=SourceState.RECEIVING)
+
+    def times(self) -> dict[int, Arrivals]:
+        return {}
 
 
 class Hall:
