@@ -31,6 +31,7 @@ from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.tags import Tag, TagCamera
 from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
 
@@ -73,6 +74,10 @@ class ProjectDocument:
     """What a virtual drive suffers."""
     stations: tuple[Station, ...] = ()
     """Places where the vehicle has to stand accurately."""
+    tags: tuple[Tag, ...] = ()
+    """Landmarks that tell place and heading at once."""
+    tag_camera: TagCamera = field(default_factory=TagCamera)
+    """The camera that sees them."""
     layout: LayoutBrief = field(default_factory=LayoutBrief)
     """What is asked of a suggested layout of reflectors."""
 
@@ -152,6 +157,8 @@ def load_project(path: Path, found: Findings | None = None) -> Project:
             uncertainty=keys.uncertainty,
             disturbances=_disturbances(document, keys),
             stations=keys.stations,
+            tags=keys.tags,
+            tag_camera=keys.tag_camera,
             layout=keys.layout,
         )
     except ProjectError as error:

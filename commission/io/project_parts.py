@@ -30,11 +30,12 @@ from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.tags import Tag, TagCamera
 from commission.site.uncertainty import Uncertainty
 
-_LISTS = {"reflectors": "id", "scanners": "name", "routes": "name", "stations": "name"}
+_LISTS = {"reflectors": "id", "scanners": "name", "routes": "name", "stations": "name", "tags": "id"}
 """Parts that are lists, and the field that tells their elements apart."""
-_WHOLE = ("name", "parameters", "uncertainty", "disturbances", "layout")
+_WHOLE = ("name", "parameters", "uncertainty", "disturbances", "layout", "tag_camera")
 """Parts that are written as they are."""
 
 
@@ -53,6 +54,8 @@ class _Parts:
     reflectors: tuple[Reflector, ...] = ()
     routes: tuple[Route, ...] = ()
     stations: tuple[Station, ...] = ()
+    tags: tuple[Tag, ...] = ()
+    tag_camera: TagCamera = field(default_factory=TagCamera)
 
 
 def change(before: Project | None, after: Project, *, with_map: bool = True) -> dict[str, Any]:

@@ -23,6 +23,7 @@ from commission.site.fields import fields_of, in_file
 from commission.site.layout_brief import LayoutBrief
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
+from commission.site.tags import TagCamera
 
 _PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_./ ()-]*")
 _WIDTH = 110
@@ -50,6 +51,8 @@ def project_text(project: Project, schema: int, floor_map: str | None, reflector
         *_entry("scanners", project.scanners, "", ""),
         *_entry("routes", project.routes, "", ""),
         *(_entry("stations", project.stations, "", "") if project.stations else ()),
+        *(_entry("tags", project.tags, "", "") if project.tags else ()),
+        *(_entry("tag_camera", project.tag_camera, "", "") if project.tag_camera != TagCamera() else ()),
         "parameters:",
         *_fields(project.parameters, "  "),
         "uncertainty:",

@@ -27,21 +27,23 @@ class ContourScans(NamedTuple):
     scanners: IntArray
 
 
-def contour_scans(log: RecordLog, setup: LocalizerSetup, scans: tuple[int, int], cycles: int) -> ContourScans | None:
+def contour_scans(
+    log: RecordLog, setup: LocalizerSetup, scans: tuple[int, IntArray], cycles: int
+) -> ContourScans | None:
     """Read the scans of a stretch of cycles; None where contours are not looked at.
 
     Parameters
     ----------
     log : all records of the drive.
     setup : says whether they are.
-    scans : first cycle of the stretch, and how many of its cycles are scans: all of them are delivered before any
-        detections of the sensor itself.
+    scans : number of the first scan of the stretch, and which of its cycles are scans: all of them are delivered
+        before any detections of the sensor itself.
     cycles : of the stretch.
     """
     if setup.contour is None:
         return None
-    first, count = scans
-    numbers, indices = log.scan_order[first : first + count], setup.indices_of(log.scanners)
+    first, among = scans
+    numbers, indices = log.scan_order[first : first + len(among)], setup.indices_of(log.scanners)
     widest = max((int(each.beams.max(initial=0)) for each in log.scans), default=0)
     ranges = np.full((cycles, widest), np.nan, dtype=np.float32)
     angles, scanners = np.zeros((2, cycles)), np.zeros(cycles, dtype=np.int64)
@@ -50,9 +52,10 @@ def contour_scans(log: RecordLog, setup: LocalizerSetup, scans: tuple[int, int],
         where = np.flatnonzero((numbers >= start) & (numbers < start + len(each)))
         if len(where):
             block = each.block(int(numbers[where[0]]) - start, int(numbers[where[-1]]) - start + 1)
-            ranges[where, : block.ranges.shape[1]] = block.ranges
-            angles[0, where], angles[1, where] = block.angle_min, block.angle_increment
-            scanners[where] = indices[each.scanner]
+            rows = among[where]
+            ranges[rows, : block.ranges.shape[1]] = block.ranges
+            angles[0, rows], angles[1, rows] = block.angle_min, block.angle_increment
+            scanners[rows] = indices[each.scanner]
         start += len(each)
     return ContourScans(read_only(ranges), read_only(angles[0]), read_only(angles[1]), read_only(scanners))
 

@@ -14,6 +14,7 @@ from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.site.parameters import ContourParameters
 from commission.site.reflectors import Reflector
 from commission.site.scanner import Scanner
+from commission.site.tags import Tag, TagCamera
 from commission.site.uncertainty import Uncertainty
 
 Constants = tuple[Hashable, ...]
@@ -77,6 +78,27 @@ def contour_constants(parameters: ContourParameters) -> Constants:
     """What is considered of contours, behind all other constants: how far the map is off where the vehicle is."""
     known = (parameters.map_sigma, parameters.map_heading_sigma, parameters.map_correlation)
     return (("map x", *known), ("map y", *known), ("map heading", *known))
+
+
+def tag_constants(tags: Sequence[Tag], camera: TagCamera, uncertainty: Uncertainty) -> Constants:
+    """What is considered of the camera that looks for tags, then of each tag; none where the site has no tags.
+
+    Parameters
+    ----------
+    tags : of the site.
+    camera : that sees them.
+    uncertainty : 1-sigma of mounting and clock.
+    """
+    if not tags:
+        return ()
+    at = tuple(map(float, camera.mounting))
+    place, heading = ("tag camera", *at, uncertainty.mounting_position), ("tag camera", *at, uncertainty.mounting_heading)
+    constants: list[Hashable] = [("mounting x", *place), ("mounting y", *place), ("mounting heading", *heading)]
+    constants.append(("clock", "tag camera", uncertainty.clock))
+    for tag in tags:
+        known = (tag.id, tag.x, tag.y, tag.heading, tag.sigma, tag.heading_sigma)
+        constants += [("tag x", *known), ("tag y", *known), ("tag heading", *known)]
+    return tuple(constants)
 
 
 def columns_of(cross: CrossCovariance | None, constants: Constants | None) -> FloatArray | None:

@@ -24,7 +24,7 @@ from commission.localization.joint import NEAREST
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import Motion, NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
-from commission.localization.rejection import rejects_the_world, weigh
+from commission.localization.rejection import Evidence, rejects_the_world, weigh
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
 from commission.localization.supervisor import FAIL, LOST, OPERATIONAL, supervise
@@ -184,31 +184,56 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         said_by_contours(figures),
         model.rejection,
     )
-    was_lost = state.mode == LOST
-    mode = supervise(FAIL if was_lost else state.mode, posterior, model.limits)
+    return Cycle(prior, supervised(state, stamp_ns, posterior, motion, evidence, pivot, model))
+
+
+@compiled_inline
+def supervised(  # noqa: PLR0917 - what a cycle has found, value by value
+    before: FilterState,
+    stamp_ns: int,
+    posterior: PoseGaussian,
+    motion: Motion,
+    evidence: Evidence,
+    pivot: tuple[float, float],
+    model: FilterModel,
+) -> FilterState:
+    """State after a cycle, whatever kind of observation it was.
+
+    Parameters
+    ----------
+    before : state before it.
+    stamp_ns : of the cycle [ns].
+    posterior, motion : belief after all corrections, and motion up to the stamp.
+    evidence : what was accepted and rejected of late, this cycle included.
+    pivot : where `cross` is about [m].
+    model : of the whole filter.
+
+    Notes
+    -----
+    No formula: `supervise`, Sobreira et al. 2016, Algorithm 4; then the rule by rejections, which overrules it.
+    """
+    was_lost = before.mode == LOST
+    mode = supervise(FAIL if was_lost else before.mode, posterior, model.limits)
     if evidence.confirmed < model.rejection.confirmations:
         mode = FAIL
     if rejects_the_world(was_lost, evidence, model.rejection):
         mode = LOST
-    output, output_ns = state.output, state.output_ns
+    output, output_ns = before.output, before.output_ns
     if mode == OPERATIONAL:
         output, output_ns = posterior, stamp_ns
-    return Cycle(
-        prior,
-        FilterState(
-            posterior,
-            stamp_ns,
-            motion,
-            mode,
-            evidence,
-            output,
-            output_ns,
-            stamp_ns,
-            state.sensor_detects,
-            pivot,
-            state.cross,
-            state.search,
-        ),
+    return FilterState(
+        posterior,
+        stamp_ns,
+        motion,
+        mode,
+        evidence,
+        output,
+        output_ns,
+        stamp_ns,
+        before.sensor_detects,
+        pivot,
+        before.cross,
+        before.search,
     )
 
 

@@ -22,6 +22,7 @@ from commission.localization.detector import (
 )
 from commission.localization.detector_model import BeamColumns, DetectorModel, beams_at, beams_of
 from commission.localization.setup import LocalizerSetup
+from commission.localization.tag_frames import TagCycles, among, in_turn
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanLog
 
@@ -47,6 +48,8 @@ class DetectionLog:
     """(n,) width that the likeliest kind of reflector has there [beams]; NaN where nobody knows."""
     status: NDArray[np.int8]
     """(n,) `Status.INLIER`, or `Status.OUTLIER_DETECTOR` for a rejected cluster."""
+    tags: TagCycles | None = None
+    """What the camera that looks for tags saw; None where the log has no frames of it."""
 
     def __len__(self) -> int:
         """Return the number of scans."""
@@ -65,6 +68,7 @@ class DetectionLog:
             self.beams[rows],
             self.expected[rows],
             self.status[rows],
+            None if self.tags is None else self.tags.part(first, last),
         )
 
 
@@ -77,6 +81,25 @@ def cycle_stamps(log: RecordLog, *, sensor_detects: bool = False) -> IntArray:
         sensor's own detections are delivered first.
     sensor_detects : whether it has done so before this log begins.
     """
+    stamps = _scan_cycles(log, sensor_detects)
+    if not len(log.tags):
+        return stamps
+    # As `among` has it: of equal stamps the frame comes first.
+    return np.sort(np.concatenate((log.tags.stamps_ns, stamps)), kind="stable")
+
+
+def tag_cycles(log: RecordLog, *, sensor_detects: bool = False) -> TagCycles | None:
+    """Frames of the camera that looks for tags among all cycles; None where the log has none.
+
+    Parameters
+    ----------
+    log, sensor_detects : as in `cycle_stamps`.
+    """
+    return among(log.tags, _scan_cycles(log, sensor_detects)) if len(log.tags) else None
+
+
+def _scan_cycles(log: RecordLog, sensor_detects: bool) -> IntArray:
+    """(S,) stamp of every cycle that is a scan [ns]."""
     scans = _scans_used(log, sensor_detects)
     if scans == 0:
         return log.detection_stamps_ns
@@ -109,7 +132,36 @@ def extract_detections(
     UsageError
         the log names a scanner that the setup does not have.
     """
-    scans = _scans_used(log, sensor_detects)
+    tags = tag_cycles(log, sensor_detects=sensor_detects)
+    if tags is not None:
+        end = len(tags.is_frame) if last is None else last
+        inner, outer = (int(np.count_nonzero(~tags.is_frame[:cycle])) for cycle in (first, end))
+        scanned = _of_scans(log, setup, (inner, outer), sensor_detects=sensor_detects, parallel=parallel)
+        stamps = cycle_stamps(log, sensor_detects=sensor_detects)
+        return _with_frames(scanned, stamps[first:end], tags.part(first, end))
+    return _of_scans(log, setup, (first, last), sensor_detects=sensor_detects, parallel=parallel)
+
+
+def _with_frames(scanned: DetectionLog, stamps_ns: IntArray, tags: TagCycles) -> DetectionLog:
+    """Put frames, which have no detections, among scans."""
+    cycles, is_scan = len(stamps_ns), ~tags.is_frame
+    counts, scanners = np.zeros(cycles, dtype=np.int64), np.zeros(cycles, dtype=np.int64)
+    counts[is_scan], scanners[is_scan] = np.diff(scanned.offsets), scanned.scanners
+    offsets = np.concatenate(([0], np.cumsum(counts)))
+    rows = scanned.range_bearing, scanned.beams, scanned.expected, scanned.status
+    return _log(stamps_ns, scanners, offsets, *rows, tags)
+
+
+def _of_scans(
+    log: RecordLog,
+    setup: LocalizerSetup,
+    cycles: tuple[int, int | None],
+    *,
+    sensor_detects: bool,
+    parallel: bool,
+) -> DetectionLog:
+    """Detections in the cycles that are scans, from one of them to before another."""
+    (first, last), scans = cycles, _scans_used(log, sensor_detects)
     end = scans + len(log.detection_stamps_ns) if last is None else last
     parts: list[DetectionLog] = []
     if first < scans:
@@ -119,11 +171,11 @@ def extract_detections(
     return joined(parts)
 
 
-def nothing_detected(stamps_ns: IntArray) -> DetectionLog:
-    """Return what is detected at these stamps while all reflectors are covered."""
+def nothing_detected(stamps_ns: IntArray, tags: TagCycles | None = None) -> DetectionLog:
+    """Return what is detected at these stamps while all reflectors are covered: tags alone, where there are any."""
     offsets = np.zeros(len(stamps_ns) + 1, dtype=np.int64)
     scanners = np.zeros(len(stamps_ns), dtype=np.int64)
-    return _log(stamps_ns, scanners, offsets, *room_for(0))
+    return _log(stamps_ns, scanners, offsets, *room_for(0), tags)
 
 
 def detect_log(scans: ScanLog, setup: LocalizerSetup, *, scanner: int = 0, parallel: bool = False) -> DetectionLog:
@@ -229,7 +281,7 @@ def joined(logs: Iterable[DetectionLog]) -> DetectionLog:
     stamps, scanners, offsets, beams = (Growing(np.int64) for _ in range(4))
     range_bearing, expected, status = Growing(np.float64, 2), Growing(np.float64), Growing(np.int8)
     offsets.append(first.offsets[:1])
-    begin = 0
+    begin, tags = 0, list[TagCycles | None]()
     for log in itertools.chain((first, second), rest):
         stamps.append(log.stamps_ns)
         scanners.append(log.scanners)
@@ -239,6 +291,7 @@ def joined(logs: Iterable[DetectionLog]) -> DetectionLog:
         beams.append(log.beams)
         expected.append(log.expected)
         status.append(log.status)
+        tags.append(log.tags)
     return _log(
         stamps.array(),
         scanners.array(),
@@ -247,6 +300,7 @@ def joined(logs: Iterable[DetectionLog]) -> DetectionLog:
         beams.array(),
         expected.array(),
         status.array(),
+        in_turn(tags),
     )
 
 
@@ -258,6 +312,7 @@ def _log(  # noqa: PLR0917 - the columns of the log
     beams: IntArray,
     expected: FloatArray,
     status: NDArray[np.int8],
+    tags: TagCycles | None = None,
 ) -> DetectionLog:
     """Return a log of read-only arrays."""
     return DetectionLog(
@@ -268,6 +323,7 @@ def _log(  # noqa: PLR0917 - the columns of the log
         beams=read_only(beams),
         expected=read_only(expected),
         status=read_only(status),
+        tags=tags,
     )
 
 

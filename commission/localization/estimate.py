@@ -44,9 +44,21 @@ class Belief:
     """(3, 3) of x [m], y [m], theta [rad]."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenTags:
+    """Tags that a camera saw in one frame."""
+
+    sightings: FloatArray
+    """(n, 6) x [m], y [m], heading [rad] in the camera's frame, then 1-sigma of each or NaN."""
+    ids: tuple[str, ...]
+    """(n,) id of each; empty: not read."""
+    figures: FloatArray | None
+    """(n, 6) what became of each, see `tags`; None: they are not looked at."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Estimate:
-    """One cycle: one scan processed."""
+    """One cycle: one scan processed, or one frame of a camera that looks for tags."""
 
     stamp_ns: int
     """Time of the scan [ns]."""
@@ -80,6 +92,8 @@ class Estimate:
     """Index of the scanner that saw them, in the setup."""
     contours: FloatArray | None = None
     """(12,) what became of the contours of the scan, see `contour`; None: they are not looked at."""
+    tags: SeenTags | None = None
+    """What a frame saw of tags; None of a scan."""
 
     def count(self, status: Status) -> int:
         """Return the number of detections of one status."""

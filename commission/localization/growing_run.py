@@ -7,17 +7,19 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.localization.contour import COLUMNS
 from commission.localization.detection_log import DetectionLog
 from commission.localization.detector import INLIER
-from commission.localization.estimate import Belief, Estimate, Status
+from commission.localization.estimate import Belief, Estimate, SeenTags, Status
 from commission.localization.localizer import Localizer
 from commission.localization.priors import KeptPriors, PriorRows
 from commission.localization.run_columns import Checkpoint, RunColumns, RunSegment
 from commission.localization.search_state import SearchMoment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState
+from commission.localization.tag_frames import TagCycles
+from commission.localization.tags import COLUMNS as TAG_COLUMNS
 from commission.localization.whole_run import CHECKPOINT_CYCLES
 from commission.site.records import Record
 
@@ -36,6 +38,8 @@ class Cycles(NamedTuple):
     covariances: FloatArray
     modes: NDArray[np.int8]
     contours: FloatArray
+    is_frame: BoolArray
+    """Whether the cycle is a frame of the camera that looks for tags."""
 
 
 class DetectionRows(NamedTuple):
@@ -49,6 +53,13 @@ class DetectionRows(NamedTuple):
     status: NDArray[np.int8]
     reflectors: IntArray
     d2: FloatArray
+
+
+class SightingRows(NamedTuple):
+    """A row per sighting of a tag."""
+
+    sightings: FloatArray
+    figures: FloatArray
 
 
 class GrowingRun:
@@ -77,7 +88,11 @@ class GrowingRun:
             covariances[1],
             np.empty(n, np.int8),
             np.zeros((n, COLUMNS)),
+            np.zeros(n, np.bool_),
         )
+        self._tag_offsets: IntArray = np.zeros(n + 1, np.int64)
+        self._sightings = SightingRows(np.empty((n, 6)), np.empty((n, TAG_COLUMNS)))
+        self._ids: list[str] = []
         self._offsets: IntArray = np.zeros(n + 1, np.int64)
         self._detections = DetectionRows(
             np.empty((n, 2)),
@@ -154,8 +169,10 @@ class GrowingRun:
             beams=rows.beams,
             expected=rows.expected_beams,
             status=rows.detected,
+            tags=self._tags(cycles.is_frame),
         )
         segments = tuple(segment for segment in self._segments if segment.first < max(n, 1))
+        looking = any(segment.setup.tag_model is not None for segment in segments)
         matching = any(segment.setup.contour is not None for segment in segments)
         return RunColumns(
             segments=segments,
@@ -170,9 +187,33 @@ class GrowingRun:
             reflector=rows.reflectors,
             d2=rows.d2,
             contours=cycles.contours if matching else cycles.contours[:0],
+            tags=read_only(self._sightings.figures[: len(self._ids) if looking else 0]),
             searches=tuple(self._searches),
             final=self._localizer.state,
         )
+
+    def _tags(self, is_frame: BoolArray) -> TagCycles | None:
+        """What the camera has seen of tags so far; None where there was no frame."""
+        if not is_frame.any():
+            return None
+        count = len(self._ids)
+        offsets = read_only(self._tag_offsets[: len(is_frame) + 1])
+        ids = read_only(np.array(self._ids, dtype=np.str_))
+        numbers = read_only(np.cumsum(is_frame) - is_frame)
+        return TagCycles(is_frame, offsets, read_only(self._sightings.sightings[:count]), ids, numbers)
+
+    def _append_tags(self, row: int, seen: SeenTags | None) -> None:
+        """Write what a frame saw of tags, and what became of it."""
+        first = len(self._ids)
+        last = first + (0 if seen is None else len(seen.ids))
+        if last > len(self._sightings.figures):
+            self._sightings = SightingRows._make(_longer(column, last) for column in self._sightings)
+        if seen is not None:
+            self._sightings.sightings[first:last] = seen.sightings
+            self._sightings.figures[first:last] = 0.0 if seen.figures is None else seen.figures
+            self._ids.extend(seen.ids)
+        self._cycles.is_frame[row] = seen is not None
+        self._tag_offsets[row + 1] = last
 
     def _append(self, estimate: Estimate) -> None:
         """Write one cycle and its detections."""
@@ -181,6 +222,7 @@ class GrowingRun:
         if row == len(self._cycles.modes):
             self._cycles = Cycles._make(_longer(column, row + 1) for column in self._cycles)
             self._offsets = _longer(self._offsets, row + 2)
+            self._tag_offsets = _longer(self._tag_offsets, row + 2)
         if last > len(self._detections.d2):
             self._detections = DetectionRows._make(_longer(column, last) for column in self._detections)
         cycles, found = self._cycles, self._detections
@@ -189,6 +231,7 @@ class GrowingRun:
         cycles.means[row], cycles.covariances[row] = estimate.posterior.mean, estimate.posterior.covariance
         cycles.modes[row] = estimate.mode
         cycles.contours[row] = 0.0 if estimate.contours is None else estimate.contours
+        self._append_tags(row, estimate.tags)
         rejected = estimate.status == Status.OUTLIER_DETECTOR
         found.range_bearing[first:last], found.beams[first:last] = estimate.detections, estimate.beams
         found.measured[first:last] = estimate.measured

@@ -17,8 +17,8 @@ from commission.localization.contour import COLUMNS
 from commission.localization.contour_scans import contour_scan
 from commission.localization.cross_covariance import columns_of, cross_covariance
 from commission.localization.cycle import Cycle, process_odometry, process_scan, room_for_scans
-from commission.localization.detector import DetectedReflectors, detect, status_of_reported
-from commission.localization.estimate import Belief, Estimate, Mode
+from commission.localization.detector import DetectedReflectors, detect, room_for, status_of_reported
+from commission.localization.estimate import Belief, Estimate, Mode, SeenTags
 from commission.localization.observation import project_detections
 from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import to_belief
@@ -35,12 +35,18 @@ from commission.localization.seen_of_late import SeenScan
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState, belief_of, output_of, state_at_start
 from commission.localization.sweep import Sweep, bring_to_stamp
+from commission.localization.tag_cycle import TagFrames, process_tags
+from commission.localization.tag_start import told_by_tags
+from commission.localization.tags import COLUMNS as TAG_COLUMNS
+from commission.localization.tags import entries_of
 from commission.localization.wheel_scale import as_driven
 from commission.site.parameters import OdometryParameters, Parameters
-from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan, TagSightings
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 
+NOTHING_DETECTED = DetectedReflectors(*room_for(0))
+"""What a frame with tags has of reflectors."""
 LAST_NS = 2**63 - 1
 """No record is newer [ns]."""
 
@@ -176,7 +182,7 @@ class Localizer:
         """Process records up to the next scan and return its estimate; None when there is none, or it has to wait."""
         while self._waiting:
             record, following = self._waiting[0], NOT_YET
-            if isinstance(record, Scan | Detections):
+            if isinstance(record, Scan | Detections | TagSightings):
                 found = self._following(record.stamp_ns)
                 if found is None:
                     return None
@@ -223,6 +229,8 @@ class Localizer:
                 status, unknown = status_of_reported(record.range_bearing, blind), np.full(count, np.nan)
                 seen = DetectedReflectors(record.range_bearing, np.zeros(count, dtype=np.int64), unknown, status)
                 return self._process(record, seen, following)
+            case TagSightings():
+                return self._process(record, NOTHING_DETECTED, following)
             case Scan():
                 if self._state.sensor_detects:
                     return None
@@ -257,41 +265,43 @@ class Localizer:
         bring_to_stamp(self._state.motion, following, 0, len(measured), measured, sweep, model, settled)
         return read_only(settled)
 
-    def _process(self, scan: Scan | Detections, seen: DetectedReflectors, following: NextOdometry) -> Estimate:
+    def _process(self, scan: Scan | Detections | TagSightings, seen: DetectedReflectors, following: NextOdometry) -> Estimate:
         """Predict to the scan's stamp, associate, correct, supervise."""
         stamp_ns, before = scan.stamp_ns, self._state
+        scanner = 0 if isinstance(scan, TagSightings) else scan.scanner
         measured = read_only(seen.range_bearing)
-        detections = self._at_stamp(scan.scanner, measured, following)
+        detections = self._at_stamp(scanner, measured, following)
         count = len(detections)
         status = seen.status.copy()
         reflector: IntArray = np.empty(count, dtype=np.int64)
         d2 = np.empty(count)
         figures = None if self._setup.contour is None else np.zeros(COLUMNS)
+        tags = self._seen_tags(scan)
         if before.mode == Mode.INITIALIZING:
             associate_nothing(status, reflector, d2)
             cycle = unlocated(before, stamp_ns, following, self._setup.filter.odometry)
+        elif isinstance(scan, TagSightings) and tags is not None and tags.figures is not None:
+            cycle = self._tagged(scan, following, tags.figures)
         else:
             cycle = self._filtered(scan, detections, following, (status, reflector, d2), figures)
         self._state = cycle.state
         if not is_sought(before, self._setup.filter.limits):
             self._state = cycle.state._replace(search=None)
         if is_sought(before, self._setup.filter.limits) or is_sought(self._state, self._setup.filter.limits):
-            if self._map is None:
-                self._map = search_map(self._setup)
             scan_seen = SeenScan(
                 stamp_ns=stamp_ns,
                 detections=detections,
                 status=seen.status,
-                scanner=scan.scanner,
-                observation=self._setup.observations[scan.scanner],
+                scanner=scanner,
+                observation=self._setup.observations[scanner],
                 ranges=lambda: scan if isinstance(scan, Scan) else None,
-                upside_down=self._setup.scanners[scan.scanner].upside_down,
+                upside_down=self._setup.scanners[scanner].upside_down,
                 following=following,
             )
-            self._state = sought(before, cycle.state, scan_seen, self._map)
+            self._state = self._sought(before, cycle.state, scan_seen, tags)
         posterior = belief_of(self._state)
         offsets = np.array((0, count), dtype=np.int64)
-        scanners = np.array((scan.scanner,), dtype=np.int64)
+        scanners = np.array((scanner,), dtype=np.int64)
         points = project_detections(
             posterior.mean[np.newaxis], offsets, detections, self._setup.observation_rows, scanners=scanners
         )
@@ -310,20 +320,68 @@ class Localizer:
             reflector=reflector,
             d2=d2,
             gate=self._setup.filter.gate.d2,
-            scanner=scan.scanner,
-            contours=figures,
+            scanner=scanner,
+            contours=figures if tags is None else None,
+            tags=tags,
         )
+
+    def _seen_tags(self, record: Scan | Detections | TagSightings) -> SeenTags | None:
+        """What a frame saw of tags, with room for what becomes of it where they are looked at; None of a scan."""
+        if not isinstance(record, TagSightings):
+            return None
+        figures = None if self._setup.tag_model is None else np.zeros((len(record.ids), TAG_COLUMNS))
+        return SeenTags(record.sightings, record.ids, figures)
+
+    def _sought(
+        self, before: FilterState, after: FilterState, scan: SeenScan, tags: SeenTags | None
+    ) -> FilterState:
+        """Go on searching after a scan or a frame; a tag tells at once."""
+        if tags is not None and tags.figures is not None:
+            ids = np.array(tags.ids, dtype=np.str_)
+            told = told_by_tags(after, self._setup, tags.sightings, ids, tags.figures)
+            if told is not None:
+                return told
+        if self._map is None:
+            self._map = search_map(self._setup)
+        return sought(before, after, scan, self._map)
+
+    def _tagged(self, frame: TagSightings, following: NextOdometry, figures: FloatArray) -> Cycle:
+        """Let the filter process a frame with tags; what becomes of them is written."""
+        setup, constants, count = self._setup, self._setup.constants, len(frame.ids)
+        cross = columns_of(self._state.cross, constants)
+        entries = entries_of(np.array(frame.ids, dtype=np.str_), setup.tags)
+        offsets = np.array((0, count), dtype=np.int64)
+        if setup.tag_model is None:
+            raise ValueError("a frame with tags is processed where none are looked at; expected tags in the setup")
+        cycle = process_tags(
+            self._state._replace(cross=None, search=None),
+            frame.stamp_ns,
+            0,
+            count,
+            TagFrames(read_only(np.ones(1, np.bool_)), read_only(offsets), frame.sightings, entries, setup.tag_model),
+            setup.filter,
+            setup.observations[0],
+            setup.index.places,
+            setup.index.offsets,
+            cross,
+            room_for_scans(cross, 0).busy,
+            np.empty(0, np.int8),
+            following,
+            figures,
+        )
+        state = cycle.state._replace(cross=cross_covariance(cross, constants), search=self._state.search)
+        return Cycle(cycle.prior, state)
 
     def _filtered(
         self,
-        scan: Scan | Detections,
+        scan: Scan | Detections | TagSightings,
         detections: FloatArray,
         following: NextOdometry,
         written: tuple[NDArray[np.int8], IntArray, FloatArray],
         figures: FloatArray | None,
     ) -> Cycle:
         """Let the filter process a scan; what becomes of its detections and contours is written."""
-        constants = self._setup.constants
+        constants, scanner = self._setup.constants, 0 if isinstance(scan, TagSightings) else scan.scanner
         cross = columns_of(self._state.cross, constants)
         room = room_for_scans(cross, len(detections))
         cycle = process_scan(
@@ -333,18 +391,18 @@ class Localizer:
             len(detections),
             detections,
             self._setup.filter,
-            self._setup.observations[scan.scanner],
+            self._setup.observations[scanner],
             self._setup.index.places,
             self._setup.index.offsets,
             cross,
             room.work,
             room.aims,
             room.busy,
-            scan.scanner,
+            scanner,
             *written,
             following,
             self._setup.contour,
-            contour_scan(self._setup, scan if isinstance(scan, Scan) else None, scan.scanner),
+            contour_scan(self._setup, scan if isinstance(scan, Scan) else None, scanner),
             figures,
         )
         state = cycle.state._replace(cross=cross_covariance(cross, constants), search=self._state.search)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.detection_log import DetectionLog
-from commission.localization.estimate import Belief, Estimate, Mode, Status
+from commission.localization.estimate import Belief, Estimate, Mode, SeenTags, Status
 from commission.localization.observation import project_detections
 from commission.localization.priors import Priors
 from commission.localization.search_state import SearchMoment
@@ -84,6 +84,8 @@ class RunColumns:
     """(n,) squared Mahalanobis distance to that reflector; NaN: none."""
     contours: FloatArray
     """(K, 12) what became of the contours of each cycle, see `contour`; (0, 12) where they are not looked at."""
+    tags: FloatArray
+    """(m, 6) what became of each sighting of a tag, see `tags`; (0, 6) where they are not looked at."""
     final: FilterState
     """State after the last record, odometry included."""
     searches: tuple[SearchMoment, ...] = ()
@@ -183,8 +185,22 @@ class RunColumns:
             d2=self.d2[rows],
             gate=setup.filter.gate.d2,
             scanner=int(self.detected.scanners[cycle]),
-            contours=self.contours[cycle] if setup.contour is not None else None,
+            contours=self.contours[cycle] if setup.contour is not None and not self.is_frame(cycle) else None,
+            tags=self._tags(cycle),
         )
+
+    def is_frame(self, cycle: int) -> bool:
+        """Whether a cycle is a frame of the camera that looks for tags, and no scan."""
+        return self.detected.tags is not None and bool(self.detected.tags.is_frame[cycle])
+
+    def _tags(self, cycle: int) -> SeenTags | None:
+        """Return what a frame saw of tags, and what became of it; None of a scan."""
+        seen = self.detected.tags
+        if seen is None or not self.is_frame(cycle):
+            return None
+        rows = slice(int(seen.offsets[cycle]), int(seen.offsets[cycle + 1]))
+        figures = self.tags[rows] if self.segment(cycle).setup.tag_model is not None else None
+        return SeenTags(seen.sightings[rows], tuple(seen.ids[rows].tolist()), figures)
 
     def _posterior(self, cycle: int) -> Belief:
         """Return the filter's own belief after a cycle."""

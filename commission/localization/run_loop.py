@@ -38,6 +38,11 @@ from commission.localization.setup import FilterModel, LocalizerSetup
 from commission.localization.state import FilterState
 from commission.localization.supervisor import INITIALIZING, LOST
 from commission.localization.sweep import bring_to_stamp, sweep_at
+from commission.localization.tag_cycle import TagFrames, process_tags
+from commission.localization.tag_frames import TagCycles
+from commission.localization.tag_start import told_by_tags
+from commission.localization.tags import COLUMNS as TAG_COLUMNS
+from commission.localization.tags import entries_of
 from commission.localization.wheel_scale import as_driven
 from commission.site.record_log import RecordLog
 from commission.site.records import Scan
@@ -56,6 +61,8 @@ class Columns(NamedTuple):
     """(n, 2) detections at the stamp of their scan, upright; (0, 2) where they are what was measured."""
     contours: FloatArray
     """(K, 12) what became of the contours of each cycle, see `contour`; (0, 12) where they are not looked at."""
+    tags: FloatArray
+    """(m, 6) what became of each sighting of a tag, see `tags`; (0, 6) where they are not looked at."""
 
 
 def empty_columns(detected: DetectionLog, setups: Sequence[LocalizerSetup]) -> Columns:
@@ -68,6 +75,7 @@ def empty_columns(detected: DetectionLog, setups: Sequence[LocalizerSetup]) -> C
     """
     sweeping = any(len(setup.sweep_rows) for setup in setups)
     matching = any(setup.contour is not None for setup in setups)
+    looking = any(setup.tag_model is not None for setup in setups)
     cycles, total = len(detected), len(detected.range_bearing)
     return Columns(
         np.empty((cycles, 3)),
@@ -78,6 +86,7 @@ def empty_columns(detected: DetectionLog, setups: Sequence[LocalizerSetup]) -> C
         np.empty(total),
         detected.range_bearing.copy() if sweeping else np.empty((0, 2)),
         np.zeros((cycles if matching else 0, CONTOUR_COLUMNS)),
+        np.zeros((len(detected.tags.sightings) if detected.tags is not None and looking else 0, TAG_COLUMNS)),
     )
 
 
@@ -91,6 +100,9 @@ def cut(columns: Columns, detected: DetectionLog, first: int, last: int) -> Colu
     first, last : cycles, the last one excluded.
     """
     rows = slice(int(detected.offsets[first]), int(detected.offsets[last]))
+    tags = columns.tags
+    if detected.tags is not None and len(tags):
+        tags = tags[int(detected.tags.offsets[first]) : int(detected.tags.offsets[last])]
     return Columns(
         columns.means[first:last],
         columns.covariances[first:last],
@@ -100,17 +112,18 @@ def cut(columns: Columns, detected: DetectionLog, first: int, last: int) -> Colu
         columns.d2[rows],
         columns.settled[rows] if len(columns.settled) else columns.settled,
         columns.contours[first:last] if len(columns.contours) else columns.contours,
+        tags,
     )
 
 
-def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: int) -> None:
+def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: int, sightings: int = 0) -> None:
     """Copy the first cycles of another run.
 
     Parameters
     ----------
     earlier : what is copied from.
     columns : what is written to.
-    cycles, detections : how many rows of each kind.
+    cycles, detections, sightings : how many rows of each kind.
     """
     columns.means[:cycles] = earlier.means[:cycles]
     columns.covariances[:cycles] = earlier.covariances[:cycles]
@@ -122,6 +135,8 @@ def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: in
         columns.settled[:detections] = earlier.range_bearing[:detections]
     if len(columns.contours) and len(earlier.contours):
         columns.contours[:cycles] = earlier.contours[:cycles]
+    if len(columns.tags) and len(earlier.tags):
+        columns.tags[:sightings] = earlier.tags[:sightings]
 
 
 def odometry_rows(log: RecordLog, stamps_ns: IntArray, first: int, last: int) -> tuple[int, int]:
@@ -185,7 +200,7 @@ def continued(log: RecordLog, setup: LocalizerSetup, state: FilterState, stretch
             # The scan that told so is the first one of the search.
             search = search or search_map(setup)
             newest = _part(stretch, (done - 1, done), (row, row))
-            state = sought(state, state, _seen(log, setup, state, newest, NOT_YET), search)
+            state = _found(log, setup, search, (state, state), newest, NOT_YET)
         if cycles and state.search is not None and stretch.searches is not None:
             found = state.search
             stretch.searches.append(SearchMoment(stretch.first + done - 1, found.hypotheses, found.track))
@@ -225,19 +240,39 @@ def _driven(log: RecordLog, setup: LocalizerSetup, row: int) -> tuple[float, flo
     return dx, dy, dtheta
 
 
+def _found(  # noqa: PLR0917 - a cycle and what is known around it
+    log: RecordLog,
+    setup: LocalizerSetup,
+    search: SearchMap,
+    states: tuple[FilterState, FilterState],
+    cycle: CycleStretch,
+    following: NextOdometry,
+) -> FilterState:
+    """Go on searching after a single cycle, from the states before and after it; a tag tells at once."""
+    before, after = states
+    tags = cycle.detected.tags
+    if tags is not None and tags.is_frame[0]:
+        told = told_by_tags(after, setup, tags.sightings, tags.ids, cycle.columns.tags)
+        if told is not None:
+            return told
+    return sought(before, after, _seen(log, setup, before, cycle, following), search)
+
+
 def _seen(
     log: RecordLog, setup: LocalizerSetup, state: FilterState, cycle: CycleStretch, following: NextOdometry
 ) -> SeenScan:
     """Return what the scan of a single cycle saw."""
     scanner = int(cycle.detected.scanners[0])
     settled, stamp_ns = cycle.columns.settled, int(cycle.detected.stamps_ns[0])
+    tags = cycle.detected.tags
+    is_frame = tags is not None and bool(tags.is_frame[0])
     return SeenScan(
         stamp_ns=stamp_ns,
         detections=settled if len(settled) else cycle.detected.range_bearing,
         status=cycle.detected.status,
         scanner=scanner,
         observation=setup.observations[scanner],
-        ranges=lambda: None if state.sensor_detects else _scan_at(log, setup, stamp_ns, scanner),
+        ranges=lambda: None if state.sensor_detects or is_frame else _scan_at(log, setup, stamp_ns, scanner),
         upside_down=setup.scanners[scanner].upside_down,
         following=following,
     )
@@ -281,7 +316,7 @@ def _searched(
         after, _, _ = _tracked(log, setup, state._replace(search=None), cycle._replace(rows=(row, row)))
         if not is_sought(state, setup.filter.limits):
             return after
-    state = sought(state, after, _seen(log, setup, state, cycle, following), search)
+    state = _found(log, setup, search, (state, after), cycle, following)
     _write_belief(state.belief, 0, columns.means, columns.covariances)
     columns.modes[0] = state.mode
     return state
@@ -300,6 +335,8 @@ def _tracked(
     own = log.detection_stamps_ns
     scans = int(np.searchsorted(detected.stamps_ns, own[0])) if len(own) else len(detected)
     scans = 0 if state.sensor_detects else scans
+    numbers = np.arange(scans) if detected.tags is None else np.flatnonzero(~detected.tags.is_frame[:scans])
+    before = stretch.first if detected.tags is None else stretch.first - _first_number(detected.tags)
     after, cycles, delivered = _run(
         read_only(log.odometry_stamps_ns[rows]),
         read_only(as_driven(log.displacements[rows], setup.parameters.odometry)),
@@ -322,11 +359,25 @@ def _tracked(
         stretch.columns,
         stretch.priors,
         setup.contour,
-        contour_scans(log, setup, (stretch.first, scans), len(detected)),
+        contour_scans(log, setup, (before, numbers), len(detected)),
+        _frames(setup, detected),
     )
     # Odometry alone changes nothing of it, nor does another setup before its first scan.
     cross_after = cross_covariance(cross, setup.constants) if len(detected) else state.cross
     return after._replace(cross=cross_after), cycles, delivered
+
+
+def _first_number(tags: TagCycles) -> int:
+    """Frames of the run before the first cycle of a stretch; of no cycle none are asked for."""
+    return int(tags.numbers[0]) if len(tags.numbers) else 0
+
+
+def _frames(setup: LocalizerSetup, detected: DetectionLog) -> TagFrames | None:
+    """Frames of a stretch for the loop; None where tags are not looked at."""
+    tags, model = detected.tags, setup.tag_model
+    if tags is None or model is None:
+        return None
+    return TagFrames(tags.is_frame, tags.offsets, tags.sightings, entries_of(tags.ids, setup.tags), model)
 
 
 @compiled
@@ -353,6 +404,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
     priors: PriorRows,
     contours: ContourModel | None,
     scans: ContourScans | None,
+    frames: TagFrames | None,
 ) -> tuple[FilterState, int, int]:
     """Deliver odometry and scans in the order of their stamps, odometry first, until the vehicle is lost.
 
@@ -361,7 +413,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
     Of the odometry the rows up to `delivered`; the one behind them only tells the motion of scans before it. Where
     there are sweeps, `detections` is a view of the column `settled`, which is written before it is read.
     """
-    means, covariances, modes, status, reflectors, d2, settled, figures = columns
+    means, covariances, modes, status, reflectors, d2, settled, figures, sightings = columns
     rows = 0
     for k in range(len(scan_stamps)):
         while rows < delivered and odometry_stamps[rows] <= scan_stamps[k]:
@@ -373,6 +425,30 @@ def _run(  # noqa: PLR0917 - the columns of the log
             dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
             following = NextOdometry(True, odometry_stamps[rows], dx, dy, dtheta)
         observation = observation_at(observations, scanners[k])
+        if frames is not None and frames.is_frame[k]:
+            cycle = process_tags(
+                state,
+                scan_stamps[k],
+                frames.offsets[k],
+                frames.offsets[k + 1],
+                frames,
+                model,
+                observation,
+                places,
+                cell_offsets,
+                cross,
+                busy,
+                status,
+                following,
+                sightings,
+            )
+            state = cycle.state
+            _write_belief(cycle.prior, k, priors.means, priors.covariances)
+            _write_belief(state.belief, k, means, covariances)
+            modes[k] = state.mode
+            if state.mode == LOST and model.limits.find_again:
+                return state, k + 1, rows
+            continue
         if len(sweeps):
             sweep = sweep_at(sweeps, scanners[k])
             bring_to_stamp(state.motion, following, offsets[k], offsets[k + 1], measured, sweep, observation, settled)

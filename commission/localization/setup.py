@@ -11,9 +11,15 @@ import numpy as np
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.association import Gate, gate_of
-from commission.localization.consider import ConsiderModel
+from commission.localization.consider import PER_REFLECTOR, PER_SCANNER, ConsiderModel
 from commission.localization.contour import ContourModel, contour_model
-from commission.localization.cross_covariance import Constants, constants_of, contour_constants, survey_variance
+from commission.localization.cross_covariance import (
+    Constants,
+    constants_of,
+    contour_constants,
+    survey_variance,
+    tag_constants,
+)
 from commission.localization.detector_model import DetectorModel, detector_model
 from commission.localization.filter_kinds import filter_kind, is_invariant
 from commission.localization.observation import (
@@ -26,11 +32,13 @@ from commission.localization.reflector_index import Cells, ReflectorIndex, build
 from commission.localization.rejection import RejectionRule, rejection_rule
 from commission.localization.supervisor import SupervisorLimits, supervisor_limits
 from commission.localization.sweep import sweep_of, sweep_rows
+from commission.localization.tags import TagModel, tag_model
 from commission.site.floor_map import FloorMap
 from commission.site.parameters import Parameters
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
+from commission.site.tags import Tag, TagCamera
 from commission.site.uncertainty import Uncertainty
 
 _THRESHOLDS = ("intensity_threshold", "far_threshold", "far_distance")
@@ -72,6 +80,10 @@ class LocalizerSetup:
     """How well map and mounting are known: what the filter considers."""
     floor: FloorMap | None = None
     """Walls of the hall, where the project has them."""
+    tags: tuple[Tag, ...] = ()
+    """Landmarks that tell place and heading at once."""
+    tag_camera: TagCamera = field(default_factory=TagCamera)
+    """The camera that sees them."""
     filter: FilterModel = field(init=False, repr=False, compare=False)
     """Scalars of the filter."""
     constants: Constants | None = field(init=False, repr=False, compare=False)
@@ -87,6 +99,8 @@ class LocalizerSetup:
     detectors: tuple[DetectorModel, ...] = field(init=False, repr=False, compare=False)
     """Scalars and tables of the detector, for each scanner."""
 
+    tag_model: TagModel | None = field(init=False, repr=False, compare=False)
+    """Tags and camera for kernels; None: they are not looked at."""
     contour: ContourModel | None = field(init=False, repr=False, compare=False)
     """Contours of the floor map; None: they are not looked at."""
 
@@ -108,6 +122,11 @@ class LocalizerSetup:
         order = index.places[:, 3].astype(np.int64)
         constants = constants_of(self.reflectors.reflectors, order, self.scanners, known) if considers else None
         contour = contour_model(self.floor, self.scanners, self.parameters.contour)
+        before = PER_REFLECTOR * len(index.places) + PER_SCANNER * len(self.scanners)
+        tags = tag_model(self.tags, self.tag_camera, self.parameters.tag, before)
+        if constants is not None and tags is not None:
+            constants += tag_constants(self.tags, self.tag_camera, known)
+        object.__setattr__(self, "tag_model", tags)
         if constants is not None and contour is not None:
             constants += contour_constants(self.parameters.contour)
         object.__setattr__(self, "contour", contour)
@@ -175,4 +194,6 @@ class LocalizerSetup:
             parameters=project.parameters,
             uncertainty=project.uncertainty,
             floor=project.floor_map,
+            tags=project.tags,
+            tag_camera=project.tag_camera,
         )

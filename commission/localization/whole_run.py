@@ -18,6 +18,7 @@ from commission.localization.detection_log import (
     extract_detections,
     joined,
     nothing_detected,
+    tag_cycles,
 )
 from commission.localization.detector import passing_widths
 from commission.localization.estimate import Belief
@@ -166,12 +167,13 @@ def _detected(
     bounds = (*sorted(start for start in starts if start < len(stamps_ns)), len(stamps_ns))
     # In pieces, so that it can be stopped; what the sensor has detected is only cut out of its columns.
     step = max(len(stamps_ns), 1) if not log.scans else CHECKPOINT_CYCLES
+    tags = tag_cycles(log, sensor_detects=sensor_detects)
 
     def parts() -> Iterator[DetectionLog]:
         for first, last in itertools.pairwise(bounds):
             segment = _segment(segments, first)
             if segment.covered:
-                yield nothing_detected(stamps_ns[first:last])
+                yield nothing_detected(stamps_ns[first:last], None if tags is None else tags.part(first, last))
             elif earlier is not None and _detects_like(segment, earlier.segment(first)):
                 yield earlier.detected.part(first, last)
             else:
@@ -201,7 +203,8 @@ def _filtered(
     (begin, state), cycles = known[-1], len(detected)
     columns = empty_columns(detected, [segment.setup for segment in segments])
     if earlier is not None:
-        take_over(earlier, columns, begin, int(detected.offsets[begin]))
+        seen = 0 if detected.tags is None else int(detected.tags.offsets[begin])
+        take_over(earlier, columns, begin, int(detected.offsets[begin]), seen)
     checkpoints = list(known)
     searches = [] if earlier is None else [moment for moment in earlier.searches if moment.cycle < begin]
     for segment, first, last in _chunks(segments, begin, cycles):
@@ -225,6 +228,7 @@ def _filtered(
         reflector=columns.reflectors,
         d2=columns.d2,
         contours=columns.contours,
+        tags=columns.tags,
         searches=tuple(searches),
         range_bearing=columns.settled if len(columns.settled) else detected.range_bearing,
         final=_final(log, segments[-1].setup, detected.part(cycles, cycles), checkpoints[-1], detected.stamps_ns),

@@ -328,6 +328,38 @@ class ContourParameters:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TagParameters:
+    """Tags, each of which tells place and heading at once."""
+
+    enabled: Annotated[bool, Switch("Tags")] = True
+    """Whether tags that a camera sees correct the pose, where the site has any."""
+    position_sigma: Annotated[
+        float,
+        Quantity(label="Tag seen 1σ", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=0.5, slider=(1.0, 100.0)),
+    ] = 0.02
+    """1-sigma noise of a tag's measured place, each axis of the camera, where the recording does not say it."""
+    heading_sigma: Annotated[
+        float, Quantity(label="Tag turned 1σ", unit="rad", shown=DEGREES, bounds=POSITIVE, step=0.01, slider=(0.1, 10.0))
+    ] = 0.02
+    """1-sigma noise of a tag's measured heading, where the recording does not say it."""
+    gate_probability: Annotated[
+        float,
+        Quantity(
+            label="Tag accepted to",
+            shown=PERCENT,
+            bounds=Bounds.inside(0.0, 1.0),
+            step=0.01,
+            slider=(50.0, 99.99),
+            is_tail=True,
+        ),
+    ] = 0.999
+    """Probability that a true sighting falls inside the validation gate, of three degrees of freedom."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, "tag.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SupervisorParameters:
     """When the estimate is no longer good enough to drive on (Algorithm 4)."""
 
@@ -464,5 +496,7 @@ class Parameters:
     """When to stop the vehicle."""
     contour: Annotated[ContourParameters, Group("Contours")] = field(default_factory=ContourParameters)
     """What walls say."""
+    tag: Annotated[TagParameters, Group("Tags")] = field(default_factory=TagParameters)
+    """What tags say."""
     integrity: Annotated[IntegrityParameters, Group("Protection level")] = field(default_factory=IntegrityParameters)
     """How sure a bound of the error has to be."""

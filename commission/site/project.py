@@ -13,6 +13,7 @@ from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route, route_named
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.tags import Tag, TagCamera
 from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import DifferentialVehicle, Vehicle
 
@@ -33,6 +34,10 @@ class Project:
     """Wheels and outline."""
     scanners: tuple[Scanner, ...] = field(default_factory=lambda: (Scanner(),))
     """The laser scanners, one at least; names are unique."""
+    tags: tuple[Tag, ...] = ()
+    """Landmarks that tell place and heading at once; ids are unique."""
+    tag_camera: TagCamera = field(default_factory=TagCamera)
+    """The camera that sees them."""
     parameters: Parameters = field(default_factory=Parameters)
     """Tunables of the localizer."""
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
@@ -47,6 +52,10 @@ class Project:
     def __post_init__(self) -> None:
         if not self.scanners:
             raise ProjectError("scanners is empty; expected at least one")
+        tags = [tag.id for tag in self.tags]
+        if len(set(tags)) < len(tags):
+            twice = next(each for each in tags if tags.count(each) > 1)
+            raise ProjectError(f"tag id {twice!r} is used twice; expected unique ids")
         for kind, named in (("route", self.routes), ("station", self.stations), ("scanner", self.scanners)):
             seen: set[str] = set()
             for name in (value.name for value in named):

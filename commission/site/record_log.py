@@ -18,9 +18,11 @@ from commission.site.records import (
     Record,
     ReferencePose,
     Scan,
+    TagSightings,
 )
 from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import ONLY_NAME
+from commission.site.tag_log import NO_TAGS, TagLog
 from commission.site.truth import Truth
 
 
@@ -48,6 +50,8 @@ class RecordLog:
     """(n, 2) range [m] and bearing [rad] of each detection, scanner frame."""
     detection_scanners: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     """(D,) scanner of each; of none said, the first."""
+    tags: TagLog = NO_TAGS
+    """Frames of the camera that looks for tags."""
     reference_stamps_ns: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     """(R,) [ns]."""
     reference_poses: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
@@ -116,6 +120,7 @@ class RecordLog:
             detection_offsets=np.concatenate([[0], np.cumsum(counts, dtype=np.int64)]).astype(np.int64),
             range_bearing=np.concatenate([r.range_bearing for r in detections]) if detections else np.empty((0, 2)),
             detection_scanners=np.array([r.scanner for r in detections], dtype=np.int64),
+            tags=TagLog.of([r for r in kinds[TagSightings] if isinstance(r, TagSightings)]),
             reference_stamps_ns=_stamps(kinds[ReferencePose]),
             reference_poses=np.array([r.pose for r in references]).reshape(-1, 3),
         )
@@ -161,7 +166,8 @@ class RecordLog:
     @property
     def _stamps_by_kind(self) -> tuple[IntArray, ...]:
         """Stamps of each kind in its own order [ns], by the rank of the kind."""
-        return self.odometry_stamps_ns, self.reference_stamps_ns, self.detection_stamps_ns, self.scan_stamps_ns
+        own, scans = self.detection_stamps_ns, self.scan_stamps_ns
+        return self.odometry_stamps_ns, self.reference_stamps_ns, self.tags.stamps_ns, own, scans
 
     def _record(self, kind: int, index: int) -> Record:
         """Return a record by the rank of its kind, and its index there."""
@@ -169,6 +175,11 @@ class RecordLog:
             return Odometry(int(self.odometry_stamps_ns[index]), self.displacements[index])
         if kind == ORDER_WITHIN_A_STAMP[ReferencePose]:
             return ReferencePose(int(self.reference_stamps_ns[index]), self.reference_poses[index])
+        if kind == ORDER_WITHIN_A_STAMP[TagSightings]:
+            seen = slice(self.tags.offsets[index], self.tags.offsets[index + 1])
+            return TagSightings(
+                int(self.tags.stamps_ns[index]), self.tags.sightings[seen], tuple(self.tags.ids[seen].tolist())
+            )
         if kind == ORDER_WITHIN_A_STAMP[Detections]:
             rows = slice(self.detection_offsets[index], self.detection_offsets[index + 1])
             scanner = int(self.detection_scanners[index])

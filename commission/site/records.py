@@ -75,6 +75,28 @@ class Detections:
 
 
 @dataclass(frozen=True, slots=True)
+class TagSightings:
+    """Tags that a camera has measured in one frame; empty when it saw none."""
+
+    stamp_ns: int
+    """Time of the frame [ns]."""
+    sightings: FloatArray
+    """(N, 6) x [m], y [m] and heading [rad] of each tag in the camera's frame, then 1-sigma of each; NaN: not said."""
+    ids: tuple[str, ...]
+    """(N,) id of each tag; empty where the camera cannot read it."""
+
+    def __post_init__(self) -> None:
+        values = frozen(self.sightings, (None, 6), "tag sightings", finite=False)
+        if not np.isfinite(values[:, :3]).all():
+            raise ValueError("tag sightings: x, y or heading is no finite number; expected metres and radians")
+        if (values[:, 3:] <= 0.0).any() or np.isinf(values[:, 3:]).any():
+            raise ValueError("tag sightings: a sigma is not positive; expected more than 0, or NaN where it is not said")
+        if len(self.ids) != len(values):
+            raise ValueError(f"tag sightings: {len(self.ids)} ids of {len(values)} tags; expected one each")
+        object.__setattr__(self, "sightings", values)
+
+
+@dataclass(frozen=True, slots=True)
 class ReferencePose:
     """Ground truth, or the pose that a second system reports. The localizer never reads it."""
 
@@ -87,12 +109,13 @@ class ReferencePose:
         object.__setattr__(self, "pose", frozen(self.pose, (3,), "reference pose", finite=False))
 
 
-Record: TypeAlias = Odometry | Scan | Detections | ReferencePose
+Record: TypeAlias = Odometry | Scan | Detections | TagSightings | ReferencePose
 
 ORDER_WITHIN_A_STAMP: dict[type, int] = {
     Odometry: 0,
     ReferencePose: 1,
-    Detections: 2,
-    Scan: 3,
+    TagSightings: 2,
+    Detections: 3,
+    Scan: 4,
 }
 """Records of one stamp are delivered in this order: motion first, then what was seen after it."""

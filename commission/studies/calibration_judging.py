@@ -188,6 +188,7 @@ def _detections_of(detected: DetectionLog, kept: BoolArray) -> DetectionLog:
         beams=read_only(detected.beams[kept]),
         expected=read_only(detected.expected[kept]),
         status=read_only(detected.status[kept]),
+        tags=detected.tags,
     )
 
 
