@@ -23,6 +23,7 @@ from commission.io.recordings.bearing_file import BEARINGS
 from commission.io.recordings.contour_file import CONTOUR
 from commission.io.recordings.csv_folder import DETECTIONS, ODOMETRY, REFERENCE, SCANS
 from commission.io.recordings.reference_file import REFERENCE_MOUNT
+from commission.io.recordings.tag_file import TAGS
 from commission.io.recordings.truth_file import TRUTH
 
 MANIFEST = ".commission.result"
@@ -30,7 +31,7 @@ MANIFEST = ".commission.result"
 _RECORDING = re.compile(
     "|".join(
         (
-            *map(re.escape, (ODOMETRY, DETECTIONS, SCANS, REFERENCE, REFERENCE_MOUNT, TRUTH, CONTOUR, BEARINGS)),
+            *map(re.escape, (ODOMETRY, DETECTIONS, SCANS, REFERENCE, REFERENCE_MOUNT, TRUTH, CONTOUR, BEARINGS, TAGS)),
             r"scans_.*\.npz",
         )
     )

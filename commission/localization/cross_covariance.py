@@ -92,7 +92,10 @@ def tag_constants(tags: Sequence[Tag], camera: TagCamera, uncertainty: Uncertain
     if not tags:
         return ()
     at = tuple(map(float, camera.mounting))
-    place, heading = ("tag camera", *at, uncertainty.mounting_position), ("tag camera", *at, uncertainty.mounting_heading)
+    place, heading = (
+        ("tag camera", *at, uncertainty.mounting_position),
+        ("tag camera", *at, uncertainty.mounting_heading),
+    )
     constants: list[Hashable] = [("mounting x", *place), ("mounting y", *place), ("mounting heading", *heading)]
     constants.append(("clock", "tag camera", uncertainty.clock))
     for tag in tags:

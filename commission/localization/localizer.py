@@ -265,7 +265,9 @@ class Localizer:
         bring_to_stamp(self._state.motion, following, 0, len(measured), measured, sweep, model, settled)
         return read_only(settled)
 
-    def _process(self, scan: Scan | Detections | TagSightings, seen: DetectedReflectors, following: NextOdometry) -> Estimate:
+    def _process(
+        self, scan: Scan | Detections | TagSightings, seen: DetectedReflectors, following: NextOdometry
+    ) -> Estimate:
         """Predict to the scan's stamp, associate, correct, supervise."""
         stamp_ns, before = scan.stamp_ns, self._state
         scanner = 0 if isinstance(scan, TagSightings) else scan.scanner
@@ -332,9 +334,7 @@ class Localizer:
         figures = None if self._setup.tag_model is None else np.zeros((len(record.ids), TAG_COLUMNS))
         return SeenTags(record.sightings, record.ids, figures)
 
-    def _sought(
-        self, before: FilterState, after: FilterState, scan: SeenScan, tags: SeenTags | None
-    ) -> FilterState:
+    def _sought(self, before: FilterState, after: FilterState, scan: SeenScan, tags: SeenTags | None) -> FilterState:
         """Go on searching after a scan or a frame; a tag tells at once."""
         if tags is not None and tags.figures is not None:
             ids = np.array(tags.ids, dtype=np.str_)

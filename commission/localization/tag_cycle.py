@@ -1,4 +1,4 @@
-"""One cycle of the localizer for a frame of the camera that looks for tags: its stamp is reached, its sightings correct.
+"""One cycle of the localizer for a frame of the camera that looks for tags: its stamp is reached, sightings correct.
 
 Beside `cycle`, which is that of a scan, and called by the same two: live, and by the compiled loop of whole runs.
 """

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
+from commission.geometry import se2
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.geometry.se2 import compose_scalars, inverse_scalars
 from commission.localization.cross_covariance import cross_covariance
 from commission.localization.estimate import Mode
 from commission.localization.pose_gaussian import PoseGaussian
@@ -87,17 +87,17 @@ def _belief_at(
     X = X_tag z^-1 m^-1; P = H^-1 (R + J B J^T) H^-T and C = -H^-1 J B with the rows of `tag_rows` there: derived from
     H (x' - x) = v - J (c' - c), x' and c' being what is estimated.
     """
-    away = inverse_scalars(float(sighting[0]), float(sighting[1]), float(sighting[2]))
-    camera = compose_scalars(*(float(each) for each in model.places[entry]), *away)
-    x, y, theta = compose_scalars(*camera, *inverse_scalars(model.mount_x, model.mount_y, model.mount_theta))
+    mounting = np.array((model.mount_x, model.mount_y, model.mount_theta))
+    camera = se2.compose(model.places[entry], se2.inverse(sighting[:3]))
+    x, y, theta = (float(each) for each in se2.compose(camera, se2.inverse(mounting)))
     at = PoseGaussian(x, y, theta, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     # The clock is taken for right: how fast the vehicle is, nobody knows yet who does not know where it is.
     rows = tag_rows(at, sighting, model.places[entry], model, (0.0, 0.0, 0.0))
     considered = np.diag(considered_of(entry, model, setup.filter.consider))
     noise = np.diag(rows.variances) + rows.constants @ considered @ rows.constants.T
     half = np.linalg.solve(rows.jacobians, noise)
-    P = np.linalg.solve(rows.jacobians, half.T)
-    P = 0.5 * (P + P.T)
-    columns = -np.linalg.solve(rows.jacobians, rows.constants @ considered)
+    solved = np.linalg.solve(rows.jacobians, half.T)
+    P = 0.5 * (solved + solved.T)
+    columns = np.asarray(-np.linalg.solve(rows.jacobians, rows.constants @ considered), dtype=np.float64)
     upper = (P[0, 0], P[0, 1], P[0, 2], P[1, 1], P[1, 2], P[2, 2])
     return PoseGaussian(x, y, theta, *(float(each) for each in upper)), columns

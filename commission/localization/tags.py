@@ -108,7 +108,7 @@ def entries_of(ids: Ids, tags: Sequence[Tag]) -> IntArray:
 
 
 @compiled
-def tag_rows(  # noqa: PLR0917 - a sighting and the vehicle, number by number
+def tag_rows(
     belief: PoseGaussian, sighting: FloatArray, tag: FloatArray, model: TagModel, twist: tuple[float, float, float]
 ) -> ContourRows:
     """Three rows of a sighting of one tag, with the camera's and the tag's constants beside them.
@@ -124,8 +124,8 @@ def tag_rows(  # noqa: PLR0917 - a sighting and the vehicle, number by number
     Notes
     -----
     z = R(-phi) (t - p - R(theta) m), t_theta - phi with phi = theta + m_theta, and H of it: Dixon et al. 2010,
-    equations 17 to 20, which have the camera at base. Of the constants: -R(-m_theta) of the mounting's place, (z_y, -z_x,
-    -1) of its heading, -H xdot of a late clock, R(-phi) and 1 of the tag: derived from the same z.
+    equations 17 to 20, which have the camera at base. Of the constants: -R(-m_theta) of the mounting's place, (z_y,
+    -z_x, -1) of its heading, -H xdot of a late clock, R(-phi) and 1 of the tag: derived from the same z.
     """
     phi = belief.theta + model.mount_theta
     c, s = math.cos(phi), math.sin(phi)

@@ -16,11 +16,12 @@ from commission.simulation.drive import driven_wheels
 from commission.site.disturbances import ConstantErrors, ScannerError
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
-from commission.site.truth import TruePlace, TrueWheels, Truth
+from commission.site.tags import Tag
+from commission.site.truth import TAG_CAMERA, TruePlace, TrueTag, TrueWheels, Truth
 
 STREAM = 5
 """Stream of random numbers of a seed, beside those of `scenario`; the next number says which kind of constant."""
-SURVEY, MOUNTING, RANGE_BIAS, CLOCK, WHEEL_SCALE = range(1, 6)
+SURVEY, MOUNTING, RANGE_BIAS, CLOCK, WHEEL_SCALE, TAG = range(1, 7)
 
 
 def draw_truth(project: Project, route: str, seed: int) -> Truth:
@@ -47,6 +48,8 @@ def draw_truth(project: Project, route: str, seed: int) -> Truth:
         ),
         scanners=tuple(_scanner(scanner.name, errors, seed) for scanner in project.scanners),
         reflectors=tuple(place for place in places if place is not None),
+        tags=tuple(off for off in (_tag(tag, errors, seed) for tag in project.tags) if off is not None),
+        tag_camera=_scanner(TAG_CAMERA, errors, seed) if project.tags else ScannerError(scanner=TAG_CAMERA),
     )
 
 
@@ -65,7 +68,32 @@ def true_site(project: Project, truth: Truth) -> Project:
         replace(each, mounting=each.mounting + np.array(error_of(truth, each.name).mounting))
         for each in project.scanners
     )
-    return replace(project, reflectors=reflectors, scanners=scanners)
+    tags = {tag.id: tag for tag in truth.tags}
+    return replace(
+        project,
+        reflectors=reflectors,
+        scanners=scanners,
+        tags=tuple(_moved(each, tags[each.id]) if each.id in tags else each for each in project.tags),
+        tag_camera=replace(
+            project.tag_camera, mounting=project.tag_camera.mounting + np.array(truth.tag_camera.mounting)
+        ),
+    )
+
+
+def _moved(tag: Tag, off: TrueTag) -> Tag:
+    """Return a tag where it stands."""
+    return replace(tag, x=tag.x + off.dx, y=tag.y + off.dy, heading=tag.heading + off.turn)
+
+
+def _tag(tag: Tag, errors: ConstantErrors, seed: int) -> TrueTag | None:
+    """Where a tag stands; None where that is where the map says."""
+    sigma = errors.survey_factor * tag.sigma if tag.sigma > 0.0 else errors.survey_sigma
+    turn = errors.survey_factor * tag.heading_sigma
+    if not sigma and not turn:
+        return None
+    draws = _normal(seed, TAG, tag.id, 3)
+    dx, dy = (float(off) for off in sigma * draws[:2])
+    return TrueTag(id=tag.id, dx=dx, dy=dy, turn=float(turn * draws[2]))
 
 
 def error_of(truth: Truth, scanner: str) -> ScannerError:

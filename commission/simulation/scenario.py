@@ -21,6 +21,7 @@ from commission.simulation.constants import draw_truth, error_of, true_site
 from commission.simulation.drive import DriveOptions, TrueMotion, drive, measure
 from commission.simulation.people import Crowd, WalkableFloor
 from commission.simulation.scan import VirtualScanner
+from commission.simulation.tags import tag_frames
 from commission.site.disturbances import ScannerError
 from commission.site.path import legs_of
 from commission.site.project import Project
@@ -29,7 +30,8 @@ from commission.site.records import ORDER_WITHIN_A_STAMP, Odometry, Record, Refe
 from commission.site.scanner import Scanner, scan_moments
 
 START, WHEELS, BEAMS, PEOPLE, LOSSES = range(5)
-"""Streams of random numbers of one seed."""
+TAGS = 6
+"""Streams of random numbers of one seed; 5 is that of `constants`."""
 
 DEFAULTS = DriveOptions()
 
@@ -87,7 +89,7 @@ def records(
     Yields
     ------
     record : Odometry (the first one zero), and at each scan a ReferencePose (the truth, also where the scan is lost)
-        and a Scan. Stamps start at 0.
+        and a Scan; where the site has tags, frames with them. Stamps start at 0.
 
     Raises
     ------
@@ -111,6 +113,7 @@ def records(
     yield from heapq.merge(
         _odometry(motion, displacements),
         _reference(shown, poses[first]),
+        tag_frames(site, motion, stream_of(seed, TAGS), late_s=truth.tag_camera.clock_offset),
         *(
             _reported(
                 _of_scanner(all_scans, index), project.scanners[index], error_of(truth, project.scanners[index].name)

@@ -339,7 +339,8 @@ class TagParameters:
     ] = 0.02
     """1-sigma noise of a tag's measured place, each axis of the camera, where the recording does not say it."""
     heading_sigma: Annotated[
-        float, Quantity(label="Tag turned 1σ", unit="rad", shown=DEGREES, bounds=POSITIVE, step=0.01, slider=(0.1, 10.0))
+        float,
+        Quantity(label="Tag turned 1σ", unit="rad", shown=DEGREES, bounds=POSITIVE, step=0.01, slider=(0.1, 10.0)),
     ] = 0.02
     """1-sigma noise of a tag's measured heading, where the recording does not say it."""
     gate_probability: Annotated[

@@ -90,7 +90,9 @@ class TagSightings:
         if not np.isfinite(values[:, :3]).all():
             raise ValueError("tag sightings: x, y or heading is no finite number; expected metres and radians")
         if (values[:, 3:] <= 0.0).any() or np.isinf(values[:, 3:]).any():
-            raise ValueError("tag sightings: a sigma is not positive; expected more than 0, or NaN where it is not said")
+            raise ValueError(
+                "tag sightings: a sigma is not positive; expected more than 0, or NaN where it is not said"
+            )
         if len(self.ids) != len(values):
             raise ValueError(f"tag sightings: {len(self.ids)} ids of {len(values)} tags; expected one each")
         object.__setattr__(self, "sightings", values)

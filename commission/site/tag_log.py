@@ -37,7 +37,9 @@ class TagLog:
         object.__setattr__(self, "offsets", read_only(np.asarray(self.offsets, dtype=np.int64)))
         object.__setattr__(self, "ids", read_only(np.asarray(self.ids, dtype=np.str_)))
         if len(self.offsets) != len(self.stamps_ns) + 1 or self.offsets[-1] != len(self.sightings):
-            raise ValueError(f"offsets of tags end at {self.offsets[-1]}; expected {len(self.sightings)}, one per frame")
+            raise ValueError(
+                f"offsets of tags end at {self.offsets[-1]}; expected {len(self.sightings)}, one per frame"
+            )
         if len(self.ids) != len(self.sightings):
             raise ValueError(f"{len(self.ids)} ids of {len(self.sightings)} sightings; expected one each")
 

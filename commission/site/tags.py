@@ -88,9 +88,7 @@ class TagCamera:
     """Smallest and largest distance at which it measures a tag."""
     rate: Annotated[
         float,
-        Quantity(
-            label="Frames per s", unit="frames/s", shown=BARE, bounds=Bounds.between(0.1, 1000.0), step=0.01
-        ),
+        Quantity(label="Frames per s", unit="frames/s", shown=BARE, bounds=Bounds.between(0.1, 1000.0), step=0.01),
     ] = 10.0
     """Frames per second."""
     position_sigma: Annotated[

@@ -10,7 +10,7 @@ from typing import Annotated
 
 from commission.site.disturbances import ScannerError, WheelNoise
 from commission.site.fields import described
-from commission.site.quantity import MILLIMETRES, PERCENT, Quantity
+from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT, Quantity
 
 
 def _share(label: str) -> Quantity:
@@ -47,6 +47,24 @@ class TruePlace:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TrueTag:
+    """Where a tag truly stands."""
+
+    id: str
+    """Its id in the map."""
+    dx: Annotated[float, _OFF]
+    """True x less the map's."""
+    dy: Annotated[float, _OFF]
+    """True y less the map's."""
+    turn: Annotated[float, Quantity(label="Turned by", unit="rad", shown=DEGREES, step=0.01)]
+    """True heading less the map's."""
+
+
+TAG_CAMERA = "tag camera"
+"""What the camera that looks for tags is called."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:
     """All constants of one virtual drive."""
 
@@ -60,6 +78,10 @@ class Truth:
     """Errors of each scanner: what was drawn, and what the project says of it."""
     reflectors: tuple[TruePlace, ...] = ()
     """Reflectors that do not stand where the map says."""
+    tags: tuple[TrueTag, ...] = ()
+    """Tags that do not stand where the map says."""
+    tag_camera: ScannerError = field(default_factory=lambda: ScannerError(scanner=TAG_CAMERA))
+    """Errors of the camera that looks for them."""
 
 
 def truth_told(truth: Truth) -> list[tuple[str, str]]:
@@ -76,6 +98,11 @@ def truth_told(truth: Truth) -> list[tuple[str, str]]:
         told.append(("reflectors", text))
     else:
         told.append(("reflectors", "where the map says"))
+    if truth.tags:
+        most = max(truth.tags, key=lambda tag: math.hypot(tag.dx, tag.dy))
+        told.append(("tags", f"{len(truth.tags)} off, {_OFF.text(math.hypot(most.dx, most.dy))} at most ({most.id})"))
+    if of_camera := ", ".join(_numbers(truth.tag_camera)):
+        told.append((TAG_CAMERA, of_camera))
     return told
 
 

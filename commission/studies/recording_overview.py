@@ -56,6 +56,11 @@ def channels(log: RecordLog) -> tuple[Channel, ...]:
         if len(scans):
             called = _called(log, "scans", log.scanners[scans.scanner])
             found.append(_channel(log, called, scans.stamps_ns, _scan_values(scans)))
+    if len(log.tags):
+        values = f"{len(log.tags.ids)} tags seen"
+        if len(log.tags.ids):
+            values += f", {_spans(log.tags.sightings[:, :3], ('x', 'y', 'theta'), ('m', 'm', 'rad'))}"
+        found.append(_channel(log, "tags", log.tags.stamps_ns, values))
     if len(log.reference_stamps_ns):
         values = _spans(log.reference_poses, ("x", "y", "theta"), ("m", "m", "rad"))
         found.append(_channel(log, "reference", log.reference_stamps_ns, values))

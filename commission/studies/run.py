@@ -41,6 +41,7 @@ from commission.studies.metrics import (
 from commission.studies.scanner_figures import ScannerFigures, scanner_figures
 from commission.studies.scanner_figures import warm_up as scanner_figures_warm_up
 from commission.studies.start import Start
+from commission.studies.tag_figures import tag_figures
 
 Number = int | float | None
 JUDGING_SHARE = 0.1
@@ -376,6 +377,7 @@ def summary(result: RunResult) -> dict[str, Number]:
         "microseconds_per_cycle": result.microseconds_per_cycle,
     }
     entries |= contour_figures(result.columns)
+    entries |= tag_figures(result.columns)
     if result.statistics is not None:
         entries |= {
             "reference_cycles": result.statistics.compared,

@@ -57,6 +57,6 @@ def _simulated(project: Project, source: VirtualDrive, progress: Progress) -> Dr
 def _recorded(project: Project, source: RecordedDrive, progress: Progress) -> Drive:
     progress(0.0, "reading the recording")
     log = load_log(source.path)
-    if not log.scans and not len(log.detection_stamps_ns):
-        raise SourceError(f"{source.path} holds no scan; expected scans.npz or detections.csv")
+    if not log.scans and not len(log.detection_stamps_ns) and not len(log.tags):
+        raise SourceError(f"{source.path} holds no scan; expected scans.npz, detections.csv or tags.csv")
     return Drive(log, start_of(project, log))

@@ -23,7 +23,8 @@ from commission.localization.state import belief_of
 from commission.site.parameters import SupervisorParameters
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
-from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan, TagSightings
+from commission.site.tag_log import TagLog
 from commission.site.walls import walls_of
 from commission.studies.run import RunInput, RunResult, judge
 from commission.studies.start import Start, StartOrigin, belief_at, route_start, unknown_start_at
@@ -79,6 +80,7 @@ class LiveRun:
         self._reference = _StampedRows(3)
         self._detections = _StampedRows(2)
         self._seen = _StampedRows(2)
+        self._tags: list[TagSightings] = []
         self._newest_ns = self._odometry_ns = 0
         self._spent = 0.0
 
@@ -200,6 +202,8 @@ class LiveRun:
             case Detections():
                 self._seen.append(record.stamp_ns, np.array([[len(record.range_bearing), record.scanner]]))
                 self._detections.append(record.stamp_ns, record.range_bearing)
+            case TagSightings():
+                self._tags.append(record)
             case Scan():
                 if record.scanner not in self._spools:
                     self._spools[record.scanner] = SpooledScans(record.scanner)
@@ -217,6 +221,7 @@ class LiveRun:
             detection_offsets=np.concatenate([[0], np.cumsum(seen[:, 0])]).astype(np.int64),
             range_bearing=self._detections.values,
             detection_scanners=seen[:, 1],
+            tags=TagLog.of(self._tags),
             reference_stamps_ns=self._reference.stamps_ns,
             reference_poses=self._reference.values,
         )

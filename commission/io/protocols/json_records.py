@@ -1,7 +1,7 @@
 """Records as JSON, one message each: what any vehicle can send in twenty lines, without a library.
 
-A message is an object with a `type` (`odometry`, `scan`, `detections`, `reference`), numbers in SI units and radians,
-and optionally `stamp_ns` by the sender's clock and `seq`, which counts its messages. `null` is a range of no return.
+A message is an object with a `type` (`odometry`, `scan`, `detections`, `tags`, `reference`), numbers in SI units and
+radians, and optionally `stamp_ns` by the sender's clock and `seq`, which counts its messages. `null` is a range of no return.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from msgspec import Meta, Struct
 from commission.errors import DecodeError
 from commission.geometry.arrays import FloatArray, read_only
 from commission.io.protocols.message import LiveMessage, OdometryPose
-from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan, TagSightings
 
 MESSAGE_LIMIT = 65_507
 """Bytes of a message: a datagram holds no more."""
@@ -63,13 +63,21 @@ class _Detections(_Sent, tag="detections"):
     scanner: str | None = None
 
 
+class _Tags(_Sent, tag="tags"):
+    """Tags that a camera has measured in one frame: id, then x, y, theta and where it is known 1-sigma of each."""
+
+    ids: Annotated[list[str], Meta(max_length=1_000)]
+    poses: Annotated[list[_Pose], Meta(max_length=1_000)]
+    sigmas: Annotated[list[tuple[_Number | None, _Number | None, _Number | None]], Meta(max_length=1_000)] | None = None
+
+
 class _Reference(_Sent, tag="reference"):
     """Where a second system says that the vehicle is."""
 
     pose: tuple[_Number, _Number, _Number | None]
 
 
-_Any: TypeAlias = _Odometry | _Scan | _Detections | _Reference
+_Any: TypeAlias = _Odometry | _Scan | _Detections | _Tags | _Reference
 _DECODER: msgspec.json.Decoder[_Any] = msgspec.json.Decoder(_Any)
 
 
@@ -113,6 +121,13 @@ def _record(sent: _Any, scanners: Sequence[str]) -> Record | OdometryPose:
         case _Detections():
             rows = np.array(sent.range_bearing, dtype=np.float64).reshape(-1, 2)
             return Detections(stamp, rows, _index(sent.scanner, scanners))
+        case _Tags():
+            count = len(sent.poses)
+            sigmas = [(None, None, None)] * count if sent.sigmas is None else sent.sigmas
+            if len(sigmas) != count:
+                raise ValueError(f"sigmas has {len(sigmas)} values; expected one for each of {count} poses")
+            both = [np.array(each, dtype=np.float64).reshape(-1, 3) for each in (sent.poses, sigmas)]
+            return TagSightings(stamp, np.concatenate(both, axis=1), tuple(sent.ids))
         case _Reference():
             x, y, theta = sent.pose
             return ReferencePose(stamp, np.array([x, y, math.nan if theta is None else theta]))
@@ -181,6 +196,13 @@ def _content(record: Record | OdometryPose, scanners: Sequence[str]) -> dict[str
         case Detections():
             rows = record.range_bearing.tolist()
             return {"type": "detections", "range_bearing": rows, "scanner": scanners[record.scanner]}
+        case TagSightings():
+            return {
+                "type": "tags",
+                "ids": list(record.ids),
+                "poses": record.sightings[:, :3].tolist(),
+                "sigmas": [_nullable(row) for row in record.sightings[:, 3:]],
+            }
         case Scan():
             return {
                 "type": "scan",

@@ -1,6 +1,6 @@
 """A recording as a folder of tables: what an engineer can make from any log. The reading side.
 
-`odometry.csv`, and where they exist `detections.csv`, `scans.npz` (of several scanners `scans_NAME.npz`),
+`odometry.csv`, and where they exist `detections.csv`, `tags.csv`, `scans.npz` (of several scanners `scans_NAME.npz`),
 `reference.csv`, `reference.json` and `truth.json`. A pause in any of them is no error: vehicles stand still, scanners
 are unplugged. Neither is disorder, nor a stamp that comes twice, as real logs have them: both are mended and told.
 """
@@ -20,6 +20,7 @@ from commission.io.csv_table import Block, read_table
 from commission.io.recordings import motion
 from commission.io.recordings.reference_file import REFERENCE_MOUNT, read_reference_mount
 from commission.io.recordings.scan_archive import ScanArchive
+from commission.io.recordings.tag_file import TAGS, read_tags
 from commission.io.recordings.truth_file import TRUTH, read_truth
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanStore
@@ -105,7 +106,7 @@ class CsvFolder:
         """Whether a path is such a folder, complete or not."""
         if not path.is_dir():
             return False
-        return any((path / name).exists() for name in (ODOMETRY, DETECTIONS, SCANS, REFERENCE)) or any(
+        return any((path / name).exists() for name in (ODOMETRY, DETECTIONS, SCANS, REFERENCE, TAGS)) or any(
             path.glob(NAMED_SCANS)
         )
 
@@ -148,6 +149,7 @@ class CsvFolder:
             detection_offsets=np.append(offsets[starts], offsets[-1]),
             range_bearing=detections.values[seen],
             detection_scanners=detections.scanners[starts],
+            tags=read_tags(self.path / TAGS),
             reference_stamps_ns=reference.stamps_ns,
             reference_poses=reference.rows,
             truth=self.truth(),

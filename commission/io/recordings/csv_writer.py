@@ -25,11 +25,15 @@ from commission.io.recordings.csv_folder import (
 )
 from commission.io.recordings.reference_file import REFERENCE_MOUNT, write_reference_mount
 from commission.io.recordings.scan_writer import ScanWriter
+from commission.io.recordings.tag_file import SIGMA_COLUMNS, TAG_COLUMNS, TAGS, tag_lines
 from commission.io.recordings.truth_file import TRUTH, write_truth
-from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan, TagSightings
 from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import ONLY_NAME
 from commission.site.truth import Truth
+
+_TABLES = {Odometry: ODOMETRY, Detections: DETECTIONS, ReferencePose: REFERENCE, TagSightings: TAGS}
+"""Table of each kind of record that has one."""
 
 
 def write_recording(
@@ -75,6 +79,7 @@ def write_recording(
             TRUTH,
             CONTOUR,
             BEARINGS,
+            TAGS,
             *(path.name for path in folder.glob(NAMED_SCANS)),
         ):
             if name not in names:
@@ -88,12 +93,13 @@ def _write_all(scratch: Path, records: Iterable[Record], folder: Path, scanners:
     with ExitStack() as stack:
         tables = {
             kind: stack.enter_context((scratch / name).open("w", encoding="utf-8", newline="\n"))
-            for kind, name in ((Odometry, ODOMETRY), (Detections, DETECTIONS), (ReferencePose, REFERENCE))
+            for kind, name in _TABLES.items()
         }
         for kind, columns in (
             (Odometry, ODOMETRY_COLUMNS),
             (Detections, DETECTION_COLUMNS if len(scanners) == 1 else (*DETECTION_COLUMNS, SCANNER_COLUMN)),
             (ReferencePose, REFERENCE_COLUMNS),
+            (TagSightings, (*TAG_COLUMNS, *SIGMA_COLUMNS)),
         ):
             tables[kind].write(",".join(columns) + "\n")
         files = [scans_file(scanners, index) for index in range(len(scanners))]
@@ -106,7 +112,7 @@ def _write_all(scratch: Path, records: Iterable[Record], folder: Path, scanners:
                 names.add(files[record.scanner])
             else:
                 tables[type(record)].write(_rows(record, cells))
-                names.add({Odometry: ODOMETRY, Detections: DETECTIONS, ReferencePose: REFERENCE}[type(record)])
+                names.add(_TABLES[type(record)])
         for table in tables.values():
             table.flush()
             os.fsync(table.fileno())
@@ -115,12 +121,14 @@ def _write_all(scratch: Path, records: Iterable[Record], folder: Path, scanners:
     return names
 
 
-def _rows(record: Odometry | Detections | ReferencePose, scanners: Sequence[str]) -> str:
+def _rows(record: Odometry | Detections | TagSightings | ReferencePose, scanners: Sequence[str]) -> str:
     """Lines of a record, detections with the cell of their scanner; `repr` of a number reads back as the same."""
     if isinstance(record, Detections):
         end = f"{scanners[record.scanner]}\n"
         if len(record.range_bearing) == 0:
             return f"{record.stamp_ns},,{end}"
         return "".join(f"{record.stamp_ns},{r!r},{b!r}{end}" for r, b in record.range_bearing.tolist())
+    if isinstance(record, TagSightings):
+        return "".join(tag_lines(record))
     values = record.displacement if isinstance(record, Odometry) else record.pose
     return ",".join([str(record.stamp_ns), *("" if math.isnan(v) else repr(v) for v in values.tolist())]) + "\n"

@@ -5,6 +5,7 @@ It knows the fields of a few types, and no record of ours.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
@@ -12,6 +13,8 @@ import numpy as np
 from commission.geometry.arrays import FloatArray, Growing, IntArray
 from commission.io.recordings.cdr_columns import CdrColumns
 from commission.io.recordings.mcap_index import McapIndex
+from commission.site.records import TagSightings
+from commission.site.tag_log import TagLog
 
 BEAM_LIMIT = 100_000
 """Beams in one scan."""
@@ -53,6 +56,41 @@ class PairColumns:
         self.stamps_ns.append(found.stamps_ns())
         self.counts.append(counts)
         self.pairs.append(np.stack([found.gathered(firsts, counts), found.gathered(seconds, counts)], axis=1))
+
+
+class TagColumns:
+    """Messages that are a header, an array of doubles, six of each tag, and the ids of these as a list of JSON."""
+
+    def __init__(self) -> None:
+        self.stamps_ns: Growing[np.int64] = Growing(np.int64)
+        self.counts: Growing[np.int64] = Growing(np.int64)
+        self.sightings: Growing[np.float64] = Growing(np.float64, 6)
+        self.ids: list[str] = []
+
+    def take(self, _: int, found: CdrColumns) -> None:
+        """Take the messages of a chunk; raises ValueError where they are of another type."""
+        counts, firsts = found.arrays(found.after_header(4), 8)
+        lengths, texts = found.arrays(firsts + 8 * counts, 1)
+        for count, begin, length in zip(counts.tolist(), texts.tolist(), lengths.tolist(), strict=True):
+            ids = json.loads(found.content[begin : begin + max(length - 1, 0)].tobytes().decode())
+            if not isinstance(ids, list) or 6 * len(ids) != count or not all(isinstance(each, str) for each in ids):
+                raise ValueError("a message has other ids than tags")
+            self.ids.extend(ids)
+        self.stamps_ns.append(found.stamps_ns())
+        self.counts.append(counts // 6)
+        self.sightings.append(found.gathered(firsts, counts).reshape(-1, 6))
+
+    def log(self) -> TagLog:
+        """Return the frames in order of their stamps; raises ValueError where a number cannot be."""
+        stamps, counts, ids = self.stamps_ns.array(), self.counts.array(), self.ids
+        ends, sightings = np.cumsum(counts), self.sightings.array()
+        frames = [
+            TagSightings(
+                int(stamps[k]), sightings[ends[k] - counts[k] : ends[k]], tuple(ids[ends[k] - counts[k] : ends[k]])
+            )
+            for k in np.argsort(stamps, kind="stable").tolist()
+        ]
+        return TagLog.of(frames)
 
 
 class ScanColumns:

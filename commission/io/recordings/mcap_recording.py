@@ -17,6 +17,7 @@ from commission.io.recordings.mcap_columns import (
     PairColumns,
     RowColumns,
     ScanColumns,
+    TagColumns,
     in_order_once,
     read_columns,
 )
@@ -28,6 +29,7 @@ from commission.io.recordings.recorder import (
     DISPLACEMENTS,
     METADATA,
     REFERENCES,
+    TAGS,
     VERSION,
     beams_topic,
     detected_topic,
@@ -42,6 +44,7 @@ from commission.site.record_store import ScanStore
 from commission.site.recorded_start import RecordedStart
 from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import is_name
+from commission.site.tag_log import TagLog
 from commission.site.truth import Truth
 
 _BEGIN = 400
@@ -107,11 +110,11 @@ class McapRecording(WholeRecording):
 
     def load(self) -> RecordLog:
         """Read everything but scans into columns; raises FileFormatError."""
-        moved, referred = RowColumns(3), RowColumns(3)
+        moved, referred, tagged = RowColumns(3), RowColumns(3), TagColumns()
         topics = scanner_topics(self.scanners)
         scans = [(ScanColumns(), ExactBeams()) for _ in topics]
         detected = [PairColumns() for _ in topics]
-        takers = {DISPLACEMENTS: moved.take, REFERENCES: referred.take}
+        takers = {DISPLACEMENTS: moved.take, REFERENCES: referred.take, TAGS: tagged.take}
         for topic, (ranges, beams), pairs in zip(topics, scans, detected, strict=True):
             takers |= {topic: ranges.take, beams_topic(topic): beams.take, detected_topic(topic): pairs.take}
         index, self._index = self._index or McapIndex(self.path), None
@@ -129,8 +132,8 @@ class McapRecording(WholeRecording):
             found, told = self._scans(index, scanner, ranges, beams)
             notes += told
             stores += [] if found is None else [found]
-        detections = self._detections(detected)
-        if not (len(odometry.stamps_ns) or len(reference_stamps) or stores or len(detections[0])):
+        detections, tags = self._detections(detected), self._tags(tagged)
+        if not (len(odometry.stamps_ns) or len(reference_stamps) or stores or len(detections[0]) or len(tags)):
             raise FileFormatError(self.path, "", "holds no record", "a recording of a drive")
         self._check(odometry.rows, "displacements")
         return RecordLog(
@@ -142,6 +145,7 @@ class McapRecording(WholeRecording):
             detection_scanners=detections[1],
             detection_offsets=detections[2],
             range_bearing=detections[3],
+            tags=tags,
             reference_stamps_ns=reference_stamps[rows],
             reference_poses=reference_poses[rows],
             reference_mount=self.reference_mount(),
@@ -204,6 +208,13 @@ class McapRecording(WholeRecording):
         if len(pairs) and not pairs[:, 0].min() > 0.0:
             raise FileFormatError(self.path, "detections", f"has a range of {pairs[:, 0].min():g} m", "more than 0 m")
         return stamps[order], scanners[order], offsets, pairs[rows]
+
+    def _tags(self, found: TagColumns) -> TagLog:
+        """Frames with tags; raises FileFormatError where a number cannot be."""
+        try:
+            return found.log()
+        except ValueError as error:
+            raise FileFormatError(self.path, "tags", str(error), "a file as it was recorded") from error
 
     def _check(self, values: np.ndarray, name: str) -> None:
         """Raise FileFormatError where a number is not finite."""

@@ -6,6 +6,7 @@ each stands one of our own types, which holds what was recorded to the last bit;
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -13,7 +14,7 @@ import numpy as np
 from commission.geometry.arrays import FloatArray
 from commission.io.recordings.cdr import CdrWriter
 from commission.localization.estimate import Estimate
-from commission.site.records import Detections, Odometry, ReferencePose, Scan
+from commission.site.records import Detections, Odometry, ReferencePose, Scan, TagSightings
 
 MAP, ODOM, BASE_LINK = "map", "odom", "base_link"
 """Names of frames (REP 105)."""
@@ -28,10 +29,12 @@ BEAMS = "commission_msgs/msg/Beams"
 DISPLACEMENT = "commission_msgs/msg/Displacement"
 DETECTED = "commission_msgs/msg/Detections"
 REFERENCE = "commission_msgs/msg/ReferencePose"
+TAGS = "commission_msgs/msg/Tags"
 OWN_FIELDS = {
     BEAMS: "float64 angle_min\nfloat64 angle_increment\nbool[] reflector\n",
     DISPLACEMENT: "float64 dx\nfloat64 dy\nfloat64 dtheta\n",
     DETECTED: "float64[] range\nfloat64[] bearing\n",
+    TAGS: "float64[] values\nstring ids\n",
     REFERENCE: "float64 x\nfloat64 y\nfloat64 theta\n",
 }
 """Our own types behind their header, in the language of ROS 2 messages [m, rad]."""
@@ -112,6 +115,12 @@ def detections(record: Detections, frame: str) -> bytes:
     """Return what a sensor detected itself, in the frame of the scanner."""
     ranges, bearings = record.range_bearing.T
     return CdrWriter().header(record.stamp_ns, frame).array(ranges).array(bearings).message()
+
+
+def tags(record: TagSightings) -> bytes:
+    """Return what a camera saw of tags: six numbers of each, and their ids as a list of JSON."""
+    writer = CdrWriter().header(record.stamp_ns, "camera").array(record.sightings.ravel())
+    return writer.text(json.dumps(record.ids)).message()
 
 
 def estimated_pose(estimate: Estimate) -> bytes:

@@ -16,7 +16,7 @@ from commission.io.conversion import convert
 from commission.io.reading import read_text
 from commission.io.recordings.versioned_json import json_of, refuse_other_versions
 from commission.site.disturbances import ScannerError
-from commission.site.truth import TruePlace, TrueWheels, Truth
+from commission.site.truth import TAG_CAMERA, TruePlace, TrueTag, TrueWheels, Truth
 
 TRUTH = "truth.json"
 SCHEMA = 1
@@ -41,6 +41,10 @@ class TruthDocument:
     """Errors of each scanner."""
     reflectors: tuple[TruePlace, ...] = ()
     """Reflectors that do not stand where the map says."""
+    tags: tuple[TrueTag, ...] = ()
+    """Tags that do not stand where the map says."""
+    tag_camera: ScannerError = field(default_factory=lambda: ScannerError(scanner=TAG_CAMERA))
+    """Errors of the camera that looks for them."""
 
 
 def write_truth(path: Path, truth: Truth) -> None:
@@ -73,5 +77,11 @@ def truth_of(path: Path, text: str) -> Truth:
     refuse_other_versions(document, values["schema"], SCHEMA)
     keys = convert(document, TruthDocument)
     return Truth(
-        seed=keys.seed, route=keys.route, wheels=keys.wheels, scanners=keys.scanners, reflectors=keys.reflectors
+        seed=keys.seed,
+        route=keys.route,
+        wheels=keys.wheels,
+        scanners=keys.scanners,
+        reflectors=keys.reflectors,
+        tags=keys.tags,
+        tag_camera=keys.tag_camera,
     )
