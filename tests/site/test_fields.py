@@ -35,11 +35,12 @@ from commission.site.reflectors import Reflector, ReflectorKind
 from commission.site.routes import Route, Segment
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.tags import Tag, TagCamera
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle
 
 EDITED = (
     *(DifferentialVehicle, TricycleVehicle, OmnidirectionalVehicle, Scanner, Reflector, Station, Segment, Route),
-    *(WheelNoise, ConstantErrors, ScannerError),
+    *(WheelNoise, ConstantErrors, ScannerError, Tag, TagCamera),
     *(Disturbances, ShinyObject, TiltedStretch, CoveredPeriod, Demands, CandidateOptions, AllowedHeights),
 )
 NO_QUANTITY = {"Segment.degree"}
