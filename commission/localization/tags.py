@@ -260,8 +260,8 @@ def correct_by_tag(  # noqa: PLR0917 - the filter's state around one sighting
 
     Notes
     -----
-    K, P and x of Dixon et al. 2010, equations 21 to 23, row by row in Joseph's form, with constants considered: see
-    `corrected_by_rows`.
+    K = P H^T (H P H^T + R)^-1, P' = (I - K H) P, x' = x + K (z - h(x)): Dixon et al. 2010, equations 21 to 23, row by
+    row in Joseph's form, with constants considered as in `corrected_by_rows`.
     """
     figures[:] = 0.0
     if entry == NOT_READ:
