@@ -200,7 +200,13 @@ class GrowingRun:
         offsets = read_only(self._tag_offsets[: len(is_frame) + 1])
         ids = read_only(np.array(self._ids, dtype=np.str_))
         numbers = read_only(np.cumsum(is_frame) - is_frame)
-        return TagCycles(is_frame, offsets, read_only(self._sightings.sightings[:count]), ids, numbers)
+        return TagCycles(
+            is_frame=is_frame,
+            offsets=offsets,
+            sightings=read_only(self._sightings.sightings[:count]),
+            ids=ids,
+            numbers=numbers,
+        )
 
     def _append_tags(self, row: int, seen: SeenTags | None) -> None:
         """Write what a frame saw of tags, and what became of it."""

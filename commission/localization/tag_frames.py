@@ -11,7 +11,7 @@ from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_onl
 from commission.site.tag_log import Ids, TagLog
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class TagCycles:
     """A row per cycle, and a row per sighting."""
 
@@ -31,7 +31,13 @@ class TagCycles:
         rows = slice(int(self.offsets[first]), int(self.offsets[last]))
         offsets = read_only(self.offsets[first : last + 1] - self.offsets[first])
         here = slice(first, last)
-        return TagCycles(self.is_frame[here], offsets, self.sightings[rows], self.ids[rows], self.numbers[here])
+        return TagCycles(
+            is_frame=self.is_frame[here],
+            offsets=offsets,
+            sightings=self.sightings[rows],
+            ids=self.ids[rows],
+            numbers=self.numbers[here],
+        )
 
 
 def among(tags: TagLog, stamps_ns: IntArray) -> TagCycles | None:
@@ -50,7 +56,13 @@ def among(tags: TagLog, stamps_ns: IntArray) -> TagCycles | None:
     is_frame[at], counts[at] = True, np.diff(tags.offsets)
     offsets = np.concatenate(([0], np.cumsum(counts))).astype(np.int64)
     numbers = np.cumsum(is_frame) - is_frame
-    return TagCycles(read_only(is_frame), read_only(offsets), tags.sightings, tags.ids, read_only(numbers))
+    return TagCycles(
+        is_frame=read_only(is_frame),
+        offsets=read_only(offsets),
+        sightings=tags.sightings,
+        ids=tags.ids,
+        numbers=read_only(numbers),
+    )
 
 
 def in_turn(parts: Sequence[TagCycles | None]) -> TagCycles | None:
@@ -62,9 +74,9 @@ def in_turn(parts: Sequence[TagCycles | None]) -> TagCycles | None:
         raise ValueError("some parts of a run know of frames with tags and some do not; expected all of one log")
     offsets = np.concatenate([[0], np.cumsum(np.concatenate([np.diff(part.offsets) for part in some]))])
     return TagCycles(
-        read_only(np.concatenate([part.is_frame for part in some])),
-        read_only(offsets.astype(np.int64)),
-        read_only(np.concatenate([part.sightings for part in some])),
-        read_only(np.concatenate([part.ids for part in some])),
-        read_only(np.concatenate([part.numbers for part in some])),
+        is_frame=read_only(np.concatenate([part.is_frame for part in some])),
+        offsets=read_only(offsets.astype(np.int64)),
+        sightings=read_only(np.concatenate([part.sightings for part in some])),
+        ids=read_only(np.concatenate([part.ids for part in some])),
+        numbers=read_only(np.concatenate([part.numbers for part in some])),
     )
