@@ -70,6 +70,9 @@ def consistency(columns: RunColumns, first: int = 0, after: int | None = None) -
     per_cycle = columns.counts(Status.INLIER)[first:after]
     times = np.asarray((columns.stamps_ns[first:after] - columns.stamps_ns[first]) * 1e-9, dtype=np.float64)
     seen = times[per_cycle > 0]
+    # A frame of a camera that looks for tags is no scan: that it shows no reflector says nothing.
+    tags = columns.detected.tags
+    of_scans = per_cycle if tags is None else per_cycle[~tags.is_frame[first:after]]
     return Consistency(
         cycles=after - first,
         accepted=accepted,
@@ -78,7 +81,7 @@ def consistency(columns: RunColumns, first: int = 0, after: int | None = None) -
         nis_expected=_expected(columns, first, after),
         nis_before_gate_mean=_mean(d2[has_distance(columns)[rows]]),
         rejected_fraction=rejected / (accepted + rejected) if accepted + rejected else math.nan,
-        unseen_fraction=float(np.mean(per_cycle == 0)),
+        unseen_fraction=float(np.mean(of_scans == 0)) if len(of_scans) else 1.0,
         longest_unseen=float(np.diff(np.concatenate((times[:1], seen, times[-1:]))).max()),
     )
 

@@ -1,7 +1,8 @@
 """Records as JSON, one message each: what any vehicle can send in twenty lines, without a library.
 
 A message is an object with a `type` (`odometry`, `scan`, `detections`, `tags`, `reference`), numbers in SI units and
-radians, and optionally `stamp_ns` by the sender's clock and `seq`, which counts its messages. `null` is a range of no return.
+radians, and optionally `stamp_ns` by the sender's clock and `seq`, which counts its messages. `null` is a range of no
+return.
 """
 
 from __future__ import annotations
