@@ -49,6 +49,7 @@
     const now = [box.left, box.bottom, box.width, camera.fov, ...camera.position.toArray(), pointer].join();
     if (now === shown) return;
     shown = now;
+    document.documentElement.style.setProperty("--c-floor", `${box.left}px`); // for the rail of tools beside it
     status.style.left = `${box.left + 12}px`;
     status.style.top = `${box.bottom - 30}px`;
     const isPlan = camera.fov < FLAT_DEGREES;

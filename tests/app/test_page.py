@@ -81,8 +81,8 @@ def test_no_key_stands_for_two_commands(
     state = AppState(project=project, saved=project)
     Page(server, lambda _action: None, state, FEATURES)
     # What each browser has of its own.
-    ToolButtons(server.gui, lambda _action: None)
-    MapToolButtons(server.gui, lambda _action: None)
+    ToolButtons(server.gui, lambda _action: None, 1)
+    MapToolButtons(server.gui, lambda _action: None, 1)
     AssociationPanel(server.gui, lambda _action: None, 1)
     assert len(keys) > 18
     assert {key: labels for key, labels in keys.items() if len(labels) > 1} == {}

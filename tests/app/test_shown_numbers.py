@@ -361,7 +361,7 @@ COME_FROM = ("Error of position, 2σ by source [mm]", "Error of heading, 2σ by 
 
 def test_the_numbers_along_a_route_are_those_of_its_prediction(expected_route: RouteView, site: Project) -> None:
     route, prediction = expected_route, expected_route.prediction
-    shown = dict(re.findall(r"<tr><td>(.*?)</td><td>(.*?)</td></tr>", chart(route, None)))
+    shown = dict(re.findall(r"<tr[^>]*><td>(.*?)</td><td>(.*?)</td></tr>", chart(route, None)))
     contributed = in_any_direction(errors_of(site).parts, XY)
     table = {
         "Length": (prediction.drive.metres[-1],),
@@ -575,7 +575,7 @@ def test_a_ranking_tells_failing_metres_and_two_sigma_as_a_share_of_the_limit() 
         outdated=False,
     )
     shown = ranking_table(view)
-    rows = dict(re.findall(r"<tr><td>(R\d)</td><td>(.*?)</td></tr>", shown))
+    rows = dict(re.findall(r"<tr[^>]*><td>(R\d)</td><td>(.*?)</td></tr>", shown))
     # The metres of both routes together; the load of the worse one.
     assert rows == {"R6": "4 m; 124 %", "R3": "0 m; 46 %"}
     assert "Loop: 3 to 5 m, 9 to 10 m<br>Dock: 0 to 1 m" in shown

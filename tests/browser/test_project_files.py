@@ -75,7 +75,7 @@ def test_a_project_that_is_edited_elsewhere_is_shown_read_only_and_taken_over_by
     assert second.state.project.name != "Mine"
     assert here.page.get_by_role("button", name="Take over").count() == 0
 
-    assert_bar_is_whole(there, "Take over", "Plan", "3D", "Fit", "Follow")
+    assert_bar_is_whole(there, "Take over", "2D", "3D", "Fit", "Follow")
 
     there.press("Take over")
     second.until(lambda: second.state.read_only == "" and second.state.project.name == "Edited", 30.0)
@@ -141,7 +141,7 @@ def test_what_became_of_the_journal_is_told_on_the_page(open_hall: Open, folder:
     page.wait_until_told(f"the project's folder {folder} was deleted or moved; all edits are kept in")
     page.wait_for_text("its folder is gone; edits are kept in")
     rename(served, page, "Two")
-    assert_bar_is_whole(page, "Overwrite", "Read again", "Plan", "3D", "Fit", "Follow")
+    assert_bar_is_whole(page, "Overwrite", "Read again", "2D", "3D", "Fit", "Follow")
     page.press("Overwrite")
     page.wait_for_text("saved ")
     assert load_project(folder).name == "Two"

@@ -34,8 +34,26 @@ CUT_OFF = """() => {
   const play = [...strip.querySelectorAll('button')].filter((each) => names.includes(each.textContent));
   const lines = new Set(play.map((each) => Math.round(each.getBoundingClientRect().top)));
   if (play.length !== 5 || lines.size !== 1) found.push(`${play.length} buttons in ${lines.size} lines`);
+  const floor = document.querySelector('canvas[data-engine]').getBoundingClientRect();
+  const tools = [...document.querySelectorAll('div:has(>.c-rail)+div button')];
+  if (tools.length !== 9) found.push(`${tools.length} tools`);
+  let above = floor.top;
+  for (const each of tools) {
+    const box = each.getBoundingClientRect();
+    if (box.right > floor.left + 1 || box.left < floor.left - 50) say(each, 'not at the edge of the floor');
+    if (box.top < above - 1 || box.bottom > floor.bottom + 1) say(each, 'over another tool, or beyond the floor');
+    if (!each.contains(document.elementFromPoint(box.left + 20, box.top + 9))) say(each, 'covered');
+    const label = each.querySelector('.mantine-Button-label');
+    if (label.scrollWidth > each.clientWidth + 1) say(each, 'name is cut');
+    above = box.bottom;
+  }
   return found;
 }"""
+TOOL = """(name) => [...document.querySelectorAll('div:has(>.c-rail)+div button')]
+  .find((each) => each.textContent === name)"""
+LIT = """() => [...document.querySelectorAll('div:has(>.c-rail)+div button')]
+  .filter((each) => getComputedStyle(each).backgroundColor !== 'rgba(0, 0, 0, 0)').map((each) => each.textContent)"""
+"""Names of the tools that are lit."""
 
 
 def wall_of(count: int) -> Project:
@@ -70,6 +88,17 @@ def test_no_button_or_name_is_cut_off_at_any_size(served: Served, window: Callab
         names = page.page.evaluate("() => window.commissionPlots.namesShown")
         assert {"x", "y", "largest", "inliers", "outliers"} <= {name.split(" ")[0] for name in names}, (width, names)
     assert found == {size: [] for size in SIZES}
+    # The rail shows which tool is in use, whether a key or the rail has chosen it.
+    page.page.mouse.move(600, 300)
+    for choose, lit in (
+        (lambda: page.page.keyboard.press("m"), "Measure"),
+        (lambda: page.page.evaluate(f"({TOOL})('Wall').click()"), "Wall"),
+        (lambda: page.page.keyboard.press("g"), "Align"),
+        (lambda: page.page.keyboard.press("Escape"), "Select"),
+    ):
+        choose()
+        page.page.mouse.move(600, 300)
+        page.page.wait_for_function(f"name => String(({LIT})()) === name", arg=lit)
 
 
 def test_what_is_selected_on_the_floor_is_scrolled_to_in_its_table_on_whichever_page_it_is(

@@ -92,7 +92,7 @@ class Magnify(Action):
 class Camera(StrEnum):
     """What one browser looks at."""
 
-    PLAN = "Plan"
+    PLAN = "2D"
     THREE_D = "3D"
     FIT = "Fit"
     FOLLOW = "Follow"

@@ -88,9 +88,16 @@ def escaped(text: object) -> str:
     return "&#35;".join(html.escape(part, quote=True) for part in str(text).split("#"))
 
 
+IN_ONE_LINE = 22
+"""Letters of a value that no line break tears from its unit."""
+
+
 def table(rows: Iterable[tuple[str, str]]) -> str:
     """Return a table of two columns; the caller escapes what is not its own."""
-    body = "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in rows)
+    body = "".join(
+        f"<tr{' class=c-one' if len(value) <= IN_ONE_LINE else ''}><td>{name}</td><td>{value}</td></tr>"
+        for name, value in rows
+    )
     return f'<table class="c-table">{body}</table>'
 
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from commission.app.base.paints import Surface, Worded
-from commission.app.base.theme import LEFT_PX, RIGHT_PX, css
+from commission.app.base.theme import LEFT_PX, RAIL_PX, RIGHT_PX, css
 
+TOOLS = 9
+"""On the rail at the floor's edge, which share its height."""
 NO_RUN_PX = 34
 """Height of the strip below the floor while there is no run [pixels]."""
 
@@ -60,6 +62,26 @@ div:has(>div>.c-bottom):has(.c-no-run)>:nth-child(4){{grid-column:1/span 24!impo
  height:26px;padding:0;border-radius:3px;border:1px solid {css(Surface.EDGE_QUIET.dark)};
  background:{css(Surface.CARD.dark)};color:inherit;font-size:15px;line-height:1;cursor:pointer}}
 .c-daylight:is(:hover,:focus-visible){{border-color:{css(Worded.BRAND.dark)}}}
+[data-dock-region=left] [data-dock-column]{{padding-right:{RAIL_PX}px}}
+:root{{--c-tool:clamp(18px,(100vh - var(--c-top) - var(--c-bottom) - 20px)/{TOOLS},38px)}}
+div:has(>.c-rail)+div :is(div,.mantine-Flex-root){{width:100%!important;flex-direction:column!important;
+ flex-wrap:nowrap!important;gap:0!important}}
+div:has(>.c-top) div:has(>.c-rail)+div button,div:has(>div>.c-top) div:has(>.c-rail)+div button{{box-sizing:border-box;
+ display:block;position:relative;width:{RAIL_PX - 4}px;height:var(--c-tool)!important;margin:0 2px;padding:0!important;
+ flex:none!important;border:none;border-radius:4px;background:none;color:{css(Worded.WORD.dark)};overflow:hidden}}
+div:has(>.c-rail)+div button:is(:hover,:focus-visible){{background:{css(Surface.PRESSED.dark)}}}
+div:has(>.c-rail)+div button::before{{content:"";position:absolute;left:12px;top:min(5px,(var(--c-tool) - 18px)/2);
+ width:18px;height:18px;background:currentColor;mask:var(--c-icon) center/contain no-repeat;transform:none;filter:none;
+ opacity:1;border-radius:0}}
+div:has(>.c-rail)+div button::after{{content:var(--c-key) / "";position:absolute;right:3px;top:1px;font-size:9px;
+ line-height:11px;opacity:.75}}
+div:has(>.c-rail)+div .mantine-Button-inner{{position:absolute;left:0;right:0;top:24px;height:12px}}
+div:has(>.c-rail)+div .mantine-Button-label{{font-size:9.5px;line-height:12px;max-width:none!important}}
+.c-hint{{position:fixed;z-index:40;top:calc(var(--c-top) + 8px);width:max-content;box-sizing:border-box;
+ left:calc((100vw + var(--c-floor) - {RIGHT_PX}px)/2);max-width:calc(100vw - var(--c-floor) - {RIGHT_PX + 24}px);
+ transform:translateX(-50%);pointer-events:none;text-align:center;font-size:12.5px;padding:3px 14px;border-radius:3px;
+ background:{css(Surface.CARD.dark)};border:1px solid {css(Worded.LACKING.dark)}}}
+@media (max-width:1500px){{:root:has(.c-hint) .c-scale{{top:auto;bottom:calc(var(--c-bottom) + 40px)}}}}
 .c-browse{{position:absolute;right:2px;top:2px;bottom:2px;width:24px;border:none;border-radius:3px;cursor:pointer;
  background:{css(Surface.PRESSED.dark)};color:inherit;font:inherit;font-size:12px;line-height:1}}
 .c-browse:is(:hover,:focus-visible){{background:{css(Worded.PRESS.dark)};color:#fff}}

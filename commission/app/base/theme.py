@@ -147,7 +147,10 @@ FOLDED_PX = 46
 LOW_BOTTOM_PX = 200
 """The same where the window is low."""
 TABS_PX = 138
-LEFT_PX = 300
+RAIL_PX = 46
+"""Width of the rail of tools at the floor's edge [pixels]."""
+LEFT_PX = 300 + RAIL_PX
+"""Where the floor begins, unless somebody drags its edge elsewhere."""
 RIGHT_PX = 290
 
 WIDE = "<div class='c-wide'></div>"
@@ -172,7 +175,8 @@ LIVE = "<div class='c-live'></div>"
 # floating panel of the time line into a strip at the bottom, and take their space from the floor. Where a rule does not
 # match (another viser), the panels float and everything still works.
 STYLE = f"""<style>
-:root{{--c-selected-line:rgb{SELECTED_LINE};--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px;--c-tabs:{TABS_PX}px}}
+:root{{--c-selected-line:rgb{SELECTED_LINE};--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px;--c-tabs:{TABS_PX}px;
+ --c-floor:{LEFT_PX + 4}px}}
 [data-dock-root]{{height:calc(100% - var(--c-top) - var(--c-bottom))!important;top:var(--c-top);
  overflow:visible!important}}
 [data-dock-region] .mantine-ScrollArea-viewport>div{{padding-right:6px}}
@@ -198,6 +202,7 @@ div:has(>div>.c-top)>div{{padding:0!important;margin:0!important}}
 div:has(>div>.c-top)>:first-child{{flex:1;min-width:0}}
 div:has(>div>.c-top) button{{height:26px!important;padding:0 10px!important;font-size:12px!important}}
 div:has(>div>.c-top) .mantine-Flex-root{{flex-wrap:nowrap!important}}
+div:has(>div>.c-top)>div>.mantine-Flex-root>[style*="flex-shrink: 0"]{{display:none}}
 div:has(>div>.c-top) .mantine-Button-label{{overflow:hidden;text-overflow:ellipsis}}
 div:has(>div>.c-bottom){{display:grid;grid-template-columns:repeat(24,minmax(0,1fr));align-items:center;
  padding-top:2px!important}}
@@ -280,8 +285,9 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
  font-variant-numeric:tabular-nums}}
 .c-table{{width:100%;border-collapse:collapse;font-size:12px;font-variant-numeric:tabular-nums}}
 .c-table td{{padding:1px 0;vertical-align:top}}
-.c-table td:first-child{{opacity:.65;padding-right:10px;white-space:nowrap}}
+.c-table td:first-child{{opacity:.65;padding-right:10px}}
 .c-table td:last-child{{text-align:right}}
+.c-table .c-one td:last-child{{white-space:nowrap}}
 .c-before-after{{width:100%;border-collapse:collapse;font-size:12px;font-variant-numeric:tabular-nums;margin-top:4px}}
 .c-before-after td{{padding:1px 0 1px 8px;text-align:right;white-space:nowrap}}
 .c-before-after td:first-child{{padding-left:0;text-align:left;opacity:.65;white-space:normal}}

@@ -22,7 +22,7 @@ FEATURE = Feature(
     panels=(
         Docked(make=lambda at: EquipmentFields(at.gui, at.post, at.state.project), tab=SITE, rank=30),
         Docked(make=lambda at: Overlay(at.scene, at.post, at.browser), tab=None, rank=10, own=True),
-        Docked(make=lambda at: ToolButtons(at.gui, at.post), tab=SELECTION, rank=10, own=True),
+        Docked(make=lambda at: ToolButtons(at.gui, at.post, at.browser), tab=None, rank=91, own=True),
         Docked(make=lambda at: FinishButton(at.gui, at.post, at.browser), tab=SELECTION, rank=30, own=True),
         Docked(make=lambda at: SelectionPanel(at.gui, at.post, at.browser), tab=SELECTION, rank=50, own=True),
         Docked(

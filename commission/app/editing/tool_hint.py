@@ -6,7 +6,6 @@ from viser import GuiApi
 
 from commission.app.base.panel import BasePanel, escaped
 from commission.app.base.state import AppState
-from commission.app.base.theme import SELECTED, css
 from commission.app.base.view import PageView
 from commission.app.editing.editor import Editor, editor_of
 from commission.app.editing.gestures import moved, selected_of
@@ -53,10 +52,4 @@ class ToolHint(BasePanel):
         if text == self._shown:
             return
         self._shown = text
-        self._html.content = (
-            "<div class='c-hint' style='position:fixed;z-index:40;top:52px;left:50%;transform:translateX(-50%);"
-            "pointer-events:none;white-space:nowrap;font-size:12.5px;padding:3px 14px;border-radius:3px;"
-            f"background:rgba(16,18,21,.88);border:1px solid {css(SELECTED)}'>{text}</div>"
-            if text
-            else ""
-        )
+        self._html.content = f"<div class='c-hint'>{text}</div>" if text else ""

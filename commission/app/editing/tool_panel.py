@@ -1,12 +1,11 @@
-"""Buttons and keys of the tools for the site, and what attracts while one places something."""
+"""Tools for the site on the rail, their keys, and what attracts while one places something."""
 
 from __future__ import annotations
 
-from typing import Any, Literal, TypeAlias
+from typing import Any, ClassVar, Literal, TypeAlias
 
 from viser import GuiApi
 
-from commission.app.base import theme
 from commission.app.base.actions import Action
 from commission.app.base.inputs import Inputs, show
 from commission.app.base.panel import BasePanel, Post, posting, write_label
@@ -22,12 +21,9 @@ from commission.app.editing.actions import (
 )
 from commission.app.editing.editor import Snapping, editor_of
 from commission.app.editing.site_tools import SITE_TOOLS, MeasureTool, PlaceTool, RouteTool, StationTool
-from commission.app.editing.tool import Tool
+from commission.app.editing.tool_rail import SELECT, ToolRail
 from commission.site.fields import get_field, names_of
 from commission.site.quantity import MILLIMETRES
-
-SELECT = "Select"
-"""On the button that puts the tool away."""
 
 Command: TypeAlias = tuple[str, Any, Any, Action]
 """Label, key and modifier as viser calls them, and what the key asks for."""
@@ -55,14 +51,19 @@ STEPS: tuple[tuple[float, Literal["shift"] | None], ...] = ((0.001, None), (0.01
 """How far an arrow key moves what is selected [m], and with which other key."""
 
 
-class ToolButtons(BasePanel):
-    """A row of buttons, and keys for what the hand does most."""
+class ToolButtons(ToolRail):
+    """The tools for the site, and keys for what the hand does most."""
 
-    def __init__(self, gui: GuiApi, post: Post) -> None:
-        gui.add_html(theme.WIDE.replace("c-wide", "c-wide c-tools"))
-        named: dict[str, Tool | None] = {SELECT: None, **{tool.name: tool for tool in SITE_TOOLS}}
-        buttons = gui.add_button_group("", tuple(named))
-        buttons.on_click(posting(post, lambda event: ChooseTool(named[event.target.value])))
+    group = "site"
+    tools = (None, *SITE_TOOLS)
+    keys: ClassVar = {
+        SELECT if action.tool is None else action.tool.name: key
+        for _label, key, _modifier, action in COMMANDS
+        if isinstance(action, ChooseTool)
+    }
+
+    def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
+        super().__init__(gui, post, browser)
         for label, key, modifier, action in COMMANDS:
             command = gui.add_command(label, hotkey=key, modifier=modifier)
             command.on_trigger(posting(post, lambda _event, action=action: action))

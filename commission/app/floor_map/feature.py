@@ -19,7 +19,7 @@ FEATURE = Feature(
     panels=(
         Docked(make=lambda at: FloorMapPanel(at.gui, at.post, at.state.project), tab=SITE, rank=20),
         Docked(make=lambda at: MapTroublePanel(at.gui, at.browser), tab=SITE, rank=20, own=True),
-        Docked(make=lambda at: MapToolButtons(at.gui, at.post), tab=SELECTION, rank=20, own=True),
+        Docked(make=lambda at: MapToolButtons(at.gui, at.post, at.browser), tab=None, rank=92, own=True),
         Docked(make=lambda at: MapToolFields(at.gui, at.post, at.browser), tab=SELECTION, rank=40, own=True),
     ),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from viser import GuiApi, GuiEvent
@@ -17,6 +17,8 @@ from commission.app.base.view import PageView
 from commission.app.editing.actions import ChooseTool
 from commission.app.editing.editor import editor_of
 from commission.app.editing.tool import Tool
+from commission.app.editing.tool_panel import ToolButtons
+from commission.app.editing.tool_rail import ToolRail
 from commission.app.floor_map import actions
 from commission.app.floor_map.align_tool import LETTERS, AlignTool, NamedPoint
 from commission.app.floor_map.pen import MapPen
@@ -30,10 +32,11 @@ FREE, UNKNOWN = "free", "unknown"
 MAP_ONLY, EVERYTHING = "the map alone", "what is on it, too"
 MAP_TOOLS: tuple[Tool, ...] = (EraseTool(), WallTool(), ObstacleTool(), AlignTool())
 """In the order of their buttons."""
-KEYS: tuple[tuple[str, Literal["X", "L", "O"], Tool], ...] = (
+KEYS: tuple[tuple[str, Literal["X", "L", "O", "G"], Tool], ...] = (
     ("Erase walls", "X", EraseTool()),
     ("Draw a wall", "L", WallTool()),
     ("Draw an obstacle", "O", ObstacleTool()),
+    ("Align with the plant", "G", AlignTool()),
 )
 """What a key does."""
 NOWHERE = NamedPoint((0.0, 0.0), (0.0, 0.0))
@@ -44,14 +47,16 @@ LONGEST_NAME = 40
 """Letters of a point's name that are kept."""
 
 
-class MapToolButtons(BasePanel):
-    """Buttons and keys that choose one of the floor map's tools."""
+class MapToolButtons(ToolRail):
+    """The floor map's tools on the rail, and their keys."""
 
-    def __init__(self, gui: GuiApi, post: Post) -> None:
-        gui.add_html(theme.WIDE)
-        buttons = gui.add_button_group("", tuple(tool.name for tool in MAP_TOOLS))
-        named = {tool.name: tool for tool in MAP_TOOLS}
-        buttons.on_click(posting(post, lambda event: ChooseTool(named[event.target.value])))
+    group = "map"
+    tools = MAP_TOOLS
+    keys: ClassVar = {tool.name: key for _label, key, tool in KEYS}
+    above = len(ToolButtons.tools)
+
+    def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
+        super().__init__(gui, post, browser)
         for label, key, tool in KEYS:
             command = gui.add_command(label, hotkey=key)
             command.on_trigger(posting(post, lambda _event, tool=tool: ChooseTool(tool)))
