@@ -84,7 +84,7 @@ def test_scene_and_numbers_are_of_the_scan_at_the_cursor_and_a_hidden_view_comes
     page.open_tab("Association")
     page.page.wait_for_selector(".c-a-picture")
     for seconds in (3.0, 5.0):
-        page.open_tab("Legend")
+        page.open_tab("Layers")
         page.page.wait_for_selector(".c-a-picture", state="hidden")
         at(served, seconds)
         page.open_tab("Association")

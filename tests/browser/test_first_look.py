@@ -94,7 +94,7 @@ def test_who_turns_the_wheel_while_the_page_builds_up_keeps_what_was_zoomed_to(
     zoomed = fitted
     while zoomed == fitted or zoomed != float(client.camera.position[2]):  # the wheel's way takes a while to its end
         zoomed = float(client.camera.position[2])
-        page.page.wait_for_timeout(600)
+        page.page.wait_for_timeout(1200)
     assert zoomed < 0.8 * fitted
     page.page.wait_for_timeout(FITTED_AFTER_MS)
     assert float(client.camera.position[2]) == pytest.approx(zoomed)

@@ -66,7 +66,7 @@ def test_a_kept_layout_is_compared_with_a_changed_one_in_numbers_and_colors_and_
     assert page.page.locator(".c-layouts .c-worse").count() > 3
     assert page.page.locator(".c-layouts .c-better").count() == 0
     page.wait_until_drawn(nodes=["/plan/difference"])
-    page.open_tab("Legend")
+    page.open_tab("Layers")
     page.wait_for_text("Now against layout 1: position error")
     assert found.difference.better == 0.0
     assert found.difference.worse > 0.3

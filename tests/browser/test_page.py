@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from playwright.sync_api import Browser
 
+from commission.app.base.paints import Floor, Paint, Run
 from commission.app.base.panel import clock
 from commission.app.run.actions import Play, Restart, Seek, SetSpeed, VirtualDrive
 from commission.app.run.state import RunState
@@ -188,6 +191,33 @@ def test_a_layer_switched_off_disappears_and_the_legend_explains_the_rest(run: O
     page.page.wait_for_function("() => !window.__viserMutable.nodeRefFromName['/routes'].visible")
     page.tick("Routes")
     page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/routes'].visible")
+    groups = page.page.locator(".c-layers h4").all_inner_texts()
+    assert groups == ["Map", "Site", "Run", "Plan"]
+
+
+def test_the_opacity_of_a_layer_makes_its_marks_fainter_for_points_and_for_lines(
+    run: OpenRun, page: OpenPage, tmp_path: Path
+) -> None:
+    page.open_tab("Layers")
+    run.runtime.post(Play(playing=False))
+    shown = "text => document.querySelector('.c-clock b').innerText === text"
+    page.page.wait_for_function(shown, arg=settled_clock(run))
+    page.page.wait_for_timeout(500)
+
+    def amount(layer: str, percent: int, paint: Paint) -> int:
+        slider = page.page.get_by_label(f"Opacity of {layer} [%]")
+        slider.evaluate("(e, v) => { e.value = v; e.dispatchEvent(new Event('input', { bubbles: true })); }", percent)
+        page.page.wait_for_timeout(600)
+        page.wait_until_drawn()
+        page.screenshot(shot := tmp_path / f"{layer}{percent}.png")
+        pixels = np.asarray(Image.open(shot).convert("RGB"), np.int64)[60:400, 360:980]
+        return int((np.abs(pixels - np.array(paint.dark)).max(axis=2) < 24).sum())
+
+    for layer, paint in (("Scan", Run.SCAN), ("Vehicle", Floor.VEHICLE)):
+        whole = amount(layer, 100, paint)
+        assert whole > 20, layer
+        assert amount(layer, 20, paint) < 0.6 * whole, layer  # plates of names are as bright as the vehicle
+        assert amount(layer, 100, paint) == pytest.approx(whole, rel=0.1), "and back"
 
 
 def test_a_recording_that_is_none_gives_one_clear_line_on_the_page(run: OpenRun, page: OpenPage) -> None:

@@ -50,7 +50,7 @@ def test_each_name_in_the_tour_is_on_the_page(served: Served, window: Callable[.
     page.open(nodes=["/vehicle"])
     page.page.wait_for_function("() => document.querySelectorAll('.c-chips button').length > 5")
     read = set[str]()
-    for tab in ("Site", "Plan", "Run", "Tune", "Selection", "Reflectors", "Routes", "Legend", "Layers", "Problems"):
+    for tab in ("Site", "Plan", "Run", "Tune", "Selection", "Reflectors", "Routes", "Layers", "Problems"):
         page.open_tab(tab)
         page.page.wait_for_timeout(250)
         read |= set(page.page.evaluate(ALL_WORDS))

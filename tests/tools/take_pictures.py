@@ -165,7 +165,7 @@ def budget(page: OpenPage, runtime: Runtime) -> None:
 def rejecting(page: OpenPage, runtime: Runtime) -> None:
     """A drive whose filter believes in too little noise: what the Run panel, numbers and trail say of it."""
     page.open_tab("Run")
-    page.open_tab("Legend")
+    page.open_tab("Layers")
     page.choose("Trail shows", "share rejected")
     page.page.locator(".c-summary").scroll_into_view_if_needed()
 
@@ -307,7 +307,7 @@ def listed(name: str) -> Steps:
 
 
 PICTURES = (
-    Picture("page_laboratory", "laboratory", tab("Run", "Legend")),
+    Picture("page_laboratory", "laboratory", tab("Run", "Layers")),
     Picture("page_3d", "shop_floor", three_d),
     Picture("covered", "shop_floor", covered),
     Picture("events", "shop_floor", listed("Events"), world=vain),

@@ -12,7 +12,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, Points, heading_mark, outline_segments, stroke_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.floor_picture import FloorPicture
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_floor_picture, add_lines
 from commission.app.base.paints import Plan
 from commission.app.base.view import PageView
@@ -49,6 +49,7 @@ class AmbiguityLayer(BaseLayer):
     """Ambiguous places."""
 
     name = "Ambiguous places"
+    group = LayerGroup.PLAN
     rank = 30
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes", "vehicle")
     legend = (

@@ -7,7 +7,7 @@ from commission.app.ambiguity.ambiguity_layer import AmbiguityLayer
 from commission.app.ambiguity.ambiguity_legend import AmbiguityLegend
 from commission.app.ambiguity.ambiguity_panel import ColdStartPanel
 from commission.app.ambiguity.service import AmbiguityService
-from commission.app.base.feature import LEGEND, PLAN, Docked, Feature
+from commission.app.base.feature import LAYERS, PLAN, Docked, Feature
 
 FEATURE = Feature(
     name="ambiguity",
@@ -18,6 +18,6 @@ FEATURE = Feature(
         Docked(
             make=lambda at: ColdStartPanel(at.gui, at.post, at.container), tab=PLAN, rank=40, folder="Ambiguous places"
         ),
-        Docked(make=lambda at: AmbiguityLegend(at.gui), tab=LEGEND, rank=12),
+        Docked(make=lambda at: AmbiguityLegend(at.gui), tab=LAYERS, rank=12),
     ),
 )

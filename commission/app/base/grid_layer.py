@@ -8,7 +8,7 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import lift
 from commission.app.base.extent import Extent, extent_of
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.site.project import Project
 
@@ -36,6 +36,7 @@ class GridLayer(BaseLayer):
     """The grid."""
 
     name = "Grid"
+    group = LayerGroup.MAP
     rank = 40
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from typing import Protocol
 
 from viser import SceneApi, SceneNodeHandle
@@ -11,13 +12,24 @@ from commission.app.base.view import PageView
 from commission.site.project import Project
 
 
+class LayerGroup(StrEnum):
+    """What a layer belongs to: the groups of the list of layers, in its order."""
+
+    MAP = "Map"
+    SITE = "Site"
+    RUN = "Run"
+    PLAN = "Plan"
+
+
 class Layer(Protocol):
     """One drawn thing that can be switched off."""
 
     name: str
     """Shown beside its switch; unique."""
+    group: LayerGroup
+    """What it belongs to."""
     rank: int
-    """Where it stands in legend and switches: what lies lowest comes first."""
+    """Where it stands in its group: what lies lowest comes first."""
     legend: tuple[Legend, ...]
     """Its entries in the legend."""
     reads: tuple[str, ...]
@@ -49,6 +61,7 @@ class BaseLayer:
     """A layer that draws nothing: each one overrides what it needs."""
 
     name = ""
+    group = LayerGroup.PLAN
     rank = 0
     legend: tuple[Legend, ...] = ()
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes", "vehicle", "scanners")

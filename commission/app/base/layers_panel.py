@@ -1,13 +1,16 @@
-"""Legend and switches of everything drawn on the floor."""
+"""Everything that is drawn on the floor: what it looks like, whether it is shown, and how strongly."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
+from html import escape
 
-from viser import GuiApi
+from viser import GuiApi, LabelHandle
 
-from commission.app.base import actions, theme
-from commission.app.base.layer import Layer
+from commission.app.base import actions, theme, viser_private
+from commission.app.base.actions import Action
+from commission.app.base.layer import Layer, LayerGroup
 from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.state import MAGNIFICATIONS, AppState
 from commission.app.base.view import PageView
@@ -22,26 +25,59 @@ SHAPES = {
 }
 
 
-def legend(layers: Sequence[Layer], magnify: float) -> str:
-    """Return the legend of layers; it says when ellipses are not true to scale."""
+def legend(layer: Layer, magnify: float) -> str:
+    """Return what the marks of a layer mean; it says when ellipses are not true to scale."""
     scale = "" if magnify == 1.0 else f", drawn {magnify:g}x"
-    rows = "".join(
-        "<div style='display:flex;align-items:center;gap:8px;height:19px'><svg width='18' height='14'>"
-        f"{SHAPES[entry.mark].format(c=theme.css(entry.color))}</svg><span>{escaped(entry.text)}"
-        f"{scale if entry.mark is theme.Mark.RING else ''}</span></div>"
-        for layer in layers
+    return "".join(
+        f"<div class='c-mark'><svg width='18' height='14'>{SHAPES[entry.mark].format(c=theme.css(entry.color))}</svg>"
+        f"<span>{escaped(entry.text)}{scale if entry.mark is theme.Mark.RING else ''}</span></div>"
         for entry in layer.legend
     )
-    return f"<div class='c-legend' style='font-size:12px;padding:2px 6px'>{rows}</div>"
 
 
-class LegendPanel(BasePanel):
-    """What the colors and shapes mean."""
+def layer_row(layer: Layer, magnify: float, *, shown: bool) -> str:
+    """Return a layer with its switch, its opacity and, where it is shown, its legend.
+
+    Parameters
+    ----------
+    layer : of which.
+    magnify : factor of ellipses.
+    shown : whether it is switched on.
+    """
+    name = escape(layer.name, quote=True)
+    nodes = [node.name for node in layer.nodes() if not isinstance(node, LabelHandle)]
+    opacity = (
+        f"<input type='range' min='10' max='100' step='5' value='100' aria-label='Opacity of {name} [%]'"
+        f" data-nodes='{escape(json.dumps(nodes), quote=True)}'>"
+    )
+    return (
+        f"<div class='c-layer' data-layer='{name}'><label><input type='checkbox'"
+        f"{' checked' if shown else ''} aria-label='Show {name}'><span>{name}</span></label>{opacity if nodes else ''}"
+        f"</div>{legend(layer, magnify) if shown else ''}"
+    )
+
+
+def switched(sent: str) -> Action:
+    """Return what the page's script asks for (web_assets/layers.js).
+
+    Raises
+    ------
+    ValueError
+        Where it is none of that.
+    """
+    asked = json.loads(sent)
+    match asked:
+        case {"layer": str(name), "shown": bool(shown)}:
+            return actions.ShowLayer(name, shown)
+        case _:
+            raise ValueError(f"the page sent {sent[:80]!r}; expected the name of a layer and whether it is shown")
+
+
+class LayersPanel(BasePanel):
+    """Layers in their groups. How strongly they are drawn is each browser's own, and its script's."""
 
     def __init__(self, gui: GuiApi, post: Post, layers: Sequence[Layer], state: AppState) -> None:
         self._layers = layers
-        self._html = gui.add_html("")
-        self._shown: tuple[object, ...] = ()
         scale = gui.add_dropdown(
             "Ellipses",
             tuple(_factor(m) for m in MAGNIFICATIONS),
@@ -49,35 +85,25 @@ class LegendPanel(BasePanel):
             hint="Draw validation areas and pose covariance larger than they are; true to scale is 1x.",
         )
         scale.on_update(posting(post, lambda event: actions.Magnify(float(str(event.target.value).rstrip("x")))))
+        inbox = gui.add_text("Layers switched", "", visible=False)
+        inbox.on_update(posting(post, lambda event: switched(event.target.value)))
+        self._inbox = viser_private.identifier(inbox)
+        self._html = gui.add_html("")
 
     def draw_slowly(self, view: PageView) -> None:
-        """Explain what is drawn now, and say by how much ellipses are magnified."""
+        """List what there is to draw now, and what is switched off."""
         state = view.state
-        used = [layer for layer in self._layers if layer.name not in state.hidden and layer.is_used(view)]
-        shown = (state.magnify, *(layer.name for layer in used))
-        if shown != self._shown:
-            self._shown = shown
-            self._html.content = legend(used, state.magnify)
-
-
-class LayersPanel(BasePanel):
-    """A switch for each layer."""
-
-    def __init__(self, gui: GuiApi, post: Post, layers: Sequence[Layer], state: AppState) -> None:
-        self._switches = {}
-        for layer in layers:
-            switch = gui.add_checkbox(layer.name, layer.name not in state.hidden)
-            switch.on_update(
-                posting(post, lambda event, name=layer.name: actions.ShowLayer(name, bool(event.target.value)))
+        groups = []
+        for group in LayerGroup:
+            rows = "".join(
+                layer_row(layer, state.magnify, shown=layer.name not in state.hidden)
+                for layer in self._layers
+                if layer.group is group and (layer.name in state.hidden or layer.is_used(view))
             )
-            self._switches[layer.name] = switch
-
-    def draw_slowly(self, view: PageView) -> None:
-        """Follow the state."""
-        for name, switch in self._switches.items():
-            visible = name not in view.state.hidden
-            if switch.value is not visible:
-                switch.value = visible
+            groups.append(rows and f"<h4>{group}</h4>{rows}")
+        content = f"<div class='c-layers' data-inbox='{self._inbox}'>{''.join(groups)}</div>"
+        if content != self._html.content:
+            self._html.content = content
 
 
 def _factor(magnification: float) -> str:

@@ -1,4 +1,4 @@
-"""What the page has without any feature: grid, legend, switches of layers, choice of the view, work under way."""
+"""What the page has without any feature: grid, layers with their legend, choice of the view, work under way."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from viser import GuiApi
 
 from commission.app.base import page_reducer, viser_private
 from commission.app.base.actions import Camera, HoldSlider, SetCamera, StopJob
-from commission.app.base.feature import LAYERS, LEGEND, Docked, Feature
+from commission.app.base.feature import LAYERS, Docked, Feature
 from commission.app.base.grid_layer import GridLayer
 from commission.app.base.inputs import show
-from commission.app.base.layers_panel import LayersPanel, LegendPanel
+from commission.app.base.layers_panel import LayersPanel
 from commission.app.base.panel import BasePanel, Post, posting, shortened, write_label
 from commission.app.base.view import PageView
 
@@ -62,7 +62,6 @@ FEATURE = Feature(
         Docked(make=lambda at: JobButton(at.gui, at.post), tab=None, rank=20),
         Docked(make=lambda at: SliderHold(at.gui, at.post, at.browser), tab=None, own=True),
         Docked(make=lambda at: CameraButtons(at.gui, at.post), tab=None, rank=40),
-        Docked(make=lambda at: LegendPanel(at.gui, at.post, at.layers, at.state), tab=LEGEND, rank=20),
-        Docked(make=lambda at: LayersPanel(at.gui, at.post, at.layers, at.state), tab=LAYERS),
+        Docked(make=lambda at: LayersPanel(at.gui, at.post, at.layers, at.state), tab=LAYERS, rank=20),
     ),
 )

@@ -88,7 +88,7 @@ def escaped(text: object) -> str:
     return "&#35;".join(html.escape(part, quote=True) for part in str(text).split("#"))
 
 
-IN_ONE_LINE = 22
+IN_ONE_LINE = 24
 """Letters of a value that no line break tears from its unit."""
 
 

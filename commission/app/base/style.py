@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from commission.app.base.icons import mask
 from commission.app.base.paints import Surface, Worded
 from commission.app.base.theme import LEFT_PX, RAIL_PX, RIGHT_PX, css
 
 TOOLS = 9
 """On the rail at the floor's edge, which share its height."""
+OPEN_EYE, SHUT_EYE = (
+    mask(path)
+    for path in (
+        "M2 12c3-5 6.5-7 10-7s7 2 10 7c-3 5-6.5 7-10 7s-7-2-10-7zM12 9a3 3 0 1 0 0 6a3 3 0 1 0 0-6",
+        "M2 12c3-5 6.5-7 10-7s7 2 10 7c-3 5-6.5 7-10 7s-7-2-10-7zM4 21L20 3",
+    )
+)
 NO_RUN_PX = 34
 """Height of the strip below the floor while there is no run [pixels]."""
 
@@ -62,6 +70,22 @@ div:has(>div>.c-bottom):has(.c-no-run)>:nth-child(4){{grid-column:1/span 24!impo
  height:26px;padding:0;border-radius:3px;border:1px solid {css(Surface.EDGE_QUIET.dark)};
  background:{css(Surface.CARD.dark)};color:inherit;font-size:15px;line-height:1;cursor:pointer}}
 .c-daylight:is(:hover,:focus-visible){{border-color:{css(Worded.BRAND.dark)}}}
+.c-layers{{padding:0 8px 4px;font-size:12px}}
+.c-layers h4{{margin:6px 0 1px;font-size:11px;font-weight:600;opacity:.65;
+ border-bottom:1px solid {css(Surface.EDGE.dark)}}}
+.c-layer{{display:flex;align-items:center;gap:8px;min-height:21px}}
+.c-layer label{{color:{css(Worded.WORD.dark)};
+ flex:1;min-width:0;display:flex;align-items:center;gap:7px;cursor:pointer}}
+.c-layer [type=checkbox]{{appearance:none;flex:none;width:16px;height:16px;margin:0;cursor:pointer;
+ background:currentColor;opacity:.9;mask:{SHUT_EYE} center/contain no-repeat}}
+.c-layer [type=checkbox]:checked{{mask-image:{OPEN_EYE}}}
+.c-layer label:has(:focus-visible){{outline:1px solid {css(Worded.BRAND.dark)}}}
+.c-layer label:has(:not(:checked))>span{{opacity:.5}}
+.c-layer [type=range]{{flex:none;width:64px;height:14px;margin:0;accent-color:{css(Worded.BRAND.dark)};cursor:pointer;
+ opacity:.55}}
+.c-layer [type=range]:is(:hover,:focus-visible){{opacity:1}}
+.c-mark{{display:flex;align-items:center;gap:8px;min-height:17px;padding-left:23px;font-size:11.5px;opacity:.85}}
+.c-mark svg{{flex:none}}
 [data-dock-region=left] [data-dock-column]{{padding-right:{RAIL_PX}px}}
 :root{{--c-tool:clamp(18px,(100vh - var(--c-top) - var(--c-bottom) - 20px)/{TOOLS},38px)}}
 div:has(>.c-rail)+div :is(div,.mantine-Flex-root){{width:100%!important;flex-direction:column!important;

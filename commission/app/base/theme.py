@@ -285,7 +285,7 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
  font-variant-numeric:tabular-nums}}
 .c-table{{width:100%;border-collapse:collapse;font-size:12px;font-variant-numeric:tabular-nums}}
 .c-table td{{padding:1px 0;vertical-align:top}}
-.c-table td:first-child{{opacity:.65;padding-right:10px}}
+.c-table td:first-child{{opacity:.65;padding-right:10px;width:62%}}
 .c-table td:last-child{{text-align:right}}
 .c-table .c-one td:last-child{{white-space:nowrap}}
 .c-before-after{{width:100%;border-collapse:collapse;font-size:12px;font-variant-numeric:tabular-nums;margin-top:4px}}

@@ -6,7 +6,7 @@ from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, outline_segments
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.coverage.view import EllipseView, coverage_of
@@ -19,6 +19,7 @@ class FixEllipseLayer(BaseLayer):
     """1-sigma ellipses of a fix."""
 
     name = "Ellipses of a fix"
+    group = LayerGroup.PLAN
     rank = 60
     reads: tuple[str, ...] = ()
 

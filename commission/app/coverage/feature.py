@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from commission.app.base.feature import LEGEND, PLAN, Docked, Feature
+from commission.app.base.feature import LAYERS, PLAN, Docked, Feature
 from commission.app.base.pointer import FloorClicks
 from commission.app.coverage import reducer
 from commission.app.coverage.actions import ReadFloor
@@ -25,7 +25,7 @@ FEATURE = Feature(
             folder="Heatmap of the floor",
             is_open=True,
         ),
-        Docked(make=lambda at: HeatLegend(at.gui), tab=LEGEND, rank=10),
+        Docked(make=lambda at: HeatLegend(at.gui), tab=LAYERS, rank=10),
         Docked(make=lambda at: FloorClicks(at.scene, at.post, ReadFloor), tab=None, rank=90),
     ),
 )

@@ -6,7 +6,7 @@ from viser import ImageHandle, LabelHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.floor_picture import FloorPicture
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_floor_picture
 from commission.app.base.view import PageView
 from commission.app.coverage.scale import picture
@@ -20,6 +20,7 @@ class HeatLayer(BaseLayer):
     """Coverage of the floor."""
 
     name = "Heatmap"
+    group = LayerGroup.PLAN
     rank = 20
     reads: tuple[str, ...] = ()
 

@@ -7,7 +7,7 @@ from viser import LabelHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import lift, outline_segments, rings, stroke_segments
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines, add_marks
 from commission.app.editing.name_places import reflector_names
 from commission.geometry.arrays import FloatArray
@@ -23,6 +23,7 @@ class ReflectorLayer(BaseLayer):
     """Where the map says that reflectors are."""
 
     name = "Reflectors"
+    group = LayerGroup.SITE
     rank = 120
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
     legend = (theme.Legend("reflector (paper: dark blue)", theme.REFLECTOR, theme.Mark.DOT),)
@@ -60,6 +61,7 @@ class ReflectorNameLayer(BaseLayer):
     """Names of the reflectors, where they are few enough to be read."""
 
     name = "Reflector names"
+    group = LayerGroup.SITE
     rank = 140
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes", "stations")
 

@@ -8,7 +8,7 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import stroke_segments
 from commission.app.base.extent import extent_of
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
@@ -42,6 +42,7 @@ class RouteLayer(BaseLayer):
     """All routes of the project."""
 
     name = "Routes"
+    group = LayerGroup.SITE
     rank = 50
     reads: tuple[str, ...] = ("floor_map", "routes")
     legend = (theme.Legend("route (dashed: in reverse)", theme.ROUTE, theme.Mark.LINE),)

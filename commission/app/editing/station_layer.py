@@ -8,7 +8,7 @@ from viser import LabelHandle, SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import outline_segments
 from commission.app.base.extent import extent_of
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.editing.name_places import STATION_NAME_BELOW, station_text
@@ -35,6 +35,7 @@ class StationLayer(BaseLayer):
     """All stations of the project."""
 
     name = "Stations"
+    group = LayerGroup.SITE
     rank = 80
     reads: tuple[str, ...] = ("floor_map", "stations", "vehicle")
     legend = (theme.Legend("station, with its required accuracy", theme.STATION, theme.Mark.LINE),)

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import ClassVar
-from urllib.parse import quote
 
 from viser import GuiApi
 
+from commission.app.base.icons import mask
 from commission.app.base.inputs import write_html
 from commission.app.base.paints import Worded
 from commission.app.base.panel import BasePanel, Post, posting
@@ -49,22 +49,13 @@ def rail_style(group: str, names: Sequence[str], keys: Mapping[str, str], above:
     """
     here = f"div:has(>.c-rail-{group})+div"
     of_each = "".join(
-        f"{here} button:nth-child({place}){{--c-icon:{_mask(ICONS[name])};--c-key:'{keys.get(name, '')}'}}"
+        f"{here} button:nth-child({place}){{--c-icon:{mask(ICONS[name])};--c-key:'{keys.get(name, '')}'}}"
         for place, name in enumerate(names, start=1)
     )
     return (
         f"<style>{here}{{position:fixed;width:{RAIL_PX}px;left:calc(var(--c-floor) - {RAIL_PX}px);"
         f"top:calc(var(--c-top) + 6px + {above} * var(--c-tool) + {8 if above else 0}px)}}{of_each}</style>"
     )
-
-
-def _mask(path: str) -> str:
-    """Return lines as a picture to cut out of a color."""
-    svg = (
-        "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 24 24'><path fill='none' stroke='black' "
-        f"stroke-width='1.7' stroke-linecap='round' stroke-linejoin='round' d='{path}'/></svg>"
-    )
-    return f'url("data:image/svg+xml,{quote(svg)}")'
 
 
 class ToolRail(BasePanel):

@@ -8,7 +8,7 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, crosses, outline_segments, polyline_segments, stroke_segments
 from commission.app.base.extent import extent_of
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.failures.view import FailureView
@@ -23,6 +23,7 @@ class FailingLayer(BaseLayer):
     """The chosen reflector and its dependents."""
 
     name = "What if one fails"
+    group = LayerGroup.PLAN
     rank = 110
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
     legend = (theme.Legend("fails without the chosen reflector", theme.DEPENDENT, theme.Mark.LINE),)

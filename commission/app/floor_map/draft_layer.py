@@ -8,7 +8,7 @@ from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import lift, polyline_segments
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines, add_points
 from commission.app.base.paints import Floor
 from commission.app.base.view import PageView
@@ -40,6 +40,7 @@ class MapDraftLayer(BaseLayer):
     """The image, in everybody's scene, over all else: one clicks on it."""
 
     name = "Image being placed"
+    group = LayerGroup.MAP
     rank = 240
     reads: tuple[str, ...] = ()
 

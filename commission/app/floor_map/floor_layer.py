@@ -13,7 +13,7 @@ from viser import FrameHandle, ImageHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import yaw_quaternion
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
 from commission.site.project import Project
 
@@ -72,6 +72,7 @@ class FloorLayer(BaseLayer):
     """The floor map."""
 
     name = "Floor map"
+    group = LayerGroup.MAP
     rank = 10
     reads: tuple[str, ...] = ("floor_map",)
     legend = (theme.Legend("wall", theme.WALL, theme.Mark.SQUARE),)

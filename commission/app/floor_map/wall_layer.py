@@ -10,7 +10,7 @@ from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import yaw_quaternion
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.geometry.arrays import BoolArray
 from commission.geometry.stretches import stretches_of
 from commission.site.floor_map import OCCUPIED
@@ -50,6 +50,7 @@ class WallLayer(BaseLayer):
     """Extruded walls."""
 
     name = "Walls in 3D"
+    group = LayerGroup.MAP
     rank = 230
     reads: tuple[str, ...] = ("floor_map",)
 

@@ -9,7 +9,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, Points, outline_segments, rings, stroke_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.floor_picture import FloorPicture
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_floor_picture, add_lines
 from commission.app.base.view import PageView
 from commission.app.layouts.difference import DifferenceView, picture
@@ -26,6 +26,7 @@ class DifferenceLayer(BaseLayer):
     """The difference heatmap."""
 
     name = "Difference of layouts"
+    group = LayerGroup.PLAN
     rank = 25
     reads: tuple[str, ...] = ()
 
@@ -62,6 +63,7 @@ class KeptLayoutLayer(BaseLayer):
     """Reflectors of the kept layout that stand otherwise now."""
 
     name = "Kept layout"
+    group = LayerGroup.PLAN
     rank = 125
     legend = (theme.Legend("reflector of the kept layout", theme.KEPT, theme.Mark.DOT),)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from commission.app.base.feature import LEGEND, PLAN, Docked, Feature
+from commission.app.base.feature import LAYERS, PLAN, Docked, Feature
 from commission.app.layouts import reducer
 from commission.app.layouts.difference_layer import DifferenceLayer, KeptLayoutLayer
 from commission.app.layouts.difference_legend import DifferenceLegend
@@ -16,6 +16,6 @@ FEATURE = Feature(
     layers=(DifferenceLayer, KeptLayoutLayer),
     panels=(
         Docked(make=lambda at: LayoutsPanel(at.gui, at.post), tab=PLAN, rank=60, folder="Compare layouts"),
-        Docked(make=lambda at: DifferenceLegend(at.gui), tab=LEGEND, rank=15),
+        Docked(make=lambda at: DifferenceLegend(at.gui), tab=LAYERS, rank=15),
     ),
 )

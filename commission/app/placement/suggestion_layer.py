@@ -16,7 +16,7 @@ from commission.app.base.drawing import (
     stroke_segments,
 )
 from commission.app.base.extent import extent_of
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines, add_points
 from commission.app.base.view import PageView
 from commission.app.placement.view import LayoutView
@@ -45,6 +45,7 @@ class SuggestionLayer(BaseLayer):
     """Suggested reflectors."""
 
     name = "Suggested layout"
+    group = LayerGroup.PLAN
     rank = 130
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
     legend = (

@@ -10,7 +10,7 @@ from viser import LabelHandle, PointCloudHandle, SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import lift, thinned
 from commission.app.base.extent import extent_of
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_points
 from commission.app.base.view import PageView
 from commission.app.prediction.view import RouteView
@@ -63,6 +63,7 @@ class EventLayer(BaseLayer):
     """Marks and names along the predicted route."""
 
     name = "Stops, stations, risks"
+    group = LayerGroup.PLAN
     rank = 100
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes")
     legend = (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from commission.app.base.feature import LEGEND, PLAN, Docked, Feature
+from commission.app.base.feature import LAYERS, PLAN, Docked, Feature
 from commission.app.prediction import reducer
 from commission.app.prediction.event_layer import EventLayer
 from commission.app.prediction.limit_legend import LimitLegend
@@ -17,6 +17,6 @@ FEATURE = Feature(
     layers=(RibbonLayer, EventLayer),
     panels=(
         Docked(make=lambda at: RoutePanel(at.gui, at.post, at.container), tab=PLAN, rank=20, folder="Along a route"),
-        Docked(make=lambda at: LimitLegend(at.gui), tab=LEGEND, rank=14),
+        Docked(make=lambda at: LimitLegend(at.gui), tab=LAYERS, rank=14),
     ),
 )

@@ -7,7 +7,7 @@ from viser import LineSegmentsHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import stroke_segments
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.prediction.limit_colors import limit_classes, palette
@@ -43,6 +43,7 @@ class RibbonLayer(BaseLayer):
     """Predicted uncertainty along the chosen route."""
 
     name = "Route prediction"
+    group = LayerGroup.PLAN
     rank = 90
     reads: tuple[str, ...] = ()
 

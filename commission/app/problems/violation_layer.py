@@ -10,7 +10,7 @@ from viser import LineSegmentsHandle, SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, Points, outline_segments, polyline_segments, thinned
 from commission.app.base.extent import extent_of
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.problems.view import inspection_of
@@ -32,6 +32,7 @@ class ViolationLayer(BaseLayer):
     """Too tight curves, corners, walls in the way, too little room."""
 
     name = "Route violations"
+    group = LayerGroup.SITE
     rank = 70
     reads: tuple[str, ...] = ("floor_map", "vehicle")
     legend = (

@@ -6,7 +6,7 @@ from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import lift
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_marks
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
@@ -16,6 +16,7 @@ class AccumulatedLayer(BaseLayer):
     """Detections accumulated over the drive."""
 
     name = "Accumulated detections"
+    group = LayerGroup.RUN
     rank = 180
 
     def __init__(self, scene: SceneApi) -> None:

@@ -7,7 +7,7 @@ from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import polyline_segments, thinned
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.studies.vision import VisionResult
@@ -19,6 +19,7 @@ class CameraLayer(BaseLayer):
     """Both tracks of the camera."""
 
     name = "Camera tracks"
+    group = LayerGroup.RUN
     rank = 218
     legend = (
         theme.Legend("camera by the laser", theme.CAMERA_BY_LASER, theme.Mark.LINE),

@@ -9,7 +9,7 @@ from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import NO_POINTS, lift, stroke_segments
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines, add_marks
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
@@ -31,6 +31,7 @@ class DetectionLayer(BaseLayer):
     """Detections of the newest scan, each with its offset from the reflector it is taken for."""
 
     name = "Detections"
+    group = LayerGroup.RUN
     rank = 170
     legend = tuple(theme.Legend(text, color, MARKS[shape]) for color, shape, text in STYLES.values())
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from commission.app.base.feature import ASSOCIATION, LEGEND, RUN, SELECTION, TIME, TUNE, Docked, Feature
+from commission.app.base.feature import ASSOCIATION, LAYERS, RUN, SELECTION, TIME, TUNE, Docked, Feature
 from commission.app.run import reducer, variant_reducer
 from commission.app.run.accumulated_layer import AccumulatedLayer
 from commission.app.run.association_panel import AssociationPanel
@@ -59,7 +59,7 @@ FEATURE = Feature(
         Docked(make=lambda at: WorldPanel(at.gui, at.post, at.state), tab=RUN, rank=20, folder="Virtual world"),
         Docked(make=lambda at: EditsPanel(at.gui, at.post, at.state), tab=TUNE, rank=-10),
         Docked(make=lambda at: VariantsPanel(at.gui, at.post), tab=TUNE, rank=-5),
-        Docked(make=lambda at: TrailLegend(at.gui), tab=LEGEND, rank=16),
+        Docked(make=lambda at: TrailLegend(at.gui), tab=LAYERS, rank=16),
         Docked(make=lambda at: TimeLine(at.gui, at.post, at.state.part(RunState).speed), tab=TIME, rank=10),
         Docked(make=lambda at: Plots(at.gui, at.post, at.browser), tab=TIME, rank=20, own=True),
     ),

@@ -7,7 +7,7 @@ from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import lift
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_marks
 from commission.app.base.view import PageView
 from commission.app.run.found_table import BY_KEY, Found, classes_of, palette
@@ -21,6 +21,7 @@ class FigureLayer(BaseLayer):
     """A disc below each reflector."""
 
     name = "Reflectors by figure"
+    group = LayerGroup.RUN
     rank = 115
 
     def __init__(self, scene: SceneApi) -> None:

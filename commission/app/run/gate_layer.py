@@ -7,7 +7,7 @@ from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import outline_segments
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
@@ -18,6 +18,7 @@ class GateLayer(BaseLayer):
     """Validation ellipses, all in one node."""
 
     name = "Validation areas"
+    group = LayerGroup.RUN
     rank = 150
     legend = (theme.Legend("validation area (gate)", theme.GATE, theme.Mark.RING),)
 

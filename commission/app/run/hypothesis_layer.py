@@ -8,7 +8,7 @@ from viser import LabelHandle, SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, Points, outline_segments, rings, stroke_segments
 from commission.app.base.extent import extent_of
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.run.hypotheses import shown_hypotheses
@@ -33,6 +33,7 @@ class HypothesisLayer(BaseLayer):
     """Hypotheses of a search."""
 
     name = "Hypotheses"
+    group = LayerGroup.RUN
     rank = 205
     reads: tuple[str, ...] = ("floor_map", "reflectors", "routes", "vehicle")
     legend = (theme.Legend("where it may be, 2σ; not confirmed", theme.HYPOTHESIS, theme.Mark.RING),)

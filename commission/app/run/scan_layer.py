@@ -6,7 +6,7 @@ from viser import PointCloudHandle, SceneApi
 
 from commission.app.base import theme
 from commission.app.base.drawing import lift
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_marks
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
@@ -16,6 +16,7 @@ class ScanLayer(BaseLayer):
     """Scan points."""
 
     name = "Scan"
+    group = LayerGroup.RUN
     rank = 160
     legend = (
         theme.Legend("scan point (paper: dark)", theme.SCAN, theme.Mark.DOT),

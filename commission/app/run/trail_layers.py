@@ -7,7 +7,7 @@ from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import polyline_segments, stroke_segments, thinned
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.run.state import RunState
@@ -22,6 +22,7 @@ class TrailLayer(BaseLayer):
     """Trail of the estimate."""
 
     name = "Trail"
+    group = LayerGroup.RUN
     rank = 210
     legend = (theme.Legend("trail of the estimate", theme.TRAIL, theme.Mark.LINE),)
 
@@ -47,6 +48,7 @@ class ConsistencyLayer(BaseLayer):
     """Trail in the colors of how well detections fit, where that is asked for."""
 
     name = "Trail by consistency"
+    group = LayerGroup.RUN
     rank = 215
 
     def __init__(self, scene: SceneApi) -> None:
@@ -86,6 +88,7 @@ class VariantLayer(BaseLayer):
     """Trails of the variants."""
 
     name = "Trails of variants"
+    group = LayerGroup.RUN
     rank = 212
     legend = tuple(
         theme.Legend(f"trail of variant {letter}", color, theme.Mark.LINE)
@@ -122,6 +125,7 @@ class ReferenceLayer(BaseLayer):
     """Trail of the reference."""
 
     name = "Reference"
+    group = LayerGroup.RUN
     rank = 220
     legend = (theme.Legend("reference (truth)", theme.REFERENCE, theme.Mark.LINE),)
 

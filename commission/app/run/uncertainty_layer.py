@@ -7,7 +7,7 @@ from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import lift, outline_segments
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
@@ -21,6 +21,7 @@ class UncertaintyLayer(BaseLayer):
     """Pose covariance."""
 
     name = "Pose covariance"
+    group = LayerGroup.RUN
     rank = 200
     legend = (
         theme.Legend("2σ of the estimated position", theme.POSE, theme.Mark.RING),

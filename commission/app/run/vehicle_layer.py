@@ -13,7 +13,7 @@ from viser import FrameHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import heading_mark, outline_segments, stroke_segments, yaw_quaternion
-from commission.app.base.layer import BaseLayer
+from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
@@ -68,6 +68,7 @@ class VehicleLayer(BaseLayer):
     """The vehicle."""
 
     name = "Vehicle"
+    group = LayerGroup.RUN
     rank = 190
     reads: tuple[str, ...] = ("vehicle", "scanners", "routes")
     legend = (
