@@ -11,7 +11,7 @@ from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_lines
 from commission.app.base.view import PageView
-from commission.app.editing.name_places import STATION_NAME_BELOW, station_text
+from commission.app.editing.name_places import NamePlace, station_names, station_text
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
@@ -37,7 +37,7 @@ class StationLayer(BaseLayer):
     name = "Stations"
     group = LayerGroup.SITE
     rank = 80
-    reads: tuple[str, ...] = ("floor_map", "stations", "vehicle")
+    reads: tuple[str, ...] = ("floor_map", "reflectors", "stations", "vehicle")
     legend = (theme.Legend("station, with its required accuracy", theme.STATION, theme.Mark.LINE),)
 
     def is_used(self, view: PageView) -> bool:
@@ -63,12 +63,12 @@ class StationLayer(BaseLayer):
         shown = project.stations if len(project.stations) <= MOST_LABELS else ()
         for name in self._labels.keys() - {station.name for station in shown}:
             self._labels.pop(name).remove()
-        for station in shown:
-            self._write(station, STATION_NAME_BELOW * size)
+        for station, place in zip(shown, station_names(project) if shown else (), strict=True):
+            self._write(station, place)
 
-    def _write(self, station: Station, below: float) -> None:
-        """Write name and accuracy under a station."""
-        position = (station.x, station.y - below, theme.Height.LABEL)
+    def _write(self, station: Station, place: NamePlace) -> None:
+        """Write name and accuracy beside a station."""
+        position = (*place.at, theme.Height.LABEL)
         text = station_text(station)
         label = self._labels.get(station.name)
         if label is None:
@@ -77,10 +77,10 @@ class StationLayer(BaseLayer):
                 text,
                 position=position,
                 font_screen_scale=0.7,
-                anchor="top-center",
+                anchor=place.anchor,
             )
         else:
-            label.position, label.text = position, text
+            label.position, label.text, label.anchor = position, text, place.anchor
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return marks, outlines and names."""

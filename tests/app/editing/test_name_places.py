@@ -17,6 +17,7 @@ from commission.app.editing.name_places import (
     name_places,
     pixels_per_metre,
     reflector_names,
+    station_names,
     station_text,
 )
 from commission.io.bundled import bundled_folder
@@ -68,7 +69,20 @@ def test_on_bundled_sites_no_name_covers_another_one(site: str) -> None:
     scale, shown = pixels_per_metre(extent_of(project)), project.reflectors.reflectors
     places = reflector_names(project, shown)
     boxes = {each.id: rectangle(place, each.id, scale) for each, place in zip(shown, places, strict=True)}
-    below = 3.2 * extent_of(project).mark_size()
-    dock = NamePlace((first.x, first.y + 0.3 - below), "top-center")
+    (dock,) = station_names(project)
     boxes["the station"] = rectangle(dock, station_text(project.stations[0]), scale)
     assert {(a, b) for a, b in combinations(boxes, 2) if shared(boxes[a], boxes[b]) > 1.0} == set()
+
+
+def test_a_station_alone_has_its_name_below_and_its_neighbors_names_do_not_cover_it() -> None:
+    project = load_project(bundled_folder("maps") / "shop_floor")
+    alone = replace(project, stations=(Station(name="Press line 1", x=12.0, y=7.0, heading=0.0),))
+    (place,) = station_names(alone)
+    assert place.anchor == "top-center"
+    assert place.at == pytest.approx((12.0, 7.0 - 3.2 * extent_of(project).mark_size()))
+    # Three docks side by side, closer than their names are wide.
+    beside = (0.0, 0.6, 1.2)
+    docks = tuple(Station(name=f"Press line {n}", x=12.0 + dx, y=7.0, heading=0.0) for n, dx in enumerate(beside, 1))
+    site, scale = replace(project, stations=docks), pixels_per_metre(extent_of(project))
+    boxes = [rectangle(p, station_text(d), scale) for p, d in zip(station_names(site), docks, strict=True)]
+    assert [shared(one, other) for one, other in combinations(boxes, 2)] == [0.0, 0.0, 0.0]
