@@ -392,6 +392,7 @@ def take(browser: Browser, picture: Picture, size: tuple[int, int], path: Path) 
         runtime.post(Seek(picture.time))
         until(lambda: _is_at(runtime, picture.time))
         picture.steps(page, runtime)
+        page.page.mouse.move(0, 0)  # no hint of what was pressed last over the floor
         page.page.wait_for_timeout(1500)
         page.wait_until_drawn()
         page.screenshot(path)

@@ -80,7 +80,7 @@ div:has(>div>.c-bottom):has(.c-no-run)>:nth-child(4){{grid-column:1/span 24!impo
  background:currentColor;opacity:.9;mask:{SHUT_EYE} center/contain no-repeat}}
 .c-layer [type=checkbox]:checked{{mask-image:{OPEN_EYE}}}
 .c-layer label:has(:focus-visible){{outline:1px solid {css(Worded.BRAND.dark)}}}
-.c-layer label:has(:not(:checked))>span{{opacity:.5}}
+.c-layer label:has(>input:not(:checked))>span{{opacity:.5}}
 .c-layer [type=range]{{flex:none;width:64px;height:14px;margin:0;accent-color:{css(Worded.BRAND.dark)};cursor:pointer;
  opacity:.55}}
 .c-layer [type=range]:is(:hover,:focus-visible){{opacity:1}}
