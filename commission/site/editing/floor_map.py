@@ -199,7 +199,8 @@ def _polygon_window(floor_map: FloorMap, polygon: FloatArray) -> _Window | None:
         if first >= end:
             continue
         rows = np.arange(first, end)
-        crossings = xa + (rows + 0.5 - ya) / (yb - ya) * (xb - xa)
+        # Divided last: an edge through a center then crosses it exactly, where corners are on fractions of a cell.
+        crossings = xa + (rows + 0.5 - ya) * (xb - xa) / (yb - ya)
         columns = np.clip(np.ceil(crossings - 0.5).astype(np.int64), left, right) - left
         toggles[rows - bottom, columns] ^= 1
     return _Window(bottom, left, np.bitwise_xor.accumulate(toggles, axis=1)[:, :-1].astype(np.bool_))

@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from commission.errors import UsageError
@@ -42,6 +42,7 @@ CORNERS = st.lists(
 )
 
 
+@example(quarters=[(0, 0), (4, 33), (48, 11)])
 @given(quarters=CORNERS)
 def test_exactly_the_cells_with_centers_in_the_polygon_are_set(quarters: list[tuple[int, int]]) -> None:
     polygon = [(Fraction(x, 4), Fraction(y, 4)) for x, y in quarters]
