@@ -29,7 +29,7 @@ MOST_GAP = 0.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Floor:
+class QuickestArrivals:
     """The quickest arrivals of one source: arrival = device time + offset + drift x (time since the first) + delay."""
 
     offset_ns: int
@@ -68,7 +68,7 @@ class ArrivalOffset:
         return self.offset is not None and abs(self.offset - allowed) > max(2.0 * self.sigma, 1e-4)
 
 
-def floor_of(device_ns: IntArray, arrived_ns: IntArray) -> Floor | None:
+def floor_of(device_ns: IntArray, arrived_ns: IntArray) -> QuickestArrivals | None:
     """Return the quickest arrivals of a source; None where there are too few.
 
     Parameters
@@ -85,8 +85,8 @@ def floor_of(device_ns: IntArray, arrived_ns: IntArray) -> Floor | None:
         return None
     first_ns, delay_ns = int(arrived_ns[0]), arrived_ns - device_ns
     lowest_ns = int(delay_ns.min())
-    at = (device_ns - device_ns[0]) * 1e-9
-    delays = (delay_ns - lowest_ns) * 1e-9
+    at = (device_ns - device_ns[0]).astype(np.float64) * 1e-9
+    delays = (delay_ns - lowest_ns).astype(np.float64) * 1e-9
     drift, base = _line_below(at, delays)
     if abs(drift) > LARGEST_DRIFT:
         drift, base = 0.0, 0.0
@@ -94,7 +94,7 @@ def floor_of(device_ns: IntArray, arrived_ns: IntArray) -> Floor | None:
     part = np.minimum((BLOCKS * at / max(float(at[-1]), 1e-9)).astype(np.int64), BLOCKS - 1)
     quickest = np.array([above[part == number].min() for number in np.unique(part)])
     middle = 0.5 * float(at[-1])
-    return Floor(
+    return QuickestArrivals(
         offset_ns=lowest_ns + round(base * 1e9),
         drift=drift,
         # Half of the parts come within the median of the quickest: the quickest of all is surer than a part's.
@@ -144,7 +144,7 @@ def ticks_of(arrived_ns: IntArray) -> IntArray | None:
 
 def _distinct(numbers: FloatArray) -> FloatArray:
     """Return numbers of which each is before the next one: of two alike, the first arrived late."""
-    rows = np.arange(len(numbers))
+    rows = np.arange(len(numbers), dtype=np.float64)
     return np.minimum.accumulate((numbers - rows)[::-1])[::-1] + rows
 
 
@@ -158,7 +158,7 @@ def arrival_offset(
     scanner : its name.
     scans, odometry : times by the device's clock, None where it says none, and times of arrival [ns].
     """
-    floors: list[Floor] = []
+    floors: list[QuickestArrivals] = []
     for device_ns, arrived_ns in (scans, odometry):
         times = ticks_of(arrived_ns) if device_ns is None else device_ns
         floor = None if times is None else floor_of(times, arrived_ns)

@@ -173,7 +173,7 @@ class LiveService(Service):
         )
         told = tuple(f"{count} {words}" for words, count in shown.told.items())
         recording = None if self._recorder is None else self._recorder.status()
-        return (LiveView(sources, told, recording, shown.account, shown.clocks),)
+        return (LiveView(sources=sources, told=told, recording=recording, account=shown.account, clocks=shown.clocks),)
 
     def close(self) -> None:
         """Stop listening."""

@@ -27,7 +27,7 @@ class SourceView:
     """Its records that came too late and are left out, by kind."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LiveView:
     """All sources."""
 

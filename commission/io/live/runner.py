@@ -45,7 +45,7 @@ class SourceNow:
     """Its records that came too late and are left out, by kind."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LiveSnapshot:
     """All that is known of a live run at a moment."""
 
@@ -134,7 +134,8 @@ class LiveRunner:
         account = RecordAccount.of([each.status for each in sources], self._taken, kinds, self._refused)
         now_ns = None if self._stopped.is_set() else self.session.clock.now_ns()
         mended = {words: count for words, count in told.items() if count}
-        return LiveSnapshot(sources, self.run.so_far(now_ns), mended, account, self._clocks)
+        run = self.run.so_far(now_ns)
+        return LiveSnapshot(sources=sources, run=run, told=mended, account=account, clocks=self._clocks)
 
     def _localize(self) -> None:
         self.run.prepare()

@@ -74,7 +74,7 @@ def arrival(clocks: float | None, late: float | None) -> ArrivalOffset:
 
 def test_what_arrival_says_stands_beside_motion_with_its_effect_and_is_used_where_scans_are_stamped_late() -> None:
     late = arrival(None, 0.012)
-    live = LiveView((), (), clocks=(late,))
+    live = LiveView(sources=(), told=(), clocks=(late,))
     html = clocks_html(view_of(page(), live))
     # The fastest route of the site is driven at 1 m/s: 12 mm in twelve milliseconds.
     speed = max(route.speed for route in PROJECT.routes) if PROJECT.routes else 1.0
@@ -85,7 +85,7 @@ def test_what_arrival_says_stands_beside_motion_with_its_effect_and_is_used_wher
     assert len(used.undo) == 1
     assert "agrees with what is allowed for" in clocks_html(view_of(used, live))
     own = arrival(0.0372, None)
-    html = clocks_html(view_of(page(), LiveView((), (), clocks=(own,))))
+    html = clocks_html(view_of(page(), LiveView(sources=(), told=(), clocks=(own,))))
     assert "its clock shows +37.2 ± 0.3 ms (1σ) more than the vehicle's, drift +20 µs/s" in html
     with pytest.raises(UsageError, match="arrival shows no clock that is another one"):
         after(page(), UseArrivalClocks((own,)))
