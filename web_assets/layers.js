@@ -18,6 +18,9 @@
     const { inbox } = target.closest(".c-layers").dataset;
     window.commissionTell?.(inbox, JSON.stringify({ n: `${performance.now()} ${++count}`, layer, shown: target.checked }));
   }, true);
+  addEventListener("click", ({ target }) => {
+    if (target.matches?.(".c-layer > span")) target.previousElementSibling.click(); // a name is as good as its eye
+  }, true);
   addEventListener("input", ({ target }) => {
     const layer = layerOf(target);
     if (layer === undefined || target.type !== "range") return;

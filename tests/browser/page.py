@@ -173,9 +173,7 @@ class OpenPage:
 
     def row(self, label: str) -> Locator:
         """The row of widgets behind this label."""
-        return self.page.locator("label", has_text=label).locator(
-            "xpath=ancestor::*[contains(@class,'Flex-root') or @data-layer][1]"
-        )
+        return self.page.locator("label", has_text=label).locator("xpath=ancestor::*[contains(@class,'Flex-root')][1]")
 
     def fill(self, label: str, text: str) -> None:
         """Type into the input of this label and leave it."""

@@ -187,11 +187,11 @@ def test_a_layer_switched_off_disappears_and_the_legend_explains_the_rest(run: O
     for entry in ("inlier", "outlier: outside every gate", "outlier: too few or many beams", "reference (truth)"):
         page.wait_for_text(entry)
     page.open_tab("Layers")
-    page.tick("Routes")
+    page.page.locator("[data-layer=Routes] > span").click()
     page.page.wait_for_function("() => !window.__viserMutable.nodeRefFromName['/routes'].visible")
     strength = "names => names.map(n => getComputedStyle(document.querySelector(`[data-layer=${n}] span`)).opacity)"
     assert page.page.evaluate(strength, ["Routes", "Grid"]) == ["0.5", "1"], "which one is off can be read"
-    page.tick("Routes")
+    page.page.get_by_label("Show Routes").click()
     page.page.wait_for_function("() => window.__viserMutable.nodeRefFromName['/routes'].visible")
     groups = page.page.locator(".c-layers h4").all_inner_texts()
     assert groups == ["Map", "Site", "Run", "Plan"]

@@ -51,9 +51,9 @@ def layer_row(layer: Layer, magnify: float, *, shown: bool) -> str:
         f" data-nodes='{escape(json.dumps(nodes), quote=True)}'>"
     )
     return (
-        f"<div class='c-layer' data-layer='{name}'><label><input type='checkbox'"
-        f"{' checked' if shown else ''} aria-label='Show {name}'><span>{name}</span></label>{opacity if nodes else ''}"
-        f"</div>{legend(layer, magnify) if shown else ''}"
+        f"<div class='c-layer' data-layer='{name}'><input type='checkbox'{' checked' if shown else ''}"
+        f" aria-label='Show {name}'><span>{name}</span>{opacity if nodes else ''}</div>"
+        f"{legend(layer, magnify) if shown else ''}"
     )
 
 

@@ -74,13 +74,12 @@ div:has(>div>.c-bottom):has(.c-no-run)>:nth-child(4){{grid-column:1/span 24!impo
 .c-layers h4{{margin:6px 0 1px;font-size:11px;font-weight:600;opacity:.65;
  border-bottom:1px solid {css(Surface.EDGE.dark)}}}
 .c-layer{{display:flex;align-items:center;gap:8px;min-height:21px}}
-.c-layer label{{color:{css(Worded.WORD.dark)};
- flex:1;min-width:0;display:flex;align-items:center;gap:7px;cursor:pointer}}
 .c-layer [type=checkbox]{{appearance:none;flex:none;width:16px;height:16px;margin:0;cursor:pointer;
  background:currentColor;opacity:.9;mask:{SHUT_EYE} center/contain no-repeat}}
 .c-layer [type=checkbox]:checked{{mask-image:{OPEN_EYE}}}
-.c-layer label:has(:focus-visible){{outline:1px solid {css(Worded.BRAND.dark)}}}
-.c-layer label:has(>input:not(:checked))>span{{opacity:.5}}
+.c-layer>:focus-visible{{outline:1px solid {css(Worded.BRAND.dark)}}}
+.c-layer>span{{flex:1;min-width:0;cursor:pointer}}
+.c-layer>:not(:checked)+span{{opacity:.5}}
 .c-layer [type=range]{{flex:none;width:64px;height:14px;margin:0;accent-color:{css(Worded.BRAND.dark)};cursor:pointer;
  opacity:.55}}
 .c-layer [type=range]:is(:hover,:focus-visible){{opacity:1}}
