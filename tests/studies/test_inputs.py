@@ -194,7 +194,9 @@ def others(value: Any) -> Iterator[tuple[str, Any]]:
         case str():
             yield "", f"{value}x"
         case np.ndarray():
-            yield "", value + 0.1
+            # Of an empty array, such as the tags of a drive that sees none, there is no other of its kind.
+            if value.size:
+                yield "", np.char.add(value, "x") if value.dtype.kind == "U" else value + 0.1
         case FloorMap():
             yield "", FloorMap(np.roll(value.cells, 3, axis=1), value.resolution)
         case tuple():
