@@ -194,9 +194,7 @@ def others(value: Any) -> Iterator[tuple[str, Any]]:
         case str():
             yield "", f"{value}x"
         case np.ndarray():
-            # Of an empty array, such as the tags of a drive that sees none, there is no other of its kind.
-            if value.size:
-                yield "", np.char.add(value, "x") if value.dtype.kind == "U" else value + 0.1
+            yield from _other_arrays(value)
         case FloorMap():
             yield "", FloorMap(np.roll(value.cells, 3, axis=1), value.resolution)
         case tuple():
@@ -207,6 +205,12 @@ def others(value: Any) -> Iterator[tuple[str, Any]]:
                     yield f"[{index}]{path}", (*value[:index], other, *value[index + 1 :])
         case _ if dataclasses.is_dataclass(value):
             yield from _with_other_fields(value)
+
+
+def _other_arrays(value: np.ndarray) -> Iterator[tuple[str, Any]]:
+    # Of an empty array, such as the tags of a drive that sees none, there is no other of its kind.
+    if value.size:
+        yield "", np.char.add(value, "x") if value.dtype.kind == "U" else value + 0.1
 
 
 def _with_other_fields(value: Any) -> Iterator[tuple[str, Any]]:
