@@ -9,13 +9,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from commission.io.live.status import SourceStatus
-from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan, TagSightings
 
 WORDS: dict[type[Record], tuple[str, str]] = {
     Odometry: ("odometry record", "odometry records"),
     ReferencePose: ("reference pose", "reference poses"),
     Detections: ("set of detections", "sets of detections"),
     Scan: ("scan", "scans"),
+    TagSightings: ("frame with tags", "frames with tags"),
 }
 """What one record and several are called."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import threading
+import typing
 from collections.abc import Callable
 
 import numpy as np
@@ -14,10 +15,11 @@ from commission.io.live.connection import Arrival
 from commission.io.live.registry import SourceAddress
 from commission.io.live.session import BEHIND_NS, Session, connection_of
 from commission.io.live.sorter import PATIENCE_NS, Sorter
-from commission.io.live.status import Arrivals, SourceState, SourceStatus
-from commission.io.protocols.message import Sent
-from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
-from tests.io.live.virtual import NAMES, Sending, until
+from commission.io.live.status import ODOMETRY, Arrivals, SourceState, SourceStatus
+from commission.io.protocols.json_records import encode_message
+from commission.io.protocols.message import LiveMessage, Sent
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan, TagSightings
+from tests.io.live.virtual import NAMES, Listening, Sending, until
 
 MS = 1_000_000
 
@@ -153,3 +155,23 @@ def test_what_became_of_the_records_is_said_by_kind_and_cause() -> None:
         "100 records received, 12 lost: 1 scan came too late, 4 odometry records came too late, 2 dropped, since this "
         "computer was too slow, 1 refused by the localizer, 3 never came, 1 undecodable"
     )
+
+
+def test_records_of_every_kind_have_words_for_being_lost() -> None:
+    for kind in typing.get_args(Record):
+        account = RecordAccount.of([SourceStatus(state=SourceState.RECEIVING, records=2)], 0, {kind: 2})
+        assert "2 lost: 2 " in account.text
+
+
+def test_frames_of_a_camera_say_nothing_of_when_odometry_arrives() -> None:
+    frame = TagSightings(5, np.array([[1.0, 0.0, 0.1, *3 * [np.nan]]]), ("7",))
+    records = frame, Odometry(7, np.zeros(3))
+    with Listening("json") as listening, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        for number, record in enumerate(records):
+            data = encode_message(LiveMessage(record, record.stamp_ns, number), NAMES)
+            out.sendto(data, ("127.0.0.1", listening.connection.address.port))
+        assert until(lambda: len(listening.arrivals) == len(records))
+        assert isinstance(listening.arrivals[0].record, TagSightings)
+        times = listening.connection.times()
+    assert list(times) == [ODOMETRY]
+    assert len(times[ODOMETRY][1]) == 1
