@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import random
 import socket
 import time
@@ -138,14 +139,15 @@ def test_a_silent_source_is_told_within_a_second(name: str) -> None:
 
 @pytest.mark.parametrize("name", DATAGRAMS)
 def test_a_sender_that_begins_again_is_heard_again_without_duplicates(name: str) -> None:
-    with Listening(name) as listening:
+    # All stay open: else the system now and then gives a sender the port of one before, and it is taken for that one.
+    with Listening(name) as listening, contextlib.ExitStack() as senders:
         to = "127.0.0.1", listening.connection.address.port
         for life in range(20):
             sending = Sending(name)
-            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
-                for piece in flat(sending.pieces(range(4))):
-                    out.sendto(piece, to)
-                assert until(lambda life=life: listening.numbers.count(2) == life + 1)
+            out = senders.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+            for piece in flat(sending.pieces(range(4))):
+                out.sendto(piece, to)
+            assert until(lambda life=life: listening.numbers.count(2) == life + 1)
         found = listening.numbers
     assert [number for number in found if number == 0] == [0] * 20
     stamps = [arrival.record.stamp_ns for arrival in listening.arrivals]
