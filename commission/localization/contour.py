@@ -21,7 +21,6 @@ from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.geometry.gaussian import chi_square_gate
 from commission.geometry.se2 import compose_scalars, exp_scalars, inverse_scalars
 from commission.localization.consider import PER_REFLECTOR, PER_SCANNER, ConsiderModel
-from commission.localization.consider_columns import carry_over, mark_busy
 from commission.localization.contour_match import (
     GridPose,
     MatchRule,
@@ -31,17 +30,11 @@ from commission.localization.contour_match import (
     information_of,
     match,
 )
-from commission.localization.contour_rows import (
-    ContourRows,
-    corrected_by_rows,
-    nis_of_rows,
-    told_directions,
-)
 from commission.localization.contour_tables import ContourTables, contour_tables
-from commission.localization.invariant import about_elsewhere, carry_along
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import Motion, NextOdometry, trend, velocity
 from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.pose_rows import PoseRows, correct_all_by_rows, nis_of_rows, told_directions
 from commission.localization.sweep import Sweep
 from commission.site.floor_map import FloorMap
 from commission.site.parameters import ContourParameters
@@ -266,7 +259,7 @@ def observe_contours(  # noqa: PLR0917 - the filter's state around one scan
 
     Notes
     -----
-    No formula: `scan_points`, `best_start`, `match`, `told_directions`, `nis_of_rows`, `corrected_by_rows` in turn.
+    No formula: `scan_points`, `best_start`, `match`, `told_directions`, `nis_of_rows`, `correct_all_by_rows` in turn.
     """
     columns = np.zeros((3, PER_SCANNER + PER_MAP))
     first, last = PER_REFLECTOR * reflectors + PER_SCANNER * scan.scanner, 0
@@ -320,24 +313,8 @@ def observe_contours(  # noqa: PLR0917 - the filter's state around one scan
         figures[USE] = REJECTED
         return belief
     figures[USE] = ACCEPTED
-    transition = np.empty((3, 3))
-    corrected = corrected_by_rows(belief, columns, considered, rows, transition)
-    if invariant:
-        # A match is a pose, so that the mean needs no exponential; the covariance is about where the mean was.
-        way_x, way_y = corrected.x - belief.x, corrected.y - belief.y
-        corrected = about_elsewhere(corrected, way_x, way_y)
-        carry_along(columns, columns.shape[1], way_x, way_y)
-        carry_along(transition, 3, way_x, way_y)
-    if cross is not None and busy is not None:
-        carry_over(cross, transition, busy)
-        for row in range(3):
-            for i in range(PER_SCANNER):
-                cross[row, first + i] = columns[row, i]
-            for i in range(PER_MAP):
-                cross[row, last + i] = columns[row, PER_SCANNER + i]
-        mark_busy(busy, first, first + PER_SCANNER)
-        mark_busy(busy, last, last + PER_MAP)
-    return corrected
+    stretches = (first, PER_SCANNER), (last, PER_MAP)
+    return correct_all_by_rows(belief, columns, considered, rows, stretches, cross, busy, invariant)
 
 
 @compiled_inline
@@ -363,7 +340,7 @@ def rows_of_match(  # noqa: PLR0917 - a match and its points
     points: FloatArray,
     model: ContourModel,
     figures: FloatArray,
-) -> ContourRows:
+) -> PoseRows:
     """Rows of a match, without the constants.
 
     Parameters
@@ -413,12 +390,12 @@ def rows_of_match(  # noqa: PLR0917 - a match and its points
     figures[COST] = cost_of(pose, lever, points, tables, length, math.inf, False).total / len(points)
     figures[MATCH_X], figures[MATCH_Y], figures[MATCH_THETA] = x, y, theta
     figures[SIGMA] = sigma
-    return ContourRows(residuals, jacobians, noise, np.zeros((len(beams), PER_SCANNER + PER_MAP)))
+    return PoseRows(residuals, jacobians, noise, np.zeros((len(beams), PER_SCANNER + PER_MAP)))
 
 
 @compiled_inline
 def constant_jacobians(
-    belief: PoseGaussian, rows: ContourRows, mount: ObservationModel, twist: tuple[float, float, float]
+    belief: PoseGaussian, rows: PoseRows, mount: ObservationModel, twist: tuple[float, float, float]
 ) -> None:
     """Write how constants change the rows of a match.
 

@@ -442,39 +442,36 @@ def _run(  # noqa: PLR0917 - the columns of the log
                 following,
                 sightings,
             )
-            state = cycle.state
-            _write_belief(cycle.prior, k, priors.means, priors.covariances)
-            _write_belief(state.belief, k, means, covariances)
-            modes[k] = state.mode
-            if state.mode == LOST and model.limits.find_again:
-                return state, k + 1, rows
-            continue
-        if len(sweeps):
-            sweep = sweep_at(sweeps, scanners[k])
-            bring_to_stamp(state.motion, following, offsets[k], offsets[k + 1], measured, sweep, observation, settled)
-        cycle = process_scan(
-            state,
-            scan_stamps[k],
-            offsets[k],
-            offsets[k + 1],
-            detections,
-            model,
-            observation,
-            places,
-            cell_offsets,
-            cross,
-            work,
-            aims,
-            busy,
-            scanners[k],
-            status,
-            reflectors,
-            d2,
-            following,
-            contours,
-            contour_scan_at(scans, k, observations, sweeps),
-            figures_at(scans, figures, k),
-        )
+        else:
+            first, last = offsets[k], offsets[k + 1]
+            if len(sweeps):
+                sweep = sweep_at(sweeps, scanners[k])
+                bring_to_stamp(
+                    state.motion, following, offsets[k], offsets[k + 1], measured, sweep, observation, settled
+                )
+            cycle = process_scan(
+                state,
+                scan_stamps[k],
+                first,
+                last,
+                detections,
+                model,
+                observation,
+                places,
+                cell_offsets,
+                cross,
+                work,
+                aims,
+                busy,
+                scanners[k],
+                status,
+                reflectors,
+                d2,
+                following,
+                contours,
+                contour_scan_at(scans, k, observations, sweeps),
+                figures_at(scans, figures, k),
+            )
         state = cycle.state
         _write_belief(cycle.prior, k, priors.means, priors.covariances)
         _write_belief(state.belief, k, means, covariances)

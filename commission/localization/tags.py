@@ -18,10 +18,8 @@ from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.geometry.gaussian import chi_square_gate
 from commission.localization.consider import ConsiderModel
-from commission.localization.consider_columns import carry_over, mark_busy
-from commission.localization.contour_rows import ContourRows, corrected_by_rows, nis_of_rows
-from commission.localization.invariant import about_elsewhere, carry_along
 from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.pose_rows import PoseRows, correct_all_by_rows, nis_of_rows
 from commission.site.parameters import TagParameters
 from commission.site.tag_log import Ids
 from commission.site.tags import Tag, TagCamera
@@ -110,7 +108,7 @@ def entries_of(ids: Ids, tags: Sequence[Tag]) -> IntArray:
 @compiled
 def tag_rows(
     belief: PoseGaussian, sighting: FloatArray, tag: FloatArray, model: TagModel, twist: tuple[float, float, float]
-) -> ContourRows:
+) -> PoseRows:
     """Three rows of a sighting of one tag, with the camera's and the tag's constants beside them.
 
     Parameters
@@ -156,7 +154,7 @@ def tag_rows(
     J[0, PER_CAMERA], J[0, PER_CAMERA + 1] = c, s
     J[1, PER_CAMERA], J[1, PER_CAMERA + 1] = -s, c
     J[2, PER_CAMERA + 2] = 1.0
-    return ContourRows(residuals, H, variances, J)
+    return PoseRows(residuals, H, variances, J)
 
 
 @compiled_inline
@@ -261,7 +259,7 @@ def correct_by_tag(  # noqa: PLR0917 - the filter's state around one sighting
     Notes
     -----
     K = P H^T (H P H^T + R)^-1, P' = (I - K H) P, x' = x + K (z - h(x)): Dixon et al. 2010, equations 21 to 23, row by
-    row in Joseph's form, with constants considered as in `corrected_by_rows`.
+    row in Joseph's form, with constants considered as in `correct_all_by_rows`.
     """
     figures[:] = 0.0
     if entry == NOT_READ:
@@ -279,22 +277,5 @@ def correct_by_tag(  # noqa: PLR0917 - the filter's state around one sighting
         figures[USE] = REJECTED
         return belief
     figures[USE] = ACCEPTED
-    transition = np.empty((3, 3))
-    corrected = corrected_by_rows(belief, columns, considered, rows, transition)
-    if invariant:
-        # A sighting is a pose, so that the mean needs no exponential; the covariance is about where the mean was.
-        way_x, way_y = corrected.x - belief.x, corrected.y - belief.y
-        corrected = about_elsewhere(corrected, way_x, way_y)
-        carry_along(columns, columns.shape[1], way_x, way_y)
-        carry_along(transition, 3, way_x, way_y)
-    if cross is not None and busy is not None:
-        carry_over(cross, transition, busy)
-        first, tag = model.first, model.first + PER_CAMERA + PER_TAG * entry
-        for row in range(3):
-            for i in range(PER_CAMERA):
-                cross[row, first + i] = columns[row, i]
-            for i in range(PER_TAG):
-                cross[row, tag + i] = columns[row, PER_CAMERA + i]
-        mark_busy(busy, first, first + PER_CAMERA)
-        mark_busy(busy, tag, tag + PER_TAG)
-    return corrected
+    stretches = (model.first, PER_CAMERA), (model.first + PER_CAMERA + PER_TAG * entry, PER_TAG)
+    return correct_all_by_rows(belief, columns, considered, rows, stretches, cross, busy, invariant)

@@ -28,12 +28,12 @@ from commission.localization.contour import (
     observe_contours,
     scan_points,
 )
-from commission.localization.contour_rows import ContourRows, corrected_by_rows, nis_of_rows, told_directions
 from commission.localization.estimate import Belief
 from commission.localization.localizer import Localizer
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import AT_REST, NOT_YET, NextOdometry
 from commission.localization.pose_gaussian import PoseGaussian, covariance_of, from_belief, mean_of
+from commission.localization.pose_rows import PoseRows, corrected_by_rows, nis_of_rows, told_directions
 from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.sweep import AT_ONCE, sweep_of
@@ -96,7 +96,7 @@ def test_a_match_corrects_like_equations_5_to_9():
         P, noise = root @ root.T + 1e-6 * np.eye(3), np.diag(rng.uniform(1e-5, 1e-3, 3))
         mean, seen = np.array((3.0, -2.0, 0.3)), np.array((3.05, -2.1, 0.28))
         belief = from_belief(Belief(0, mean, P))
-        rows = ContourRows(seen - mean, np.eye(3), np.diag(noise).copy(), np.zeros((3, 2)))
+        rows = PoseRows(seen - mean, np.eye(3), np.diag(noise).copy(), np.zeros((3, 2)))
         W = P @ np.linalg.inv(P + noise)
         after = corrected_by_rows(belief, np.zeros((3, 2)), np.zeros(2), rows, np.empty((3, 3)))
         assert mean_of(after) == pytest.approx(mean + W @ (seen - mean), abs=1e-12)
@@ -116,7 +116,7 @@ def test_considered_constants_correct_like_schmidts_filter_of_the_whole_state():
         cross, considered = whole[:3, 3:].copy(), np.diag(whole)[3:].copy()
         residuals, transition = rng.standard_normal(2) * 0.01, np.empty((3, 3))
         belief = from_belief(Belief(0, np.zeros(3), whole[:3, :3]))
-        after = corrected_by_rows(belief, cross, considered, ContourRows(residuals, H, v, J), transition)
+        after = corrected_by_rows(belief, cross, considered, PoseRows(residuals, H, v, J), transition)
         mean, full, A = np.zeros(5), whole.copy(), np.eye(3)
         for k in range(2):
             row = np.concatenate((H[k], J[k]))

@@ -1,6 +1,6 @@
-"""Rows of a contour match: residual, Jacobian and variance for each direction that contours tell, and their correction.
+"""Rows of what tells a pose, a contour match or a tag: residual, Jacobian and variance of each, and their correction.
 
-Considered constants (mounting and clock of the scanner, the map where the vehicle is) stand beside the rows as columns.
+Considered constants (mounting and clock of the sensor, the map where the vehicle is) stand beside the rows as columns.
 """
 
 from __future__ import annotations
@@ -12,20 +12,22 @@ import numpy as np
 
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.angles import wrap_scalar
-from commission.geometry.arrays import FloatArray
+from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.eigen import eigen_symmetric
+from commission.localization.consider_columns import carry_over, mark_busy
+from commission.localization.invariant import about_elsewhere, carry_along
 from commission.localization.pose_gaussian import PoseGaussian
 
 
-class ContourRows(NamedTuple):
-    """Up to three rows: each says how far the pose is from the match along one direction."""
+class PoseRows(NamedTuple):
+    """Up to three rows: each says how far the pose is from what was found, along one direction."""
 
     residuals: FloatArray
-    """(n,) of the match less the pose."""
+    """(n,) of what was found less the pose."""
     jacobians: FloatArray
     """(n, 3) direction, with respect to x, y and heading of base."""
     variances: FloatArray
-    """(n,) noise of the beams; what is constant stands in `constants`."""
+    """(n,) noise of what was found; what is constant stands in `constants`."""
     constants: FloatArray
     """(n, M) with respect to the considered constants."""
 
@@ -62,8 +64,8 @@ def told_directions(second: FloatArray, lever: float, fewest: float) -> tuple[Fl
 
 
 @compiled
-def nis_of_rows(belief: PoseGaussian, cross: FloatArray, considered: FloatArray, rows: ContourRows) -> float:
-    """NIS of all rows of a match together.
+def nis_of_rows(belief: PoseGaussian, cross: FloatArray, considered: FloatArray, rows: PoseRows) -> float:
+    """NIS of all rows together.
 
     Parameters
     ----------
@@ -110,9 +112,9 @@ def nis_of_rows(belief: PoseGaussian, cross: FloatArray, considered: FloatArray,
 
 @compiled
 def corrected_by_rows(
-    belief: PoseGaussian, cross: FloatArray, considered: FloatArray, rows: ContourRows, transition: FloatArray
+    belief: PoseGaussian, cross: FloatArray, considered: FloatArray, rows: PoseRows, transition: FloatArray
 ) -> PoseGaussian:
-    """Correct a belief by the rows of a match, one after the other.
+    """Correct a belief by rows, one after the other.
 
     Parameters
     ----------
@@ -166,6 +168,52 @@ def corrected_by_rows(
         transition[:, :] = _product(A, transition)
     P = covariance
     return PoseGaussian(mean[0], mean[1], wrap_scalar(mean[2]), P[0, 0], P[0, 1], P[0, 2], P[1, 1], P[1, 2], P[2, 2])
+
+
+@compiled_inline
+def correct_all_by_rows(  # noqa: PLR0917 - the filter's state around a few rows
+    belief: PoseGaussian,
+    columns: FloatArray,
+    considered: FloatArray,
+    rows: PoseRows,
+    stretches: tuple[tuple[int, int], tuple[int, int]],
+    cross: FloatArray | None,
+    busy: IntArray | None,
+    invariant: bool,
+) -> PoseGaussian:
+    """Correct a belief by rows, and its covariance with all constants, also those that are none of theirs.
+
+    Parameters
+    ----------
+    belief, considered, rows : as in `corrected_by_rows`.
+    columns : (3, M) its covariance with the constants of the rows, corrected in place.
+    stretches : first column in `cross`, and number, of each of the two stretches that `columns` are of.
+    cross : covariance of the pose with all constants at `belief`, written in place, or None.
+    busy : see `busy_chunks`.
+    invariant : whether the covariance is that of a right-invariant error.
+
+    Notes
+    -----
+    No formula: `corrected_by_rows`; of a right-invariant error then `about_elsewhere` with the way of the mean.
+    """
+    transition = np.empty((3, 3))
+    corrected = corrected_by_rows(belief, columns, considered, rows, transition)
+    if invariant:
+        # Rows tell a pose, so that the mean needs no exponential; the covariance is about where the mean was.
+        way_x, way_y = corrected.x - belief.x, corrected.y - belief.y
+        corrected = about_elsewhere(corrected, way_x, way_y)
+        carry_along(columns, columns.shape[1], way_x, way_y)
+        carry_along(transition, 3, way_x, way_y)
+    if cross is not None and busy is not None:
+        carry_over(cross, transition, busy)
+        at = 0
+        for first, count in stretches:
+            for row in range(3):
+                for i in range(count):
+                    cross[row, first + i] = columns[row, at + i]
+            mark_busy(busy, first, first + count)
+            at += count
+    return corrected
 
 
 @compiled_inline
