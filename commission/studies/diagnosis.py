@@ -10,9 +10,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
 from commission.geometry.arrays import FloatArray
 from commission.progress import Progress, part, silent
@@ -21,6 +18,7 @@ from commission.site.project import Project
 from commission.site.quantity import MILLIMETRES, PERCENT
 from commission.studies.calibration import Calibration, CalibrationVerdict, Value, accepted
 from commission.studies.calibration_fit import places_of
+from commission.studies.heaps import heaps_of, middle_of, nearest_of
 from commission.studies.inputs import StudyInput
 from commission.studies.reflector_figures import ReflectorFigures, ReflectorFiguresInput, reflector_figures
 from commission.studies.run import RunInput, judged_run
@@ -212,31 +210,23 @@ def _clusters(found: Calibration) -> Iterator[OutlierCluster]:
         return
     scanners, places, _ = places_of(drive, found.fit.point)
     places, scanners = places[lost], scanners[lost]
-    # Squares of the floor, not detections: of a thing that stands there are thousands, each near all others.
-    squares, square = np.unique(np.floor(places / CELL_M), axis=0, return_inverse=True)
-    pairs = KDTree(squares).query_pairs(1.5, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(squares), len(squares)))
-    label = connected_components(links, directed=False)[1][square]
-    counts = np.bincount(label)
     fewest = max(FEWEST, LEAST_SHARE * len(drive.stamps_ns))
     mapped = drive.places + found.fit.point.constants[drive.layout.places :].reshape(-1, 2)
-    for index in np.argsort(-counts, kind="stable").tolist():
-        if counts[index] < fewest:
+    for rows in heaps_of(places, CELL_M):
+        if len(rows) < fewest:
             return
-        rows = label == index
-        middle = np.median(places[rows], axis=0)
-        if np.median(np.hypot(*(places[rows] - middle).T)) > WIDEST_M:
+        middle, spread = middle_of(places[rows])
+        if spread > WIDEST_M:
             continue
-        off = np.hypot(*(mapped - middle).T)
-        nearest = int(np.argmin(off)) if len(off) else -1
+        near = nearest_of(mapped, middle, NEAR_M)
         x, y = scanners[rows, :2].mean(axis=0).tolist()
         yield OutlierCluster(
             x=float(middle[0]),
             y=float(middle[1]),
-            count=int(counts[index]),
+            count=len(rows),
             from_x=x,
             from_y=y,
-            near=ids[nearest] if nearest >= 0 and off[nearest] < NEAR_M else "",
+            near=ids[near] if near >= 0 else "",
         )
 
 

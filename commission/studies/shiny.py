@@ -10,11 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import KDTree
 
-from commission.geometry import se2
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray
 from commission.localization.detector import threshold_at
 from commission.localization.estimate import Mode, Status
@@ -23,6 +19,7 @@ from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress, silent
 from commission.site.quantity import PERCENT
 from commission.site.record_log import RecordLog
+from commission.studies.heaps import heaps_of, middle_of, nearest_of
 from commission.studies.inputs import StudyInput
 from commission.studies.sensor_view import peak_of
 
@@ -112,16 +109,12 @@ def shiny_things(inputs: ShinyInput, progress: Progress = silent) -> tuple[Shiny
     rows, cycles, places = _unknown(inputs)
     if len(rows) < FEWEST:
         return ()
-    # Squares of the floor, not sightings: of a thing that stands there are thousands, each near all others.
-    squares, square = np.unique(np.floor(places / CELL_M), axis=0, return_inverse=True)
-    pairs = KDTree(squares).query_pairs(1.5, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(squares), len(squares)))
-    label = connected_components(links, directed=False)[1][square.reshape(-1)]
-    counts = np.bincount(label)
     found: list[ShinyThing] = []
-    for number, index in enumerate(np.flatnonzero(counts >= FEWEST).tolist()):
-        progress(number / len(counts), "")
-        of = label == index
+    heaps = heaps_of(places, CELL_M)
+    for number, of in enumerate(heaps):
+        progress(number / len(heaps), "")
+        if len(of) < FEWEST:
+            break
         thing = _thing(inputs, (rows[of], cycles[of], places[of]))
         if thing is not None:
             found.append(thing)
@@ -140,28 +133,18 @@ def _unknown(inputs: ShinyInput) -> tuple[NDArray[np.int64], IntArray, FloatArra
     known: BoolArray = columns.modes[:last] == Mode.OPERATIONAL
     rows = np.flatnonzero((columns.reflector[:count] < 0) & known[cycles])
     cycles = cycles[rows]
-    ranges, bearings = columns.detected.range_bearing[rows].T
-    mountings = np.array([scanner.mounting for scanner in inputs.setup.scanners], dtype=np.float64)
-    scanners = columns.detected.scanners[cycles]
-    # Bearings are as the scanner reports them: of one that hangs upside down they run the other way.
-    turned = np.array([-1.0 if scanner.upside_down else 1.0 for scanner in inputs.setup.scanners])[scanners]
-    T_map_scanner = se2.compose(columns.means[cycles], mountings[scanners])
-    angles = T_map_scanner[:, 2] + turned * bearings
-    places = T_map_scanner[:, :2] + ranges[:, np.newaxis] * np.column_stack((np.cos(angles), np.sin(angles)))
-    return rows, cycles, places
+    return rows, cycles, columns.points_map()[rows]
 
 
 def _thing(inputs: ShinyInput, of: tuple[NDArray[np.int64], IntArray, FloatArray]) -> ShinyThing | None:
     """Return what one heap of sightings is; None where they are of no one thing."""
     (rows, cycles, places), columns = of, inputs.columns
-    middle = np.median(places, axis=0)
-    spread = float(np.median(np.hypot(*(places - middle).T)))
+    middle, spread = middle_of(places)
     scans = np.unique(cycles)
     if spread > WIDEST_M or len(scans) < FEWEST:
         return None
-    off = np.hypot(*(inputs.setup.reflectors.centers - middle).T)
-    nearest = int(np.argmin(off)) if len(off) else -1
-    beside = inputs.setup.reflectors.reflectors[nearest].id if nearest >= 0 and off[nearest] < BESIDE_M else ""
+    nearest = nearest_of(inputs.setup.reflectors.centers, middle, BESIDE_M)
+    beside = inputs.setup.reflectors.reflectors[nearest].id if nearest >= 0 else ""
     ranges = columns.detected.range_bearing[rows, 0]
     intensity, threshold = _intensities(inputs, rows, cycles)
     return ShinyThing(
