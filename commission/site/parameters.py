@@ -35,6 +35,19 @@ FILTER_KINDS = ("ekf", "ukf", "ckf", "invariant")
 ASSOCIATION_METHODS = ("exclusive", "nearest", "careful", "joint")
 """Ways to decide which reflector a detection belongs to; `nearest` is the paper's."""
 
+
+def _gate(label: str) -> Quantity:
+    """What is known of the probability that something true falls inside a validation gate."""
+    return Quantity(
+        label=label,
+        shown=PERCENT,
+        bounds=Bounds.inside(0.0, 1.0),
+        step=0.01,
+        slider=(50.0, 99.99),
+        is_tail=True,
+    )
+
+
 _SCALE = Bounds.between(-0.5, 0.5)
 """Wheels that are off by more are other wheels."""
 
@@ -213,17 +226,7 @@ class AssociationParameters:
 
     enabled: Annotated[bool, Switch("Association filter")] = True
     """Whether detections outside the validation gate of their likeliest reflector are rejected (association filter)."""
-    gate_probability: Annotated[
-        float,
-        Quantity(
-            label="Gate",
-            shown=PERCENT,
-            bounds=Bounds.inside(0.0, 1.0),
-            step=0.01,
-            slider=(50.0, 99.99),
-            is_tail=True,
-        ),
-    ] = 0.95
+    gate_probability: Annotated[float, _gate("Gate")] = 0.95
     """Probability that a true detection falls inside the validation gate, P_G."""
     method: Annotated[str, Choice("Associated by", ASSOCIATION_METHODS)] = "exclusive"
     """How: `nearest` lets several detections be of one reflector (the paper), `exclusive` keeps the nearest of them,
@@ -310,17 +313,7 @@ class ContourParameters:
         float, Quantity(label="Direction told by", shown=PERCENT, bounds=SHARE, step=0.5, slider=(0.0, 20.0))
     ] = 0.05
     """Share of the matched beams that must tell a direction: along a corridor, no information is taken from walls."""
-    gate_probability: Annotated[
-        float,
-        Quantity(
-            label="Accepted to",
-            shown=PERCENT,
-            bounds=Bounds.inside(0.0, 1.0),
-            step=0.01,
-            slider=(50.0, 99.99),
-            is_tail=True,
-        ),
-    ] = 0.999
+    gate_probability: Annotated[float, _gate("Accepted to")] = 0.999
     """Probability that a true match falls inside the validation gate."""
 
     def __post_init__(self) -> None:
@@ -343,17 +336,7 @@ class TagParameters:
         Quantity(label="Tag turned 1σ", unit="rad", shown=DEGREES, bounds=POSITIVE, step=0.01, slider=(0.1, 10.0)),
     ] = 0.02
     """1-sigma noise of a tag's measured heading, where the recording does not say it."""
-    gate_probability: Annotated[
-        float,
-        Quantity(
-            label="Tag accepted to",
-            shown=PERCENT,
-            bounds=Bounds.inside(0.0, 1.0),
-            step=0.01,
-            slider=(50.0, 99.99),
-            is_tail=True,
-        ),
-    ] = 0.999
+    gate_probability: Annotated[float, _gate("Tag accepted to")] = 0.999
     """Probability that a true sighting falls inside the validation gate, of three degrees of freedom."""
 
     def __post_init__(self) -> None:
