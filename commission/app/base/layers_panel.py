@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from html import escape
 
 from viser import GuiApi, LabelHandle
 
 from commission.app.base import actions, theme, viser_private
 from commission.app.base.actions import Action
+from commission.app.base.inputs import write_html
 from commission.app.base.layer import Layer, LayerGroup
 from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.state import MAGNIFICATIONS, AppState
@@ -44,11 +44,11 @@ def layer_row(layer: Layer, magnify: float, *, shown: bool) -> str:
     magnify : factor of ellipses.
     shown : whether it is switched on.
     """
-    name = escape(layer.name, quote=True)
+    name = escaped(layer.name)
     nodes = [node.name for node in layer.nodes() if not isinstance(node, LabelHandle)]
     opacity = (
         f"<input type='range' min='10' max='100' step='5' value='100' aria-label='Opacity of {name} [%]'"
-        f" data-nodes='{escape(json.dumps(nodes), quote=True)}'>"
+        f" data-nodes='{escaped(json.dumps(nodes))}'>"
     )
     return (
         f"<div class='c-layer' data-layer='{name}'><input type='checkbox'{' checked' if shown else ''}"
@@ -102,8 +102,7 @@ class LayersPanel(BasePanel):
             )
             groups.append(rows and f"<h4>{group}</h4>{rows}")
         content = f"<div class='c-layers' data-inbox='{self._inbox}'>{''.join(groups)}</div>"
-        if content != self._html.content:
-            self._html.content = content
+        write_html(self._html, content)
 
 
 def _factor(magnification: float) -> str:
