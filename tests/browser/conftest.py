@@ -34,9 +34,7 @@ def browser() -> Iterator[Browser]:
         chromium.close()
 
 
-@pytest.fixture
-def window(browser: Browser) -> Iterator[Callable[..., OpenPage]]:
-    """Makes windows for a server's page, and closes them at the end."""
+def _windows(browser: Browser) -> Iterator[Callable[..., OpenPage]]:
     windows: list[OpenPage] = []
 
     def make(server: viser.ViserServer, size: tuple[int, int] = WIDE) -> OpenPage:
@@ -46,3 +44,15 @@ def window(browser: Browser) -> Iterator[Callable[..., OpenPage]]:
     yield make
     for one in windows:
         one.close()
+
+
+@pytest.fixture
+def window(browser: Browser) -> Iterator[Callable[..., OpenPage]]:
+    """Makes windows for a server's page, and closes them at the end."""
+    yield from _windows(browser)
+
+
+@pytest.fixture(scope="module")
+def lasting_window(browser: Browser) -> Iterator[Callable[..., OpenPage]]:
+    """Makes windows that all tests of a module share: opening one is what takes longest."""
+    yield from _windows(browser)

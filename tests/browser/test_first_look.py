@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Callable, Iterator
 
 import pytest
-from playwright.sync_api import Browser
 
 from commission.app.base.theme import LEFT_PX, RIGHT_PX
 from commission.app.run.actions import Play, VirtualDrive
@@ -27,12 +26,11 @@ def served() -> Iterator[Served]:
 
 
 @pytest.fixture(scope="module")
-def opened(browser: Browser, served: Served) -> Iterator[OpenPage]:
+def opened(served: Served, lasting_window: Callable[..., OpenPage]) -> OpenPage:
     """One window for all tests but those of its opening, which is what takes longest."""
-    page = OpenPage(browser, served.server)
+    page = lasting_window(served.server)
     page.open()
-    yield page
-    page.close()
+    return page
 
 
 @pytest.fixture

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser
 
 from commission.app.base import cameras
 from commission.app.run.actions import ChooseSource, Play, VirtualDrive
@@ -29,12 +28,11 @@ def served() -> Iterator[Served]:
 
 
 @pytest.fixture(scope="module")
-def page(browser: Browser, served: Served) -> Iterator[OpenPage]:
+def page(served: Served, lasting_window: Callable[..., OpenPage]) -> OpenPage:
     """One window for all tests, in their order."""
-    opened = OpenPage(browser, served.server)
+    opened = lasting_window(served.server)
     opened.open(nodes=["/grid/lines"])
-    yield opened
-    opened.close()
+    return opened
 
 
 def settle(page: OpenPage) -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser
 
 from commission.app.base.paints import Floor, Paint, Run
 from commission.app.base.panel import clock
@@ -50,13 +49,12 @@ def run() -> Iterator[OpenRun]:
 
 
 @pytest.fixture(scope="module")
-def page(browser: Browser, run: OpenRun) -> Iterator[OpenPage]:
+def page(run: OpenRun, lasting_window: Callable[..., OpenPage]) -> OpenPage:
     """One small window for all tests: where the processor draws, opening one is what takes longest."""
-    opened = OpenPage(browser, run.server, SMALL)
+    opened = lasting_window(run.server, SMALL)
     opened.page.set_default_timeout(60_000)
     opened.open(nodes=NODES)
-    yield opened
-    opened.close()
+    return opened
 
 
 @pytest.fixture(autouse=True)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from commission.app.coverage.scale import FIRST
@@ -55,12 +54,11 @@ def site() -> Iterator[OpenSite]:
 
 
 @pytest.fixture(scope="module")
-def page(browser: Browser, site: OpenSite) -> Iterator[OpenPage]:
-    opened = OpenPage(browser, site.server, SMALL)
+def page(site: OpenSite, lasting_window: Callable[..., OpenPage]) -> OpenPage:
+    opened = lasting_window(site.server, SMALL)
     opened.open(nodes=["/floor/map", "/reflectors/marks"])
     opened.open_tab("Plan")
-    yield opened
-    opened.close()
+    return opened
 
 
 def shot_of(page: OpenPage) -> Image.Image:

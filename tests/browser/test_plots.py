@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser
 
 from commission.app.base import theme
 from commission.app.base.panel import clock
@@ -48,11 +47,10 @@ def at_one_second(served: Served, opened: OpenPage) -> OpenPage:
 
 
 @pytest.fixture(scope="module")
-def shared(browser: Browser, served: Served) -> Iterator[OpenPage]:
-    opened = OpenPage(browser, served.server)
+def shared(served: Served, lasting_window: Callable[..., OpenPage]) -> OpenPage:
+    opened = lasting_window(served.server)
     opened.open(nodes=["/vehicle"])
-    yield opened
-    opened.close()
+    return opened
 
 
 @pytest.fixture

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
-from playwright.sync_api import Browser, Locator
+from playwright.sync_api import Locator
 
 from commission.app.base.actions import Undo
 from tests.app.sites import room
@@ -21,13 +21,12 @@ def served() -> Iterator[Served]:
 
 
 @pytest.fixture(scope="module")
-def opened(browser: Browser, served: Served) -> Iterator[OpenPage]:
+def opened(served: Served, lasting_window: Callable[..., OpenPage]) -> OpenPage:
     """One window for all tests: opening one is what takes longest."""
-    page = OpenPage(browser, served.server)
+    page = lasting_window(served.server)
     page.open()
     page.open_tab("Tune")
-    yield page
-    page.close()
+    return page
 
 
 @pytest.fixture

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Browser
 
 from commission.app.base.panel import clock
 from commission.app.editing.editor import editors_of
@@ -51,13 +50,12 @@ def found_in(served: Served) -> Found:
 
 
 @pytest.fixture(scope="module")
-def page(browser: Browser, served: Served) -> Iterator[OpenPage]:
+def page(served: Served, lasting_window: Callable[..., OpenPage]) -> OpenPage:
     """One window for all tests: opening one is what takes longest."""
-    opened = OpenPage(browser, served.server)
+    opened = lasting_window(served.server)
     opened.open(nodes=["/vehicle"])
     opened.page.wait_for_function("() => /Events [1-9]/.test(document.querySelector('.c-views').innerText)")
-    yield opened
-    opened.close()
+    return opened
 
 
 def view(page: OpenPage, name: str) -> None:

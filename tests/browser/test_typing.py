@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import pytest
-from playwright.sync_api import Browser, Locator
+from playwright.sync_api import Locator
 
 from commission.app.base.actions import Envelope
 from commission.app.base.viser_private import widget_of
@@ -62,22 +62,20 @@ def served() -> Iterator[Served]:
 
 
 @pytest.fixture(scope="module")
-def opened(browser: Browser, served: Served) -> Iterator[OpenPage]:
+def opened(served: Served, lasting_window: Callable[..., OpenPage]) -> OpenPage:
     """One window for all tests: opening one is what takes longest."""
-    page = OpenPage(browser, served.server)
+    page = lasting_window(served.server)
     page.open()
-    yield page
-    page.close()
+    return page
 
 
 @pytest.fixture(scope="module")
-def other(browser: Browser, served: Served) -> Iterator[OpenPage]:
+def other(served: Served, lasting_window: Callable[..., OpenPage]) -> OpenPage:
     """A second browser; its tests are the last, since each window that is open has to be drawn."""
-    page = OpenPage(browser, served.server)
+    page = lasting_window(served.server)
     page.open()
     page.open_tab("Tune")
-    yield page
-    page.close()
+    return page
 
 
 @pytest.fixture
