@@ -103,7 +103,9 @@ class DrawnFaults:
     """Names of reflectors that are gone."""
 
 
-def draw_faults(project: Project, rates: FaultRates, seed: int, duration: float) -> DrawnFaults:
+def draw_faults(
+    project: Project, rates: FaultRates, seed: int, duration: float, floor: WalkableFloor | None = None
+) -> DrawnFaults:
     """Draw what goes wrong in one drive, but for kidnapping.
 
     Parameters
@@ -112,6 +114,7 @@ def draw_faults(project: Project, rates: FaultRates, seed: int, duration: float)
     rates : how often.
     seed : of the drive.
     duration : about how long it takes [s].
+    floor : of the project, where it is at hand: it takes longer than a drive.
     """
     known = project.reflectors.reflectors
     names = tuple(each.id for each in known)
@@ -128,7 +131,7 @@ def draw_faults(project: Project, rates: FaultRates, seed: int, duration: float)
     own = walking(project, rates)
     disturbances = replace(
         own,
-        shiny_objects=(*own.shiny_objects, *_false(project, rates, seed)),
+        shiny_objects=(*own.shiny_objects, *_false(project, rates, seed, floor)),
         covered=(*own.covered, *_covered(rates, seed, duration)),
         slips_per_100_m=rates.slip,
         constants=_constants(own.constants, project.uncertainty) if rates.constants else own.constants,
@@ -211,12 +214,16 @@ def _moved(reflector: Reflector, dx: float, dy: float) -> Reflector:
     return replace(reflector, x=reflector.x + dx, y=reflector.y + dy)
 
 
-def _false(project: Project, rates: FaultRates, seed: int) -> tuple[ShinyObject, ...]:
+def _false(
+    project: Project, rates: FaultRates, seed: int, floor: WalkableFloor | None
+) -> tuple[ShinyObject, ...]:
     """Things on the free floor that are taken for reflectors."""
     rng = _rng(seed, FALSE)
     count = int(rng.poisson(rates.false))
-    floor = WalkableFloor.of(project) if count else None
-    if floor is None or not len(floor.cells):
+    if not count:
+        return ()
+    floor = floor or WalkableFloor.of(project)
+    if not len(floor.cells):
         return ()
     return tuple(ShinyObject(x, y, FALSE_RADIUS) for x, y in (floor.draw(rng).tolist() for _ in range(count)))
 

@@ -16,6 +16,7 @@ from commission.localization import whole_run
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress, silent
 from commission.simulation.drive import DriveOptions
+from commission.simulation.people import WalkableFloor
 from commission.simulation.random_faults import DrawnFaults, carried, draw_faults
 from commission.simulation.scenario import start_of, virtual_drive
 from commission.simulation.scenario import warm_up as scenario_warm_up
@@ -45,6 +46,7 @@ class _Prepared:
     inputs: MonteCarloInput
     setup: LocalizerSetup
     world: ShadowWorld | None
+    floor: WalkableFloor | None
     starts: dict[str, tuple[FloatArray, FloatArray]]
     durations: dict[str, float]
 
@@ -97,14 +99,15 @@ def _prepared(inputs: MonteCarloInput) -> _Prepared:
         legs = legs_of(project.route(name), project.vehicle, options.limits)
         durations[name] = sum(float(np.sum(leg.step / np.maximum(leg.speeds, 0.01))) for leg in legs)
     world = None if inputs.by_beams else ShadowWorld.of(project, setup, tuple(starts))
-    return _Prepared(inputs=inputs, setup=setup, world=world, starts=starts, durations=durations)
+    floor = WalkableFloor.of(project) if inputs.rates.false else None
+    return _Prepared(inputs=inputs, setup=setup, world=world, floor=floor, starts=starts, durations=durations)
 
 
 def _one_drive(given: _Prepared, number: int, progress: Progress) -> tuple[DriveFigures, CycleCounts]:
     """Simulate, localize and judge one drive."""
     inputs = given.inputs
     seed, route = inputs.drive_seed(number), inputs.route_of(number)
-    faults = draw_faults(inputs.project, inputs.rates, seed, given.durations[route])
+    faults = draw_faults(inputs.project, inputs.rates, seed, given.durations[route], given.floor)
     if given.world is None:
         options = DriveOptions(whole_scans=False)
         log = virtual_drive(faults.project, route, seed, options=options, dirt=faults.dirt, progress=progress)
