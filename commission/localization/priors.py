@@ -6,7 +6,7 @@ The validation areas of one cycle at the cursor are all that wants it: hours of 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -79,11 +79,19 @@ class ReplayedPriors:
     bounds : (C,) cycles of the checkpoints, ascending; cycle 0 first.
     cycles : number of cycles.
     replay : returns the priors of the cycles from a checkpoint to before the next.
+    known : those that need no replay, by the checkpoint before them; read-only.
     """
 
-    def __init__(self, bounds: Sequence[int], cycles: int, replay: Callable[[int, int], PriorRows]) -> None:
+    def __init__(
+        self,
+        bounds: Sequence[int],
+        cycles: int,
+        replay: Callable[[int, int], PriorRows],
+        known: Mapping[int, PriorRows] | None = None,
+    ) -> None:
         self._bounds = np.unique((*bounds, cycles))
-        self._replay = replay
+        self._known = known or {}
+        self._compute = replay
         self._newest: dict[int, PriorRows] = {}
         """Of a few checkpoints, by their cycles: a cursor that moves on needs them again."""
 
@@ -97,6 +105,19 @@ class ReplayedPriors:
         others = [pair for pair in kept.items() if pair[0] != first]
         self._newest = dict([*others[1 - KEPT :], (first, rows)])
         return rows.means[cycle - first], rows.covariances[cycle - first]
+
+    def known_before(self, cycle: int) -> dict[int, PriorRows]:
+        """Return those that need no replay, as far as before a cycle, by the checkpoint before them."""
+        return {
+            first: PriorRows(rows.means[: cycle - first], rows.covariances[: cycle - first])
+            for first, rows in self._known.items()
+            if first < cycle
+        }
+
+    def _replay(self, first: int, last: int) -> PriorRows:
+        """Priors from a checkpoint to before the next."""
+        known = self._known.get(first)
+        return self._compute(first, last) if known is None else known
 
     def rows(self) -> PriorRows:
         """Return those of all cycles."""

@@ -7,7 +7,7 @@ any state; what an earlier run of the same log has in common with it is taken ov
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -207,12 +207,18 @@ def _filtered(
         take_over(earlier, columns, begin, int(detected.offsets[begin]), seen)
     checkpoints = list(known)
     searches = [] if earlier is None else [moment for moment in earlier.searches if moment.cycle < begin]
+    kept = earlier.priors.known_before(begin) if earlier and isinstance(earlier.priors, ReplayedPriors) else {}
     for segment, first, last in _chunks(segments, begin, cycles):
         progress((first - begin) / (cycles - begin), "localizing")
         rows = odometry_rows(log, detected.stamps_ns, first, last)
         part_of = cut(columns, detected, first, last)
-        stretch = CycleStretch(first, rows, detected.part(first, last), part_of, prior_rows(last - first), searches)
-        state = continued(log, segment.setup, _entered(segment, first, state), stretch)
+        state, priors, told = _entered(segment, first, state), prior_rows(last - first), len(searches)
+        is_sought = state.search is not None
+        stretch = CycleStretch(first, rows, detected.part(first, last), part_of, priors, searches)
+        state = continued(log, segment.setup, state, stretch)
+        if is_sought or len(searches) > told:
+            # To search again takes a hundred times as long as to filter again, and every study of the run would.
+            kept[first] = PriorRows(read_only(priors.means), read_only(priors.covariances))
         checkpoints.append(Checkpoint(last, state))
     for column in columns:
         column.setflags(write=False)
@@ -220,7 +226,7 @@ def _filtered(
         segments=segments,
         checkpoints=tuple(checkpoints),
         detected=detected,
-        priors=_replayed(log, segments, detected, checkpoints),
+        priors=_replayed(log, segments, detected, checkpoints, kept),
         means=columns.means,
         covariances=columns.covariances,
         modes=columns.modes,
@@ -236,9 +242,13 @@ def _filtered(
 
 
 def _replayed(
-    log: RecordLog, segments: tuple[RunSegment, ...], detected: DetectionLog, checkpoints: Sequence[Checkpoint]
+    log: RecordLog,
+    segments: tuple[RunSegment, ...],
+    detected: DetectionLog,
+    checkpoints: Sequence[Checkpoint],
+    kept: Mapping[int, PriorRows],
 ) -> ReplayedPriors:
-    """Return the priors of a run, to be found again from its checkpoints."""
+    """Return the priors of a run, to be found again from its checkpoints, but for those that were kept."""
     states = {checkpoint.cycle: checkpoint.state for checkpoint in checkpoints}
 
     def replay(begin: int, end: int) -> PriorRows:
@@ -252,7 +262,7 @@ def _replayed(
             state = continued(log, segment.setup, _entered(segment, first, state), stretch)
         return PriorRows(read_only(written.means), read_only(written.covariances))
 
-    return ReplayedPriors(tuple(states), len(detected), replay)
+    return ReplayedPriors(tuple(states), len(detected), replay, kept)
 
 
 def _final(

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from commission.errors import JobCancelled
-from commission.localization import growing_run, whole_run
+from commission.localization import growing_run, run_loop, whole_run
 from commission.localization.detection_log import cycle_stamps, extract_detections
 from commission.localization.estimate import Estimate, Mode, Status
 from commission.localization.growing_run import GrowingRun
@@ -374,3 +374,30 @@ def test_a_growing_run_whose_pose_is_thrown_away_is_the_whole_run_and_tells_its_
         run_segments(drive.log, segments[:1], drive.initial, earlier=whole),
         run(drive.log, SETUPS["drive"], drive.initial),
     )
+
+
+@pytest.mark.parametrize("chunk", [4, 1000])
+def test_what_was_believed_while_a_vehicle_searched_is_told_without_a_second_search(
+    drive: Drive, chunk: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    segments = (RunSegment(0, SETUPS["drive"]), RunSegment(9, SETUPS["drive"], locate=True))
+    growing = GrowingRun(segments[0].setup, drive.initial)
+    for record in drive.log.records():
+        growing.push(record)
+        while growing.pull() is not None:
+            if len(growing) == 9:
+                growing.begin_segment(SETUPS["drive"], locate=True)
+    growing.flush()
+    expected = growing.columns().priors.rows()
+    monkeypatch.setattr(whole_run, "CHECKPOINT_CYCLES", chunk)
+    whole = run_segments(drive.log, segments, drive.initial)
+    # Another gate behind the middle of a stretch between two checkpoints.
+    resumed = run_segments(drive.log, (*segments, RunSegment(14, SETUPS["narrow gate"])), drive.initial, earlier=whole)
+
+    def searches_again(*_: object) -> None:
+        raise AssertionError("searched again")
+
+    monkeypatch.setattr(run_loop, "sought", searches_again)
+    for mine, its, other in zip(whole.priors.rows(), resumed.priors.rows(), expected, strict=True):
+        assert mine.tobytes() == other.tobytes()
+        assert its[:14].tobytes() == other[:14].tobytes()
