@@ -214,9 +214,7 @@ def _moved(reflector: Reflector, dx: float, dy: float) -> Reflector:
     return replace(reflector, x=reflector.x + dx, y=reflector.y + dy)
 
 
-def _false(
-    project: Project, rates: FaultRates, seed: int, floor: WalkableFloor | None
-) -> tuple[ShinyObject, ...]:
+def _false(project: Project, rates: FaultRates, seed: int, floor: WalkableFloor | None) -> tuple[ShinyObject, ...]:
     """Things on the free floor that are taken for reflectors."""
     rng = _rng(seed, FALSE)
     count = int(rng.poisson(rates.false))
