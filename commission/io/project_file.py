@@ -34,6 +34,7 @@ from commission.site.stations import Station
 from commission.site.tags import Tag, TagCamera
 from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
+from commission.site.zones import Zone
 
 SCHEMA = 2
 """Version of the format that this program writes."""
@@ -78,6 +79,8 @@ class ProjectDocument:
     """Landmarks that tell place and heading at once."""
     tag_camera: TagCamera = field(default_factory=TagCamera)
     """The camera that sees them."""
+    zones: tuple[Zone, ...] = ()
+    """Parts of the floor in which only some kinds of observation correct the pose."""
     layout: LayoutBrief = field(default_factory=LayoutBrief)
     """What is asked of a suggested layout of reflectors."""
 
@@ -159,6 +162,7 @@ def load_project(path: Path, found: Findings | None = None) -> Project:
             stations=keys.stations,
             tags=keys.tags,
             tag_camera=keys.tag_camera,
+            zones=keys.zones,
             layout=keys.layout,
         )
     except ProjectError as error:

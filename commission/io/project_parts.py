@@ -32,8 +32,9 @@ from commission.site.scanner import Scanner
 from commission.site.stations import Station
 from commission.site.tags import Tag, TagCamera
 from commission.site.uncertainty import Uncertainty
+from commission.site.zones import Zone
 
-_LISTS = {"reflectors": "id", "scanners": "name", "routes": "name", "stations": "name", "tags": "id"}
+_LISTS = {"reflectors": "id", "scanners": "name", "routes": "name", "stations": "name", "tags": "id", "zones": "name"}
 """Parts that are lists, and the field that tells their elements apart."""
 _WHOLE = ("name", "parameters", "uncertainty", "disturbances", "layout", "tag_camera")
 """Parts that are written as they are."""
@@ -56,6 +57,7 @@ class _Parts:
     stations: tuple[Station, ...] = ()
     tags: tuple[Tag, ...] = ()
     tag_camera: TagCamera = field(default_factory=TagCamera)
+    zones: tuple[Zone, ...] = ()
 
 
 def change(before: Project | None, after: Project, *, with_map: bool = True) -> dict[str, Any]:

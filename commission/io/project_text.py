@@ -53,6 +53,7 @@ def project_text(project: Project, schema: int, floor_map: str | None, reflector
         *(_entry("stations", project.stations, "", "") if project.stations else ()),
         *(_entry("tags", project.tags, "", "") if project.tags else ()),
         *(_entry("tag_camera", project.tag_camera, "", "") if project.tag_camera != TagCamera() else ()),
+        *(_entry("zones", project.zones, "", "") if project.zones else ()),
         "parameters:",
         *_fields(project.parameters, "  "),
         "uncertainty:",

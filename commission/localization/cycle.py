@@ -28,6 +28,7 @@ from commission.localization.rejection import Evidence, rejects_the_world, weigh
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
 from commission.localization.supervisor import FAIL, LOST, OPERATIONAL, supervise
+from commission.localization.zones import ZoneRows, kinds_at
 
 WHOLE_POSE = 3
 """Rows of a match that tells place and heading."""
@@ -93,6 +94,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     contours: ContourModel | None,
     scan: ContourScan | None,
     figures: FloatArray | None,
+    zones: ZoneRows | None,
 ) -> Cycle:
     """Process the detections of a scan.
 
@@ -115,6 +117,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     following : the odometry record at or after the scan, where it is known.
     contours, scan : contours of the map, and the scan that is matched with them; None: they are not looked at.
     figures : (COLUMNS,) out, see `contour`; None: as `contours`.
+    zones : where which kinds correct the pose; None: all everywhere.
 
     Notes
     -----
@@ -144,11 +147,12 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         reflectors,
         d2,
     )
+    here = kinds_at(zones, prior.x, prior.y)
     posterior = corrected(
         prior,
         facing,
         first,
-        last,
+        last if here.reflectors else first,
         detections,
         aims,
         observation,
@@ -162,9 +166,10 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         status,
         reflectors,
     )
-    posterior = with_contours(
-        posterior, contours, scan, state, motion, following, len(places), model, cross, busy, figures
-    )
+    if here.contours:
+        posterior = with_contours(
+            posterior, contours, scan, state, motion, following, len(places), model, cross, busy, figures
+        )
     pivot = state.pivot if cross is None else (posterior.x, posterior.y)
     for i in range(first, last):
         if reflectors[i] != NOBODY:

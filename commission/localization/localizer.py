@@ -368,6 +368,7 @@ class Localizer:
             np.empty(0, np.int8),
             following,
             figures,
+            setup.zone_rows,
         )
         state = cycle.state._replace(cross=cross_covariance(cross, constants), search=self._state.search)
         return Cycle(cycle.prior, state)
@@ -404,6 +405,7 @@ class Localizer:
             self._setup.contour,
             contour_scan(self._setup, scan if isinstance(scan, Scan) else None, scanner),
             figures,
+            self._setup.zone_rows,
         )
         state = cycle.state._replace(cross=cross_covariance(cross, constants), search=self._state.search)
         return Cycle(cycle.prior, state)

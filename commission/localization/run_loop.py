@@ -44,6 +44,7 @@ from commission.localization.tag_start import told_by_tags
 from commission.localization.tags import COLUMNS as TAG_COLUMNS
 from commission.localization.tags import entries_of
 from commission.localization.wheel_scale import as_driven
+from commission.localization.zones import ZoneRows
 from commission.site.record_log import RecordLog
 from commission.site.records import Scan
 
@@ -361,6 +362,7 @@ def _tracked(
         setup.contour,
         contour_scans(log, setup, (before, numbers), len(detected)),
         _frames(setup, detected),
+        setup.zone_rows,
     )
     # Odometry alone changes nothing of it, nor does another setup before its first scan.
     cross_after = cross_covariance(cross, setup.constants) if len(detected) else state.cross
@@ -405,6 +407,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
     contours: ContourModel | None,
     scans: ContourScans | None,
     frames: TagFrames | None,
+    zones: ZoneRows | None,
 ) -> tuple[FilterState, int, int]:
     """Deliver odometry and scans in the order of their stamps, odometry first, until the vehicle is lost.
 
@@ -441,6 +444,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
                 status,
                 following,
                 sightings,
+                zones,
             )
         else:
             first, last = offsets[k], offsets[k + 1]
@@ -471,6 +475,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
                 contours,
                 contour_scan_at(scans, k, observations, sweeps),
                 figures_at(scans, figures, k),
+                zones,
             )
         state = cycle.state
         _write_belief(cycle.prior, k, priors.means, priors.covariances)

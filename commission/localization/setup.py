@@ -33,6 +33,7 @@ from commission.localization.rejection import RejectionRule, rejection_rule
 from commission.localization.supervisor import SupervisorLimits, supervisor_limits
 from commission.localization.sweep import sweep_of, sweep_rows
 from commission.localization.tags import TagModel, tag_model
+from commission.localization.zones import ZoneRows, zone_rows
 from commission.site.floor_map import FloorMap
 from commission.site.parameters import Parameters
 from commission.site.project import Project
@@ -40,6 +41,7 @@ from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
 from commission.site.tags import Tag, TagCamera
 from commission.site.uncertainty import Uncertainty
+from commission.site.zones import Zone
 
 _THRESHOLDS = ("intensity_threshold", "far_threshold", "far_distance")
 """Parameters of the detector that are in no `DetectorModel`: which beams count as reflective is known before it."""
@@ -84,6 +86,8 @@ class LocalizerSetup:
     """Landmarks that tell place and heading at once."""
     tag_camera: TagCamera = field(default_factory=TagCamera)
     """The camera that sees them."""
+    zones: tuple[Zone, ...] = ()
+    """Where which kinds of observation correct the pose."""
     filter: FilterModel = field(init=False, repr=False, compare=False)
     """Scalars of the filter."""
     constants: Constants | None = field(init=False, repr=False, compare=False)
@@ -103,6 +107,8 @@ class LocalizerSetup:
     """Tags and camera for kernels; None: they are not looked at."""
     contour: ContourModel | None = field(init=False, repr=False, compare=False)
     """Contours of the floor map; None: they are not looked at."""
+    zone_rows: ZoneRows | None = field(init=False, repr=False, compare=False)
+    """Zones for kernels; None: every kind counts everywhere."""
 
     def __post_init__(self) -> None:
         considers, known = self.parameters.filter.consider, self.uncertainty
@@ -127,6 +133,7 @@ class LocalizerSetup:
         if constants is not None and tags is not None:
             constants += tag_constants(self.tags, self.tag_camera, known)
         object.__setattr__(self, "tag_model", tags)
+        object.__setattr__(self, "zone_rows", zone_rows(self.zones))
         if constants is not None and contour is not None:
             constants += contour_constants(self.parameters.contour)
         object.__setattr__(self, "contour", contour)
@@ -196,4 +203,5 @@ class LocalizerSetup:
             floor=project.floor_map,
             tags=project.tags,
             tag_camera=project.tag_camera,
+            zones=project.zones,
         )

@@ -21,6 +21,7 @@ from commission.localization.rejection import weigh
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
 from commission.localization.tags import ACCEPTED, REJECTED, USE, TagModel, correct_by_tag
+from commission.localization.zones import ZoneRows, kinds_at
 
 
 class TagFrames(NamedTuple):
@@ -53,6 +54,7 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
     status: NDArray[np.int8],
     following: NextOdometry,
     figures: FloatArray,
+    zones: ZoneRows | None,
 ) -> Cycle:
     """Process the sightings of a frame.
 
@@ -68,6 +70,7 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
     busy : see `busy_chunks`; None: as `cross`.
     following : the odometry record at or after the frame, where it is known.
     figures : (n, COLUMNS) out, see `tags`.
+    zones : where which kinds correct the pose; None: all everywhere.
 
     Notes
     -----
@@ -80,7 +83,7 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
         carry_over(cross, moved, busy)
     twist = velocity(state.motion, following)
     belief = prior
-    for i in range(first, last):
+    for i in range(first, last if kinds_at(zones, prior.x, prior.y).tags else first):
         belief = correct_by_tag(
             belief,
             frames.sightings[i],

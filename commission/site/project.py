@@ -16,6 +16,7 @@ from commission.site.stations import Station
 from commission.site.tags import Tag, TagCamera
 from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import DifferentialVehicle, Vehicle
+from commission.site.zones import Zone
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +39,8 @@ class Project:
     """Landmarks that tell place and heading at once; ids are unique."""
     tag_camera: TagCamera = field(default_factory=TagCamera)
     """The camera that sees them."""
+    zones: tuple[Zone, ...] = ()
+    """Parts of the floor in which only some kinds of observation correct the pose; names are unique."""
     parameters: Parameters = field(default_factory=Parameters)
     """Tunables of the localizer."""
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
@@ -56,7 +59,12 @@ class Project:
         if len(set(tags)) < len(tags):
             twice = next(each for each in tags if tags.count(each) > 1)
             raise ProjectError(f"tag id {twice!r} is used twice; expected unique ids")
-        for kind, named in (("route", self.routes), ("station", self.stations), ("scanner", self.scanners)):
+        for kind, named in (
+            ("route", self.routes),
+            ("station", self.stations),
+            ("scanner", self.scanners),
+            ("zone", self.zones),
+        ):
             seen: set[str] = set()
             for name in (value.name for value in named):
                 # Scanners give files their names, and some file systems know no capitals.

@@ -2,42 +2,24 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from typing import Annotated, TypeAlias
 
 from commission.site.checks import above, check_fields
+from commission.site.polygon import Corners, check_polygon
 from commission.site.quantity import AS_DEGREES, POSITIVE, Bounds, Quantity
 
 DEFAULT_OUTLINE = ((0.5, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.5, -0.3))
+
+_OUTLINE = ((0.5, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.5, -0.3))
 
 _Edge: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
 _OUTLINE = Quantity(label="Outline", unit="m", decimals=4)
 _HEIGHT = Quantity(label="Height", unit="m", decimals=4)
 
 
-def _check_outline(outline: tuple[tuple[float, float], ...]) -> None:
-    if len(outline) < 3:
-        raise ValueError(f"vehicle.outline has {len(outline)} corners; expected 3 or more")
-    count = len(outline)
-    edges = [(outline[i], outline[(i + 1) % count]) for i in range(count)]
-    for i, j in itertools.combinations(range(count), 2):
-        if _cross(edges[i], edges[j]):
-            one, other = (f"from corner {k + 1} to {(k + 1) % count + 1}" for k in (i, j))
-            raise ValueError(
-                f"vehicle.outline crosses itself: the edge {one} meets the one {other}; "
-                "expected corners in their order around the vehicle"
-            )
-
-
-def _cross(one: _Edge, other: _Edge) -> bool:
-    """Whether two edges meet inside of both."""
-
-    def side(edge: _Edge, corner: tuple[float, float]) -> float:
-        (ax, ay), (bx, by) = edge
-        return (bx - ax) * (corner[1] - ay) - (by - ay) * (corner[0] - ax)
-
-    return side(one, other[0]) * side(one, other[1]) < 0.0 and side(other, one[0]) * side(other, one[1]) < 0.0
+def _check_outline(outline: Corners) -> None:
+    check_polygon(outline, "vehicle.outline", "the vehicle")
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,9 @@ from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Direction, Route, Segment
 from commission.site.scanner import Scanner, StampOf
 from commission.site.stations import Station
+from commission.site.tags import Tag, TagCamera
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
+from commission.site.zones import ObservationKind, Zone
 
 METRES = st.floats(-1e4, 1e4)
 SPEED = st.floats(0.001, 100.0)
@@ -106,6 +108,16 @@ def segments(draw: st.DrawFn) -> Segment:
 def stations() -> st.SearchStrategy[Station]:
     heading, accuracy = st.floats(-math.pi, math.pi), st.floats(0.001, 10.0)
     return st.builds(Station, name=NAME, x=METRES, y=METRES, heading=heading, required_accuracy=accuracy)
+
+
+def zones() -> st.SearchStrategy[Zone]:
+    kinds = st.lists(st.sampled_from(ObservationKind), min_size=1, unique=True).map(tuple)
+    return st.builds(Zone, name=NAME.filter(str.strip), outline=OUTLINE, kinds=kinds)
+
+
+def tags() -> st.SearchStrategy[Tag]:
+    heading = st.floats(-math.pi, math.pi)
+    return st.builds(Tag, id=st.integers(0, 99).map(str), x=METRES, y=METRES, heading=heading, anonymous=st.booleans())
 
 
 def parameters() -> st.SearchStrategy[Parameters]:
@@ -191,5 +203,8 @@ def projects() -> st.SearchStrategy[Project]:
         parameters=parameters(),
         disturbances=disturbances(),
         stations=st.lists(stations(), max_size=2, unique_by=lambda s: s.name).map(tuple),
+        tags=st.lists(tags(), max_size=2, unique_by=lambda tag: tag.id).map(tuple),
+        tag_camera=st.builds(TagCamera, mounting=st.tuples(ARM, ARM, st.floats(-math.pi, math.pi)).map(np.array)),
+        zones=st.lists(zones(), max_size=2, unique_by=lambda zone: zone.name).map(tuple),
         layout=layouts(),
     )
