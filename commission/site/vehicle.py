@@ -11,9 +11,6 @@ from commission.site.quantity import AS_DEGREES, POSITIVE, Bounds, Quantity
 
 DEFAULT_OUTLINE = ((0.5, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.5, -0.3))
 
-_OUTLINE = ((0.5, 0.3), (-0.5, 0.3), (-0.5, -0.3), (0.5, -0.3))
-
-_Edge: TypeAlias = tuple[tuple[float, float], tuple[float, float]]
 _OUTLINE = Quantity(label="Outline", unit="m", decimals=4)
 _HEIGHT = Quantity(label="Height", unit="m", decimals=4)
 
