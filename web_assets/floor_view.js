@@ -49,7 +49,9 @@
     const now = [box.left, box.bottom, box.width, camera.fov, ...camera.position.toArray(), pointer].join();
     if (now === shown) return;
     shown = now;
-    document.documentElement.style.setProperty("--c-floor", `${box.left}px`); // for the rail of tools beside it
+    const { style } = document.documentElement; // for the rail of tools on its left and the numbers of now on its right
+    style.setProperty("--c-floor", `${box.left}px`);
+    style.setProperty("--c-right", `${innerWidth - box.right}px`);
     status.style.left = `${box.left + 12}px`;
     status.style.top = `${box.bottom - 30}px`;
     const isPlan = camera.fov < FLAT_DEGREES;

@@ -243,7 +243,7 @@ def test_every_number_of_the_newest_cycle_is_shown(run: RunView, project: Projec
         "2σ along x, along y": f"{1000.0 * sigmas[0]:.1f}, {1000.0 * sigmas[1]:.1f} mm",
         "2σ heading / limit": f"{math.degrees(sigmas[2]):.2f} / 3.0°",
         "Inliers": str(estimate.count(Status.INLIER)),
-        "Outliers by beams, gate": "0, 0",
+        "Outliers: beams, gate": "0, 0",
         "Largest NIS / gate": f"{estimate.d2.max():.2f} / 5.99",
         "NIS of all / expected, 1 s": f"{np.concatenate([each.d2 for each in recent]).mean():.2f} / 2",
         "Rejected, 1 s": "0.0 %",

@@ -150,7 +150,7 @@ NOW: dict[str, Callable[[At], tuple[float, ...]]] = {
     "2σ along x, along y": lambda at: (1000.0 * two_sigma(at, 0), 1000.0 * two_sigma(at, 1)),
     "2σ heading / limit": lambda at: (DEGREES * two_sigma(at, 2), DEGREES * 0.061),
     "Inliers": lambda at: (float(np.sum(at.status == 0)),),
-    "Outliers by beams, gate": lambda at: (float(np.sum(at.status == 1)), float(np.sum(at.status == 2))),
+    "Outliers: beams, gate": lambda at: (float(np.sum(at.status == 1)), float(np.sum(at.status == 2))),
     "Largest NIS / gate": lambda at: (max(at.d2[at.status == 0]), GATE),
     "NIS of all / expected, 1 s": lambda at: (at.run.result.recent.nis[at.run.newest], 2.0),
     "Rejected, 1 s": lambda at: (100.0 * at.run.result.recent.rejected[at.run.newest],),
@@ -208,7 +208,7 @@ def test_outliers_are_those_of_the_detector_and_those_of_the_gate(at: At) -> Non
     status = np.array([2, 0, 1, 2, 0, 2], dtype=np.int8)
     shown = dict(now_rows(replace(at.run, estimate=replace(at.run.estimate, status=status))))
     assert_reads(shown["Inliers"], 2.0)
-    assert_reads(shown["Outliers by beams, gate"], 1.0, 3.0)
+    assert_reads(shown["Outliers: beams, gate"], 1.0, 3.0)
     counted = replace(at.run.result, counts=np.array([[2, 1, 3], [5, 0, 4]]))
     (inliers, outliers) = next(chart.lines for chart in CHARTS if chart.title == "Inliers, outliers per scan")
     assert inliers.values(counted).tolist() == [2.0, 5.0]

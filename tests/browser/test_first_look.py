@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import re
+import time
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -193,3 +195,70 @@ def test_a_hint_stands_beside_the_panel_and_covers_none_of_its_fields(
     field = page.row("Seed").bounding_box()
     assert field is not None
     assert abs(box["y"] + 0.5 * box["height"] - field["y"]) < 80, "at the height of what it explains"
+
+
+@pytest.mark.parametrize("size", [(1024, 700), (1600, 900)])
+def test_the_numbers_of_now_stand_above_whatever_is_selected_and_nothing_is_named_that_is_gone(
+    served: Served, page: OpenPage, size: tuple[int, int]
+) -> None:
+    page.page.set_viewport_size({"width": size[0], "height": size[1]})
+    page.wait_until_drawn()
+    page.open_tab("Selection")
+    now, count = page.page.locator(".c-now"), len(served.state.project.reflectors)
+
+    def stands_above() -> bool:
+        """Whether mode and pose can be read, right above the tabs."""
+        box, tab = now.bounding_box(), page.page.get_by_role("tab", name="Selection", exact=True).bounding_box()
+        assert box is not None
+        assert tab is not None
+        shown = now.evaluate("e => e.scrollTop === 0 && e.innerText")
+        return "Position x, y" in shown and 90.0 < box["height"] and box["y"] + box["height"] <= tab["y"] + 1.0
+
+    page.wait_for_text("Nothing is selected.")
+    assert stands_above()
+    reflector = served.state.project.reflectors.reflectors[0]
+    page.click_at((reflector.x, reflector.y))
+    page.wait_for_text(f"Reflector {reflector.id}")
+    assert stands_above()
+    field = page.page.locator("label", has_text=re.compile(r"^y \[m\]$")).bounding_box()
+    below = page.page.get_by_role("tab", name="Layers", exact=True).bounding_box()
+    assert field is not None
+    assert below is not None
+    assert field["y"] + field["height"] < below["y"], "properties have room, too"
+    page.page.keyboard.press("Delete")
+    served.until(lambda: len(served.state.project.reflectors) == count - 1)
+    page.wait_for_text("Nothing is selected.")
+    assert page.page.locator(".c-selected").count() == 0
+    assert stands_above()
+    page.page.keyboard.press("Control+z")
+    served.until(lambda: len(served.state.project.reflectors) == count)
+
+
+def test_what_is_looked_at_is_lit_in_the_bar(page: OpenPage) -> None:
+    names = ("2D", "3D", "Fit", "Follow")
+
+    def lit() -> set[str]:
+        """Buttons of another color than one that is never lit."""
+        colors = {
+            name: page.page.get_by_role("button", name=name, exact=True).evaluate(
+                "e => getComputedStyle(e).backgroundColor"
+            )
+            for name in names
+        }
+        return {name for name in names if colors[name] != colors["Fit"]}
+
+    page.page.mouse.move(0, 400)
+    assert lit() == {"2D"}
+    for pressed, expected in (
+        ("3D", {"3D"}),
+        ("Follow", {"3D", "Follow"}),
+        ("2D", {"2D"}),
+        ("Follow", {"2D", "Follow"}),
+        ("Fit", {"2D"}),
+    ):
+        page.press(pressed)
+        page.page.mouse.move(0, 400)
+        end = time.monotonic() + 20.0
+        while lit() != expected:
+            assert time.monotonic() < end, f"after {pressed} lit are {lit()}; expected {expected}"
+            page.page.wait_for_timeout(50)

@@ -46,8 +46,19 @@ def before_after(
             _count("Stop if one fails", before.stopping, after.stopping),
             _count(f"Ambiguous, of {after.places}", before.ambiguous, after.ambiguous),
         ]
+    return compared(heads, (*lines, *more))
+
+
+def compared(heads: tuple[str, str], lines: Sequence[ComparedLine]) -> str:
+    """Return lines as a table of three columns, as html.
+
+    Parameters
+    ----------
+    heads : what the two sides are called.
+    lines : in their order.
+    """
     head = "".join(f"<td>{escaped(each)}</td>" for each in ("", *heads))
-    return f"<table class='c-before-after'><tr>{head}</tr>{''.join(map(_row, (*lines, *more)))}</table>"
+    return f"<table class='c-before-after'><tr>{head}</tr>{''.join(map(_row, lines))}</table>"
 
 
 def _count(what: str, before: int, after: int) -> ComparedLine:

@@ -137,15 +137,25 @@ class Cameras:
             own.follow = not own.follow
             if own.follow and self._target is not None and not own.three_d:
                 self._look_down(own.client, self._target, FOLLOWED_HEIGHT)
+            self._light(own)
             return
         own.follow = False
         if wanted is not Camera.FIT and own.three_d is not (wanted is Camera.THREE_D):
             own.three_d = wanted is Camera.THREE_D
             self._furnish(own)
+        self._light(own)
         if own.three_d:
             self._look_from_the_south(own.client)
         else:
             self._fit(own)
+
+    def _light(self, own: ClientView) -> None:
+        """Let a browser's page light the buttons of what it looks at (the style of the bar)."""
+        looks = [Camera.THREE_D if own.three_d else Camera.PLAN, *([Camera.FOLLOW] if own.follow else [])]
+        lit = json.dumps(" ".join(looks))
+        viser_private.run_on_page(
+            self._server, own.client.client_id, f"document.documentElement.dataset.camera = {lit}"
+        )
 
     def look_at(self, client_id: int, place: Point) -> None:
         """Bring a place into the middle of a browser's view, near enough to see it."""
@@ -153,6 +163,7 @@ class Cameras:
         if own is None:
             return
         own.follow, own.came_at = False, -SETTLING
+        self._light(own)
         camera = self._origin.camera(own.client)
         distance = float(np.linalg.norm(camera.position - camera.look_at))
         if not own.three_d:

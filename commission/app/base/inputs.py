@@ -187,10 +187,16 @@ class WorkBar:
 
 
 class Text:
-    """Html that is made anew only where what it is made from has changed, and hidden while there is none."""
+    """Html that is made anew only where what it is made from has changed, and hidden while there is none.
 
-    def __init__(self, gui: GuiApi) -> None:
-        self._html = gui.add_html("", visible=False)
+    Parameters
+    ----------
+    gui : where it is made.
+    order : where it stands among the other widgets; none: behind those that there are.
+    """
+
+    def __init__(self, gui: GuiApi, order: float | None = None) -> None:
+        self._html = gui.add_html("", visible=False, order=order)
         self._source: object = None
 
     def write(self, source: object, make: Callable[[], str]) -> None:

@@ -40,6 +40,8 @@ class CameraButtons(BasePanel):
     """What the browser looks at."""
 
     def __init__(self, gui: GuiApi, post: Post) -> None:
+        # What is lit, the browser's own cameras say (`cameras`), since each looks at something else.
+        gui.add_html("<div class='c-wide c-cameras'></div>")
         buttons = gui.add_button_group("", tuple(camera.value for camera in Camera))
         buttons.on_click(posting(post, lambda event: SetCamera(Camera(event.target.value))))
 

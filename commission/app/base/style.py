@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from commission.app.base.actions import Camera
 from commission.app.base.icons import mask
 from commission.app.base.paints import Surface, Worded
 from commission.app.base.theme import LEFT_PX, RAIL_PX, RIGHT_PX, css
@@ -17,6 +18,13 @@ OPEN_EYE, SHUT_EYE = (
 )
 NO_RUN_PX = 34
 """Height of the strip below the floor while there is no run [pixels]."""
+
+NOW_PX, LOW_NOW_PX, HIGH_NOW_PX = 185, 115, 255
+"""Height of the numbers of now [pixels], and where the window is low or high: whole rows."""
+LIT_CAMERA = ",".join(
+    f":root[data-camera~='{camera.value}'] div:has(>.c-cameras)+div button:nth-child({place})"
+    for place, camera in enumerate(Camera, start=1)
+)
 
 # Ticks are drawn, not written: the name of a tab stays what it is.
 BAR_AND_GUIDE = f"""<style>
@@ -70,6 +78,19 @@ div:has(>div>.c-bottom):has(.c-no-run)>:nth-child(4){{grid-column:1/span 24!impo
  height:26px;padding:0;border-radius:3px;border:1px solid {css(Surface.EDGE_QUIET.dark)};
  background:{css(Surface.CARD.dark)};color:inherit;font-size:15px;line-height:1;cursor:pointer}}
 .c-daylight:is(:hover,:focus-visible){{border-color:{css(Worded.BRAND.dark)}}}
+:root{{--c-now:{NOW_PX}px}}
+@media (max-height:800px){{:root{{--c-now:{LOW_NOW_PX}px}}}}
+@media (min-height:1000px){{:root{{--c-now:{HIGH_NOW_PX}px}}}}
+:root:has(.c-no-run){{--c-now:34px}}
+[data-dock-region=right]{{box-sizing:border-box;padding-top:var(--c-now)}}
+div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
+.c-now{{position:fixed;z-index:1;top:var(--c-top);right:0;width:var(--c-right);height:var(--c-now);
+ box-sizing:border-box;overflow:hidden auto;scrollbar-width:thin;padding:5px 14px 2px 8px;
+ border-bottom:1px solid {css(Surface.EDGE.dark)}}}
+.c-now .c-table{{line-height:1.3}}
+.c-now .c-table td:first-child{{width:1px;white-space:nowrap}}
+{LIT_CAMERA}{{background:{css(Worded.PRESS.dark)}!important;border-color:{css(Worded.PRESS.dark)}!important;
+ color:#fff!important}}
 .c-layers{{padding:0 8px 4px;font-size:12px}}
 .c-layers h4{{margin:6px 0 1px;font-size:11px;font-weight:600;opacity:.65;
  border-bottom:1px solid {css(Surface.EDGE.dark)}}}

@@ -176,7 +176,7 @@ LIVE = "<div class='c-live'></div>"
 # match (another viser), the panels float and everything still works.
 STYLE = f"""<style>
 :root{{--c-selected-line:rgb{SELECTED_LINE};--c-top:{TOP_BAR_PX}px;--c-bottom:{BOTTOM_PX}px;--c-tabs:{TABS_PX}px;
- --c-floor:{LEFT_PX + 4}px}}
+ --c-floor:{LEFT_PX + 4}px;--c-right:{RIGHT_PX + 4}px}}
 [data-dock-root]{{height:calc(100% - var(--c-top) - var(--c-bottom))!important;top:var(--c-top);
  overflow:visible!important}}
 [data-dock-region] .mantine-ScrollArea-viewport>div{{padding-right:6px}}

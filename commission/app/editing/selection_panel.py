@@ -18,14 +18,22 @@ from commission.app.editing import actions
 from commission.app.editing.editor import Editor
 from commission.app.editing.gestures import selected_of
 from commission.app.editing.route_fields import RouteFields
+from commission.app.editing.route_gestures import route_of
 from commission.app.editing.site_tools import measurement
 from commission.app.editing.station_fields import StationFields
 from commission.site.fields import get_field, names_of
+from commission.site.project import Project
 from commission.site.quantity import DEGREES
 from commission.site.reflectors import Reflector, ReflectorKind
 
 ALONE = ("id", "x", "y")
 """Fields that several reflectors cannot share."""
+
+
+NOTHING = (
+    "<div class='c-note c-nothing' style='padding:4px 0'>Nothing is selected. Click a reflector, a station or a route; "
+    "drag over the floor for several reflectors.</div>"
+)
 
 
 class SelectionPanel(BasePanel):
@@ -106,7 +114,8 @@ class SelectionPanel(BasePanel):
             self._inputs.forget()
         self._reflectors = selected
         self._inputs.follow(view.state)
-        self._head.content = _company(self._browser, len(view.state.browsers)) + _head(editor, self._reflectors)
+        company = _company(self._browser, len(view.state.browsers))
+        self._head.content = company + _head(editor, selected, view.state.project)
         self._buttons.visible = self._copies.visible = bool(self._reflectors)
         for name, widget in self._fields.items():
             shown = bool(selected) and (len(self._reflectors) == 1 or name not in ALONE)
@@ -128,7 +137,7 @@ def _company(browser: int, browsers: int) -> str:
     return f"<div class='c-note' style='padding:0 6px 4px'>This is browser {browser}; {browsers} edit this site.</div>"
 
 
-def _head(editor: Editor, reflectors: tuple[Reflector, ...]) -> str:
+def _head(editor: Editor, reflectors: tuple[Reflector, ...], project: Project) -> str:
     """Say what is selected, and what was clicked or measured."""
     rows: list[tuple[str, str]] = []
     found = measurement(editor)
@@ -140,15 +149,17 @@ def _head(editor: Editor, reflectors: tuple[Reflector, ...]) -> str:
         ]
     if editor.last_click is not None and not reflectors:
         rows.append(("Last click x, y", f"{editor.last_click[0]:.3f}, {editor.last_click[1]:.3f} m"))
+    # What is selected may be gone: deleted here, or by another browser; an undo brings it back selected.
+    is_there = bool(reflectors) or route_of(project, editor) or any(s.name == editor.station for s in project.stations)
+    if not is_there:
+        return f"<div style='padding:2px 14px 2px 6px'>{table(rows)}{'' if editor.tool else NOTHING}</div>"
     if len(reflectors) > 1:
         title = f"{len(reflectors)} reflectors"
     elif reflectors:
         title = f"Reflector {escaped(reflectors[0].id)}"
     elif editor.point is not None:
         title = f"Route {escaped(editor.point.route)}"
-    elif editor.station:
+    else:
         named = editor.station.lower().startswith("station")
         title = escaped(editor.station) if named else f"Station {escaped(editor.station)}"
-    else:
-        title = "Vehicle"
     return f"<div style='padding:2px 14px 2px 6px'>{table(rows)}<div class='c-selected'><b>{title}</b></div></div>"

@@ -10,7 +10,17 @@ from commission.studies.problems import Problem
 
 @dataclass(frozen=True, slots=True)
 class FaceFromWalls(Action):
-    """Turn every plate of unknown direction away from the wall that it hangs on."""
+    """Show where plates of unknown direction face, turned away from the walls that they hang on."""
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptFacing(Action):
+    """Turn the plates as shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class DropFacing(Action):
+    """Leave the plates as they are."""
 
 
 @dataclass(frozen=True, slots=True)

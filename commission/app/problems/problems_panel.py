@@ -6,11 +6,10 @@ from viser import GuiApi, GuiTabHandle
 
 from commission.app.base import actions, theme
 from commission.app.base.actions import ClearFaults
-from commission.app.base.inputs import show
 from commission.app.base.panel import BasePanel, Post, escaped, posting
 from commission.app.base.rows import Rows
 from commission.app.base.view import PageView
-from commission.app.problems.actions import FaceFromWalls, ShowProblem
+from commission.app.problems.actions import ShowProblem
 from commission.app.problems.view import inspection_of
 from commission.studies.problems import Problem, Severity
 
@@ -33,13 +32,6 @@ class ProblemsPanel(BasePanel):
 
     def __init__(self, gui: GuiApi, post: Post, tab: GuiTabHandle) -> None:
         self._html = gui.add_html("")
-        self._face = gui.add_button(
-            "Face plates from walls",
-            color="gray",
-            visible=False,
-            hint="Plates of unknown direction that hang on a wall then face away from it.",
-        )
-        self._face.on_click(posting(post, lambda _event: FaceFromWalls()))
         self._clear = gui.add_button("Clear", color="gray", visible=False)
         self._clear.on_click(posting(post, lambda _event: ClearFaults()))
         self._found: tuple[Problem, ...] = ()
@@ -55,7 +47,6 @@ class ProblemsPanel(BasePanel):
     def draw_slowly(self, view: PageView) -> None:
         """Show both lists."""
         problems, found = view.state.faults, inspection_of(view).problems
-        show(self._face, visible=any(r.lacks_direction for r in view.state.project.reflectors.reflectors))
         if self._shown is not None and self._shown[0] is problems and self._shown[1] is found:
             return
         self._shown = problems, found

@@ -11,7 +11,8 @@ from commission.app.base.state import AppState, Edit
 from commission.app.editing.editor import editor_of
 from commission.app.editing.reducer import with_reflectors
 from commission.app.editing.route_gestures import control_point_at
-from commission.app.problems.actions import FaceFromWalls, ShowProblem
+from commission.app.problems.actions import AcceptFacing, DropFacing, FaceFromWalls, ShowProblem
+from commission.app.problems.facing import Facing
 from commission.errors import UsageError
 from commission.site.editing.facing import faced_from_walls, said_of
 from commission.studies.problems import Subject
@@ -23,8 +24,24 @@ def face_from_walls(_action: FaceFromWalls, state: AppState, sender: Sender) -> 
     if floor_map is None:
         raise UsageError("the project has no floor map to take directions from; expected one")
     faced = faced_from_walls(state.project.reflectors, floor_map)
-    outcome = with_reflectors(state, faced.reflectors, Edit(f"face {len(faced.turned)} plates from walls", sender))
-    return replace(outcome, effects=(*outcome.effects, Tell(said_of(faced), failed=not faced.turned)))
+    if not faced.turned:
+        return Outcome(state, (Tell(said_of(faced), failed=True),))
+    return Outcome(state.with_browser(sender.browser, Facing(faced, state.project)))
+
+
+@reduce.register
+def accept_facing(_action: AcceptFacing, state: AppState, sender: Sender) -> Outcome:
+    faced = state.of_browser(sender.browser, Facing).of(state.project)
+    if faced is None:
+        raise UsageError("no directions of plates wait for the site as it is now; expected to find them first")
+    edit = Edit(f"face {len(faced.turned)} plates from walls", sender)
+    outcome = with_reflectors(state.with_browser(sender.browser, Facing()), faced.reflectors, edit)
+    return replace(outcome, effects=(*outcome.effects, Tell(said_of(faced), failed=False)))
+
+
+@reduce.register
+def drop_facing(_action: DropFacing, state: AppState, sender: Sender) -> Outcome:
+    return Outcome(state.with_browser(sender.browser, Facing()))
 
 
 @reduce.register

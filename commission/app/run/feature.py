@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from commission.app.base.feature import ASSOCIATION, LAYERS, RUN, SELECTION, TIME, TUNE, Docked, Feature
+from commission.app.base.feature import ASSOCIATION, LAYERS, RUN, TIME, TUNE, Docked, Feature
 from commission.app.run import reducer, variant_reducer
 from commission.app.run.accumulated_layer import AccumulatedLayer
 from commission.app.run.association_panel import AssociationPanel
@@ -50,7 +50,7 @@ FEATURE = Feature(
     ),
     panels=(
         Docked(make=lambda at: Badge(at.gui), tab=None, rank=10),
-        Docked(make=lambda at: NowPanel(at.gui, at.browser), tab=SELECTION, rank=60, own=True),
+        Docked(make=lambda at: NowPanel(at.gui), tab=None, rank=12),
         Docked(make=lambda at: AssociationPanel(at.gui, at.post, at.browser), tab=ASSOCIATION, own=True),
         Docked(make=lambda at: RunPanel(at.gui, at.post, at.state), tab=RUN),
         Docked(make=lambda at: SummaryPanel(at.gui), tab=RUN, rank=5),

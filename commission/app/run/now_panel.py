@@ -7,10 +7,8 @@ import math
 import numpy as np
 from viser import GuiApi
 
-from commission.app.base.inputs import show
 from commission.app.base.panel import BasePanel, escaped, table
 from commission.app.base.view import PageView
-from commission.app.editing.editor import editor_of
 from commission.app.run.found_table import Found
 from commission.app.run.summary_panel import known, share
 from commission.app.run.view import RunView
@@ -37,12 +35,12 @@ def rows(run: RunView, found: Found | None = None) -> list[tuple[str, str]]:
     x, y, heading = run.pose
     shown = [
         ("Mode", MODES[run.mode]),
-        ("Fail episodes so far", str(len(run.lived_episodes))),
         ("Position x, y", f"{x:.3f}, {y:.3f} m"),
         ("Heading", DEGREES.text(heading, ".2f")),
     ]
+    episodes = ("Fail episodes so far", str(len(run.lived_episodes)))
     if run.estimate is None:
-        return shown
+        return [*shown, episodes]
     result, newest = run.result, run.newest
     limits = run.segment.setup.parameters.supervisor
     sigma_x, sigma_y, sigma_heading = result.two_sigma[newest]
@@ -54,16 +52,17 @@ def rows(run: RunView, found: Found | None = None) -> list[tuple[str, str]]:
         ("2σ position / limit", MILLIMETRES.against(largest, limits.position_limit)),
         ("2σ along x, along y", f"{MILLIMETRES.number(sigma_x, '.1f')}, {MILLIMETRES.text(sigma_y, '.1f')}"),
         ("2σ heading / limit", DEGREES.against(sigma_heading, limits.heading_limit, (".2f", ".1f"))),
-        *_protection(run, found),
         ("Inliers", str(estimate.count(Status.INLIER))),
         (
-            "Outliers by beams, gate",
+            "Outliers: beams, gate",
             f"{estimate.count(Status.OUTLIER_DETECTOR)}, {estimate.count(Status.OUTLIER_ASSOCIATION)}",
         ),
+        *_protection(run, found),
         ("Largest NIS / gate", f"{nis} / {estimate.gate:.2f}"),
         ("NIS of all / expected, 1 s", f"{known(result.recent.nis[newest])} / 2"),
         ("Rejected, 1 s", share(result.recent.rejected[newest])),
         *_of_scanners(result),
+        episodes,
         ("Cycle time", f"{result.microseconds_per_cycle:.1f} µs, mean of the drive"),
         ("Position error", MILLIMETRES.text(error, ".1f") if math.isfinite(error) else "no reference"),
     ]
@@ -129,17 +128,17 @@ def _of_scanners(result: RunResult) -> list[tuple[str, str]]:
 
 
 class NowPanel(BasePanel):
-    """Numbers of the newest cycle, as long as a browser has nothing selected whose values take the room."""
+    """Numbers of the newest cycle, always there, above the properties of whatever is selected."""
 
-    def __init__(self, gui: GuiApi, browser: int) -> None:
-        self._browser = browser
-        self._html = gui.add_html("<div class='c-note'>Numbers appear with the first scan.</div>")
+    def __init__(self, gui: GuiApi) -> None:
+        self._html = gui.add_html(_framed("<div class='c-note'>Numbers appear with the first scan.</div>"))
 
     def draw_slowly(self, view: PageView) -> None:
         """Show the numbers."""
-        is_shown = not editor_of(view.state, self._browser).has_selection
-        show(self._html, visible=is_shown)
         run = view.part(RunView)
-        if run is not None and is_shown:
-            shown = table([*rows(run, view.part(Found)), *rejected_by_beams(run)])
-            self._html.content = f"<div class='c-now' style='padding:2px 14px 2px 6px'>{shown}</div>"
+        if run is not None:
+            self._html.content = _framed(table([*rows(run, view.part(Found)), *rejected_by_beams(run)]))
+
+
+def _framed(content: str) -> str:
+    return f"<div class='c-now'>{content}</div>"

@@ -89,7 +89,16 @@ def _agreed(walls: list[WallPoint]) -> float | None:
 
 def said_of(faced: Faced) -> str:
     """Say how many plates have a direction now, and which have none."""
+    rest = f"; {_left(faced)}" if faced.left else ""
+    return f"{len(faced.turned)} plates face away from their walls now{rest}"
+
+
+def left_said(faced: Faced) -> str:
+    """Say which plates stay without a direction, as a sentence; nothing where there are none."""
+    return f"{_left(faced)}." if faced.left else ""
+
+
+def _left(faced: Faced) -> str:
     shown = ", ".join(faced.left[:MOST_NAMED])
     more = f" and {len(faced.left) - MOST_NAMED} more" if len(faced.left) > MOST_NAMED else ""
-    rest = f"; {shown}{more} are locked, hang near no wall, or near several" if faced.left else ""
-    return f"{len(faced.turned)} plates face away from their walls now{rest}"
+    return f"{shown}{more} are locked, hang near no wall, or near several"
