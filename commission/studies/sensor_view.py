@@ -62,6 +62,8 @@ class SeenCluster:
     """Id of the reflector that it is taken for; empty: none."""
     peak: float
     """Largest intensity of its beams [sensor's unit]; NaN where there are none."""
+    place: tuple[float, float]
+    """Where it stands by the belief after the scan [m], map frame."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -142,11 +144,12 @@ def _clusters(inputs: SensorInput, scan: Scan, cycle: int) -> tuple[SeenCluster,
     ids = [reflector.id for reflector in used.reflectors.reflectors]
     model, step = setup.detectors[inputs.scanner], scan.angle_increment
     found: list[SeenCluster] = []
-    for (distance, bearing), beams, status, reflector in zip(
+    for (distance, bearing), beams, status, reflector, (x, y) in zip(
         columns.detected.range_bearing[rows].tolist(),
         columns.detected.beams[rows].tolist(),
         columns.status[rows].tolist(),
         columns.reflector[rows].tolist(),
+        columns.estimate(cycle).points_map.tolist(),
         strict=True,
     ):
         kinds = [passing_widths(distance, step, kind, model) for kind in range(len(model.radii))]
@@ -159,6 +162,7 @@ def _clusters(inputs: SensorInput, scan: Scan, cycle: int) -> tuple[SeenCluster,
                 status=Status(status),
                 reflector=ids[reflector] if reflector >= 0 else "",
                 peak=peak_of(scan, bearing, beams),
+                place=(x, y),
             )
         )
     return tuple(sorted(found, key=lambda each: each.bearing))

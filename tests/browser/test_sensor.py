@@ -9,18 +9,25 @@ import pytest
 
 from commission.app.base.view import view_of
 from commission.app.live.sensor_panel import scan_of
+from commission.app.live.state import SensorWatch
 from commission.app.run.actions import Play, Seek, VirtualDrive
 from commission.app.run.service import RunService
+from commission.site.disturbances import ShinyObject
 from tests.app.sites import room
 from tests.browser.page import OpenPage
 from tests.browser.serving import Served
+
+
+POST = (4.0, 5.0)
+"""Where something shiny stands that is no reflector of the map [m]."""
 
 
 @pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
     project = room()
     light = replace(project.disturbances.intensity, enabled=True)
-    project = replace(project, disturbances=replace(project.disturbances, intensity=light))
+    shiny = ShinyObject(x=POST[0], y=POST[1], radius=0.05)
+    project = replace(project, disturbances=replace(project.disturbances, intensity=light, shiny_objects=(shiny,)))
     opened = Served(project, source=VirtualDrive(project.routes[0].name))
     opened.until(lambda: opened.view is not None)
     opened.runtime.post(Play(playing=False))
@@ -30,11 +37,15 @@ def served() -> Iterator[Served]:
     opened.close()
 
 
-def test_a_person_drags_the_threshold_over_the_peaks_and_takes_it_back(
-    served: Served, window: Callable[..., OpenPage]
-) -> None:
-    page = window(served.server, (1024, 700))
-    page.open()
+@pytest.fixture(scope="module")
+def page(served: Served, lasting_window: Callable[..., OpenPage]) -> OpenPage:
+    """One window for both tests, in their order."""
+    opened = lasting_window(served.server, (1024, 700))
+    opened.open()
+    return opened
+
+
+def test_a_person_drags_the_threshold_over_the_peaks_and_takes_it_back(served: Served, page: OpenPage) -> None:
     assert page.page.locator(".c-s-intensity").count() == 0, "its tab is not in front"
     page.open_tab("Sensor")
     page.page.wait_for_selector(".c-s-intensity")
@@ -66,3 +77,56 @@ def test_a_person_drags_the_threshold_over_the_peaks_and_takes_it_back(
     served.until(lambda: served.state.project.parameters.detector.intensity_threshold == 0.5)
     page.wait_for_text(f"{len(found.clusters)} clusters")
     assert page.errors == []
+
+
+def test_what_shines_beside_the_map_is_listed_and_a_click_in_list_or_plot_marks_it_on_the_floor(
+    served: Served, page: OpenPage
+) -> None:
+    page.open_tab("Sensor")
+    row = page.page.locator(".c-s-list tbody tr").first
+    row.wait_for()
+    cells = row.locator("td").all_inner_texts()
+    x, y = (float(each) for each in cells[0].split(", "))
+    assert (x, y) == pytest.approx(POST, abs=0.1)
+    assert int(cells[1]) > 20
+    nearest, farthest = (float(each) for each in cells[2].split("–"))
+    assert 0.5 < nearest < farthest < 12.0
+    peak, threshold = (float(each) for each in cells[3].split(" / "))
+    assert peak > threshold == 0.5
+    body = page.page.locator(".c-s-list").bounding_box()
+    assert body is not None
+    assert body["x"] + body["width"] <= 1024.0
+    assert body["y"] + body["height"] <= 700.0
+
+    def is_in_the_middle(place: tuple[float, float]) -> bool:
+        canvas = page.page.evaluate(
+            "() => (({left, top, width, height}) => [left + width / 2, top + height / 2])"
+            "(window.__viserMutable.canvas.getBoundingClientRect())"
+        )
+        return page.pixel_of(place) == pytest.approx(canvas, abs=6.0)
+
+    row.click()
+    served.until(lambda: watch(served).marked == pytest.approx(POST, abs=0.1))
+    page.page.wait_for_selector(".c-s-list tr[aria-selected]")
+    served.until(lambda: is_in_the_middle((x, y)))
+    lines = "() => window.__viserMutable.nodeRefFromName['/live/seen_mark'] !== undefined"
+    page.page.wait_for_function(lines)
+
+    # A cluster of a reflector, in the plot: that reflector is selected, and the floor goes to it.
+    mark = page.page.locator(".c-s-intensity .c-s-mark:not([data-reflector=''])").first
+    name, box = mark.get_attribute("data-reflector"), mark.bounding_box()
+    assert box is not None
+    page.page.mouse.click(box["x"] + 0.5 * box["width"] + 2.0, box["y"] + 0.5 * box["height"] + 1.0)
+    page.page.locator(".c-s-said", has_text=f"accepted, {name}").wait_for()
+    page.wait_for_text(f"Reflector {name}")
+    reflector = next(each for each in served.state.project.reflectors.reflectors if each.id == name)
+    served.until(lambda: is_in_the_middle(watch(served).marked or (0.0, 0.0)))
+    assert watch(served).marked == pytest.approx((reflector.x, reflector.y), abs=0.15)
+    assert page.page.locator(".c-s-intensity .c-s-chosen").count() == 1
+    assert page.page.locator(".c-s-list tr[aria-selected]").count() == 0
+    assert page.errors == []
+
+
+def watch(served: Served) -> SensorWatch:
+    """What the only browser does with the view."""
+    return served.state.of_browser(next(iter(served.state.browsers)), SensorWatch)

@@ -16,6 +16,14 @@ class RunShown(Action):
     """The run; none: a vehicle drives now, and its run still grows."""
 
 
+@dataclass(frozen=True, slots=True)
+class ShownRun:
+    """The run that is on the page, in its state: for studies of it."""
+
+    result: RunResult | None = None
+    """The run; none: there is none, or a vehicle drives now."""
+
+
 class LearnedFromDrive(Action):
     """An edit by which the project learns what was true in the drive on the page: the base of frozen dataclasses.
 

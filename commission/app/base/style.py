@@ -5,7 +5,7 @@ from __future__ import annotations
 from commission.app.base.actions import Camera
 from commission.app.base.icons import mask
 from commission.app.base.paints import Surface, Worded
-from commission.app.base.theme import LEFT_PX, RAIL_PX, RIGHT_PX, css
+from commission.app.base.theme import BACKGROUND, LEFT_PX, RAIL_PX, RIGHT_PX, css
 
 TOOLS = 9
 """On the rail at the floor's edge, which share its height."""
@@ -91,6 +91,29 @@ div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
 .c-now .c-table td:first-child{{width:1px;white-space:nowrap}}
 {LIT_CAMERA}{{background:{css(Worded.PRESS.dark)}!important;border-color:{css(Worded.PRESS.dark)}!important;
  color:#fff!important}}
+.c-s-plots{{margin-right:calc(34vw + 8px)}}
+.c-s-head{{margin-right:34vw}}
+.c-s-plot .c-s-title{{max-width:calc(100% - 52px);overflow:hidden;text-overflow:ellipsis}}
+.c-s-beams .c-s-top{{background:{css(BACKGROUND)};z-index:1}}
+.c-s-plot [data-at]{{cursor:pointer;pointer-events:all}}
+.c-s-chosen{{stroke:{css(Worded.LACKING.dark)};stroke-width:16;stroke-linecap:round}}
+.c-s-plot .c-s-said{{color:{css(Worded.LACKING.dark)}}}
+.c-s-list{{position:fixed;right:10px;bottom:14px;width:34vw;height:calc(var(--c-bottom) - 24px);box-sizing:border-box;
+ display:flex;flex-direction:column;font-size:12px}}
+.c-s-list-head{{line-height:26px;white-space:nowrap;overflow:hidden;text-overflow:ellipsis;flex:none}}
+.c-s-list-body{{flex:1;min-height:0;overflow:auto;scrollbar-width:thin}}
+.c-s-list table{{border-collapse:collapse;width:100%;font-variant-numeric:tabular-nums;white-space:nowrap}}
+.c-s-list th{{position:sticky;top:0;background:{css(Surface.HEAD.dark)};font-weight:400;padding:1px 6px;
+ text-align:right}}
+.c-s-list td{{padding:1px 6px;text-align:right;border-top:1px solid {css(Surface.RULE.dark)}}}
+.c-s-list :is(td,th):first-child{{text-align:left}}
+.c-s-list tbody tr{{cursor:pointer}}
+.c-s-list tbody tr:is(:hover,:focus-visible){{background:{css(Surface.PRESSED.dark)};outline:none}}
+.c-s-list tbody tr[aria-selected]{{background:var(--c-selected-line)}}
+.c-s-find{{margin-left:10px;padding:0 8px;border-radius:3px;border:1px solid {css(Surface.EDGE_QUIET.dark)};
+ background:none;color:inherit;font:inherit;cursor:pointer}}
+@media (max-width:1290px){{.c-s-list :is(td,th){{padding:1px 4px}} .c-s-list :is(td,th):last-child{{display:none}}
+ .c-s-list{{font-size:11px}}}}
 .c-layers{{padding:0 8px 4px;font-size:12px}}
 .c-layers h4{{margin:6px 0 1px;font-size:11px;font-weight:600;opacity:.65;
  border-bottom:1px solid {css(Surface.EDGE.dark)}}}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from commission.app.base.actions import Action
+from commission.app.base.actions import Action, Point
 from commission.app.base.drive_now import DriveNow
 from commission.studies.arrival import ArrivalOffset
 from commission.studies.clock import ClockOffset
@@ -101,3 +101,29 @@ class SetThreshold(Action):
 
     value: object
     """The intensity [sensor's unit]."""
+
+
+@dataclass(frozen=True, slots=True)
+class WatchSensor(Action):
+    """Say whether a browser has the raw-sensor view before it: shiny things are looked for while one has."""
+
+    seen: bool
+    """Whether it has."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FindShiny(Action):
+    """Look for shiny things in what a vehicle that still drives has seen so far."""
+
+    drive: DriveNow
+    """What it has."""
+
+
+@dataclass(frozen=True, slots=True)
+class MarkSeen(Action):
+    """Mark what a scanner has seen, in the view and on the floor, and go there."""
+
+    place: Point
+    """Where it stands [m], map frame."""
+    reflector: str = ""
+    """Reflector that it is taken for, which is selected; empty: none."""

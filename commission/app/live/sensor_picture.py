@@ -11,6 +11,7 @@ import numpy as np
 
 from commission.app.base import theme
 from commission.app.base.panel import escaped
+from commission.app.live.shiny_list import SAME_M
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Status
 from commission.site.quantity import DEGREES, PERCENT
@@ -62,7 +63,7 @@ def head(view: SensorView, threshold: float) -> str:
     )
 
 
-def intensity_picture(view: SensorView, threshold: float, inbox: str) -> str:
+def intensity_picture(view: SensorView, threshold: float, inbox: str, marked: tuple[float, float] | None = None) -> str:
     """Return intensity over bearing with the threshold as a line that can be dragged, as html.
 
     Parameters
@@ -70,6 +71,7 @@ def intensity_picture(view: SensorView, threshold: float, inbox: str) -> str:
     view : the scan.
     threshold : the one near by [sensor's unit].
     inbox : identifier of the text field that the page's script writes a dragged threshold into.
+    marked : place of what was clicked [m], map frame; none: nothing was.
     """
     scan = view.scan
     if scan.intensities is None and scan.reflector is None:
@@ -93,7 +95,8 @@ def intensity_picture(view: SensorView, threshold: float, inbox: str) -> str:
         f"<path class='c-s-curve' d='{_stems(x[~lit], y[~lit])}'/><path class='c-s-lit' d='{_stems(x[lit], y[lit])}'/>"
     )
     far = "" if np.ptp(limits) < 1e-9 or not view.has_intensities else f"<path class='c-s-far' d='{_dots(x, limits)}'/>"
-    marks = "".join(_mark(view, each, low, high, top) for each in view.clusters)
+    chosen = marked_cluster(view, marked)
+    marks = "".join(_mark(view, each, (low, high, top), is_chosen=each is chosen) for each in view.clusters)
     grid = "".join(
         f"<path class='c-s-grid' d='M{SIDE * (at - low) / (high - low):.1f} 0V{SIDE:g}'/>" for at in steps(low, high)
     )
@@ -112,8 +115,14 @@ def intensity_picture(view: SensorView, threshold: float, inbox: str) -> str:
         f"<div class='c-s-plot c-s-intensity' data-top='{top:.6g}' data-inbox='{inbox}'>"
         f"<svg viewBox='0 0 {SIDE:g} {SIDE:g}' preserveAspectRatio='none'>{grid}{curve}{far}{marks}</svg>"
         f"{_names(view, low, high)}{words}{'' if flags else _scale(top)}{handle}"
-        f"<span class='c-s-title'>{_title(view)}</span></div>"
+        f"{_title(view) if chosen is None else _chosen_title(chosen)}</div>"
     )
+
+
+def marked_cluster(view: SensorView, marked: tuple[float, float] | None) -> SeenCluster | None:
+    """Return the cluster at a marked place [m], map frame; None where the scan has none there."""
+    near = [each for each in view.clusters if marked is not None and math.dist(each.place, marked) <= SAME_M]
+    return min(near, key=lambda each: math.dist(each.place, marked or each.place), default=None)
 
 
 def height(values: FloatArray, top: float) -> FloatArray:
@@ -143,11 +152,16 @@ def _strengths(view: SensorView) -> FloatArray:
 
 
 def _title(view: SensorView) -> str:
+    text = "intensity over bearing [sensor's unit]"
     if view.scan.intensities is None:
-        return "reflector flag over bearing: the sensor decides, there is no threshold"
-    if view.scan.reflector is not None:
-        return "intensity over bearing: the sensor flags reflectors (bright), there is no threshold"
-    return "intensity over bearing [sensor's unit]"
+        text = "reflector flag over bearing: the sensor decides, there is no threshold"
+    elif view.scan.reflector is not None:
+        text = "intensity over bearing: the sensor flags reflectors (bright), there is no threshold"
+    return f"<span class='c-s-title'>{text}</span>"
+
+
+def _chosen_title(each: SeenCluster) -> str:
+    return f"<span class='c-s-title c-s-said'>marked: {escaped(told(each))}</span>"
 
 
 def steps(low: float, high: float) -> list[float]:
@@ -167,16 +181,25 @@ def _dots(x: FloatArray, y: FloatArray) -> str:
     return "".join(f"M{at:.1f} {to:.0f}h0" for at, to in zip(x.tolist(), y.tolist(), strict=True))
 
 
-def _mark(view: SensorView, each: SeenCluster, low: float, high: float, top: float) -> str:
-    """A dot over the strongest beam of a cluster, in the color of what became of it."""
+def _mark(view: SensorView, each: SeenCluster, axes: tuple[float, float, float], *, is_chosen: bool) -> str:
+    """A dot over the strongest beam of a cluster, in the color of what became of it; `axes`: bearings [deg], top."""
+    low, high, top = axes
     peak = 1.0 if view.scan.intensities is None else each.peak
     if math.isnan(peak):
         return ""
     x = SIDE * (DEGREES.of(each.bearing) - low) / (high - low)
     y = max(SIDE * (1.0 - float(height(np.array(peak), top))) - 40.0, 20.0)
+    return _dot(each, (x, y), is_chosen=is_chosen)
+
+
+def _dot(each: SeenCluster, at: tuple[float, float], *, is_chosen: bool) -> str:
+    """What stands for a cluster in either plot: pointed at it says what it is, clicked it is marked."""
+    place = f"M{at[0]:.1f} {at[1]:.0f}h0"
+    halo = f"<path class='c-s-chosen' d='{place}'/>" if is_chosen else ""
+    x, y = each.place
     return (
-        f"<path class='c-s-mark' stroke='{COLORS[each.status]}' d='M{x:.1f} {y:.0f}h0'>"
-        f"<title>{escaped(told(each))}</title></path>"
+        f"{halo}<path class='c-s-mark' stroke='{COLORS[each.status]}' d='{place}' data-at='{x:.4f},{y:.4f}' "
+        f"data-reflector='{escaped(each.reflector)}'><title>{escaped(told(each))}</title></path>"
     )
 
 
@@ -186,7 +209,7 @@ def told(each: SeenCluster) -> str:
     who = f", {each.reflector}" if each.reflector else ""
     peak = "" if math.isnan(each.peak) else f", peak {each.peak:.4g}"
     where = f"{DEGREES.text(each.bearing, '.1f')}, {each.range:.2f} m"
-    return f"{where}, {each.beams} beams{window}{peak}: {WORDS[each.status]}{who}"
+    return f"{where}, {each.beams} beam{'' if each.beams == 1 else 's'}{window}{peak}: {WORDS[each.status]}{who}"
 
 
 def _names(view: SensorView, low: float, high: float) -> str:
@@ -202,8 +225,15 @@ def _names(view: SensorView, low: float, high: float) -> str:
     )
 
 
-def beams_picture(view: SensorView) -> str:
-    """Return beams of clusters over range against those that pass (Sobreira et al. 2016, Fig. 6), as html."""
+def beams_picture(view: SensorView, inbox: str = "", marked: tuple[float, float] | None = None) -> str:
+    """Return beams of clusters over range against those that pass (Sobreira et al. 2016, Fig. 6), as html.
+
+    Parameters
+    ----------
+    view : the scan.
+    inbox : identifier of the text field that the page's script writes clicks into.
+    marked : place of what was clicked [m], map frame; none: nothing was.
+    """
     seen = view.widths
     reach = upper_end(max([float(seen[:, 0].max(initial=0.0)), 1.0]) * FILLED)
     most = upper_end(max(float(np.quantile(seen[:, 1], 0.99)) if len(seen) else 0.0, 8.0))
@@ -221,15 +251,20 @@ def beams_picture(view: SensorView) -> str:
     for passed, color in ((1.0, "c-s-passed"), (0.0, "c-s-failed")):
         of = seen[seen[:, 2] == passed]
         dots += f"<path class='{color}' d='{_dots(*place(of[:, 0], of[:, 1]))}'/>"
+    chosen = marked_cluster(view, marked)
     now = "".join(
-        f"<path class='c-s-mark' stroke='{COLORS[each.status]}' d='M{SIDE * each.range / reach:.1f} "
-        f"{SIDE * (1.0 - min(each.beams / most, 1.0)):.0f}h0'><title>{escaped(told(each))}</title></path>"
+        _dot(
+            each,
+            (SIDE * each.range / reach, SIDE * (1.0 - min(each.beams / most, 1.0))),
+            is_chosen=each is chosen,
+        )
         for each in view.clusters
         if each.beams
     )
     return (
-        f"<div class='c-s-plot c-s-beams'><svg viewBox='0 0 {SIDE:g} {SIDE:g}' preserveAspectRatio='none'>"
+        f"<div class='c-s-plot c-s-beams' data-inbox='{inbox}'>"
+        f"<svg viewBox='0 0 {SIDE:g} {SIDE:g}' preserveAspectRatio='none'>"
         f"{band}{dots}{now}</svg><span class='c-s-top'>{most:g} beams</span><span class='c-s-x' style='left:50%'>"
         f"{0.5 * reach:g} m</span><span class='c-s-x c-s-end'>{reach:g} m</span>"
-        "<span class='c-s-title'>beams over range, drive so far; band: passes</span></div>"
+        "<span class='c-s-title'>beams over range; band: passes</span></div>"
     )

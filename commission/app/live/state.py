@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from commission.app.base.actions import Point
+from commission.app.base.drive_now import DriveNow
 from commission.io.live.permission import NEAR, Permission
 from commission.io.vda5050_states import StateFile
 from commission.studies.clock import ClockOffset
@@ -31,3 +33,21 @@ class ClockState:
 
     found: tuple[ClockOffset, ...] = ()
     """One for each scanner; none before it was asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class SensorWatch:
+    """What one browser does with the raw-sensor view."""
+
+    seen: bool = False
+    """Whether it has it before it."""
+    marked: Point | None = None
+    """Where something stands that was clicked [m], map frame; none: nothing was."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ShinyAsked:
+    """Whose shiny things are looked for, where no drive is shown that is over."""
+
+    drive: DriveNow | None = None
+    """A live drive as far as it had come; none: nobody has asked."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from commission.app.base.actions import Sender
 from commission.app.base.reducer import Outcome, reduce
-from commission.app.base.shown_run import RunShown
+from commission.app.base.shown_run import RunShown, ShownRun
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.tune.calibration_actions import AcceptFigure, CalibrateByDrive, DropCalibration, LookAtFigure
 from commission.app.tune.calibration_state import CalibrationState
@@ -20,8 +20,9 @@ from commission.studies.calibration_words import label_of
 
 @reduce.register
 def run_shown(action: RunShown, state: AppState, _sender: Sender) -> Outcome:
-    """Take note of what a calibration would be of."""
-    return Outcome(state.with_part(replace(state.part(CalibrationState), shown=action.result)))
+    """Take note of what a calibration would be of, and any other study of the run that is shown."""
+    noted = state.with_part(ShownRun(action.result))
+    return Outcome(noted.with_part(replace(noted.part(CalibrationState), shown=action.result)))
 
 
 @reduce.register
