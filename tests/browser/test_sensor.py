@@ -17,7 +17,6 @@ from tests.app.sites import room
 from tests.browser.page import OpenPage
 from tests.browser.serving import Served
 
-
 POST = (4.0, 5.0)
 """Where something shiny stands that is no reflector of the map [m]."""
 

@@ -114,6 +114,7 @@ div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
  background:none;color:inherit;font:inherit;cursor:pointer}}
 @media (max-width:1290px){{.c-s-list :is(td,th){{padding:1px 4px}} .c-s-list :is(td,th):last-child{{display:none}}
  .c-s-list{{font-size:11px}}}}
+[data-dock-region=right] [data-dock-scroll]>div:has(.c-points){{flex-grow:1.3!important}}
 .c-layers{{padding:0 8px 4px;font-size:12px}}
 .c-layers h4{{margin:6px 0 1px;font-size:11px;font-weight:600;opacity:.65;
  border-bottom:1px solid {css(Surface.EDGE.dark)}}}

@@ -70,11 +70,16 @@ class SetPlantPoint(Action):
     """Name one of the points to align by, and say where it lies in the plant."""
 
     index: int
-    """Which point, 0 or 1: the other one stays as it is, for who types quickly is ahead of what is shown."""
+    """Which point, from 0: the others stay as they are, for who types quickly is ahead of what is shown."""
     plant: Point
     """Where it lies [m], plant coordinates."""
     name: str = ""
     """What it is called."""
+
+
+@dataclass(frozen=True, slots=True)
+class ForgetPoint(Action):
+    """Forget the point to align by that was clicked last."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,10 +92,10 @@ class SetAligned(Action):
 
 @dataclass(frozen=True, slots=True)
 class SetSurveyed(Action):
-    """Align by a table of points in the plant, named as reflectors and stations are, in place of two clicked ones."""
+    """Align by a table of points in the plant, named as reflectors, stations or clicked points are."""
 
     table: str
-    """Pasted rows of name, x, y; empty: by the clicked ones again."""
+    """Pasted rows of name, x, y; empty: by the clicked ones alone."""
 
 
 @dataclass(frozen=True, slots=True)

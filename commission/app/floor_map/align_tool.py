@@ -1,4 +1,4 @@
-"""The tool that moves the floor map onto the plant's coordinate system by two points of known coordinates. Pure."""
+"""The tool that moves the floor map onto the plant's coordinate system by points of known coordinates. Pure."""
 
 from __future__ import annotations
 
@@ -18,10 +18,14 @@ from commission.app.editing.tool import Label, Tool
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
 from commission.site.editing.alignment import DOUBTFUL, Alignment, KnownPoint, align, aligned, moved_onto
-from commission.site.editing.plant_fit import PlantPair, fit_points
+from commission.site.editing.plant_fit import PlantPair, fit_points, pairs_of
+from commission.site.project import Project
 from commission.site.quantity import COORDINATE, MILLIMETRES, PERCENT, Quantity, Words
 
-LETTERS = "AB"
+LETTERS = "ABCDEFGHIJKL"
+"""Points that are clicked, in their order; a table may have any number of others."""
+NEAR = 2.0
+"""A click so many times as near to a point as means something moves it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,30 +42,69 @@ class NamedPoint:
 
 @dataclass(frozen=True, slots=True)
 class AlignTool(Tool):
-    """Takes two points by which the map is moved onto the plant's coordinate system."""
+    """Takes points by which the map is moved onto the plant's coordinate system: two, or more to check them by."""
 
     known: tuple[NamedPoint, ...] = ()
-    """At most two: A and B."""
+    """Those that were clicked: A, B, ..."""
     everything: bool = False
     """Whether reflectors, routes and stations go with the map."""
 
+    table: tuple[tuple[str, float, float], ...] = ()
+    """Name, x and y [m] of points that were surveyed in the plant, as pasted."""
     surveyed: tuple[PlantPair, ...] = ()
-    """Reflectors and stations that were surveyed in the plant; where there are any, they count and A and B do not."""
+    """Those of them that are reflectors, stations, or clicked points by their names."""
 
     name = "Align"
 
     def clicked(self, state: AppState, click: ClickFloor, sender: Sender) -> Outcome:
         """Take a point: the center of a reflector, a station, a corner of a wall, or the place itself."""
-        return Outcome(with_tool(state, sender, self.with_point(marked_place(state.project, click.place, click.reach))))
+        place = marked_place(state.project, click.place, click.reach)
+        return Outcome(with_tool(state, sender, self.with_point(place, NEAR * click.reach).paired(state.project)))
 
-    def with_point(self, place: Point) -> AlignTool:
-        """Return the tool after a click: A, then B, then the nearer one is moved and keeps what was typed for it."""
-        if len(self.known) < 2:
+    def with_point(self, place: Point, near: float) -> AlignTool:
+        """Return the tool after a click: the next point, or one that is near is moved and keeps what was typed for it.
+
+        Parameters
+        ----------
+        place : that was clicked [m], map frame.
+        near : distance up to which a point is moved [m]; the nearest is, too, where all letters are in use.
+        """
+        old = min(self.known, key=lambda point: math.dist(point.at, place), default=None)
+        is_full = len(self.known) == len(LETTERS)
+        if old is None or not (is_full or math.dist(old.at, place) <= near):
             return replace(self, known=(*self.known, NamedPoint(place, place)))
-        nearer = min((0, 1), key=lambda index: math.dist(self.known[index].at, place))
-        old = self.known[nearer]
         new = replace(old, at=place, plant=place if old.plant == old.at else old.plant)
         return replace(self, known=tuple(new if point is old else point for point in self.known))
+
+    def without_last(self) -> AlignTool:
+        """Return the tool without the point that was clicked last."""
+        return replace(self, known=self.known[:-1])
+
+    def paired(self, project: Project) -> AlignTool:
+        """Return the tool with the points of the table found in the project and among the clicked ones, by name."""
+        free = [(point.name, *point.at) for point in self.known if point.name]
+        return replace(self, surveyed=pairs_of(project, self.table, free)[0])
+
+    @property
+    def is_checked(self) -> bool:
+        """Whether more is known than two clicked points: then all points are fitted, and each is held against it."""
+        return bool(self.surveyed) or len(self.known) > 2
+
+    def pairs(self) -> tuple[PlantPair, ...]:
+        """Return all points that are known on both sides: of the table, and those clicked whose place was typed."""
+        in_table = frozenset(pair.name.casefold() for pair in self.surveyed)
+        typed = (
+            PlantPair(point.name or letter, point.at, point.plant)
+            for letter, point in zip(LETTERS, self.known, strict=False)
+            if point.plant != point.at and point.name.casefold() not in in_table
+        )
+        return (*self.surveyed, *typed)
+
+    def untyped(self) -> tuple[str, ...]:
+        """Return what clicked points are called of which nothing says where they lie in the plant."""
+        counted = frozenset(pair.name.casefold() for pair in self.pairs())
+        named = (point.name or letter for letter, point in zip(LETTERS, self.known, strict=False))
+        return tuple(name for name in named if name.casefold() not in counted)
 
     def alignment(self) -> Alignment | None:
         """Return how the points move the map; none before there are two that say so."""
@@ -75,27 +118,32 @@ class AlignTool(Tool):
 
     def hint(self, state: AppState, browser: int) -> str:  # noqa: ARG002 - the tool's
         """Say which point comes next."""
-        which = LETTERS[len(self.known)] if len(self.known) < 2 else ""
-        expected = f"click {which}, a corner or a reflector of known plant coordinates" if which else "type coordinates"
+        which = LETTERS[len(self.known)] if len(self.known) < len(LETTERS) else ""
+        what = "a corner, a column or a reflector of known plant coordinates"
+        expected = f"click {which}, {what}" if which else "type coordinates"
+        if which and len(self.known) > 1:
+            expected = f"type coordinates, or click {which} to check them by"
         return f"Align: {expected} &nbsp; (Esc ends)"
 
     def sketch(self, state: AppState, browser: int) -> list[FloatArray]:  # noqa: ARG002 - the tool's
-        """Return the line from A to B."""
-        return [np.array(self.marks())] if len(self.known) > 1 else []
+        """Return the line from A to B; of more points none, since no line says anything of them."""
+        return [np.array(self.marks())] if len(self.known) == 2 else []
 
     def marks(self) -> tuple[Point, ...]:
         """Return the points."""
         return tuple(point.at for point in self.known)
 
     def labels(self) -> tuple[Label, ...]:
-        """Return A and B."""
-        return tuple((letter, point.at) for letter, point in zip(LETTERS, self.known, strict=False))
+        """Return what the clicked points are called."""
+        named = zip(LETTERS, self.known, strict=False)
+        return tuple((f"{letter} {point.name}".strip(), point.at) for letter, point in named)
 
 
-def _by_surveyed(state: AppState, sender: Sender, pairs: tuple[PlantPair, ...]) -> Outcome:
-    """Return what follows from moving everything by surveyed points, which go along with the map."""
+def _by_all(state: AppState, sender: Sender, tool: AlignTool) -> Outcome:
+    """Return what follows from a fit of all points; with a table, which may name what stands on the map, all moves."""
+    pairs = tool.pairs()
     found = fit_points(pairs)
-    project = moved_onto(state.project, found.T_plant_map, everything=True)
+    project = moved_onto(state.project, found.T_plant_map, everything=bool(tool.surveyed) or tool.everything)
     after = edited(with_tool(state, sender, None), project, Edit(f"align to {len(pairs)} points", sender))
     text = (
         f"aligned to {len(pairs)} points: RMS {MILLIMETRES.text(found.rms, '.1f')}, at most "
@@ -115,14 +163,14 @@ def align_tool_of(state: AppState, sender: Sender) -> AlignTool:
 def align_map(state: AppState, sender: Sender) -> Outcome:
     """Return what follows from moving and turning the map: one undo step, and everybody sees it whole."""
     tool = align_tool_of(state, sender)
-    if tool.surveyed:
-        return _by_surveyed(state, sender, tool.surveyed)
+    if tool.is_checked:
+        return _by_all(state, sender, tool)
     if len(tool.known) < 2:
         raise UsageError(f"{len(tool.known)} points were clicked; expected A and B")
     a, b = (KnownPoint(point.at, point.plant) for point in tool.known)
     found = align(a, b)
     project = aligned(state.project, found, everything=tool.everything)
-    names = " and ".join(point.name or letter for letter, point in zip(LETTERS, tool.known, strict=True))
+    names = " and ".join(point.name or letter for letter, point in zip(LETTERS, tool.known, strict=False))
     after = edited(with_tool(state, sender, None), project, Edit(f"align to {names}", sender))
     text = f"aligned to {names}, each {MILLIMETRES.text(abs(0.5 * found.residual))} off"
     if found.share > DOUBTFUL:

@@ -31,7 +31,7 @@ from commission.errors import UsageError
 from commission.io.image_map import Picture
 from commission.io.mesh import Model
 from commission.io.plant_points import surveyed_points
-from commission.site.editing.plant_fit import PlantPair, fit_points, pairs_of
+from commission.site.editing.plant_fit import fit_points
 from commission.site.fields import with_field
 from commission.site.project import Project
 from commission.site.quantity import MILLIMETRES
@@ -154,7 +154,15 @@ def set_plant_point(action: actions.SetPlantPoint, state: AppState, sender: Send
         return Outcome(state)
     known = list(tool.known)
     known[action.index] = replace(known[action.index], plant=action.plant, name=action.name)
-    return Outcome(with_tool(state, sender, replace(tool, known=tuple(known))))
+    return Outcome(with_tool(state, sender, replace(tool, known=tuple(known)).paired(state.project)))
+
+
+@reduce.register
+def forget_point(_action: actions.ForgetPoint, state: AppState, sender: Sender) -> Outcome:
+    tool = editor_of(state, sender.browser).tool
+    if not isinstance(tool, AlignTool):
+        return Outcome(state)
+    return Outcome(with_tool(state, sender, tool.without_last().paired(state.project)))
 
 
 @reduce.register
@@ -170,14 +178,17 @@ def set_surveyed(action: actions.SetSurveyed, state: AppState, sender: Sender) -
     tool = editor_of(state, sender.browser).tool
     if not isinstance(tool, AlignTool):
         return Outcome(state)
-    pairs: tuple[PlantPair, ...] = ()
     told: tuple[Tell, ...] = ()
-    if action.table.strip():
-        pairs, unknown = pairs_of(state.project, surveyed_points(action.table))
-        fit_points(pairs)
+    table = tuple(surveyed_points(action.table)) if action.table.strip() else ()
+    found = replace(tool, table=table).paired(state.project)
+    if table:
+        unknown = [name for name, _x, _y in table if name not in {pair.name for pair in found.surveyed}]
+        if len(found.pairs()) >= 2:
+            fit_points(found.pairs())
         if unknown:
-            told = (Tell(f"no reflector or station is called {', '.join(unknown[:5])}; left out", failed=False),)
-    return Outcome(with_tool(state, sender, replace(tool, surveyed=pairs)), told)
+            text = f"nothing is called {', '.join(unknown[:5])}: left out, until a clicked point has that name"
+            told = (Tell(text, failed=False),)
+    return Outcome(with_tool(state, sender, found), told)
 
 
 @reduce.register

@@ -1,10 +1,10 @@
-"""The floor map's tools as part of the selection's panel: how walls are drawn, and the two points to align by."""
+"""The floor map's tools as part of the selection's panel: how walls are drawn, and the points to align by."""
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar, Literal
 
-import numpy as np
 from viser import GuiApi, GuiEvent
 
 from commission.app.base import actions as page_actions
@@ -23,7 +23,9 @@ from commission.app.floor_map import actions
 from commission.app.floor_map.align_tool import LETTERS, AlignTool, NamedPoint
 from commission.app.floor_map.pen import MapPen
 from commission.app.floor_map.tools import EraseTool, ObstacleTool, WallTool
+from commission.errors import UsageError
 from commission.site.editing.alignment import DOUBTFUL, WRONG
+from commission.site.editing.plant_check import FEWEST_FOR_WORST, PointCheck, check_points, worst_of
 from commission.site.editing.plant_fit import PlantFit, fit_points
 from commission.site.fields import field_info, get_field
 from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
@@ -43,6 +45,7 @@ NOWHERE = NamedPoint((0.0, 0.0), (0.0, 0.0))
 PLANT, NAME = field_info(NOWHERE, "plant"), field_info(NOWHERE, "name")
 MOST_POINTS = 12
 """Surveyed points whose residuals are listed, the worst first."""
+A_FOURTH = "<div class='c-note'>Of three points nothing says which one is wrong: a fourth does.</div>"
 LONGEST_NAME = 40
 """Letters of a point's name that are kept."""
 
@@ -81,7 +84,9 @@ class MapToolFields(BasePanel):
         gui = self._gui
         self._folder = gui.add_folder("Onto the plant's coordinates", visible=False)
         with self._folder:
-            self._points = [self._add_point(index) for index in range(2)]
+            self._points = [self._add_point(index) for index in range(len(LETTERS))]
+            self._forget = gui.add_button("Forget the last point", color="gray", hint="The one that was clicked last.")
+            self._forget.on_click(posting(self._post, lambda _event: actions.ForgetPoint()))
             self._moves = gui.add_dropdown(
                 "Moves", (MAP_ONLY, EVERYTHING), hint="Reflectors, routes, stations: where they are, or with the map."
             )
@@ -92,8 +97,8 @@ class MapToolFields(BasePanel):
                 "Surveyed points",
                 "",
                 multiline=True,
-                hint="Rows of name, x, y in the plant from a table: names are those of reflectors and stations. "
-                "Where there are any, everything is moved by them, and A and B do not count.",
+                hint="Rows of name, x, y in the plant from a table: names are those of reflectors, stations, or of "
+                "points that you have clicked and named. Where there are any, everything is moved.",
             )
             self._surveyed.on_update(posting(self._post, lambda event: actions.SetSurveyed(event.target.value)))
             self._said = gui.add_html("")
@@ -127,16 +132,18 @@ class MapToolFields(BasePanel):
             self._show_alignment(tool)
 
     def _show_alignment(self, tool: AlignTool) -> None:
+        show(self._forget, visible=bool(tool.known))
         for index, widgets in enumerate(self._points):
             known = index < len(tool.known)
             point = tool.known[index] if known else NOWHERE
             for widget, value in zip(widgets, (point.name, held(PLANT, point.plant)), strict=True):
+                show(widget, visible=known or index < 2)
                 write(widget, value)
                 enable(widget, "" if known else f"click point {LETTERS[index]} on the floor first")
         write(self._moves, EVERYTHING if tool.everything else MAP_ONLY)
         self._said.content = f"<div style='padding:2px 6px'>{alignment_text(tool)}</div>"
-        if tool.surveyed:
-            enable(self._align, "")
+        if tool.is_checked:
+            enable(self._align, checked_problem(tool))
             return
         found = tool.alignment()
         why_not = "two points and their places in the plant are needed" if found is None else ""
@@ -147,8 +154,8 @@ class MapToolFields(BasePanel):
 
 def alignment_text(tool: AlignTool) -> str:
     """Return what the points say, as html."""
-    if tool.surveyed:
-        return surveyed_text(fit_points(tool.surveyed))
+    if tool.is_checked:
+        return checked_text(tool)
     clicked = [
         (f"{letter} on the map", f"{point.at[0]:.3f}, {point.at[1]:.3f} m")
         for letter, point in zip(LETTERS, tool.known, strict=False)
@@ -181,23 +188,68 @@ def alignment_text(tool: AlignTool) -> str:
     return f"{table(rows)}<div class='c-note'>{note}</div>"
 
 
-def surveyed_text(found: PlantFit) -> str:
-    """Return by how much each surveyed point is missed, the worst first, as html."""
-    order = np.argsort(-found.offs, kind="stable")[:MOST_POINTS]
+def checked_problem(tool: AlignTool) -> str:
+    """Return why the points make no fit, in one line; empty: they do."""
+    try:
+        fit_points(tool.pairs())
+    except UsageError as error:
+        return str(error)
+    return ""
+
+
+def checked_text(tool: AlignTool) -> str:
+    """Return the fit of all points, and each point held against the others, the worst first, as html."""
+    missing = tool.untyped()
+    note = (
+        f"Not counted: {', '.join(map(escaped, missing))}, of which x, y in the plant are missing." if missing else ""
+    )
+    problem = checked_problem(tool)
+    if problem:
+        color = theme.css(theme.REFUSED)
+        return f"<div style='color:{color};font-size:12px'>{escaped(problem)}</div><div class='c-note'>{note}</div>"
+    found = fit_points(tool.pairs())
     rows = [
         ("Points", str(len(found.pairs))),
         ("RMS", MILLIMETRES.text(found.rms, ".1f")),
         ("Turns by", DEGREES.text(float(found.T_plant_map[2]), ".3f")),
         ("Distances, plant / map", f"{found.scale:.5f}"),
-        *(
-            (
-                f"{escaped(found.pairs[index].name)} off by",
-                f"{MILLIMETRES.number(found.residuals[index, 0], '+.1f')}, "
-                f"{MILLIMETRES.text(found.residuals[index, 1], '+.1f')}",
-            )
-            for index in order.tolist()
-        ),
     ]
     striking = found.striking
-    note = f"Stands out: {', '.join(map(escaped, striking))}. Look at it, or leave it out." if striking else ""
-    return f"{table(rows)}<div class='c-note'>{note}</div>"
+    if striking:
+        note = f"Stands out: {', '.join(map(escaped, striking))}. Look at it, or leave it out. {note}"
+    return f"{table(rows)}{points_table(found)}<div class='c-note'>{note}</div>"
+
+
+def points_table(found: PlantFit) -> str:
+    """Return what each point is off by and what the others say of it, the worst first and marked, as html."""
+    checks = check_points(found)
+    worst = worst_of(checks)
+    titles = (
+        ("", "Name of the point"),
+        (
+            f"dx, dy [{MILLIMETRES.unit}]",
+            "Where the plant has the point less where the moved map has it, along the plant's axes",
+        ),
+        ("1σ", "What is to be expected of that, each axis, by how much all points scatter"),
+        ("without it", "By how much the fit of all other points misses it, and the 1σ of that"),
+    )
+    head = "".join(f"<td title='{escaped(hint)}'>{title}</td>" for title, hint in titles)
+    order = sorted(checks, key=lambda each: (-each.strength, -each.off))[:MOST_POINTS]
+    lines = "".join(_point_row(each, is_worst=each is worst) for each in order)
+    more = f"<div class='c-note'>and {len(checks) - MOST_POINTS} more</div>" if len(checks) > MOST_POINTS else ""
+    return (
+        f"<table class='c-before-after c-points'><tr>{head}</tr>{lines}</table>"
+        f"{more}{'' if worst or len(checks) != FEWEST_FOR_WORST - 1 else A_FOURTH}"
+    )
+
+
+def _point_row(check: PointCheck, *, is_worst: bool) -> str:
+    dx, dy = (MILLIMETRES.number(each, "+.1f") for each in check.residual)
+    without = known(check.left_out) + (f" ± {known(check.left_out_sigma)}" if check.left_out >= 0.0 else "")
+    name = f"<b>{escaped(check.pair.name)}</b> (worst)" if is_worst else escaped(check.pair.name)
+    return f"<tr><td>{name}</td><td>{dx}, {dy}</td><td>{known(check.sigma)}</td><td>{without}</td></tr>"
+
+
+def known(length: float) -> str:
+    """Return a length in the unit of the table; a dash where it is not known [m]."""
+    return "–" if math.isnan(length) else MILLIMETRES.number(length, ".1f")

@@ -132,14 +132,18 @@ def _check(fit: PlantFit, *, mirrored: bool) -> None:
 
 
 def pairs_of(
-    project: Project, surveyed: Iterable[tuple[str, float, float]]
+    project: Project,
+    surveyed: Iterable[tuple[str, float, float]],
+    free: Iterable[tuple[str, float, float]] = (),
 ) -> tuple[tuple[PlantPair, ...], tuple[str, ...]]:
-    """Pair surveyed points with reflectors and stations of the same name.
+    """Pair surveyed points with reflectors, stations and free points of the same name.
 
     Parameters
     ----------
     project : the site, in the map's frame.
     surveyed : name, x and y of each point in the plant's coordinates [m].
+    free : name, x and y [m], map frame, of points that are neither: corners, columns, marks on the floor. Where one is
+        called as a reflector or a station is, it is the one that is meant.
 
     Returns
     -------
@@ -152,6 +156,7 @@ def pairs_of(
     """
     places = {station.name.casefold(): (station.x, station.y) for station in project.stations}
     places |= {each.id.casefold(): (each.x, each.y) for each in project.reflectors.reflectors}
+    places |= {name.casefold(): (x, y) for name, x, y in free}
     pairs: list[PlantPair] = []
     unknown: list[str] = []
     seen = set[str]()

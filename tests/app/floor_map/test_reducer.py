@@ -252,8 +252,11 @@ def test_points_to_align_by_snap_to_reflectors_and_to_corners_of_walls(state: Ap
         (0.25, 2.0),
         pytest.approx((7.5, 3.5)),
     ]
-    again = after(clicked, click(4.0, 4.0)).state
-    assert [point.at for point in known(again)] == [(0.25, 2.0), (4.0, 4.0)]
+    # A click near a point moves it, one elsewhere is another point to check them by.
+    again = after(clicked, click(4.0, 4.0), actions.SetPlantPoint(2, (104.0, 54.0)), click(4.15, 4.0)).state
+    assert [point.at for point in known(again)] == [(0.25, 2.0), pytest.approx((7.5, 3.5)), (4.15, 4.0)]
+    assert known(again)[2].plant == (104.0, 54.0)
+    assert known(after(again, actions.ForgetPoint()).state) == known(again)[:2]
 
 
 def aligning(state: AppState, *, everything: bool, stretch: float = 1.0) -> Outcome:

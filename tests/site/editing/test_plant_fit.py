@@ -4,19 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from commission.app.base.actions import ClickFloor
 from commission.app.base.state import AppState
 from commission.app.editing.actions import ChooseTool
 from commission.app.editing.editor import editor_of
-from commission.app.floor_map.actions import AlignMap, SetSurveyed
+from commission.app.floor_map.actions import AlignMap, SetPlantPoint, SetSurveyed
 from commission.app.floor_map.align_tool import AlignTool
 from commission.app.floor_map.tool_fields import alignment_text
+from commission.cli.align import Align
 from commission.errors import CommissionError, UsageError
 from commission.io.plant_points import surveyed_points
+from commission.io.project_file import load_project, save_project
+from commission.site.editing.plant_check import check_points, worst_of
 from commission.site.editing.plant_fit import PlantPair, fit_points, pairs_of
 from tests.app.asking import ME, after, joined
 from tests.app.sites import room
@@ -89,6 +94,99 @@ def test_points_that_no_move_explains_are_refused(change, why: str) -> None:
         fit_points([change(each) for each in pairs()])
     with pytest.raises(UsageError, match="expected 2 or more"):
         fit_points(pairs()[:1])
+
+
+def test_sigma_of_a_residual_and_of_what_the_others_miss_a_point_by_is_how_much_they_scatter() -> None:
+    rng, sigma, count = np.random.default_rng(3), 0.004, 400
+    residuals, missed, told, told_without = (np.empty((count, len(PLACES), *rest)) for rest in ((2,), (), (), ()))
+    for trial in range(count):
+        noise = rng.normal(0.0, sigma, (len(PLACES), 2))
+        given = [
+            replace(each, plant=(each.plant[0] + dx, each.plant[1] + dy))
+            for each, (dx, dy) in zip(pairs(), noise.tolist(), strict=True)
+        ]
+        for index, each in enumerate(check_points(fit_points(given))):
+            residuals[trial, index], missed[trial, index] = each.residual, each.left_out
+            told[trial, index], told_without[trial, index] = each.sigma, each.left_out_sigma
+    # Squares average without bias: 1-sigma of a mean of 2 * 400 squares is 5 %, of those told less.
+    real = np.mean(residuals**2, axis=(0, 2))
+    assert np.mean(told**2, axis=0) == pytest.approx(real, rel=0.2)
+    assert np.mean(told_without**2, axis=0) == pytest.approx(0.5 * np.mean(missed**2, axis=0), rel=0.2)
+    # The point in the middle has the most freedom, those at the corners the least.
+    assert int(np.argmax(real)) == 4
+    assert np.mean(told**2, axis=0)[4] == pytest.approx(0.8 * sigma**2, rel=0.1)
+
+
+def test_the_worst_point_is_the_one_that_is_wrong_and_the_others_say_by_how_much() -> None:
+    given = pairs(noise=0.002)
+    x, y = given[2].plant
+    given[2] = replace(given[2], plant=(x + 0.06, y - 0.08))
+    checks = check_points(fit_points(given))
+    worst = worst_of(checks)
+    assert worst is checks[2]
+    assert worst.left_out == pytest.approx(0.1, abs=0.01)
+    assert worst.off < 0.08, "a wrong point draws the fit to it"
+    assert [each.pair.name for each in checks] == [each.name for each in given]
+    assert math.isnan(check_points(fit_points(given[:2]))[0].left_out)
+    # Of three points, one wrong by 0.1 m, each contradicts the other two.
+    three = check_points(fit_points(given[1:4]))
+    assert all(each.left_out > 0.03 for each in three)
+    assert worst_of(three) is None
+
+
+def test_corners_that_are_no_reflectors_align_the_site_and_each_is_held_against_the_others() -> None:
+    project = room()
+    state = joined(AppState(project=project, saved=project))
+    corners = ((1.0, 6.0), (9.0, 6.5), (5.0, 1.0), (2.0, 4.0))
+    clicked = after(state, ChooseTool(AlignTool()), *(ClickFloor(place, 0.01) for place in corners)).state
+    places = [point.at for point in editor_of(clicked, ME).tool.known]  # type: ignore[union-attr]
+    plants = [in_plant(*place) for place in places]
+    wrong = (plants[2][0] + 0.05, plants[2][1])
+    named = after(
+        clicked,
+        SetPlantPoint(0, plants[0], "column B4"),
+        SetPlantPoint(1, plants[1]),
+        # The third and the fourth by a table, one of them by its letter's name.
+        SetPlantPoint(2, places[2], "gate"),
+        SetPlantPoint(3, places[3], "D4"),
+        SetSurveyed(f"gate\t{wrong[0]:.4f}\t{wrong[1]:.4f}\nd4\t{plants[3][0]:.4f}\t{plants[3][1]:.4f}\nX\t0\t0"),
+    )
+    assert any("nothing is called X" in effect.text for effect in named.effects)  # type: ignore[attr-defined]
+    tool = editor_of(named.state, ME).tool
+    assert isinstance(tool, AlignTool)
+    text = alignment_text(tool)
+    assert "<b>gate</b> (worst)" in text
+    assert text.count("(worst)") == 1
+    assert [each in text for each in ("column B4", "<td>B</td>", "d4")] == [True] * 3
+    right = after(named.state, SetSurveyed(f"gate\t{plants[2][0]:.4f}\t{plants[2][1]:.4f}")).state
+    assert "Not counted: D4, of which x, y in the plant are missing." in alignment_text(
+        editor_of(right, ME).tool  # type: ignore[arg-type]
+    )
+    moved = after(right, AlignMap()).state
+    assert len(moved.undo) == 1
+    for before, now in zip(project.reflectors.reflectors, moved.project.reflectors.reflectors, strict=True):
+        assert (now.x, now.y) == pytest.approx(in_plant(before.x, before.y), abs=1e-3)
+
+
+def test_the_command_takes_points_that_are_no_reflectors_and_says_what_each_is_off_by(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save_project(room(), tmp_path / "site")
+    here = {"gate": (5.0, 1.0), "B4": (1.0, 6.0), "C7": (9.0, 6.5)}
+    for name, rows in (("map", here), ("plant", {name: in_plant(*place) for name, place in here.items()})):
+        lines = [f"{each},{x:.4f},{y:.4f}" for each, (x, y) in rows.items()]
+        (tmp_path / f"{name}.csv").write_text("\n".join(["name,x,y", *lines]), encoding="utf-8")
+    command = Align(
+        project=tmp_path / "site", points=tmp_path / "plant.csv", on_map=tmp_path / "map.csv", out=tmp_path / "out"
+    )
+    command.run()
+    said = capsys.readouterr().out
+    assert "turned by 31.00" in said
+    assert said.count("Off ") == 3
+    assert "gate: " in said
+    assert "the others miss it by 0." in said
+    reflector, now = (load_project(tmp_path / each).reflectors.reflectors[0] for each in ("site", "out"))
+    assert (now.x, now.y) == pytest.approx(in_plant(reflector.x, reflector.y), abs=1e-3)
 
 
 def table(extra: str = "") -> str:
