@@ -41,6 +41,16 @@ class NamedPoint:
 
 
 @dataclass(frozen=True, slots=True)
+class PlantSurvey:
+    """Points that were surveyed in the plant, from a table."""
+
+    rows: tuple[tuple[str, float, float], ...] = ()
+    """Name, x and y [m], as pasted."""
+    pairs: tuple[PlantPair, ...] = ()
+    """Those of them that are reflectors, stations, or clicked points by their names."""
+
+
+@dataclass(frozen=True, slots=True)
 class AlignTool(Tool):
     """Takes points by which the map is moved onto the plant's coordinate system: two, or more to check them by."""
 
@@ -49,10 +59,8 @@ class AlignTool(Tool):
     everything: bool = False
     """Whether reflectors, routes and stations go with the map."""
 
-    table: tuple[tuple[str, float, float], ...] = ()
-    """Name, x and y [m] of points that were surveyed in the plant, as pasted."""
-    surveyed: tuple[PlantPair, ...] = ()
-    """Those of them that are reflectors, stations, or clicked points by their names."""
+    survey: PlantSurvey = PlantSurvey()
+    """What a table says of points; nothing where none was pasted."""
 
     name = "Align"
 
@@ -83,7 +91,13 @@ class AlignTool(Tool):
     def paired(self, project: Project) -> AlignTool:
         """Return the tool with the points of the table found in the project and among the clicked ones, by name."""
         free = [(point.name, *point.at) for point in self.known if point.name]
-        return replace(self, surveyed=pairs_of(project, self.table, free)[0])
+        rows = self.survey.rows
+        return replace(self, survey=PlantSurvey(rows, pairs_of(project, rows, free)[0]))
+
+    @property
+    def surveyed(self) -> tuple[PlantPair, ...]:
+        """Points of the table that are known on the map, too."""
+        return self.survey.pairs
 
     @property
     def is_checked(self) -> bool:

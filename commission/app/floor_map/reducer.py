@@ -12,7 +12,7 @@ from commission.app.base.state import AppState, Edit, edited
 from commission.app.base.uploads import Upload
 from commission.app.editing.editor import editor_of, with_tool
 from commission.app.floor_map import actions, align_tool
-from commission.app.floor_map.align_tool import AlignTool
+from commission.app.floor_map.align_tool import AlignTool, PlantSurvey
 from commission.app.floor_map.draft import (
     ENDINGS,
     MAP_ENDINGS,
@@ -180,7 +180,7 @@ def set_surveyed(action: actions.SetSurveyed, state: AppState, sender: Sender) -
         return Outcome(state)
     told: tuple[Tell, ...] = ()
     table = tuple(surveyed_points(action.table)) if action.table.strip() else ()
-    found = replace(tool, table=table).paired(state.project)
+    found = replace(tool, survey=PlantSurvey(table)).paired(state.project)
     if table:
         unknown = [name for name, _x, _y in table if name not in {pair.name for pair in found.surveyed}]
         if len(found.pairs()) >= 2:

@@ -32,7 +32,7 @@ FARTHEST = 1e8
 NOTHING = "The scan appears with the first record of a drive."
 
 
-class Said(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class FromScript(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """What the page's script says: the line was dragged, something was clicked, or the list is asked for."""
 
     n: int
@@ -143,11 +143,11 @@ def said(text: str, drive: DriveNow | None) -> Action:
 
     Parameters
     ----------
-    text : JSON of `Said`.
+    text : JSON of `FromScript`.
     drive : on the page; none: there is none.
     """
     try:
-        asked = msgspec.json.decode(text, type=Said)
+        asked = msgspec.json.decode(text, type=FromScript)
     except msgspec.MsgspecError as error:
         raise ValueError(f"the sensor view says {text[:60]!r}; expected what its script says ({error})") from error
     if asked.threshold is not None:
