@@ -68,6 +68,7 @@ def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
         state.pivot,
         state.cross,
         state.search,
+        state.protection,
     )
 
 
@@ -239,6 +240,41 @@ def supervised(  # noqa: PLR0917 - what a cycle has found, value by value
         pivot,
         before.cross,
         before.search,
+        before.protection,
+    )
+
+
+@compiled_inline
+def with_mode(before: FilterState, after: FilterState, mode: int) -> FilterState:
+    """State after a cycle whose mode is another one: what the vehicle is given goes along with it.
+
+    Parameters
+    ----------
+    before : state before the cycle.
+    after : state after it, by another judgement.
+    mode : its mode.
+
+    Notes
+    -----
+    No formula: the belief while it is operational, and the last such one otherwise.
+    """
+    output, output_ns = before.output, before.output_ns
+    if mode == OPERATIONAL:
+        output, output_ns = after.belief, after.belief_ns
+    return FilterState(
+        after.belief,
+        after.belief_ns,
+        after.motion,
+        mode,
+        after.evidence,
+        output,
+        output_ns,
+        after.newest_ns,
+        after.sensor_detects,
+        after.pivot,
+        after.cross,
+        after.search,
+        after.protection,
     )
 
 

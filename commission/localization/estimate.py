@@ -94,6 +94,9 @@ class Estimate:
     """(12,) what became of the contours of the scan, see `contour`; None: they are not looked at."""
     tags: SeenTags | None = None
     """What a frame saw of tags; None of a scan."""
+    levels: FloatArray | None = None
+    """(2,) protection level of position [m] and heading [rad], inf where there is none; None: the supervisor goes by
+    2-sigma."""
 
     def count(self, status: Status) -> int:
         """Return the number of detections of one status."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,6 +41,8 @@ class Cycles(NamedTuple):
     contours: FloatArray
     is_frame: BoolArray
     """Whether the cycle is a frame of the camera that looks for tags."""
+    levels: FloatArray
+    """NaN where the supervisor goes by 2-sigma."""
 
 
 class DetectionRows(NamedTuple):
@@ -89,6 +92,7 @@ class GrowingRun:
             np.empty(n, np.int8),
             np.zeros((n, COLUMNS)),
             np.zeros(n, np.bool_),
+            np.empty((n, 2)),
         )
         self._tag_offsets: IntArray = np.zeros(n + 1, np.int64)
         self._sightings = SightingRows(np.empty((n, 6)), np.empty((n, TAG_COLUMNS)))
@@ -174,6 +178,7 @@ class GrowingRun:
         segments = tuple(segment for segment in self._segments if segment.first < max(n, 1))
         looking = any(segment.setup.tag_model is not None for segment in segments)
         matching = any(segment.setup.contour is not None for segment in segments)
+        protecting = any(segment.setup.protection is not None for segment in segments)
         return RunColumns(
             segments=segments,
             checkpoints=tuple(self._checkpoints),
@@ -188,6 +193,7 @@ class GrowingRun:
             d2=rows.d2,
             contours=cycles.contours if matching else cycles.contours[:0],
             tags=read_only(self._sightings.figures[: len(self._ids) if looking else 0]),
+            levels=cycles.levels if protecting else cycles.levels[:0],
             searches=tuple(self._searches),
             final=self._localizer.state,
         )
@@ -237,6 +243,7 @@ class GrowingRun:
         cycles.means[row], cycles.covariances[row] = estimate.posterior.mean, estimate.posterior.covariance
         cycles.modes[row] = estimate.mode
         cycles.contours[row] = 0.0 if estimate.contours is None else estimate.contours
+        cycles.levels[row] = math.nan if estimate.levels is None else estimate.levels
         self._append_tags(row, estimate.tags)
         rejected = estimate.status == Status.OUTLIER_DETECTOR
         found.range_bearing[first:last], found.beams[first:last] = estimate.detections, estimate.beams

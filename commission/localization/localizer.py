@@ -6,6 +6,7 @@ odometry records waits for the second one, for at most one interval of odometry:
 
 from __future__ import annotations
 
+import math
 from collections import deque
 
 import numpy as np
@@ -22,6 +23,8 @@ from commission.localization.estimate import Belief, Estimate, Mode, SeenTags
 from commission.localization.observation import project_detections
 from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import to_belief
+from commission.localization.protected_cycle import supervised_by_level
+from commission.localization.protection_state import bank_of, protection_state
 from commission.localization.relocalization import (
     associate_nothing,
     forgotten,
@@ -253,8 +256,9 @@ class Localizer:
         if state.search is not None:
             self._state = searching_odometry(state, record.stamp_ns, (dx, dy, dtheta), noise)
             return
-        moved = process_odometry(state._replace(cross=None), record.stamp_ns, dx, dy, dtheta, noise)
-        self._state = moved._replace(cross=state.cross)
+        bare = state._replace(cross=None, protection=None)
+        moved = process_odometry(bare, record.stamp_ns, dx, dy, dtheta, noise)
+        self._state = moved._replace(cross=state.cross, protection=state.protection)
 
     def _at_stamp(self, scanner: int, measured: FloatArray, following: NextOdometry) -> FloatArray:
         """Return the detections of a scan at its stamp, upright: what was measured, where there is no other."""
@@ -279,6 +283,7 @@ class Localizer:
         d2 = np.empty(count)
         figures = None if self._setup.contour is None else np.zeros(COLUMNS)
         tags = self._seen_tags(scan)
+        levels = None if self._setup.protection is None else np.full(2, math.inf)
         if before.mode == Mode.INITIALIZING:
             associate_nothing(status, reflector, d2)
             cycle = unlocated(before, stamp_ns, following, self._setup.filter.odometry)
@@ -286,6 +291,9 @@ class Localizer:
             cycle = self._tagged(scan, following, tags.figures)
         else:
             cycle = self._filtered(scan, detections, following, (status, reflector, d2), figures)
+        if levels is not None and before.mode != Mode.INITIALIZING:
+            written = (read_only(detections), status, reflector)
+            cycle = Cycle(cycle.prior, self._by_level(before, cycle, scanner, written, levels))
         self._state = cycle.state
         if not is_sought(before, self._setup.filter.limits):
             self._state = cycle.state._replace(search=None)
@@ -325,7 +333,40 @@ class Localizer:
             scanner=scanner,
             contours=figures if tags is None else None,
             tags=tags,
+            levels=levels,
         )
+
+    def _by_level(
+        self,
+        before: FilterState,
+        cycle: Cycle,
+        scanner: int,
+        written: tuple[FloatArray, NDArray[np.int8], IntArray],
+        levels: FloatArray,
+    ) -> FilterState:
+        """Let the supervisor go by the protection level, which is written."""
+        setup, after = self._setup, cycle.state
+        if setup.protection is None:
+            raise ValueError("protection levels are asked for where the supervisor goes by 2-sigma")
+        detections, status, reflectors = written
+        bank = bank_of(before.protection, setup.protected_names)
+        bare = after._replace(cross=None, search=None, protection=None)
+        state = supervised_by_level(
+            before._replace(cross=None, search=None, protection=None),
+            Cycle(cycle.prior, bare),
+            0,
+            len(detections),
+            detections,
+            status,
+            reflectors,
+            setup.observations[scanner],
+            setup.filter,
+            setup.protection,
+            bank,
+            levels,
+        )
+        protection = protection_state(bank, setup.protected_names)
+        return state._replace(cross=after.cross, search=after.search, protection=protection)
 
     def _seen_tags(self, record: Scan | Detections | TagSightings) -> SeenTags | None:
         """What a frame saw of tags, with room for what becomes of it where they are looked at; None of a scan."""
@@ -354,7 +395,7 @@ class Localizer:
         if setup.tag_model is None:
             raise ValueError("a frame with tags is processed where none are looked at; expected tags in the setup")
         cycle = process_tags(
-            self._state._replace(cross=None, search=None),
+            self._state._replace(cross=None, search=None, protection=None),
             frame.stamp_ns,
             0,
             count,
@@ -386,7 +427,7 @@ class Localizer:
         cross = columns_of(self._state.cross, constants)
         room = room_for_scans(cross, len(detections))
         cycle = process_scan(
-            self._state._replace(cross=None, search=None),
+            self._state._replace(cross=None, search=None, protection=None),
             scan.stamp_ns,
             0,
             len(detections),

@@ -1,7 +1,7 @@
 """Protection levels: how large the error of a run can be where one reflector misleads it and nobody notices.
 
-Solution separation: beside the run, one filter for each reflector of late that leaves this reflector out. A run is
-judged cycle by cycle; the localizer itself knows nothing of it.
+Solution separation: beside the run, one filter for each reflector of late that leaves this reflector out. One step
+judges a cycle: the supervisor calls it where it goes by protection levels, the study of a finished run for any run.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from commission.compiled import compiled, compiled_inline
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.kalman import correct
-from commission.localization.observation import observation_at
+from commission.localization.observation import ObservationModel, observation_at
 from commission.localization.pose_gaussian import PoseGaussian, larger_eigenvalue
 from commission.localization.supervisor import INITIALIZING, LOST
 
@@ -27,6 +27,10 @@ KEPT_CYCLES = 20
 NEGLIGIBLE = 1.05
 """Variance without a reflector, as a multiple of that with it, below which its filter is given up."""
 INLIER = 0
+
+
+EVERY, NEWEST = SLOTS, SLOTS + 1
+"""Rows of the filter that leaves no reflector out, and of the run's own belief after its newest cycle."""
 
 
 class Levels(NamedTuple):
@@ -40,20 +44,63 @@ class Levels(NamedTuple):
     """(K,) number of the reflector whose failure would be worst for the position; -1: no fault is."""
 
 
+class Level(NamedTuple):
+    """Protection level of one cycle."""
+
+    position: float
+    """Largest error of the position [m]."""
+    heading: float
+    """Largest error of the heading [rad]."""
+    reflector: int
+    """Number of the reflector whose failure would be worst for the position; -1: no fault is."""
+
+
+class ProtectionModel(NamedTuple):
+    """What levels are reckoned with, for kernels."""
+
+    risk: float
+    """Integrity risk per cycle."""
+    fault: float
+    """Probability that a reflector in sight misleads."""
+    places: FloatArray
+    """(N, 3) x, y [m] and variance [m^2] of each reflector of the map."""
+    numbers: IntArray
+    """(N,) number by which each is known; the same reflector has the same in all maps that a bank is used with."""
+
+
 class Bank(NamedTuple):
-    """Filters that leave one reflector out each; the last one leaves none out."""
+    """Filters that leave one reflector out each, one that leaves none out, and the run's own belief; in and out."""
 
     beliefs: FloatArray
-    """(SLOTS + 1, 9) x, y, theta, xx, xy, xt, yy, yt, tt."""
+    """(SLOTS + 2, 9) x, y, theta, xx, xy, xt, yy, yt, tt; (0, 9): levels are not asked for."""
     owner: IntArray
-    """(SLOTS,) number of the reflector that is left out; -1: the filter is not used."""
-    seen: IntArray
-    """(SLOTS,) cycle of its last sighting."""
+    """(SLOTS,) number of the reflector that is left out; -1: the filter is not used. (0,): as `beliefs`."""
+    unseen: IntArray
+    """(SLOTS,) cycles since its last sighting."""
+    begun: NDArray[np.bool_]
+    """(1,) whether the rows that leave none out are in use."""
 
 
 def new_bank() -> Bank:
     """Return a bank in which no filter is used."""
-    return Bank(np.zeros((SLOTS + 1, 9)), np.full(SLOTS, -1, dtype=np.int64), np.zeros(SLOTS, dtype=np.int64))
+    owner, unseen = np.full(SLOTS, -1, dtype=np.int64), np.zeros(SLOTS, dtype=np.int64)
+    return Bank(np.zeros((SLOTS + 2, 9)), owner, unseen, np.zeros(1, dtype=np.bool_))
+
+
+@compiled_inline
+def forget(bank: Bank) -> None:
+    """Give all filters up: the next cycle begins anew, from the run's own belief.
+
+    Parameters
+    ----------
+    bank : in and out.
+
+    Notes
+    -----
+    No formula: it writes flags.
+    """
+    bank.owner[:] = -1
+    bank.begun[0] = False
 
 
 @compiled_inline
@@ -80,13 +127,19 @@ def _write(row: FloatArray, p: PoseGaussian) -> None:
 
 
 @compiled
-def _row_of(mean: FloatArray, covariance: FloatArray) -> FloatArray:
-    """(9,) mean (3,) and covariance (3, 3) in one row."""
-    row = np.empty(9)
-    row[:3] = mean
-    row[3], row[4], row[5] = covariance[0, 0], covariance[0, 1], covariance[0, 2]
-    row[6], row[7], row[8] = covariance[1, 1], covariance[1, 2], covariance[2, 2]
-    return row
+def _belief_of(mean: FloatArray, covariance: FloatArray) -> PoseGaussian:
+    """Belief of a mean (3,) and a covariance (3, 3)."""
+    return PoseGaussian(
+        mean[0],
+        mean[1],
+        mean[2],
+        covariance[0, 0],
+        covariance[0, 1],
+        covariance[0, 2],
+        covariance[1, 1],
+        covariance[1, 2],
+        covariance[2, 2],
+    )
 
 
 @compiled
@@ -109,15 +162,15 @@ def _carried(row: FloatArray, dx: float, dy: float) -> FloatArray:
 
 
 @compiled
-def _predict(bank: Bank, before: FloatArray, prior: FloatArray) -> None:
+def _predict(bank: Bank, prior: FloatArray) -> None:
     """Carry all filters over the motion between two cycles, as the run's own belief was carried.
 
     Parameters
     ----------
     bank : filters.
-    before : (9,) belief of the run after the cycle before.
-    prior : (9,) its belief before this cycle.
+    prior : (9,) belief of the run before this cycle.
     """
+    before = bank.beliefs[NEWEST]
     dx, dy = prior[0] - before[0], prior[1] - before[1]
     noise = prior[3:] - _carried(before, dx, dy)
     # With considered constants the difference need be no covariance.
@@ -126,7 +179,7 @@ def _predict(bank: Bank, before: FloatArray, prior: FloatArray) -> None:
     noise[2] = min(max(noise[2], -math.sqrt(noise[0] * noise[5])), math.sqrt(noise[0] * noise[5]))
     noise[4] = min(max(noise[4], -math.sqrt(noise[3] * noise[5])), math.sqrt(noise[3] * noise[5]))
     for slot in range(SLOTS + 1):
-        if slot < SLOTS and bank.owner[slot] < 0:
+        if slot != EVERY and bank.owner[slot] < 0:
             continue
         row = bank.beliefs[slot]
         covariance = _carried(row, dx, dy) + noise
@@ -137,24 +190,24 @@ def _predict(bank: Bank, before: FloatArray, prior: FloatArray) -> None:
 
 
 @compiled
-def _enter(bank: Bank, number: int, cycle: int, prior: FloatArray) -> None:
+def _enter(bank: Bank, number: int) -> None:
     """See to it that there is a filter without a reflector: one that begins leaves it out from this scan on."""
     free, least = -1, math.inf
     for slot in range(SLOTS):
         if bank.owner[slot] == number:
-            bank.seen[slot] = cycle
+            bank.unseen[slot] = 0
             return
         if bank.owner[slot] < 0:
             free, least = slot, -math.inf
         elif bank.beliefs[slot, 3] + bank.beliefs[slot, 6] < least:
             free, least = slot, bank.beliefs[slot, 3] + bank.beliefs[slot, 6]
-    bank.owner[free], bank.seen[free] = number, cycle
-    bank.beliefs[free] = prior
+    bank.owner[free], bank.unseen[free] = number, 0
+    bank.beliefs[free] = bank.beliefs[EVERY]
 
 
 @compiled
-def _judge(bank: Bank, own: FloatArray, cycle: int, factors: tuple[float, float], levels: Levels) -> None:
-    """Write the levels of a cycle.
+def _judge(bank: Bank, own: PoseGaussian, model: ProtectionModel) -> Level:
+    """Level of a cycle; filters whose reflector matters no more are given up.
 
     Notes
     -----
@@ -162,16 +215,15 @@ def _judge(bank: Bank, own: FloatArray, cycle: int, factors: tuple[float, float]
     al., Navigation 62, 2015), with the position's K = sqrt(-2 ln p), by which exp(-K^2 / 2) bounds a distance in two
     dimensions, and the heading's such that erfc(K / sqrt 2) = p is bounded by the same.
     """
-    risk, fault = factors
     used = 0
     for slot in range(SLOTS):
         used += bank.owner[slot] >= 0
-    k0 = math.sqrt(-2.0 * math.log(0.5 * risk))
-    kj = math.sqrt(max(-2.0 * math.log(min(0.5 * risk / max(used * fault, 1e-300), 1.0)), 0.0))
-    variance = max(larger_eigenvalue(own[3], own[4], own[6]), 0.0)
-    heading_variance = max(own[8], 0.0)
+    k0 = math.sqrt(-2.0 * math.log(0.5 * model.risk))
+    kj = math.sqrt(max(-2.0 * math.log(min(0.5 * model.risk / max(used * model.fault, 1e-300), 1.0)), 0.0))
+    variance = max(larger_eigenvalue(own.xx, own.xy, own.yy), 0.0)
+    heading_variance = max(own.tt, 0.0)
     position, heading, worst = k0 * math.sqrt(variance), k0 * math.sqrt(heading_variance), -1
-    every = bank.beliefs[SLOTS]
+    every = bank.beliefs[EVERY]
     with_all = max(larger_eigenvalue(every[3], every[4], every[6]), 1e-12)
     for slot in range(SLOTS):
         if bank.owner[slot] < 0:
@@ -180,14 +232,68 @@ def _judge(bank: Bank, own: FloatArray, cycle: int, factors: tuple[float, float]
         # What the run knows of constants makes its own variance larger than that of a filter of white noise.
         grown = max(larger_eigenvalue(row[3], row[4], row[6]) / with_all, 1.0)
         turned = max(row[8] / max(every[8], 1e-12), 1.0)
-        apart = math.hypot(own[0] - row[0], own[1] - row[1])
+        apart = math.hypot(own.x - row[0], own.y - row[1])
         level = apart + kj * math.sqrt(variance * grown)
         if level > position:
             position, worst = level, bank.owner[slot]
-        heading = max(heading, abs(wrap_scalar(own[2] - row[2])) + kj * math.sqrt(heading_variance * turned))
-        if cycle - bank.seen[slot] > KEPT_CYCLES and grown < NEGLIGIBLE and apart * apart < 0.05 * variance:
+        heading = max(heading, abs(wrap_scalar(own.theta - row[2])) + kj * math.sqrt(heading_variance * turned))
+        if bank.unseen[slot] > KEPT_CYCLES and grown < NEGLIGIBLE and apart * apart < 0.05 * variance:
             bank.owner[slot] = -1
-    levels.position[cycle], levels.heading[cycle], levels.reflector[cycle] = position, heading, worst
+    return Level(position, heading, worst)
+
+
+@compiled
+def protect_cycle(  # noqa: PLR0917 - a cycle, number by number
+    bank: Bank,
+    prior: PoseGaussian,
+    own: PoseGaussian,
+    first: int,
+    last: int,
+    detections: FloatArray,
+    status: NDArray[np.int8],
+    reflectors: IntArray,
+    observation: ObservationModel,
+    model: ProtectionModel,
+) -> Level:
+    """Carry the filters to a cycle, correct them by what the run has accepted, and return the level.
+
+    Parameters
+    ----------
+    bank : in and out.
+    prior, own : belief of the run before and after the cycle.
+    first, last : rows of the scan's detections, the last one excluded.
+    detections, status, reflectors : range [m] and bearing [rad], a `Status`, index into the reflector map.
+    observation : mounting and noise of the scan's scanner.
+    model : map, integrity risk and probability of a fault.
+
+    Notes
+    -----
+    |e| <= |x - x_j| + K sigma_j, the largest over all j: solution separation, Blanch et al. 2015.
+    """
+    row = np.empty(9)
+    _write(row, prior)
+    if bank.begun[0]:
+        _predict(bank, row)
+    else:
+        bank.beliefs[EVERY] = row
+        bank.begun[0] = True
+    bank.unseen[:] += 1
+    for i in range(first, last):
+        if status[i] == INLIER:
+            _enter(bank, int(model.numbers[reflectors[i]]))
+    for i in range(first, last):
+        if status[i] != INLIER:
+            continue
+        place, number = model.places[reflectors[i]], model.numbers[reflectors[i]]
+        distance, bearing = detections[i, 0] - observation.range_bias, detections[i, 1]
+        for slot in range(SLOTS + 1):
+            if slot != EVERY and (bank.owner[slot] < 0 or bank.owner[slot] == number):
+                continue
+            belief = _belief(bank.beliefs[slot])
+            corrected = correct(belief, distance, bearing, place[0], place[1], place[2], observation)
+            _write(bank.beliefs[slot], corrected)
+    _write(bank.beliefs[NEWEST], own)
+    return _judge(bank, own, model)
 
 
 @compiled
@@ -202,11 +308,9 @@ def protect(  # noqa: PLR0917 - the columns of a run
     range_bearing: FloatArray,
     status: NDArray[np.int8],
     reflectors: IntArray,
-    numbers: IntArray,
     scanners: IntArray,
     observations: FloatArray,
-    places: FloatArray,
-    factors: tuple[float, float],
+    model: ProtectionModel,
     bank: Bank,
     levels: Levels,
 ) -> None:
@@ -218,44 +322,34 @@ def protect(  # noqa: PLR0917 - the columns of a run
     prior_means, prior_covariances : (B, 3), (B, 3, 3) beliefs before these cycles.
     means, covariances, modes : (K, ...) of the whole run, after each cycle.
     offsets, range_bearing, status, reflectors : detections of the whole run.
-    numbers : (N,) number of each reflector of the setup, the same in all setups.
     scanners : (K,) of each cycle.
     observations : (S, 6) see `observation_rows`.
-    places : (N, 3) x, y [m] and variance [m^2] of each reflector of the setup.
-    factors : integrity risk per cycle, and probability that a reflector in sight misleads.
+    model : map, integrity risk and probability of a fault.
     bank : in and out.
     levels : out.
 
     Notes
     -----
-    |e| <= |x - x_j| + K sigma_j, the largest over all j: solution separation, Blanch et al. 2015.
+    No formula: `protect_cycle`. Nothing is promised while the vehicle is sought, nor in the cycle in which it is found,
+    whose belief does not follow from the one before.
     """
     for k in range(len(prior_means)):
         cycle = first + k
-        own = _row_of(means[cycle], covariances[cycle])
-        if modes[cycle] == INITIALIZING or modes[cycle] == LOST:
-            bank.owner[:] = -1
-            bank.beliefs[SLOTS] = own
+        sought_before = cycle > 0 and (modes[cycle - 1] == INITIALIZING or modes[cycle - 1] == LOST)
+        if sought_before or modes[cycle] == INITIALIZING or modes[cycle] == LOST:
+            forget(bank)
             levels.position[cycle], levels.heading[cycle], levels.reflector[cycle] = math.inf, math.inf, -1
             continue
-        prior = _row_of(prior_means[k], prior_covariances[k])
-        if cycle == 0 or modes[cycle - 1] == INITIALIZING or modes[cycle - 1] == LOST:
-            bank.beliefs[SLOTS] = prior
-        else:
-            _predict(bank, _row_of(means[cycle - 1], covariances[cycle - 1]), prior)
-        model = observation_at(observations, scanners[cycle])
-        for i in range(offsets[cycle], offsets[cycle + 1]):
-            if status[i] == INLIER:
-                _enter(bank, int(numbers[reflectors[i]]), cycle, bank.beliefs[SLOTS])
-        for i in range(offsets[cycle], offsets[cycle + 1]):
-            if status[i] != INLIER:
-                continue
-            place = places[reflectors[i]]
-            for slot in range(SLOTS + 1):
-                if slot < SLOTS and (bank.owner[slot] < 0 or bank.owner[slot] == numbers[reflectors[i]]):
-                    continue
-                row = bank.beliefs[slot]
-                distance = range_bearing[i, 0] - model.range_bias
-                bearing = range_bearing[i, 1]
-                _write(row, correct(_belief(row), distance, bearing, place[0], place[1], place[2], model))
-        _judge(bank, own, cycle, factors, levels)
+        found = protect_cycle(
+            bank,
+            _belief_of(prior_means[k], prior_covariances[k]),
+            _belief_of(means[cycle], covariances[cycle]),
+            offsets[cycle],
+            offsets[cycle + 1],
+            range_bearing,
+            status,
+            reflectors,
+            observation_at(observations, scanners[cycle]),
+            model,
+        )
+        levels.position[cycle], levels.heading[cycle], levels.reflector[cycle] = found

@@ -74,6 +74,13 @@ def build_index(reflectors: ReflectorMap, survey_sigmas: FloatArray | None = Non
     )
 
 
+def in_order_of_map(index: ReflectorIndex) -> FloatArray:
+    """(N, 3) x, y [m] and variance [m^2] of each reflector, in the order of the reflector map."""
+    places = np.empty((len(index.places), 3))
+    places[index.places[:, 3].astype(np.int64)] = index.places[:, :3]
+    return read_only(places)
+
+
 @compiled_inline
 def cell_range(low: float, high: float, per_metre: float, count: int) -> tuple[int, int]:
     """First and last cell that an interval touches; last < first when none.

@@ -69,7 +69,7 @@ def searching_odometry(
     if search is None:
         raise ValueError("the state has no search; expected one of a vehicle that is lost or not located yet")
     track, _ = advance(search.track, state.motion, stamp_ns, *displacement, noise)
-    bare = state._replace(cross=None, search=None)
+    bare = state._replace(cross=None, search=None, protection=None)
     moved = process_odometry(bare, stamp_ns, *displacement, noise)
     if state.mode == Mode.INITIALIZING:
         moved = moved._replace(belief=state.belief)
@@ -92,6 +92,7 @@ def forgotten(state: FilterState, setup: LocalizerSetup) -> FilterState:
         pivot=(belief.x, belief.y),
         cross=None,
         search=new_search(state.belief_ns),
+        protection=None,
     )
 
 
@@ -182,4 +183,5 @@ def _located(after: FilterState, search: Search, best: FloatArray, stamp_ns: int
         pivot=(belief.x, belief.y),
         cross=None,
         search=None,
+        protection=None,
     )

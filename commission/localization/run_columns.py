@@ -86,6 +86,9 @@ class RunColumns:
     """(K, 12) what became of the contours of each cycle, see `contour`; (0, 12) where they are not looked at."""
     tags: FloatArray
     """(m, 6) what became of each sighting of a tag, see `tags`; (0, 6) where they are not looked at."""
+    levels: FloatArray
+    """(K, 2) protection level of position [m] and heading [rad] that the supervisor goes by: inf where the vehicle is
+    lost or not located, NaN where it goes by 2-sigma; (0, 2) where it always does."""
     final: FilterState
     """State after the last record, odometry included."""
     searches: tuple[SearchMoment, ...] = ()
@@ -187,6 +190,7 @@ class RunColumns:
             scanner=int(self.detected.scanners[cycle]),
             contours=self.contours[cycle] if setup.contour is not None and not self.is_frame(cycle) else None,
             tags=self._tags(cycle),
+            levels=None if setup.protection is None else self.levels[cycle],
         )
 
     def is_frame(self, cycle: int) -> bool:

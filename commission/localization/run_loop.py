@@ -5,6 +5,7 @@ It knows one setup and one state at its beginning; what lies before and after th
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -23,6 +24,9 @@ from commission.localization.observation import observation_at
 from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.priors import PriorRows
+from commission.localization.protected_cycle import supervised_by_level
+from commission.localization.protection import Bank, ProtectionModel
+from commission.localization.protection_state import NO_MODEL, bank_of, protection_state
 from commission.localization.relocalization import (
     associate_nothing,
     is_sought,
@@ -64,6 +68,9 @@ class Columns(NamedTuple):
     """(K, 12) what became of the contours of each cycle, see `contour`; (0, 12) where they are not looked at."""
     tags: FloatArray
     """(m, 6) what became of each sighting of a tag, see `tags`; (0, 6) where they are not looked at."""
+    levels: FloatArray
+    """(K, 2) protection level of position [m] and heading [rad], NaN where the supervisor does not go by it; (0, 2)
+    where it never does."""
 
 
 def empty_columns(detected: DetectionLog, setups: Sequence[LocalizerSetup]) -> Columns:
@@ -77,6 +84,7 @@ def empty_columns(detected: DetectionLog, setups: Sequence[LocalizerSetup]) -> C
     sweeping = any(len(setup.sweep_rows) for setup in setups)
     matching = any(setup.contour is not None for setup in setups)
     looking = any(setup.tag_model is not None for setup in setups)
+    protecting = any(setup.protection is not None for setup in setups)
     cycles, total = len(detected), len(detected.range_bearing)
     return Columns(
         np.empty((cycles, 3)),
@@ -88,6 +96,7 @@ def empty_columns(detected: DetectionLog, setups: Sequence[LocalizerSetup]) -> C
         detected.range_bearing.copy() if sweeping else np.empty((0, 2)),
         np.zeros((cycles if matching else 0, CONTOUR_COLUMNS)),
         np.zeros((len(detected.tags.sightings) if detected.tags is not None and looking else 0, TAG_COLUMNS)),
+        np.full((cycles if protecting else 0, 2), np.nan),
     )
 
 
@@ -114,6 +123,7 @@ def cut(columns: Columns, detected: DetectionLog, first: int, last: int) -> Colu
         columns.settled[rows] if len(columns.settled) else columns.settled,
         columns.contours[first:last] if len(columns.contours) else columns.contours,
         tags,
+        columns.levels[first:last] if len(columns.levels) else columns.levels,
     )
 
 
@@ -138,6 +148,8 @@ def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: in
         columns.contours[:cycles] = earlier.contours[:cycles]
     if len(columns.tags) and len(earlier.tags):
         columns.tags[:sightings] = earlier.tags[:sightings]
+    if len(columns.levels) and len(earlier.levels):
+        columns.levels[:cycles] = earlier.levels[:cycles]
 
 
 def odometry_rows(log: RecordLog, stamps_ns: IntArray, first: int, last: int) -> tuple[int, int]:
@@ -312,6 +324,8 @@ def _searched(
             )
         prior, after = unlocated(state, stamp_ns, following, setup.filter.odometry)
         associate_nothing(columns.status, columns.reflectors, columns.d2)
+        if setup.protection is not None:
+            columns.levels[0] = math.inf
         _write_belief(prior, 0, cycle.priors.means, cycle.priors.covariances)
     else:
         after, _, _ = _tracked(log, setup, state._replace(search=None), cycle._replace(rows=(row, row)))
@@ -331,6 +345,7 @@ def _tracked(
     # One row more than is delivered: the last scans may lie between it and the row before.
     rows = slice(first, last + 1)
     cross = columns_of(state.cross, setup.constants)
+    bank = bank_of(state.protection, setup.protected_names)
     settled = stretch.columns.settled
     room = room_for_scans(cross, int(np.diff(detected.offsets).max(initial=0)))
     own = log.detection_stamps_ns
@@ -356,17 +371,20 @@ def _tracked(
         room.work,
         room.aims,
         room.busy,
-        state._replace(cross=None),
+        state._replace(cross=None, protection=None),
         stretch.columns,
         stretch.priors,
         setup.contour,
         contour_scans(log, setup, (before, numbers), len(detected)),
         _frames(setup, detected),
         setup.zone_rows,
+        NO_MODEL if setup.protection is None else setup.protection,
+        bank,
     )
     # Odometry alone changes nothing of it, nor does another setup before its first scan.
     cross_after = cross_covariance(cross, setup.constants) if len(detected) else state.cross
-    return after._replace(cross=cross_after), cycles, delivered
+    protection = protection_state(bank, setup.protected_names) if len(detected) else state.protection
+    return after._replace(cross=cross_after, protection=protection), cycles, delivered
 
 
 def _first_number(tags: TagCycles) -> int:
@@ -408,6 +426,8 @@ def _run(  # noqa: PLR0917 - the columns of the log
     scans: ContourScans | None,
     frames: TagFrames | None,
     zones: ZoneRows | None,
+    protection: ProtectionModel,
+    bank: Bank,
 ) -> tuple[FilterState, int, int]:
     """Deliver odometry and scans in the order of their stamps, odometry first, until the vehicle is lost.
 
@@ -416,8 +436,8 @@ def _run(  # noqa: PLR0917 - the columns of the log
     Of the odometry the rows up to `delivered`; the one behind them only tells the motion of scans before it. Where
     there are sweeps, `detections` is a view of the column `settled`, which is written before it is read.
     """
-    means, covariances, modes, status, reflectors, d2, settled, figures, sightings = columns
-    rows = 0
+    means, covariances, modes, status, reflectors, d2, settled, figures, sightings, levels = columns
+    by_level, rows = len(bank.owner) > 0, 0
     for k in range(len(scan_stamps)):
         while rows < delivered and odometry_stamps[rows] <= scan_stamps[k]:
             dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
@@ -477,7 +497,23 @@ def _run(  # noqa: PLR0917 - the columns of the log
                 figures_at(scans, figures, k),
                 zones,
             )
-        state = cycle.state
+        if by_level:
+            state = supervised_by_level(
+                state,
+                cycle,
+                offsets[k],
+                offsets[k + 1],
+                detections,
+                status,
+                reflectors,
+                observation,
+                model,
+                protection,
+                bank,
+                levels[k],
+            )
+        else:
+            state = cycle.state
         _write_belief(cycle.prior, k, priors.means, priors.covariances)
         _write_belief(state.belief, k, means, covariances)
         modes[k] = state.mode

@@ -28,6 +28,8 @@ from commission.localization.observation import (
     observation_rows,
 )
 from commission.localization.odometry import OdometryNoise, odometry_noise
+from commission.localization.protection import ProtectionModel
+from commission.localization.protection_state import protection_model
 from commission.localization.reflector_index import Cells, ReflectorIndex, build_index
 from commission.localization.rejection import RejectionRule, rejection_rule
 from commission.localization.supervisor import SupervisorLimits, supervisor_limits
@@ -109,6 +111,8 @@ class LocalizerSetup:
     """Contours of the floor map; None: they are not looked at."""
     zone_rows: ZoneRows | None = field(init=False, repr=False, compare=False)
     """Zones for kernels; None: every kind counts everywhere."""
+    protection: ProtectionModel | None = field(init=False, repr=False, compare=False)
+    """What protection levels are reckoned with; None: the supervisor does not go by them."""
 
     def __post_init__(self) -> None:
         considers, known = self.parameters.filter.consider, self.uncertainty
@@ -137,6 +141,7 @@ class LocalizerSetup:
         if constants is not None and contour is not None:
             constants += contour_constants(self.parameters.contour)
         object.__setattr__(self, "contour", contour)
+        object.__setattr__(self, "protection", protection_model(self.parameters, index, self.reflectors.reflectors))
         object.__setattr__(self, "constants", constants)
         object.__setattr__(self, "index", index)
         object.__setattr__(self, "filter", model)
@@ -146,6 +151,11 @@ class LocalizerSetup:
         object.__setattr__(self, "sweep_rows", sweep_rows([sweep_of(each) for each in self.scanners]))
         detectors = tuple(detector_model(self.reflectors, each, self.parameters.detector) for each in self.scanners)
         object.__setattr__(self, "detectors", detectors)
+
+    @property
+    def protected_names(self) -> tuple[str, ...] | None:
+        """Ids of the reflectors, by their numbers in `protection`; None: the supervisor does not go by its levels."""
+        return None if self.protection is None else tuple(each.id for each in self.reflectors.reflectors)
 
     @property
     def survey_sigmas(self) -> FloatArray:

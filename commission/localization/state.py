@@ -12,6 +12,7 @@ from commission.localization.cross_covariance import CrossCovariance
 from commission.localization.estimate import Belief, Mode
 from commission.localization.odometry import AT_REST, Motion
 from commission.localization.pose_gaussian import PoseGaussian, from_belief, to_belief
+from commission.localization.protection_state import ProtectionState
 from commission.localization.rejection import NO_EVIDENCE, Evidence
 from commission.localization.search_state import Search, new_search
 
@@ -46,6 +47,8 @@ class FilterState(NamedTuple):
     """Covariance with the considered constants; None: all are zero. Kernels are handed its array, and None here."""
     search: Search | None = None
     """What is known of a vehicle that is lost or not located yet; None while it knows where it is, and in kernels."""
+    protection: ProtectionState | None = None
+    """Filters that leave one reflector out each; None: not begun, or not asked for, and in kernels."""
 
 
 def state_at_start(initial: Belief) -> FilterState:

@@ -71,7 +71,23 @@ def supervise(mode: int, belief: PoseGaussian, limits: SupervisorLimits) -> int:
     variance = max(belief.xx, belief.yy) if limits.by_axes else position_variance(belief)
     if not math.isfinite(variance + belief.xx + belief.yy):
         return FAIL
-    position, heading = 2.0 * math.sqrt(variance), 2.0 * math.sqrt(belief.tt)
+    return judge(mode, 2.0 * math.sqrt(variance), 2.0 * math.sqrt(belief.tt), limits)
+
+
+@compiled_inline
+def judge(mode: int, position: float, heading: float, limits: SupervisorLimits) -> int:
+    """Mode after a scan, by what is held against the limits, 2-sigma or protection level.
+
+    Parameters
+    ----------
+    mode : before the scan.
+    position, heading : what is held against them [m], [rad].
+    limits : Err_p, Err_o and R_B.
+
+    Notes
+    -----
+    fail beyond Err, operational again below Err / R_B: Sobreira et al. 2016, Algorithm 4, lines 5 and 11.
+    """
     if mode == OPERATIONAL:
         return OPERATIONAL if position <= limits.position and heading <= limits.heading else FAIL
     limit_p, limit_o = limits.position / limits.recovery_ratio, limits.heading / limits.recovery_ratio

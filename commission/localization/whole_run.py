@@ -235,6 +235,7 @@ def _filtered(
         d2=columns.d2,
         contours=columns.contours,
         tags=columns.tags,
+        levels=columns.levels,
         searches=tuple(searches),
         range_bearing=columns.settled if len(columns.settled) else detected.range_bearing,
         final=_final(log, segments[-1].setup, detected.part(cycles, cycles), checkpoints[-1], detected.stamps_ns),

@@ -343,6 +343,10 @@ class TagParameters:
         check_fields(self, "tag.")
 
 
+HELD_TWO_SIGMA, HELD_LEVEL = "two_sigma", "protection_level"
+"""What the supervisor may hold against its limits."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SupervisorParameters:
     """When the estimate is no longer good enough to drive on (Algorithm 4)."""
@@ -356,6 +360,9 @@ class SupervisorParameters:
     """Largest allowed 2-sigma of the position, Err_p."""
     position_sigma: Annotated[str, Choice("Position σ", ("largest", "axes"))] = "largest"
     """Which one: the `largest` in any direction (longer axis of the ellipse), or of the `axes` x and y (the paper)."""
+    held: Annotated[str, Choice("Held against limits", (HELD_TWO_SIGMA, HELD_LEVEL))] = HELD_TWO_SIGMA
+    """What is held against both limits: `two_sigma` of the filter, or the `protection_level`, which bounds the error at
+    the integrity risk even where one reflector misleads. Predictions along routes go by 2σ."""
     heading_limit: Annotated[
         float,
         Quantity(label="2σ heading", unit="rad", shown=DEGREES, bounds=POSITIVE, step=0.1, slider=(0.1, 15.0)),

@@ -74,9 +74,11 @@ class RunEvent:
     lasts: float = math.nan
     """How long: of a stretch its own length, of a recovery that of the time before it [s]."""
     position: float = math.nan
-    """2-sigma of the position of a fail, length of a jump, way of a blind stretch [m]."""
+    """What was held against the limit of the position in a fail, length of a jump, way of a blind stretch [m]."""
     heading: float = math.nan
-    """2-sigma of the heading of a fail, turn of a jump [rad]."""
+    """What was held against the limit of the heading in a fail, turn of a jump [rad]."""
+    held: str = "2σ"
+    """What was held against the limits of a fail: 2-sigma or protection level."""
     share: float = math.nan
     """Share of the detections of the last second that were rejected, where the vehicle is lost [0..1]."""
     limits: tuple[float, float] = (math.nan, math.nan)
@@ -159,11 +161,13 @@ def _modes(run: RunResult) -> Iterator[RunEvent]:
         if before[cycle] == Mode.INITIALIZING or (before[cycle] == Mode.LOST and _searches(run, cycle)):
             yield RunEvent(kind=EventKind.FOUND, time=time, lasts=time - searched_from)
             continue
+        held = run.held(cycle)
         yield RunEvent(
             kind=EventKind.FAIL,
             time=time,
-            position=float(run.position_two_sigma[cycle]),
-            heading=float(run.two_sigma[cycle, 2]),
+            held=held.name,
+            position=held.position,
+            heading=held.heading,
             limits=(float(limits[cycle, 0]), float(limits[cycle, 1])),
         )
 
@@ -323,7 +327,8 @@ def told(event: RunEvent) -> str:
     match event.kind:
         case EventKind.FAIL:
             heading = DEGREES.against(event.heading, event.limits[1], (".2f", ".1f"))
-            text = f"2σ {MILLIMETRES.against(event.position, event.limits[0])}, {heading}"
+            text = f"{event.held} {MILLIMETRES.against(event.position, event.limits[0])}, {heading}"
+            text = text if math.isfinite(event.position) else f"no {event.held} level yet"
         case EventKind.RECOVERED:
             text = f"after {event.lasts:.2f} s"
         case EventKind.LOST:

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
-from commission.localization.protection import Levels, new_bank, protect
+from commission.localization.protection import Levels, ProtectionModel, new_bank, protect
+from commission.localization.reflector_index import in_order_of_map
 from commission.localization.run_columns import RunColumns
 from commission.progress import Progress, silent
 from commission.site.parameters import IntegrityParameters
@@ -65,8 +66,10 @@ def protection(
         for begin, end in itertools.pairwise(bounds):
             setup = columns.segment(begin).setup
             here = slice(begin - first, end - first)
-            places = np.empty((len(setup.reflectors), 3))
-            places[setup.index.places[:, 3].astype(np.int64)] = setup.index.places[:, :3]
+            numbers = own[columns.segments.index(columns.segment(begin))]
+            model = ProtectionModel(
+                given.risk, given.fault_probability, in_order_of_map(setup.index), read_only(numbers)
+            )
             protect(
                 begin,
                 read_only(rows.means[here]),
@@ -78,11 +81,9 @@ def protection(
                 columns.range_bearing,
                 columns.status,
                 columns.reflector,
-                own[columns.segments.index(columns.segment(begin))],
                 columns.detected.scanners,
                 setup.observation_rows,
-                read_only(places),
-                (given.risk, given.fault_probability),
+                model,
                 bank,
                 levels,
             )
@@ -147,10 +148,8 @@ def warm_up() -> None:
         read_only(np.empty(0, dtype=np.int8)),
         no_rows,
         no_rows,
-        no_rows,
         read_only(np.empty((0, 6))),
-        nothing,
-        (0.1, 0.1),
+        ProtectionModel(0.1, 0.1, nothing, no_rows),
         new_bank(),
         levels,
     )

@@ -9,6 +9,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +119,21 @@ class RunInput(StudyInput):
         return replace(self, segments=tuple(kept))
 
 
+TWO_SIGMA = "2σ"
+"""What the supervisor goes by unless it is told otherwise."""
+
+
+class Held(NamedTuple):
+    """What the supervisor holds against its limits."""
+
+    name: str
+    """What it is: 2-sigma, or the protection level."""
+    position: float
+    """[m]; inf where there is no level."""
+    heading: float
+    """[rad]."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RunResult:
     """A drive localized, and judged against its reference where it has one: K cycles."""
@@ -174,6 +190,13 @@ class RunResult:
     def without_reference(self) -> tuple[int, int]:
         """Cycles outside of the time of the reference, and in its gaps."""
         return without_reference(self.columns.stamps_ns, self.inputs.log.reference_times_ns, self.errors)
+
+    def held(self, cycle: int) -> Held:
+        """Return what the supervisor held against its limits in a cycle."""
+        levels = self.columns.levels
+        if len(levels) and not math.isnan(levels[cycle, 0]):
+            return Held("protection", float(levels[cycle, 0]), float(levels[cycle, 1]))
+        return Held(TWO_SIGMA, float(self.position_two_sigma[cycle]), float(self.two_sigma[cycle, 2]))
 
     def reference_places(self, cycles: IntArray) -> FloatArray:
         """(N, 2) places of base at some cycles by the reference [m], map frame; NaN where there is none."""

@@ -89,6 +89,7 @@ PARAMETERS = {
     "supervisor.enabled": ("Supervisor", None),
     "supervisor.position_limit": ("2σ position [mm]", 1000.0),
     "supervisor.position_sigma": ("Position σ", None),
+    "supervisor.held": ("Held against limits", None),
     "supervisor.heading_limit": ("2σ heading [°]", DEGREES),
     "supervisor.recovery_ratio": ("Recovery ratio", 1.0),
     "supervisor.rejection_enabled": ("Lost by rejections", None),

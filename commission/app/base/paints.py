@@ -73,6 +73,7 @@ class Run:
     VARIANT_C = Paint("variant C", (250, 170, 120), (194, 116, 66))
     FIRST_CURVE = Paint("first curve of a plot", (77, 196, 255), (0, 130, 182))
     SECOND_CURVE = Paint("second curve of a plot", (255, 180, 84), (186, 112, 0))
+    THIRD_CURVE = Paint("third curve of a plot", (226, 120, 240), (160, 44, 176))
     WHOLE_CURVE = Paint("curve of the whole", (230, 233, 239), (40, 44, 51))
     EDIT = Paint("an edit during the drive", (192, 139, 255), (128, 70, 184))
     OPERATIONAL = Paint("operational", (28, 124, 60), (24, 122, 56))

@@ -10,6 +10,7 @@ from commission.app.base import theme
 from commission.app.base.paints import Run, Surface
 
 TURQUOISE, ORANGE = theme.css(Run.FIRST_CURVE.dark), theme.css(Run.SECOND_CURVE.dark)
+THIRD = theme.css(Run.THIRD_CURVE.dark)
 INK = theme.css(Run.WHOLE_CURVE.dark)
 LIMIT = theme.css(theme.OVER_LIMIT)
 HEIGHT_PX = 150

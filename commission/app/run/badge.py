@@ -1,6 +1,8 @@
-"""The supervisor's badge in the bar at the top: operational, fail or lost, and 2-sigma against its limits."""
+"""The supervisor's badge in the bar at the top: operational, fail or lost, and 2-sigma or level against its limits."""
 
 from __future__ import annotations
+
+import math
 
 from viser import GuiApi
 
@@ -21,13 +23,14 @@ def badge_text(view: PageView) -> tuple[str, str, str]:
         under_way = [escaped(job.line) for job in view.jobs]
         return ("PREPARING" if under_way else "NO RUN"), "; ".join(under_way), theme.IDLE_COLOR
     limits = run.segment.setup.parameters.supervisor
-    position, heading = run.result.position_two_sigma[run.newest], run.result.two_sigma[run.newest, 2]
+    held, position, heading = run.result.held(run.newest)
     beside = (
-        f"2σ {MILLIMETRES.against(position, limits.position_limit, ('.0f', '.0f'))}"
+        f"{held} {MILLIMETRES.against(position, limits.position_limit, ('.0f', '.0f'))}"
         f"{_share(position, limits.position_limit)}"
         f"{DEGREES.against(heading, limits.heading_limit, ('.2f', '.1f'))}"
         f"{_share(heading, limits.heading_limit)}"
     )
+    beside = beside if math.isfinite(position) else f"{held}: no level"
     lived = run.lived_episodes
     if run.mode is not Mode.OPERATIONAL:
         since = f" {run.time - lived[-1][0]:.0f} s" if lived else ""

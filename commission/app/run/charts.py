@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.app.base import theme
-from commission.app.base.plot_style import INK, LIMIT, ORANGE, TURQUOISE
+from commission.app.base.plot_style import INK, LIMIT, ORANGE, THIRD, TURQUOISE
 from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import chi_square_gate
 from commission.localization.estimate import Status
@@ -32,6 +32,8 @@ class Line:
     """From a run and some of its cycles to one value for each, in the plot's unit; NaN where it is unknown."""
     of_detections: bool = False
     """Whether it is of detections and not of cycles: a cycle may have several or none."""
+    by_level: bool = False
+    """Whether it is there only where the supervisor goes by protection levels."""
 
     def values(self, run: RunResult, rows: slice = slice(None)) -> FloatArray:
         """Return the values of a run, or of some rows of it; in the plot's unit."""
@@ -69,6 +71,10 @@ class Chart:
     is_shown: bool = True
     """Whether it is shown before somebody chooses."""
 
+    def lines_of(self, run: RunResult) -> tuple[Line, ...]:
+        """Its curves of a run: those that there are."""
+        return tuple(line for line in self.lines if len(run.columns.levels) or not line.by_level)
+
     @property
     def compared(self) -> Line:
         """The curve of it that variants are compared by: the first of cycles."""
@@ -82,6 +88,13 @@ def _gate(parameters: Parameters) -> float:
 def _decade_below(value: float) -> float:
     """The power of ten below: where a logarithmic axis has a label anyway."""
     return 10.0 ** math.floor(math.log10(value))
+
+
+def _levels(run: RunResult, at: slice) -> FloatArray:
+    """(K, 2) protection levels [m, rad] that the supervisor went by; NaN where there is none."""
+    every = run.columns.levels
+    levels = every[at] if len(every) else np.full((len(run.two_sigma[at]), 2), math.nan)
+    return np.where(np.isfinite(levels), levels, math.nan)
 
 
 def _heading_errors(run: RunResult, at: slice) -> FloatArray:
@@ -116,6 +129,13 @@ CHARTS = (
                 color=ORANGE,
                 part=lambda run, at: MILLIMETRES.of(run.two_sigma[at, 1]),
             ),
+            Line(
+                label="protection level",
+                column="protection_position_mm",
+                color=THIRD,
+                part=lambda run, at: MILLIMETRES.of(_levels(run, at)[:, 0]),
+                by_level=True,
+            ),
         ),
         limits=(Limit("limit", lambda p: MILLIMETRES.of(p.supervisor.position_limit)),),
         span=lambda p: (
@@ -132,6 +152,13 @@ CHARTS = (
                 column="heading_two_sigma_deg",
                 color=TURQUOISE,
                 part=lambda run, at: DEGREES.of(run.two_sigma[at, 2]),
+            ),
+            Line(
+                label="protection level",
+                column="protection_heading_deg",
+                color=THIRD,
+                part=lambda run, at: DEGREES.of(_levels(run, at)[:, 1]),
+                by_level=True,
             ),
         ),
         limits=(Limit("limit", lambda p: DEGREES.of(p.supervisor.heading_limit)),),

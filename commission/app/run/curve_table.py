@@ -35,7 +35,7 @@ def curve_table(
     after = int(np.searchsorted(run.times, span[1], side="right"))
     names = ["stamp_ns", "time"]
     columns: list[FloatArray] = []
-    for line in (line for chart in charts for line in chart.lines):
+    for line in (line for chart in charts for line in chart.lines_of(run)):
         names += [f"{line.column}_lowest", f"{line.column}_highest"] if line.of_detections else [line.column]
         columns += _columns(run, line, first, after)
     text = io.StringIO(newline="")

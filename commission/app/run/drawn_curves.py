@@ -62,7 +62,10 @@ def values_at(
     kept : variants of the drive; their values follow those of a plot's own curves.
     """
     return [
-        [*(_at(run, line, cycle) for line in chart.lines), *(_at(each.run, chart.compared, cycle) for each in kept)]
+        [
+            *(_at(run, line, cycle) for line in chart.lines_of(run)),
+            *(_at(each.run, chart.compared, cycle) for each in kept),
+        ]
         for chart in charts
     ]
 
@@ -113,7 +116,7 @@ def with_gaps(values: FloatArray, bins: Bins) -> FloatArray:
 
 
 def _chart(run: RunResult, chart: Chart, bins: Bins, kept: Sequence[KeptRun]) -> dict[str, Any]:
-    every = [(run, line) for line in chart.lines]
+    every = [(run, line) for line in chart.lines_of(run)]
     every += [(each.run, replace(chart.compared, label=each.letter, color=color_of(each.letter))) for each in kept]
     lines = [binned(of, line, bins) for of, line in every]
     largest = float(np.fmax.reduce(np.concatenate([highs for _, highs in lines]), initial=math.nan))

@@ -16,7 +16,7 @@ from commission.localization.detector import passing_widths
 from commission.localization.estimate import Estimate, Mode, Status
 from commission.site.quantity import DEGREES, MILLIMETRES
 from commission.site.truth import truth_told
-from commission.studies.run import RunResult
+from commission.studies.run import TWO_SIGMA, RunResult
 from commission.studies.scanner_figures import residuals_told
 
 MODES = {
@@ -72,17 +72,24 @@ def rows(run: RunView, found: Found | None = None) -> list[tuple[str, str]]:
 
 def _protection(run: RunView, found: Found | None) -> list[tuple[str, str]]:
     """How large the error can be at most, and which reflector's failure would make it so."""
-    if found is None or found.levels is None or found.events.inputs.run is not run.result:
+    limits, held = run.segment.setup.parameters.supervisor, run.result.held(run.newest)
+    decided: list[tuple[str, str]] = []
+    if found is not None and found.levels is not None and found.events.inputs.run is run.result:
+        levels, worst = found.levels, int(found.levels.worst[run.newest])
+        position, heading = levels.position[run.newest], levels.heading[run.newest]
+        decided = [
+            ("Decided by", "noise alone" if worst < 0 else f"{escaped(levels.reflector[worst])}, if it misleads")
+        ]
+    elif held.name != TWO_SIGMA:
+        position, heading = held.position, held.heading
+    else:
         return []
-    levels, newest = found.levels, run.newest
-    limits = run.segment.setup.parameters.supervisor
-    position, heading, worst = levels.position[newest], levels.heading[newest], int(levels.worst[newest])
     if not math.isfinite(position):
         return [("Protection level", "none: not located")]
     return [
         ("Protection level / limit", MILLIMETRES.against(position, limits.position_limit)),
         ("Protection, heading / limit", DEGREES.against(heading, limits.heading_limit, (".2f", ".1f"))),
-        ("Decided by", "noise alone" if worst < 0 else f"{escaped(levels.reflector[worst])}, if it misleads"),
+        *decided,
     ]
 
 

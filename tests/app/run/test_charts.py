@@ -35,6 +35,8 @@ EXPECTED = {
     ("2σ of position [mm]", "x"): lambda e, t: 1000.0 * sigma(0)(e, t),
     ("2σ of position [mm]", "y"): lambda e, t: 1000.0 * sigma(1)(e, t),
     ("2σ of heading [°]", "heading"): lambda e, t: DEGREES * sigma(2)(e, t),
+    ("2σ of position [mm]", "protection level"): lambda e, t: 1000.0 * e.levels[0],
+    ("2σ of heading [°]", "protection level"): lambda e, t: DEGREES * e.levels[1],
     ("NIS of all detections", "each"): None,
     ("NIS of all detections", "mean of 1 s"): None,
     ("Inliers, outliers per scan", "inliers"): inliers,
@@ -51,8 +53,9 @@ EXPECTED = {
 
 @pytest.fixture(scope="module")
 def strict(project: Project, drive: Drive) -> RunResult:
-    """A gate that rejects some detections, so that no curve is empty."""
-    narrow = replace(project, parameters=with_field(project.parameters, "association.gate_probability", 0.6))
+    """A gate that rejects some detections, and a supervisor by protection level, so that no curve is empty."""
+    parameters = with_field(project.parameters, "association.gate_probability", 0.6)
+    narrow = replace(project, parameters=with_field(parameters, "supervisor.held", "protection_level"))
     return judged_run(RunInput.of(narrow, drive.log, drive.start))
 
 

@@ -143,7 +143,7 @@ def test_values_at_the_cursor_are_those_of_its_cycle(result: RunResult) -> None:
     assert shown[3][0] == [estimate.count(Status.INLIER)] * 2
     assert shown[2][0] == [pytest.approx(estimate.d2.min()), pytest.approx(estimate.d2.max())]
     assert shown[0][1] == [pytest.approx(2000.0 * math.sqrt(estimate.posterior.covariance[0, 0]))] * 2
-    assert values_at(result, CHARTS, -1) == [[None] * len(chart.lines) for chart in CHARTS]
+    assert values_at(result, CHARTS, -1) == [[None] * len(chart.lines_of(result)) for chart in CHARTS]
 
 
 def test_a_table_has_the_rows_and_curves_that_are_shown(result: RunResult) -> None:

@@ -122,7 +122,7 @@ def test_plots_lay_a_curve_of_each_variant_over_their_own(result: RunResult, nar
         assert (line["label"], line["color"], line["variant"]) == ("B", color_of("B"), True)
         assert line["low"] == its["lines"][chart.lines.index(chart.compared)]["low"]
     values = values_at(result, CHARTS, 20, kept)
-    assert [len(each) for each in values] == [len(chart.lines) + 1 for chart in CHARTS]
+    assert [len(each) for each in values] == [len(chart.lines_of(result)) + 1 for chart in CHARTS]
     two_sigma = values[0][-1]
     assert two_sigma is not None
     assert two_sigma[0] == pytest.approx(1000.0 * narrow.position_two_sigma[20])

@@ -1,0 +1,69 @@
+"""What a cycle comes to where the supervisor goes by protection levels: the last step, after `cycle` or `tag_cycle`.
+
+Called by the same two: live, and by the compiled loop of whole runs; by neither where it goes by 2-sigma.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numpy import int8
+from numpy.typing import NDArray
+
+from commission.compiled import compiled
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.localization.cycle import Cycle, with_mode
+from commission.localization.observation import ObservationModel
+from commission.localization.protection import Bank, ProtectionModel, forget, protect_cycle
+from commission.localization.setup import FilterModel
+from commission.localization.state import FilterState
+from commission.localization.supervisor import FAIL, LOST, judge
+
+
+@compiled
+def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
+    before: FilterState,
+    cycle: Cycle,
+    first: int,
+    last: int,
+    detections: FloatArray,
+    status: NDArray[int8],
+    reflectors: IntArray,
+    observation: ObservationModel,
+    model: FilterModel,
+    protection: ProtectionModel,
+    bank: Bank,
+    levels: FloatArray,
+) -> FilterState:
+    """State after a cycle whose supervisor holds the protection level against its limits, in place of 2-sigma.
+
+    Parameters
+    ----------
+    before : state before the cycle.
+    cycle : what it comes to by 2-sigma.
+    first, last : rows of the scan's detections, the last one excluded.
+    detections, status, reflectors : range [m] and bearing [rad], a `Status`, index into the reflector map.
+    observation : mounting and noise of the scan's scanner.
+    model : of the whole filter.
+    protection : map, integrity risk and probability of a fault.
+    bank : filters that leave one reflector out each; in and out.
+    levels : (2,) out: of the position [m] and of the heading [rad]; inf while the vehicle is lost.
+
+    Notes
+    -----
+    No formula: `protect_cycle`, then Sobreira et al. 2016, Algorithm 4, with levels for 2-sigma; the rules by
+    rejections and by confirmations overrule it as they do otherwise.
+    """
+    after = cycle.state
+    if LOST in (before.mode, after.mode):
+        # What the filters without a reflector would begin from is what the vehicle was lost with.
+        forget(bank)
+        levels[0], levels[1] = math.inf, math.inf
+        return after if after.mode == LOST else with_mode(before, after, FAIL)
+    found = protect_cycle(
+        bank, cycle.prior, after.belief, first, last, detections, status, reflectors, observation, protection
+    )
+    levels[0], levels[1] = found.position, found.heading
+    if after.evidence.confirmed < model.rejection.confirmations:
+        return with_mode(before, after, FAIL)
+    return with_mode(before, after, judge(before.mode, found.position, found.heading, model.limits))
