@@ -13,7 +13,34 @@ RADIUS = "test_association.py::test_radius_that_is_searched_is_no_larger_than_it
 VIEWPOINT = "test_association.py::test_viewpoint_is_the_place_of_the_scanner_and_its_longest_sigma"
 RECOVERY = "test_supervisor.py::test_recovers_only_when_every_two_sigma_is_below_its_limit_divided_by_the_ratio"
 
+PROTECTION = TESTS + "test_protection_mode.py::"
+TEXTBOOK = PROTECTION + "test_the_level_is_that_of_textbook_filters_and_the_mode_follows_it"
+
 LOCALIZATION = (
+    Mutant(
+        name="a filter that leaves a reflector out is corrected by it",
+        file=FOLDER + "protection.py",
+        find="bank.owner[slot] < 0 or bank.owner[slot] == number",
+        replace="bank.owner[slot] < 0 or bank.owner[slot] == number + 1",
+        tests=(
+            TEXTBOOK,
+            PROTECTION + "test_four_reflectors_around_a_vehicle_at_rest_give_the_level_of_the_closed_form",
+        ),
+    ),
+    Mutant(
+        name="where the supervisor goes by protection levels, 2-sigma still decides",
+        file=FOLDER + "protected_cycle.py",
+        find="judge(before.mode, found.position, found.heading, model.limits)",
+        replace="after.mode",
+        tests=(TEXTBOOK,),
+    ),
+    Mutant(
+        name="filters of the protection level outlive that the vehicle is lost",
+        file=FOLDER + "protected_cycle.py",
+        find="        forget(bank)\n",
+        replace="",
+        tests=(PROTECTION + "test_live_is_the_whole_run_to_the_last_bit",),
+    ),
     Mutant(
         name="a beam that goes through a wall counts as one that ends at it",
         file=FOLDER + "wall_evidence.py",
