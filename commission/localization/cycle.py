@@ -258,9 +258,8 @@ def with_mode(before: FilterState, after: FilterState, mode: int) -> FilterState
     -----
     No formula: the belief while it is operational, and the last such one otherwise.
     """
-    output, output_ns = before.output, before.output_ns
-    if mode == OPERATIONAL:
-        output, output_ns = after.belief, after.belief_ns
+    output = after.belief if mode == OPERATIONAL else before.output
+    output_ns = after.belief_ns if mode == OPERATIONAL else before.output_ns
     return FilterState(
         after.belief,
         after.belief_ns,
