@@ -200,8 +200,8 @@ LOCALIZATION = (
     Mutant(
         name="supervisor fails on one sigma of y",
         file=FOLDER + "supervisor.py",
-        find="position, heading = 2.0 * math.sqrt(variance)",
-        replace="position, heading = 1.0 * math.sqrt(variance)",
+        find="2.0 * math.sqrt(variance)",
+        replace="1.0 * math.sqrt(variance)",
         tests=(TESTS + "test_supervisor.py::test_each_two_sigma_above_its_limit_fails",),
     ),
     Mutant(

@@ -46,8 +46,8 @@ PAGE = (
     Mutant(
         name="badge shows one sigma of the position",
         file=FOLDER + "run/badge.py",
-        find="2σ {MILLIMETRES.against(position,",
-        replace="2σ {MILLIMETRES.against(0.5 * position,",
+        find="{held} {MILLIMETRES.against(position,",
+        replace="{held} {MILLIMETRES.against(0.5 * position,",
         tests=(NUMBERS + "test_the_badge_shows_the_largest_sigma_in_any_direction_and_both_limits",),
     ),
     Mutant(
