@@ -346,10 +346,10 @@ class Localizer:
     ) -> FilterState:
         """Let the supervisor go by the protection level, which is written."""
         setup, after = self._setup, cycle.state
-        if setup.protection is None:
-            raise ValueError("protection levels are asked for where the supervisor goes by 2-sigma")
         detections, status, reflectors = written
         bank = bank_of(before.protection, setup.protected_names)
+        if setup.protection is None or bank is None:
+            raise ValueError("protection levels are asked for where the supervisor goes by 2-sigma")
         bare = after._replace(cross=None, search=None, protection=None)
         state = supervised_by_level(
             before._replace(cross=None, search=None, protection=None),

@@ -72,9 +72,9 @@ class Bank(NamedTuple):
     """Filters that leave one reflector out each, one that leaves none out, and the run's own belief; in and out."""
 
     beliefs: FloatArray
-    """(SLOTS + 2, 9) x, y, theta, xx, xy, xt, yy, yt, tt; (0, 9): levels are not asked for."""
+    """(SLOTS + 2, 9) x, y, theta, xx, xy, xt, yy, yt, tt."""
     owner: IntArray
-    """(SLOTS,) number of the reflector that is left out; -1: the filter is not used. (0,): as `beliefs`."""
+    """(SLOTS,) number of the reflector that is left out; -1: the filter is not used."""
     unseen: IntArray
     """(SLOTS,) cycles since its last sighting."""
     begun: NDArray[np.bool_]

@@ -16,11 +16,6 @@ from commission.localization.reflector_index import ReflectorIndex, in_order_of_
 from commission.site.parameters import HELD_LEVEL, Parameters
 from commission.site.reflectors import Reflector
 
-NOT_ASKED = Bank(np.empty((0, 9)), np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0, np.bool_))
-"""What kernels are handed where the supervisor does not go by protection levels."""
-NO_MODEL = ProtectionModel(0.1, 0.1, read_only(np.empty((0, 3))), read_only(np.empty(0, np.int64)))
-"""The same of the model."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ProtectionState:
@@ -66,8 +61,8 @@ def protection_model(
     return ProtectionModel(given.risk, given.fault_probability, in_order_of_map(index), numbers)
 
 
-def bank_of(state: ProtectionState | None, names: tuple[str, ...] | None) -> Bank:
-    """Bank for the steps to write in: a copy, by the numbers of a map; `NOT_ASKED` where no levels are asked for.
+def bank_of(state: ProtectionState | None, names: tuple[str, ...] | None) -> Bank | None:
+    """Bank for the steps to write in: a copy, by the numbers of a map; None where no levels are asked for.
 
     Parameters
     ----------
@@ -75,7 +70,7 @@ def bank_of(state: ProtectionState | None, names: tuple[str, ...] | None) -> Ban
     names : ids of the reflectors of the map; None: levels are not asked for.
     """
     if names is None:
-        return NOT_ASKED
+        return None
     bank = new_bank()
     if state is None:
         return bank
@@ -88,7 +83,7 @@ def bank_of(state: ProtectionState | None, names: tuple[str, ...] | None) -> Ban
     return bank
 
 
-def protection_state(bank: Bank, names: tuple[str, ...] | None) -> ProtectionState | None:
+def protection_state(bank: Bank | None, names: tuple[str, ...] | None) -> ProtectionState | None:
     """Return what steps have left in a bank, as a value; None where no filter is in use.
 
     Parameters
@@ -96,7 +91,7 @@ def protection_state(bank: Bank, names: tuple[str, ...] | None) -> ProtectionSta
     bank : after the steps.
     names : as `bank_of` was given them.
     """
-    if names is None or not bank.begun[0]:
+    if names is None or bank is None or not bank.begun[0]:
         return None
     return ProtectionState(
         names, read_only(bank.beliefs.copy()), read_only(bank.owner.copy()), read_only(bank.unseen.copy())

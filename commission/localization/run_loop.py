@@ -26,7 +26,7 @@ from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.priors import PriorRows
 from commission.localization.protected_cycle import supervised_by_level
 from commission.localization.protection import Bank, ProtectionModel
-from commission.localization.protection_state import NO_MODEL, bank_of, protection_state
+from commission.localization.protection_state import bank_of, protection_state
 from commission.localization.relocalization import (
     associate_nothing,
     is_sought,
@@ -378,7 +378,7 @@ def _tracked(
         contour_scans(log, setup, (before, numbers), len(detected)),
         _frames(setup, detected),
         setup.zone_rows,
-        NO_MODEL if setup.protection is None else setup.protection,
+        setup.protection,
         bank,
     )
     # Odometry alone changes nothing of it, nor does another setup before its first scan.
@@ -426,8 +426,8 @@ def _run(  # noqa: PLR0917 - the columns of the log
     scans: ContourScans | None,
     frames: TagFrames | None,
     zones: ZoneRows | None,
-    protection: ProtectionModel,
-    bank: Bank,
+    protection: ProtectionModel | None,
+    bank: Bank | None,
 ) -> tuple[FilterState, int, int]:
     """Deliver odometry and scans in the order of their stamps, odometry first, until the vehicle is lost.
 
@@ -437,7 +437,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
     there are sweeps, `detections` is a view of the column `settled`, which is written before it is read.
     """
     means, covariances, modes, status, reflectors, d2, settled, figures, sightings, levels = columns
-    by_level, rows = len(bank.owner) > 0, 0
+    rows = 0
     for k in range(len(scan_stamps)):
         while rows < delivered and odometry_stamps[rows] <= scan_stamps[k]:
             dx, dy, dtheta = displacements[rows, 0], displacements[rows, 1], displacements[rows, 2]
@@ -497,7 +497,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
                 figures_at(scans, figures, k),
                 zones,
             )
-        if by_level:
+        if protection is not None and bank is not None:
             state = supervised_by_level(
                 state,
                 cycle,
