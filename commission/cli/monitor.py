@@ -16,7 +16,8 @@ from tyro.conf import Positional, UseAppendAction, arg
 from commission.errors import UsageError
 
 if TYPE_CHECKING:
-    from commission.studies.monitor import MapFinding, Monitor
+    from commission.studies.map_findings import MapFinding
+    from commission.studies.monitor import Monitor
 
 HEADER = ("fault", "id", "x_before", "y_before", "x", "y", "sigma", "since", "seen", "expected", "text")
 
@@ -51,7 +52,8 @@ class MonitorCommand:
         from commission.io.project_copy import refuse_to_replace, save_copy
         from commission.io.project_file import apply_settings, load_project
         from commission.io.recordings.base import load_log
-        from commission.studies.monitor import MonitorInput, corrected, diagnosed_drive, monitor
+        from commission.studies.map_correction import corrected
+        from commission.studies.monitor import MonitorInput, diagnosed_drive, monitor
         from commission.studies.start import start_of
 
         if self.out is not None:

@@ -19,15 +19,11 @@ from commission.site.record_log import RecordLog
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.uncertainty import Uncertainty
 from commission.studies.diagnosis import Diagnosis
+from commission.studies.map_correction import corrected
+from commission.studies.map_findings import MapFault
 from commission.studies.metrics import reference_at
-from commission.studies.monitor import (
-    MapFault,
-    MonitorInput,
-    change_point,
-    corrected,
-    diagnosed_drive,
-    monitor,
-)
+from commission.studies.monitor import MonitorInput, diagnosed_drive, monitor
+from commission.studies.moved_reflector import change_point
 from commission.studies.start import Start, StartOrigin
 from tests.acceptance.eight import eight
 from tests.planning.driven import QUICK
