@@ -11,6 +11,8 @@ from commission.app.run.actions import Play, Seek, VirtualDrive
 from commission.app.run.charts import color_of
 from commission.app.run.service import RunService
 from commission.app.tune.calibration_service import CalibrationService
+from commission.app.tune.map_check import CorrectMap
+from commission.studies.map_findings import MapFault, MapFinding
 from commission.studies.variants import VariantsResult
 from tests.app.sites import room
 from tests.browser.page import OpenPage
@@ -106,6 +108,7 @@ def test_a_kept_variant_stays_beside_a_moved_gate_and_undo_brings_it_back(
     served.until(lambda: served.state.project.parameters.association.gate_probability == 0.95, 10.0)
 
     calibrated(served, page)
+    map_corrected(served, page)
 
     page.page.get_by_label("Forget A").click()
     page.wait_for_text("Keep the run as it is now")
@@ -148,3 +151,38 @@ def calibrated(served: Served, page: OpenPage) -> None:
         page.page.get_by_role("button", name="Undo").first.click()
         page.wait_for_text(f"5 figures proposed, {left} accepted.")
     assert served.state.project is before
+
+
+def map_corrected(served: Served, page: OpenPage) -> None:
+    """Let the map have a reflector elsewhere than the drive, and correct it by the drive; then take it all back."""
+    first = served.state.project.reflectors.reflectors[0]
+    wrong = MapFinding(
+        fault=MapFault.MOVED,
+        id=first.id,
+        before=(first.x, first.y),
+        after=(first.x, first.y + 0.08),
+        sigma=0.0,
+        since="",
+        evidence=(),
+        text="",
+    )
+    served.runtime.post(CorrectMap((wrong,)))
+    served.until(lambda: served.state.project.reflectors.reflectors[0].y == first.y + 0.08, 10.0)
+    surveyed = served.state.project
+    page.fold("Map against the drive")
+    page.press("Check the map by this drive")
+    page.wait_for_text("R1 has moved by")
+    page.wait_for_text("0.250, 2.080 →")
+    tick = page.page.get_by_role("checkbox", name="R1: moved")
+    assert tick.is_checked()
+    tick.click()
+    page.wait_for_text("Correct the map (0)")
+    assert page.page.get_by_role("button", name="Correct the map (0)").is_disabled()
+    tick.click()
+    page.press("Correct the map (1)")
+    served.until(lambda: abs(served.state.project.reflectors.reflectors[0].y - first.y) < 0.02, 10.0)
+    page.wait_for_text("The map has it elsewhere by now")
+    page.page.get_by_role("button", name="Undo").first.click()
+    served.until(lambda: served.state.project == surveyed, 10.0)
+    page.page.get_by_role("button", name="Undo").first.click()
+    served.until(lambda: served.state.project.reflectors.reflectors[0] == first, 10.0)
