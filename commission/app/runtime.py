@@ -33,6 +33,8 @@ FRAME_S = 0.04
 """Shortest time between two pictures: 25 Hz [s]."""
 SLOW_FRAME_S = 0.2
 """The same for plots, trails and numbers [s]."""
+ANSWER_S = 0.06
+"""The same once a browser has asked for something: what is selected or sought is said within 100 ms [s]."""
 AFTER_A_FAULT_S = 0.2
 """Pause of the owner thread after a fault that it could not even tell [s]."""
 SAME_FAULT_AFTER_S = 5.0
@@ -105,6 +107,7 @@ class Runtime:
         self._page: PageLike | None = None
         self._shown: Project | None = None
         self._due = Due.SOON
+        self._is_asked = False
         self._drawn_at = self._drawn_slowly_at = self._turned_at = clock()
         self._told = "", -math.inf
         self._stopped = threading.Event()
@@ -203,8 +206,13 @@ class Runtime:
         if self._due is Due.SOON:
             due = min(due, self._drawn_at + FRAME_S)
         elif self._due is Due.SLOWLY:
-            due = min(due, self._drawn_slowly_at + SLOW_FRAME_S)
+            due = min(due, self._drawn_slowly_at + self._slow_frame_s)
         return min(max(due - self._clock(), 0.001), IDLE_S)
+
+    @property
+    def _slow_frame_s(self) -> float:
+        """Shortest time between two whole pictures as things are [s]."""
+        return ANSWER_S if self._is_asked else SLOW_FRAME_S
 
     def handle(self, message: Message) -> None:
         """Do what one message says."""
@@ -224,6 +232,7 @@ class Runtime:
                 if page is not None:
                     page.disconnected(number)
             case Envelope(action, sender):
+                self._is_asked |= sender.browser is not None
                 self._apply(action, sender)
             case _:
                 self._apply(message)
@@ -264,13 +273,13 @@ class Runtime:
         if self.state.project is not self._shown:
             self._show_site()
         now = self._clock()
-        slowly = self._due > Due.NEVER and now - self._drawn_slowly_at >= SLOW_FRAME_S
+        slowly = self._due > Due.NEVER and now - self._drawn_slowly_at >= self._slow_frame_s
         if slowly or (self._due is Due.SOON and now - self._drawn_at >= FRAME_S):
             self._drawn_at = now
             # What is drawn slowly is still to come after a quick picture.
             self._due = Due.NEVER if slowly else Due.SLOWLY
             if slowly:
-                self._drawn_slowly_at = now
+                self._drawn_slowly_at, self._is_asked = now, False
             self._page.draw(self.view(whole=slowly), slowly=slowly)
 
     def view(self, *, whole: bool = True) -> PageView:

@@ -4,10 +4,11 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from commission.app.base import actions
-from commission.app.base.actions import Action, Camera, Envelope, Sender, SetCamera
+from commission.app.base.actions import Action, Camera, Envelope, LookAgain, Sender, SetCamera
 from commission.app.base.effects import Effect, PlaceCamera, Tell
 from commission.app.base.feature import Feature
 from commission.app.base.service import Context, Service
@@ -31,7 +32,7 @@ from commission.app.run.drives import Drive
 from commission.app.run.service import RunService
 from commission.app.run.state import RunState
 from commission.app.run.view import RunView
-from commission.app.runtime import BrowserCame, BrowserLeft, Runtime
+from commission.app.runtime import SLOW_FRAME_S, BrowserCame, BrowserLeft, Runtime
 from commission.app.tune.actions import SetParameter
 from commission.errors import FileFormatError
 from commission.progress import Progress
@@ -264,3 +265,33 @@ def test_a_job_in_sight_is_stopped_by_its_button_and_what_there_was_stays(bench:
     assert before is not None
     assert bench.run.result is before.result
     assert bench.page.told == []
+
+
+def test_what_a_browser_asks_for_is_drawn_whole_within_a_tenth_of_a_second_and_a_drive_as_before() -> None:
+    project, now = Project(name="x"), [100.0]
+    runtime = Runtime(AppState(project=project, saved=project), (), clock=lambda: now[0])
+    pictures: list[tuple[float, bool]] = []
+
+    class Page(Pictures):
+        def draw(self, view: PageView, *, slowly: bool) -> None:
+            pictures.append((round(now[0] - 100.0, 3), slowly))
+
+    runtime._page = Page()
+
+    def let(seconds: float, every: Action | Envelope | None = None) -> None:
+        for _ in range(round(seconds / 0.02)):
+            now[0] += 0.02
+            if every is not None:
+                runtime.handle(every)
+            runtime.tick()
+
+    let(0.5, LookAgain())
+    whole = [at for at, slowly in pictures if slowly]
+    assert np.diff(whole) == pytest.approx(np.full(len(whole) - 1, SLOW_FRAME_S), abs=0.021)
+    while not pictures[-1][1]:  # until one was drawn this moment
+        let(0.02, LookAgain())
+    asked = now[0] - 100.0
+    pictures.clear()
+    runtime.handle(by(1, LookAgain()))
+    let(0.1)
+    assert min(at for at, slowly in pictures if slowly) - asked < 0.09

@@ -88,7 +88,7 @@ div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
  box-sizing:border-box;overflow:hidden auto;scrollbar-width:thin;padding:5px 14px 2px 8px;
  border-bottom:1px solid {css(Surface.EDGE.dark)}}}
 .c-now .c-table{{line-height:1.3}}
-.c-now .c-table td:first-child{{width:1px;white-space:nowrap}}
+.c-now .c-table td:first-child{{width:auto}}
 {LIT_CAMERA}{{background:{css(Worded.PRESS.dark)}!important;border-color:{css(Worded.PRESS.dark)}!important;
  color:#fff!important}}
 .c-s-plots{{margin-right:calc(34vw + 8px)}}
