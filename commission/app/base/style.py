@@ -19,8 +19,8 @@ OPEN_EYE, SHUT_EYE = (
 NO_RUN_PX = 34
 """Height of the strip below the floor while there is no run [pixels]."""
 
-NOW_PX, LOW_NOW_PX, HIGH_NOW_PX = 185, 115, 255
-"""Height of the numbers of now [pixels], and where the window is low or high: whole rows."""
+NOW_PX, LOW_NOW_PX, HIGH_NOW_PX = 185, 98, 255
+"""Height of the numbers of now [pixels], and where the window is low (the badge alone says the mode) or high."""
 LIT_CAMERA = ",".join(
     f":root[data-camera~='{camera.value}'] div:has(>.c-cameras)+div button:nth-child({place})"
     for place, camera in enumerate(Camera, start=1)
@@ -79,7 +79,7 @@ div:has(>div>.c-bottom):has(.c-no-run)>:nth-child(4){{grid-column:1/span 24!impo
  background:{css(Surface.CARD.dark)};color:inherit;font-size:15px;line-height:1;cursor:pointer}}
 .c-daylight:is(:hover,:focus-visible){{border-color:{css(Worded.BRAND.dark)}}}
 :root{{--c-now:{NOW_PX}px}}
-@media (max-height:800px){{:root{{--c-now:{LOW_NOW_PX}px}}}}
+@media (max-height:800px){{:root{{--c-now:{LOW_NOW_PX}px}} .c-now tr:first-child{{display:none}}}}
 @media (min-height:1000px){{:root{{--c-now:{HIGH_NOW_PX}px}}}}
 :root:has(.c-no-run){{--c-now:34px}}
 [data-dock-region=right]{{box-sizing:border-box;padding-top:var(--c-now)}}
@@ -88,7 +88,8 @@ div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
  box-sizing:border-box;overflow:hidden auto;scrollbar-width:thin;padding:5px 14px 2px 8px;
  border-bottom:1px solid {css(Surface.EDGE.dark)}}}
 .c-now .c-table{{line-height:1.3}}
-.c-now .c-table td:first-child{{width:auto}}
+.c-now .c-table td:first-child{{width:1px;white-space:nowrap}}
+.c-now .c-table .c-one td:last-child{{white-space:normal}}
 {LIT_CAMERA}{{background:{css(Worded.PRESS.dark)}!important;border-color:{css(Worded.PRESS.dark)}!important;
  color:#fff!important}}
 .c-s-plots{{margin-right:calc(34vw + 8px)}}
@@ -113,8 +114,9 @@ div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
 .c-s-find{{margin-left:10px;padding:0 8px;border-radius:3px;border:1px solid {css(Surface.EDGE_QUIET.dark)};
  background:none;color:inherit;font:inherit;cursor:pointer}}
 @media (max-width:1290px){{.c-s-list :is(td,th){{padding:1px 4px}} .c-s-list :is(td,th):last-child{{display:none}}
- .c-s-list{{font-size:11px}}}}
+ .c-s-list{{font-size:11px;height:calc(var(--c-bottom) - 48px)}} .c-s-head{{margin-right:0}}}}
 [data-dock-region=right] [data-dock-scroll]>div:has(.c-points){{flex-grow:1.3!important}}
+:root[data-mantine-color-scheme]{{--mantine-color-dimmed:{css(Surface.AXIS.dark)}!important}}
 .c-layers{{padding:0 8px 4px;font-size:12px}}
 .c-layers h4{{margin:6px 0 1px;font-size:11px;font-weight:600;opacity:.65;
  border-bottom:1px solid {css(Surface.EDGE.dark)}}}

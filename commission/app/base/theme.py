@@ -227,7 +227,7 @@ div:has(>.c-carried){{display:none!important}}
 .c-plots-bar button:disabled{{opacity:.3;cursor:default;border-color:transparent}}
 .c-chips{{flex:1;min-width:0;overflow:hidden;font-size:11px}}
 .c-plots-bar [aria-pressed=true]{{opacity:1;background:{css(Surface.PRESSED.dark)}}}
-.c-plots-bar [aria-pressed=false]{{opacity:.5}}
+.c-plots-bar [aria-pressed=false]{{opacity:.65}}
 .c-plots-end button{{border-color:{css(Surface.EDGE_QUIET.dark)};margin-left:4px;font-size:11px}}
 .c-plots-body{{flex:1;min-height:0;position:relative;overflow:hidden}}
 .c-list-view{{position:absolute;inset:0;overflow:auto;padding:0 8px;display:none}}

@@ -22,7 +22,7 @@ class VariantsPanel(BasePanel):
 
     def __init__(self, gui: GuiApi, post: Post) -> None:
         keep = gui.add_button(
-            "Keep",
+            "Keep as a variant",
             color="gray",
             hint="Keep this run as variant A, B or C beside what is tried next; *Variants* below the floor compares.",
         )
