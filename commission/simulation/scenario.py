@@ -19,6 +19,7 @@ from commission.progress import Progress, silent
 from commission.simulation import follower, people, scan
 from commission.simulation.constants import draw_truth, error_of, true_site
 from commission.simulation.drive import DriveOptions, TrueMotion, drive, measure
+from commission.simulation.goods import reels_at
 from commission.simulation.people import Crowd, WalkableFloor
 from commission.simulation.scan import VirtualScanner
 from commission.simulation.tags import tag_frames
@@ -189,6 +190,8 @@ def _scans(
             crowd.step(1e-9 * (stamp - before), pose)
         before = stamp
         legs = nobody if crowd is None else crowd.legs()
+        if disturbances.reels:
+            legs = np.concatenate([legs, reels_at(disturbances.reels, 1e-9 * stamp)])
         intensities, flags = None, None
         if disturbances.intensity.enabled:
             ranges, intensities = virtual[index].bright_scan(pose, legs, beams[index], beam_poses=beam_poses)

@@ -190,6 +190,33 @@ class CoveredPeriod:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Reel:
+    """A paper reel that stands upright, alone or below others: goods that come, go and are carried."""
+
+    x: Annotated[float, X]
+    """Center, x in the map frame."""
+    y: Annotated[float, Y]
+    """Center, y in the map frame."""
+    radius: Annotated[float, Quantity(label="Radius", unit="m", bounds=Bounds.between(0.01, 10.0), decimals=4)] = 0.6
+    """Its radius."""
+    appears: Annotated[float, Quantity(label="Appears", unit="s", bounds=NOT_NEGATIVE)] = 0.0
+    """Time after the start of the drive at which it is put down."""
+    vanishes: Annotated[float, Quantity(label="Vanishes", unit="s", bounds=NOT_NEGATIVE)] = 0.0
+    """Time after the start at which it is gone; 0: it stays."""
+    carried: Annotated[float, Quantity(label="Carried from", unit="s", bounds=NOT_NEGATIVE)] = 0.0
+    """Time after the start at which another vehicle begins to carry it; 0: it stays where it is."""
+    to_x: Annotated[float, X] = 0.0
+    """Where it is carried to, x in the map frame."""
+    to_y: Annotated[float, Y] = 0.0
+    """Where it is carried to, y in the map frame."""
+    speed: Annotated[float, Quantity(label="Carried at", unit="m/s", bounds=Bounds.between(0.001, 20.0))] = 1.0
+    """How fast it is carried."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, "reel's ")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Disturbances:
     """Everything that a virtual drive suffers beyond the noise of its sensors."""
 
@@ -209,6 +236,8 @@ class Disturbances:
     """Mean number of wheel slips per 100 m driven."""
     covered: tuple[CoveredPeriod, ...] = ()
     """Times at which all reflectors are covered."""
+    reels: tuple[Reel, ...] = ()
+    """Paper reels that stand about, come, go and are carried."""
     wheels: Annotated[WheelNoise, Group("Noise of the wheels")] = field(default_factory=WheelNoise)
     """True noise of the wheels."""
     constants: Annotated[ConstantErrors, Group("Constant errors")] = field(default_factory=ConstantErrors)

@@ -157,14 +157,17 @@ def _route(route: Route, T: FloatArray) -> Route:
 
 
 def _disturbances(disturbances: Disturbances, T: FloatArray) -> Disturbances:
-    def place(x: float, y: float) -> dict[str, float]:
+    def place(x: float, y: float, prefix: str = "") -> dict[str, float]:
         moved = se2.transform_points(T, np.array([x, y]))
-        return {"x": float(moved[0]), "y": float(moved[1])}
+        return {f"{prefix}x": float(moved[0]), f"{prefix}y": float(moved[1])}
 
     return replace(
         disturbances,
         shiny_objects=tuple(replace(each, **place(each.x, each.y)) for each in disturbances.shiny_objects),
         tilted_stretches=tuple(replace(each, **place(each.x, each.y)) for each in disturbances.tilted_stretches),
+        reels=tuple(
+            replace(each, **place(each.x, each.y), **place(each.to_x, each.to_y, "to_")) for each in disturbances.reels
+        ),
     )
 
 

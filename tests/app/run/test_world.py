@@ -62,7 +62,7 @@ FIELDS = {
     "constants.separation_scale_sigma": ("Wheel separation 1σ [%]", 100.0),
 }
 """Label and factor of the unit of each number's widget."""
-IN_FILE = {"shiny_objects", "tilted_stretches", "covered", "constants.scanners"}
+IN_FILE = {"shiny_objects", "tilted_stretches", "covered", "reels", "constants.scanners"}
 """Lists, which the page does not edit."""
 GROUPS = {"wheels", "constants", "intensity"}
 """Values in folders of their own."""
