@@ -96,6 +96,8 @@ class ContourScan(NamedTuple):
     observation: ObservationModel
     """Mounting of its scanner."""
     sweep: Sweep
+    beams: int = 0
+    """How many of the ranges are its own: rows of several scanners are as wide as the widest."""
 
 
 def contour_model(floor: FloorMap | None, scanners: Sequence[Scanner], given: ContourParameters) -> ContourModel | None:
@@ -117,9 +119,6 @@ def contour_model(floor: FloorMap | None, scanners: Sequence[Scanner], given: Co
         float(given.largest_error),
         float(given.beam_sigma),
     )
-    blind = [
-        (number, *sector) for number, each in enumerate(scanners) for sector in each.reported_blind_sectors.tolist()
-    ]
     one, two, three = (chi_square_gate(given.gate_probability, dof) for dof in (1, 2, 3))
     return ContourModel(
         contour_tables(floor),
@@ -130,6 +129,16 @@ def contour_model(floor: FloorMap | None, scanners: Sequence[Scanner], given: Co
         given.map_sigma**2,
         given.map_heading_sigma**2,
         1.0 / given.map_correlation,
+        *what_is_no_echo(scanners),
+    )
+
+
+def what_is_no_echo(scanners: Sequence[Scanner]) -> tuple[FloatArray, FloatArray]:
+    """Return `limits` and `blind` of a `ContourModel`."""
+    blind = [
+        (number, *sector) for number, each in enumerate(scanners) for sector in each.reported_blind_sectors.tolist()
+    ]
+    return (
         read_only(np.array([each.range for each in scanners], dtype=np.float64).reshape(-1, 2)),
         read_only(np.array(blind, dtype=np.float64).reshape(-1, 3)),
     )
@@ -153,11 +162,39 @@ def scan_points(
     q = exp(tau v) m p with p the measured point, m the mounting, tau its time after the stamp, v the twist of base:
     motion at a constant twist (Solà et al. 2018, equations 156 to 158).
     """
+    per_cell = 1.0 / model.tables.resolution
+    return beam_points(scan, model.limits, model.blind, per_cell, motion, following, points)
+
+
+@compiled_inline
+def beam_points(  # noqa: PLR0917 - a scan, what is no echo, and the motion around it
+    scan: ContourScan,
+    limits: FloatArray,
+    blind: FloatArray,
+    scale: float,
+    motion: Motion,
+    following: NextOdometry,
+    points: FloatArray,
+) -> int:
+    """Write the points of a scan as they lie at its stamp, in any unit; return how many there are.
+
+    Parameters
+    ----------
+    scan : its beams.
+    limits, blind : see `ContourModel`.
+    scale : units in a metre.
+    motion, following : odometry before the scan and after it.
+    points : (B, 2) out: points, base frame.
+
+    Notes
+    -----
+    q = exp(tau v) m p, as in `scan_points` (Solà et al. 2018, equations 156 to 158).
+    """
     forward, left, turn = motion.trend_x, motion.trend_y, motion.trend_theta
     if following.known:
         forward, left, turn = trend(motion, following.stamp_ns, following.dx, following.dy, following.dtheta)
-    mount, sweep, per_cell = scan.observation, scan.sweep, 1.0 / model.tables.resolution
-    nearest, farthest = model.limits[scan.scanner, 0], model.limits[scan.scanner, 1]
+    mount, sweep = scan.observation, scan.sweep
+    nearest, farthest = limits[scan.scanner, 0], limits[scan.scanner, 1]
     moves = sweep.seconds_per_rad != 0.0 or sweep.seconds_at_middle != 0.0
     count = 0
     for i in range(len(scan.ranges)):
@@ -165,7 +202,7 @@ def scan_points(
         if not nearest <= distance <= farthest:
             continue
         bearing = scan.angle_min + scan.angle_increment * i
-        if len(model.blind) and _is_blind(bearing, scan.scanner, model.blind):
+        if len(blind) and _is_blind(bearing, scan.scanner, blind):
             continue
         direction = mount.mount_theta + sweep.upright * bearing
         x, y = mount.mount_x + distance * math.cos(direction), mount.mount_y + distance * math.sin(direction)
@@ -174,7 +211,7 @@ def scan_points(
             dx, dy, angle = exp_scalars(tau * forward, tau * left, tau * turn)
             c, s = math.cos(angle), math.sin(angle)
             x, y = dx + c * x - s * y, dy + s * x + c * y
-        points[count, 0], points[count, 1] = x * per_cell, y * per_cell
+        points[count, 0], points[count, 1] = x * scale, y * scale
         count += 1
     return count
 

@@ -1,4 +1,4 @@
-"""Scans as the contours of a whole run read them: those of a stretch of cycles, in memory. No step of the filter."""
+"""Scans as contours and temporary landmarks read them: those of a stretch of cycles, in memory. No filter in here."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
-from commission.localization.contour import ContourScan
+from commission.localization.contour import ContourModel, ContourScan
 from commission.localization.observation import observation_at
 from commission.localization.setup import LocalizerSetup
 from commission.localization.sweep import AT_ONCE, Sweep, sweep_at
@@ -25,12 +25,14 @@ class ContourScans(NamedTuple):
     angle_min: FloatArray
     angle_increment: FloatArray
     scanners: IntArray
+    beams: IntArray
+    """How many there are; 0 in a cycle that is no scan."""
 
 
 def contour_scans(
     log: RecordLog, setup: LocalizerSetup, scans: tuple[int, IntArray], cycles: int
 ) -> ContourScans | None:
-    """Read the scans of a stretch of cycles; None where contours are not looked at.
+    """Read the scans of a stretch of cycles; None where nobody looks at it.
 
     Parameters
     ----------
@@ -40,13 +42,13 @@ def contour_scans(
         before any detections of the sensor itself.
     cycles : of the stretch.
     """
-    if setup.contour is None:
+    if setup.contour is None and setup.temporary is None:
         return None
     first, among = scans
     numbers, indices = log.scan_order[first : first + len(among)], setup.indices_of(log.scanners)
     widest = max((int(each.beams.max(initial=0)) for each in log.scans), default=0)
     ranges = np.full((cycles, widest), np.nan, dtype=np.float32)
-    angles, scanners = np.zeros((2, cycles)), np.zeros(cycles, dtype=np.int64)
+    angles, (scanners, beams) = np.zeros((2, cycles)), np.zeros((2, cycles), dtype=np.int64)
     start = 0
     for each in log.scans:
         where = np.flatnonzero((numbers >= start) & (numbers < start + len(each)))
@@ -55,13 +57,14 @@ def contour_scans(
             rows = among[where]
             ranges[rows, : block.ranges.shape[1]] = block.ranges
             angles[0, rows], angles[1, rows] = block.angle_min, block.angle_increment
-            scanners[rows] = indices[each.scanner]
+            scanners[rows], beams[rows] = indices[each.scanner], block.beams
         start += len(each)
-    return ContourScans(read_only(ranges), read_only(angles[0]), read_only(angles[1]), read_only(scanners))
+    numbers_of_each = read_only(angles[0]), read_only(angles[1]), read_only(scanners), read_only(beams)
+    return ContourScans(read_only(ranges), *numbers_of_each)
 
 
 def contour_scan(setup: LocalizerSetup, scan: Scan | None, scanner: int) -> ContourScan | None:
-    """Return one scan for kernels; None where contours are not looked at.
+    """Return one scan for kernels; None where nobody looks at it.
 
     Parameters
     ----------
@@ -69,7 +72,7 @@ def contour_scan(setup: LocalizerSetup, scan: Scan | None, scanner: int) -> Cont
     scan : the scan; None where the sensor itself has detected, which says nothing of contours.
     scanner : index of the scanner.
     """
-    if setup.contour is None:
+    if setup.contour is None and setup.temporary is None:
         return None
     if scan is None:
         scanner = 0
@@ -81,6 +84,7 @@ def contour_scan(setup: LocalizerSetup, scan: Scan | None, scanner: int) -> Cont
         scanner,
         setup.observations[scanner],
         Sweep(*setup.sweep_rows[scanner].tolist()) if len(setup.sweep_rows) else AT_ONCE,
+        len(ranges),
     )
 
 
@@ -88,7 +92,7 @@ def contour_scan(setup: LocalizerSetup, scan: Scan | None, scanner: int) -> Cont
 def contour_scan_at(
     scans: ContourScans | None, cycle: int, observations: FloatArray, sweeps: FloatArray
 ) -> ContourScan | None:
-    """Scan of a cycle, or None where contours are not looked at.
+    """Scan of a cycle, or None where nobody looks at it.
 
     Parameters
     ----------
@@ -111,16 +115,17 @@ def contour_scan_at(
         scanner,
         observation_at(observations, scanner),
         sweep,
+        scans.beams[cycle],
     )
 
 
 @compiled_inline
-def figures_at(scans: ContourScans | None, figures: FloatArray, cycle: int) -> FloatArray | None:
+def figures_at(model: ContourModel | None, figures: FloatArray, cycle: int) -> FloatArray | None:
     """Row of a cycle to write what became of its contours to, or None where they are not looked at.
 
     Parameters
     ----------
-    scans : of the stretch, or None.
+    model : of the contours, or None.
     figures : (K, COLUMNS) of the stretch.
     cycle : in it.
 
@@ -128,6 +133,6 @@ def figures_at(scans: ContourScans | None, figures: FloatArray, cycle: int) -> F
     -----
     No formula: a row.
     """
-    if scans is None:
+    if model is None:
         return None
     return figures[cycle]

@@ -28,6 +28,8 @@ from commission.localization.rejection import Evidence, rejects_the_world, weigh
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
 from commission.localization.supervisor import FAIL, LOST, OPERATIONAL, supervise
+from commission.localization.temporary import TemporaryModel, observe_temporary
+from commission.localization.temporary_memory import TemporaryMemory
 from commission.localization.zones import ZoneRows, kinds_at
 
 WHOLE_POSE = 3
@@ -69,6 +71,7 @@ def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
         state.cross,
         state.search,
         state.protection,
+        state.temporary,
     )
 
 
@@ -96,6 +99,9 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     scan: ContourScan | None,
     figures: FloatArray | None,
     zones: ZoneRows | None,
+    temporary: TemporaryModel | None,
+    memory: TemporaryMemory | None,
+    goods: FloatArray | None,
 ) -> Cycle:
     """Process the detections of a scan.
 
@@ -119,11 +125,14 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     contours, scan : contours of the map, and the scan that is matched with them; None: they are not looked at.
     figures : (COLUMNS,) out, see `contour`; None: as `contours`.
     zones : where which kinds correct the pose; None: all everywhere.
+    temporary, memory : rules of temporary landmarks, and those that are known, written; None: none are looked at.
+    goods : (COLUMNS,) out, see `temporary`; None: as `temporary`.
 
     Notes
     -----
     No formula: `reach`, `associate`, `correct` and `supervise` in turn: Sobreira et al. 2016, Algorithms 1, 3 and 4;
-    then the rule by rejections, which overrules it. Contours come after reflectors, from the freshest state.
+    then the rule by rejections, which overrules it. Contours come after reflectors, from the freshest state,
+    and temporary landmarks after both.
     """
     prior, motion = reach(state.belief, state.motion, stamp_ns, following, model.odometry)
     given = considering(cross, prior, state.pivot, state.motion, following, model.consider)
@@ -171,6 +180,9 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         posterior = with_contours(
             posterior, contours, scan, state, motion, following, len(places), model, cross, busy, figures
         )
+    posterior = with_temporary(
+        prior, posterior, temporary, memory, scan, state, motion, following, stamp_ns, model, cross, busy, goods
+    )
     pivot = state.pivot if cross is None else (posterior.x, posterior.y)
     for i in range(first, last):
         if reflectors[i] != NOBODY:
@@ -241,6 +253,7 @@ def supervised(  # noqa: PLR0917 - what a cycle has found, value by value
         before.cross,
         before.search,
         before.protection,
+        before.temporary,
     )
 
 
@@ -274,6 +287,7 @@ def with_mode(before: FilterState, after: FilterState, mode: int) -> FilterState
         after.cross,
         after.search,
         after.protection,
+        after.temporary,
     )
 
 
@@ -324,6 +338,59 @@ def with_contours(  # noqa: PLR0917 - the filter's state around one scan
         busy,
         figures,
         is_invariant(model.gate.kind),
+    )
+
+
+@compiled_inline
+def with_temporary(  # noqa: PLR0917 - the filter's state around one scan
+    prior: PoseGaussian,
+    belief: PoseGaussian,
+    temporary: TemporaryModel | None,
+    memory: TemporaryMemory | None,
+    scan: ContourScan | None,
+    before: FilterState,
+    motion: Motion,
+    following: NextOdometry,
+    stamp_ns: int,
+    model: FilterModel,
+    cross: FloatArray | None,
+    busy: IntArray | None,
+    goods: FloatArray | None,
+) -> PoseGaussian:
+    """Correct a belief by the temporary landmarks of a scan, where they are looked at.
+
+    Parameters
+    ----------
+    prior : belief after *predict*.
+    belief : after reflectors and contours.
+    temporary, memory, scan, goods : as in `process_scan`.
+    before : state before the scan.
+    motion, following : odometry before the scan and after it.
+    stamp_ns : of the scan [ns].
+    model : of the whole filter.
+    cross, busy : covariance with the constants, about `belief`, or None.
+
+    Notes
+    -----
+    No formula: `observe_temporary`.
+    """
+    if temporary is None or memory is None or scan is None or goods is None:
+        return belief
+    was_lost, invariant = before.mode == LOST, is_invariant(model.gate.kind)
+    return observe_temporary(
+        prior,
+        belief,
+        was_lost,
+        temporary,
+        memory,
+        scan,
+        motion,
+        following,
+        stamp_ns,
+        invariant,
+        cross,
+        busy,
+        goods,
     )
 
 

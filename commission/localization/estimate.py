@@ -92,6 +92,8 @@ class Estimate:
     """Index of the scanner that saw them, in the setup."""
     contours: FloatArray | None = None
     """(12,) what became of the contours of the scan, see `contour`; None: they are not looked at."""
+    temporary: FloatArray | None = None
+    """(9,) what became of the temporary landmarks in the scan, see `temporary`; None: they are not looked at."""
     tags: SeenTags | None = None
     """What a frame saw of tags; None of a scan."""
     levels: FloatArray | None = None

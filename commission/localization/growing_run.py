@@ -21,6 +21,7 @@ from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState
 from commission.localization.tag_frames import TagCycles
 from commission.localization.tags import COLUMNS as TAG_COLUMNS
+from commission.localization.temporary_model import COLUMNS as TEMPORARY_COLUMNS
 from commission.localization.whole_run import CHECKPOINT_CYCLES
 from commission.site.records import Record
 
@@ -39,6 +40,7 @@ class Cycles(NamedTuple):
     covariances: FloatArray
     modes: NDArray[np.int8]
     contours: FloatArray
+    temporary: FloatArray
     is_frame: BoolArray
     """Whether the cycle is a frame of the camera that looks for tags."""
     levels: FloatArray
@@ -91,6 +93,7 @@ class GrowingRun:
             covariances[1],
             np.empty(n, np.int8),
             np.zeros((n, COLUMNS)),
+            np.zeros((n, TEMPORARY_COLUMNS)),
             np.zeros(n, np.bool_),
             np.empty((n, 2)),
         )
@@ -179,6 +182,7 @@ class GrowingRun:
         looking = any(segment.setup.tag_model is not None for segment in segments)
         matching = any(segment.setup.contour is not None for segment in segments)
         protecting = any(segment.setup.protection is not None for segment in segments)
+        remembering = any(segment.setup.temporary is not None for segment in segments)
         return RunColumns(
             segments=segments,
             checkpoints=tuple(self._checkpoints),
@@ -192,6 +196,7 @@ class GrowingRun:
             reflector=rows.reflectors,
             d2=rows.d2,
             contours=cycles.contours if matching else cycles.contours[:0],
+            temporary=cycles.temporary if remembering else cycles.temporary[:0],
             tags=read_only(self._sightings.figures[: len(self._ids) if looking else 0]),
             levels=cycles.levels if protecting else cycles.levels[:0],
             searches=tuple(self._searches),
@@ -244,6 +249,7 @@ class GrowingRun:
         cycles.modes[row] = estimate.mode
         cycles.contours[row] = 0.0 if estimate.contours is None else estimate.contours
         cycles.levels[row] = math.nan if estimate.levels is None else estimate.levels
+        cycles.temporary[row] = 0.0 if estimate.temporary is None else estimate.temporary
         self._append_tags(row, estimate.tags)
         rejected = estimate.status == Status.OUTLIER_DETECTOR
         found.range_bearing[first:last], found.beams[first:last] = estimate.detections, estimate.beams

@@ -42,6 +42,8 @@ from commission.localization.tag_cycle import TagFrames, process_tags
 from commission.localization.tag_start import told_by_tags
 from commission.localization.tags import COLUMNS as TAG_COLUMNS
 from commission.localization.tags import entries_of
+from commission.localization.temporary_memory import TemporaryMemory, landmarks_in, memory_of
+from commission.localization.temporary_model import COLUMNS as TEMPORARY_COLUMNS
 from commission.localization.wheel_scale import as_driven
 from commission.site.parameters import OdometryParameters, Parameters
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan, TagSightings
@@ -256,9 +258,10 @@ class Localizer:
         if state.search is not None:
             self._state = searching_odometry(state, record.stamp_ns, (dx, dy, dtheta), noise)
             return
-        bare = state._replace(cross=None, protection=None)
+        bare = state._replace(cross=None, protection=None, temporary=None)
         moved = process_odometry(bare, record.stamp_ns, dx, dy, dtheta, noise)
-        self._state = moved._replace(cross=state.cross, protection=state.protection)
+        kept = {"cross": state.cross, "protection": state.protection, "temporary": state.temporary}
+        self._state = moved._replace(**kept)
 
     def _at_stamp(self, scanner: int, measured: FloatArray, following: NextOdometry) -> FloatArray:
         """Return the detections of a scan at its stamp, upright: what was measured, where there is no other."""
@@ -282,15 +285,16 @@ class Localizer:
         reflector: IntArray = np.empty(count, dtype=np.int64)
         d2 = np.empty(count)
         figures = None if self._setup.contour is None else np.zeros(COLUMNS)
+        goods = None if self._setup.temporary is None else np.zeros(TEMPORARY_COLUMNS)
         tags = self._seen_tags(scan)
         levels = None if self._setup.protection is None else np.full(2, math.inf)
         if before.mode == Mode.INITIALIZING:
             associate_nothing(status, reflector, d2)
             cycle = unlocated(before, stamp_ns, following, self._setup.filter.odometry)
         elif isinstance(scan, TagSightings) and tags is not None and tags.figures is not None:
-            cycle = self._tagged(scan, following, tags.figures)
+            cycle = self._tagged(scan, following, tags.figures, goods)
         else:
-            cycle = self._filtered(scan, detections, following, (status, reflector, d2), figures)
+            cycle = self._filtered(scan, detections, following, (status, reflector, d2), (figures, goods))
         if levels is not None and before.mode != Mode.INITIALIZING:
             written = (read_only(detections), status, reflector)
             cycle = Cycle(cycle.prior, self._by_level(before, cycle, scanner, written, levels))
@@ -332,6 +336,7 @@ class Localizer:
             gate=self._setup.filter.gate.d2,
             scanner=scanner,
             contours=figures if tags is None else None,
+            temporary=goods,
             tags=tags,
             levels=levels,
         )
@@ -350,9 +355,9 @@ class Localizer:
         bank = bank_of(before.protection, setup.protected_names)
         if setup.protection is None or bank is None:
             raise ValueError("protection levels are asked for where the supervisor goes by 2-sigma")
-        bare = after._replace(cross=None, search=None, protection=None)
+        bare = after._replace(cross=None, search=None, protection=None, temporary=None)
         state = supervised_by_level(
-            before._replace(cross=None, search=None, protection=None),
+            before._replace(cross=None, search=None, protection=None, temporary=None),
             Cycle(cycle.prior, bare),
             0,
             len(detections),
@@ -366,7 +371,8 @@ class Localizer:
             levels,
         )
         protection = protection_state(bank, setup.protected_names)
-        return state._replace(cross=after.cross, search=after.search, protection=protection)
+        kept = {"cross": after.cross, "search": after.search, "temporary": after.temporary}
+        return state._replace(**kept, protection=protection)
 
     def _seen_tags(self, record: Scan | Detections | TagSightings) -> SeenTags | None:
         """What a frame saw of tags, with room for what becomes of it where they are looked at; None of a scan."""
@@ -386,16 +392,19 @@ class Localizer:
             self._map = search_map(self._setup)
         return sought(before, after, scan, self._map)
 
-    def _tagged(self, frame: TagSightings, following: NextOdometry, figures: FloatArray) -> Cycle:
+    def _tagged(
+        self, frame: TagSightings, following: NextOdometry, figures: FloatArray, goods: FloatArray | None
+    ) -> Cycle:
         """Let the filter process a frame with tags; what becomes of them is written."""
         setup, constants, count = self._setup, self._setup.constants, len(frame.ids)
         cross = columns_of(self._state.cross, constants)
         entries = entries_of(np.array(frame.ids, dtype=np.str_), setup.tags)
         offsets = np.array((0, count), dtype=np.int64)
+        memory = self._memory()
         if setup.tag_model is None:
             raise ValueError("a frame with tags is processed where none are looked at; expected tags in the setup")
         cycle = process_tags(
-            self._state._replace(cross=None, search=None, protection=None),
+            self._state._replace(cross=None, search=None, protection=None, temporary=None),
             frame.stamp_ns,
             0,
             count,
@@ -410,9 +419,25 @@ class Localizer:
             following,
             figures,
             setup.zone_rows,
+            setup.temporary,
+            memory,
+            contour_scan(setup, None, 0),
+            goods,
         )
-        state = cycle.state._replace(cross=cross_covariance(cross, constants), search=self._state.search)
-        return Cycle(cycle.prior, state)
+        return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory))
+
+    def _memory(self) -> TemporaryMemory | None:
+        """Temporary landmarks as arrays to be written; None where they are not looked at."""
+        rules = self._setup.temporary
+        return None if rules is None else memory_of(self._state.temporary, rules.most)
+
+    def _with_arrays(self, state: FilterState, cross: FloatArray | None, memory: TemporaryMemory | None) -> FilterState:
+        """Put what a cycle has left in its arrays into the state, and the search that went on beside it."""
+        return state._replace(
+            cross=cross_covariance(cross, self._setup.constants),
+            search=self._state.search,
+            temporary=self._state.temporary if memory is None else landmarks_in(memory),
+        )
 
     def _filtered(
         self,
@@ -420,14 +445,14 @@ class Localizer:
         detections: FloatArray,
         following: NextOdometry,
         written: tuple[NDArray[np.int8], IntArray, FloatArray],
-        figures: FloatArray | None,
+        figures: tuple[FloatArray | None, FloatArray | None],
     ) -> Cycle:
-        """Let the filter process a scan; what becomes of its detections and contours is written."""
+        """Let the filter process a scan; what becomes of its detections, contours and goods is written."""
         constants, scanner = self._setup.constants, 0 if isinstance(scan, TagSightings) else scan.scanner
         cross = columns_of(self._state.cross, constants)
-        room = room_for_scans(cross, len(detections))
+        room, memory = room_for_scans(cross, len(detections)), self._memory()
         cycle = process_scan(
-            self._state._replace(cross=None, search=None, protection=None),
+            self._state._replace(cross=None, search=None, protection=None, temporary=None),
             scan.stamp_ns,
             0,
             len(detections),
@@ -445,8 +470,10 @@ class Localizer:
             following,
             self._setup.contour,
             contour_scan(self._setup, scan if isinstance(scan, Scan) else None, scanner),
-            figures,
+            figures[0],
             self._setup.zone_rows,
+            self._setup.temporary,
+            memory,
+            figures[1],
         )
-        state = cycle.state._replace(cross=cross_covariance(cross, constants), search=self._state.search)
-        return Cycle(cycle.prior, state)
+        return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory))

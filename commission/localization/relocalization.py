@@ -65,15 +65,15 @@ def searching_odometry(
     displacement : [m, m, rad].
     noise : variances per metre, radian and second.
     """
-    search, cross = state.search, state.cross
+    search, cross, temporary = state.search, state.cross, state.temporary
     if search is None:
         raise ValueError("the state has no search; expected one of a vehicle that is lost or not located yet")
     track, _ = advance(search.track, state.motion, stamp_ns, *displacement, noise)
-    bare = state._replace(cross=None, search=None, protection=None)
+    bare = state._replace(cross=None, search=None, protection=None, temporary=None)
     moved = process_odometry(bare, stamp_ns, *displacement, noise)
     if state.mode == Mode.INITIALIZING:
         moved = moved._replace(belief=state.belief)
-    return moved._replace(cross=cross, search=replace(search, track=track))
+    return moved._replace(cross=cross, search=replace(search, track=track), temporary=temporary)
 
 
 def forgotten(state: FilterState, setup: LocalizerSetup) -> FilterState:
@@ -91,6 +91,7 @@ def forgotten(state: FilterState, setup: LocalizerSetup) -> FilterState:
         evidence=NO_EVIDENCE._replace(stamp_ns=state.belief_ns),
         pivot=(belief.x, belief.y),
         cross=None,
+        temporary=None,
         search=new_search(state.belief_ns),
         protection=None,
     )
@@ -182,6 +183,7 @@ def _located(after: FilterState, search: Search, best: FloatArray, stamp_ns: int
         evidence=NO_EVIDENCE._replace(stamp_ns=stamp_ns, confirmed=0.0),
         pivot=(belief.x, belief.y),
         cross=None,
+        temporary=None,
         search=None,
         protection=None,
     )

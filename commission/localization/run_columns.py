@@ -89,6 +89,8 @@ class RunColumns:
     levels: FloatArray
     """(K, 2) protection level of position [m] and heading [rad] that the supervisor goes by: inf where the vehicle is
     lost or not located, NaN where it goes by 2-sigma; (0, 2) where it always does."""
+    temporary: FloatArray
+    """(K, 9) what became of temporary landmarks in each cycle, see `temporary`; (0, 9) where they are not looked at."""
     final: FilterState
     """State after the last record, odometry included."""
     searches: tuple[SearchMoment, ...] = ()
@@ -189,6 +191,7 @@ class RunColumns:
             gate=setup.filter.gate.d2,
             scanner=int(self.detected.scanners[cycle]),
             contours=self.contours[cycle] if setup.contour is not None and not self.is_frame(cycle) else None,
+            temporary=self.temporary[cycle] if setup.temporary is not None else None,
             tags=self._tags(cycle),
             levels=None if setup.protection is None else self.levels[cycle],
         )

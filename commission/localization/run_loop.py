@@ -47,6 +47,9 @@ from commission.localization.tag_frames import TagCycles
 from commission.localization.tag_start import told_by_tags
 from commission.localization.tags import COLUMNS as TAG_COLUMNS
 from commission.localization.tags import entries_of
+from commission.localization.temporary_memory import TemporaryMemory, landmarks_in, memory_of
+from commission.localization.temporary_model import COLUMNS as TEMPORARY_COLUMNS
+from commission.localization.temporary_model import TemporaryModel
 from commission.localization.wheel_scale import as_driven
 from commission.localization.zones import ZoneRows
 from commission.site.record_log import RecordLog
@@ -71,6 +74,8 @@ class Columns(NamedTuple):
     levels: FloatArray
     """(K, 2) protection level of position [m] and heading [rad], NaN where the supervisor does not go by it; (0, 2)
     where it never does."""
+    temporary: FloatArray
+    """(K, 9) what became of temporary landmarks in each cycle, see `temporary`; (0, 9) where they are not looked at."""
 
 
 def empty_columns(detected: DetectionLog, setups: Sequence[LocalizerSetup]) -> Columns:
@@ -85,6 +90,7 @@ def empty_columns(detected: DetectionLog, setups: Sequence[LocalizerSetup]) -> C
     matching = any(setup.contour is not None for setup in setups)
     looking = any(setup.tag_model is not None for setup in setups)
     protecting = any(setup.protection is not None for setup in setups)
+    remembering = any(setup.temporary is not None for setup in setups)
     cycles, total = len(detected), len(detected.range_bearing)
     return Columns(
         np.empty((cycles, 3)),
@@ -97,6 +103,7 @@ def empty_columns(detected: DetectionLog, setups: Sequence[LocalizerSetup]) -> C
         np.zeros((cycles if matching else 0, CONTOUR_COLUMNS)),
         np.zeros((len(detected.tags.sightings) if detected.tags is not None and looking else 0, TAG_COLUMNS)),
         np.full((cycles if protecting else 0, 2), np.nan),
+        np.zeros((cycles if remembering else 0, TEMPORARY_COLUMNS)),
     )
 
 
@@ -124,6 +131,7 @@ def cut(columns: Columns, detected: DetectionLog, first: int, last: int) -> Colu
         columns.contours[first:last] if len(columns.contours) else columns.contours,
         tags,
         columns.levels[first:last] if len(columns.levels) else columns.levels,
+        columns.temporary[first:last] if len(columns.temporary) else columns.temporary,
     )
 
 
@@ -146,6 +154,8 @@ def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: in
         columns.settled[:detections] = earlier.range_bearing[:detections]
     if len(columns.contours) and len(earlier.contours):
         columns.contours[:cycles] = earlier.contours[:cycles]
+    if len(columns.temporary) and len(earlier.temporary):
+        columns.temporary[:cycles] = earlier.temporary[:cycles]
     if len(columns.tags) and len(earlier.tags):
         columns.tags[:sightings] = earlier.tags[:sightings]
     if len(columns.levels) and len(earlier.levels):
@@ -346,6 +356,7 @@ def _tracked(
     rows = slice(first, last + 1)
     cross = columns_of(state.cross, setup.constants)
     bank = bank_of(state.protection, setup.protected_names)
+    memory = None if setup.temporary is None else memory_of(state.temporary, setup.temporary.most)
     settled = stretch.columns.settled
     room = room_for_scans(cross, int(np.diff(detected.offsets).max(initial=0)))
     own = log.detection_stamps_ns
@@ -371,7 +382,7 @@ def _tracked(
         room.work,
         room.aims,
         room.busy,
-        state._replace(cross=None, protection=None),
+        state._replace(cross=None, protection=None, temporary=None),
         stretch.columns,
         stretch.priors,
         setup.contour,
@@ -380,11 +391,20 @@ def _tracked(
         setup.zone_rows,
         setup.protection,
         bank,
+        setup.temporary,
+        memory,
     )
     # Odometry alone changes nothing of it, nor does another setup before its first scan.
-    cross_after = cross_covariance(cross, setup.constants) if len(detected) else state.cross
-    protection = protection_state(bank, setup.protected_names) if len(detected) else state.protection
-    return after._replace(cross=cross_after, protection=protection), cycles, delivered
+    if not len(detected):
+        return (
+            after._replace(cross=state.cross, protection=state.protection, temporary=state.temporary),
+            cycles,
+            delivered,
+        )
+    cross_after = cross_covariance(cross, setup.constants)
+    protection = protection_state(bank, setup.protected_names)
+    temporary = state.temporary if memory is None else landmarks_in(memory)
+    return after._replace(cross=cross_after, protection=protection, temporary=temporary), cycles, delivered
 
 
 def _first_number(tags: TagCycles) -> int:
@@ -428,6 +448,8 @@ def _run(  # noqa: PLR0917 - the columns of the log
     zones: ZoneRows | None,
     protection: ProtectionModel | None,
     bank: Bank | None,
+    temporary: TemporaryModel | None,
+    memory: TemporaryMemory | None,
 ) -> tuple[FilterState, int, int]:
     """Deliver odometry and scans in the order of their stamps, odometry first, until the vehicle is lost.
 
@@ -436,7 +458,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
     Of the odometry the rows up to `delivered`; the one behind them only tells the motion of scans before it. Where
     there are sweeps, `detections` is a view of the column `settled`, which is written before it is read.
     """
-    means, covariances, modes, status, reflectors, d2, settled, figures, sightings, levels = columns
+    means, covariances, modes, status, reflectors, d2, settled, figures, sightings, levels, goods = columns
     rows = 0
     for k in range(len(scan_stamps)):
         while rows < delivered and odometry_stamps[rows] <= scan_stamps[k]:
@@ -465,6 +487,10 @@ def _run(  # noqa: PLR0917 - the columns of the log
                 following,
                 sightings,
                 zones,
+                temporary,
+                memory,
+                contour_scan_at(scans, k, observations, sweeps),
+                goods_at(temporary, goods, k),
             )
         else:
             first, last = offsets[k], offsets[k + 1]
@@ -494,8 +520,11 @@ def _run(  # noqa: PLR0917 - the columns of the log
                 following,
                 contours,
                 contour_scan_at(scans, k, observations, sweeps),
-                figures_at(scans, figures, k),
+                figures_at(contours, figures, k),
                 zones,
+                temporary,
+                memory,
+                goods_at(temporary, goods, k),
             )
         if protection is not None and bank is not None:
             state = supervised_by_level(
@@ -524,6 +553,25 @@ def _run(  # noqa: PLR0917 - the columns of the log
         state = process_odometry(state, odometry_stamps[rows], dx, dy, dtheta, model.odometry)
         rows += 1
     return state, len(scan_stamps), rows
+
+
+@compiled_inline
+def goods_at(temporary: TemporaryModel | None, goods: FloatArray, cycle: int) -> FloatArray | None:
+    """Row of a cycle to write what became of its temporary landmarks to, or None where they are not looked at.
+
+    Parameters
+    ----------
+    temporary : rules of temporary landmarks, or None.
+    goods : (K, COLUMNS) of the stretch.
+    cycle : in it.
+
+    Notes
+    -----
+    No formula: a row.
+    """
+    if temporary is None:
+        return None
+    return goods[cycle]
 
 
 @compiled_inline

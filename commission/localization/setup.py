@@ -35,6 +35,7 @@ from commission.localization.rejection import RejectionRule, rejection_rule
 from commission.localization.supervisor import SupervisorLimits, supervisor_limits
 from commission.localization.sweep import sweep_of, sweep_rows
 from commission.localization.tags import TagModel, tag_model
+from commission.localization.temporary_model import TemporaryModel, temporary_model
 from commission.localization.zones import ZoneRows, zone_rows
 from commission.site.floor_map import FloorMap
 from commission.site.parameters import Parameters
@@ -113,6 +114,8 @@ class LocalizerSetup:
     """Zones for kernels; None: every kind counts everywhere."""
     protection: ProtectionModel | None = field(init=False, repr=False, compare=False)
     """What protection levels are reckoned with; None: the supervisor does not go by them."""
+    temporary: TemporaryModel | None = field(init=False, repr=False, compare=False)
+    """Rules of temporary landmarks; None: they are not looked at."""
 
     def __post_init__(self) -> None:
         considers, known = self.parameters.filter.consider, self.uncertainty
@@ -142,6 +145,7 @@ class LocalizerSetup:
             constants += contour_constants(self.parameters.contour)
         object.__setattr__(self, "contour", contour)
         object.__setattr__(self, "protection", protection_model(self.parameters, index, self.reflectors.reflectors))
+        object.__setattr__(self, "temporary", temporary_model(self.scanners, self.parameters.temporary))
         object.__setattr__(self, "constants", constants)
         object.__setattr__(self, "index", index)
         object.__setattr__(self, "filter", model)

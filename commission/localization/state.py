@@ -15,6 +15,7 @@ from commission.localization.pose_gaussian import PoseGaussian, from_belief, to_
 from commission.localization.protection_state import ProtectionState
 from commission.localization.rejection import NO_EVIDENCE, Evidence
 from commission.localization.search_state import Search, new_search
+from commission.localization.temporary_memory import TemporaryLandmarks
 
 NO_RECORD_NS = -(2**63)
 """Stamp of the newest record before there is one: no stamp is older [ns]."""
@@ -49,6 +50,8 @@ class FilterState(NamedTuple):
     """What is known of a vehicle that is lost or not located yet; None while it knows where it is, and in kernels."""
     protection: ProtectionState | None = None
     """Filters that leave one reflector out each; None: not begun, or not asked for, and in kernels."""
+    temporary: TemporaryLandmarks | None = None
+    """Landmarks that come and go; None: none are remembered. Kernels are handed its arrays, and None here."""
 
 
 def state_at_start(initial: Belief) -> FilterState:

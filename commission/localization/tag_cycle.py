@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.consider_columns import carry_over
-from commission.localization.cycle import Cycle, supervised
+from commission.localization.contour import ContourScan
+from commission.localization.cycle import Cycle, supervised, with_temporary
 from commission.localization.filter_kinds import is_invariant
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import NextOdometry, reach, velocity
@@ -21,6 +22,8 @@ from commission.localization.rejection import weigh
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
 from commission.localization.tags import ACCEPTED, REJECTED, USE, TagModel, correct_by_tag
+from commission.localization.temporary_memory import TemporaryMemory
+from commission.localization.temporary_model import TemporaryModel
 from commission.localization.zones import ZoneRows, kinds_at
 
 
@@ -55,6 +58,10 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
     following: NextOdometry,
     figures: FloatArray,
     zones: ZoneRows | None,
+    temporary: TemporaryModel | None,
+    memory: TemporaryMemory | None,
+    scan: ContourScan | None,
+    goods: FloatArray | None,
 ) -> Cycle:
     """Process the sightings of a frame.
 
@@ -71,6 +78,7 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
     following : the odometry record at or after the frame, where it is known.
     figures : (n, COLUMNS) out, see `tags`.
     zones : where which kinds correct the pose; None: all everywhere.
+    temporary, memory, scan, goods : as in `process_scan`; the scan of a frame has no beams.
 
     Notes
     -----
@@ -96,6 +104,9 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
             figures[i],
             is_invariant(model.gate.kind),
         )
+    belief = with_temporary(
+        prior, belief, temporary, memory, scan, state, motion, following, stamp_ns, model, cross, busy, goods
+    )
     evidence = weigh(
         state.evidence,
         stamp_ns,

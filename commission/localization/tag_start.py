@@ -73,6 +73,7 @@ def told_by_tags(
         evidence=NO_EVIDENCE._replace(stamp_ns=after.belief_ns, confirmed=0.0),
         pivot=(belief.x, belief.y),
         cross=cross,
+        temporary=None,
         search=None,
     )
 

@@ -236,6 +236,7 @@ def _filtered(
         contours=columns.contours,
         tags=columns.tags,
         levels=columns.levels,
+        temporary=columns.temporary,
         searches=tuple(searches),
         range_bearing=columns.settled if len(columns.settled) else detected.range_bearing,
         final=_final(log, segments[-1].setup, detected.part(cycles, cycles), checkpoints[-1], detected.stamps_ns),

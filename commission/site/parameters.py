@@ -348,6 +348,117 @@ HELD_TWO_SIGMA, HELD_LEVEL = "two_sigma", "protection_level"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class TemporaryParameters:
+    """Temporary landmarks: reels and corners of goods that come and go ("Gold-fish SLAM")."""
+
+    enabled: Annotated[bool, Switch("Temporary landmarks")] = False
+    """Whether reels and corners that a scan shows are landmarks until they are forgotten, beside what is fixed."""
+    most: Annotated[
+        int,
+        Quantity(
+            label="Remembered at most",
+            unit="landmarks",
+            shown=Shown("", 1.0),
+            bounds=Bounds.between(0, 200),
+            step=1,
+            slider=(0, 100),
+        ),
+    ] = 40
+    """Temporary landmarks at most; the one seen longest ago makes room. 0: none are remembered."""
+    least_radius: Annotated[
+        float, Quantity(label="Reel radius from", unit="m", bounds=POSITIVE, step=0.01, slider=(0.05, 1.0))
+    ] = 0.3
+    """Radius of the smallest reel."""
+    largest_radius: Annotated[
+        float, Quantity(label="Reel radius to", unit="m", bounds=POSITIVE, step=0.01, slider=(0.1, 3.0))
+    ] = 0.9
+    """Radius of the largest reel."""
+    fewest_points: Annotated[
+        int,
+        Quantity(
+            label="Beams on it",
+            unit="beams",
+            shown=Shown("", 1.0),
+            bounds=Bounds.between(3, 1000),
+            step=1,
+            slider=(3, 50),
+        ),
+    ] = 8
+    """Beams that must meet a reel or a corner."""
+    least_arc: Annotated[
+        float,
+        Quantity(label="Arc from", unit="rad", shown=DEGREES, bounds=POSITIVE, step=1.0, slider=(10.0, 180.0)),
+    ] = 1.4
+    """Arc angle of a reel that must be in sight: less is hidden too much, or no reel."""
+    largest_arc: Annotated[
+        float,
+        Quantity(label="Arc to", unit="rad", shown=DEGREES, bounds=POSITIVE, step=1.0, slider=(90.0, 360.0)),
+    ] = 3.5
+    """Arc angle of a reel that can be in sight: more is a corner that was taken for a circle."""
+    largest_residual: Annotated[
+        float,
+        Quantity(label="Residual to", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=1.0, slider=(5.0, 200.0)),
+    ] = 0.04
+    """Largest root mean square of the distances of beams from their circle, or from a side of their corner."""
+    corners: Annotated[bool, Switch("Corners")] = True
+    """Whether right-angled corners that stand out (pillars, pallets, boxes) are landmarks, too."""
+    least_side: Annotated[
+        float, Quantity(label="Sides from", unit="m", bounds=POSITIVE, step=0.05, slider=(0.05, 2.0))
+    ] = 0.25
+    """Length in sight of the shorter side of a corner."""
+    largest_side: Annotated[
+        float, Quantity(label="Sides to", unit="m", bounds=POSITIVE, step=0.1, slider=(0.2, 10.0))
+    ] = 2.0
+    """Length in sight of the longer side of a corner."""
+    corner_tolerance: Annotated[
+        float,
+        Quantity(label="Square within", unit="rad", shown=DEGREES, bounds=POSITIVE, step=0.5, slider=(1.0, 30.0)),
+    ] = 0.15
+    """How far the two sides of a corner may be from a right angle."""
+    gap: Annotated[
+        float, Quantity(label="Cut at gaps of", unit="m", bounds=POSITIVE, step=0.05, slider=(0.05, 2.0))
+    ] = 0.3
+    """Distance of neighboring beams' ends from which on they are of two things."""
+    beam_sigma: Annotated[
+        float,
+        Quantity(label="Beam end 1σ", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=0.5, slider=(1.0, 100.0)),
+    ] = 0.02
+    """1-sigma noise of a beam's end; what the beams of a reel show counts where it is more."""
+    position_sigma: Annotated[
+        float,
+        Quantity(
+            label="Landmark seen 1σ", unit="m", shown=MILLIMETRES, bounds=NOT_NEGATIVE, step=0.5, slider=(0.0, 100.0)
+        ),
+    ] = 0.01
+    """1-sigma noise of a measured place besides that of its beams, each axis."""
+    gate_probability: Annotated[float, _gate("Landmark accepted to")] = 0.99
+    """Probability that a true sighting of a landmark falls inside the validation gate."""
+    confirmations: Annotated[
+        int, Quantity(label="Born after", unit="scans", bounds=Bounds.between(1, 100), step=1, slider=(1, 20))
+    ] = 3
+    """Scans that must see a thing in one place until it is a landmark: what is carried is none."""
+    misses: Annotated[
+        int, Quantity(label="Gone after", unit="scans", bounds=Bounds.between(1, 1000), step=1, slider=(1, 20))
+    ] = 3
+    """Scans in a row that see past a landmark, or another thing in its place, until it is forgotten."""
+    forget_after: Annotated[
+        float, Quantity(label="Forgotten after", unit="s", bounds=POSITIVE, step=1.0, slider=(1.0, 600.0))
+    ] = 60.0
+    """Time after which a landmark that was not seen again is forgotten."""
+    largest_sigma: Annotated[
+        float, Quantity(label="Forgotten from 1σ", unit="m", bounds=POSITIVE, step=0.1, slider=(0.1, 10.0))
+    ] = 1.0
+    """1-sigma of its place, in any direction, from which on a landmark is forgotten."""
+    reach: Annotated[
+        float, Quantity(label="Remembered within", unit="m", bounds=POSITIVE, step=1.0, slider=(5.0, 200.0))
+    ] = 30.0
+    """Distance from the vehicle up to which landmarks are looked for and remembered."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, "temporary.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SupervisorParameters:
     """When the estimate is no longer good enough to drive on (Algorithm 4)."""
 
@@ -489,5 +600,7 @@ class Parameters:
     """What walls say."""
     tag: Annotated[TagParameters, Group("Tags")] = field(default_factory=TagParameters)
     """What tags say."""
+    temporary: Annotated[TemporaryParameters, Group("Temporary landmarks")] = field(default_factory=TemporaryParameters)
+    """What goods that come and go say."""
     integrity: Annotated[IntegrityParameters, Group("Protection level")] = field(default_factory=IntegrityParameters)
     """How sure a bound of the error has to be."""
