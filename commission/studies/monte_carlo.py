@@ -109,7 +109,8 @@ def _one_drive(given: _Prepared, number: int, progress: Progress) -> tuple[Drive
     seed, route = inputs.drive_seed(number), inputs.route_of(number)
     faults = draw_faults(inputs.project, inputs.rates, seed, given.durations[route], given.floor)
     if given.world is None:
-        options = DriveOptions(whole_scans=False)
+        kinds = given.setup.parameters
+        options = DriveOptions(whole_scans=kinds.contour.enabled or kinds.temporary.enabled)
         log = virtual_drive(faults.project, route, seed, options=options, dirt=faults.dirt, progress=progress)
     else:
         progress(0.0, "driving")

@@ -43,6 +43,7 @@ from commission.studies.scanner_figures import ScannerFigures, scanner_figures
 from commission.studies.scanner_figures import warm_up as scanner_figures_warm_up
 from commission.studies.start import Start
 from commission.studies.tag_figures import tag_figures
+from commission.studies.temporary_figures import temporary_figures
 
 Number = int | float | None
 JUDGING_SHARE = 0.1
@@ -401,6 +402,7 @@ def summary(result: RunResult) -> dict[str, Number]:
     }
     entries |= contour_figures(result.columns)
     entries |= tag_figures(result.columns)
+    entries |= temporary_figures(result.columns)
     if result.statistics is not None:
         entries |= {
             "reference_cycles": result.statistics.compared,

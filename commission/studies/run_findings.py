@@ -9,6 +9,7 @@ from commission.studies.misfit import MisfitInput, misfit
 from commission.studies.plausibility import Finding, PlausibilityInput, plausibility
 from commission.studies.run import RunResult
 from commission.studies.tag_figures import tag_findings
+from commission.studies.temporary_figures import temporary_findings
 
 JUDGED_BEFORE = 0.2
 """Share of the progress of what is judged before localizing."""
@@ -46,4 +47,5 @@ def run_findings(result: RunResult, progress: Progress = silent) -> tuple[Findin
     found = misfit(inputs, part(progress, JUDGED_BEFORE, 1.0))
     # A factor of the noise says little where the setup itself is another one.
     noise = noise_findings(result.columns) if not found else ()
-    return (*before, *found, *noise, *contour_findings(result.columns), *tag_findings(result.columns))
+    kinds = (*contour_findings(result.columns), *tag_findings(result.columns), *temporary_findings(result.columns))
+    return (*before, *found, *noise, *kinds)
