@@ -14,6 +14,7 @@ from commission.site.disturbances import (
     ConstantErrors,
     CoveredPeriod,
     Disturbances,
+    Reel,
     ScannerError,
     ShinyObject,
     TiltedStretch,
@@ -41,7 +42,7 @@ from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle,
 EDITED = (
     *(DifferentialVehicle, TricycleVehicle, OmnidirectionalVehicle, Scanner, Reflector, Station, Segment, Route),
     *(WheelNoise, ConstantErrors, ScannerError, Tag, TagCamera),
-    *(Disturbances, ShinyObject, TiltedStretch, CoveredPeriod, Demands, CandidateOptions, AllowedHeights),
+    *(Disturbances, ShinyObject, TiltedStretch, CoveredPeriod, Reel, Demands, CandidateOptions, AllowedHeights),
 )
 NO_QUANTITY = {"Segment.degree"}
 """Numbers that nobody sets: the degree belongs to the knots."""
