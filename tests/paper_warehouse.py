@@ -17,13 +17,14 @@ from commission.simulation.drive import DriveOptions
 from commission.simulation.scenario import start_of, virtual_drive
 from commission.site.disturbances import Disturbances, Reel
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
-from commission.site.parameters import Parameters, SupervisorParameters, TemporaryParameters
+from commission.site.parameters import OdometryParameters, Parameters, SupervisorParameters, TemporaryParameters
 from commission.site.path import MotionLimits
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
 from commission.site.scanner import Scanner
+from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import DifferentialVehicle
 
 LENGTH, WIDTH = 100.0, 80.0
@@ -32,6 +33,18 @@ SCANNER = Scanner(
     field_of_view_deg=(-135.0, 135.0), resolution_deg=0.5, rate=10.0, range=(0.1, 40.0), reflector_range=12.0
 )
 REEL = 0.6
+CALIBRATED = OdometryParameters(
+    forward_per_sqrt_m=0.01,
+    lateral_per_sqrt_m=0.003,
+    heading_per_sqrt_m=0.006,
+    heading_per_sqrt_rad=0.01,
+    acceleration=0.0,
+    turn_acceleration=0.0,
+)
+"""What the wheels of the virtual vehicle are like."""
+EXACT = Uncertainty(survey=0.0, mounting_position=0.0, mounting_heading=0.0, range_bias=0.0, clock=0.0)
+"""Nothing is wrong in the same way all along, and nobody thinks so."""
+UNSUPERVISED = SupervisorParameters(enabled=False, rejection_enabled=False)
 SPOTS = np.array(
     [(15.0, 10.0), (50.0, 10.0), (85.0, 10.0), (95.0, 40.0), (85.0, 70.0), (50.0, 70.0), (15.0, 70.0), (5.0, 40.0)]
 )
@@ -110,7 +123,8 @@ def warehouse(seed: int, spots=range(8)) -> Project:
         vehicle=DifferentialVehicle(wheel_separation=1.5),
         scanners=(SCANNER,),
         disturbances=Disturbances(reels=reels(seed)),
-        parameters=Parameters(supervisor=SupervisorParameters(enabled=False, rejection_enabled=False)),
+        parameters=Parameters(odometry=CALIBRATED, supervisor=UNSUPERVISED),
+        uncertainty=EXACT,
     )
 
 
