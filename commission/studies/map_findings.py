@@ -84,11 +84,12 @@ def told(
     share = PERCENT.text(newest.seen / max(newest.expected, 1))
     seen = f"seen in {newest.seen} of {newest.expected} scans ({share})"
     if fault is MapFault.MOVED and after is not None:
-        dx, dy = after[0] - before[0], after[1] - before[1]
+        dx, dy = _whole(after[0] - before[0]), _whole(after[1] - before[1])
         known = f" ± {MILLIMETRES.text(sigma)}" if math.isfinite(sigma) else ""
+        moved = MILLIMETRES.text(math.dist(before, after))
         return (
-            f"{name} has moved by {MILLIMETRES.text(math.hypot(dx, dy))}{known}: {MILLIMETRES.text(dx, '+.0f')} in x, "
-            f"{MILLIMETRES.text(dy, '+.0f')} in y; since {since}"
+            f"{name} has moved by {moved}{known}: {MILLIMETRES.text(dx, '+.0f')} "
+            f"in x, {MILLIMETRES.text(dy, '+.0f')} in y; since {since}"
         )
     if fault is MapFault.DOUBLE:
         return f"{name} stands twice: its place and another one beside it are seen by turns; since {since}"
@@ -96,3 +97,8 @@ def told(
         return f"{name} is missing: {seen}; since {since}"
     beams = f", {PERCENT.text(newest.beams)} of the beams that are expected" if math.isfinite(newest.beams) else ""
     return f"{name} is dirty or half hidden: {seen}{beams}; since {since}"
+
+
+def _whole(length: float) -> float:
+    """Length in whole millimetres [m]: less than half of one is none, to neither side."""
+    return round(length, 3) + 0.0

@@ -172,7 +172,7 @@ def map_corrected(served: Served, page: OpenPage) -> None:
     page.fold("Map against the drive")
     page.press("Check the map by this drive")
     page.wait_for_text("R1 has moved by")
-    page.wait_for_text("0.250, 2.080 →")
+    page.wait_for_text("0.250, 2.080")
     tick = page.page.get_by_role("checkbox", name="R1: moved")
     assert tick.is_checked()
     tick.click()

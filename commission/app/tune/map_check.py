@@ -100,5 +100,5 @@ def correct_map(action: CorrectMap, state: AppState, sender: Sender) -> Outcome:
         if reason:
             raise UsageError(f"{finding.id}: {reason}; the map stays as it is")
     reflectors = corrected(state.project.reflectors, action.findings, add_new=True)
-    edit = Edit(f"correct the map by {len(action.findings)} of the drive", sender)
+    edit = Edit("correct the map", sender)
     return Outcome(edited(state, replace(state.project, reflectors=reflectors), edit))

@@ -8,7 +8,7 @@ from viser import GuiApi, GuiInputHandle
 
 from commission.app.base.actions import Action
 from commission.app.base.inputs import Text, WorkBar, enable, show
-from commission.app.base.panel import BasePanel, Post, escaped, posting, table, write, write_label
+from commission.app.base.panel import BasePanel, Post, escaped, posting, write, write_label
 from commission.app.base.view import PageView
 from commission.app.tune.calibration_state import CalibrationState
 from commission.app.tune.map_check import CheckMap, CorrectMap, DropMapCheck, TickFinding
@@ -129,13 +129,14 @@ def changes_text(ticked: tuple[MapFinding, ...]) -> str:
     """Return what the map says before and after the correction, a line for each reflector."""
     if not ticked:
         return ""
-    rows = [(escaped(each.id), f"{_place(each.before)} → {_after(each)}") for each in ticked]
-    head = "<div class='c-note'>Place in the map, x, y [m]: before → after</div>"
-    return f"<div style='padding:2px 10px 4px 6px'>{head}{table(rows)}</div>"
+    lines = [("x, y [m]", "map now", "corrected")]
+    lines += [(each.id, _place(each.before), _after(each)) for each in ticked]
+    rows = "".join("<tr>" + "".join(f"<td>{escaped(cell)}</td>" for cell in line) + "</tr>" for line in lines)
+    return f"<div style='padding:2px 10px 4px 6px'><table class='c-before-after'>{rows}</table></div>"
 
 
 def _place(at: tuple[float, float] | None) -> str:
-    return "none" if at is None else f"{at[0]:.3f}, {at[1]:.3f}"
+    return "not there" if at is None else f"{at[0]:.3f}, {at[1]:.3f}"
 
 
 def _after(finding: MapFinding) -> str:
