@@ -333,7 +333,8 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 [data-dock-region=right] [role=tab]{{padding:0 .62em!important}}
 [data-shows~=c-association] [data-dock-scroll]>div:has(.c-association){{flex-grow:2!important}}
 .c-association{{padding:0 12px 0 4px}}
-@media (max-height:800px){{.c-a-picture{{max-width:216px!important}}}}
+@media (max-height:800px){{.c-a-picture{{max-width:196px!important}}
+ [data-shows~=c-association] [data-dock-scroll]>div:has(.c-association){{flex-grow:8!important}}}}
 .mantine-Slider-markWrapper:only-child .mantine-Slider-mark{{background:{css(SELECTED)};border:none;width:2px;
  height:12px;border-radius:0;transform:translateY(-3px)!important}}
 div:has(>div>.c-bottom):has(.c-no-run) button{{opacity:.35;pointer-events:none}}
