@@ -64,6 +64,8 @@ class Run:
     CAMERA_BY_LASER = Paint("camera by the laser", (122, 168, 250), (26, 92, 196))
     CAMERA_BY_CONTOUR = Paint("camera by its contour", (255, 182, 96), (184, 98, 0))
     HYPOTHESIS = Paint("a place where the vehicle may be", (255, 190, 240), (168, 0, 150))
+    GOODS = Paint("temporary landmark", (214, 196, 120), (122, 104, 8))
+    GOODS_SIGMA = Paint("2 sigma of a temporary landmark", (150, 224, 190), (10, 118, 92))
     CLOUD = Paint("earlier innovations", (128, 150, 176), (104, 126, 154))
     SPREAD = Paint("mean and spread of innovations", (195, 204, 216), (78, 88, 102))
     AFTER = Paint("after the correction", (232, 234, 238), (36, 40, 46))

@@ -21,6 +21,7 @@ from commission.app.run.scan_layer import ScanLayer
 from commission.app.run.service import RunService
 from commission.app.run.state import RunState
 from commission.app.run.summary_panel import SummaryPanel
+from commission.app.run.temporary_layer import TemporaryLayer
 from commission.app.run.time_line import TimeLine
 from commission.app.run.trail_layers import ConsistencyLayer, ReferenceLayer, TrailLayer, VariantLayer
 from commission.app.run.trail_legend import TrailLegend
@@ -41,6 +42,7 @@ FEATURE = Feature(
         VehicleLayer,
         UncertaintyLayer,
         HypothesisLayer,
+        TemporaryLayer,
         TrailLayer,
         VariantLayer,
         ConsistencyLayer,

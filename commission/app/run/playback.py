@@ -21,6 +21,7 @@ from commission.localization.search_state import SearchMoment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState
 from commission.localization.sweep import points_at_stamp
+from commission.localization.temporary_memory import TemporaryLandmarks
 from commission.localization.validation import validation_ellipses, validation_outlines
 from commission.localization.wheel_scale import as_driven
 from commission.localization.whole_run import state_before
@@ -141,6 +142,7 @@ class Playback:
             gates=_gates(estimate, segment.setup, areas),
             accumulated=self._accumulated(lived) if whole else None,
             hypotheses=self._hypotheses(lived),
+            temporary=self._temporary(lived, segment.setup),
         )
 
     def _areas(self, lived: int, estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
@@ -162,6 +164,13 @@ class Playback:
         if self._searched is None or self._searched[0] is not moment:
             self._searched = moment, hypotheses_of(moment)
         return self._searched[1]
+
+    def _temporary(self, lived: int, setup: LocalizerSetup) -> TemporaryLandmarks | None:
+        """Temporary landmarks after the newest cycle."""
+        if setup.temporary is None or not lived:
+            return None
+        known = self._state_before(lived).temporary
+        return known if known is not None and len(known) else None
 
     def _state_before(self, cycle: int) -> FilterState:
         """State before a cycle; while the vehicle drives on, from the one before it."""

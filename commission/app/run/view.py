@@ -10,6 +10,7 @@ from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Estimate, Mode
 from commission.localization.hypotheses import Hypothesis
 from commission.localization.run_columns import RunSegment
+from commission.localization.temporary_memory import TemporaryLandmarks
 from commission.studies.run import RunResult
 
 Stretch: TypeAlias = tuple[float, float]
@@ -85,6 +86,8 @@ class RunView:
     """Every detection so far; none in views that are drawn at the full rate."""
     hypotheses: tuple[Hypothesis, ...] = ()
     """Where it may be, the likeliest first, while it looks where it is; else none."""
+    temporary: TemporaryLandmarks | None = None
+    """Temporary landmarks after the newest cycle; none where they are not looked at, or none is known."""
     hall: DrivenHall = DrivenHall.RECORDED
     """Whether the drive is one in the project's hall."""
     kept: tuple[KeptRun, ...] = ()
