@@ -241,6 +241,7 @@ def _report(result: RunResult, cut: Sequence[Section]) -> list[str]:
         f"{_seconds(fits.longest_unseen)} at most",
         *_by_section(cut),
         *_by_scanner(result),
+        *_by_goods(result),
         f"Supervisor   operational {PERCENT.text(result.operational_fraction, '.1f')}, lost "
         f"{PERCENT.text(result.lost_fraction, '.1f')}; fail episodes: {len(result.episodes)}"
         + "".join(_longest(result)),
@@ -353,6 +354,21 @@ def _by_scanner(result: RunResult) -> list[str]:
     if len(result.scanners) == 1:
         return []
     return [f"Scanner      {each.name}: {told(each)}" for each in result.scanners]
+
+
+def _by_goods(result: RunResult) -> list[str]:
+    """A line about temporary landmarks, where they are looked at."""
+    from commission.studies.temporary_figures import temporary_figures
+
+    told = temporary_figures(result.columns)
+    if not told:
+        return []
+    nis = told["temporary_nis_per_row_mean"]
+    fits = "" if nis is None else f", NIS {nis:.2f} of each row (1 is consistent)"
+    return [
+        f"Temporary    {told['temporary_matched']} sightings of landmarks{fits}; {told['temporary_born']} born, "
+        f"{told['temporary_forgotten']} forgotten, {told['temporary_known_max']} known at most"
+    ]
 
 
 def _longest(result: RunResult) -> list[str]:
