@@ -27,7 +27,7 @@ class ObservationKind(StrEnum):
 class Zone:
     """A part of the floor, and what corrects the pose there; outside of all zones everything does."""
 
-    name: Annotated[str, Words("Zone")]
+    name: Annotated[str, Words("Called")]
     """Name, unique within the project."""
     outline: Annotated[Corners, Quantity(label="Corners", unit="m", decimals=4)]
     """Its corners in their order, map frame; where zones overlap the first of them counts."""

@@ -37,6 +37,7 @@ class Floor:
     ROUTE = Paint("route", (116, 128, 150), (92, 104, 128))
     STATION = Paint("station", (92, 214, 220), (0, 124, 130))
     REFLECTOR = Paint("reflector", (48, 108, 255), (18, 66, 200))
+    ZONE = Paint("zone in which some kinds correct the pose", (170, 196, 84), (96, 118, 16))
     SELECTED = Paint("selected", (255, 159, 28), (198, 110, 0))
     DRAFT_PAPER = Paint("paper of an image being placed", (58, 62, 70), (222, 226, 232))
     DRAFT_INK = Paint("ink of an image being placed", (214, 219, 227), (52, 57, 65))

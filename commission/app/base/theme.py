@@ -22,6 +22,7 @@ GRID_METER = Floor.GRID_METER.dark
 ROUTE = Floor.ROUTE.dark
 STATION = Floor.STATION.dark
 REFLECTOR = Floor.REFLECTOR.dark
+ZONE = Floor.ZONE.dark
 PREVIEW = Floor.PREVIEW.dark
 GATE = Run.GATE.dark
 POSE = Run.POSE.dark

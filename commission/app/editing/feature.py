@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from commission.app.base.feature import REFLECTORS, ROUTES, SELECTION, SITE, Docked, Feature
-from commission.app.editing import reducer, site_reducer, station_reducer
+from commission.app.editing import reducer, site_reducer, station_reducer, zone_reducer
 from commission.app.editing.equipment_fields import EquipmentFields
 from commission.app.editing.overlay import Overlay
 from commission.app.editing.reflector_layer import ReflectorLayer, ReflectorNameLayer
@@ -14,13 +14,16 @@ from commission.app.editing.selection_panel import SelectionPanel
 from commission.app.editing.station_layer import StationLayer
 from commission.app.editing.tool_hint import ToolHint
 from commission.app.editing.tool_panel import FinishButton, SnappingPanel, ToolButtons
+from commission.app.editing.zone_fields import ZoneFields
+from commission.app.editing.zone_layer import ZoneLayer
 
 FEATURE = Feature(
     name="editing",
-    reducers=(reducer, site_reducer, station_reducer),
-    layers=(RouteLayer, StationLayer, ReflectorLayer, ReflectorNameLayer),
+    reducers=(reducer, site_reducer, station_reducer, zone_reducer),
+    layers=(ZoneLayer, RouteLayer, StationLayer, ReflectorLayer, ReflectorNameLayer),
     panels=(
         Docked(make=lambda at: EquipmentFields(at.gui, at.post, at.state.project), tab=SITE, rank=30),
+        Docked(make=lambda at: ZoneFields(at.gui, at.post, at.browser), tab=SITE, rank=40, folder="Zones", own=True),
         Docked(make=lambda at: Overlay(at.scene, at.post, at.browser), tab=None, rank=10, own=True),
         Docked(make=lambda at: ToolButtons(at.gui, at.post, at.browser), tab=None, rank=91, own=True),
         Docked(make=lambda at: FinishButton(at.gui, at.post, at.browser), tab=SELECTION, rank=30, own=True),

@@ -26,6 +26,7 @@ ON_A_DRIVE = (
     Floor.WALL,
     Floor.STATION,
     Floor.REFLECTOR,
+    Floor.ZONE,
     Floor.SELECTED,
     Floor.VEHICLE,
     Run.GATE,
@@ -95,7 +96,7 @@ def test_what_a_drive_shows_is_told_apart(shown: str) -> None:
 @pytest.mark.parametrize(
     "drawn",
     [
-        *(Floor.WALL, Floor.ROUTE, Floor.REFLECTOR, Floor.STATION, Floor.SELECTED, Floor.VEHICLE),
+        *(Floor.WALL, Floor.ROUTE, Floor.REFLECTOR, Floor.STATION, Floor.ZONE, Floor.SELECTED, Floor.VEHICLE),
         *(Run.GATE, Run.POSE, Run.HEADING, Run.INLIER, Run.OUTLIER, Run.SCAN, Run.TRAIL, Run.REFERENCE),
         *(Plan.SUGGESTED, Plan.OVER_LIMIT, Plan.KEPT),
     ],
