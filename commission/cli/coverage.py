@@ -49,6 +49,9 @@ class CoverageCommand:
     budget: bool = False
     """Whether it is also told what constants (survey, mounting, range bias, clock: `uncertainty` of the project) add to
     the error of a fix, and what most of it comes from. Of many headings that takes as many times longer."""
+    contours: bool = False
+    """Whether it is also told what the contours of the floor map tell a single scan, as `parameters.contour` matches
+    them: where no reflector is needed."""
     force: bool = False
     """Whether files in DIR that this command did not write are overwritten; its own earlier results always are."""
 
@@ -63,6 +66,8 @@ class CoverageCommand:
             raise UsageError(f"--ellipses is {self.ellipses}; expected metres greater than 0")
         out = result_folder(self.out, "coverage", FILES, force=self.force, sources=(self.project,))
         project = load_project(self.project)
+        if self.contours and project.floor_map is None:
+            raise UsageError(f"{self.project} has no floor map; --contours expects one")
         try:
             result = coverage(CoverageInput.of(project, self._options()))
         except ValueError as error:
@@ -70,7 +75,7 @@ class CoverageCommand:
         entries = summary(result, project.parameters.supervisor)
         ellipses = None if self.ellipses is None else ellipses_of(result, self.ellipses)
         with out.writing() as folder:
-            write_coverage(folder, result.coverage, result.drivable, entries, result.budget)
+            write_coverage(folder, result, entries)
             if ellipses is not None:
                 write_ellipses(folder, ellipses)
         sys.stdout.write("\n".join([*_report(entries, result.coverage.options), f"Written to   {self.out}"]) + "\n")
@@ -90,6 +95,7 @@ class CoverageCommand:
             visibility=VisibilityOptions(self.min_beams, self.max_incidence),
             spacing=self.spacing,
             with_constants=self.budget,
+            with_contours=self.contours,
         )
 
 
@@ -127,7 +133,22 @@ def _report(entries: dict[str, int | float | None], options: FixOptions) -> list
         f"{figure('position_sigma_p95_m', MILLIMETRES, '.1f')} at 95 % of the floor; heading "
         f"{figure('heading_sigma_median_rad', PLAIN_DEGREES, '.2f')} and "
         f"{figure('heading_sigma_p95_rad', PLAIN_DEGREES, '.2f')}",
+        *_contours(entries, share, figure),
         *_budget(entries, share, figure),
+    ]
+
+
+def _contours(
+    entries: dict[str, int | float | None], share: Callable[[str], str], figure: Callable[[str, Shown, str], str]
+) -> list[str]:
+    """Line about what contours tell, where that was asked for."""
+    if "contour_share_whole_pose" not in entries:
+        return []
+    within, either = share("contour_share_within_limits"), share("share_within_limits_by_either")
+    return [
+        f"Contours     tell the whole pose on {share('contour_share_whole_pose')}, 1-sigma "
+        f"{figure('contour_position_sigma_median_m', MILLIMETRES, '.1f')} median; two sigma within the limits on "
+        f"{within}, by reflectors or contours on {either}"
     ]
 
 

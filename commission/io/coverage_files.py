@@ -14,10 +14,11 @@ from commission.geometry.arrays import BoolArray
 from commission.io.atomic import atomic_file, write_text
 from commission.io.lattice_image import NO_FLOOR, lattice_image, shades
 from commission.io.table_writer import angle, figure, place, write_table
+from commission.planning.contour_coverage import ContourCoverage
 from commission.planning.coverage import Coverage
 from commission.planning.error_budget import CONTRIBUTIONS
 from commission.planning.floor_budget import FloorBudget
-from commission.studies.coverage import Ellipses
+from commission.studies.coverage import CoverageResult, Ellipses
 
 ARRAYS = "coverage.npz"
 TABLE = "coverage.csv"
@@ -45,28 +46,22 @@ NO_FIX = (200, 60, 60)
 ROWS_AT_ONCE = 50_000
 
 
-def write_coverage(
-    folder: Path,
-    found: Coverage,
-    drivable: BoolArray,
-    summary: Mapping[str, float | None],
-    budget: FloorBudget | None = None,
-) -> None:
+def write_coverage(folder: Path, result: CoverageResult, summary: Mapping[str, float | None]) -> None:
     """Write `coverage.npz`, `coverage.csv`, `coverage.png` and `summary.json`; each is replaced whole or not at all.
 
     Parameters
     ----------
     folder : made when missing.
-    found : figures of a fix over a lattice.
-    drivable : (N,) which points are floor; the table and the image leave the others out.
+    result : figures over a lattice; table and image leave out what is no floor. Its budget and what contours tell
+        become further columns.
     summary : by key; the last file written, so that where it is the others are complete.
-    budget : the error with all constants and the share of each source in its square, for further columns.
 
     Raises
     ------
     FileFormatError
         a file cannot be written.
     """
+    found, drivable = result.coverage, result.drivable
     lattice = found.lattice
     arrays: dict[str, NDArray[np.generic]] = {
         "x": lattice.x + lattice.spacing * np.arange(lattice.columns),
@@ -74,7 +69,8 @@ def write_coverage(
         "drivable": drivable.reshape(lattice.rows, lattice.columns),
     }
     arrays |= {name + unit: found.image(name) for name, unit in UNITS.items()}
-    more = {} if budget is None else _budget_columns(budget)
+    more = {} if result.budget is None else _budget_columns(result.budget)
+    more |= {} if result.contours is None else _contour_columns(result.contours)
     arrays |= {name: column.reshape(lattice.rows, lattice.columns) for name, column in more.items()}
     with atomic_file(folder / ARRAYS) as file:
         np.savez_compressed(file, allow_pickle=False, **arrays)
@@ -115,6 +111,16 @@ def _budget_columns(budget: FloorBudget) -> dict[str, NDArray[np.float64]]:
     """(N,) columns of the error with all constants [m], and of the share of each source in its square."""
     shares = {f"{part}_share": budget.shares[:, index] for index, part in enumerate(CONTRIBUTIONS)}
     return {"total_sigma_m": budget.sigma, **shares}
+
+
+def _contour_columns(contours: ContourCoverage) -> dict[str, NDArray[np.float64]]:
+    """(N,) columns of what contours tell; no 1-sigma where they do not tell the whole pose."""
+    return {
+        "contour_told": contours.told.astype(np.float64),
+        "contour_beams": contours.beams.astype(np.float64),
+        "contour_position_sigma_m": contours.position_sigma,
+        "contour_heading_sigma_rad": contours.heading_sigma,
+    }
 
 
 def _rows(found: Coverage, drivable: BoolArray, more: Mapping[str, NDArray[np.float64]]) -> Iterator[tuple[str, ...]]:

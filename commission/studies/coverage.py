@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from commission.compiled import warm_up
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.geometry.gaussian import ellipse_axes
+from commission.planning.contour_coverage import WHOLE_POSE, ContourCoverage, contour_coverage
 from commission.planning.coverage import Coverage, Lattice, lattice_of
 from commission.planning.coverage import coverage as over_lattice
 from commission.planning.dilution import FixOptions, Heading, Measurement, fix_options, odometry_prior
@@ -24,7 +25,7 @@ from commission.planning.vehicle_visibility import VehicleVisibility, vehicle_vi
 from commission.planning.visibility import VisibilityOptions
 from commission.progress import Progress, part, silent
 from commission.site.floor_map import FREE, FloorMap
-from commission.site.parameters import Parameters, SupervisorParameters
+from commission.site.parameters import ContourParameters, Parameters, SupervisorParameters
 from commission.site.parts import HasFloorMap
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
@@ -32,7 +33,7 @@ from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.site.uncertainty import Uncertainty
 from commission.studies.inputs import StudyInput
-from commission.studies.kernels import DILUTION, SEVERAL_SCANNERS, SIGHT
+from commission.studies.kernels import CONTOURS, DILUTION, SEVERAL_SCANNERS, SIGHT
 
 Number = int | float | None
 
@@ -74,6 +75,8 @@ class CoverageOptions:
     """Distance between neighboring points [m]. None: a round one that keeps the picture small."""
     with_constants: bool = False
     """Whether it is told what constants that are not known exactly add to the error of a fix."""
+    with_contours: bool = False
+    """Whether it is told what the contours of the floor map tell, too."""
 
     def fix(self, parameters: Parameters, scanners: tuple[Scanner, ...], speed: float) -> FixOptions:
         """What is asked of a fix, with the noise that the localizer assumes.
@@ -126,6 +129,8 @@ class CoverageInput(StudyInput):
     """Distance between neighboring points [m]. None: a round one that keeps the picture small."""
     constants: Constants | None
     """How well constants are known; None where they do not matter."""
+    contours: ContourParameters | None = None
+    """How contours are matched; None where they do not matter."""
 
     @staticmethod
     def of(project: Project, options: CoverageOptions | None = None) -> CoverageInput:
@@ -147,6 +152,7 @@ class CoverageInput(StudyInput):
             visibility=replace(options.visibility, detector=project.parameters.detector),
             spacing=options.spacing,
             constants=Constants(project.uncertainty, speed) if options.with_constants else None,
+            contours=project.parameters.contour if options.with_contours else None,
         )
 
     def lattice(self) -> Lattice:
@@ -170,6 +176,8 @@ class CoverageResult:
     """(N,) whether each point lies on floor that the map knows to be free; all of it without a map."""
     budget: FloorBudget | None = None
     """The error of a fix with all constants, and what it comes from, where that was asked for."""
+    contours: ContourCoverage | None = None
+    """What contours tell, where that was asked for and there is a map."""
 
 
 def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResult:
@@ -187,18 +195,35 @@ def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResu
     """
     lattice = inputs.lattice()
     several = (SEVERAL_SCANNERS,) if len(inputs.scanners) > 1 else ()
-    warm_up((SIGHT, DILUTION, *several), part(progress, 0.0, COMPILING))
+    walls = (CONTOURS,) if inputs.contours is not None else ()
+    warm_up((SIGHT, DILUTION, *several, *walls), part(progress, 0.0, COMPILING))
     progress(COMPILING, "sight of each reflector")
     visible = vehicle_visibility(inputs, inputs.visibility)
-    until = 1.0 if inputs.constants is None else ADDING
-    found = over_lattice(visible, lattice, inputs.fix, part(progress, PREPARING, until))
+    told = contours_of(inputs, lattice, part(progress, PREPARING, ADDING)) if inputs.contours is not None else None
+    begin = PREPARING if told is None else ADDING
+    until = 1.0 if inputs.constants is None else ADDING + 0.5 * (1.0 - ADDING)
+    found = over_lattice(visible, lattice, inputs.fix, part(progress, begin, until))
     budget = None
     if inputs.constants is not None:
         known = inputs.constants
         site = BudgetSite(visible=visible, uncertainty=known.uncertainty, speed=known.speed)
-        budget = floor_budget(found, site, part(progress, ADDING, 1.0))
+        budget = floor_budget(found, site, part(progress, until, 1.0))
     floor = np.array(found.floor) if inputs.floor_map is None else free_floor(inputs, lattice.points())
-    return CoverageResult(found, visible, floor, budget)
+    return CoverageResult(found, visible, floor, budget, told)
+
+
+def contours_of(inputs: CoverageInput, lattice: Lattice, progress: Progress = silent) -> ContourCoverage | None:
+    """What contours tell over the floor of an input that asks for it; None without a floor map.
+
+    Parameters
+    ----------
+    inputs : the site and what is asked.
+    lattice : the points.
+    progress : told how far it is; may raise to cancel.
+    """
+    if inputs.floor_map is None or inputs.contours is None:
+        return None
+    return contour_coverage(inputs.floor_map, inputs.scanners, inputs.contours, lattice, inputs.fix, progress)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -268,7 +293,30 @@ def summary(result: CoverageResult, limits: SupervisorParameters) -> dict[str, N
         for quantile, label in ((0.5, "median"), (0.95, "p95")):
             # Of the whole floor: where more than a twentieth has no fix, the 95 % quantile does not exist.
             entries[f"{name}_{label}_{unit}"] = _quantile(values[on], quantile)
+    if result.contours is not None:
+        entries |= _contour_entries(result, result.contours, limits)
     return entries | ({} if result.budget is None else _budget_entries(result.budget, on))
+
+
+def _contour_entries(
+    result: CoverageResult, contours: ContourCoverage, limits: SupervisorParameters
+) -> dict[str, Number]:
+    """What contours alone would do, and what reflectors or contours would."""
+    on = result.drivable
+    within = contours_within(contours, limits)
+    return {
+        "contour_share_whole_pose": _mean(contours.told[on] == WHOLE_POSE),
+        "contour_share_within_limits": _mean(within[on]),
+        "contour_position_sigma_median_m": _quantile(contours.position_sigma[on], 0.5),
+        "contour_position_sigma_p95_m": _quantile(contours.position_sigma[on], 0.95),
+        "share_within_limits_by_either": _mean((within | within_limits(result.coverage, limits))[on]),
+    }
+
+
+def contours_within(contours: ContourCoverage, limits: SupervisorParameters) -> BoolArray:
+    """Whether two sigma of a single match stay below the supervisor's limits at each point: (N,) array."""
+    position_ok = 2.0 * contours.position_sigma <= limits.position_limit
+    return position_ok & (2.0 * contours.heading_sigma <= limits.heading_limit)
 
 
 def _budget_entries(budget: FloorBudget, on: BoolArray) -> dict[str, Number]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from commission.geometry import spline_kernels
 from commission.planning import (
+    contour_coverage,
     error_budget,
     fix_shares,
     information,
@@ -18,6 +19,7 @@ from commission.planning import (
 
 SIGHT = ("lines of sight", visibility.warm_up)
 DILUTION = ("dilution", vehicle_fixes.warm_up)
+CONTOURS = ("contours over the floor", contour_coverage.warm_up)
 SEVERAL_SCANNERS = ("dilution of several scanners", vehicle_fixes.warm_up_several)
 CURVES = ("curves", spline_kernels.warm_up)
 PREDICTION = ("prediction", route_prediction.warm_up)

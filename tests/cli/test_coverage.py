@@ -6,6 +6,8 @@ import re
 import numpy as np
 import pytest
 
+from tests.conftest import REPOSITORY
+
 
 def summary(folder):
     return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
@@ -102,3 +104,29 @@ def test_the_budget_of_the_floor_is_written_and_told(commission, project, tmp_pa
     assert sum(largest) <= 1.0 + 1e-12
     assert f"position {1000.0 * entries['total_sigma_median_m']:.1f} mm median" in told
     assert f"clock on {100.0 * largest[4]:.1f} %" in told
+
+
+def test_what_contours_tell_is_written_and_told(commission, tmp_path):
+    site = REPOSITORY / "maps" / "laboratory"
+    code, told, err = commission("coverage", site, "--out", tmp_path / "out", "--spacing", "0.5", "--contours")
+    assert (code, err) == (0, "")
+    entries = summary(tmp_path / "out")
+    with np.load(tmp_path / "out" / "coverage.npz") as found:
+        on = found["drivable"]
+        whole = found["contour_told"][on] == 3
+        sigma, turned = found["contour_position_sigma_m"][on], found["contour_heading_sigma_rad"][on]
+        reflectors = 2.0 * found["position_sigma_m"][on], 2.0 * found["heading_sigma_rad"][on]
+    assert np.isfinite(sigma).tolist() == whole.tolist()
+    # The supervisor's limits by default: 0.1 m and 3 degrees.
+    within = (2.0 * sigma <= 0.1) & (2.0 * turned <= np.radians(3.0))
+    either = within | ((reflectors[0] <= 0.1) & (reflectors[1] <= np.radians(3.0)))
+    assert entries["contour_share_whole_pose"] == pytest.approx(whole.mean())
+    assert entries["contour_share_within_limits"] == pytest.approx(within.mean())
+    assert entries["share_within_limits_by_either"] == pytest.approx(either.mean())
+    assert f"tell the whole pose on {100.0 * whole.mean():.1f} %" in told
+
+
+def test_contours_without_a_floor_map_are_one_clear_error(commission, project, tmp_path):
+    code, _, err = commission("coverage", project, "--out", tmp_path / "out", "--contours")
+    assert code == 2
+    assert "has no floor map; --contours expects one" in err

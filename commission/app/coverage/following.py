@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commission.app.coverage.settings import Figure
+from commission.app.coverage.settings import BY_CONTOURS, Figure
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.planning import coverage as coverage_kernels
+from commission.planning.contour_coverage import ContourCoverage
 from commission.planning.coverage import LiveCoverage
 from commission.planning.floor_budget import FloorBudget
 from commission.progress import Progress, part
@@ -30,12 +31,25 @@ class Covered:
     """(N,) where a vehicle could stand."""
     budget: FloorBudget | None = None
     """The error of a fix with all constants, where it is asked for: of the reflectors as they were at first."""
+    contours: ContourCoverage | None = None
+    """What contours tell, where it is asked for and there is a floor map."""
 
     def values(self, figure: Figure) -> FloatArray:
         """(N,) a figure of the floor, SI; infinite where it is not known."""
-        if figure is not Figure.TOTAL_SIGMA:
-            return getattr(self.live.coverage.fixes, figure.value)
-        return np.full(len(self.floor), math.inf) if self.budget is None else self.budget.sigma
+        nothing = np.full(len(self.floor), math.inf)
+        if figure is Figure.TOTAL_SIGMA:
+            return nothing if self.budget is None else self.budget.sigma
+        if figure is Figure.CONTOUR_POSITION:
+            return nothing if self.contours is None else self.contours.position_sigma
+        if figure is Figure.CONTOUR_HEADING:
+            return nothing if self.contours is None else self.contours.heading_sigma
+        return getattr(self.live.coverage.fixes, figure.value)
+
+    def has(self, figure: Figure) -> bool:
+        """Whether a figure was computed."""
+        if figure is Figure.TOTAL_SIGMA:
+            return self.budget is not None
+        return self.contours is not None if figure in BY_CONTOURS else True
 
     def follow(self, before: CoverageInput, now: CoverageInput) -> bool:
         """Move the reflectors that were moved, where nothing else is different.
@@ -72,7 +86,7 @@ def cover(inputs: CoverageInput, progress: Progress) -> Covered:
     found = coverage(inputs, part(progress, 0.0, 0.95))
     progress(0.95, "compiling moved reflectors")
     coverage_kernels.warm_up()
-    return Covered(LiveCoverage(found.visible, found.coverage), found.drivable, found.budget)
+    return Covered(LiveCoverage(found.visible, found.coverage), found.drivable, found.budget, found.contours)
 
 
 def changed_reflectors(before: ReflectorMap, after: ReflectorMap) -> list[int] | None:

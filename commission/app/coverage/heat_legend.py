@@ -13,9 +13,9 @@ from commission.app.base.ramp import cell_html, ramp_html, scales_html
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.coverage.scale import NO_FIX_COLORS
-from commission.app.coverage.settings import CoverageSettings, Figure
+from commission.app.coverage.settings import BY_CONTOURS, CoverageSettings, Figure
 from commission.app.coverage.view import EllipseView, FloorReading, HeatView, coverage_of
-from commission.app.coverage.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES, value_text
+from commission.app.coverage.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES, none_text, value_text
 from commission.planning.error_budget import CONTRIBUTIONS
 from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT, Shown
 
@@ -45,7 +45,7 @@ def heat_scale(heat: HeatView, state: AppState) -> str:
     bounds = [number_text(bound) for bound in heat.scale.bounds]
     head = f"<b>{escaped(quantity.label)}</b><div class='c-note'>{_conditions(state, heat.scale.figure)}</div>"
     shares = [PERCENT.number(share) for share in heat.shares[1:]]
-    none = "none visible" if heat.scale.figure is Figure.VISIBLE else "no fix"
+    none = none_text(heat.scale.figure)
     hatch = HATCH_CSS.format(*(theme.css(color) for color in NO_FIX_COLORS))
     counts = _count_labels(heat) if heat.scale.figure is Figure.VISIBLE else None
     lines = [
@@ -93,7 +93,11 @@ def reading_table(reading: FloorReading, state: AppState) -> str:
 def _conditions(state: AppState, figure: Figure) -> str:
     """Say under which conditions the heatmap holds."""
     settings, blocked_per_m = state.part(CoverageSettings), state.part(Conditions).blocked_per_m
-    parts = [HEADING_NAMES[settings.heading.seen_by(state.project.scanners)], MEASUREMENT_NAMES[settings.measurement]]
+    heading = HEADING_NAMES[settings.heading.seen_by(state.project.scanners)]
+    if figure in BY_CONTOURS:
+        walls = "the floor map alone, nobody about" if state.project.floor_map is not None else "there is no floor map"
+        return escaped(f"{heading}; {walls}")
+    parts = [heading, MEASUREMENT_NAMES[settings.measurement]]
     if blocked_per_m > 0.0:
         parts.append(f"people {PERCENT.number(blocked_per_m, '.1f')} %/m")
     elif figure in AMONG_PEOPLE:
@@ -104,9 +108,9 @@ def _conditions(state: AppState, figure: Figure) -> str:
 def _limit(heat: HeatView, state: AppState) -> str:
     """Say where the supervisor's limit lies on the scale."""
     limits = state.project.parameters.supervisor
-    if heat.scale.figure in {Figure.POSITION_SIGMA, Figure.TOTAL_SIGMA}:
+    if heat.scale.figure in {Figure.POSITION_SIGMA, Figure.TOTAL_SIGMA, Figure.CONTOUR_POSITION}:
         return _limit_text(MILLIMETRES, limits.position_limit, (".0f", ".0f"))
-    if heat.scale.figure is Figure.HEADING_SIGMA:
+    if heat.scale.figure in {Figure.HEADING_SIGMA, Figure.CONTOUR_HEADING}:
         return _limit_text(DEGREES, limits.heading_limit, (".1f", ".2f"))
     return ""
 

@@ -50,6 +50,8 @@ QUANTITIES: dict[Figure, ShownFigure] = {
     Figure.POSITION_SIGMA: ShownFigure(label="Position error, 1σ [mm]", shown=MILLIMETRES),
     Figure.HEADING_SIGMA: ShownFigure(label="Heading error, 1σ [°]", shown=DEGREES),
     Figure.TOTAL_SIGMA: ShownFigure(label="Position error with constants, 1σ [mm]", shown=MILLIMETRES),
+    Figure.CONTOUR_POSITION: ShownFigure(label="Position error by contours, 1σ [mm]", shown=MILLIMETRES),
+    Figure.CONTOUR_HEADING: ShownFigure(label="Heading error by contours, 1σ [°]", shown=DEGREES),
     Figure.POSITION_DOP: ShownFigure(label="Position dilution (DOP)"),
     Figure.HEADING_DOP: ShownFigure(label="Heading dilution (DOP)"),
     Figure.EXPECTED_VISIBLE: ShownFigure(

@@ -29,11 +29,19 @@ class Figure(StrEnum):
     HEADING_SIGMA = "heading_sigma"
     TOTAL_SIGMA = "total_sigma"
     """With constants; no figure of a fix, but of its budget."""
+    CONTOUR_POSITION = "contour_position"
+    """By the contours of the floor map; of no fix, either."""
+    CONTOUR_HEADING = "contour_heading"
+    """The same of the heading."""
     POSITION_DOP = "position_dop"
     HEADING_DOP = "heading_dop"
     EXPECTED_VISIBLE = "expected_visible"
     TWO_OR_MORE = "two_or_more"
     THREE_OR_MORE = "three_or_more"
+
+
+BY_CONTOURS = frozenset({Figure.CONTOUR_POSITION, Figure.CONTOUR_HEADING})
+"""Figures that no reflector has a part in."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,6 +84,7 @@ class CoverageSettings:
             blocked_per_m=conditions.blocked_per_m,
             visibility=conditions.visibility,
             with_constants=self.figure is Figure.TOTAL_SIGMA,
+            with_contours=self.figure in BY_CONTOURS,
         )
 
 

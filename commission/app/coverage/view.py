@@ -107,7 +107,7 @@ def reading_of(covered: Covered, probe: tuple[float, float]) -> FloorReading | N
     index = covered.live.coverage.lattice.index_near(*probe)
     if index is None:
         return None
-    shown = [figure for figure in QUANTITIES if figure is not Figure.TOTAL_SIGMA or covered.budget is not None]
+    shown = [figure for figure in QUANTITIES if covered.has(figure)]
     values = {figure: float(covered.values(figure)[index]) for figure in shown}
     shares = () if covered.budget is None else tuple(covered.budget.shares[index].tolist())
     return FloorReading(probe, values, bool(covered.floor[index]), shares)

@@ -6,7 +6,7 @@ import math
 
 from commission.app.base.numbers import number_text
 from commission.app.coverage.scale import QUANTITIES, is_fix, unit_of
-from commission.app.coverage.settings import Figure
+from commission.app.coverage.settings import BY_CONTOURS, Figure
 from commission.planning.dilution import Heading, Measurement
 from commission.site.quantity import PERCENT, joined
 
@@ -25,6 +25,13 @@ MEASUREMENT_NAMES: dict[Measurement, str] = {
 }
 
 
+def none_text(figure: Figure) -> str:
+    """Say what there is not where a figure has no value."""
+    if figure is Figure.VISIBLE:
+        return "none visible"
+    return "not the whole pose" if figure in BY_CONTOURS else "no fix"
+
+
 def value_text(figure: Figure, value: float, measurement: Measurement) -> str:
     """Return a value of a figure (SI) in the page's unit, which may depend on what is measured.
 
@@ -35,7 +42,7 @@ def value_text(figure: Figure, value: float, measurement: Measurement) -> str:
     measurement : what is measured of each reflector.
     """
     if not is_fix(figure, value):
-        return "none visible" if figure is Figure.VISIBLE else "no fix"
+        return none_text(figure)
     quantity = QUANTITIES[figure]
     shown = quantity.shown.of(value)
     if quantity.shown is PERCENT:

@@ -87,6 +87,23 @@ def test_the_error_with_constants_is_that_of_its_study_and_computed_anew_when_a_
     assert not bench.view.heat.outdated
 
 
+def test_what_contours_tell_is_that_of_its_study_and_stays_when_a_reflector_moves(
+    bench: Bench[CoverageService], project: Project
+) -> None:
+    bench.ask(SetCoverage("figure", "contour_position"), ReadFloor((2.0, 2.0), 0.01))
+    heat = bench.found().heat
+    options = replace(CoverageSettings(), figure=Figure.CONTOUR_POSITION).options(Conditions())
+    result = coverage(CoverageInput.of(project, options))
+    assert result.contours is not None
+    assert np.array_equal(heat.classes.ravel(), heat.scale.classes(result.contours.position_sigma, result.drivable))
+    reading, index = bench.view.reading, result.coverage.lattice.index_near(2.0, 2.0)
+    assert reading.values[Figure.CONTOUR_POSITION] == result.contours.position_sigma[index]
+    assert reading.values[Figure.CONTOUR_HEADING] == result.contours.heading_sigma[index]
+    bench.move(0, 0.7)
+    assert not bench.jobs.unfinished()
+    assert np.array_equal(bench.view.heat.classes, heat.classes)
+
+
 def test_without_a_map_a_reflector_that_moves_the_floors_edge_is_computed_anew(project: Project) -> None:
     bench = Bench(CoverageService, replace(project, floor_map=None))
     bench.ask(VISIBLE)
