@@ -369,6 +369,7 @@ class Localizer:
             setup.protection,
             bank,
             levels,
+            setup.zone_rows,
         )
         protection = protection_state(bank, setup.protected_names)
         kept = {"cross": after.cross, "search": after.search, "temporary": after.temporary}

@@ -18,6 +18,7 @@ from commission.localization.protection import Bank, ProtectionModel, forget, pr
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
 from commission.localization.supervisor import FAIL, LOST, judge
+from commission.localization.zones import ZoneRows, kinds_at
 
 
 @compiled
@@ -34,6 +35,7 @@ def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
     protection: ProtectionModel,
     bank: Bank,
     levels: FloatArray,
+    zones: ZoneRows | None,
 ) -> FilterState:
     """State after a cycle whose supervisor holds the protection level against its limits, in place of 2-sigma.
 
@@ -48,6 +50,7 @@ def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
     protection : map, integrity risk and probability of a fault.
     bank : filters that leave one reflector out each; in and out.
     levels : (2,) out: of the position [m] and of the heading [rad]; inf while the vehicle is lost.
+    zones : where which kinds correct the pose; None: all everywhere.
 
     Notes
     -----
@@ -60,6 +63,8 @@ def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
         forget(bank)
         levels[0], levels[1] = math.inf, math.inf
         return after if after.mode == LOST else with_mode(before, after, FAIL)
+    if not kinds_at(zones, cycle.prior.x, cycle.prior.y).reflectors:
+        last = first
     found = protect_cycle(
         bank, cycle.prior, after.belief, first, last, detections, status, reflectors, observation, protection
     )

@@ -19,6 +19,7 @@ from commission.localization.kalman import correct
 from commission.localization.observation import ObservationModel, observation_at
 from commission.localization.pose_gaussian import PoseGaussian, larger_eigenvalue
 from commission.localization.supervisor import INITIALIZING, LOST
+from commission.localization.zones import ZoneRows, kinds_at
 
 SLOTS = 24
 """Reflectors that are left out, one by one, at most: those seen last."""
@@ -313,6 +314,7 @@ def protect(  # noqa: PLR0917 - the columns of a run
     model: ProtectionModel,
     bank: Bank,
     levels: Levels,
+    zones: ZoneRows | None,
 ) -> None:
     """Judge some cycles of one setup in a row.
 
@@ -327,6 +329,7 @@ def protect(  # noqa: PLR0917 - the columns of a run
     model : map, integrity risk and probability of a fault.
     bank : in and out.
     levels : out.
+    zones : where which kinds correct the pose; None: all everywhere.
 
     Notes
     -----
@@ -340,12 +343,13 @@ def protect(  # noqa: PLR0917 - the columns of a run
             forget(bank)
             levels.position[cycle], levels.heading[cycle], levels.reflector[cycle] = math.inf, math.inf, -1
             continue
+        here = kinds_at(zones, prior_means[k, 0], prior_means[k, 1])
         found = protect_cycle(
             bank,
             _belief_of(prior_means[k], prior_covariances[k]),
             _belief_of(means[cycle], covariances[cycle]),
             offsets[cycle],
-            offsets[cycle + 1],
+            offsets[cycle + 1] if here.reflectors else offsets[cycle],
             range_bearing,
             status,
             reflectors,

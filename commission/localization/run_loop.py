@@ -540,6 +540,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
                 protection,
                 bank,
                 levels[k],
+                zones,
             )
         else:
             state = cycle.state

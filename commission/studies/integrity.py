@@ -86,6 +86,7 @@ def protection(
                 model,
                 bank,
                 levels,
+                setup.zone_rows,
             )
         first = after
     return Protection(
@@ -152,4 +153,5 @@ def warm_up() -> None:
         ProtectionModel(0.1, 0.1, nothing, no_rows),
         new_bank(),
         levels,
+        None,
     )

@@ -17,9 +17,10 @@ from commission.localization.setup import LocalizerSetup
 from commission.localization.whole_run import run
 from commission.localization.zones import kinds_at, zone_rows
 from commission.simulation.scenario import start_of, virtual_drive
-from commission.site.parameters import TagParameters
+from commission.site.parameters import HELD_LEVEL, Parameters, SupervisorParameters, TagParameters
 from commission.site.records import Detections, Odometry, Scan
 from commission.site.zones import ObservationKind, Zone
+from commission.studies.integrity import protection
 from tests.localization.drives import Plan, random_drive
 from tests.localization.test_contour import ON, SWEEPING, project_of
 from tests.localization.test_tags import NEAR, STANDING, assert_the_same, grown, mixed
@@ -102,6 +103,9 @@ def test_where_reflectors_do_not_count_the_pose_is_that_of_a_drive_on_which_none
     expected = run(blind.log, plain, drive.initial)
     assert columns.means.tobytes() == expected.means.tobytes()
     assert columns.covariances.tobytes() == expected.covariances.tobytes()
+    levels, without = protection(columns), protection(expected)
+    assert levels.position.tobytes() == without.position.tobytes()
+    assert np.isfinite(levels.position[first:]).any()
     # Reflectors testify all the same: they are associated, and accepted.
     rows = slice(int(columns.offsets[first]), None)
     assert (columns.status[rows] == Status.INLIER).mean() > 0.5
@@ -111,6 +115,24 @@ def test_where_reflectors_do_not_count_the_pose_is_that_of_a_drive_on_which_none
     for cycle, estimate in enumerate([*estimates, *localizer.flush()]):
         assert_same_estimate(estimate, columns.estimate(cycle))
     assert localizer.state == columns.final
+
+
+def test_a_supervisor_by_protection_levels_reckons_with_no_reflector_where_none_corrects():
+    rng = np.random.default_rng(3)
+    parameters = Parameters(supervisor=SupervisorParameters(held=HELD_LEVEL))
+    setup = dataclasses.replace(setup_of(rng, parameters), zones=(zone(EVERYWHERE, CONTOURS),))
+    drive = random_drive(setup, rng, Plan(scans=40))
+    columns = run(drive.log, setup, drive.initial)
+    records = [
+        dataclasses.replace(each, range_bearing=np.empty((0, 2))) if isinstance(each, Detections) else each
+        for each in drive.records
+    ]
+    blind = dataclasses.replace(drive, records=records)
+    unseen = run(blind.log, dataclasses.replace(setup, zones=()), drive.initial)
+    assert np.isfinite(columns.levels).all()
+    assert columns.levels.tobytes() == unseen.levels.tobytes()
+    live = grown(drive.log, setup, drive.initial)
+    assert live.levels.tobytes() == columns.levels.tobytes()
 
 
 def test_reflectors_that_do_not_correct_tell_of_a_vehicle_that_stands_elsewhere():
