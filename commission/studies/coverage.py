@@ -164,7 +164,7 @@ class CoverageInput(StudyInput):
         return lattice_of(self, next((spacing for spacing in ROUND_SPACINGS if spacing >= least), least))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class CoverageResult:
     """Visibility and dilution over a floor."""
 
@@ -209,7 +209,7 @@ def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResu
         site = BudgetSite(visible=visible, uncertainty=known.uncertainty, speed=known.speed)
         budget = floor_budget(found, site, part(progress, until, 1.0))
     floor = np.array(found.floor) if inputs.floor_map is None else free_floor(inputs, lattice.points())
-    return CoverageResult(found, visible, floor, budget, told)
+    return CoverageResult(coverage=found, visible=visible, drivable=floor, budget=budget, contours=told)
 
 
 def contours_of(inputs: CoverageInput, lattice: Lattice, progress: Progress = silent) -> ContourCoverage | None:

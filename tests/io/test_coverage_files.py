@@ -32,7 +32,8 @@ def found() -> CoverageResult:
 def of(project: Project) -> CoverageResult:
     """Figures of a project over the lattice, all of which is floor."""
     visible = vehicle_visibility(project)
-    return CoverageResult(coverage(visible, LATTICE, FixOptions()), visible, np.ones(len(LATTICE), dtype=bool))
+    found = coverage(visible, LATTICE, FixOptions())
+    return CoverageResult(coverage=found, visible=visible, drivable=np.ones(len(LATTICE), dtype=bool))
 
 
 def test_files_hold_the_figures_of_the_floor(found, tmp_path):
