@@ -98,7 +98,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     contours: ContourModel | None,
     scan: ContourScan | None,
     figures: FloatArray | None,
-    zones: ZoneRows | None,
+    zones: ZoneRows,
     temporary: TemporaryModel | None,
     memory: TemporaryMemory | None,
     goods: FloatArray | None,
@@ -124,7 +124,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     following : the odometry record at or after the scan, where it is known.
     contours, scan : contours of the map, and the scan that is matched with them; None: they are not looked at.
     figures : (COLUMNS,) out, see `contour`; None: as `contours`.
-    zones : where which kinds correct the pose; None: all everywhere.
+    zones : where which kinds correct the pose.
     temporary, memory : rules of temporary landmarks, and those that are known, written; None: none are looked at.
     goods : (COLUMNS,) out, see `temporary`; None: as `temporary`.
 

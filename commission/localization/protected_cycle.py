@@ -35,7 +35,7 @@ def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
     protection: ProtectionModel,
     bank: Bank,
     levels: FloatArray,
-    zones: ZoneRows | None,
+    zones: ZoneRows,
 ) -> FilterState:
     """State after a cycle whose supervisor holds the protection level against its limits, in place of 2-sigma.
 
@@ -50,7 +50,7 @@ def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
     protection : map, integrity risk and probability of a fault.
     bank : filters that leave one reflector out each; in and out.
     levels : (2,) out: of the position [m] and of the heading [rad]; inf while the vehicle is lost.
-    zones : where which kinds correct the pose; None: all everywhere.
+    zones : where which kinds correct the pose.
 
     Notes
     -----

@@ -314,7 +314,7 @@ def protect(  # noqa: PLR0917 - the columns of a run
     model: ProtectionModel,
     bank: Bank,
     levels: Levels,
-    zones: ZoneRows | None,
+    zones: ZoneRows,
 ) -> None:
     """Judge some cycles of one setup in a row.
 
@@ -329,7 +329,7 @@ def protect(  # noqa: PLR0917 - the columns of a run
     model : map, integrity risk and probability of a fault.
     bank : in and out.
     levels : out.
-    zones : where which kinds correct the pose; None: all everywhere.
+    zones : where which kinds correct the pose.
 
     Notes
     -----

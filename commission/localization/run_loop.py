@@ -445,7 +445,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
     contours: ContourModel | None,
     scans: ContourScans | None,
     frames: TagFrames | None,
-    zones: ZoneRows | None,
+    zones: ZoneRows,
     protection: ProtectionModel | None,
     bank: Bank | None,
     temporary: TemporaryModel | None,

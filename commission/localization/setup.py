@@ -110,8 +110,8 @@ class LocalizerSetup:
     """Tags and camera for kernels; None: they are not looked at."""
     contour: ContourModel | None = field(init=False, repr=False, compare=False)
     """Contours of the floor map; None: they are not looked at."""
-    zone_rows: ZoneRows | None = field(init=False, repr=False, compare=False)
-    """Zones for kernels; None: every kind counts everywhere."""
+    zone_rows: ZoneRows = field(init=False, repr=False, compare=False)
+    """Zones for kernels."""
     protection: ProtectionModel | None = field(init=False, repr=False, compare=False)
     """What protection levels are reckoned with; None: the supervisor does not go by them."""
     temporary: TemporaryModel | None = field(init=False, repr=False, compare=False)

@@ -57,7 +57,7 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
     status: NDArray[np.int8],
     following: NextOdometry,
     figures: FloatArray,
-    zones: ZoneRows | None,
+    zones: ZoneRows,
     temporary: TemporaryModel | None,
     memory: TemporaryMemory | None,
     scan: ContourScan | None,
@@ -77,7 +77,7 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
     busy : see `busy_chunks`; None: as `cross`.
     following : the odometry record at or after the frame, where it is known.
     figures : (n, COLUMNS) out, see `tags`.
-    zones : where which kinds correct the pose; None: all everywhere.
+    zones : where which kinds correct the pose.
     temporary, memory, scan, goods : as in `process_scan`; the scan of a frame has no beams.
 
     Notes

@@ -36,28 +36,27 @@ class KindsHere(NamedTuple):
     tags: bool
 
 
-def zone_rows(zones: Sequence[Zone]) -> ZoneRows | None:
-    """Return zones for kernels; None where there are none.
+def zone_rows(zones: Sequence[Zone]) -> ZoneRows:
+    """Return zones for kernels: one kernel serves sites with and without them.
 
     Parameters
     ----------
     zones : of the site; where they overlap the first of them counts.
     """
-    if not zones:
-        return None
-    counts = np.array([[kind in zone.kinds for kind in ObservationKind] for zone in zones], dtype=np.bool_)
-    offsets = np.cumsum([0, *(len(zone.outline) for zone in zones)])
-    corners = np.array([corner for zone in zones for corner in zone.outline], dtype=np.float64)
+    kinds = [[kind in zone.kinds for kind in ObservationKind] for zone in zones]
+    offsets = np.cumsum([0, *(len(zone.outline) for zone in zones)], dtype=np.int64)
+    corners = np.array([corner for zone in zones for corner in zone.outline], dtype=np.float64).reshape(-1, 2)
+    counts = np.array(kinds, dtype=np.bool_).reshape(-1, len(ObservationKind))
     return ZoneRows(read_only(offsets), read_only(corners), read_only(counts))
 
 
 @compiled_inline
-def kinds_at(zones: ZoneRows | None, x: float, y: float) -> KindsHere:
+def kinds_at(zones: ZoneRows, x: float, y: float) -> KindsHere:
     """Which kinds correct the pose at a place; all of them outside of the zones.
 
     Parameters
     ----------
-    zones : of the site, or None.
+    zones : of the site.
     x, y : of base [m], map frame.
 
     Notes
@@ -66,8 +65,6 @@ def kinds_at(zones: ZoneRows | None, x: float, y: float) -> KindsHere:
     number, by definition: a ray along x leaves the zone once more than it enters it (Jordan). A place on the border of
     two zones that touch is in one of them.
     """
-    if zones is None:
-        return KindsHere(True, True, True)
     for z in range(len(zones.offsets) - 1):
         first, last = zones.offsets[z], zones.offsets[z + 1]
         inside = False

@@ -16,6 +16,7 @@ from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_onl
 from commission.localization.protection import Levels, ProtectionModel, new_bank, protect
 from commission.localization.reflector_index import in_order_of_map
 from commission.localization.run_columns import RunColumns
+from commission.localization.zones import zone_rows
 from commission.progress import Progress, silent
 from commission.site.parameters import IntegrityParameters
 from commission.studies.reflector_figures import numbered
@@ -153,5 +154,5 @@ def warm_up() -> None:
         ProtectionModel(0.1, 0.1, nothing, no_rows),
         new_bank(),
         levels,
-        None,
+        zone_rows(()),
     )

@@ -63,7 +63,7 @@ def test_the_first_of_zones_that_overlap_counts_and_a_border_is_in_exactly_one()
     overlapping = zone_rows([zone(left, REFLECTORS, TAGS), zone(EVERYWHERE, CONTOURS, name="B")])
     assert tuple(kinds_at(overlapping, 0.5, 0.5)) == (True, False, True)
     assert tuple(kinds_at(overlapping, 5.0, 0.5)) == (False, True, False)
-    assert tuple(kinds_at(None, 5.0, 0.5)) == (True, True, True)
+    assert tuple(kinds_at(zone_rows(()), 5.0, 0.5)) == (True, True, True)
 
 
 @pytest.mark.parametrize("beams", [0, 720], ids=["detections", "raw scans"])

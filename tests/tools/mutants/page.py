@@ -324,8 +324,8 @@ PAGE = (
     Mutant(
         name="heading of the heatmap in milliradians",
         file=FOLDER + "coverage/scale.py",
-        find="shown=DEGREES)",
-        replace='shown=Shown("°", 1000.0))',
+        find='"Heading error, 1σ [°]", shown=DEGREES)',
+        replace='"Heading error, 1σ [°]", shown=Shown("°", 1000.0))',
         tests=(NUMBERS + "test_a_figure_of_the_floor_is_read_in_its_unit",),
     ),
     Mutant(
