@@ -32,7 +32,7 @@ class TemporaryLayer(BaseLayer):
     group = LayerGroup.RUN
     rank = 207
     legend = (
-        theme.Legend("reel or corner that is a landmark", theme.GOODS, theme.Mark.RING),
+        theme.Legend("reel or corner that is a landmark", theme.GOODS, theme.Mark.LINE),
         theme.Legend("2σ of its place; age in s", theme.GOODS_SIGMA, theme.Mark.RING),
     )
 
