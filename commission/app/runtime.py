@@ -35,6 +35,9 @@ SLOW_FRAME_S = 0.2
 """The same for plots, trails and numbers [s]."""
 ANSWER_S = 0.06
 """The same once a browser has asked for something: what is selected or sought is said within 100 ms [s]."""
+DRAWING = 3.0
+"""Such a picture waits that many times as long as the last one took: who asks without a pause (a drag, a script) leaves
+the owner thread most of its time for what is asked, and for the journal."""
 AFTER_A_FAULT_S = 0.2
 """Pause of the owner thread after a fault that it could not even tell [s]."""
 SAME_FAULT_AFTER_S = 5.0
@@ -107,7 +110,7 @@ class Runtime:
         self._page: PageLike | None = None
         self._shown: Project | None = None
         self._due = Due.SOON
-        self._is_asked = False
+        self._is_asked, self._drawing_s = False, 0.0
         self._drawn_at = self._drawn_slowly_at = self._turned_at = clock()
         self._told = "", -math.inf
         self._stopped = threading.Event()
@@ -212,7 +215,7 @@ class Runtime:
     @property
     def _slow_frame_s(self) -> float:
         """Shortest time between two whole pictures as things are [s]."""
-        return ANSWER_S if self._is_asked else SLOW_FRAME_S
+        return min(max(ANSWER_S, DRAWING * self._drawing_s), SLOW_FRAME_S) if self._is_asked else SLOW_FRAME_S
 
     def handle(self, message: Message) -> None:
         """Do what one message says."""
@@ -281,6 +284,8 @@ class Runtime:
             if slowly:
                 self._drawn_slowly_at, self._is_asked = now, False
             self._page.draw(self.view(whole=slowly), slowly=slowly)
+            if slowly:
+                self._drawing_s = self._clock() - now
 
     def view(self, *, whole: bool = True) -> PageView:
         """Return everything the page shows; `whole` with what is drawn slowly, too."""

@@ -243,6 +243,7 @@ def test_each_browser_has_its_own_view(bench: Bench) -> None:
 
 def test_a_job_in_sight_is_stopped_by_its_button_and_what_there_was_stays(bench: Bench) -> None:
     bench.play()
+    bench.until(lambda: bool(bench.page.views) and not bench.page.views[-1].jobs)
     before = bench.run
     started, end = threading.Event(), threading.Event()
 
@@ -295,3 +296,25 @@ def test_what_a_browser_asks_for_is_drawn_whole_within_a_tenth_of_a_second_and_a
     runtime.handle(by(1, LookAgain()))
     let(0.1)
     assert min(at for at, slowly in pictures if slowly) - asked < 0.09
+
+
+def test_who_asks_without_a_pause_leaves_the_owner_thread_most_of_its_time() -> None:
+    project, now, took = Project(name="x"), [100.0], 0.05
+    runtime = Runtime(AppState(project=project, saved=project), (), clock=lambda: now[0])
+    whole: list[float] = []
+
+    class Page(Pictures):
+        def draw(self, view: PageView, *, slowly: bool) -> None:
+            if slowly:
+                whole.append(now[0])
+                now[0] += took
+
+    runtime._page = Page()
+    for _ in range(200):
+        now[0] += 0.01
+        runtime.handle(by(1, LookAgain()))
+        runtime.tick()
+    gaps = np.diff(whole[1:])
+    assert len(gaps) > 5
+    assert gaps.min() >= 3.0 * took
+    assert gaps.max() <= SLOW_FRAME_S + 0.02

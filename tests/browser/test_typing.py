@@ -224,15 +224,21 @@ def _is_one_entry(page: OpenPage, served: Served, heard: Heard, number: tuple[ob
     page.page.keyboard.press("Control+A")
     heard.envelopes.clear()
     page.page.keyboard.type(f"{after:.10g}", delay=5)
-    page.page.wait_for_timeout(80)
+    page.page.wait_for_timeout(50)
     assert heard.envelopes == [], f"{handle.label} tells of keys"
     steps = len(served.state.undo)
     page.page.keyboard.press("Enter")
-    page.page.wait_for_timeout(250)
+
+    def is_entered() -> bool:
+        return (handle.value[index] if isinstance(handle.value, tuple) else handle.value) == pytest.approx(
+            after, rel=1e-6
+        )
+
+    served.until(is_entered, 10.0)
+    page.page.wait_for_timeout(80)  # a second entry would come now
+    assert is_entered(), handle.label
     assert heard.fields() in ([widget], []), handle.label
     assert len(served.state.undo) <= steps + 1, handle.label
-    entered = handle.value if not isinstance(handle.value, tuple) else handle.value[index]
-    assert entered == pytest.approx(after, rel=1e-6), handle.label
     return True
 
 
