@@ -29,7 +29,7 @@ from commission.localization.contour import (
     rows_of_match,
     to_grid,
 )
-from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.pose_gaussian import PoseGaussian, larger_eigenvalue
 from commission.planning.coverage import Lattice
 from commission.planning.dilution import FixOptions, Heading
 from commission.progress import Progress, silent
@@ -224,23 +224,21 @@ def _information(  # noqa: PLR0917 - a point, its beams, and who sees them
 def _sigmas(information: FloatArray) -> tuple[float, float, float]:
     """Directions that are told, and 1-sigma of position (its worst direction) and heading; inf where not all are.
 
-    C = information^-1; position: sqrt of the largest eigenvalue of its block of x and y.
+    C = V diag(1 / values) V^T, the inverse by the eigenvalues of the information.
     """
-    values, _ = eigen_symmetric(information)
+    values, vectors = eigen_symmetric(information)
     largest = values.max()
-    rank = 0.0
-    for k in range(3):
+    rank, xx, xy, yy, tt = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(WHOLE_POSE):
         if values[k] > SINGULAR * largest:
             rank += 1.0
+            xx += vectors[0, k] * vectors[0, k] / values[k]
+            xy += vectors[0, k] * vectors[1, k] / values[k]
+            yy += vectors[1, k] * vectors[1, k] / values[k]
+            tt += vectors[2, k] * vectors[2, k] / values[k]
     if rank < WHOLE_POSE:
         return rank, math.inf, math.inf
-    a, b, c = information[0, 0], information[0, 1], information[0, 2]
-    d, e, f = information[1, 1], information[1, 2], information[2, 2]
-    det = a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d)
-    xx, yy, xy = (d * f - e * e) / det, (a * f - c * c) / det, (c * e - b * f) / det
-    tt = (a * d - b * b) / det
-    largest = 0.5 * (xx + yy) + math.sqrt(0.25 * (xx - yy) ** 2 + xy * xy)
-    return rank, math.sqrt(largest), math.sqrt(tt)
+    return rank, math.sqrt(larger_eigenvalue(xx, xy, yy)), math.sqrt(tt)
 
 
 def warm_up() -> None:

@@ -199,7 +199,7 @@ def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResu
     warm_up((SIGHT, DILUTION, *several, *walls), part(progress, 0.0, COMPILING))
     progress(COMPILING, "sight of each reflector")
     visible = vehicle_visibility(inputs, inputs.visibility)
-    told = contours_of(inputs, lattice, part(progress, PREPARING, ADDING)) if inputs.contours is not None else None
+    told = contours_of(inputs, lattice, part(progress, PREPARING, ADDING))
     begin = PREPARING if told is None else ADDING
     until = 1.0 if inputs.constants is None else ADDING + 0.5 * (1.0 - ADDING)
     found = over_lattice(visible, lattice, inputs.fix, part(progress, begin, until))
@@ -213,7 +213,7 @@ def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResu
 
 
 def contours_of(inputs: CoverageInput, lattice: Lattice, progress: Progress = silent) -> ContourCoverage | None:
-    """What contours tell over the floor of an input that asks for it; None without a floor map.
+    """What contours tell over the floor; None where nobody asks, or without a floor map.
 
     Parameters
     ----------

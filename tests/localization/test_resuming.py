@@ -344,7 +344,8 @@ def test_cycles_of_a_flush_are_checkpoints_like_others(monkeypatch: pytest.Monke
     assert growing.columns().checkpoints[-1] == (len(growing), growing.state)
 
 
-def test_a_growing_run_whose_pose_is_thrown_away_is_the_whole_run_and_tells_its_hypotheses(drive: Drive) -> None:
+def thrown_away(drive: Drive) -> tuple[tuple[RunSegment, ...], RunColumns]:
+    """Segments of a drive whose pose is thrown away at cycle 9, and its run, grown live."""
     segments = (RunSegment(0, SETUPS["drive"]), RunSegment(9, SETUPS["drive"], locate=True))
     growing = GrowingRun(segments[0].setup, drive.initial)
     for record in drive.log.records():
@@ -353,7 +354,12 @@ def test_a_growing_run_whose_pose_is_thrown_away_is_the_whole_run_and_tells_its_
             if len(growing) == 9:
                 growing.begin_segment(SETUPS["drive"], locate=True)
     growing.flush()
-    columns, whole = growing.columns(), run_segments(drive.log, segments, drive.initial)
+    return segments, growing.columns()
+
+
+def test_a_growing_run_whose_pose_is_thrown_away_is_the_whole_run_and_tells_its_hypotheses(drive: Drive) -> None:
+    segments, columns = thrown_away(drive)
+    whole = run_segments(drive.log, segments, drive.initial)
     assert_same(columns, whole)
     assert columns.segments == segments
     assert (whole.modes[:9] != Mode.INITIALIZING).all()
@@ -380,15 +386,8 @@ def test_a_growing_run_whose_pose_is_thrown_away_is_the_whole_run_and_tells_its_
 def test_what_was_believed_while_a_vehicle_searched_is_told_without_a_second_search(
     drive: Drive, chunk: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    segments = (RunSegment(0, SETUPS["drive"]), RunSegment(9, SETUPS["drive"], locate=True))
-    growing = GrowingRun(segments[0].setup, drive.initial)
-    for record in drive.log.records():
-        growing.push(record)
-        while growing.pull() is not None:
-            if len(growing) == 9:
-                growing.begin_segment(SETUPS["drive"], locate=True)
-    growing.flush()
-    expected = growing.columns().priors.rows()
+    segments, grown = thrown_away(drive)
+    expected = grown.priors.rows()
     monkeypatch.setattr(whole_run, "CHECKPOINT_CYCLES", chunk)
     whole = run_segments(drive.log, segments, drive.initial)
     # Another gate behind the middle of a stretch between two checkpoints.

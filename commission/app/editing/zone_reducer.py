@@ -11,7 +11,7 @@ from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing import zone_actions as actions
 from commission.errors import UsageError
 from commission.site.editing.names import fresh_names
-from commission.site.fields import with_field
+from commission.site.fields import in_file, with_field
 from commission.site.layout_brief import low_high
 from commission.site.zones import ObservationKind, Zone
 
@@ -68,7 +68,7 @@ def add_zone(action: actions.AddZone, state: AppState, sender: Sender) -> Outcom
     (left, low), (right, high) = low_high(action.area)
     if left == right or low == high:
         return Outcome(state)
-    zone = Zone(name=name, outline=((left, low), (right, low), (right, high), (left, high)))
+    zone = in_file(Zone(name=name, outline=((left, low), (right, low), (right, high), (left, high))))
     return _with_zones(state, (*zones, zone), Edit(f"draw {name}", sender), name)
 
 
