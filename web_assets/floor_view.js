@@ -69,11 +69,10 @@
     const [x0, y0] = window.commissionOrigin ?? [0, 0]; // of the scene, in the map (map_scene.py)
     place.textContent = at ? `x ${(x0 + at[0]).toFixed(3)}   y ${(y0 + at[1]).toFixed(3)} m` : "";
   }
-  // Who has zoomed or moved the floor keeps what was zoomed to, though the page still builds up.
-  const BUILDS_UP_MS = 10_000;
+  // Who has zoomed or moved the floor keeps what was zoomed to, though the page still builds up: told until it is heard.
   let isOdd = false;
   const tellMoved = ({ target }) => {
-    if (target === viewer()?.canvas && performance.now() < BUILDS_UP_MS) window.commissionMovedNow();
+    if (target === viewer()?.canvas && !window.commissionStands) window.commissionMovedNow();
   };
   window.commissionMovedNow = () => {
     if (!window.commissionMoved) return;

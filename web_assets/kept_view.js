@@ -5,7 +5,7 @@
 (() => {
   if (window.commissionKept) return; // the server sends this script again after each reconnection
   window.commissionKept = true;
-  const KEY = "commission-view", LOOK_EVERY_MS = 300, SETTLED_MS = 600, BUILDS_UP_MS = 12_000, FLAT_DEGREES = 5;
+  const KEY = "commission-view", LOOK_EVERY_MS = 300, SETTLED_MS = 600, FLAT_DEGREES = 5;
   const read = () => { try { return JSON.parse(sessionStorage.getItem(KEY)) ?? {}; } catch { return {}; } };
   const kept = { tabs: {}, folders: {}, camera: null, ...read() };
   const save = () => { try { sessionStorage.setItem(KEY, JSON.stringify(kept)); } catch { /* nothing is kept then */ } };
@@ -44,12 +44,16 @@
     }
   }
 
-  // The camera is put back once a picture of the whole site stands, and again while the page still builds up and the
-  // program fits the site anew; who moves the floor in between keeps what was moved to.
+  // The camera is put back once a picture of the whole site stands, and again until the program has heard of it and fits
+  // the site no more; who moves the floor in between keeps what was moved to. Who saw the whole site (the program tells,
+  // cameras.py) sees it again in the shape that the floor has now, and another site is seen whole.
   const wanted = kept.camera;
-  let isBack = !wanted, since = 0, last = "";
+  const site = () => document.querySelector(".c-top span")?.textContent ?? "";
+  let isBack = !wanted, wasBack = false, since = 0, last = "";
   for (const kind of ["wheel", "pointerdown"]) {
-    addEventListener(kind, ({ target }) => { if (target === window.__viserMutable?.canvas) isBack = true; }, true);
+    addEventListener(kind, ({ target }) => {
+      if (wasBack || target === window.__viserMutable?.canvas) isBack = true; // "Fit", or a line of a table, too
+    }, true);
   }
   function followCamera() {
     const { camera, cameraControl } = window.__viserMutable ?? {};
@@ -59,13 +63,18 @@
     const origin = String(window.commissionOrigin ?? [0, 0]);
     if (now.join() !== last) [last, since] = [now.join(), performance.now()];
     if (performance.now() - since < SETTLED_MS) return;
-    if (!isBack && wanted.origin === origin) {
-      if (performance.now() > BUILDS_UP_MS) isBack = true;
-      if (now.every((value, index) => Math.abs(value - wanted.at[index]) < 0.01)) return;
-      window.commissionMovedNow?.();
-      cameraControl.setLookAt(...wanted.at, false);
-    } else if (String(kept.camera?.at) !== String(now)) {
-      kept.camera = { origin, at: now };
+    if (!site()) return; // the bar has not come
+    if (!isBack && wanted.origin === origin && wanted.site === site()) {
+      if (!window.commissionStands) window.commissionMovedNow?.();
+      wasBack = true;
+      if (now.some((value, index) => Math.abs(value - wanted.at[index]) > 0.01)) {
+        cameraControl.setLookAt(...wanted.at, false);
+      } else isBack = Boolean(window.commissionStands);
+      return;
+    }
+    const seen = window.commissionWhole ? null : { origin, site: site(), at: now };
+    if (JSON.stringify(kept.camera) !== JSON.stringify(seen)) {
+      kept.camera = seen;
       save();
     }
   }

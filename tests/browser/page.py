@@ -65,6 +65,14 @@ _IS_SETTLED = """() => {
 }"""
 """Panels, styles and the camera's place arrive one by one, and the floor fades in: a click in between misses."""
 
+_IS_STILL = """() => {
+  const { camera, cameraControl } = window.__viserMutable;
+  const now = camera.position.clone(), end = cameraControl.getPosition(now.clone(), true), at = now.toArray().join();
+  if (window.__still?.at !== at) window.__still = {at, since: performance.now()};
+  return now.distanceTo(end) < 1e-5 * now.length() && performance.now() - window.__still.since > 150;
+}"""
+"""A camera glides to where a wheel or a hand has sent it; on a busy computer it stands in between, too."""
+
 _COLLECT_NOTES = """window.__notes = [];
 new MutationObserver(() => {
   for (const note of document.querySelectorAll('.mantine-Notification-description'))
@@ -129,6 +137,10 @@ class OpenPage:
         frame = self.page.evaluate(_FRAME)
         self.page.evaluate("window.__viserMutable.requestRender()")
         self.page.wait_for_function(f"frame => ({_FRAME}) > frame", arg=frame)
+
+    def wait_until_still(self) -> None:
+        """Wait until the camera has come to where the wheel or a hand has sent it."""
+        self.page.wait_for_function(_IS_STILL, polling=50)
 
     def forget_refusals(self) -> None:
         """Leave the field that is typed into, and take back what was said at the fields, for the next test to see."""

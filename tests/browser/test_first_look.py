@@ -14,7 +14,7 @@ from commission.app.run.actions import Play, VirtualDrive
 from tests.app.sites import room
 from tests.browser.page import OpenPage
 from tests.browser.serving import Served
-from tests.browser.test_floor_view import FITTED_AFTER_MS
+from tests.browser.test_floor_view import metre
 
 
 @pytest.fixture(scope="module")
@@ -83,21 +83,18 @@ def test_who_turns_the_wheel_while_the_page_builds_up_keeps_what_was_zoomed_to(
     served: Served, window: Callable[..., OpenPage]
 ) -> None:
     page = window(served.server)
-    client = page.open()
-    x, y = page.pixel_of((3.0, 6.0))
-    page.page.wait_for_timeout(300)
-    fitted = float(client.camera.position[2])
-    page.page.mouse.move(x, y)
+    page.open()
+    fitted = metre(page)
+    page.page.mouse.move(*page.pixel_of((3.0, 6.0)))
     for _ in range(5):
         page.page.mouse.wheel(0, -300)
-        page.page.wait_for_timeout(50)
-    zoomed = fitted
-    while zoomed == fitted or zoomed != float(client.camera.position[2]):  # the wheel's way takes a while to its end
-        zoomed = float(client.camera.position[2])
-        page.page.wait_for_timeout(1200)
-    assert zoomed < 0.8 * fitted
-    page.page.wait_for_timeout(FITTED_AFTER_MS)
-    assert float(client.camera.position[2]) == pytest.approx(zoomed)
+    page.page.wait_for_function("() => window.commissionStands === true")  # the program has heard of it
+    page.wait_until_still()
+    zoomed = metre(page)
+    assert zoomed > 1.25 * fitted
+    page.page.set_viewport_size({"width": 1580, "height": 900})  # for this the whole site would be fitted anew
+    page.wait_until_drawn()
+    assert metre(page) == pytest.approx(zoomed)
 
 
 @pytest.mark.parametrize(

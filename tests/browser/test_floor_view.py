@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from commission.app.base import cameras
 from commission.app.run.actions import ChooseSource, Play, VirtualDrive
 from commission.app.run.state import RunState
 from tests.app.sites import room
@@ -16,8 +15,6 @@ from tests.browser.page import OpenPage
 from tests.browser.serving import Served
 
 PLACE = (3.0, 2.0)
-FITTED_AFTER_MS = 1000.0 * cameras.SETTLING + 500.0
-"""Until then the program fits the plan anew, whatever a person does [ms]."""
 
 
 @pytest.fixture(scope="module")
@@ -33,18 +30,6 @@ def page(served: Served, lasting_window: Callable[..., OpenPage]) -> OpenPage:
     opened = lasting_window(served.server)
     opened.open(nodes=["/grid/lines"])
     return opened
-
-
-def settle(page: OpenPage) -> None:
-    """Let the camera come to rest; where the processor draws, that takes some pictures."""
-    before = None
-    for _ in range(100):
-        page.page.wait_for_timeout(150)
-        now = (page.pixel_of((0.0, 0.0)), page.pixel_of((1.0, 0.0)))
-        if now == before:
-            return
-        before = now
-    raise TimeoutError("the camera does not come to rest")
 
 
 def metre(page: OpenPage) -> float:
@@ -73,13 +58,11 @@ def test_the_edge_says_where_the_pointer_is_and_how_long_things_are(page: OpenPa
 
 
 def test_the_wheel_zooms_to_the_pointer(page: OpenPage) -> None:
-    page.page.wait_for_timeout(FITTED_AFTER_MS)
     at, before = np.array(page.pixel_of(PLACE)), metre(page)
     page.page.mouse.move(*at)
     for _ in range(4):
         page.page.mouse.wheel(0, -200)
-        page.page.wait_for_timeout(50)
-    settle(page)
+    page.wait_until_still()
     assert metre(page) > 1.3 * before
     assert np.hypot(*(np.array(page.pixel_of(PLACE)) - at)) < 6.0
     length, pixels = ruler(page)
@@ -91,9 +74,9 @@ def test_the_middle_button_moves_the_floor(page: OpenPage) -> None:
     page.page.mouse.move(*at)
     page.page.mouse.down(button="middle")
     page.page.mouse.move(at[0] + 90.0, at[1] + 40.0, steps=6)
-    settle(page)  # where the processor draws, the hand is farther than the picture
+    page.wait_until_still()  # where the processor draws, the hand is farther than the picture
     page.page.mouse.up(button="middle")
-    settle(page)
+    page.wait_until_still()
     assert metre(page) == pytest.approx(before, rel=1e-3)
     np.testing.assert_allclose(np.array(page.pixel_of(PLACE)) - at, (90.0, 40.0), atol=6.0)
     assert page.errors == []

@@ -14,7 +14,6 @@ from tests.browser.serving import Served
 
 def where(page: OpenPage) -> tuple[float, ...]:
     """Pixels of two places of the floor."""
-    page.page.wait_for_timeout(100)
     return (*page.pixel_of((3.0, 6.0)), *page.pixel_of((4.0, 6.0)))
 
 
@@ -28,7 +27,6 @@ def test_closing_one_browser_disturbs_nobody_and_a_reload_keeps_tab_folder_and_p
         served.runtime.post(Play(playing=False))
         page, other = window(served.server, (1024, 700)), window(served.server, (1024, 700))
         client = page.open()
-        page.page.wait_for_timeout(4500)  # it is not fitted anew any more
         page.open_tab("Plan")
         page.open_tab("Site")
         page.fold("Vehicle")
@@ -36,12 +34,11 @@ def test_closing_one_browser_disturbs_nobody_and_a_reload_keeps_tab_folder_and_p
         page.page.mouse.move(*page.pixel_of((3.0, 6.0)))
         for _ in range(4):
             page.page.mouse.wheel(0, -300)
-        page.page.wait_for_timeout(1500)
+        page.wait_until_still()
         place = where(page)
         other.open()
         other.close()
         served.until(lambda: len(served.state.browsers) == 1)
-        page.page.wait_for_timeout(500)
         assert client.client_id in served.state.browsers
         assert where(page) == place
         assert page.page.get_by_role("tab", name="Layers", exact=True).get_attribute("aria-selected") == "true"
@@ -53,8 +50,20 @@ def test_closing_one_browser_disturbs_nobody_and_a_reload_keeps_tab_folder_and_p
         for name in ("Site", "Layers"):
             assert page.page.get_by_role("tab", name=name, exact=True).get_attribute("aria-selected") == "true"
         served.until(lambda: where(page) == pytest.approx(place, abs=1.0), seconds=30.0)
-        page.page.wait_for_timeout(3000)
+        page.page.wait_for_function("() => window.commissionStands === true")  # it is not fitted anew any more
+        page.wait_until_still()
         assert where(page) == pytest.approx(place, abs=1.0), "and it stays there"
+        page.press("Fit")
+        page.page.wait_for_function("() => JSON.parse(sessionStorage['commission-view']).camera === null")
+        page.page.set_viewport_size({"width": 900, "height": 700})
+        before = set(served.server.get_clients())
+        page.page.reload()
+        page.wait_for_client(before)
+        page.wait_until_drawn()
+        floor = page.page.locator("canvas").first.bounding_box()
+        assert floor is not None
+        corners = [page.pixel_of((x, y)) for x in (0.0, 12.0) for y in (0.0, 8.0)]
+        assert all(floor["x"] < x < floor["x"] + floor["width"] for x, _ in corners), "who saw all sees all again"
         assert page.errors == []
     finally:
         served.close()

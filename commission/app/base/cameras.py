@@ -32,7 +32,9 @@ NEAREST_FLIGHT = 8.0
 STRAIGHT_DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 LOCK = "/lock"
 SETTLING = 4.0
-"""Time after a browser came during which its panels still take their places and change the shape of the floor [s]."""
+"""Time in which a browser shows the whole site, in one shape, before its panels count as in their places [s]."""
+BUILDS_UP = 60.0
+"""Time after a browser came in which it shows the whole site, however busy its computer is [s]."""
 
 OnDrag: TypeAlias = Callable[[Any], Coroutine[Any, Any, None]]
 """Takes viser's drag events of the floor; `async`, since only those keep their order."""
@@ -56,8 +58,14 @@ class ClientView:
     """Where the camera was put to show the whole site [m]."""
     is_fitted: bool = False
     """Whether the browser has shown the whole site."""
+    is_settled: bool = False
+    """Whether its panels are in their places, or a person has moved the floor: what it shows is its own then."""
+    is_whole: bool = False
+    """Whether its page has been told that it shows the whole site."""
     came_at: float = field(default_factory=time.monotonic)
     """When it came, on the clock of this computer [s]."""
+    changed_at: float = field(default_factory=time.monotonic)
+    """When it last showed anything else than the whole site while its page built up [s]."""
 
 
 class Cameras:
@@ -113,14 +121,16 @@ class Cameras:
     def _let_hand_win(self, client: ClientHandle) -> None:
         """Fit nothing anew once the floor is zoomed or moved by hand: the page's script tells (floor_view.js)."""
         moved = client.gui.add_checkbox("The floor was moved by hand", False, visible=False)
-        script = f"window.commissionMoved = {json.dumps(viser_private.identifier(moved))}"
+        told = json.dumps(viser_private.identifier(moved))
+        script = f"window.commissionMoved = {told}; window.commissionStands = window.commissionWhole = false"
         viser_private.run_on_page(self._server, client.client_id, script)
         own = self._views[client.client_id]
 
         def settle(_event: object) -> None:
             # A wheel turned before the plan was there zooms nothing that anybody has seen.
             if own.is_fitted:
-                own.came_at = -SETTLING
+                own.is_settled = True
+                viser_private.run_on_page(self._server, client.client_id, "window.commissionStands = true")
 
         moved.on_update(settle)
 
@@ -162,7 +172,7 @@ class Cameras:
         own = self._views.get(client_id)
         if own is None:
             return
-        own.follow, own.came_at = False, -SETTLING
+        own.follow, own.is_settled = False, True
         self._light(own)
         camera = self._origin.camera(own.client)
         distance = float(np.linalg.norm(camera.position - camera.look_at))
@@ -266,17 +276,40 @@ class Cameras:
         own, camera = self._views.get(moved.client.client_id), self._origin.camera(moved.client)
         if own is None or own.three_d or own.follow:
             return
-        own.is_fitted = own.is_fitted or self._is_where_fitted(camera, own)
-        shift = float(np.hypot(*(camera.look_at[:2] - self._extent.center)))
         is_reshaped = abs(_aspect(own.client) - own.aspect) > 0.01
-        if time.monotonic() - own.came_at < SETTLING:
-            is_due = is_reshaped or shift > 0.01 * max(self._extent.size)
+        was_fitted = self._is_where_fitted(camera, own)
+        is_whole = was_fitted and not is_reshaped
+        self._tell_whether_whole(own, is_whole=is_whole)
+        if not self._builds_up(own, is_whole=is_whole):
+            is_due = is_reshaped and was_fitted
         else:
-            is_due = is_reshaped and self._is_where_fitted(camera, own)
+            # Not only where the shape has changed: what was sent for a shape before may have come last.
+            is_due = not is_whole
         if is_due:
             self._fit(own)
             return
         self._keep_north_up(camera)
+
+    def _builds_up(self, own: ClientView, *, is_whole: bool) -> bool:
+        """Whether a page still takes its places: until it has shown the whole site for a while, in one shape.
+
+        How long that takes is not known: where a processor draws for many windows, ten seconds until the first picture.
+        """
+        now = time.monotonic()
+        has_stood = own.is_fitted and now - own.changed_at > SETTLING
+        if has_stood or now - own.came_at > BUILDS_UP:
+            own.is_settled = True
+        if not is_whole:
+            own.changed_at = now
+        own.is_fitted = own.is_fitted or is_whole
+        return not own.is_settled
+
+    def _tell_whether_whole(self, own: ClientView, *, is_whole: bool) -> None:
+        """Let a page know whether it shows the whole site: a reload does so again, in its own shape (kept_view.js)."""
+        if is_whole is not own.is_whole:
+            own.is_whole = is_whole
+            script = f"window.commissionWhole = {json.dumps(is_whole)}"
+            viser_private.run_on_page(self._server, own.client.client_id, script)
 
     def _is_where_fitted(self, camera: CameraHandle, own: ClientView) -> bool:
         """Whether a camera still shows the whole site as it was put to."""
