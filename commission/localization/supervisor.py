@@ -132,4 +132,10 @@ def position_two_sigma(covariances: FloatArray, parameters: SupervisorParameters
     covariances : (K, 3, 3) of x [m], y [m] and heading [rad].
     parameters : say which one counts.
     """
-    return 2.0 * np.sqrt(position_variances(covariances, position_directions(covariances, parameters)))
+    xx, xy, yy = covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]
+    if parameters.position_sigma == "axes":
+        return 2.0 * np.sqrt(np.maximum(np.maximum(xx, yy), 0.0))
+    # `larger_eigenvalue`, as the supervisor itself has it: of hours, angles and their directions take long.
+    half_difference = 0.5 * (xx - yy)
+    largest = 0.5 * (xx + yy) + np.sqrt(half_difference * half_difference + xy * xy)
+    return 2.0 * np.sqrt(np.maximum(largest, 0.0))

@@ -17,6 +17,7 @@ from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_onl
 from commission.geometry.gaussian import truncated_chi_square_mean
 from commission.localization.estimate import Status
 from commission.localization.run_columns import RunColumns
+from commission.studies.tallies import Tallies, tallies_of
 
 DOF = 2
 """Degrees of freedom of a detection: range and bearing."""
@@ -54,20 +55,21 @@ def has_distance(columns: RunColumns) -> BoolArray:
     return np.isfinite(columns.d2) & (columns.status != Status.OUTLIER_DETECTOR)
 
 
-def consistency(columns: RunColumns, first: int = 0, after: int | None = None) -> Consistency:
+def consistency(
+    columns: RunColumns, first: int = 0, after: int | None = None, *, tallies: Tallies | None = None
+) -> Consistency:
     """Figures of the cycles from `first` to the one before `after`; to the last one when None.
 
     Parameters
     ----------
     columns : the run.
     first, after : bounds of at least one cycle.
+    tallies : of these cycles, where they are known.
     """
     after = len(columns) if after is None else after
-    rows = slice(int(columns.offsets[first]), int(columns.offsets[after]))
-    status, d2 = columns.status[rows], columns.d2[rows]
-    inlier, outlier = status == Status.INLIER, status == Status.OUTLIER_ASSOCIATION
-    accepted, rejected = int(np.count_nonzero(inlier)), int(np.count_nonzero(outlier))
-    per_cycle = columns.counts(Status.INLIER)[first:after]
+    tallies = tallies_of(columns, first, after) if tallies is None else tallies
+    per_cycle = tallies.counts[:, Status.INLIER]
+    accepted, rejected = (int(tallies.counts[:, s].sum()) for s in (Status.INLIER, Status.OUTLIER_ASSOCIATION))
     times = np.asarray((columns.stamps_ns[first:after] - columns.stamps_ns[first]) * 1e-9, dtype=np.float64)
     seen = times[per_cycle > 0]
     # A frame of a camera that looks for tags is no scan: that it shows no reflector says nothing.
@@ -77,9 +79,9 @@ def consistency(columns: RunColumns, first: int = 0, after: int | None = None) -
         cycles=after - first,
         accepted=accepted,
         rejected=rejected,
-        nis_mean=_mean(d2[inlier]),
+        nis_mean=_mean(tallies.accepted_d2, accepted),
         nis_expected=_expected(columns, first, after),
-        nis_before_gate_mean=_mean(d2[has_distance(columns)[rows]]),
+        nis_before_gate_mean=_mean(tallies.known_d2, int(tallies.known.sum())),
         rejected_fraction=rejected / (accepted + rejected) if accepted + rejected else math.nan,
         unseen_fraction=float(np.mean(of_scans == 0)) if len(of_scans) else 1.0,
         longest_unseen=float(np.diff(np.concatenate((times[:1], seen, times[-1:]))).max()),
@@ -106,28 +108,28 @@ class Recent(NamedTuple):
     """(K,) share of the detections that are rejected [0..1]."""
 
 
-def recent(columns: RunColumns) -> Recent:
+def recent(columns: RunColumns, *, tallies: Tallies | None = None) -> Recent:
     """Figures of each moment of a run.
 
     Parameters
     ----------
     columns : the run.
+    tallies : of all its cycles, where they are known.
     """
+    tallies = tallies_of(columns) if tallies is None else tallies
     firsts = np.searchsorted(columns.stamps_ns, columns.stamps_ns - round(RECENT_S * 1e9), side="right")
-    known = has_distance(columns)
-    count = _between(known, columns, firsts)
-    nis = _ratio(_between(np.where(known, columns.d2, 0.0), columns, firsts), count)
-    outliers = _between(columns.status == Status.OUTLIER_ASSOCIATION, columns, firsts)
-    inliers = _between(columns.status == Status.INLIER, columns, firsts)
+    nis = _ratio(_until(tallies.known_d2, firsts), _until(tallies.known, firsts))
+    outliers = _until(tallies.counts[:, Status.OUTLIER_ASSOCIATION], firsts)
+    inliers = _until(tallies.counts[:, Status.INLIER], firsts)
     return Recent(read_only(nis), read_only(_ratio(outliers, inliers + outliers)))
 
 
-def _between(values: FloatArray | BoolArray, columns: RunColumns, firsts: IntArray) -> NDArray[Any]:
-    """(K,) sum of a value of each detection from a cycle on, up to and with each of the cycles."""
-    # Of hours, each column of the detections is 10 MB: one is filled, and none is copied.
-    totals = np.zeros(len(values) + 1, np.int64 if values.dtype == np.bool_ else np.float64)
+def _until(values: NDArray[Any], firsts: IntArray) -> NDArray[Any]:
+    """(K,) sum of a value of each cycle from another cycle on, up to and with each."""
+    # Of hours, each column of the cycles is 4 MB: one is filled, and none is copied.
+    totals = np.zeros(len(values) + 1, np.int64 if values.dtype == np.int32 else np.float64)
     np.cumsum(values, out=totals[1:])
-    return totals[columns.offsets[1:]] - totals[columns.offsets[firsts]]
+    return totals[1:] - totals[firsts]
 
 
 def _ratio(values: NDArray[Any], counts: NDArray[Any]) -> FloatArray:
@@ -135,5 +137,5 @@ def _ratio(values: NDArray[Any], counts: NDArray[Any]) -> FloatArray:
     return np.where(counts > 0.0, values / np.maximum(counts, 1.0), math.nan)
 
 
-def _mean(values: FloatArray) -> float:
-    return float(values.mean()) if len(values) else math.nan
+def _mean(sums: FloatArray, count: int) -> float:
+    return float(sums.sum()) / count if count else math.nan

@@ -136,33 +136,46 @@ def nees(errors: FloatArray, covariances: FloatArray) -> FloatArray:
     nees : (K,) array; NaN where the error is unknown, infinite where the covariance is singular: the filter claims to
         know exactly what it does not.
     """
-    result = np.empty(len(errors))
+    return nees_of_leading(errors, covariances)[:, -1]
+
+
+def nees_of_leading(errors: FloatArray, covariances: FloatArray) -> FloatArray:
+    """`nees` of the first of n axes, of the first two, and so on: of a pose, that of its place is the second.
+
+    Parameters
+    ----------
+    errors, covariances : as in `nees`.
+
+    Returns
+    -------
+    nees : (K, n) array.
+    """
+    result = np.empty(errors.shape)
     for rows in (slice(first, first + ROWS_AT_ONCE) for first in range(0, len(errors), ROWS_AT_ONCE)):
-        result[rows] = _nees(read_only(errors[rows]), read_only(covariances[rows]))
+        _nees(read_only(errors[rows]), read_only(covariances[rows]), result[rows])
     return result
 
 
 @compiled
-def _nees(errors: FloatArray, covariances: FloatArray) -> FloatArray:
-    """e^T P^-1 e by the Cholesky factor of the correlations, row by row.
+def _nees(errors: FloatArray, covariances: FloatArray, result: FloatArray) -> None:
+    """e^T P^-1 e of the leading axes by the Cholesky factor of the correlations, row by row.
 
-    Scaled to correlations, metres and radians are comparable and the determinant tells a singular matrix.
+    Scaled to correlations, metres and radians are comparable and the determinant tells a singular matrix. The factor
+    of the leading axes is the leading part of the factor.
     """
     count, n = errors.shape
-    result = np.empty(count)
     factor = np.zeros((n, n))
     solved = np.zeros(n)
     sigmas = np.zeros(n)
     for k in range(count):
-        known = True
+        known, certain, determinant, total = True, True, 1.0, 0.0
         for i in range(n):
             known = known and math.isfinite(errors[k, i])
             sigmas[i] = math.sqrt(max(covariances[k, i, i], 0.0))
-        result[k] = math.inf if known else math.nan
-        if not known or not sigmas.min() > 0.0:
-            continue
-        determinant, total = 1.0, 0.0
-        for i in range(n):
+            certain = certain and sigmas[i] > 0.0
+            result[k, i] = math.inf if known else math.nan
+            if not known or not certain:
+                continue
             for j in range(i + 1):
                 rest = covariances[k, i, j] / (sigmas[i] * sigmas[j])
                 for m in range(j):
@@ -177,9 +190,8 @@ def _nees(errors: FloatArray, covariances: FloatArray) -> FloatArray:
                 value -= factor[i, m] * solved[m]
             solved[i] = value / factor[i, i]
             total += solved[i] * solved[i]
-        if determinant > SINGULAR:
-            result[k] = total
-    return result
+            if determinant > SINGULAR:
+                result[k, i] = total
 
 
 def largest_jump(errors: FloatArray) -> float:
@@ -249,8 +261,7 @@ def error_statistics(
         return None
     distances = distance[known]
     headings = errors[known, 2]
-    pose_nees = nees(errors, covariances)
-    position_nees = nees(errors[:, :2], covariances[:, :2, :2])
+    _, position_nees, pose_nees = nees_of_leading(errors, covariances).T
     return ErrorStatistics(
         compared=len(distances),
         position_rmse=float(np.sqrt(np.mean(distances**2))),

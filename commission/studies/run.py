@@ -43,6 +43,8 @@ from commission.studies.scanner_figures import ScannerFigures, scanner_figures
 from commission.studies.scanner_figures import warm_up as scanner_figures_warm_up
 from commission.studies.start import Start
 from commission.studies.tag_figures import tag_figures
+from commission.studies.tallies import tallies_of
+from commission.studies.tallies import warm_up as tallies_warm_up
 from commission.studies.temporary_figures import temporary_figures
 
 Number = int | float | None
@@ -212,7 +214,7 @@ def warm_up() -> None:
     """Compile everything that a run needs."""
     whole_run.warm_up()
     nees(np.zeros((1, 3)), np.eye(3)[np.newaxis])
-    nees(np.zeros((1, 2)), np.eye(2)[np.newaxis])
+    tallies_warm_up()
     scanner_figures_warm_up()
 
 
@@ -264,15 +266,15 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
     microseconds_per_cycle : time that the localizer took [us].
     """
     log = inputs.log
-    references = references_of(log, columns)
-    scanners = scanner_figures(columns, references)
+    references, tallies = references_of(log, columns), tallies_of(columns)
+    scanners = scanner_figures(columns, references, tallies)
     errors = pose_errors(columns.means, references)
     covariances = _of_places_known(columns, log, references)
     # Each is a column of the whole run: it goes before the others come.
     del references
     statistics = error_statistics(errors, covariances, columns.modes == Mode.OPERATIONAL, limits_along(columns)[:, 0])
     del covariances
-    whole, newest = consistency(columns), recent(columns)
+    whole, newest = consistency(columns, tallies=tallies), recent(columns, tallies=tallies)
     first_ns = log.first_ns
     times = np.asarray((columns.stamps_ns - first_ns) * 1e-9, dtype=np.float64)
     return RunResult(
@@ -286,8 +288,8 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
         position_two_sigma=read_only(supervised_two_sigma(columns)),
         consistency=whole,
         recent=newest,
-        counts=read_only(_counts(columns)),
-        nis=read_only(largest_nis(columns)),
+        counts=read_only(tallies.counts),
+        nis=read_only(tallies.largest_d2),
         statistics=statistics,
         episodes=fail_episodes(columns.stamps_ns, columns.modes),
         scanners=scanners,
@@ -333,14 +335,6 @@ def two_sigma_of(covariances: FloatArray) -> FloatArray:
     return sigmas
 
 
-def _counts(columns: RunColumns) -> NDArray[np.int32]:
-    """(K, 3) detections of each `Status` in each cycle."""
-    counts = np.empty((len(columns), len(Status)), dtype=np.int32)
-    for status in Status:
-        counts[:, status] = columns.counts(status)
-    return counts
-
-
 def supervised_two_sigma(columns: RunColumns) -> FloatArray:
     """(K,) 2-sigma of the position [m], in each cycle the one that its supervisor holds against the limit."""
     ends = (*columns.firsts[1:].tolist(), len(columns))
@@ -360,19 +354,6 @@ def limits_along(columns: RunColumns) -> FloatArray:
         ]
     )
     return np.repeat(limits, np.diff((*columns.firsts, len(columns))), axis=0)
-
-
-def largest_nis(columns: RunColumns) -> FloatArray:
-    """(K,) largest squared Mahalanobis distance of an inlier of each cycle; NaN in a cycle without one."""
-    nis = np.full(len(columns), -math.inf)
-    values = np.where(columns.status == Status.INLIER, columns.d2, -math.inf)
-    starts = columns.offsets[:-1]
-    some = starts < columns.offsets[1:]
-    if some.any():
-        # Cycles without detections have no rows, so that each stretch ends where the next one begins.
-        nis[some] = np.maximum.reduceat(values, starts[some])
-    nis[np.isneginf(nis)] = math.nan
-    return nis
 
 
 def summary(result: RunResult) -> dict[str, Number]:

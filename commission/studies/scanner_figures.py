@@ -9,17 +9,25 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from commission.compiled import compiled
+from commission.compiled import compiled, compiled_inline
 from commission.geometry import se2
-from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
+from commission.geometry.directions import UnitVector, composed, direction_of, turn_to
 from commission.localization.estimate import Status
-from commission.localization.observation import observation_at, observation_model, observation_rows, scanner_offset
+from commission.localization.observation import (
+    ObservationModel,
+    observation_at,
+    observation_model,
+    observation_rows,
+    offset_facing,
+)
 from commission.localization.run_columns import RunColumns, RunSegment
 from commission.site.quantity import DEGREES, MILLIMETRES
+from commission.studies.tallies import Tallies, tallies_of
 
 BELONGS = 1.0
 """A detection that lies farther from its reflector [m], seen from reference or estimate, is of something else."""
@@ -52,22 +60,29 @@ class ScannerFigures:
     """Mean of bearings minus those expected from the reference pose [rad], of all detections near their reflector."""
 
 
-def scanner_figures(columns: RunColumns, references: FloatArray) -> tuple[ScannerFigures, ...]:
+def scanner_figures(
+    columns: RunColumns, references: FloatArray, tallies: Tallies | None = None
+) -> tuple[ScannerFigures, ...]:
     """Figures of each scanner of the last setup of a run.
 
     Parameters
     ----------
     columns : the run.
     references : (K, 3) reference pose at each cycle [m, m, rad], map frame; NaN where there is none.
+    tallies : of its cycles, where they are known.
     """
     names = [scanner.name for scanner in columns.segments[-1].setup.scanners]
-    own, known = (_means_of_near(columns, poses, names) for poses in (columns.means, references))
-    return tuple(_figures(name, columns, (own[index], known[index])) for index, name in enumerate(names))
+    tallies = tallies_of(columns) if tallies is None else tallies
+    means = _means_of_near(columns, references, names)
+    return tuple(_figures(name, columns, tallies, means[index]) for index, name in enumerate(names))
 
 
-def _means_of_near(columns: RunColumns, poses: FloatArray, names: list[str]) -> list[tuple[float, float]]:
-    """Mean residuals [m, rad] of the detections of each scanner that are near their reflector."""
-    totals = np.zeros((len(names), 3))
+def _means_of_near(columns: RunColumns, references: FloatArray, names: list[str]) -> FloatArray:
+    """(S, 2, 2) mean residuals [m, rad] of the detections of each scanner that are near their reflector.
+
+    First against the estimate, then against the reference; NaN where there is none.
+    """
+    totals = np.zeros((len(names), 2, 3))
     ends = (*columns.firsts[1:].tolist(), len(columns))
     for segment, end in zip(columns.segments, ends, strict=True):
         setup = segment.setup
@@ -77,7 +92,8 @@ def _means_of_near(columns: RunColumns, poses: FloatArray, names: list[str]) -> 
         sums = _sums_of_near(
             read_only(columns.offsets[segment.first : end + 1]),
             read_only(columns.detected.scanners[cycles]),
-            read_only(poses[cycles]),
+            read_only(columns.means[cycles]),
+            read_only(references[cycles]),
             read_only(columns.range_bearing[rows]),
             read_only(columns.reflector[rows]),
             read_only(setup.reflectors.centers),
@@ -86,28 +102,27 @@ def _means_of_near(columns: RunColumns, poses: FloatArray, names: list[str]) -> 
         for scanner, found in zip(setup.scanners, sums, strict=True):
             if scanner.name in names:
                 totals[names.index(scanner.name)] += found
-    return [
-        (float(ranges / of), float(bearings / of)) if of else (math.nan, math.nan) for ranges, bearings, of in totals
-    ]
+    return np.where(totals[..., 2:] > 0.0, totals[..., :2] / np.maximum(totals[..., 2:], 1.0), math.nan)
 
 
 @compiled
 def _sums_of_near(  # noqa: PLR0917 - columns and tables, array by array
     offsets: IntArray,
     scanners: IntArray,
-    poses: FloatArray,
+    means: FloatArray,
+    references: FloatArray,
     measured: FloatArray,
     reflectors: IntArray,
     centers: FloatArray,
     models: FloatArray,
 ) -> FloatArray:
-    """(S, 3) sums of the residuals in range [m] and bearing [rad] of what is near its reflector, and how many.
+    """(S, 2, 3) sums of residuals in range [m] and bearing [rad] of what is near its reflector, and how many.
 
     Parameters
     ----------
     offsets : (K + 1,) first row of each cycle, counted in any way that goes on, and behind the last.
     scanners : (K,) scanner of each cycle.
-    poses : (K, 3) pose of base [m, m, rad], map frame; NaN where unknown.
+    means, references : (K, 3) poses of base [m, m, rad], map frame, seen from which the sums are; NaN where unknown.
     measured : (n, 2) range [m] and bearing [rad] of each row, scanner frame.
     reflectors : (n,) index of the reflector of each row; negative: nobody's.
     centers : (N, 2) reflector centers [m], map frame.
@@ -117,33 +132,56 @@ def _sums_of_near(  # noqa: PLR0917 - columns and tables, array by array
     -----
     Residuals: z - h of equation 2 of Sobreira et al. 2016, less the range bias. Near: hypot(dr, r dphi) < `BELONGS`.
     """
-    sums = np.zeros((len(models), 3))
+    sums = np.zeros((len(models), 2, 3))
     for k in range(len(scanners)):
-        x, y, theta = poses[k, 0], poses[k, 1], poses[k, 2]
-        if not math.isfinite(x + y + theta):
-            continue
         model = observation_at(models, scanners[k])
-        offset_x, offset_y = scanner_offset(theta, model)
+        own, known = _seat(means, k, model), _seat(references, k, model)
         for row in range(offsets[k] - offsets[0], offsets[k + 1] - offsets[0]):
             if reflectors[row] < 0:
                 continue
-            rx, ry = centers[reflectors[row], 0] - x - offset_x, centers[reflectors[row], 1] - y - offset_y
-            distance = math.sqrt(rx * rx + ry * ry)
-            along = measured[row, 0] - model.range_bias - distance
-            turn = wrap_scalar(measured[row, 1] - math.atan2(ry, rx) + theta + model.mount_theta)
-            across = (measured[row, 0] - along) * turn
-            if along * along + across * across < BELONGS * BELONGS:
-                sums[scanners[k], 0] += along
-                sums[scanners[k], 1] += turn
-                sums[scanners[k], 2] += 1.0
+            x, y = centers[reflectors[row], 0], centers[reflectors[row], 1]
+            measured_range, aim = measured[row, 0] - model.range_bias, direction_of(measured[row, 1])
+            for which in range(2):
+                along, turn = _residual(own if which == 0 else known, measured_range, aim, x, y)
+                across = (measured[row, 0] - along) * turn
+                if along * along + across * across < BELONGS * BELONGS:
+                    sums[scanners[k], which, 0] += along
+                    sums[scanners[k], which, 1] += turn
+                    sums[scanners[k], which, 2] += 1.0
     return sums
+
+
+class _Seat(NamedTuple):
+    """Place of a scanner [m], map frame, and where it faces; NaN where unknown."""
+
+    x: float
+    y: float
+    facing: UnitVector
+
+
+@compiled_inline
+def _seat(poses: FloatArray, cycle: int, model: ObservationModel) -> _Seat:
+    """Scanner of the base in a cycle."""
+    facing = direction_of(poses[cycle, 2])
+    offset_x, offset_y = offset_facing(facing, model)
+    facing = composed(facing, direction_of(model.mount_theta))
+    return _Seat(poses[cycle, 0] + offset_x, poses[cycle, 1] + offset_y, facing)
+
+
+@compiled_inline
+def _residual(seat: _Seat, measured_range: float, aim: UnitVector, x: float, y: float) -> tuple[float, float]:
+    """Residual in range [m] and bearing [rad] of a detection of a place; NaN where the scanner's is unknown."""
+    rx, ry = x - seat.x, y - seat.y
+    distance = math.sqrt(rx * rx + ry * ry)
+    inverse = 1.0 / distance if distance > 0.0 else 0.0
+    return measured_range - distance, turn_to(rx * inverse, ry * inverse, composed(seat.facing, aim))
 
 
 def warm_up() -> None:
     """Compile what sums up residuals."""
     rows, nobody = read_only(np.zeros((0, 2))), read_only(np.zeros(0, dtype=np.int64))
-    offsets, models = read_only(np.zeros(1, dtype=np.int64)), read_only(np.zeros((1, 6)))
-    _sums_of_near(offsets, nobody, read_only(np.zeros((0, 3))), rows, nobody, rows, models)
+    offsets, models, poses = read_only(np.zeros(1, dtype=np.int64)), read_only(np.zeros((1, 6))), np.zeros((0, 3))
+    _sums_of_near(offsets, nobody, read_only(poses), read_only(poses), rows, nobody, rows, models)
 
 
 def sensors_of(columns: RunColumns, poses: FloatArray, stretch: tuple[RunSegment, int, int]) -> FloatArray:
@@ -178,27 +216,22 @@ def _cycles_of(columns: RunColumns, name: str) -> BoolArray:
     return its
 
 
-def _figures(name: str, columns: RunColumns, means: tuple[tuple[float, float], tuple[float, float]]) -> ScannerFigures:
+def _figures(name: str, columns: RunColumns, tallies: Tallies, means: FloatArray) -> ScannerFigures:
     """Figures of one scanner; `means` are its residuals against the estimate and against the reference."""
     cycles = _cycles_of(columns, name)
-    its = np.repeat(cycles, np.diff(columns.offsets))
-    accepted = its & (columns.status == Status.INLIER)
+    counts = tallies.counts[cycles].sum(axis=0, dtype=np.int64)
+    accepted = int(counts[Status.INLIER])
     return ScannerFigures(
         name=name,
         scans=int(np.count_nonzero(cycles)),
-        seen=int(np.count_nonzero(its & (columns.status != Status.OUTLIER_DETECTOR))),
-        accepted=int(np.count_nonzero(accepted)),
-        nis_mean=_mean(columns.d2[accepted]),
-        range_residual=means[0][0],
-        bearing_residual=means[0][1],
-        reference_range_residual=means[1][0],
-        reference_bearing_residual=means[1][1],
+        seen=accepted + int(counts[Status.OUTLIER_ASSOCIATION]),
+        accepted=accepted,
+        nis_mean=float(tallies.accepted_d2[cycles].sum()) / accepted if accepted else math.nan,
+        range_residual=float(means[0, 0]),
+        bearing_residual=float(means[0, 1]),
+        reference_range_residual=float(means[1, 0]),
+        reference_bearing_residual=float(means[1, 1]),
     )
-
-
-def _mean(values: FloatArray) -> float:
-    finite = values[np.isfinite(values)]
-    return float(finite.mean()) if len(finite) else math.nan
 
 
 def residuals_told(figures: ScannerFigures) -> tuple[str, str] | None:

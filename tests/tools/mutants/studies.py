@@ -66,9 +66,9 @@ STUDIES = (
     ),
     Mutant(
         name="largest NIS counts what the gate rejects",
-        file=FOLDER + "run.py",
-        find="np.where(columns.status == Status.INLIER, columns.d2, -math.inf)",
-        replace="np.where(np.isfinite(columns.d2), columns.d2, -math.inf)",
+        file=FOLDER + "tallies.py",
+        find="if status[row] == INLIER:",
+        replace="if status[row] != OUTLIER_DETECTOR:",
         tests=(
             TESTS + "test_run.py::test_every_curve_has_the_numbers_of_its_cycles",
             TESTS + "test_run.py::test_the_largest_nis_of_a_cycle_is_that_of_its_inliers_alone",
