@@ -21,6 +21,8 @@ from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route
 from commission.site.stations import Station
+from commission.site.tags import Tag
+from commission.site.zones import Zone
 
 DOUBTFUL = 0.002
 """Difference of the two distances, as a share, from which the points should be looked at: 20 mm on 10 m."""
@@ -100,8 +102,8 @@ def aligned(project: Project, alignment: Alignment, *, everything: bool) -> Proj
     project : the site.
     alignment : how.
     everything : whether what was placed on the map goes with it: reflectors (locked ones, too: they stay where they are
-        on the map), routes, stations, where virtual drives are disturbed, and where new reflectors may stand. Otherwise
-        they are in the plant's coordinates already.
+        on the map), tags, zones, routes, stations, where virtual drives are disturbed, and where new reflectors may
+        stand. Otherwise they are in the plant's coordinates already.
 
     Raises
     ------
@@ -134,6 +136,8 @@ def moved_onto(project: Project, T: FloatArray, *, everything: bool) -> Project:
     return replace(
         moved,
         reflectors=ReflectorMap(tuple(_reflector(r, T) for r in project.reflectors.reflectors)),
+        tags=tuple(_tag(tag, T) for tag in project.tags),
+        zones=tuple(_zone(zone, T) for zone in project.zones),
         routes=tuple(_route(route, T) for route in project.routes),
         stations=tuple(_station(station, T) for station in project.stations),
         disturbances=_disturbances(project.disturbances, T),
@@ -144,6 +148,16 @@ def moved_onto(project: Project, T: FloatArray, *, everything: bool) -> Project:
 def _reflector(reflector: Reflector, T: FloatArray) -> Reflector:
     x, y, heading = se2.compose(T, np.array([reflector.x, reflector.y, reflector.heading or 0.0]))
     return replace(reflector, x=float(x), y=float(y), heading=None if reflector.heading is None else float(heading))
+
+
+def _tag(tag: Tag, T: FloatArray) -> Tag:
+    x, y, heading = se2.compose(T, tag.pose)
+    return replace(tag, x=float(x), y=float(y), heading=float(heading))
+
+
+def _zone(zone: Zone, T: FloatArray) -> Zone:
+    corners = se2.transform_points(T, np.array(zone.outline)).tolist()
+    return replace(zone, outline=tuple((x, y) for x, y in corners))
 
 
 def _station(station: Station, T: FloatArray) -> Station:

@@ -18,6 +18,8 @@ from commission.site.layout_brief import AllowedHeights, CandidateOptions, Deman
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.site.stations import Station
+from commission.site.tags import Tag
+from commission.site.zones import Zone
 from tests.app.sites import room
 
 PLACE = st.tuples(st.floats(-500.0, 500.0), st.floats(-500.0, 500.0))
@@ -86,7 +88,8 @@ def test_a_map_whose_origin_is_turned_already_is_turned_on_from_there() -> None:
 def test_everything_that_was_placed_on_the_map_goes_with_it() -> None:
     before = site()
     facing = tuple(replace(each, heading=0.3 * k) for k, each in enumerate(before.reflectors.reflectors))
-    before = replace(before, reflectors=ReflectorMap(facing))
+    zone, tag = Zone(name="Hall", outline=((0.0, 0.0), (4.0, 0.0), (4.0, 2.0))), Tag(id="7", x=1.0, y=2.0, heading=0.3)
+    before = replace(before, reflectors=ReflectorMap(facing), zones=(zone,), tags=(tag,))
     after = aligned(before, TURNED, everything=True)
     # A quarter turn: x becomes y, y becomes -x.
     for old, new in zip(before.reflectors.reflectors, after.reflectors.reflectors, strict=True):
@@ -96,6 +99,9 @@ def test_everything_that_was_placed_on_the_map_goes_with_it() -> None:
     for old, new in zip(before.routes[0].segments, after.routes[0].segments, strict=True):
         expected = np.column_stack((100.0 - old.control_points[:, 1], 50.0 + old.control_points[:, 0]))
         np.testing.assert_allclose(new.control_points, expected)
+    (moved,), (seen,) = after.zones, after.tags
+    np.testing.assert_allclose(moved.outline, ((100.0, 50.0), (100.0, 54.0), (98.0, 54.0)))
+    assert (seen.x, seen.y, seen.heading) == pytest.approx((98.0, 51.0, 0.3 + math.pi / 2))
     dock, shiny, tilted = after.stations[0], after.disturbances.shiny_objects[0], after.disturbances.tilted_stretches[0]
     assert (dock.x, dock.y, dock.heading) == pytest.approx((98.0, 53.0, 0.3 + math.pi / 2))
     assert (shiny.x, shiny.y, tilted.x, tilted.y) == pytest.approx((98.0, 51.0, 95.0, 54.0))
