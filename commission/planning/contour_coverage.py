@@ -11,14 +11,16 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from commission.compiled import compiled
-from commission.geometry.arrays import BoolArray, FloatArray, read_only
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.geometry.eigen import eigen_symmetric
 from commission.geometry.raycast import RayCaster
+from commission.geometry.se2 import compose
 from commission.localization.contour import (
     COLUMNS,
     FEWEST_POINTS,
@@ -52,7 +54,7 @@ class ContourCoverage:
     """What contours tell at each of N points of a lattice, at the heading, or the worst or best one, that is asked."""
 
     lattice: Lattice
-    """The points, positions of the scanner."""
+    """The points: positions as in `vehicle_fixes.fixes`."""
     told: NDArray[np.int8]
     """(N,) directions that are told: 3 is place and heading, 2 all but one, as in a corridor."""
     position_sigma: FloatArray
@@ -65,6 +67,23 @@ class ContourCoverage:
     def image(self, figure: str) -> NDArray[np.generic]:
         """One figure as a (rows, columns) array; row 0 is the lowest y."""
         return getattr(self, figure).reshape(self.lattice.rows, self.lattice.columns)
+
+
+class _Looks(NamedTuple):
+    """How the scanners of a vehicle look about a point: H headings, S scanners, D directions, V places."""
+
+    levers: FloatArray
+    """(V, 2) where scanners stand about a point [m], map axes."""
+    headings: FloatArray
+    """(H,) [rad]."""
+    place_of: IntArray
+    """(H, S) at which of the places each scanner stands."""
+    seen: BoolArray
+    """(H, S, D) whether it sees a direction."""
+    scanner_of: IntArray
+    """(S,) its number in the vehicle."""
+    weights: FloatArray
+    """(S,) its beams that each direction stands for."""
 
 
 def contour_coverage(  # noqa: PLR0917 - the site, and what is asked
@@ -80,31 +99,38 @@ def contour_coverage(  # noqa: PLR0917 - the site, and what is asked
     Parameters
     ----------
     floor : the map.
-    scanners : of the vehicle; at each point, as if each stood there.
+    scanners : of the vehicle. Where they stand about a point is as in `vehicle_fixes.fixes`: the point is that of base,
+        or of the scanner where there is one only and no heading is given. All round, several share the turn at the
+        point: no direction counts twice.
     given : noise of a beam and the least share of beams that tell a direction, whether contours are switched on or not.
     lattice : the points.
-    options : which headings are looked at; of several, what each figure is at the worst or best of them.
+    options : which headings are looked at; of several, what each figure is at the worst or best of them. One that puts
+        one of several scanners into a wall is none.
     progress : told how far it is; may raise to cancel.
     """
-    model = _model(floor, scanners, given)
-    caster = RayCaster(floor.occupancy())
+    model, caster = _model(floor, scanners, given), RayCaster(floor.occupancy())
     directions = np.arange(-math.pi, math.pi - 0.5 * CAST_RAD, CAST_RAD)
-    headings, seen, weights = _views(scanners, options, directions)
+    looks = _looks(scanners, options, directions)
     points, best = lattice.points(), options.heading is Heading.BEST
     found = np.empty((len(points), 4))
     farthest = max(scanner.range[1] for scanner in scanners)
+    at_once = max(POINTS_AT_ONCE // len(looks.levers), 1)
 
     def tell(first: int) -> int:
-        here = slice(first, min(first + POINTS_AT_ONCE, len(points)))
-        rays = np.empty((here.stop - first, len(directions), 3))
-        rays[..., :2], rays[..., 2] = points[here, np.newaxis], directions
+        here = slice(first, min(first + at_once, len(points)))
+        places = points[here, np.newaxis] + looks.levers
+        rays = np.empty((*places.shape[:2], len(directions), 3))
+        rays[..., :2], rays[..., 2] = places[:, :, np.newaxis], directions
         ranges = caster.cast(rays, farthest)
-        _tell(points[here], ranges, directions, headings, seen, weights, model, best, found[here])
+        stands = np.ones((len(places), len(looks.headings)), dtype=np.bool_)
+        if len(scanners) > 1:
+            stands = ~caster.grid.is_occupied(places)[:, looks.place_of].any(axis=2)
+        _tell(points[here], ranges, stands, directions, looks, model, best, found[here])
         return here.stop
 
     # Kernels hold no lock, so that threads use all cores; no parallel kernel takes the tables of a map.
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for done in pool.map(tell, range(0, len(points), POINTS_AT_ONCE)):
+        for done in pool.map(tell, range(0, len(points), at_once)):
             progress(done / len(points), "contours over the floor")
     return ContourCoverage(
         lattice=lattice,
@@ -123,19 +149,22 @@ def _model(floor: FloorMap, scanners: Sequence[Scanner], given: ContourParameter
     return model
 
 
-def _views(
-    scanners: Sequence[Scanner], options: FixOptions, directions: FloatArray
-) -> tuple[FloatArray, BoolArray, FloatArray]:
-    """(H,) headings, (H, S, D) directions that each scanner sees then, and (S,) its beams that each stands for."""
+def _looks(scanners: Sequence[Scanner], options: FixOptions, directions: FloatArray) -> _Looks:
+    """Where the scanners stand for what is asked, and what they see of (D,) directions."""
     heading = options.heading.seen_by(scanners)
+    numbers = np.arange(len(scanners))
+    if heading is Heading.ALL_ROUND and len(scanners) > 1:
+        widths = [scanner.field_of_view[1] - scanner.field_of_view[0] for scanner in scanners]
+        numbers = numbers[[int(np.argmax(widths))]]
     if heading is Heading.ALL_ROUND:
         headings = np.zeros(1)
     elif heading is Heading.GIVEN:
         headings = np.array([options.given_heading])
     else:
         headings = np.arange(options.headings, dtype=np.float64) * (2.0 * math.pi / options.headings)
-    seen = np.ones((len(headings), len(scanners), len(directions)), dtype=np.bool_)
-    for s, scanner in enumerate(scanners):
+    seen = np.ones((len(headings), len(numbers), len(directions)), dtype=np.bool_)
+    levers = np.zeros((len(headings), len(numbers), 2))
+    for s, scanner in enumerate([scanners[number] for number in numbers]):
         if heading is Heading.ALL_ROUND:
             continue
         low, high = scanner.field_of_view
@@ -144,18 +173,20 @@ def _views(
             seen[h, s] = bearings <= high + 1e-9
             for begin, width in scanner.blind_sectors.reshape(-1, 2):
                 seen[h, s] &= np.mod(bearings - begin, 2.0 * math.pi) > width
-    weights = np.array([CAST_RAD / abs(scanner.angle_increment) for scanner in scanners])
-    return headings, seen, weights
+            if len(scanners) > 1 or heading is Heading.GIVEN:
+                levers[h, s] = compose(np.array((0.0, 0.0, turned)), scanner.mounting)[:2]
+    places, place_of = np.unique(levers.reshape(-1, 2), axis=0, return_inverse=True)
+    weights = np.array([CAST_RAD / abs(scanners[number].angle_increment) for number in numbers])
+    return _Looks(places, headings, place_of.reshape(levers.shape[:2]), seen, numbers, weights)
 
 
 @compiled
 def _tell(  # noqa: PLR0917 - points, beams, headings
     points: FloatArray,
     ranges: FloatArray,
+    stands: BoolArray,
     directions: FloatArray,
-    headings: FloatArray,
-    seen: BoolArray,
-    weights: FloatArray,
+    looks: _Looks,
     model: ContourModel,
     best: bool,
     out: FloatArray,
@@ -166,8 +197,12 @@ def _tell(  # noqa: PLR0917 - points, beams, headings
     """
     for n in range(len(points)):
         told, position, heading, beams = (0.0, math.inf, math.inf, 0.0) if best else (3.0, 0.0, 0.0, math.inf)
-        for h in range(len(headings)):
-            information, count = _information(points[n], ranges[n], directions, headings[h], seen[h], weights, model)
+        if not stands[n].any():
+            told, position, heading, beams = 0.0, math.inf, math.inf, 0.0
+        for h in range(len(looks.headings)):
+            if not stands[n, h]:
+                continue
+            information, count = _information(points[n], ranges[n], directions, h, looks, model)
             rank, s_position, s_heading = _sigmas(information)
             if best:
                 told, beams = max(told, rank), max(beams, count)
@@ -180,30 +215,28 @@ def _tell(  # noqa: PLR0917 - points, beams, headings
 
 @compiled
 def _information(  # noqa: PLR0917 - a point, its beams, and who sees them
-    point: FloatArray,
-    ranges: FloatArray,
-    directions: FloatArray,
-    heading: float,
-    seen: BoolArray,
-    weights: FloatArray,
-    model: ContourModel,
+    point: FloatArray, ranges: FloatArray, directions: FloatArray, h: int, looks: _Looks, model: ContourModel
 ) -> tuple[FloatArray, float]:
     """(3, 3) information of x, y and heading, and beams that end on a contour, of a vehicle that looks somewhere."""
+    heading = looks.headings[h]
+    c, s = math.cos(heading), math.sin(heading)
     information, count = np.zeros((3, 3)), 0.0
     pose = PoseGaussian(point[0], point[1], heading, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
-    ends, figures = np.empty((len(ranges), 2)), np.empty(COLUMNS)
+    ends, figures = np.empty((ranges.shape[1], 2)), np.empty(COLUMNS)
     per_cell = 1.0 / model.tables.resolution
-    for s in range(len(weights)):
+    for k in range(len(looks.weights)):
+        weight, place, limits = looks.weights[k], looks.place_of[h, k], model.limits[looks.scanner_of[k]]
+        lever_x = c * looks.levers[place, 0] + s * looks.levers[place, 1]
+        lever_y = c * looks.levers[place, 1] - s * looks.levers[place, 0]
         n = 0
-        for i in range(len(ranges)):
-            if seen[s, i] and model.limits[s, 0] <= ranges[i] <= model.limits[s, 1]:
+        for i in range(ranges.shape[1]):
+            distance = ranges[place, i]
+            if looks.seen[h, k, i] and limits[0] <= distance <= limits[1]:
                 bearing = directions[i] - heading
-                ends[n, 0], ends[n, 1] = (
-                    per_cell * ranges[i] * math.cos(bearing),
-                    per_cell * ranges[i] * math.sin(bearing),
-                )
+                ends[n, 0] = per_cell * (lever_x + distance * math.cos(bearing))
+                ends[n, 1] = per_cell * (lever_y + distance * math.sin(bearing))
                 n += 1
-        if n * weights[s] < FEWEST_POINTS:
+        if n * weight < FEWEST_POINTS:
             continue
         points = ends[:n]
         rows = rows_of_match(
@@ -211,12 +244,11 @@ def _information(  # noqa: PLR0917 - a point, its beams, and who sees them
         )
         if figures[MATCHED] < model.least_matched * n:
             continue
-        count += figures[MATCHED] * weights[s]
-        for k in range(len(rows.variances)):
+        count += figures[MATCHED] * weight
+        for r in range(len(rows.variances)):
             for a in range(3):
                 for b in range(3):
-                    told = rows.jacobians[k, a] * rows.jacobians[k, b]
-                    information[a, b] += weights[s] * told / rows.variances[k]
+                    information[a, b] += weight * rows.jacobians[r, a] * rows.jacobians[r, b] / rows.variances[r]
     return information, count
 
 

@@ -72,7 +72,7 @@ def test_without_walls_in_reach_nothing_is_told():
 
 
 def test_the_worst_heading_of_a_scanner_that_looks_ahead_is_that_of_the_given_ones():
-    ahead = dataclasses.replace(ROUND, field_of_view_deg=(-100.0, 100.0), mounting=np.array((0.2, 0.0, 0.5)))
+    ahead = dataclasses.replace(ROUND, field_of_view_deg=(-100.0, 100.0), mounting=np.array((0.0, 0.0, 0.5)))
     floor, lattice = hall(9.0, 5.0), at(2.0, 3.0)
     worst, best = (
         contour_coverage(floor, (ahead,), GIVEN, lattice, FixOptions(heading=heading, headings=8))
@@ -104,15 +104,35 @@ def test_a_scanner_that_hides_behind_the_vehicle_tells_less_and_two_tell_more_th
     assert two.position_sigma[0] == pytest.approx(one.position_sigma[0] / math.sqrt(2.0), rel=1e-9)
 
 
+def test_several_scanners_stand_where_they_are_mounted_and_share_the_turn_all_round():
+    floor, ahead = hall(9.0, 5.0), dataclasses.replace(ROUND, mounting=np.array((1.5, 0.0, 0.0)))
+    pair = ahead, dataclasses.replace(ROUND, name="rear", mounting=np.array((-1.5, 0.0, math.pi)))
+    # All round they stand at the point, and no direction counts twice.
+    one, both = (contour_coverage(floor, each, GIVEN, at(4.0, 2.0), ALL_ROUND) for each in ((ROUND,), pair))
+    assert both.position_sigma[0] == one.position_sigma[0]
+    assert both.beams[0] == one.beams[0]
+    # Of base, 1 m from a wall that the scanner would be behind: nothing is seen from there, and no heading is like it.
+    given = FixOptions(heading=Heading.GIVEN)
+    assert contour_coverage(floor, (ahead,), GIVEN, at(8.0, 2.5), given).told.tolist() == [0]
+    in_wall = dataclasses.replace(ahead, mounting=np.array((1.02, 0.0, 0.0)))
+    for heading in (Heading.GIVEN, Heading.WORST, Heading.BEST):
+        asked = FixOptions(heading=heading, headings=1)
+        assert np.isinf(contour_coverage(floor, (pair[1], in_wall), GIVEN, at(8.0, 2.5), asked).position_sigma).all()
+
+
 def test_over_the_warehouse_it_is_what_the_localizer_believes_after_one_scan():
-    """The localizer's own posterior from a wide prior, without the map's error: no formula of the coverage is in it."""
+    """The localizer's own posterior from a wide prior, without the map's error: no formula of the coverage is in it.
+
+    Of base, from which the scanner is mounted ahead and to the left.
+    """
+    scanner = dataclasses.replace(ROUND, mounting=np.array((1.0, 0.3, 0.2)))
     site = load_project(REPOSITORY / "maps" / "warehouse")
     floor = site.floor_map
     given = ContourParameters(enabled=True, map_sigma=0.0, map_heading_sigma=0.0)
     parameters = Parameters(contour=given, filter=FilterParameters(consider=False))
     setup = LocalizerSetup(
         reflectors=ReflectorMap(),
-        scanners=(ROUND,),
+        scanners=(scanner,),
         parameters=parameters,
         floor=floor,
         uncertainty=dataclasses.replace(
@@ -122,8 +142,9 @@ def test_over_the_warehouse_it_is_what_the_localizer_believes_after_one_scan():
     caster, rng = RayCaster(floor.occupancy()), np.random.default_rng(4)
     compared = 0
     for x, y in ((3.0, 3.0), (50.0, 25.0), (95.0, 30.0), (52.0, 57.0), (20.0, 2.0), (50.0, 45.0)):
-        found = contour_coverage(floor, (ROUND,), given, at(x, y), ALL_ROUND)
-        rays = np.array([(x, y, ROUND.angle_min + k * ROUND.angle_increment) for k in range(ROUND.beam_count)])
+        found = contour_coverage(floor, (scanner,), given, at(x, y), FixOptions(heading=Heading.GIVEN))
+        bearings = ROUND.angle_min + ROUND.angle_increment * np.arange(ROUND.beam_count)
+        rays = np.array([(x + 1.0, y + 0.3, 0.2 + bearing) for bearing in bearings])
         ranges = caster.cast(rays, ROUND.range[1])
         noisy = np.where(np.isfinite(ranges), ranges + 0.005 * rng.standard_normal(len(ranges)), np.nan)
         localizer = Localizer(setup, Belief(0, np.array((x, y, 0.0)), np.diag(np.square((0.1, 0.1, 0.03)))))
