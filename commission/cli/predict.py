@@ -70,6 +70,7 @@ class Predict:
         name = project.routes[0].name if self.route is None else self.route
         found = prediction(PredictionInput.of(project, name, self._options()))
         lines = [*_report(name, found.prediction, found.errors), *_at_stations(found.stations)]
+        lines += _in_zones(found.planned.way_without_reflectors)
         with out.writing() as folder:
             lines += self._what_if(project, found.drives, folder)
             write_prediction(folder, name, found.prediction, found.errors, found.stations)
@@ -140,6 +141,12 @@ def _at_stations(stations: Sequence[StationAccuracy]) -> list[str]:
     ]
     verdict = f"too uncertain at {', '.join(missed)}" if missed else "each is reached as accurately as it requires"
     return [f"Stations     {len(stations)} on the route; {verdict}"]
+
+
+def _in_zones(way: float) -> list[str]:
+    """Line about the way on which zones leave reflectors out, if there is any."""
+    told = "predicted there by odometry alone; contours and tags are not reckoned with"
+    return [f"Zones        reflectors correct nothing on {way:.1f} m of the way: {told}"] if way > 0.0 else []
 
 
 def budget_told(parts: Iterable[float]) -> str:

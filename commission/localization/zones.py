@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from commission.compiled import compiled_inline
-from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.compiled import compiled, compiled_inline
+from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.site.zones import ObservationKind, Zone
 
 
@@ -48,6 +48,28 @@ def zone_rows(zones: Sequence[Zone]) -> ZoneRows:
     corners = np.array([corner for zone in zones for corner in zone.outline], dtype=np.float64).reshape(-1, 2)
     counts = np.array(kinds, dtype=np.bool_).reshape(-1, len(ObservationKind))
     return ZoneRows(read_only(offsets), read_only(corners), read_only(counts))
+
+
+def counts_at(zones: Sequence[Zone], kind: ObservationKind, points: FloatArray) -> BoolArray:
+    """Whether a kind corrects the pose at places: (N,) array, by the rule of `kinds_at`.
+
+    Parameters
+    ----------
+    zones : of the site.
+    kind : which one.
+    points : (N, 2) places of base [m], map frame.
+    """
+    found = np.ones(len(points), dtype=np.bool_)
+    if zones:
+        _fill_counts(zone_rows(zones), list(ObservationKind).index(kind), points, found)
+    return found
+
+
+@compiled
+def _fill_counts(zones: ZoneRows, kind: int, points: FloatArray, found: BoolArray) -> None:
+    """Write whether a kind counts at each place."""
+    for n in range(len(points)):
+        found[n] = kinds_at(zones, points[n, 0], points[n, 1])[kind]
 
 
 @compiled_inline

@@ -124,7 +124,8 @@ def contour_coverage(  # noqa: PLR0917 - the site, and what is asked
         ranges = caster.cast(rays, farthest)
         stands = np.ones((len(places), len(looks.headings)), dtype=np.bool_)
         if len(scanners) > 1:
-            stands = ~caster.grid.is_occupied(places)[:, looks.place_of].any(axis=2)
+            in_wall = np.asarray(caster.grid.is_occupied(places))
+            stands = np.logical_not(in_wall[:, looks.place_of].any(axis=2))
         _tell(points[here], ranges, stands, directions, looks, model, best, found[here])
         return here.stop
 
@@ -152,10 +153,10 @@ def _model(floor: FloorMap, scanners: Sequence[Scanner], given: ContourParameter
 def _looks(scanners: Sequence[Scanner], options: FixOptions, directions: FloatArray) -> _Looks:
     """Where the scanners stand for what is asked, and what they see of (D,) directions."""
     heading = options.heading.seen_by(scanners)
-    numbers = np.arange(len(scanners))
+    numbers = list(range(len(scanners)))
     if heading is Heading.ALL_ROUND and len(scanners) > 1:
         widths = [scanner.field_of_view[1] - scanner.field_of_view[0] for scanner in scanners]
-        numbers = numbers[[int(np.argmax(widths))]]
+        numbers = [int(np.argmax(widths))]
     if heading is Heading.ALL_ROUND:
         headings = np.zeros(1)
     elif heading is Heading.GIVEN:
@@ -177,7 +178,7 @@ def _looks(scanners: Sequence[Scanner], options: FixOptions, directions: FloatAr
                 levers[h, s] = compose(np.array((0.0, 0.0, turned)), scanner.mounting)[:2]
     places, place_of = np.unique(levers.reshape(-1, 2), axis=0, return_inverse=True)
     weights = np.array([CAST_RAD / abs(scanners[number].angle_increment) for number in numbers])
-    return _Looks(places, headings, place_of.reshape(levers.shape[:2]), seen, numbers, weights)
+    return _Looks(places, headings, place_of.reshape(levers.shape[:2]), seen, np.array(numbers), weights)
 
 
 @compiled

@@ -101,6 +101,8 @@ class Coverage:
     """One of each figure per point; as images: `image`."""
     floor: BoolArray = field(repr=False)
     """(N,) whether a point is on the floor and not in a wall."""
+    counts: BoolArray = field(repr=False)
+    """(N,) whether reflectors correct the pose there; elsewhere none is visible."""
     sight: ViewMask = field(repr=False)
     """(V, N, ceil(M / 64)) which of the M reflectors each view sees, as in `VisibilityModel.visible`; a single scanner
     has one view, several have one each, for each heading that is looked at."""
@@ -139,6 +141,7 @@ def coverage(
     lattice: Lattice,
     options: FixOptions,
     progress: Progress = silent,
+    counts_there: BoolArray | None = None,
 ) -> Coverage:
     """Visibility and dilution at every point of a lattice.
 
@@ -151,7 +154,9 @@ def coverage(
     lattice : positions as in `vehicle_fixes.fixes`.
     options : measurement model and headings.
     progress : called with the fraction done [0..1] and what is being done; may raise to cancel.
+    counts_there : (N,) whether reflectors correct the pose at each point; None: everywhere.
     """
+    there = np.ones(len(lattice), dtype=np.bool_) if counts_there is None else counts_there
     points, counts, figures = lattice.points(), np.empty(len(lattice), np.int32), np.empty((len(lattice), FIGURES))
     floor = ~visible.caster.grid.is_occupied(points)
     views = views_of(visible.scanners, options)
@@ -160,12 +165,15 @@ def coverage(
         progress(tile.start / len(lattice), "coverage")
         places = views.places(points[tile])
         sight[:, tile] = views.sight(visible.models, places)
+        sight[:, tile][:, ~there[tile]] = 0
         mask, stands = np.ascontiguousarray(sight[:, tile]), views.stands(places, visible.caster)
         seen = FloorSight(points[tile], places, mask, stands)
         every = np.arange(len(seen.points))
         views.fill(visible.reflectors, seen, every, counts=counts[tile], figures=figures[tile])
     progress(1.0, "coverage")
-    return Coverage(lattice=lattice, options=options, fixes=as_fixes(counts, figures), floor=floor, sight=sight)
+    return Coverage(
+        lattice=lattice, options=options, fixes=as_fixes(counts, figures), floor=floor, counts=there, sight=sight
+    )
 
 
 def tiles(lattice: Lattice) -> list[slice]:
@@ -251,6 +259,7 @@ class LiveCoverage:
             for old, new, mask in zip(saw, sees, self._seen.mask, strict=True)
         ]
         changed = rows[0] if len(rows) == 1 else np.unique(np.concatenate(rows))
+        changed = changed[self._coverage.counts[changed]]
         self._views.fill(reflectors, self._seen, changed, counts=self._counts, figures=self._figures)
         return [*before, *after]
 
@@ -273,6 +282,7 @@ class LiveCoverage:
     def _fill_all(self) -> None:
         """Compute every point anew."""
         self._seen.mask[:] = self._views.sight(self._models, self._seen.places)
+        self._seen.mask[:, ~self._coverage.counts] = 0
         every = np.arange(len(self._lattice))
         self._views.fill(self.reflectors, self._seen, every, counts=self._counts, figures=self._figures)
 

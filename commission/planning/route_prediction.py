@@ -25,6 +25,7 @@ from commission.localization.odometry import odometry_noise
 from commission.localization.pose_gaussian import from_belief
 from commission.localization.setup import consider_model
 from commission.localization.supervisor import position_two_sigma, supervisor_limits
+from commission.localization.zones import counts_at
 from commission.planning.detection_noise import DetectionQuality, detection_quality
 from commission.planning.detection_order import farthest_first
 from commission.planning.nominal_drive import DrivePlan, NominalDrive, nominal_drive
@@ -39,6 +40,7 @@ from commission.site.routes import Route, Segment
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
 from commission.site.uncertainty import Uncertainty
+from commission.site.zones import ObservationKind
 
 AT_STATION = 0.2
 """Distance within which the vehicle is at a station [m]."""
@@ -105,8 +107,15 @@ class PlannedRoute:
     """How well the constants of the site and the vehicle are known."""
     options: PredictionOptions
     """Start and hall."""
+    without_reflectors: BoolArray
+    """(K,) whether reflectors correct nothing at a scan, because a zone leaves them out: none is visible there."""
     quality: DetectionQuality
     """How likely each reflector is detected, and what its detections are worth."""
+
+    @property
+    def way_without_reflectors(self) -> float:
+        """Way on which zones leave reflectors out, so that odometry alone is reckoned with [m]."""
+        return float(np.diff(self.drive.metres, prepend=self.drive.metres[0])[self.without_reflectors].sum())
 
     def sees(self) -> BoolArray:
         """Whether each of the M reflectors is seen at each scan, by it or the newest of another scanner: (K, M)."""
@@ -269,7 +278,7 @@ def plan_route(
     options: PredictionOptions | None = None,
     models: Sequence[VisibilityModel] | None = None,
 ) -> PlannedRoute:
-    """Plan a drive and find what it sees.
+    """Plan a drive and find what it sees and may use: where a zone leaves reflectors out, it is as if none were there.
 
     Parameters
     ----------
@@ -287,7 +296,8 @@ def plan_route(
     models = models or visibility_models(site)
     drive, model = nominal_drive(site.route(route_name), site.vehicle, site.scanners, options.plan), models[0]
     reflectors = model.reflectors
-    seen = seen_in_turn(models, drive.poses, drive.scanners)
+    counts = counts_at(site.zones, ObservationKind.REFLECTORS, drive.poses[:, :2])
+    seen = _seen_at(seen_in_turn(models, drive.poses, drive.scanners), counts)
     surveyed = np.array([survey_variance(each, site.uncertainty) for each in reflectors.reflectors])
     own = np.array([each.sigma**2 + each.radius_sigma**2 for each in reflectors.reflectors])
     believed = surveyed if site.parameters.filter.consider else own
@@ -303,8 +313,16 @@ def plan_route(
         parameters=site.parameters,
         uncertainty=site.uncertainty,
         options=options,
+        without_reflectors=read_only(~counts),
         quality=detection_quality(model.reflectors, site.scanners, site.parameters.detector),
     )
+
+
+def _seen_at(seen: VisibleReflectors, counts: BoolArray) -> VisibleReflectors:
+    """Drop what is seen at scans (K,) that do not count."""
+    stays = np.repeat(counts, seen.counts())
+    offsets = np.concatenate(([0], np.cumsum(np.where(counts, seen.counts(), 0))))
+    return VisibleReflectors(offsets, seen.indices[stays])
 
 
 def restricted(planned: PlannedRoute, kept: BoolArray) -> PlannedRoute:

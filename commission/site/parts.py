@@ -15,6 +15,7 @@ from commission.site.scanner import Scanner
 from commission.site.stations import Station
 from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import Vehicle
+from commission.site.zones import Zone
 
 
 class HasReflectors(Protocol):
@@ -80,6 +81,15 @@ class HasParameters(Protocol):
         ...
 
 
+class HasZones(Protocol):
+    """Zones."""
+
+    @property
+    def zones(self) -> tuple[Zone, ...]:
+        """Parts of the floor in which only some kinds of observation correct the pose."""
+        ...
+
+
 class HasUncertainty(Protocol):
     """How well constants are known."""
 
@@ -101,7 +111,7 @@ class Told(HasParameters, HasScanners, Protocol):
     """What says which reflectors are told apart."""
 
 
-class Driven(Sighted, HasVehicle, HasParameters, HasUncertainty, Protocol):
+class Driven(Sighted, HasVehicle, HasParameters, HasUncertainty, HasZones, Protocol):
     """What says how a vehicle drives a route, and what it sees and believes on it."""
 
     def route(self, name: str, /) -> Route:

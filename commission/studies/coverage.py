@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from commission.compiled import warm_up
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.geometry.gaussian import ellipse_axes
+from commission.localization.zones import counts_at
 from commission.planning.contour_coverage import WHOLE_POSE, ContourCoverage, contour_coverage
 from commission.planning.coverage import Coverage, Lattice, lattice_of
 from commission.planning.coverage import coverage as over_lattice
@@ -32,6 +33,7 @@ from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.site.uncertainty import Uncertainty
+from commission.site.zones import ObservationKind, Zone
 from commission.studies.inputs import StudyInput
 from commission.studies.kernels import CONTOURS, DILUTION, SEVERAL_SCANNERS, SIGHT
 
@@ -131,6 +133,8 @@ class CoverageInput(StudyInput):
     """How well constants are known; None where they do not matter."""
     contours: ContourParameters | None = None
     """How contours are matched; None where they do not matter."""
+    zones: tuple[Zone, ...] = ()
+    """Where which kinds of observation correct the pose."""
 
     @staticmethod
     def of(project: Project, options: CoverageOptions | None = None) -> CoverageInput:
@@ -153,6 +157,7 @@ class CoverageInput(StudyInput):
             spacing=options.spacing,
             constants=Constants(project.uncertainty, speed) if options.with_constants else None,
             contours=project.parameters.contour if options.with_contours else None,
+            zones=project.zones,
         )
 
     def lattice(self) -> Lattice:
@@ -202,7 +207,8 @@ def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResu
     told = contours_of(inputs, lattice, part(progress, PREPARING, ADDING))
     begin = PREPARING if told is None else ADDING
     until = 1.0 if inputs.constants is None else ADDING + 0.5 * (1.0 - ADDING)
-    found = over_lattice(visible, lattice, inputs.fix, part(progress, begin, until))
+    counts = counts_at(inputs.zones, ObservationKind.REFLECTORS, lattice.points())
+    found = over_lattice(visible, lattice, inputs.fix, part(progress, begin, until), counts)
     budget = None
     if inputs.constants is not None:
         known = inputs.constants
@@ -213,7 +219,7 @@ def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResu
 
 
 def contours_of(inputs: CoverageInput, lattice: Lattice, progress: Progress = silent) -> ContourCoverage | None:
-    """What contours tell over the floor; None where nobody asks, or without a floor map.
+    """What contours tell over the floor, nothing in zones that leave them out; None if nobody asks, or without a map.
 
     Parameters
     ----------
@@ -223,7 +229,15 @@ def contours_of(inputs: CoverageInput, lattice: Lattice, progress: Progress = si
     """
     if inputs.floor_map is None or inputs.contours is None:
         return None
-    return contour_coverage(inputs.floor_map, inputs.scanners, inputs.contours, lattice, inputs.fix, progress)
+    found = contour_coverage(inputs.floor_map, inputs.scanners, inputs.contours, lattice, inputs.fix, progress)
+    counts = counts_at(inputs.zones, ObservationKind.CONTOURS, lattice.points())
+    return replace(
+        found,
+        told=np.where(counts, found.told, 0).astype(np.int8),
+        position_sigma=np.where(counts, found.position_sigma, math.inf),
+        heading_sigma=np.where(counts, found.heading_sigma, math.inf),
+        beams=np.where(counts, found.beams, 0).astype(np.int32),
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -242,7 +256,7 @@ def ellipses_of(result: CoverageResult, spacing: float) -> Ellipses:
     """Ellipses at points of the lattice of a coverage, under its conditions; `spacing` apart at least [m]."""
     found = result.coverage
     chosen = every_nth(found.lattice, max(1, math.ceil(spacing / found.lattice.spacing - 1e-9)))
-    points = found.lattice.points()[chosen[result.drivable[chosen]]]
+    points = found.lattice.points()[chosen[(result.drivable & found.counts)[chosen]]]
     covariances = position_covariances(result.visible, points, found.options)
     known = np.isfinite(covariances).all(axis=(1, 2))
     return Ellipses(points[known], *ellipse_axes(covariances[known]))

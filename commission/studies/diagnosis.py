@@ -41,7 +41,7 @@ MOVED_SIGMAS, MOVED_M = 4.0, 0.015
 CELL_M = 0.05
 """Detections in squares of the floor that touch are of one thing [m]."""
 FEWEST = 30
-"""Detections below which nothing is said of a thing."""
+"""Detections below which nothing is said of a thing, nor of where a reflector stands."""
 LEAST_SHARE = 0.01
 """Share of the scans in which a thing has to be seen, so that people who pass by are none."""
 WIDEST_M = 0.15
@@ -240,7 +240,7 @@ def _reflectors(inputs: DiagnosisInput, clusters: tuple[OutlierCluster, ...]) ->
     beside = {each.near: each for each in reversed(clusters) if each.near}
     for index, name in enumerate(figures.names):
         suspicion, text, off = None, "", np.zeros(2)
-        thing, moved = beside.get(name), _moved(found, index)
+        thing, moved = beside.get(name), _moved(found, index) if own[index] >= FEWEST else None
         if thing is not None and own[index] >= OWN_SHARE * thing.count:
             suspicion, text = Suspicion.DOUBLE, f"{name} is double: {thing.text}"
             off = np.array([thing.x, thing.y]) - figures.places[index]

@@ -16,6 +16,7 @@ from commission.site.routes import Route, route_named
 from commission.site.scanner import Scanner
 from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import Vehicle
+from commission.site.zones import Zone
 from commission.studies.inputs import StudyInput
 
 SEEING = 0.2
@@ -38,6 +39,8 @@ class DrivesInput(StudyInput):
     """Tunables of the localizer."""
     uncertainty: Uncertainty
     """How well the constants of the site and the vehicle are known."""
+    zones: tuple[Zone, ...]
+    """Where which kinds of observation correct the pose."""
     routes: tuple[Route, ...]
     """The routes, and no others."""
     prediction: PredictionOptions
@@ -73,6 +76,7 @@ class DrivesInput(StudyInput):
             vehicle=project.vehicle,
             parameters=project.parameters,
             uncertainty=project.uncertainty,
+            zones=project.zones,
             routes=project.routes if names is None else tuple(map(project.route, names)),
             prediction=prediction or PredictionOptions(),
             visibility=visibility or VisibilityOptions(),

@@ -28,6 +28,7 @@ from commission.site.scanner import Scanner
 from commission.site.stations import Station
 from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import Vehicle
+from commission.site.zones import Zone
 from commission.studies.ambiguity import AmbiguityInput, ambiguity
 from commission.studies.coverage import CoverageInput, CoverageOptions, CoverageResult, coverage
 from commission.studies.inputs import StudyInput
@@ -61,6 +62,8 @@ class LayoutInput(StudyInput):
     """Tunables of the localizer."""
     uncertainty: Uncertainty
     """How well the constants of the site and the vehicle are known."""
+    zones: tuple[Zone, ...]
+    """Where which kinds of observation correct the pose."""
     routes: tuple[Route, ...]
     """The routes that count."""
     stations: tuple[Station, ...]
@@ -98,6 +101,7 @@ class LayoutInput(StudyInput):
             vehicle=site.vehicle,
             parameters=site.parameters,
             uncertainty=site.uncertainty,
+            zones=site.zones,
             routes=tuple(map(site.route, site.layout.counted(site.routes))),
             stations=site.stations,
             prediction=prediction,

@@ -27,6 +27,7 @@ from commission.site.scanner import Scanner
 from commission.site.stations import Station
 from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import Vehicle
+from commission.site.zones import Zone
 from commission.studies.inputs import StudyInput
 from commission.studies.kernels import DRIVES, ERRORS, INFORMATION, SHARES
 
@@ -50,6 +51,8 @@ class PlacementInput(StudyInput):
     """Tunables of the localizer."""
     uncertainty: Uncertainty
     """How well the constants of the site and the vehicle are known."""
+    zones: tuple[Zone, ...]
+    """Where which kinds of observation correct the pose."""
     routes: tuple[Route, ...]
     """The routes that count."""
     stations: tuple[Station, ...]
@@ -85,6 +88,7 @@ class PlacementInput(StudyInput):
             vehicle=project.vehicle,
             parameters=project.parameters,
             uncertainty=project.uncertainty,
+            zones=project.zones,
             routes=tuple(map(project.route, names)),
             stations=project.stations,
             options=options or PlacementOptions(demands=brief.demands, candidates=brief.candidates),

@@ -33,6 +33,7 @@ from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.zones import ObservationKind, Zone
 from tests.planning.sites import open_field, surely_detected
 
 LINE = ((2.0, 3.0), (6.0, -3.0), (11.0, 3.5), (15.0, -2.5), (19.0, 3.0))
@@ -67,6 +68,22 @@ def test_prediction_equals_the_localizer_on_exact_records():
     np.testing.assert_allclose(predicted.prior_covariances, run.priors.rows().covariances, rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(predicted.means, run.means, atol=1e-9)
     assert np.array_equal(predicted.modes, run.modes)
+
+
+def test_where_a_zone_leaves_reflectors_out_the_prediction_is_the_localizer_that_does_not_use_them():
+    project = open_field(LINE, parameters=NO_GATE)
+    box = ((8.0, -9.0), (14.0, -9.0), (14.0, 9.0), (8.0, 9.0))
+    zoned = replace(project, zones=(Zone(name="Hall", outline=box, kinds=(ObservationKind.CONTOURS,)),))
+    seen, planned = (surely_detected(plan_route(each, "Line")) for each in (project, zoned))
+    assert planned.way_without_reflectors == pytest.approx(6.0, abs=0.1)
+    predicted = predict_route(planned)
+    columns = whole_run.run(
+        exact_records(project, seen),
+        LocalizerSetup.of(zoned),
+        Belief(0, planned.drive.poses[0], np.diag(np.square(PredictionOptions().start_sigmas))),
+    )
+    np.testing.assert_allclose(predicted.covariances, columns.covariances, rtol=1e-6, atol=1e-12)
+    assert predicted.two_sigma[:, 0].max() > 1.5 * predict_route(seen).two_sigma[:, 0].max()
 
 
 def test_nominal_drive_rests_and_keeps_to_the_speed_of_the_route():

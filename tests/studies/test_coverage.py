@@ -6,11 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from commission.planning.coverage import LiveCoverage
 from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
 from commission.site.parameters import SupervisorParameters
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
+from commission.site.zones import ObservationKind, Zone
 from commission.studies.coverage import (
     CoverageInput,
     CoverageOptions,
@@ -24,6 +26,8 @@ CORNERS = ReflectorMap(
     tuple(Reflector(id=str(i), x=x, y=y) for i, (x, y) in enumerate([(0.5, 0.5), (9.5, 0.5), (9.5, 5.5), (0.5, 5.5)]))
 )
 
+REFLECTORS, CONTOURS, TAGS = ObservationKind
+ALL = ((-1.0, -1.0), (11.0, -1.0), (11.0, 7.0), (-1.0, 7.0))
 
 TURNING = Scanner(resolution_deg=0.1, field_of_view_deg=(-180.0, 180.0))
 
@@ -112,3 +116,25 @@ def test_quantiles_are_those_of_the_drivable_floor_and_none_where_they_have_no_f
     assert (entries["position_sigma_median_m"], entries["position_sigma_p95_m"]) == pytest.approx((0.11, 0.2))
     assert entries["heading_sigma_median_rad"] == pytest.approx(0.11)
     assert entries["heading_sigma_p95_rad"] is None
+
+
+def test_a_zone_leaves_out_reflectors_or_contours_of_the_floor_it_covers():
+    left = ((-1.0, -1.0), (5.0, -1.0), (5.0, 7.0), (-1.0, 7.0))
+    zones = (Zone(name="Left", outline=left, kinds=(CONTOURS,)), Zone(name="All", outline=ALL, kinds=(REFLECTORS,)))
+    site = hall()
+    walls = CoverageOptions(spacing=0.5, with_contours=True)
+    result = coverage(CoverageInput.of(replace(site, zones=zones), walls))
+    plain = coverage(CoverageInput.of(site, walls))
+    is_left = result.coverage.lattice.points()[:, 0] < 5.0
+    fixes, before = result.coverage.fixes, plain.coverage.fixes
+    assert not fixes.visible[is_left].any()
+    assert np.isinf(fixes.position_sigma[is_left]).all()
+    assert fixes.visible[~is_left].tolist() == before.visible[~is_left].tolist()
+    assert fixes.position_sigma[~is_left].tolist() == before.position_sigma[~is_left].tolist()
+    assert result.contours is not None and plain.contours is not None
+    assert not result.contours.told[~is_left].any()
+    assert result.contours.position_sigma[is_left].tolist() == plain.contours.position_sigma[is_left].tolist()
+    # A reflector that is dragged does not bring it back.
+    live = LiveCoverage(result.visible, result.coverage)
+    live.move(0, replace(CORNERS.reflectors[0], x=1.0))
+    assert not live.coverage.fixes.visible[is_left].any()

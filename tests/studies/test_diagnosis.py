@@ -41,3 +41,17 @@ def test_a_reflector_that_is_seen_too_rarely_is_dirty_and_one_that_hardly_ever_i
         (line,) = [each for each in named.lines if each.startswith(f"R{OF} is {suspicion.value}: seen in ")]
         seen, expected = (int(word) for word in line.split() if word.isdigit())
         assert seen / expected == pytest.approx(share, abs=0.08)
+
+
+def test_a_handful_of_sightings_beside_its_place_does_not_say_that_a_reflector_has_moved() -> None:
+    log = drive(40.0)
+    beside = log.range_bearing.copy()
+    beside[OF :: len(PLACES), 0] += 0.06
+    few = seen_in(replace(log, range_bearing=beside), 0.05)
+    found = calibrate(CalibrationInput.of(PROJECT, few, Start(start(), StartOrigin.GIVEN)))
+    named = diagnosis(diagnosis_input(PROJECT, found, None))
+    assert 5 <= np.count_nonzero(found.fit.reflector == OF) < 30
+    # Gone, for all that it is seen at its place; that it stands elsewhere, nobody has seen often enough.
+    assert [(each.id, each.suspicion) for each in named.reflectors if each.suspicion is not None] == [
+        (f"R{OF}", Suspicion.MISSING)
+    ]

@@ -30,7 +30,7 @@ def ellipses(covered: Covered, places: tuple[Place, ...], factor: float, *, grid
     lattice, options = covered.live.coverage.lattice, covered.live.coverage.options
     near = np.array([index for index in (lattice.index_near(*place) for place in places) if index is not None], int)
     chosen = np.unique(np.concatenate([near, _coarse(covered) if grid else near]))
-    chosen = chosen[covered.floor[chosen]]
+    chosen = chosen[(covered.floor & covered.live.coverage.counts)[chosen]]
     points = lattice.points()[chosen]
     covariances = position_covariances(covered.live.visible, points, options)
     known = np.isfinite(covariances).all(axis=(1, 2))

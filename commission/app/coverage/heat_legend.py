@@ -96,13 +96,18 @@ def _conditions(state: AppState, figure: Figure) -> str:
     heading = HEADING_NAMES[settings.heading.seen_by(state.project.scanners)]
     if figure in BY_CONTOURS:
         walls = "the floor map alone, nobody about" if state.project.floor_map is not None else "there is no floor map"
-        return escaped(f"{heading}; {walls}")
+        return escaped("; ".join((heading, walls, *_zones(state))))
     parts = [heading, MEASUREMENT_NAMES[settings.measurement]]
     if blocked_per_m > 0.0:
         parts.append(f"people {PERCENT.number(blocked_per_m, '.1f')} %/m")
     elif figure in AMONG_PEOPLE:
         parts.append("nobody about: set People [%/m]")
-    return escaped("; ".join(parts))
+    return escaped("; ".join((*parts, *_zones(state))))
+
+
+def _zones(state: AppState) -> tuple[str, ...]:
+    """Say that zones count, where there are any."""
+    return ("as zones say",) if state.project.zones else ()
 
 
 def _limit(heat: HeatView, state: AppState) -> str:

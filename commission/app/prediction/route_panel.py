@@ -106,10 +106,16 @@ class RoutePanel(BasePanel):
 
 
 def _risk_text(route: RouteView) -> str:
-    """Say whether a wrong association is to be feared."""
+    """Say whether a wrong association is to be feared, and on how much of the way zones leave reflectors out."""
     if not route.risks:
         text = "No neighbors inside each other's gate: no wrong association expected."
     else:
         listed = f", the first {MOST_RISKS} listed" if len(route.risks) > MOST_RISKS else ""
         text = f"{len(route.risks)} neighbors inside the gate{listed}; a click goes there."
+    way = route.way_without_reflectors
+    if way > 0.0:
+        text += (
+            f" Zones leave reflectors out on {way:.1f} m of the way: odometry alone is reckoned with there, "
+            "contours and tags are not."
+        )
     return f"<div class='c-note' style='padding:2px 6px'>{text}</div>"

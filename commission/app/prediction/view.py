@@ -61,6 +61,8 @@ class RouteView:
     """Neighbors that may be taken for each other, the most probable first."""
     stations: tuple[StationAccuracy, ...]
     """Stations on the route, and whether what they require is met."""
+    way_without_reflectors: float
+    """Way on which zones leave reflectors out [m]."""
     outdated: bool
     """Whether the site has changed since, and it is being predicted anew."""
 
@@ -94,6 +96,7 @@ def route_view(predicted: PredictionResult, *, outdated: bool) -> RouteView:
         risk=np.maximum.reduceat(chances, metres.first),
         risks=tuple(_risk_view(predicted, risk) for risk in predicted.risks),
         stations=predicted.stations,
+        way_without_reflectors=predicted.planned.way_without_reflectors,
         outdated=outdated,
     )
 
