@@ -202,7 +202,7 @@ def beam_points(  # noqa: PLR0917 - a scan, what is no echo, and the motion arou
         if not nearest <= distance <= farthest:
             continue
         bearing = scan.angle_min + scan.angle_increment * i
-        if len(blind) and _is_blind(bearing, scan.scanner, blind):
+        if len(blind) and is_blind(bearing, scan.scanner, blind):
             continue
         direction = mount.mount_theta + sweep.upright * bearing
         x, y = mount.mount_x + distance * math.cos(direction), mount.mount_y + distance * math.sin(direction)
@@ -217,8 +217,19 @@ def beam_points(  # noqa: PLR0917 - a scan, what is no echo, and the motion arou
 
 
 @compiled_inline
-def _is_blind(bearing: float, scanner: int, blind: FloatArray) -> bool:
-    """Whether the vehicle itself is in the way of a beam."""
+def is_blind(bearing: float, scanner: int, blind: FloatArray) -> bool:
+    """Whether the vehicle itself is in the way of a beam.
+
+    Parameters
+    ----------
+    bearing : of the beam [rad], as reported.
+    scanner : its number.
+    blind : (B, 3) see `ContourModel`.
+
+    Notes
+    -----
+    (bearing - first) mod 2 pi <= width: by definition.
+    """
     found = False
     for i in range(len(blind)):
         if blind[i, 0] == scanner:

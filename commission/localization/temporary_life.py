@@ -10,7 +10,7 @@ import math
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import BoolArray, FloatArray
-from commission.localization.contour import ContourScan
+from commission.localization.contour import ContourScan, is_blind
 from commission.localization.reels import Sighting
 from commission.localization.temporary_joint import add_landmark, drop_landmark
 from commission.localization.temporary_memory import (
@@ -136,7 +136,7 @@ def look_for_missing(memory: TemporaryMemory, matched: BoolArray, model: Tempora
     Notes
     -----
     range > distance + radius + `SEEN_THROUGH` of the three beams at its bearing, by definition; behind nearer ones it
-    is hidden, and no miss.
+    is hidden, and no miss, nor in a blind sector, where nothing is looked at.
     """
     if scan.beams < 3:
         return
@@ -155,6 +155,8 @@ def look_for_missing(memory: TemporaryMemory, matched: BoolArray, model: Tempora
         if behind > min(model.reach, model.limits[scan.scanner, 1]):
             continue
         bearing = scan.sweep.upright * wrap_scalar(math.atan2(y, x) - mount.mount_theta)
+        if is_blind(bearing, scan.scanner, model.blind):
+            continue
         beam = math.floor((bearing - scan.angle_min) / scan.angle_increment + 0.5)
         if beam < 1 or beam > scan.beams - 2:
             continue

@@ -36,13 +36,16 @@ from commission.site.reflectors import (
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.tags import Tag
 from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import Vehicle
+from commission.site.zones import Zone
 from commission.studies.detector_problems import detector_findings
 from commission.studies.inputs import StudyInput, is_same
 from commission.studies.kernels import ROOM
 from commission.studies.passed_stations import Passed, passed_stations
 from commission.studies.violations import CheckedRoute, Violation, ViolationKind, check_route
+from commission.studies.zone_problems import idle_zones
 
 MOST_OF_A_KIND = 50
 """Problems of one kind that are listed; the rest is counted."""
@@ -78,6 +81,7 @@ class Subject(StrEnum):
     STATION = "station"
     SCANNER = "scanner"
     FLOOR_MAP = "floor map"
+    ZONE = "zone"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +95,7 @@ class Problem:
     subject: Subject
     """What kind of thing it is about."""
     ids: tuple[str, ...] = ()
-    """Ids of reflectors, names of routes or stations."""
+    """Ids of reflectors, names of routes, stations or zones."""
     place: tuple[float, float] | None = None
     """Where to look [m, m], map frame; None: nowhere in particular."""
 
@@ -122,6 +126,10 @@ class ProblemsInput(StudyInput):
     """The laser scanners."""
     parameters: Parameters
     """Tunables of the localizer."""
+    tags: tuple[Tag, ...] = ()
+    """Landmarks that tell place and heading at once."""
+    zones: tuple[Zone, ...] = ()
+    """Where which kinds of observation correct the pose."""
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
     """How well the constants of the site and the vehicle are known."""
     limits: CheckLimits = field(default_factory=CheckLimits)
@@ -138,6 +146,8 @@ class ProblemsInput(StudyInput):
             vehicle=project.vehicle,
             scanners=project.scanners,
             parameters=project.parameters,
+            tags=project.tags,
+            zones=project.zones,
             uncertainty=project.uncertainty,
             limits=limits or CheckLimits(),
         )
@@ -186,6 +196,7 @@ def problems(
         *_map_problems(inputs, floor),
         *_scanner_problems(inputs),
         *_detector_problems(inputs),
+        *_zone_problems(inputs),
         *_exact_constants(inputs),
         *_unknown_values(inputs),
         *_close_reflectors(inputs),
@@ -277,6 +288,13 @@ def _map_problems(site: ProblemsInput, floor: FloorDistances | None) -> Iterable
             text="No reflectors; expected at least 3 around every route",
             subject=Subject.REFLECTOR,
         )
+
+
+def _zone_problems(site: ProblemsInput) -> Iterable[Problem]:
+    """Zones in which nothing corrects the pose."""
+    for zone, text in idle_zones(site):
+        x, y = np.mean(zone.outline, axis=0).tolist()
+        yield Problem(severity=Severity.ERROR, text=text, subject=Subject.ZONE, ids=(zone.name,), place=(x, y))
 
 
 def _exact_constants(site: ProblemsInput) -> Iterable[Problem]:

@@ -35,7 +35,8 @@ from commission.localization.temporary_joint import (
     pose_in,
     put_pose,
 )
-from commission.localization.temporary_memory import POSE, SEEN_NS, landmarks_in, memory_of
+from commission.localization.temporary_life import look_for_missing
+from commission.localization.temporary_memory import MISSES, POSE, SEEN_NS, landmarks_in, memory_of
 from commission.localization.temporary_model import temporary_model
 from commission.localization.whole_run import run, run_segments
 from commission.site.disturbances import Reel
@@ -364,6 +365,18 @@ def test_a_reel_that_vanishes_is_forgotten_and_one_that_is_hidden_is_not():
     assert known is not None
     assert (known.places_map[:, 1] < 4.5).all(), "nothing is left of what is gone"
     assert (np.diff(known.marks[:, SEEN_NS]) != 0).any() or len(known) > 3
+
+
+@pytest.mark.parametrize(("blind", "misses"), [((), 1), ((-20.0, 20.0), 0), ((20.0, 60.0), 1)])
+def test_a_landmark_behind_the_vehicle_itself_is_not_missed(blind, misses):
+    scanner = Scanner(field_of_view_deg=(-90.0, 90.0), blind_sectors_deg=(blind,) if blind else ())
+    model, memory = temporary_model((scanner,), ON), memory_of(None, 4)
+    put_pose(memory, PoseGaussian(0.0, 0.0, 0.0, 1e-4, 0.0, 0.0, 1e-4, 0.0, 1e-4))
+    add_landmark(memory, Sighting(True, 5.0, 0.0, 1e-4, 0.0, 1e-4, 0.6))
+    # A beam that the vehicle stops comes back as nothing, like one that meets nothing.
+    scan = scan_of(np.full(scanner.beam_count, np.nan), scanner)
+    look_for_missing(memory, np.zeros(4, np.bool_), model, scan)
+    assert memory.marks[0, MISSES] == misses
 
 
 def scan_of(ranges: np.ndarray, scanner: Scanner) -> ContourScan:

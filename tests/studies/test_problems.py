@@ -8,12 +8,15 @@ import pytest
 
 from commission.planning.route_check import MOST_ROOM, FloorDistances, room_along, smallest_radius, way_of
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
+from commission.site.parameters import ContourParameters
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorKind, ReflectorMap
 from commission.site.routes import Direction, Route, Segment
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.tags import Tag
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle
+from commission.site.zones import ObservationKind, Zone
 from commission.studies.problems import (
     MOST_OF_A_KIND,
     ProblemsInput,
@@ -291,3 +294,16 @@ def test_an_outline_that_blocks_all_beams_is_an_error_and_one_that_blocks_some_a
         scanner = Scanner(mounting=mounting, field_of_view_deg=(-60.0, 60.0))
         found = checked(replace(SITE, scanners=(scanner,))).problems
         assert [each.severity for each in found if "own outline blocks" in each.text] == [severity], heading
+
+
+def test_a_zone_in_which_nothing_corrects_the_pose_is_an_error_that_says_why() -> None:
+    outline = ((1.0, 1.0), (3.0, 1.0), (3.0, 2.0), (1.0, 2.0))
+    kinds = ObservationKind.CONTOURS, ObservationKind.TAGS
+    site = replace(SITE, zones=(Zone(name="Hall", outline=outline, kinds=kinds), Zone(name="All", outline=outline)))
+    (found,) = [each for each in checked(site).problems if each.subject is Subject.ZONE]
+    assert (found.severity, found.ids, found.place) == (Severity.ERROR, ("Hall",), (2.0, 1.5))
+    why = "contours are switched off (contour.enabled), there are no tags"
+    assert found.text.startswith(f"Zone 'Hall' leaves a vehicle to its odometry: {why}; expected")
+    on = replace(site, parameters=replace(site.parameters, contour=ContourParameters(enabled=True)))
+    for served in (on, replace(site, tags=(Tag(id="7", x=1.0, y=1.0),))):
+        assert not [each for each in checked(served).problems if each.subject is Subject.ZONE]

@@ -11,6 +11,7 @@ from commission.app.base.state import AppState, Edit
 from commission.app.editing.editor import editor_of
 from commission.app.editing.reducer import with_reflectors
 from commission.app.editing.route_gestures import control_point_at
+from commission.app.editing.zone_reducer import ShownZone
 from commission.app.problems.actions import AcceptFacing, DropFacing, FaceFromWalls, ShowProblem
 from commission.app.problems.facing import Facing
 from commission.errors import UsageError
@@ -55,5 +56,7 @@ def show_problem(action: ShowProblem, state: AppState, sender: Sender) -> Outcom
     elif problem.subject is Subject.ROUTE and problem.ids:
         near = problem.place or (0.0, 0.0)
         editor = editor.selecting(point=control_point_at(state.project, problem.ids[0], near, float("inf")))
+    elif problem.subject is Subject.ZONE and problem.ids:
+        state = state.with_browser(sender.browser, ShownZone(problem.ids[0]))
     there = () if problem.place is None else (FlyTo(problem.place),)
     return Outcome(state.with_browser(sender.browser, editor), there)
