@@ -69,7 +69,7 @@ class ContourCoverage:
         return getattr(self, figure).reshape(self.lattice.rows, self.lattice.columns)
 
 
-class _Looks(NamedTuple):
+class _Stances(NamedTuple):
     """How the scanners of a vehicle look about a point: H headings, S scanners, D directions, V places."""
 
     levers: FloatArray
@@ -110,23 +110,23 @@ def contour_coverage(  # noqa: PLR0917 - the site, and what is asked
     """
     model, caster = _model(floor, scanners, given), RayCaster(floor.occupancy())
     directions = np.arange(-math.pi, math.pi - 0.5 * CAST_RAD, CAST_RAD)
-    looks = _looks(scanners, options, directions)
+    stances = _stances(scanners, options, directions)
     points, best = lattice.points(), options.heading is Heading.BEST
     found = np.empty((len(points), 4))
     farthest = max(scanner.range[1] for scanner in scanners)
-    at_once = max(POINTS_AT_ONCE // len(looks.levers), 1)
+    at_once = max(POINTS_AT_ONCE // len(stances.levers), 1)
 
     def tell(first: int) -> int:
         here = slice(first, min(first + at_once, len(points)))
-        places = points[here, np.newaxis] + looks.levers
+        places = points[here, np.newaxis] + stances.levers
         rays = np.empty((*places.shape[:2], len(directions), 3))
         rays[..., :2], rays[..., 2] = places[:, :, np.newaxis], directions
         ranges = caster.cast(rays, farthest)
-        stands = np.ones((len(places), len(looks.headings)), dtype=np.bool_)
+        stands = np.ones((len(places), len(stances.headings)), dtype=np.bool_)
         if len(scanners) > 1:
             in_wall = np.asarray(caster.grid.is_occupied(places))
-            stands = np.logical_not(in_wall[:, looks.place_of].any(axis=2))
-        _tell(points[here], ranges, stands, directions, looks, model, best, found[here])
+            stands = np.logical_not(in_wall[:, stances.place_of].any(axis=2))
+        _tell(points[here], ranges, stands, directions, stances, model, best, found[here])
         return here.stop
 
     # Kernels hold no lock, so that threads use all cores; no parallel kernel takes the tables of a map.
@@ -150,7 +150,7 @@ def _model(floor: FloorMap, scanners: Sequence[Scanner], given: ContourParameter
     return model
 
 
-def _looks(scanners: Sequence[Scanner], options: FixOptions, directions: FloatArray) -> _Looks:
+def _stances(scanners: Sequence[Scanner], options: FixOptions, directions: FloatArray) -> _Stances:
     """Where the scanners stand for what is asked, and what they see of (D,) directions."""
     heading = options.heading.seen_by(scanners)
     numbers = list(range(len(scanners)))
@@ -178,7 +178,7 @@ def _looks(scanners: Sequence[Scanner], options: FixOptions, directions: FloatAr
                 levers[h, s] = compose(np.array((0.0, 0.0, turned)), scanner.mounting)[:2]
     places, place_of = np.unique(levers.reshape(-1, 2), axis=0, return_inverse=True)
     weights = np.array([CAST_RAD / abs(scanners[number].angle_increment) for number in numbers])
-    return _Looks(places, headings, place_of.reshape(levers.shape[:2]), seen, np.array(numbers), weights)
+    return _Stances(places, headings, place_of.reshape(levers.shape[:2]), seen, np.array(numbers), weights)
 
 
 @compiled
@@ -187,7 +187,7 @@ def _tell(  # noqa: PLR0917 - points, beams, headings
     ranges: FloatArray,
     stands: BoolArray,
     directions: FloatArray,
-    looks: _Looks,
+    stances: _Stances,
     model: ContourModel,
     best: bool,
     out: FloatArray,
@@ -200,10 +200,10 @@ def _tell(  # noqa: PLR0917 - points, beams, headings
         told, position, heading, beams = (0.0, math.inf, math.inf, 0.0) if best else (3.0, 0.0, 0.0, math.inf)
         if not stands[n].any():
             told, position, heading, beams = 0.0, math.inf, math.inf, 0.0
-        for h in range(len(looks.headings)):
+        for h in range(len(stances.headings)):
             if not stands[n, h]:
                 continue
-            information, count = _information(points[n], ranges[n], directions, h, looks, model)
+            information, count = _information(points[n], ranges[n], directions, h, stances, model)
             rank, s_position, s_heading = _sigmas(information)
             if best:
                 told, beams = max(told, rank), max(beams, count)
@@ -216,23 +216,23 @@ def _tell(  # noqa: PLR0917 - points, beams, headings
 
 @compiled
 def _information(  # noqa: PLR0917 - a point, its beams, and who sees them
-    point: FloatArray, ranges: FloatArray, directions: FloatArray, h: int, looks: _Looks, model: ContourModel
+    point: FloatArray, ranges: FloatArray, directions: FloatArray, h: int, stances: _Stances, model: ContourModel
 ) -> tuple[FloatArray, float]:
-    """(3, 3) information of x, y and heading, and beams that end on a contour, of a vehicle that looks somewhere."""
-    heading = looks.headings[h]
+    """(3, 3) information of x, y and heading, and beams that end on a contour, of a vehicle that looks one way."""
+    heading = stances.headings[h]
     c, s = math.cos(heading), math.sin(heading)
     information, count = np.zeros((3, 3)), 0.0
     pose = PoseGaussian(point[0], point[1], heading, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0)
     ends, figures = np.empty((ranges.shape[1], 2)), np.empty(COLUMNS)
     per_cell = 1.0 / model.tables.resolution
-    for k in range(len(looks.weights)):
-        weight, place, limits = looks.weights[k], looks.place_of[h, k], model.limits[looks.scanner_of[k]]
-        lever_x = c * looks.levers[place, 0] + s * looks.levers[place, 1]
-        lever_y = c * looks.levers[place, 1] - s * looks.levers[place, 0]
+    for k in range(len(stances.weights)):
+        weight, place, limits = stances.weights[k], stances.place_of[h, k], model.limits[stances.scanner_of[k]]
+        lever_x = c * stances.levers[place, 0] + s * stances.levers[place, 1]
+        lever_y = c * stances.levers[place, 1] - s * stances.levers[place, 0]
         n = 0
         for i in range(ranges.shape[1]):
             distance = ranges[place, i]
-            if looks.seen[h, k, i] and limits[0] <= distance <= limits[1]:
+            if stances.seen[h, k, i] and limits[0] <= distance <= limits[1]:
                 bearing = directions[i] - heading
                 ends[n, 0] = per_cell * (lever_x + distance * math.cos(bearing))
                 ends[n, 1] = per_cell * (lever_y + distance * math.sin(bearing))

@@ -14,6 +14,7 @@ from commission.app.base.field_widget import add_widget, held, meant, write_held
 from commission.app.base.panel import Post, escaped, posting, write
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
+from commission.app.base.viser_private import write_anew
 from commission.site.fields import FieldInfo, field_info, get_field
 from commission.site.project import Project
 from commission.site.quantity import PERCENT
@@ -42,6 +43,7 @@ class Inputs:
         self._widgets: list[tuple[GuiInputHandle[Any], Callable[[AppState], Any]]] = []
         self._marked: Project | None = None
         self._followed: dict[int, object] = {}
+        self._is_anew = False
 
     def connect(
         self,
@@ -118,7 +120,12 @@ class Inputs:
             value = shown(state)
             if value is not None and (index not in self._followed or self._followed[index] != value):
                 self._followed[index] = value
+                # What was refused is here, and what held before it on the page.
+                is_here = self._is_anew and widget.value == value
                 write_held(widget, value)
+                if is_here:
+                    write_anew(self._gui, widget)
+        self._is_anew = False
 
         if state.saved is not self._marked:
             self._marked = state.saved
@@ -130,6 +137,7 @@ class Inputs:
     def forget(self) -> None:
         """Write every widget anew when it follows next, whatever stands in it: it is another thing's from now on."""
         self._followed.clear()
+        self._is_anew = True
 
 
 def add_find(gui: GuiApi, post: Post, hint: str) -> GuiInputHandle[str]:

@@ -275,6 +275,17 @@ def show_value(server: ViserServer, number: int, widget: Any) -> None:
     send(server, number, _messages.GuiUpdateMessage(identifier(widget), {"value": widget.value}))
 
 
+def write_anew(gui: GuiApi, widget: Any) -> None:
+    """Let the page show the value that a widget has here, though it has not changed here: it may show another one.
+
+    Parameters
+    ----------
+    gui : that the widget is of.
+    widget : a handle that has a value.
+    """
+    gui._websock_interface.queue_message(_messages.GuiUpdateMessage(identifier(widget), {"value": widget.value}))
+
+
 def say_at_field(server: ViserServer, number: int, widget: str, text: str) -> None:
     """Let one browser say below a field why its entry was refused; nothing where it does not show that field.
 

@@ -122,3 +122,19 @@ def test_the_panel_shows_the_zone_and_nothing_without_one(drawn: AppState) -> No
     assert all(widget.visible for widget in widgets.values())
     panel.draw_slowly(view_of(after(drawn, DeleteZone())))
     assert not any(widget.visible for widget in widgets.values())
+
+
+def test_what_was_refused_for_one_zone_is_not_left_in_the_field_of_the_next(
+    drawn: AppState, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    anew: list[object] = []
+    monkeypatch.setattr("commission.app.base.inputs.write_anew", lambda _gui, widget: anew.append(widget))
+    both = after(drawn, AddZone((5.0, 5.0, 6.0, 6.0)), SetZone("name", "Hall"), ShowZone("Zone 1"))
+    panel = ZoneFields(start_server("127.0.0.1", 0).gui, lambda _envelope: None, ME)
+    panel.draw_slowly(view_of(both))
+    name = next(handle for handle in panel._fields if handle.label == "Called")
+    # Typed for Zone 1 and refused, since it is the other's: the page shows what held, and this is the name here.
+    name.value = "Hall"
+    panel.draw_slowly(view_of(after(both, ShowZone("Hall"))))
+    assert name.value == "Hall"
+    assert name in anew
