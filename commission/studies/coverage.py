@@ -41,6 +41,8 @@ Number = int | float | None
 
 FINEST = 0.1
 """Smallest distance between points, where it is not chosen [m]."""
+FINEST_OF_WALLS = 0.2
+"""The same where walls are looked at by several scanners, each of which stands elsewhere in every heading [m]."""
 LONGEST_SIDE = 400
 """Points along the longer side of the floor then: as many as it has pixels on a small screen."""
 ROUND_SPACINGS = (0.1, 0.2, 0.25, 0.5, 1.0, 2.0)
@@ -165,7 +167,8 @@ class CoverageInput(StudyInput):
         if self.spacing is not None:
             return lattice_of(self, self.spacing)
         coarse = lattice_of(self, 1.0)
-        least = max(FINEST, max(coarse.rows, coarse.columns) / LONGEST_SIDE)
+        several = self.contours is not None and len(self.scanners) > 1
+        least = max(FINEST_OF_WALLS if several else FINEST, max(coarse.rows, coarse.columns) / LONGEST_SIDE)
         return lattice_of(self, next((spacing for spacing in ROUND_SPACINGS if spacing >= least), least))
 
 
