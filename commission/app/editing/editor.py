@@ -75,6 +75,8 @@ class Editor:
 
     tool: Tool | None = None
     """What a click does; none: it selects."""
+    laid_aside: Tool | None = None
+    """A tool that was left with something begun, which is there when it is taken up again."""
     selected: tuple[str, ...] = ()
     """Ids of the selected reflectors."""
     point: ControlPoint | None = None
@@ -102,6 +104,20 @@ class Editor:
         station : name; empty: none.
         """
         return replace(self, selected=reflectors, point=point, station=station)
+
+    def using(self, tool: Tool | None, state: AppState) -> Editor:
+        """Return the editor with another tool: what was begun with the old one is dropped, unless that tool keeps it.
+
+        Parameters
+        ----------
+        tool : fresh; none: a click selects.
+        state : of the page, which may have changed since a tool was laid aside.
+        """
+        old = self.tool
+        aside = old if old is not None and old.stays and old.is_half_done else self.laid_aside
+        if tool is not None and aside is not None and type(tool) is type(aside):
+            tool, aside = aside.taken_up(state), None
+        return replace(self, tool=tool, laid_aside=aside, drag=None)
 
     @property
     def points(self) -> tuple[Point, ...]:

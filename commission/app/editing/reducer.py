@@ -72,8 +72,7 @@ def _telling_of_locked(state: AppState, ids: tuple[str, ...], outcome: Outcome) 
 
 @reduce.register
 def choose_tool(action: actions.ChooseTool, state: AppState, sender: Sender) -> Outcome:
-    editor = replace(editor_of(state, sender.browser), tool=action.tool, drag=None)
-    return Outcome(state.with_browser(sender.browser, editor))
+    return Outcome(state.with_browser(sender.browser, editor_of(state, sender.browser).using(action.tool, state)))
 
 
 @reduce.register
@@ -87,7 +86,9 @@ def set_snapping(action: actions.SetSnapping, state: AppState, sender: Sender) -
 def cancel(_action: actions.Cancel, state: AppState, sender: Sender) -> Outcome:
     editor = editor_of(state, sender.browser)
     tool = editor.tool
-    if editor.drag is not None or (tool is not None and tool.is_half_done):
+    if tool is not None and tool.stays:
+        editor = editor.using(None, state)
+    elif editor.drag is not None or (tool is not None and tool.is_half_done):
         editor = replace(editor, drag=None, tool=None if tool is None else type(tool)())
     elif tool is not None:
         editor = replace(editor, tool=None)

@@ -32,11 +32,17 @@ class Tool:
     """What Enter makes of the points; empty: nothing."""
     fewest: ClassVar[int] = 0
     """Points that this takes."""
+    stays: ClassVar[bool] = False
+    """Whether what was begun with it is there again when it is taken up again."""
 
     @property
     def is_half_done(self) -> bool:
         """Whether something was begun that Escape drops before it drops the tool."""
         return self != type(self)()
+
+    def taken_up(self, state: AppState) -> Tool:  # noqa: ARG002 - a default
+        """Return the tool with what still holds of what was begun with it, when it is taken up again."""
+        return self
 
     def clicked(self, state: AppState, click: ClickFloor, sender: Sender) -> Outcome:  # noqa: ARG002 - a default
         """Return what follows from a click; the editor in the state has its place and its reach already.

@@ -79,7 +79,10 @@ class SetPlantPoint(Action):
 
 @dataclass(frozen=True, slots=True)
 class ForgetPoint(Action):
-    """Forget the point to align by that was clicked last."""
+    """Forget points to align by."""
+
+    everything: bool = False
+    """Whether all of them; else the one that was clicked last."""
 
 
 @dataclass(frozen=True, slots=True)

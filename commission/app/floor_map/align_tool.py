@@ -38,6 +38,8 @@ class NamedPoint:
     """Where it lies in the plant's coordinate system; where it was clicked until somebody says otherwise."""
     name: Annotated[str, Words("is")] = ""
     """What you call it, such as: column B4."""
+    origin: tuple[float, float, float] | None = None
+    """Where the floor map lay when it was clicked: on another one the point means nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,30 +65,47 @@ class AlignTool(Tool):
     """What a table says of points; nothing where none was pasted."""
 
     name = "Align"
+    stays = True
+
+    def taken_up(self, state: AppState) -> AlignTool:
+        """Return the tool with its points, unless the floor map was moved or exchanged since they were clicked."""
+        kept = AlignTool(everything=self.everything) if self.is_outdated(state.project) else self
+        return kept.paired(state.project)
+
+    def is_outdated(self, project: Project) -> bool:
+        """Whether the floor map lies elsewhere than when the points were clicked."""
+        return any(point.origin != _origin(project) for point in self.known)
 
     def clicked(self, state: AppState, click: ClickFloor, sender: Sender) -> Outcome:
         """Take a point: the center of a reflector, a station, a corner of a wall, or the place itself."""
         place = marked_place(state.project, click.place, click.reach)
-        return Outcome(with_tool(state, sender, self.with_point(place, NEAR * click.reach).paired(state.project)))
+        begun = AlignTool(everything=self.everything) if self.is_outdated(state.project) else self
+        clicked = NamedPoint(place, place, origin=_origin(state.project))
+        farther = begun.with_point(clicked, NEAR * click.reach)
+        return Outcome(with_tool(state, sender, farther.paired(state.project)))
 
-    def with_point(self, place: Point, near: float) -> AlignTool:
+    def with_point(self, point: NamedPoint, near: float) -> AlignTool:
         """Return the tool after a click: the next point, or one that is near is moved and keeps what was typed for it.
 
         Parameters
         ----------
-        place : that was clicked [m], map frame.
+        point : that was clicked.
         near : distance up to which a point is moved [m]; the nearest is, too, where all letters are in use.
         """
-        old = min(self.known, key=lambda point: math.dist(point.at, place), default=None)
+        old = min(self.known, key=lambda each: math.dist(each.at, point.at), default=None)
         is_full = len(self.known) == len(LETTERS)
-        if old is None or not (is_full or math.dist(old.at, place) <= near):
-            return replace(self, known=(*self.known, NamedPoint(place, place)))
-        new = replace(old, at=place, plant=place if old.plant == old.at else old.plant)
-        return replace(self, known=tuple(new if point is old else point for point in self.known))
+        if old is None or not (is_full or math.dist(old.at, point.at) <= near):
+            return replace(self, known=(*self.known, point))
+        new = replace(old, at=point.at, plant=point.at if old.plant == old.at else old.plant)
+        return replace(self, known=tuple(new if each is old else each for each in self.known))
 
     def without_last(self) -> AlignTool:
         """Return the tool without the point that was clicked last."""
         return replace(self, known=self.known[:-1])
+
+    def without_any(self) -> AlignTool:
+        """Return the tool without the points that were clicked."""
+        return replace(self, known=())
 
     def paired(self, project: Project) -> AlignTool:
         """Return the tool with the points of the table found in the project and among the clicked ones, by name."""
@@ -153,6 +172,14 @@ class AlignTool(Tool):
         return tuple((f"{letter} {point.name}".strip(), point.at) for letter, point in named)
 
 
+def _origin(project: Project) -> tuple[float, float, float] | None:
+    """Return where the floor map lies; none where there is none."""
+    if project.floor_map is None:
+        return None
+    x, y, turned = map(float, project.floor_map.origin)
+    return x, y, turned
+
+
 def _by_all(state: AppState, sender: Sender, tool: AlignTool) -> Outcome:
     """Return what follows from a fit of all points; with a table, which may name what stands on the map, all moves."""
     pairs = tool.pairs()
@@ -177,6 +204,8 @@ def align_tool_of(state: AppState, sender: Sender) -> AlignTool:
 def align_map(state: AppState, sender: Sender) -> Outcome:
     """Return what follows from moving and turning the map: one undo step, and everybody sees it whole."""
     tool = align_tool_of(state, sender)
+    if tool.is_outdated(state.project):
+        raise UsageError("the floor map was moved or exchanged since the points were clicked; expected them anew")
     if tool.is_checked:
         return _by_all(state, sender, tool)
     if len(tool.known) < 2:

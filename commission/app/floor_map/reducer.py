@@ -158,11 +158,12 @@ def set_plant_point(action: actions.SetPlantPoint, state: AppState, sender: Send
 
 
 @reduce.register
-def forget_point(_action: actions.ForgetPoint, state: AppState, sender: Sender) -> Outcome:
+def forget_point(action: actions.ForgetPoint, state: AppState, sender: Sender) -> Outcome:
     tool = editor_of(state, sender.browser).tool
     if not isinstance(tool, AlignTool):
         return Outcome(state)
-    return Outcome(with_tool(state, sender, tool.without_last().paired(state.project)))
+    left = tool.without_any() if action.everything else tool.without_last()
+    return Outcome(with_tool(state, sender, left.paired(state.project)))
 
 
 @reduce.register

@@ -87,6 +87,8 @@ class MapToolFields(BasePanel):
             self._points = [self._add_point(index) for index in range(len(LETTERS))]
             self._forget = gui.add_button("Forget the last point", color="gray", hint="The one that was clicked last.")
             self._forget.on_click(posting(self._post, lambda _event: actions.ForgetPoint()))
+            self._clear = gui.add_button("Forget all points", color="gray", hint="They stay when you use another tool.")
+            self._clear.on_click(posting(self._post, lambda _event: actions.ForgetPoint(everything=True)))
             self._moves = gui.add_dropdown(
                 "Moves", (MAP_ONLY, EVERYTHING), hint="Reflectors, routes, stations: where they are, or with the map."
             )
@@ -133,6 +135,7 @@ class MapToolFields(BasePanel):
 
     def _show_alignment(self, tool: AlignTool) -> None:
         show(self._forget, visible=bool(tool.known))
+        show(self._clear, visible=len(tool.known) > 1)
         for index, widgets in enumerate(self._points):
             known = index < len(tool.known)
             point = tool.known[index] if known else NOWHERE

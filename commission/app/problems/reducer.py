@@ -48,7 +48,7 @@ def drop_facing(_action: DropFacing, state: AppState, sender: Sender) -> Outcome
 @reduce.register
 def show_problem(action: ShowProblem, state: AppState, sender: Sender) -> Outcome:
     problem = action.problem
-    editor = replace(editor_of(state, sender.browser), tool=None).selecting()
+    editor = editor_of(state, sender.browser).using(None, state).selecting()
     if problem.subject is Subject.REFLECTOR:
         editor = editor.selecting(problem.ids)
     elif problem.subject is Subject.STATION and problem.ids:

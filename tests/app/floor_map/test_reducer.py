@@ -259,6 +259,32 @@ def test_points_to_align_by_snap_to_reflectors_and_to_corners_of_walls(state: Ap
     assert known(after(again, actions.ForgetPoint()).state) == known(again)[:2]
 
 
+def test_points_to_align_by_are_there_again_when_the_tool_is_left_and_taken_up(state: AppState) -> None:
+    begun = after(state, use(AlignTool()), click(0.25, 2.0), click(10.25, 2.0)).state
+    begun = after(begun, actions.SetPlantPoint(1, (100.0, 60.0), "column B4")).state
+    points = known(begun)
+    for leaving in ((editing.Cancel(),), (editing.ChooseTool(None),), (use(WallTool()), click(1.0, 1.0))):
+        left = after(begun, *leaving).state
+        assert not isinstance(left.of_browser(ME, Editor).tool, AlignTool)
+        assert known(after(left, use(AlignTool())).state) == points
+    # Until they are forgotten, or the map is moved by them.
+    assert known(after(begun, actions.ForgetPoint(everything=True), editing.Cancel(), use(AlignTool())).state) == ()
+    assert known(after(aligning(state, everything=False).state, use(AlignTool())).state) == ()
+
+
+def test_points_of_a_map_that_was_moved_or_exchanged_since_are_not_taken_for_those_of_another(state: AppState) -> None:
+    begun = after(state, use(AlignTool()), click(0.25, 2.0), click(10.25, 2.0)).state
+    floor_map = begun.project.floor_map
+    assert floor_map is not None
+    other = replace(
+        begun, project=replace(begun.project, floor_map=replace(floor_map, origin=np.array([5.0, 0.0, 0.0])))
+    )
+    assert known(after(other, editing.Cancel(), use(AlignTool())).state) == ()
+    assert len(known(after(other, click(4.0, 4.0)).state)) == 1
+    with pytest.raises(UsageError, match="moved or exchanged since the points were clicked"):
+        after(other, actions.SetPlantPoint(1, (100.0, 60.0)), actions.AlignMap())
+
+
 def aligning(state: AppState, *, everything: bool, stretch: float = 1.0) -> Outcome:
     """Turn the room by a quarter about R1, which comes to lie at (100, 50)."""
     return after(
