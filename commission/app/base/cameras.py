@@ -9,6 +9,7 @@ import json
 import time
 from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field
+from threading import Lock
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -96,6 +97,9 @@ class Cameras:
         self._origin = origin
         self._views: dict[int, ClientView] = {}
         self._target: tuple[float, float] | None = None
+        # A browser's reports are heard by the server's own thread: where it fits while the owner does, the camera that
+        # is sent last has to be the one that is remembered.
+        self._fitting = Lock()
         self._begin_at(extent)
 
     def _begin_at(self, extent: Extent) -> None:
@@ -239,10 +243,9 @@ class Cameras:
 
     def _fit(self, own: ClientView) -> None:
         """Show the plan of the whole site."""
-        own.aspect = _aspect(own.client)
-        height = _visible_height(self._extent, own.aspect)
-        own.fitted = (*self._extent.center, height / PLAN_FOV)
-        self._look_down(own.client, self._extent.center, height)
+        with self._fitting:
+            own.aspect, own.fitted = _aspect(own.client), self._whole(own.client)
+            self._look_down(own.client, self._extent.center, own.fitted[2] * PLAN_FOV)
 
     def _look_down(self, client: ClientHandle, center: tuple[float, float], visible_height: float) -> None:
         distance = visible_height / PLAN_FOV
@@ -276,9 +279,10 @@ class Cameras:
         own, camera = self._views.get(moved.client.client_id), self._origin.camera(moved.client)
         if own is None or own.three_d or own.follow:
             return
-        is_reshaped = abs(_aspect(own.client) - own.aspect) > 0.01
-        was_fitted = self._is_where_fitted(camera, own)
-        is_whole = was_fitted and not is_reshaped
+        with self._fitting:
+            is_reshaped = abs(_aspect(own.client) - own.aspect) > 0.01
+            was_fitted = self._is_at(camera, own.fitted)
+        is_whole = self._is_at(camera, self._whole(own.client))
         self._tell_whether_whole(own, is_whole=is_whole)
         if not self._builds_up(own, is_whole=is_whole):
             is_due = is_reshaped and was_fitted
@@ -311,10 +315,15 @@ class Cameras:
             script = f"window.commissionWhole = {json.dumps(is_whole)}"
             viser_private.run_on_page(self._server, own.client.client_id, script)
 
-    def _is_where_fitted(self, camera: CameraHandle, own: ClientView) -> bool:
-        """Whether a camera still shows the whole site as it was put to."""
-        away = np.abs(camera.position - own.fitted)
-        return bool(np.all(away <= 1e-3 * np.array([*self._extent.size, own.fitted[2]])))
+    def _is_at(self, camera: CameraHandle, place: tuple[float, float, float]) -> bool:
+        """Whether a camera is where it was put, or would be [m]."""
+        away = np.abs(camera.position - place)
+        return bool(np.all(away <= 1e-3 * np.array([*self._extent.size, place[2]])))
+
+    def _whole(self, client: ClientHandle) -> tuple[float, float, float]:
+        """Where a camera shows the plan of the whole site on a floor as it is shaped now [m]."""
+        x, y = self._extent.center
+        return x, y, _visible_height(self._extent, _aspect(client)) / PLAN_FOV
 
     def _rotation_lock(self, client: ClientHandle) -> SceneNodeHandle:
         """Put a sheet under everything that takes left drags: the camera would turn by them, and north not stay up."""

@@ -94,6 +94,26 @@ def test_what_comes_last_for_a_shape_that_is_gone_does_not_stay(window: Window) 
     assert window.sees_all(FINAL)
 
 
+def test_a_report_that_comes_while_the_plan_is_fitted_does_not_leave_it_in_another_shape(
+    window: Window, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    heard: list[bool] = []
+    height = cameras._visible_height
+
+    def slowly(extent: Extent, aspect: float) -> float:
+        if not heard:
+            heard.append(True)
+            window.report(FINAL)  # the owner thread of a busy computer is interrupted here
+            time.sleep(0.3)
+        return height(extent, aspect)
+
+    monkeypatch.setattr(cameras, "_visible_height", slowly)
+    window.report(WIDE)
+    window.apply(0.6)
+    window.show(FINAL)
+    assert window.sees_all(FINAL)
+
+
 def test_a_browser_that_takes_longer_than_its_panels_usually_do_sees_the_whole_site(
     window: Window, settling: float
 ) -> None:
