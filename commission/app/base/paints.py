@@ -31,7 +31,7 @@ class Floor:
     UNKNOWN = Paint("floor that the map does not know", (24, 26, 30), (246, 247, 250))
     FREE = Paint("free floor", (37, 40, 45), (255, 255, 255))
     WALL = Paint("wall", (112, 118, 128), (128, 135, 147))
-    WALL_3D = Paint("wall that stands up", (118, 124, 134), (172, 178, 188))
+    WALL_3D = Paint("wall that stands up", (118, 124, 134), (132, 139, 151))
     RIM = Paint("rim of what is drawn over a heatmap", (0, 0, 0), (30, 33, 38))
     GRID_METER = Paint("grid of a meter", (62, 66, 73), (214, 218, 224))
     ROUTE = Paint("route", (116, 128, 150), (92, 104, 128))
@@ -43,23 +43,23 @@ class Floor:
     DRAFT_INK = Paint("ink of an image being placed", (214, 219, 227), (52, 57, 65))
     PREVIEW = Paint("what is being drawn or measured", (232, 226, 206), (66, 60, 40))
     VEHICLE = Paint("vehicle", (236, 239, 244), (28, 31, 36))
-    TRUCK = Paint("body of the vehicle in 3D", (232, 150, 40), (226, 144, 34))
+    TRUCK = Paint("body of the vehicle in 3D", (232, 150, 40), (198, 120, 24))
 
 
 class Run:
     """What a drive shows on the floor and in plots."""
 
-    GATE = Paint("validation area (gate)", (96, 176, 255), (40, 124, 206))
+    GATE = Paint("validation area (gate)", (96, 176, 255), (28, 106, 184))
     POSE = Paint("pose and its 2 sigma", (255, 92, 138), (214, 36, 104))
     HEADING = Paint("2 sigma of the heading", (178, 255, 218), (36, 100, 72))
-    INLIER = Paint("inlier", (255, 214, 10), (158, 128, 0))
-    OFFSET = Paint("offset of an inlier", (150, 132, 52), (184, 168, 96))
-    OUTLIER = Paint("detection rejected by the gate", (255, 59, 48), (222, 8, 12))
+    INLIER = Paint("inlier", (255, 214, 10), (138, 112, 0))
+    OFFSET = Paint("offset of an inlier", (150, 132, 52), (146, 128, 52))
+    OUTLIER = Paint("detection rejected by the gate", (255, 76, 66), (222, 8, 12))
     OUTLIER_DETECTOR = Paint("detection of too few or many beams", (196, 74, 60), (150, 46, 36))
     SCAN = Paint("scan point", (190, 197, 206), (52, 74, 104))
     FURTHER_SCAN = Paint("scan point of a further scanner", (206, 172, 140), (132, 100, 68))
     FIELD = Paint("field of view", (150, 160, 120), (124, 134, 94))
-    FAR_FIELD = Paint("reach of the scan", (78, 84, 64), (186, 192, 172))
+    FAR_FIELD = Paint("reach of the scan", (111, 118, 92), (134, 142, 116))
     TRAIL = Paint("trail of the estimate", (64, 200, 150), (0, 134, 94))
     REFERENCE = Paint("reference, and the error to it", (196, 140, 255), (134, 76, 190))
     CAMERA_BY_LASER = Paint("camera by the laser", (122, 168, 250), (26, 92, 196))
@@ -70,17 +70,17 @@ class Run:
     CLOUD = Paint("earlier innovations", (128, 150, 176), (104, 126, 154))
     SPREAD = Paint("mean and spread of innovations", (195, 204, 216), (78, 88, 102))
     AFTER = Paint("after the correction", (232, 234, 238), (36, 40, 46))
-    NOT_KNOWN = Paint("nothing was seen, nothing is known", (120, 124, 132), (160, 162, 166))
-    VARIANT_A = Paint("variant A", (255, 160, 190), (190, 100, 132))
-    VARIANT_B = Paint("variant B", (168, 230, 92), (92, 142, 0))
-    VARIANT_C = Paint("variant C", (250, 170, 120), (194, 116, 66))
-    FIRST_CURVE = Paint("first curve of a plot", (77, 196, 255), (0, 130, 182))
-    SECOND_CURVE = Paint("second curve of a plot", (255, 180, 84), (186, 112, 0))
+    NOT_KNOWN = Paint("nothing was seen, nothing is known", (120, 124, 132), (128, 130, 136))
+    VARIANT_A = Paint("variant A", (255, 160, 190), (172, 80, 114))
+    VARIANT_B = Paint("variant B", (168, 230, 92), (74, 120, 0))
+    VARIANT_C = Paint("variant C", (250, 170, 120), (168, 92, 44))
+    FIRST_CURVE = Paint("first curve of a plot", (77, 196, 255), (0, 116, 164))
+    SECOND_CURVE = Paint("second curve of a plot", (255, 180, 84), (160, 96, 0))
     THIRD_CURVE = Paint("third curve of a plot", (226, 120, 240), (160, 44, 176))
     WHOLE_CURVE = Paint("curve of the whole", (230, 233, 239), (40, 44, 51))
     EDIT = Paint("an edit during the drive", (192, 139, 255), (128, 70, 184))
-    OPERATIONAL = Paint("operational", (28, 124, 60), (24, 122, 56))
-    FAIL = Paint("the localization fails", (197, 34, 31), (192, 28, 26))
+    OPERATIONAL = Paint("operational", (28, 127, 62), (24, 122, 56))
+    FAIL = Paint("the localization fails", (213, 40, 37), (192, 28, 26))
     IDLE = Paint("no run", (74, 79, 87), (104, 110, 119))
     FAIL_EVENT = Paint("an event that fails or is lost", (255, 82, 82), (200, 34, 40))
     RECOVERED_EVENT = Paint("an event that recovers", (64, 200, 152), (0, 128, 90))
@@ -89,7 +89,7 @@ class Run:
 class Plan:
     """What studies of the plan show."""
 
-    OVER_LIMIT = Paint("a limit, and what is beyond it", (240, 70, 20), (206, 58, 6))
+    OVER_LIMIT = Paint("a limit, and what is beyond it", (246, 94, 24), (196, 54, 4))
     TOO_LITTLE = Paint("too few reflectors", (240, 132, 52), (188, 92, 0))
     RISK = Paint("risk of a wrong association", (255, 140, 40), (206, 104, 6))
     RECOVERY = Paint("goes on by itself", (120, 230, 110), (30, 140, 22))
@@ -118,17 +118,17 @@ class Plan:
     FROM_NOISE = Paint("error from noise", (138, 148, 164), (134, 144, 160))
     FROM_MAP = Paint("error from the map", (74, 134, 255), (62, 120, 240))
     FROM_MOUNTING = Paint("error from the mounting", (222, 110, 206), (196, 84, 180))
-    FROM_RANGE = Paint("error from ranges", (255, 190, 70), (210, 150, 12))
+    FROM_RANGE = Paint("error from ranges", (255, 190, 70), (182, 126, 0))
     FROM_CLOCK = Paint("error from the clock", (60, 200, 180), (8, 160, 144))
 
 
 class Worded:
     """Words and marks of the panels that say how something is."""
 
-    BRAND = Paint("what can be pressed", (60, 120, 200), (40, 98, 178))
+    BRAND = Paint("what can be pressed", (58, 118, 197), (40, 98, 178))
     PRESS = Paint("what is to be done next", (47, 95, 159), (36, 88, 156))
     DONE = Paint("done", (76, 206, 146), (0, 126, 84))
-    LACKING = Paint("is missing", (255, 170, 60), (190, 106, 0))
+    LACKING = Paint("is missing", (255, 170, 60), (164, 90, 0))
     NOTE = Paint("what is to be known", (255, 220, 90), (128, 100, 0))
     REFUSED = Paint("refused, or wrong", (255, 122, 110), (184, 50, 44))
     DOUBTFUL = Paint("doubtful", (255, 183, 77), (154, 98, 0))
@@ -170,7 +170,7 @@ class Surface:
     PLOT = Paint("ground of a plot in a file", (27, 29, 33), (251, 252, 253))
     FINE = Paint("fine grid of a picture", (34, 37, 43), (236, 238, 242))
     COARSE = Paint("coarse grid of a picture", (53, 58, 67), (208, 213, 221))
-    RAY = Paint("ray of the scanner", (107, 116, 130), (140, 148, 161))
+    RAY = Paint("ray of the scanner", (107, 116, 130), (122, 130, 144))
 
 
 def _all() -> dict[str, Paint]:

@@ -112,12 +112,14 @@ class Height:
     TRAIL = 0.06
     REFLECTOR = 0.07
     GATE = 0.08
-    DETECTION = 0.09
-    VEHICLE = 0.10
-    POSE = 0.11
-    LABEL = 0.12
-    DRAFT = 0.13
-    EDITING = 0.14
+    AROUND_DETECTION = 0.09
+    DETECTION = 0.10
+    AROUND_VEHICLE = 0.11
+    VEHICLE = 0.12
+    POSE = 0.13
+    LABEL = 0.14
+    DRAFT = 0.15
+    EDITING = 0.16
 
 
 class Mark(StrEnum):
@@ -257,7 +259,7 @@ div:has(>.c-carried){{display:none!important}}
 .c-better{{color:{css(BETTER_NUMBER)};font-style:normal}}
 .c-worse{{color:{css(WORSE_NUMBER)};font-style:normal}}
 .c-different{{color:{css(Worded.DIFFERENT.dark)};font-style:normal}}
-.c-variants td small{{opacity:.6;padding-left:5px}}
+.c-variants td small{{opacity:.7;padding-left:5px}}
 .c-variants .c-setting td{{color:{css(Worded.SETTING.dark)};font-style:italic}}
 .c-variants th button{{padding-left:7px}}
 .c-floor-scale i{{display:inline-block;width:16px;height:9px}}

@@ -25,6 +25,8 @@ STYLES: dict[Status, tuple[theme.Color, Shape, str]] = {
 }
 MARKS: dict[Shape, theme.Mark] = {"sparkle": theme.Mark.CROSS, "diamond": theme.Mark.DIAMOND}
 PIXELS: dict[Shape, int] = {"sparkle": 13, "diamond": 9}
+AROUND = 5
+"""So much larger is what is dark around a mark [pixels]."""
 
 
 class DetectionLayer(BaseLayer):
@@ -42,6 +44,17 @@ class DetectionLayer(BaseLayer):
             status: add_marks(scene, f"/run/detections/{status.name.lower()}", color, PIXELS[shape], shape=shape)
             for status, (color, shape, _) in STYLES.items()
         }
+        # Without what is dark around it a yellow cross is not seen on the bright end of a heatmap.
+        self._casings = {
+            status: add_marks(
+                scene,
+                f"/run/detections/around_{status.name.lower()}",
+                theme.CASING,
+                PIXELS[shape] + AROUND,
+                shape=shape,
+            )
+            for status, (_, shape, _) in STYLES.items()
+        }
 
     def draw(self, view: PageView) -> None:
         """Draw every detection; its offset is magnified as the gates are."""
@@ -50,16 +63,18 @@ class DetectionLayer(BaseLayer):
             return
         places, offsets = drawn_detections(run, view.state.magnify)
         for status, cloud in self._clouds.items():
-            chosen = NO_POINTS
-            if run.estimate is not None:
-                chosen = lift(places[run.estimate.status == status], theme.Height.DETECTION)
+            if run.estimate is None:
+                chosen = below = NO_POINTS
+            else:
+                at = places[run.estimate.status == status]
+                chosen, below = lift(at, theme.Height.DETECTION), lift(at, theme.Height.AROUND_DETECTION)
             if len(chosen) or len(cloud.points):
-                cloud.points = chosen
+                cloud.points, self._casings[status].points = chosen, below
         self._offsets.points = stroke_segments(offsets, theme.Height.DETECTION)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the marks of every status and the lines of their offsets."""
-        return (*self._clouds.values(), self._offsets)
+        return (*self._casings.values(), *self._clouds.values(), self._offsets)
 
 
 def drawn_detections(run: RunView, magnify: float) -> tuple[FloatArray, FloatArray]:

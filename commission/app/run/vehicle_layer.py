@@ -80,6 +80,7 @@ class VehicleLayer(BaseLayer):
         super().__init__(scene)
         self._project = Project()
         self._frame = scene.add_frame("/vehicle", show_axes=False, visible=False)
+        self._casing = add_lines(scene, "/vehicle/around", theme.CASING, 5.0)
         self._lines = add_lines(scene, "/vehicle/outline", theme.VEHICLE, 2.0)
         self._near, self._far = (
             add_lines(scene, f"/vehicle/field/{name}", color, 1.0)
@@ -93,9 +94,9 @@ class VehicleLayer(BaseLayer):
         """Draw the outline, and place and field of view of each scanner."""
         self._project = project
         outline = np.array(project.vehicle.outline)
-        sides = outline_segments(outline[np.newaxis], theme.Height.VEHICLE)
-        arrow = stroke_segments(heading_mark(outline), theme.Height.VEHICLE)
-        self._lines.points = np.concatenate([sides, arrow])
+        for node, height in ((self._lines, theme.Height.VEHICLE), (self._casing, theme.Height.AROUND_VEHICLE)):
+            sides = outline_segments(outline[np.newaxis], height)
+            node.points = np.concatenate([sides, stroke_segments(heading_mark(outline), height)])
         size = float(np.abs(outline).max())
         self._place_scanners(project.scanners, 0.3 * size)
         near = [fan(scanner, NEAR_FAN * size) for scanner in project.scanners]
@@ -154,4 +155,4 @@ class VehicleLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the parts that hang on the vehicle's frame (which itself is hidden without a run or a route)."""
-        return self._lines, *self._scanners, self._near, self._far
+        return self._casing, self._lines, *self._scanners, self._near, self._far

@@ -13,12 +13,16 @@ import numpy as np
 import pytest
 
 import commission
-from commission.app.base import theme
-from commission.app.base.paints import PAINTS, Floor, Paint, Plan, Run
+from commission.app.base import style, theme
+from commission.app.base.paints import PAINTS, Floor, Paint, Plan, Run, Surface, Worded
 from commission.io.bundled import bundled_folder
 
 LEAST = 3.0
 """What WCAG 2.1, 1.4.11, asks of graphical objects."""
+LEAST_OF_WORDS = 4.5
+"""What it asks of words, 1.4.3."""
+NOT_WORDS = (0.3, 0.35, 0.45, 0.5, 0.55, 0.6)
+"""Opacities of what cannot be pressed now or is switched off, and of marks."""
 TOLD_APART = 12.0
 """Distance of colors that are told apart beside each other: 2.3 is just noticed (Mahy et al. 1994)."""
 THEMES = ("dark", "light")
@@ -98,7 +102,11 @@ def test_what_a_drive_shows_is_told_apart(shown: str) -> None:
     [
         *(Floor.WALL, Floor.ROUTE, Floor.REFLECTOR, Floor.STATION, Floor.ZONE, Floor.SELECTED, Floor.VEHICLE),
         *(Run.GATE, Run.POSE, Run.HEADING, Run.INLIER, Run.OUTLIER, Run.SCAN, Run.TRAIL, Run.REFERENCE),
-        *(Plan.SUGGESTED, Plan.OVER_LIMIT, Plan.KEPT),
+        *(Run.OFFSET, Run.OUTLIER_DETECTOR, Run.FURTHER_SCAN, Run.FIELD, Run.FAR_FIELD, Run.NOT_KNOWN),
+        *(Run.VARIANT_A, Run.VARIANT_B, Run.VARIANT_C, Run.HYPOTHESIS, Run.GOODS, Run.GOODS_SIGMA, Run.EDIT),
+        *(Run.CAMERA_BY_LASER, Run.CAMERA_BY_CONTOUR, Floor.PREVIEW, Floor.WALL_3D, Floor.TRUCK),
+        *(Plan.SUGGESTED, Plan.OVER_LIMIT, Plan.KEPT, Plan.TAKEN_DOWN, Plan.KEEP_OUT, Plan.DEPENDENT, Plan.RISK),
+        *(Plan.TOO_LITTLE, Plan.RECOVERY, Plan.FIRST_TWIN, Plan.SECOND_TWIN),
     ],
     ids=lambda paint: paint.meaning,
 )
@@ -107,8 +115,52 @@ def test_marks_stand_out_from_the_floor(drawn: Paint, below: Paint, shown: str) 
 
 
 @pytest.mark.parametrize("shown", THEMES)
-@pytest.mark.parametrize("drawn", [Floor.ROUTE, Floor.REFLECTOR])
-def test_reflectors_and_routes_stand_out_on_walls_and_heatmaps_by_their_casing(drawn: Paint, shown: str) -> None:
+def test_words_can_be_read_on_what_they_stand_on(shown: str) -> None:
+    panel = Surface.HEAD
+    on_panels = (
+        *(Worded.DONE, Worded.NOTE, Worded.REFUSED, Worded.DOUBTFUL, Worded.BETTER, Worded.WORSE, Worded.DIFFERENT),
+        *(Worded.SETTING, Worded.WORD, Worded.INK, Worded.LACKING, Surface.AXIS, Run.FAIL_EVENT, Run.RECOVERED_EVENT),
+        # Above the plots each curve's value has the curve's color.
+        *(Run.FIRST_CURVE, Run.SECOND_CURVE, Run.THIRD_CURVE, Run.WHOLE_CURVE, Run.INLIER, Run.OUTLIER, Run.EDIT),
+        *(Run.VARIANT_A, Run.VARIANT_B, Run.VARIANT_C, Run.REFERENCE, Plan.OVER_LIMIT),
+    )
+    pairs = [
+        *((word, ground) for word in on_panels for ground in (panel, Surface.PLOT)),
+        *((word, Floor.BACKGROUND) for word in (Run.GATE, Plan.OVER_LIMIT, Worded.LACKING, Worded.STATUS, Worded.NOTE)),
+        *((word, Surface.CARD) for word in (Worded.DONE, Worded.NOTE, Worded.LACKING)),
+        (Surface.AXIS, Floor.BACKGROUND),
+        (Worded.ON_LACKING, Worded.LACKING),
+        (Surface.ON_DISABLED, Surface.CARD),
+    ]
+    found = {
+        f"{word.meaning} on {ground.meaning}": round(contrast(getattr(word, shown), getattr(ground, shown)), 2)
+        for word, ground in pairs
+    }
+    assert {name: value for name, value in found.items() if value < LEAST_OF_WORDS} == {}
+
+
+@pytest.mark.parametrize("shown", THEMES)
+@pytest.mark.parametrize("ground", [Run.OPERATIONAL, Run.FAIL, Run.IDLE, Worded.PRESS, Worded.BRAND])
+def test_white_words_can_be_read_and_their_ground_is_seen_on_a_panel(ground: Paint, shown: str) -> None:
+    color = getattr(ground, shown)
+    assert contrast((255, 255, 255), color) >= LEAST_OF_WORDS
+    if ground in (Run.OPERATIONAL, Run.FAIL, Worded.BRAND):  # the strip of the drive; what can be pressed
+        assert contrast(color, getattr(Surface.HEAD, shown)) >= LEAST
+
+
+def test_pale_words_can_be_read() -> None:
+    pale = [float(each) for each in re.findall(r"[;{]opacity:(0?\.\d+)", theme.STYLE + style.BAR_AND_GUIDE)]
+    assert len(pale) > 10
+    ink, panel = {"dark": 201.0, "light": 0.0}, {"dark": 36.0, "light": 255.0}  # viser's own
+    for opacity in {each for each in pale if each not in NOT_WORDS}:
+        for shown in THEMES:
+            grey = round(panel[shown] + opacity * (ink[shown] - panel[shown]))
+            assert contrast((grey,) * 3, (round(panel[shown]),) * 3) >= LEAST_OF_WORDS, (opacity, shown)
+
+
+@pytest.mark.parametrize("shown", THEMES)
+@pytest.mark.parametrize("drawn", [Floor.ROUTE, Floor.REFLECTOR, Floor.VEHICLE, Run.INLIER, Run.OUTLIER])
+def test_what_counts_stands_out_on_walls_and_heatmaps_by_its_casing(drawn: Paint, shown: str) -> None:
     assert theme.CASING == Floor.BACKGROUND.dark
     assert contrast(getattr(drawn, shown), getattr(Floor.BACKGROUND, shown)) >= LEAST
 
