@@ -34,11 +34,16 @@ def browser() -> Iterator[Browser]:
         chromium.close()
 
 
+COARSE = 0.5
+"""Resolution of the floor where a test does not look at its pixels: without a graphics card, drawing it is what a test
+in a browser spends most of its time on."""
+
+
 def _windows(browser: Browser) -> Iterator[Callable[..., OpenPage]]:
     windows: list[OpenPage] = []
 
-    def make(server: viser.ViserServer, size: tuple[int, int] = WIDE) -> OpenPage:
-        windows.append(OpenPage(browser, server, size))
+    def make(server: viser.ViserServer, size: tuple[int, int] = WIDE, *, sharp: bool = False) -> OpenPage:
+        windows.append(OpenPage(browser, server, size, 1.0 if sharp else COARSE))
         return windows[-1]
 
     yield make
@@ -48,7 +53,7 @@ def _windows(browser: Browser) -> Iterator[Callable[..., OpenPage]]:
 
 @pytest.fixture
 def window(browser: Browser) -> Iterator[Callable[..., OpenPage]]:
-    """Makes windows for a server's page, and closes them at the end."""
+    """Makes windows for a server's page (`sharp`: to look at the pixels of the floor), and closes them at the end."""
     yield from _windows(browser)
 
 

@@ -93,10 +93,19 @@ class OpenPage:
     browser : the running chromium.
     server : the server whose page is opened; None when the window shows something else.
     size : width and height of the window [pixels].
+    resolution : pixels of the floor for each one of the window; None: as a person gets it, which viser lowers while the
+        machine is busy.
     """
 
-    def __init__(self, browser: Browser, server: viser.ViserServer, size: tuple[int, int] = WIDE) -> None:
+    def __init__(
+        self,
+        browser: Browser,
+        server: viser.ViserServer,
+        size: tuple[int, int] = WIDE,
+        resolution: float | None = None,
+    ) -> None:
         self.server = server
+        self._resolution = resolution
         self._context: BrowserContext = browser.new_context(viewport={"width": size[0], "height": size[1]})
         self.page: Page = self._context.new_page()
         self.page.add_init_script(_COLLECT_NOTES)
@@ -113,6 +122,8 @@ class OpenPage:
     def open(self, query: str = "", nodes: Sequence[str] = ()) -> viser.ClientHandle:
         """Open the page and wait until it is connected, has these scene nodes and has drawn them."""
         before = set(self.server.get_clients())
+        if self._resolution is not None:
+            query += f"{'&' if query else '?'}fixedDpr={self._resolution}"
         self.page.goto(self.address + query)
         client = self.wait_for_client(before)
         self.wait_until_drawn(nodes)

@@ -43,7 +43,7 @@ def switch(page: OpenPage, label: str) -> None:
 def test_the_light_theme_is_light_all_over_and_stays_with_the_browser_that_chose_it(
     served: Served, window: Callable[..., OpenPage], tmp_path: Path
 ) -> None:
-    page, other = window(served.server), window(served.server)
+    page, other = window(served.server, sharp=True), window(served.server)
     for each in (page, other):
         each.open(nodes=("/floor/map", "/vehicle/outline"))
     page.open_tab("Layers")

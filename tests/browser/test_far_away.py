@@ -35,7 +35,7 @@ def seen_at(window: Callable[..., OpenPage], east: float, north: float) -> tuple
         served.until(lambda: served.view is not None)
         served.runtime.post(Play(playing=False))
         served.runtime.post(Seek(6.0))
-        page = window(served.server)
+        page = window(served.server, sharp=True)
         client = page.open(nodes=["/run/gates", "/vehicle"])
         page.page.wait_for_timeout(1500)
         picture = floor(page.page)

@@ -53,7 +53,7 @@ def seen(queue: SimpleQueue[object], window: OpenPage) -> object:
 def test_a_point_of_the_floor_is_drawn_where_the_harness_says(
     server: viser.ViserServer, window: Window, size: tuple[int, int], tmp_path: Path
 ) -> None:
-    page = window(server, size)
+    page = window(server, size, sharp=True)
     page.open(nodes=["/floor"])
     page.screenshot(tmp_path / "page.png")
     picture = np.asarray(Image.open(tmp_path / "page.png").convert("L"))

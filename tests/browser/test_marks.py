@@ -57,7 +57,7 @@ def pixels_of(page: OpenPage, around: tuple[float, float], color: theme.Color, r
 def test_an_inlier_is_a_thin_cross_of_one_size_inside_the_drawn_ellipse_at_every_zoom(
     served: Served, window: Callable[..., OpenPage], magnify: float
 ) -> None:
-    page = window(served.server)
+    page = window(served.server, sharp=True)
     client = page.open(nodes=["/run/gates", f"/run/detections/inlier/{PIXELS['sparkle']}px"])
     served.runtime.post(Magnify(magnify))
     served.until(lambda: served.state.magnify == magnify)

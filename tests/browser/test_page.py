@@ -51,7 +51,7 @@ def run() -> Iterator[OpenRun]:
 @pytest.fixture(scope="module")
 def page(run: OpenRun, lasting_window: Callable[..., OpenPage]) -> OpenPage:
     """One small window for all tests: where the processor draws, opening one is what takes longest."""
-    opened = lasting_window(run.server, SMALL)
+    opened = lasting_window(run.server, SMALL, sharp=True)
     opened.page.set_default_timeout(60_000)
     opened.open(nodes=NODES)
     return opened

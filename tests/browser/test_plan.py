@@ -55,7 +55,7 @@ def site() -> Iterator[OpenSite]:
 
 @pytest.fixture(scope="module")
 def page(site: OpenSite, lasting_window: Callable[..., OpenPage]) -> OpenPage:
-    opened = lasting_window(site.server, SMALL)
+    opened = lasting_window(site.server, SMALL, sharp=True)
     opened.open(nodes=["/floor/map", "/reflectors/marks"])
     opened.open_tab("Plan")
     return opened

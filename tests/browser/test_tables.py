@@ -52,7 +52,7 @@ def found_in(served: Served) -> Found:
 @pytest.fixture(scope="module")
 def page(served: Served, lasting_window: Callable[..., OpenPage]) -> OpenPage:
     """One window for all tests: opening one is what takes longest."""
-    opened = lasting_window(served.server)
+    opened = lasting_window(served.server, sharp=True)
     opened.open(nodes=["/vehicle"])
     opened.page.wait_for_function("() => /Events [1-9]/.test(document.querySelector('.c-views').innerText)")
     return opened
