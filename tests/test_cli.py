@@ -1,3 +1,4 @@
+import os
 import re
 import subprocess
 import sys
@@ -174,3 +175,14 @@ def test_an_initial_pose_has_three_or_six_numbers(text, pose, sigmas):
 def test_a_malformed_initial_pose_is_shown_with_the_form_expected(text, said):
     with pytest.raises(UsageError, match=said):
         parsing.initial_pose(text)
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are counted in /proc, which only Linux has")
+@pytest.mark.parametrize(("asked", "more"), [({}, 0), ({"OPENBLAS_NUM_THREADS": "3"}, 2)])
+def test_small_matrices_occupy_one_core_unless_somebody_asks_for_more(asked, more):
+    """Spread over all cores, matrices of a few dozen rows make threads wait for each other most of the time."""
+    count = "import commission, numpy, os; print(len(os.listdir('/proc/self/task')))"
+    plain = {name: value for name, value in os.environ.items() if name != "OPENBLAS_NUM_THREADS"}
+    said = subprocess.run([sys.executable, "-c", count], env=plain | asked, capture_output=True, text=True, check=True)
+    # More threads than cores are never made.
+    assert int(said.stdout) == 1 + min(more, (os.cpu_count() or 1) - 1)
