@@ -208,17 +208,20 @@ def _filtered(
     checkpoints = list(known)
     searches = [] if earlier is None else [moment for moment in earlier.searches if moment.cycle < begin]
     kept = earlier.priors.known_before(begin) if earlier and isinstance(earlier.priors, ReplayedPriors) else {}
+    room = prior_rows(CHECKPOINT_CYCLES)
     for segment, first, last in _chunks(segments, begin, cycles):
         progress((first - begin) / (cycles - begin), "localizing")
         rows = odometry_rows(log, detected.stamps_ns, first, last)
         part_of = cut(columns, detected, first, last)
-        state, priors, told = _entered(segment, first, state), prior_rows(last - first), len(searches)
+        state, told = _entered(segment, first, state), len(searches)
+        priors = PriorRows(room.means[: last - first], room.covariances[: last - first])
         is_sought = state.search is not None
         stretch = CycleStretch(first, rows, detected.part(first, last), part_of, priors, searches)
         state = continued(log, segment.setup, state, stretch)
         if is_sought or len(searches) > told:
             # To search again takes a hundred times as long as to filter again, and every study of the run would.
             kept[first] = PriorRows(read_only(priors.means), read_only(priors.covariances))
+            room = prior_rows(CHECKPOINT_CYCLES)
         checkpoints.append(Checkpoint(last, state))
     for column in columns:
         column.setflags(write=False)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -267,13 +268,16 @@ def judge(inputs: RunInput, columns: RunColumns, microseconds_per_cycle: float) 
     """
     log = inputs.log
     references, tallies = references_of(log, columns), tallies_of(columns)
-    scanners = scanner_figures(columns, references, tallies)
-    errors = pose_errors(columns.means, references)
-    covariances = _of_places_known(columns, log, references)
+    # Of hours, half of the figures take as long as the others: a core each.
+    with ThreadPoolExecutor(1) as beside:
+        pending = beside.submit(scanner_figures, columns, references, tallies)
+        errors = pose_errors(columns.means, references)
+        covariances = _of_places_known(columns, log, references)
+        operational, limits = columns.modes == Mode.OPERATIONAL, limits_along(columns)[:, 0]
+        statistics = error_statistics(errors, covariances, operational, limits)
+        scanners = pending.result()
     # Each is a column of the whole run: it goes before the others come.
-    del references
-    statistics = error_statistics(errors, covariances, columns.modes == Mode.OPERATIONAL, limits_along(columns)[:, 0])
-    del covariances
+    del references, covariances
     whole, newest = consistency(columns, tallies=tallies), recent(columns, tallies=tallies)
     first_ns = log.first_ns
     times = np.asarray((columns.stamps_ns - first_ns) * 1e-9, dtype=np.float64)
