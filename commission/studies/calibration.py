@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from commission.studies.calibration_drive import first_run, part_of, problem_of
 from commission.studies.calibration_fit import CalibrationFit, CalibrationProblem, fit
 from commission.studies.calibration_judging import agreements, best_factor
 from commission.studies.calibration_noise import noise_values, noisy, residual_spread
+from commission.studies.calibration_noise_verdicts import NoiseJudge
 from commission.studies.calibration_values import CalibrationInput, CalibrationVerdict, Value, with_value
 from commission.studies.calibration_verdicts import ConstantsJudge
 
@@ -93,7 +95,7 @@ def calibrate(inputs: CalibrationInput, progress: Progress = silent) -> Calibrat
     whole, noise = estimate(problem, part(progress, 0.05, 0.5))
     halves = _halves(problem, whole, part(progress, 0.5, 0.75))
     progress(0.75, "judging")
-    judge = ConstantsJudge(believed, problem, halves, noise, run.detected)
+    judge = ConstantsJudge(believed, problem, (halves[0].constants, halves[1].constants), noise, run.detected)
     values, found_setup = judge.constants(whole)
     progress(0.9, "noise")
     spread = residual_spread(whole)
@@ -101,9 +103,20 @@ def calibrate(inputs: CalibrationInput, progress: Progress = silent) -> Calibrat
     reflector = np.full(len(run.detected.range_bearing), -1, dtype=np.int64)
     reflector[:] = np.where(run.reflector >= 0, run.reflector, -1)
     # With all constants as found: what the filter considers of them is no noise.
-    quiet = noisy(found_setup, spread, noise)
-    factor = best_factor(agreements(log, quiet, belief, run.detected, reflector))
-    found = noise_values(inputs, whole, noise, spread, factor)
+    tried = agreements(log, noisy(found_setup, spread, noise), belief, run.detected, reflector)
+    factor = best_factor(tried)
+    noise_judge = NoiseJudge(
+        log=log,
+        start=belief,
+        detected=run.detected,
+        reflector=reflector,
+        setup=found_setup,
+        spread=spread,
+        spreads=(halves[0].spread, halves[1].spread),
+        odometry=(halves[0].odometry, halves[1].odometry),
+    )
+    verdicts = noise_judge.both(tried, noise)
+    found = noise_values(inputs, whole, (spread, noise), factor, verdicts)
     progress(1.0, "")
     return Calibration(
         inputs=inputs,
@@ -167,13 +180,31 @@ def _correlation_times(problem: CalibrationProblem, found: CalibrationFit) -> Fl
     return times
 
 
-def _halves(problem: CalibrationProblem, whole: CalibrationFit, progress: Progress) -> tuple[FloatArray, FloatArray]:
-    """Constants by the first half of the drive alone, and by the second."""
-    count = len(problem.drive.stamps_ns)
+class _Half(NamedTuple):
+    """What half of the drive says alone."""
+
+    constants: FloatArray
+    """(p,) with the noise of the whole drive."""
+    spread: FloatArray
+    """(2,) `residual_spread`."""
+    odometry: FloatArray
+    """(6,) variances of odometry."""
+
+
+def _halves(problem: CalibrationProblem, whole: CalibrationFit, progress: Progress) -> tuple[_Half, _Half]:
+    """Constants and noise by the first half of the drive alone, and by the second."""
+    middle, count = len(problem.drive.stamps_ns) // 2, len(problem.drive.stamps_ns)
     begun = replace(problem, start=whole.point, reflector=whole.reflector, noise=whole.noise, fixed_noise=True)
-    first = fit(part_of(begun, 0, count // 2), part(progress, 0.0, 0.5))
-    second = fit(part_of(begun, count // 2, count), part(progress, 0.5, 1.0))
-    return first.point.constants, second.point.constants
+    first = _half(problem, part_of(begun, 0, middle), part(progress, 0.0, 0.5))
+    return first, _half(problem, part_of(begun, middle, count), part(progress, 0.5, 1.0))
+
+
+def _half(problem: CalibrationProblem, begun: CalibrationProblem, progress: Progress) -> _Half:
+    """Fit half of a drive, then its noise, which is believed as it is before the drive."""
+    found = fit(begun, part(progress, 0.0, 0.5))
+    free = replace(begun, start=found.point, reflector=found.reflector, noise=problem.noise, fixed_noise=False)
+    noise = fit(free, part(progress, 0.5, 1.0)).noise[2:]
+    return _Half(found.point.constants, residual_spread(found), noise)
 
 
 def _notes(problem: CalibrationProblem, whole: CalibrationFit, factor: float) -> list[str]:

@@ -52,6 +52,11 @@ class Score:
         """Return the score of some stretches."""
         return Score(self.blocks[rows], self.counts[rows], self.nis)
 
+    def half(self, half: int) -> Score:
+        """Return the score of the first half of the drive, or of the second."""
+        later = np.arange(len(self.blocks)) >= len(self.blocks) // 2
+        return self.part(later if half else ~later)
+
     @property
     def mean(self) -> float:
         """Log-likelihood per detection."""
@@ -88,9 +93,7 @@ def score(log: RecordLog, setup: LocalizerSetup, start: Belief, detected: Detect
     known = np.isfinite(log_det) & judged
     log_det = np.where(known, log_det, float(np.median(log_det[known])) if known.any() else 0.0)
     likelihood = np.where(judged, -0.5 * (d2 + log_det), 0.0)
-    seconds = (run.stamps_ns - run.stamps_ns[0]) * 1e-9
-    block = np.repeat((seconds / BLOCK_S).astype(np.int64), np.diff(run.offsets))
-    size = int(seconds[-1] / BLOCK_S) + 1
+    block, size = np.repeat(_blocks(run), np.diff(run.offsets)), int(_blocks(run)[-1]) + 1
     return Score(
         np.bincount(block, likelihood, size).astype(np.float64),
         np.bincount(block, judged.astype(np.float64), size).astype(np.float64),
@@ -107,7 +110,7 @@ def _innovations(run: RunColumns, setup: LocalizerSetup) -> tuple[FloatArray, Fl
     return d2, np.where(nobody, math.nan, np.log(det))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Agreement:
     """How two localizers that see different reflectors agree, for one noise of a detection."""
 
@@ -117,10 +120,20 @@ class Agreement:
     """Mean log-likelihood of their differences."""
     ratio: float
     """Mean squared difference over its expectation: 1 is consistent, more is too sure."""
+    score: Score
+    """Log-likelihood of the differences, stretch by stretch; a cycle counts as a detection there."""
+    ratios: tuple[float, float]
+    """`ratio` of the first half of the drive, and of the second."""
 
 
 def agreements(
-    log: RecordLog, setup: LocalizerSetup, start: Belief, detected: DetectionLog, reflector: IntArray
+    log: RecordLog,
+    setup: LocalizerSetup,
+    start: Belief,
+    detected: DetectionLog,
+    reflector: IntArray,
+    *,
+    factors: Sequence[float] = FACTORS,
 ) -> tuple[Agreement, ...]:
     """Try multiples of the noise of a detection.
 
@@ -131,10 +144,11 @@ def agreements(
     start : belief before the first record.
     detected : detections of the recording.
     reflector : (n,) reflector of each, by the calibration; -1: none, it is left out.
+    factors : multiples of the noise.
 
     Returns
     -------
-    agreements : one for each of `FACTORS`; none where there are too few reflectors.
+    agreements : one for each of them; none where there are too few reflectors.
     """
     seen = np.unique(reflector[reflector >= 0])
     if len(seen) < FEWEST_REFLECTORS:
@@ -142,15 +156,21 @@ def agreements(
     halves = (seen[::2], seen[1::2])
     parts = [(_map_of(setup, half), _detections_of(detected, np.isin(reflector, half))) for half in halves]
     found: list[Agreement] = []
-    for factor in FACTORS:
+    for factor in factors:
         runs = [whole_run.run(log, _plain(part, factor), start, detected=own) for part, own in parts]
         found.append(_agreement(runs[0], runs[1], factor))
     return tuple(found)
 
 
-def best_factor(found: Sequence[Agreement]) -> float:
-    """Least multiple of the noise with which two localizers differ as much as they say; 1 where nothing was tried."""
-    ratios = np.array([each.ratio for each in found])
+def best_factor(found: Sequence[Agreement], half: int | None = None) -> float:
+    """Least multiple of the noise with which two localizers differ as much as they say; 1 where nothing was tried.
+
+    Parameters
+    ----------
+    found : what was tried, ascending.
+    half : 0 or 1, the half of the drive that says so; None: all of it.
+    """
+    ratios = np.array([each.ratio if half is None else each.ratios[half] for each in found])
     if not found or ratios[0] <= 1.0:
         return 1.0
     if ratios.min() > 1.0:
@@ -222,5 +242,17 @@ def _agreement(one: RunColumns, other: RunColumns, factor: float) -> Agreement:
     difference[:, 2] = wrap(difference[:, 2])
     d2 = np.einsum("ki,ki->k", difference, np.linalg.solve(V, difference[:, :, np.newaxis])[:, :, 0])
     _, log_det = np.linalg.slogdet(V)
-    clipped = np.minimum(d2, 3.0 * FARTHEST_D2)
-    return Agreement(factor, float(np.mean(-0.5 * (clipped + log_det))), float(np.mean(d2) / 3.0))
+    likelihood, middle = -0.5 * (np.minimum(d2, 3.0 * FARTHEST_D2) + log_det), len(d2) // 2
+    block = _blocks(one)
+    return Agreement(
+        factor=factor,
+        likelihood=float(likelihood.mean()),
+        ratio=float(d2.mean() / 3.0),
+        score=Score(np.bincount(block, likelihood).astype(np.float64), np.bincount(block).astype(np.float64), math.nan),
+        ratios=(float(d2[:middle].mean() / 3.0), float(d2[middle:].mean() / 3.0)),
+    )
+
+
+def _blocks(run: RunColumns) -> IntArray:
+    """(K,) stretch of `BLOCK_S` that each cycle lies in."""
+    return ((run.stamps_ns - run.stamps_ns[0]) * 1e-9 / BLOCK_S).astype(np.int64)

@@ -13,7 +13,7 @@ from commission.geometry.arrays import FloatArray
 from commission.localization.setup import LocalizerSetup
 from commission.site.quantity import DEGREES, MILLIMETRES, Shown
 from commission.studies.calibration_fit import CalibrationFit
-from commission.studies.calibration_values import CalibrationInput, CalibrationVerdict, Value
+from commission.studies.calibration_values import CalibrationInput, CalibrationVerdict, NoiseVerdict, Value
 
 ODOMETRY = (
     *("forward_per_sqrt_m", "forward_per_sqrt_s", "lateral_per_sqrt_m"),
@@ -32,30 +32,34 @@ def residual_spread(found: CalibrationFit) -> FloatArray:
     return np.sqrt(np.nanmean(found.residuals**2, axis=0))
 
 
-def noisy(setup: LocalizerSetup, sigmas: FloatArray, odometry: FloatArray) -> LocalizerSetup:
+def noisy(setup: LocalizerSetup, sigmas: FloatArray | None, odometry: FloatArray | None) -> LocalizerSetup:
     """Return the setup with other noise.
 
     Parameters
     ----------
     setup : of the localizer.
-    sigmas : (2,) 1-sigma of range [m] and bearing [rad].
-    odometry : (6,) variances, in the order of `ODOMETRY`.
+    sigmas : (2,) 1-sigma of range [m] and bearing [rad]; None: as it is.
+    odometry : (6,) variances, in the order of `ODOMETRY`; None: as they are.
     """
-    driven = dict(zip(ODOMETRY, np.sqrt(odometry).tolist(), strict=True))
-    given = setup.parameters
-    parameters = replace(
-        given,
-        observation=replace(given.observation, range_sigma=float(sigmas[0]), bearing_sigma=float(sigmas[1])),
-        odometry=replace(given.odometry, **driven),
-    )
-    scanners = tuple(
-        replace(each, detection_range_sigma=None, detection_bearing_sigma_deg=None) for each in setup.scanners
-    )
+    parameters, scanners = setup.parameters, setup.scanners
+    if sigmas is not None:
+        observation = replace(parameters.observation, range_sigma=float(sigmas[0]), bearing_sigma=float(sigmas[1]))
+        parameters = replace(parameters, observation=observation)
+        scanners = tuple(
+            replace(each, detection_range_sigma=None, detection_bearing_sigma_deg=None) for each in scanners
+        )
+    if odometry is not None:
+        driven = dict(zip(ODOMETRY, np.sqrt(odometry).tolist(), strict=True))
+        parameters = replace(parameters, odometry=replace(parameters.odometry, **driven))
     return replace(setup, scanners=scanners, parameters=parameters)
 
 
 def noise_values(
-    inputs: CalibrationInput, whole: CalibrationFit, odometry: FloatArray, spread: FloatArray, factor: float
+    inputs: CalibrationInput,
+    whole: CalibrationFit,
+    proposed: tuple[FloatArray, FloatArray],
+    factor: float,
+    verdicts: tuple[NoiseVerdict, NoiseVerdict],
 ) -> list[Value]:
     """Noise as figures of the project: what two localizers that see different reflectors need to agree.
 
@@ -63,10 +67,11 @@ def noise_values(
     ----------
     inputs : what the project says.
     whole : the fit.
-    odometry : (6,) variances, in the order of `ODOMETRY`.
-    spread : (2,) `residual_spread`.
-    factor : multiple of it that the localizer needs.
+    proposed : (2,) `residual_spread`, and (6,) variances of odometry in the order of `ODOMETRY`.
+    factor : multiple of the spread that the localizer needs.
+    verdicts : of the noise of detections, and of that of odometry.
     """
+    spread, odometry = proposed
     seen, driven = inputs.parameters.observation, inputs.parameters.odometry
     shown = [MILLIMETRES, DEGREES, *_shown_of_noise()]
     keys = ["observation.range_sigma", "observation.bearing_sigma", *(f"odometry.{name}" for name in ODOMETRY)]
@@ -76,16 +81,17 @@ def noise_values(
     for index, key in enumerate(keys):
         # Correlated residuals are as many independent ones as the square of the factor leaves of them.
         relative = 0.5 * factor * float(whole.noise_sigmas[index])
-        is_shown = relative < 0.5
+        is_shown, judged = relative < 0.5, verdicts[0 if index < len(spread) else 1]
+        verdict = CalibrationVerdict.WORSE if judged.is_worse else CalibrationVerdict.PROPOSED
         values.append(
             Value(
                 key=key,
                 before=before[index],
                 proposed=after[index],
                 sigma=after[index] * relative,
-                verdict=CalibrationVerdict.PROPOSED if is_shown else CalibrationVerdict.NOT_SHOWN,
+                verdict=verdict if is_shown else CalibrationVerdict.NOT_SHOWN,
                 shown=shown[index],
-                reason="" if is_shown else "other noise of the wheels hides it in this drive",
+                reason=judged.reason if is_shown else "other noise of the wheels hides it in this drive",
             )
         )
     return values

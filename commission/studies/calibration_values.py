@@ -100,6 +100,16 @@ class Value:
     """Stretches of the drive that say most of it, from and to [s]."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NoiseVerdict:
+    """What becomes of one kind of noise."""
+
+    is_worse: bool
+    """Whether a half gets worse with what the other half says."""
+    reason: str
+    """Why, in words."""
+
+
 def with_value(setup: LocalizerSetup, key: str, value: float) -> LocalizerSetup:
     """Return the setup with one figure changed.
 

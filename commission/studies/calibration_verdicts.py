@@ -96,8 +96,7 @@ class ConstantsJudge:
             for each in chosen:
                 setup = with_value(setup, each.key, each.before + each.of(constants))
             scored = score(self._inputs.log, setup, self._inputs.start.belief, self._detected)
-            later = np.arange(len(scored.blocks)) >= len(scored.blocks) // 2
-            found.append(scored.part(later if of_half == 0 else ~later))
+            found.append(scored.half(1 - of_half))
         return found[0], found[1]
 
 

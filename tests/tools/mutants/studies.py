@@ -65,6 +65,13 @@ STUDIES = (
         tests=(TESTS + "test_run.py::test_every_curve_has_the_numbers_of_its_cycles",),
     ),
     Mutant(
+        name="noise is proposed although the other half of the drive gets worse",
+        file=FOLDER + "calibration_noise_verdicts.py",
+        find="any(value < -LOSS * scatter for value, scatter in gains)",
+        replace="all(value < -LOSS * scatter for value, scatter in gains)",
+        tests=(TESTS + "test_calibration_noise.py::test_noise_of_a_quiet_half_is_worse_for_a_loud_one",),
+    ),
+    Mutant(
         name="largest NIS counts what the gate rejects",
         file=FOLDER + "tallies.py",
         find="if status[row] == INLIER:",
