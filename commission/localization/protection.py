@@ -19,6 +19,7 @@ from commission.localization.kalman import correct
 from commission.localization.observation import ObservationModel, observation_at
 from commission.localization.pose_gaussian import PoseGaussian, larger_eigenvalue
 from commission.localization.supervisor import INITIALIZING, LOST
+from commission.localization.temporary_joint import covariance_of, is_changed, solve_three
 from commission.localization.zones import ZoneRows, kinds_at
 
 SLOTS = 24
@@ -67,6 +68,8 @@ class ProtectionModel(NamedTuple):
     """(N, 3) x, y [m] and variance [m^2] of each reflector of the map."""
     numbers: IntArray
     """(N,) number by which each is known; the same reflector has the same in all maps that a bank is used with."""
+    others: bool
+    """Whether what else corrects the pose knows nothing of reflectors, by which temporary landmarks got theirs."""
 
 
 class Bank(NamedTuple):
@@ -244,6 +247,47 @@ def _judge(bank: Bank, own: PoseGaussian, model: ProtectionModel) -> Level:
 
 
 @compiled
+def _correct_alike(bank: Bank, prior: PoseGaussian, own: PoseGaussian) -> None:
+    """Correct all filters by what has corrected the run in a cycle in which no reflector did: contours, or tags.
+
+    Parameters
+    ----------
+    bank : in and out.
+    prior, own : belief of the run before and after the cycle.
+
+    Notes
+    -----
+    I = P^-1 - P0^-1 is what the cycle has told, d = x - x0 what it has moved: P_j <- (P_j^-1 + I)^-1 and
+    x_j <- x_j + P_j (P^-1 d - I (x_j - x0)): the information form (Thrun et al. 2005, table 3.5), derived.
+    """
+    before, after = _inverse(prior), _inverse(own)
+    moved = np.array((own.x - prior.x, own.y - prior.y, wrap_scalar(own.theta - prior.theta)))
+    told, pull = after - before, after @ moved
+    for slot in range(SLOTS + 1):
+        if slot != EVERY and bank.owner[slot] < 0:
+            continue
+        row = bank.beliefs[slot]
+        information = _inverse(_belief(row)) + told
+        covariance = np.eye(3)
+        if not solve_three(information, covariance):
+            continue
+        apart = np.array((row[0] - prior.x, row[1] - prior.y, wrap_scalar(row[2] - prior.theta)))
+        step = covariance @ (pull - told @ apart)
+        x, y, theta = row[0] + step[0], row[1] + step[1], wrap_scalar(row[2] + step[2])
+        p = covariance
+        _write(row, PoseGaussian(x, y, theta, p[0, 0], p[1, 0], p[2, 0], p[1, 1], p[2, 1], p[2, 2]))
+
+
+@compiled
+def _inverse(p: PoseGaussian) -> FloatArray:
+    """(3, 3) inverse of a covariance; zeros where it is none."""
+    inverse = np.eye(3)
+    if not solve_three(covariance_of(p), inverse):
+        inverse[:] = 0.0
+    return inverse
+
+
+@compiled
 def protect_cycle(  # noqa: PLR0917 - a cycle, number by number
     bank: Bank,
     prior: PoseGaussian,
@@ -269,7 +313,8 @@ def protect_cycle(  # noqa: PLR0917 - a cycle, number by number
 
     Notes
     -----
-    |e| <= |x - x_j| + K sigma_j, the largest over all j: solution separation, Blanch et al. 2015.
+    |e| <= |x - x_j| + K sigma_j, the largest over all j: solution separation, Blanch et al. 2015. Where no reflector
+    corrects, what does is taken as right, and tells all filters what it tells the run.
     """
     row = np.empty(9)
     _write(row, prior)
@@ -279,8 +324,10 @@ def protect_cycle(  # noqa: PLR0917 - a cycle, number by number
         bank.beliefs[EVERY] = row
         bank.begun[0] = True
     bank.unseen[:] += 1
+    corrects = False
     for i in range(first, last):
         if status[i] == INLIER:
+            corrects = True
             _enter(bank, int(model.numbers[reflectors[i]]))
     for i in range(first, last):
         if status[i] != INLIER:
@@ -293,6 +340,8 @@ def protect_cycle(  # noqa: PLR0917 - a cycle, number by number
             belief = _belief(bank.beliefs[slot])
             corrected = correct(belief, distance, bearing, place[0], place[1], place[2], observation)
             _write(bank.beliefs[slot], corrected)
+    if not corrects and model.others and is_changed(prior, own):
+        _correct_alike(bank, prior, own)
     _write(bank.beliefs[NEWEST], own)
     return _judge(bank, own, model)
 

@@ -58,7 +58,8 @@ def protection_model(
     if not supervisor.enabled or supervisor.held != HELD_LEVEL:
         return None
     numbers = read_only(np.arange(len(reflectors), dtype=np.int64))
-    return ProtectionModel(given.risk, given.fault_probability, in_order_of_map(index), numbers)
+    others = not parameters.temporary.enabled
+    return ProtectionModel(given.risk, given.fault_probability, in_order_of_map(index), numbers, others)
 
 
 def bank_of(state: ProtectionState | None, names: tuple[str, ...] | None) -> Bank | None:

@@ -138,7 +138,7 @@ def carry_landmarks(memory: TemporaryMemory, prior: PoseGaussian, posterior: Pos
     for j in range(POSE, n):
         P[j, 0] -= dy * P[j, 2]
         P[j, 1] += dx * P[j, 2]
-    if _same(prior, posterior):
+    if not is_changed(prior, posterior):
         return True
     way_x, way_y, turn = posterior.x - prior.x, posterior.y - prior.y, wrap_scalar(posterior.theta - prior.theta)
     # A right-invariant error is about where the mean is; both covariances about where it was.
@@ -170,10 +170,20 @@ def carry_landmarks(memory: TemporaryMemory, prior: PoseGaussian, posterior: Pos
 
 
 @compiled_inline
-def _same(a: PoseGaussian, b: PoseGaussian) -> bool:
-    """Whether nothing was corrected."""
+def is_changed(a: PoseGaussian, b: PoseGaussian) -> bool:
+    """Whether something was corrected.
+
+    Parameters
+    ----------
+    a, b : belief before and after.
+
+    Notes
+    -----
+    No formula: number by number.
+    """
     mean = a.x == b.x and a.y == b.y and a.theta == b.theta
-    return mean and a.xx == b.xx and a.xy == b.xy and a.yy == b.yy and a.xt == b.xt and a.yt == b.yt and a.tt == b.tt
+    same = a.xx == b.xx and a.xy == b.xy and a.yy == b.yy and a.xt == b.xt and a.yt == b.yt and a.tt == b.tt
+    return not (mean and same)
 
 
 @compiled_inline

@@ -69,7 +69,11 @@ def protection(
             here = slice(begin - first, end - first)
             numbers = own[columns.segments.index(columns.segment(begin))]
             model = ProtectionModel(
-                given.risk, given.fault_probability, in_order_of_map(setup.index), read_only(numbers)
+                given.risk,
+                given.fault_probability,
+                in_order_of_map(setup.index),
+                read_only(numbers),
+                not setup.parameters.temporary.enabled,
             )
             protect(
                 begin,
@@ -151,7 +155,7 @@ def warm_up() -> None:
         no_rows,
         no_rows,
         read_only(np.empty((0, 6))),
-        ProtectionModel(0.1, 0.1, nothing, no_rows),
+        ProtectionModel(0.1, 0.1, nothing, no_rows, True),
         new_bank(),
         levels,
         zone_rows(()),

@@ -19,6 +19,7 @@ from commission.simulation.scenario import start_of, virtual_drive
 from commission.site.parameters import ContourParameters
 from commission.site.reflectors import ReflectorMap
 from commission.site.zones import ObservationKind, Zone
+from commission.studies.integrity import protection
 from tests.conftest import REPOSITORY
 
 ROUTE = "Through aisles 6 and 4"
@@ -64,6 +65,11 @@ def test_no_step_of_the_pose_is_larger_than_20_mm_where_a_vehicle_leaves_the_ais
         largest, rms, most = 1e3 * steps.max(), 1e3 * np.sqrt(np.mean(errors**2)), 1e3 * errors.max()
         print(f"seed {seed}: step {largest:.1f} mm, error {rms:.2f} mm RMS, {most:.1f} at most")  # noqa: T201 - README
         assert (columns.modes == Mode.OPERATIONAL).all()
+        if not off:
+            # Contours correct the filters that leave a reflector out, too: the level does not grow where they count.
+            levels = protection(columns).position
+            assert (errors <= levels).all()
+            assert (levels[25:] < project.parameters.supervisor.position_limit).mean() > 0.99
 
 
 @pytest.fixture(scope="module")

@@ -10,6 +10,9 @@ import pytest
 
 from commission.localization.estimate import Belief, Mode
 from commission.localization.growing_run import GrowingRun
+from commission.localization.observation import observation_model
+from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.protection import EVERY, NEWEST, ProtectionModel, new_bank, protect_cycle
 from commission.localization.run_columns import RunColumns, RunSegment
 from commission.localization.search_map import search_map
 from commission.localization.setup import LocalizerSetup
@@ -103,6 +106,38 @@ def test_four_reflectors_around_a_vehicle_at_rest_give_the_level_of_the_closed_f
     expected = 0.5 * b + alone * sigma / np.sqrt(k)
     # What start and bearings tell, to 1 m and 2.4 m, is nothing beside a range.
     np.testing.assert_allclose(columns.levels[:, 0], expected, rtol=2e-3)
+
+
+@pytest.mark.parametrize("others", [True, False], ids=["by contours or tags", "where goods may be remembered"])
+def test_what_corrects_where_no_reflector_does_corrects_each_filter_by_its_own_innovation(others: bool) -> None:
+    rng = np.random.default_rng(7)
+
+    def drawn() -> tuple[np.ndarray, np.ndarray]:
+        root = 0.03 * rng.standard_normal((3, 3))
+        return 0.05 * rng.standard_normal(3), root @ root.T + 1e-5 * np.eye(3)
+
+    H, R, z = rng.standard_normal((2, 3)), np.diag([2e-4, 5e-4]), 0.02 * rng.standard_normal(2)
+
+    def told(mean: np.ndarray, P: np.ndarray) -> np.ndarray:
+        K = P @ H.T @ np.linalg.inv(H @ P @ H.T + R)
+        return row_of(mean + K @ (z - H @ mean), (np.eye(3) - K @ H) @ P)
+
+    def row_of(mean: np.ndarray, P: np.ndarray) -> np.ndarray:
+        return np.concatenate((mean, P[np.triu_indices(3)]))
+
+    own, every, one = drawn(), drawn(), drawn()
+    bank = new_bank()
+    bank.begun[0] = True
+    for row, belief in ((NEWEST, own), (EVERY, every), (0, one)):
+        bank.beliefs[row] = row_of(*belief)
+    bank.owner[0] = 5
+    nothing = np.empty(0, dtype=np.int64)
+    model = ProtectionModel(1e-5, 1e-3, np.empty((0, 3)), nothing, others)
+    mounted = observation_model(ALL_ROUND, ObservationParameters())
+    before, after = PoseGaussian(*row_of(*own)), PoseGaussian(*told(*own))
+    protect_cycle(bank, before, after, 0, 0, np.empty((0, 2)), nothing.astype(np.int8), nothing, mounted, model)
+    for row, belief in ((EVERY, every), (0, one)):
+        np.testing.assert_allclose(bank.beliefs[row], told(*belief) if others else row_of(*belief), atol=1e-10)
 
 
 def split_at(half: int) -> list[RunSegment]:

@@ -95,7 +95,8 @@ def _conditions(state: AppState, figure: Figure) -> str:
     settings, blocked_per_m = state.part(CoverageSettings), state.part(Conditions).blocked_per_m
     heading = HEADING_NAMES[settings.heading.seen_by(state.project.scanners)]
     if figure in BY_CONTOURS:
-        walls = "the floor map alone, nobody about" if state.project.floor_map is not None else "there is no floor map"
+        has_map = state.project.floor_map is not None
+        walls = "the floor map alone and exact, nobody about" if has_map else "there is no floor map"
         return escaped("; ".join((heading, walls, *_zones(state))))
     parts = [heading, MEASUREMENT_NAMES[settings.measurement]]
     if blocked_per_m > 0.0:
