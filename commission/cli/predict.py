@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from commission.site.reflectors import ReflectorMap
     from commission.studies.drives import PlannedDrives
 
+BY_TWO_SIGMA = (
+    "by 2-sigma: the project's supervisor holds the protection level, which is larger, and may stop elsewhere"
+)
 MOST_NEEDED = 5
 """Reflectors that the report names; the file has all."""
 
@@ -105,6 +108,8 @@ class Predict:
 
 def _report(name: str, prediction: RoutePrediction, errors: PredictedErrors) -> list[str]:
     """Lines for a person; millimetres and degrees as is the habit."""
+    from commission.site.parameters import HELD_LEVEL
+
     x, y, heading = prediction.two_sigma.max(axis=0)
     error_x, error_y, error_heading = errors.two_sigma.max(axis=0)
     limits = prediction.limits
@@ -126,6 +131,7 @@ def _report(name: str, prediction: RoutePrediction, errors: PredictedErrors) -> 
         f"at most {prediction.on_odometry.max():.1f} m on odometry alone",
         f"Supervisor   stops at: {stops or 'none'}{f'; drives on at: {starts}' if starts else ''}; "
         f"metres over a limit: {len(prediction.failing_metres())}",
+        *([f"             {BY_TWO_SIGMA}"] if prediction.limits.held == HELD_LEVEL else []),
     ]
 
 

@@ -51,6 +51,9 @@ def contour_findings(columns: RunColumns) -> tuple[Finding, ...]:
         return ()
     if setup.floor is None:
         probably, remedy = "the project has no floor map", "load one with walls, or set contour.enabled=false"
+    elif setup.zones:
+        probably = "zones leave contours out wherever the drive went, or the recording holds no whole scans"
+        remedy = "look at the zones of the site, or record scans"
     else:
         probably, remedy = "the recording holds no whole scans", "record them, or set contour.enabled=false"
     found = "contours are to be matched and none of the scans was"

@@ -1,7 +1,12 @@
 import csv
 import json
+from dataclasses import replace
 
 import pytest
+
+from commission.io.project_copy import save_copy
+from commission.io.project_file import load_project
+from commission.site.zones import ObservationKind, Zone
 
 
 def test_a_route_is_predicted_metre_by_metre(commission, project, tmp_path):
@@ -144,3 +149,17 @@ def test_stations_on_the_route_are_met_or_named(commission, project, tmp_path):
     assert "too uncertain at Dock" in told
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     assert [(each["station"], each["met"]) for each in summary["stations"]] == [("Dock", False), ("Gate", True)]
+
+
+def test_what_a_prediction_does_not_know_is_told(commission, project, tmp_path):
+    site = load_project(project)
+    box = ((-9.0, -9.0), (99.0, -9.0), (99.0, 99.0), (-9.0, 99.0))
+    held = replace(site.parameters.supervisor, held="protection_level")
+    zones = (Zone(name="Hall", outline=box, kinds=(ObservationKind.CONTOURS,)),)
+    changed = replace(site, zones=zones, parameters=replace(site.parameters, supervisor=held))
+    save_copy(changed, tmp_path / "zoned", force=False)
+    code, told, err = commission("predict", tmp_path / "zoned", "--route", "Straight", "--out", tmp_path / "out")
+    assert (code, err) == (0, "")
+    assert "Zones        reflectors correct nothing on 6.0 m of the way: predicted there by odometry alone" in told
+    assert "by 2-sigma: the project's supervisor holds the protection level" in told
+    assert "Reflectors   0 seen at least, 0.0 on average" in told

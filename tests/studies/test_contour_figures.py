@@ -61,8 +61,12 @@ def test_a_run_that_never_looked_has_counts_and_no_means():
 )
 def test_contours_that_are_asked_for_and_never_matched_are_told(enabled, uses, floor, said):
     columns = columns_of(*((use, 5, 0, 0.0, 0.0, 0) for use in uses))
-    setup = SimpleNamespace(parameters=SimpleNamespace(contour=SimpleNamespace(enabled=enabled)), floor=floor)
+    parameters = SimpleNamespace(contour=SimpleNamespace(enabled=enabled))
+    setup = SimpleNamespace(parameters=parameters, floor=floor, zones=())
     columns.segments = (SimpleNamespace(setup=setup),)
     found = contour_findings(columns)
     assert len(found) == (said is not None)
     assert said is None or said in str(found[0])
+    if said == "no whole scans":
+        setup.zones = ("Hall",)
+        assert "zones leave contours out wherever the drive went" in str(contour_findings(columns)[0])

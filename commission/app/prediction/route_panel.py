@@ -112,6 +112,11 @@ def _risk_text(route: RouteView) -> str:
     else:
         listed = f", the first {MOST_RISKS} listed" if len(route.risks) > MOST_RISKS else ""
         text = f"{len(route.risks)} neighbors inside the gate{listed}; a click goes there."
+    if route.by_two_sigma:
+        text += (
+            " Predicted is 2σ: the supervisor holds the protection level, which is larger, and may stop the vehicle "
+            "where nothing is told here."
+        )
     way = route.way_without_reflectors
     if way > 0.0:
         text += (

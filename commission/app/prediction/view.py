@@ -11,6 +11,7 @@ from commission.geometry.arrays import FloatArray
 from commission.planning.association_risk import NeighborRisk
 from commission.planning.route_prediction import PerMetre, RoutePrediction
 from commission.planning.station_accuracy import StationAccuracy
+from commission.site.parameters import HELD_LEVEL
 from commission.studies.prediction import PredictionResult
 
 Place: TypeAlias = tuple[float, float]
@@ -63,6 +64,8 @@ class RouteView:
     """Stations on the route, and whether what they require is met."""
     way_without_reflectors: float
     """Way on which zones leave reflectors out [m]."""
+    by_two_sigma: bool
+    """Whether 2-sigma is predicted though the supervisor holds the protection level."""
     outdated: bool
     """Whether the site has changed since, and it is being predicted anew."""
 
@@ -97,6 +100,7 @@ def route_view(predicted: PredictionResult, *, outdated: bool) -> RouteView:
         risks=tuple(_risk_view(predicted, risk) for risk in predicted.risks),
         stations=predicted.stations,
         way_without_reflectors=predicted.planned.way_without_reflectors,
+        by_two_sigma=prediction.limits.held == HELD_LEVEL,
         outdated=outdated,
     )
 
