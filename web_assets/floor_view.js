@@ -80,6 +80,11 @@
     window.commissionTell?.(window.commissionMoved, isOdd);
   };
   for (const kind of ["wheel", "pointerdown"]) addEventListener(kind, tellMoved, { capture: true, passive: true });
+  addEventListener("keydown", ({ key, target }) => { // these move the camera, too
+    if (/^(Arrow.*|[wasdqe])$/i.test(key) && !target.closest?.("input, textarea") && !window.commissionStands) {
+      window.commissionMovedNow();
+    }
+  }, true);
 
   addEventListener("pointermove", (event) => {
     pointer = event.target === viewer()?.canvas ? [event.clientX, event.clientY] : null;

@@ -32,10 +32,12 @@ NEAREST_FLIGHT = 8.0
 """Visible height when a place is flown to from farther away [m]."""
 STRAIGHT_DOWN = np.array([0.0, 1.0, 0.0, 0.0])
 LOCK = "/lock"
-SETTLING = 4.0
-"""Time in which a browser shows the whole site, in one shape, before its panels count as in their places [s]."""
 BUILDS_UP = 60.0
-"""Time after a browser came in which it shows the whole site, however busy its computer is [s]."""
+"""Time after a browser came in which it shows the whole site, unless a person moves the floor [s].
+
+How long its page takes is not known: where a processor draws for many windows, ten seconds until the first picture, and
+viser puts the camera that it began with back once more after a browser has shown another one.
+"""
 
 OnDrag: TypeAlias = Callable[[Any], Coroutine[Any, Any, None]]
 """Takes viser's drag events of the floor; `async`, since only those keep their order."""
@@ -60,13 +62,11 @@ class ClientView:
     is_fitted: bool = False
     """Whether the browser has shown the whole site."""
     is_settled: bool = False
-    """Whether its panels are in their places, or a person has moved the floor: what it shows is its own then."""
+    """Whether a person has moved the floor, or time is up: what it shows is its own then."""
     is_whole: bool = False
     """Whether its page has been told that it shows the whole site."""
     came_at: float = field(default_factory=time.monotonic)
     """When it came, on the clock of this computer [s]."""
-    changed_at: float = field(default_factory=time.monotonic)
-    """When it last showed anything else than the whole site while its page built up [s]."""
 
 
 class Cameras:
@@ -284,29 +284,14 @@ class Cameras:
             was_fitted = self._is_at(camera, own.fitted)
         is_whole = self._is_at(camera, self._whole(own.client))
         self._tell_whether_whole(own, is_whole=is_whole)
-        if not self._builds_up(own, is_whole=is_whole):
-            is_due = is_reshaped and was_fitted
-        else:
-            # Not only where the shape has changed: what was sent for a shape before may have come last.
-            is_due = not is_whole
+        own.is_fitted = own.is_fitted or is_whole
+        own.is_settled = own.is_settled or time.monotonic() - own.came_at > BUILDS_UP
+        # Before, not only where the shape has changed: what was sent for a shape before may have come last.
+        is_due = is_reshaped and was_fitted if own.is_settled else not is_whole
         if is_due:
             self._fit(own)
             return
         self._keep_north_up(camera)
-
-    def _builds_up(self, own: ClientView, *, is_whole: bool) -> bool:
-        """Whether a page still takes its places: until it has shown the whole site for a while, in one shape.
-
-        How long that takes is not known: where a processor draws for many windows, ten seconds until the first picture.
-        """
-        now = time.monotonic()
-        has_stood = own.is_fitted and now - own.changed_at > SETTLING
-        if has_stood or now - own.came_at > BUILDS_UP:
-            own.is_settled = True
-        if not is_whole:
-            own.changed_at = now
-        own.is_fitted = own.is_fitted or is_whole
-        return not own.is_settled
 
     def _tell_whether_whole(self, own: ClientView, *, is_whole: bool) -> None:
         """Let a page know whether it shows the whole site: a reload does so again, in its own shape (kept_view.js)."""

@@ -24,8 +24,8 @@ WIDE, FLAT, FINAL = (1600, 900), (956, 363), (956, 608)
 class Window:
     """What a browser does with its camera: it shows what it has been told so far, and reports that."""
 
-    def __init__(self, server: viser.ViserServer, begins_at: tuple[float, float, float]) -> None:
-        self.server = server
+    def __init__(self, server: viser.ViserServer, begins_at: tuple[float, float, float], views: Cameras) -> None:
+        self.views = views
         self.at = begins_at
         self._taken = 0
         self.raw = RawClient(server, is_silent=True)
@@ -70,16 +70,9 @@ def server() -> Iterator[viser.ViserServer]:
 def window(server: viser.ViserServer) -> Iterator[Window]:
     views = Cameras(server, (), EXTENT, SceneOrigin())
     server.on_client_connect(views.connected)
-    opened = Window(server, (3.0, 2.0, 400.0))
+    opened = Window(server, (3.0, 2.0, 400.0), views)
     yield opened
     opened.raw.close()
-
-
-@pytest.fixture
-def settling(monkeypatch: pytest.MonkeyPatch) -> float:
-    """Time after which panels count as in their places: shorter than usual, for the sake of who waits [s]."""
-    monkeypatch.setattr(cameras, "SETTLING", 0.4)
-    return 0.4
 
 
 def test_what_comes_last_for_a_shape_that_is_gone_does_not_stay(window: Window) -> None:
@@ -114,15 +107,16 @@ def test_a_report_that_comes_while_the_plan_is_fitted_does_not_leave_it_in_anoth
     assert window.sees_all(FINAL)
 
 
-def test_a_browser_that_takes_longer_than_its_panels_usually_do_sees_the_whole_site(
-    window: Window, settling: float
-) -> None:
-    window.report(WIDE)
-    time.sleep(2.0 * settling)
-    window.report(FINAL)  # with the camera that it began with
-    time.sleep(2.0 * settling)
-    window.show(FINAL)
-    assert window.sees_all(FINAL)
+def test_a_browser_that_goes_back_to_the_camera_that_it_began_with_sees_the_whole_site(window: Window) -> None:
+    first = window.at
+    window.show(WIDE)
+    assert window.sees_all(WIDE)
+    for seconds in (5.0, 20.0):
+        for own in window.views._views.values():
+            own.came_at = time.monotonic() - seconds
+        window.at = first
+        window.show(FINAL)
+        assert window.sees_all(FINAL), f"{seconds} s after it came"
 
 
 def test_who_moves_the_floor_of_a_page_that_builds_up_keeps_what_was_moved_to(window: Window) -> None:
@@ -138,10 +132,10 @@ def test_who_moves_the_floor_of_a_page_that_builds_up_keeps_what_was_moved_to(wi
 
 
 def test_a_plan_that_stands_keeps_the_whole_site_in_view_when_its_shape_changes_and_what_was_zoomed_to(
-    window: Window, settling: float
+    window: Window, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     window.show(WIDE)
-    time.sleep(1.5 * settling)
+    monkeypatch.setattr(cameras, "BUILDS_UP", 0.0)
     window.show(FINAL)
     assert window.sees_all(FINAL)
     window.at = (5.0, 5.0, 300.0)
