@@ -20,6 +20,7 @@ from commission.studies.consistency import has_distance
 from commission.studies.detection_rates import DetectionRate, detection_rates
 from commission.studies.innovations import Innovations, innovations
 from commission.studies.inputs import StudyInput
+from commission.studies.intensity_peaks import intensity_peaks
 from commission.studies.run import RunResult
 
 FARTHEST_D2 = 25.0
@@ -34,6 +35,8 @@ LONGEST_LAG_S, LAGS = 10.0, 16
 AROUND_S = 0.25
 """Speed is that of half a second about each scan."""
 METRES, METRES_PER_S, DEGREES_PER_S = Shown("m", 1.0), Shown("m/s", 1.0), Shown("°/s", DEGREES.scale)
+SENSORS_UNITS = Shown("sensor's units", 1.0)
+"""Of an intensity."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -99,7 +102,7 @@ class ResidualStudy:
     chance: FloatArray
     """(L,) size that a correlation has by chance in 95 % of the cases."""
     relations: tuple[Relation, ...]
-    """By range, bearing, speed, turn rate, and incidence of flat ones."""
+    """By range, bearing, speed, turn rate, intensity where scans hold it, and incidence of flat ones."""
     beams: BeamRelation | None
     """None where the sensor itself detects, or nobody knows how many beams a reflector has."""
     rates: tuple[DetectionRate, ...]
@@ -227,9 +230,13 @@ def _relations(run: RunResult, found: Innovations, known: BoolArray) -> list[Rel
             before, after = (np.interp(run.times + side, seconds, way) for side in (-AROUND_S, AROUND_S))
             amounts.append((name, shown, ((after - before) / (2.0 * AROUND_S))[cycle]))
     setup = columns.segments[-1].setup
+    peaks = intensity_peaks(log, columns.detected, setup)[known]
     reflectors = setup.reflectors
     flat = reflectors.is_flat[columns.reflector[known]] if len(reflectors) else np.zeros(len(cycle), dtype=np.bool_)
     relations = [_relation(name, shown, amount, residuals) for name, shown, amount in amounts]
+    bright = np.isfinite(peaks)
+    if bright.any():
+        relations.append(_relation("intensity", SENSORS_UNITS, peaks[bright], residuals[bright]))
     if flat.any():
         mountings = np.array([each.mounting[2] for each in setup.scanners])[columns.detected.scanners[cycle]]
         ray = columns.means[cycle, 2] + mountings + measured[:, 1] + math.pi

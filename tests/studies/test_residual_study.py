@@ -12,14 +12,20 @@ import numpy as np
 import pytest
 
 from commission.io.residual_charts import charts, page_of
+from commission.localization.estimate import Belief
 from commission.localization.setup import LocalizerSetup
-from commission.site.parameters import FilterParameters, OdometryParameters
+from commission.site.parameters import DetectorParameters, FilterParameters, OdometryParameters
+from commission.site.record_log import RecordLog
+from commission.site.record_store import ScanLog
+from commission.site.reflectors import Reflector, ReflectorMap
 from commission.studies.innovations import innovations
+from commission.studies.intensity_peaks import intensity_peaks
 from commission.studies.residual_study import EDGES, ResidualInput, ResidualStudy, residual_study
 from commission.studies.residual_words import correlation_time, residual_lines
 from commission.studies.run import RunInput, judged_run
+from commission.studies.sensor_view import peak_of
 from commission.studies.start import Start, StartOrigin
-from tests.studies.recorded import BEARING_SIGMA, PROJECT, RANGE_SIGMA, drive, start
+from tests.studies.recorded import BEARING_SIGMA, PROJECT, RANGE_SIGMA, SECOND, drive, start
 
 EXACT = OdometryParameters(
     forward_per_sqrt_m=1e-4,
@@ -156,3 +162,47 @@ def test_plots_are_drawn_of_all_that_is_known_and_the_page_says_what_it_is_of() 
     assert "a &lt; b" in page
     assert "project: 12" in page
     assert page.count("<svg") == len(drawn)
+
+
+def test_ranges_that_are_longer_where_an_echo_is_bright_go_with_intensity() -> None:
+    rng, period, radius, beams = np.random.default_rng(7), SECOND // 10, 0.04, 1440
+    around = np.column_stack((np.linspace(-2.9, 2.4, 7), rng.uniform(2.5, 4.5, 7)))
+    angles = -math.pi + math.radians(0.25) * np.arange(beams)
+    stamps = np.arange(1, 401) * period
+    is_bright = rng.random(400) < 0.5
+    ranges, intensities = np.full((400, beams), 8.0), rng.uniform(5.0, 20.0, (400, beams))
+    for bearing, distance in around:
+        off = np.remainder(angles - bearing + math.pi, 2.0 * math.pi) - math.pi
+        hit = np.flatnonzero(np.abs(off) < math.asin(radius / distance))
+        surface = distance * np.cos(off[hit]) - np.sqrt(radius**2 - (distance * np.sin(off[hit])) ** 2)
+        longer = np.where(is_bright, 0.015, -0.015) + rng.normal(0.0, 0.003, 400)
+        ranges[:, hit] = surface + longer[:, np.newaxis]
+        intensities[:, hit] = np.where(is_bright, 3000.0, 1500.0)[:, np.newaxis] - rng.uniform(
+            0.0, 50.0, (400, len(hit))
+        )
+    scans = ScanLog.even(
+        stamps, ranges.astype(np.float32), (-math.pi, math.radians(0.25)), intensities=intensities.astype(np.float32)
+    )
+    log = RecordLog(odometry_stamps_ns=np.arange(402) * period, displacements=np.zeros((402, 3)), scans=(scans,))
+    places = around[:, 1:] * np.column_stack((np.cos(around[:, 0]), np.sin(around[:, 0])))
+    parameters = replace(PROJECT.parameters, detector=DetectorParameters(enabled=False, intensity_threshold=1000.0))
+    reflectors = tuple(Reflector(id=f"R{i}", x=float(x), y=float(y), radius=radius) for i, (x, y) in enumerate(places))
+    project = replace(PROJECT, reflectors=ReflectorMap(reflectors), parameters=parameters)
+    begin = Start(Belief(0, np.zeros(3), 1e-6 * np.eye(3)), StartOrigin.GIVEN)
+    run = judged_run(RunInput.of(project, log, begin))
+    study = residual_study(ResidualInput(run=run, floor_map=None))
+    (relation,) = [each for each in study.relations if each.name == "intensity"]
+    assert relation.counts.sum() == study.total > 2000
+    assert relation.places[[0, -1]] == pytest.approx([1490.0, 2990.0], abs=40.0)
+    # All around alike, so that no pose takes a part of it.
+    assert relation.means[[0, -1], 0] == pytest.approx([-0.015, 0.015], abs=0.003)
+    (line,) = [line for line in residual_lines(study) if line.startswith("range residuals go with intensity")]
+    assert line.endswith("sensor's units")
+    # Of single clusters it is found otherwise.
+    columns = run.columns
+    peaks = intensity_peaks(log, columns.detected, columns.segments[0].setup)
+    cycle = np.repeat(np.arange(len(columns)), np.diff(columns.offsets))
+    for row in range(0, len(peaks), 97):
+        bearing, width = float(columns.detected.range_bearing[row, 1]), int(columns.detected.beams[row])
+        assert peaks[row] == peak_of(scans.scan(int(cycle[row])), bearing, width)
+    assert not any(each.name == "intensity" for each in studied().relations)
