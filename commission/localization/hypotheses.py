@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commission.geometry.arrays import FloatArray, read_only
+from commission.geometry.angles import difference
+from commission.geometry.arrays import BoolArray, FloatArray, read_only
 from commission.geometry.se2 import compose
 from commission.localization.hypothesis_fit import ROW, Prior, judge
 from commission.localization.missed import Sights
@@ -116,23 +117,22 @@ def _ranked(judged: FloatArray, search: Search) -> FloatArray:
     judged = judged[np.argsort(-judged[:, 9], kind="stable")]
     poses = base_poses(judged, search.track)
     kept: list[int] = []
-    for i in range(len(judged)):
-        if len(kept) == HYPOTHESES:
-            break
-        if not any(_same(poses[i], poses[j]) for j in kept):
-            kept.append(i)
+    left = np.arange(len(judged))
+    while len(left) and len(kept) < HYPOTHESES:
+        kept.append(int(left[0]))
+        left = left[~_same(poses[left], poses[left[0]])]
     ranked = judged[kept]
     if len(ranked) and _is_alone(ranked, search):
         old = search.hypotheses
-        again = len(old) > 0 and _same(poses[kept[0]], base_poses(old[:1], search.track)[0])
+        again = len(old) > 0 and bool(_same(poses[kept[:1]], base_poses(old[:1], search.track)[0])[0])
         ranked[0, 11] = 1.0 + (old[0, 11] if again else 0.0)
     return ranked
 
 
-def _same(a: FloatArray, b: FloatArray) -> bool:
-    """Whether two poses are one place."""
-    turn = math.remainder(float(a[2] - b[2]), 2.0 * math.pi)
-    return math.hypot(a[0] - b[0], a[1] - b[1]) < SAME_PLACE and abs(turn) < SAME_HEADING
+def _same(poses: FloatArray, other: FloatArray) -> BoolArray:
+    """(n,) whether each of some poses is one place with another one."""
+    apart = np.hypot(poses[:, 0] - other[0], poses[:, 1] - other[1])
+    return (apart < SAME_PLACE) & (np.abs(difference(poses[:, 2], other[2])) < SAME_HEADING)
 
 
 def probabilities(hypotheses: FloatArray) -> FloatArray:
