@@ -16,6 +16,7 @@ from tyro.conf import Positional, UseAppendAction, arg
 from commission.errors import UsageError
 
 if TYPE_CHECKING:
+    from commission.site.reflectors import ReflectorMap
     from commission.studies.map_findings import MapFinding
     from commission.studies.monitor import Monitor
 
@@ -68,7 +69,10 @@ class MonitorCommand:
         diagnoses = []
         for path in self.recordings:
             log = load_log(path)
-            diagnoses.append(diagnosed_drive(project, log, start_of(project, log)))
+            try:
+                diagnoses.append(diagnosed_drive(project, log, start_of(project, log)))
+            except UsageError as error:
+                raise UsageError(f"{path}: {error}") from None
         names = tuple(path.stem for path in self.recordings)
         names = names if len(set(names)) == len(names) else tuple(map(str, self.recordings))
         found = monitor(MonitorInput(names=names, diagnoses=tuple(diagnoses)))
@@ -80,6 +84,7 @@ class MonitorCommand:
             reflectors = corrected(as_saved.reflectors, found.findings, add_new=self.add_new)
             save_copy(dataclasses.replace(as_saved, reflectors=reflectors), self.corrected_project, force=self.force)
             written.append(f"Corrected    {self.corrected_project}")
+            written += _left(found, as_saved.reflectors, add_new=self.add_new)
         sys.stdout.write("\n".join([*_told(found), *written]) + "\n")
 
 
@@ -89,6 +94,20 @@ def _told(found: Monitor) -> list[str]:
     lines = lines or ["Found        nothing: every reflector that comes in sight is where the map has it"]
     if found.unseen:
         lines.append(f"Not told     {', '.join(found.unseen)}: hardly in sight on any of these drives")
+    return lines
+
+
+def _left(found: Monitor, reflectors: ReflectorMap, *, add_new: bool) -> list[str]:
+    """What was found and is not corrected in the map, a line each with the reason."""
+    from commission.studies.map_correction import why_not
+    from commission.studies.map_findings import MapFault
+
+    lines: list[str] = []
+    for each in found.findings:
+        is_left = each.fault is MapFault.NEW and not add_new
+        reason = "new ones are not added: --add-new does" if is_left else why_not(reflectors, each)
+        if reason:
+            lines.append(f"As it was    {each.id}: {reason}")
     return lines
 
 
