@@ -9,6 +9,8 @@ from dataclasses import replace
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.studies.map_findings import MapFault, MapFinding
 
+CORRECTED_M = 1e-3
+"""A reflector nearer than this to where it was found has been put there [m]."""
 SAME_PLACE_M = 1e-6
 """A reflector farther from where it was by the map has been edited since [m]."""
 
@@ -57,5 +59,6 @@ def why_not(reflectors: ReflectorMap, finding: MapFinding) -> str:
     if now is None:
         return "the map has it no more"
     if finding.before is None or math.dist((now.x, now.y), finding.before) > SAME_PLACE_M:
-        return "the map has it elsewhere by now: check again"
+        is_there = finding.after is not None and math.dist((now.x, now.y), finding.after) < CORRECTED_M
+        return "the map has it there by now" if is_there else "the map has it elsewhere by now: check again"
     return "it is locked and stays: unlock it first" if now.locked else ""

@@ -53,7 +53,7 @@ class MapFinding:
     after: tuple[float, float] | None
     """Where it is now [m]; None of a missing one."""
     sigma: float
-    """1-sigma of that place, each axis [m]; NaN where there is none."""
+    """1-sigma of that place, each axis [m], the survey of the others in it; NaN where there is none."""
     since: str
     """From when on, as far as the drives tell."""
     evidence: tuple[DriveEvidence, ...]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from commission.localization.cross_covariance import survey_variance
 from commission.progress import Progress, part, silent
 from commission.site.floor_map import FloorMap
 from commission.site.project import Project
@@ -31,6 +32,8 @@ from commission.studies.map_findings import DriveEvidence, MapFault, MapFinding,
 from commission.studies.moved_reflector import moved_at
 from commission.studies.start import Start
 
+NEW_SIGMA_M = 0.01
+"""1-sigma of the place of a thing among the reflectors, each axis [m]."""
 SAME_THING_M = 0.15
 """Things of two drives nearer than this are one [m]."""
 
@@ -115,7 +118,9 @@ def _of_reflector(index: int, telling: Sequence[tuple[str, Diagnosis]]) -> Itera
     after: tuple[float, float] | None = (x, y)
     sigma, since = math.nan, _since(fault, telling, index)
     if moved is not None:
-        fault, after, sigma = MapFault.MOVED, (x + moved.off[0], y + moved.off[1]), moved.sigma
+        fault, after = MapFault.MOVED, (x + moved.off[0], y + moved.off[1])
+        # It is seen from poses that the others tell: it stands no better known among them than they were surveyed.
+        sigma = math.hypot(moved.sigma, _survey_sigma(newest, index))
         since = since if moved.seconds is None else f"{telling[-1][0]}, {moved.seconds:.0f} s"
     elif fault is MapFault.MOVED:
         after = x + now.off[0], y + now.off[1]
@@ -131,6 +136,12 @@ def _of_reflector(index: int, telling: Sequence[tuple[str, Diagnosis]]) -> Itera
         evidence=evidence,
         text=told(fault, name, ((x, y), after, sigma), since, evidence),
     )
+
+
+def _survey_sigma(found: Diagnosis, index: int) -> float:
+    """1-sigma of the surveyed place of a reflector [m]."""
+    inputs = found.inputs.calibration.inputs
+    return math.sqrt(survey_variance(inputs.reflectors.reflectors[index], inputs.uncertainty))
 
 
 def _since(fault: MapFault, telling: Sequence[tuple[str, Diagnosis]], index: int) -> str:
@@ -175,7 +186,7 @@ def _new_ones(drives: Sequence[tuple[str, Diagnosis]], ids: set[str]) -> Iterato
             id=name,
             before=None,
             after=place,
-            sigma=0.01,
+            sigma=math.hypot(NEW_SIGMA_M, found.inputs.calibration.inputs.uncertainty.survey),
             since=since,
             evidence=evidence,
             text=f"{cluster.text}; since {since}",

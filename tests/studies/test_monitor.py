@@ -19,7 +19,7 @@ from commission.site.record_log import RecordLog
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.uncertainty import Uncertainty
 from commission.studies.diagnosis import Diagnosis
-from commission.studies.map_correction import corrected
+from commission.studies.map_correction import corrected, why_not
 from commission.studies.map_findings import MapFault
 from commission.studies.metrics import reference_at
 from commission.studies.monitor import MonitorInput, diagnosed_drive, monitor
@@ -119,12 +119,16 @@ def test_what_has_changed_between_two_drives_is_named_with_its_drive_and_correct
     assert moved.after is not None
     assert np.allclose(moved.after, np.array([first.x, first.y]) + MOVED, atol=0.012)
     assert "L1 has moved by" in moved.text
+    # The others, from which it is seen, were surveyed to 3 mm.
+    assert 0.003 < moved.sigma < 0.006
     assert [each.drive for each in moved.evidence] == ["monday", "friday"]
     assert by_id["new-1"].after == pytest.approx((8.0, 2.0), abs=0.03)
     # The map is made anew from what was found; what is new only where that is asked for.
     after = corrected(site().reflectors, found.findings)
     ids = [each.id for each in after.reflectors]
     assert ids == [each.id for each in site().reflectors.reflectors if each.id != "L3"]
+    assert after.reflectors[0].sigma == pytest.approx(moved.sigma, abs=1e-4)
+    assert why_not(after, moved) == "the map has it there by now"
     assert (after.reflectors[0].x, after.reflectors[0].y) == pytest.approx(moved.after, abs=1e-4)
     assert corrected(site().reflectors, found.findings, add_new=True).reflectors[-1].id == "new-1"
     locked = ReflectorMap(tuple(replace(each, locked=True) for each in site().reflectors.reflectors))
