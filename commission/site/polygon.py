@@ -1,4 +1,4 @@
-"""Corners that go around something: how many there must be, and that they do not cross. No area, no drawing."""
+"""Corners that go around something: how many there must be, and that they do not cross. No drawing."""
 
 from __future__ import annotations
 
@@ -35,6 +35,17 @@ def check_polygon(corners: Corners, name: str, around: str) -> None:
                 f"{name} crosses itself: the edge {one} meets the one {other}; "
                 f"expected corners in their order around {around}"
             )
+
+
+def area(corners: Corners) -> float:
+    """Area that corners enclose [m^2], whichever way they go around: half the sum of the cross products of neighbors.
+
+    Parameters
+    ----------
+    corners : x and y of each [m].
+    """
+    pairs = zip(corners, corners[1:] + corners[:1], strict=True)
+    return 0.5 * abs(sum(ax * by - bx * ay for (ax, ay), (bx, by) in pairs))
 
 
 def _cross(one: _Edge, other: _Edge) -> bool:

@@ -11,8 +11,11 @@ from enum import StrEnum
 from typing import Annotated
 
 from commission.site.checks import check_fields
-from commission.site.polygon import Corners, check_polygon
+from commission.site.polygon import Corners, area, check_polygon
 from commission.site.quantity import Quantity, Words
+
+LEAST_AREA = 1e-6
+"""Floor below which a zone has none [m^2]: corners in line, or in one place."""
 
 
 class ObservationKind(StrEnum):
@@ -39,6 +42,10 @@ class Zone:
             raise ValueError("a zone's name is empty; expected text")
         check_fields(self, "zones.")
         check_polygon(self.outline, f"the outline of zone {self.name!r}", "the zone")
+        if area(self.outline) < LEAST_AREA:
+            raise ValueError(
+                f"the outline of zone {self.name!r} encloses no floor; expected corners that are not in line"
+            )
         if not self.kinds:
             raise ValueError(
                 f"zone {self.name!r} is corrected by nothing; expected one of: {', '.join(ObservationKind)}"

@@ -74,6 +74,8 @@ def test_names_are_unique_corners_are_typed_and_one_is_deleted(drawn: AppState) 
     assert [zone.name for zone in state.project.zones] == ["Zone 1", "Hall"]
     with pytest.raises(UsageError, match="zone name 'Zone 1' is used already"):
         after(state, SetZone("name", "Zone 1"))
+    with pytest.raises(ValueError, match="encloses no floor"):
+        after(state, SetZone("outline", ((0.0, 0.0), (1.0, 1.0), (2.0, 2.0))))
     with pytest.raises(ValueError, match="crosses itself"):
         after(state, SetZone("outline", ((0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0))))
     corners = ((0.0, 0.0), (2.0, 0.0), (1.0, 2.0))
