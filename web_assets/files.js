@@ -72,7 +72,11 @@
       list.append(...found.recent.map((path) => line(path, "", false, () => choose(path))));
       list.append(make("div", "c-files-title", "Folder"));
     }
-    if (found.above) list.append(line("..", "one folder up", true, () => ask(found.above)));
+    if (found.above) {
+      const up = line("..", "one folder up", true, () => ask(found.above));
+      up.classList.add("c-up");
+      list.append(up);
+    }
     for (const { name, path, isFolder, size, changed } of found.entries) {
       const when = new Date(changed * 1000).toLocaleDateString();
       const go = isFolder ? () => ask(path) : () => choose(path);
@@ -116,7 +120,10 @@
         open = { kind, uuid, input };
         ask(input.value);
       });
-      input.addEventListener("change", () => remember(kind, input.value.trim()));
+      input.addEventListener("change", () => {
+        const path = input.value.trim(), isFile = MAPS.test(path) || IMPORTS.test(path);
+        if (isFile || kind === "recording" || kind === "folder") remember(kind, path); // not a folder on the way there
+      });
       place.append(button);
     }
   }, LOOK_EVERY_MS);

@@ -57,6 +57,9 @@
       if (kind !== "open") continue;
       const head = await found(".mantine-Paper-root", name);
       if (head?.nextElementSibling?.ariaHidden === "true") press(head); // it is closed
+      // Where it was open already, nothing else would show that something has happened.
+      const field = head?.nextElementSibling?.querySelector("input:not([type=checkbox], [type=file])");
+      setTimeout(() => field?.focus(), 250);
     }
   }
   addEventListener("click", ({ target }) => {

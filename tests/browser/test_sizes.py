@@ -88,6 +88,19 @@ def test_no_button_or_name_is_cut_off_at_any_size(served: Served, window: Callab
         names = page.page.evaluate("() => window.commissionPlots.namesShown")
         assert {"x", "y", "largest", "inliers", "outliers"} <= {name.split(" ")[0] for name in names}, (width, names)
     assert found == {size: [] for size in SIZES}
+    # In the lowest window a table has rows, and a list of corners is seen to its end.
+    page.page.set_viewport_size({"width": SIZES[0][0], "height": SIZES[0][1]})
+    page.open_tab("Reflectors")
+    page.open_tab("Site")
+    page.fold("Vehicle")
+    page.page.wait_for_function(
+        "() => [...document.querySelectorAll('div:has(>.c-rows)~div button')].filter((each) => {"
+        " const box = each.getBoundingClientRect();"
+        " return each.contains(document.elementFromPoint(box.left + 20, box.bottom - 2)); }).length >= 4"
+    )
+    outline = page.row("Outline").locator("input")
+    assert len(outline.input_value().split(",")) == 4
+    assert outline.evaluate("e => e.scrollWidth <= e.clientWidth")
     # The rail shows which tool is in use, whether a key or the rail has chosen it.
     page.page.mouse.move(600, 300)
     for choose, lit in (

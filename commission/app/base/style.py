@@ -171,7 +171,7 @@ div:has(>.c-rail)+div .mantine-Button-label{{font-size:9.5px;line-height:12px;ma
 .c-file span{{flex:1;overflow-wrap:anywhere}}
 .c-file small{{opacity:.7;white-space:nowrap;font-variant-numeric:tabular-nums}}
 .c-folder span{{font-weight:600}}
-.c-folder span::after{{content:" /";opacity:.7}}
+.c-folder:not(.c-up) span::after{{content:" /";opacity:.7}}
 .c-file:is(:hover,:focus-visible){{background:{css(Surface.PRESSED.dark)};outline:none}}
 .c-files-foot{{display:flex;justify-content:flex-end;gap:8px;padding:8px 14px 10px}}
 .c-files-foot button{{padding:3px 12px;border-radius:3px;border:1px solid {css(Surface.CARD_EDGE.dark)};background:none;

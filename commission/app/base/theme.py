@@ -162,6 +162,17 @@ WIDE = "<div class='c-wide'></div>"
 """An html element that lets the widget behind it, which has no label, take the label's room, too."""
 
 
+def whole_line(widget: str) -> str:
+    """Return an html element that puts a widget's label above it, so that a list of numbers has the whole line.
+
+    Parameters
+    ----------
+    widget : its identifier.
+    """
+    row = f".mantine-Flex-root:has(label[for='{widget}']):not(:has(.mantine-Flex-root label[for='{widget}']))"
+    return f"<div class='c-list-line'><style>{row}{{flex-wrap:wrap}}{row}>*{{flex:1 0 100%!important}}</style></div>"
+
+
 def path_mark(kind: str) -> str:
     """Return an html element that lets the text field behind it look into folders (web_assets/files.js).
 
@@ -277,7 +288,8 @@ div:has(>div>.c-bottom)>:nth-child(5) [style*="7.25em"]{{display:none}}
 div:has(>div>.c-route){{display:grid;grid-template-columns:repeat(3,minmax(0,1fr));padding-top:2px!important}}
 div:has(>div>.c-route)>:nth-child(1){{grid-column:span 3;padding-left:var(--c-tabs)}}
 .c-route{{font-size:12px;height:44px;display:flex;align-items:center;white-space:nowrap;overflow:hidden}}
-div:has(>:is(.c-wide,.c-live,.c-path)){{display:none}}
+div:has(>:is(.c-wide,.c-live,.c-path,.c-list-line)){{display:none}}
+input:not(:focus){{text-overflow:ellipsis}}
 div:has(>.c-wide)+*>.mantine-Flex-root>[style*="flex-shrink: 0"]{{display:none}}
 div:has(>.c-tools)+* .mantine-Button-root{{padding:0 4px!important;font-size:11px!important;min-width:0!important;
  flex:1 1 auto!important}}
@@ -338,8 +350,10 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 [data-dock-region=right] [role=tab]{{padding:0 .62em!important}}
 [data-shows~=c-association] [data-dock-scroll]>div:has(.c-association){{flex-grow:2!important}}
 .c-association{{padding:0 12px 0 4px}}
-@media (max-height:800px){{.c-a-picture{{max-width:196px!important}}
- [data-shows~=c-association] [data-dock-scroll]>div:has(.c-association){{flex-grow:8!important}}}}
+@media (max-height:800px){{.c-a-picture{{max-width:156px!important}}
+ [data-shows~=c-association] [data-dock-scroll]>div:has(.c-association){{flex-grow:2.2!important}}
+ :root:not([data-shows~=c-association]) [data-dock-region=right] [data-dock-scroll]>div:has([role=tab][title=Selection])
+ {{flex-grow:1.5!important}}}}
 .mantine-Slider-markWrapper:only-child .mantine-Slider-mark{{background:{css(SELECTED)};border:none;width:2px;
  height:12px;border-radius:0;transform:translateY(-3px)!important}}
 div:has(>div>.c-bottom):has(.c-no-run) button{{opacity:.35;pointer-events:none}}

@@ -6,6 +6,7 @@ from typing import Any
 
 from viser import GuiApi, GuiInputHandle
 
+from commission.app.base import theme, viser_private
 from commission.app.base.inputs import Inputs, Read
 from commission.app.base.state import AppState
 from commission.site.fields import field_info
@@ -81,6 +82,7 @@ def add_list(gui: GuiApi, inputs: Inputs, name: str, of: tuple[Project, Read]) -
     project, read = of
     info = field_info(project, name)
     widget = gui.add_text(info.quantity.title if info.quantity else info.label, "", hint=info.hint)
+    gui.add_html(theme.whole_line(viser_private.identifier(widget)))
 
     def shown(state: AppState) -> str | None:
         value = read(state, name)
