@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from commission.geometry import raycast
+from commission.geometry.arrays import read_only
 from commission.geometry.occupancy import OccupancyGrid
 from commission.geometry.ray_kernels import cast_ray, free_rectangles
 from commission.geometry.raycast import RayCaster
@@ -173,7 +174,7 @@ def free_from(occupied: NDArray[np.bool_], row: int, column: int) -> list[tuple[
 def test_rectangles_are_free_and_on_average_nearly_as_large_as_the_best(down: bool, left: bool) -> None:
     occupied = random_map(5, 12, 15, 0.08)
     occupied[[0, -1]] = occupied[:, [0, -1]] = True
-    rectangles = free_rectangles(occupied, down, left)
+    rectangles = free_rectangles(read_only(occupied), down, left)
     # Turned so that all of them extend to higher rows and columns.
     turned = occupied[::-1] if down else occupied
     turned, rectangles = (turned[:, ::-1], rectangles[:, ::-1]) if left else (turned, rectangles)
@@ -192,7 +193,7 @@ def test_rectangles_are_free_and_on_average_nearly_as_large_as_the_best(down: bo
 def test_a_rectangle_that_reaches_out_of_the_grid_is_as_large_as_can_be() -> None:
     occupied = np.zeros((4, 5), dtype=bool)
     occupied[1, 3] = True
-    rectangles = free_rectangles(occupied, False, False)
+    rectangles = free_rectangles(read_only(occupied), False, False)
     assert rectangles[2, 0] == 255 + (255 << 8)
     assert rectangles[1, 4] == 255 + (255 << 8)
     assert rectangles[1, 2] == 1 + (255 << 8)
