@@ -396,7 +396,7 @@ def with_temporary(  # noqa: PLR0917 - the filter's state around one scan
 
 @compiled_inline
 def said_by_contours(figures: FloatArray | None) -> float:
-    """What the contours of a scan say of the pose: 1 for it, -1 against it, 0 nothing.
+    """What the contours of a scan say of the pose: 1 for it, 0.5 for a part of it, -1 against it, 0 nothing.
 
     Parameters
     ----------
@@ -404,13 +404,13 @@ def said_by_contours(figures: FloatArray | None) -> float:
 
     Notes
     -----
-    No formula: accepted or rejected, where they tell all three of place and heading. In a corridor they tell two,
-    which fit everywhere along it.
+    No formula: accepted or rejected. In a corridor they tell two of place and heading, which fit everywhere along it;
+    where they do not fit, the pose is wrong for all that.
     """
-    if figures is None or figures[ROWS] != WHOLE_POSE:
+    if figures is None:
         return 0.0
     if figures[USE] == ACCEPTED:
-        return 1.0
+        return 1.0 if figures[ROWS] == WHOLE_POSE else 0.5
     return -1.0 if figures[USE] == REJECTED else 0.0
 
 

@@ -130,7 +130,8 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     model : of the observation.
     cells, places, cell_offsets : the map, see `ReflectorIndex`.
     status : (n,) a `Status` each; what the detector filter rejected does not count.
-    contours : 1 where they match and tell the whole pose, -1 where what they tell so is rejected, else 0.
+    contours : 1 where they match and tell the whole pose, 0.5 where they tell a part of it, -1 where what they tell is
+        rejected, else 0.
     rule : windows and limits.
 
     Notes
@@ -141,7 +142,8 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     changed. Where they do not, rejected contours speak against it; and contours that match, from a belief that was not
     doubtful, speak for it: then what is near no reflector is a thing that the map lacks and does not count, but what is
     rejected near reflectors does, so that many of those still make the vehicle lost. A match counts as three accepted
-    detections, and as one where the pose has to prove right.
+    detections, and as one where the pose has to prove right. One that tells a part of the pose proves nothing, but what
+    was rejected before it was not in a row.
     """
     accepted, rejected, near = 0.0, 0.0, 0.0
     for i in range(first, last):
@@ -160,11 +162,13 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
                 near += 1.0 if distance <= reach else 0.0
     confirmed, against = evidence.confirmed, evidence.against
     doubtful = is_doubtful(belief, rule)
-    matches = contours > 0.0 and not doubtful
+    matches = contours == 1.0 and not doubtful
     if accepted > MOST_FOR * rejected or matches:
         against = 0.0
     elif rejected >= FEWEST_AGAINST or contours < 0.0:
         against += 1.0
+    elif contours > 0.0 and not doubtful:
+        against = 0.0
     if doubtful:
         accepted, confirmed = 0.0, 0.0
     confirmed += accepted

@@ -70,6 +70,18 @@ def test_a_corridor_does_not_confirm_the_place_along_it():
     assert not any(each.mode == Mode.OPERATIONAL for each in estimates)
 
 
+def test_a_vehicle_that_was_carried_across_or_turned_in_a_corridor_is_lost_after_ten_scans():
+    floor = corridor()
+    for off in ((0.0, 0.4, 0.0), (0.0, 0.0, 0.2)):
+        localizer = localizer_in(floor, (25.0, 1.2, 0.0))
+        assert stand(localizer, floor, (25.0, 1.2, 0.0), 20)[-1].mode == Mode.OPERATIONAL
+        moved = stand(localizer, floor, np.add((25.0, 1.2, 0.0), off), 30, first=20)
+        assert all(each.contours[ROWS] == 2 for each in moved)
+        modes = [each.mode for each in moved]
+        assert modes.index(Mode.LOST) in (9, 10)
+        assert Mode.OPERATIONAL not in modes[10:]
+
+
 def test_a_room_confirms_a_pose_after_twenty_scans():
     floor = room()
     estimates = stand(localizer_in(floor, TRUTH, to_confirm=True), floor, TRUTH, 25)

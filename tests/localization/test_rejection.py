@@ -115,6 +115,8 @@ def test_a_scan_speaks_against_the_pose_by_what_it_rejects(
         (0, 0, 1.0, 0.0),
         (0, 3, 1.0, 0.0),
         (0, 0, 0.0, 4.0),
+        (0, 0, 0.5, 0.0),  # a corridor: what was rejected before was not in a row
+        (0, 3, 0.5, 5.0),
     ],
 )
 def test_contours_speak_for_or_against_the_pose_where_reflectors_do_not_speak_for_it(
@@ -127,6 +129,9 @@ def test_where_contours_match_only_what_is_rejected_near_reflectors_counts() -> 
     far, near = weighed(0, 4, contours=1.0), weighed(0, 4, contours=1.0, place=(4.5, 0.0))
     assert (far.accepted, far.rejected, far.near_rejected, far.confirmed) == (3.0, 0.0, 0.0, 1.0)
     assert (near.accepted, near.rejected, near.near_rejected, near.confirmed) == (3.0, 4.0, 4.0, 1.0)
+    aisle = weighed(0, 4, contours=0.5)
+    assert (aisle.accepted, aisle.rejected, aisle.confirmed) == (0.0, 4.0, 0.0)
+    assert weighed(0, 0, contours=0.5, variance=100.0).against == 4.0
     doubtful = weighed(0, 4, contours=1.0, variance=100.0)
     assert (doubtful.accepted, doubtful.rejected, doubtful.confirmed, doubtful.against) == (0.0, 4.0, 0.0, 5.0)
 

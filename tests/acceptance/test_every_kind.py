@@ -1,0 +1,153 @@
+"""What every observation kind has to keep, alone and all together: one battery over drives through one small room.
+
+Residuals, Jacobians by finite differences and degenerate geometry of each kind are tested by its own file.
+"""
+
+# pyright: basic
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from commission.geometry import se2
+from commission.localization.estimate import Belief, Mode
+from commission.localization.growing_run import GrowingRun
+from commission.localization.setup import LocalizerSetup
+from commission.localization.whole_run import run
+from commission.simulation.scenario import start_of, virtual_drive
+from commission.site.disturbances import ConstantErrors, Disturbances
+from commission.site.parameters import ContourParameters, Parameters, TemporaryParameters
+from commission.site.project import Project
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.routes import Route, Segment
+from commission.site.scanner import Scanner
+from commission.site.tags import Tag, TagCamera
+from commission.studies.metrics import pose_errors, reference_at
+from tests.conftest import Seeds, few_of
+from tests.localization.contour_halls import room
+
+ROUTE = "Through"
+POSTS = tuple(
+    Reflector(id=name, x=x, y=y, radius=0.04, sigma=0.004)
+    for name, x, y in (("A", 2.5, 5.5), ("B", 7.5, 2.5), ("C", 8.8, 6.5))
+)
+TAGS = (Tag(id="1", x=9.2, y=5.0, heading=3.1, sigma=0.003, heading_sigma=0.003),)
+CONTOURS = Parameters(contour=ContourParameters(enabled=True))
+CORNERS = Parameters(temporary=TemporaryParameters(enabled=True))
+KINDS = {
+    "reflectors": (POSTS, (), Parameters()),
+    "contours": ((), (), CONTOURS),
+    "tags": ((), TAGS, Parameters()),
+    "reflectors and corners that are remembered": (POSTS, (), CORNERS),
+    "all": (POSTS, TAGS, dataclasses.replace(CONTOURS, temporary=CORNERS.temporary)),
+}
+DRAWN = ConstantErrors(survey_factor=1.0, mounting_sigma=(0.002, 0.002, 0.001745), clock_offset_sigma=0.005)
+"""As large as the project takes them to be."""
+LONGEST_WRONG = 15
+"""Scans after which a wrong pose is no longer called operational."""
+
+
+# All kinds at once are a filter of their own, which takes half a minute to compile.
+@pytest.fixture(scope="module", params=few_of(list(KINDS), KINDS.keys() - {"all"}))
+def project(request: pytest.FixtureRequest) -> Project:
+    posts, tags, parameters = KINDS[request.param]
+    segment = Segment(control_points=np.array(((3.0, 3.0), (4.0, 3.2), (5.5, 4.2), (6.5, 4.5))), degree=3)
+    return Project(
+        floor_map=room(origin=(0.4, -0.3, 0.1)),
+        reflectors=ReflectorMap(posts),
+        tags=tags,
+        tag_camera=TagCamera(mounting=np.array((0.2, 0.05, 0.0)), field_of_view_deg=120.0, range=(0.1, 9.0)),
+        routes=(Route(ROUTE, speed=0.8, segments=(segment,)),),
+        scanners=(Scanner(mounting=np.array((0.3, -0.1, 0.2)), resolution_deg=0.5, rate=10.0, sweep_duration=0.03),),
+        parameters=parameters,
+        disturbances=Disturbances(constants=DRAWN),
+    )
+
+
+def start_in(project: Project) -> Belief:
+    start = start_of(project, ROUTE)
+    return Belief(0, start.pose, np.diag(start.sigmas**2))
+
+
+def references_of(columns, log) -> np.ndarray:
+    """(K, 3) true pose of each cycle, NaN where none is known."""
+    return reference_at(columns.stamps_ns, log.reference_stamps_ns, log.reference_poses)
+
+
+def is_frame(columns) -> np.ndarray:
+    """(K,) whether a cycle is of a camera's frame and not of a scan."""
+    return np.array([columns.is_frame(cycle) for cycle in range(len(columns))])
+
+
+def test_live_is_the_whole_run_to_the_last_bit(project):
+    log, setup, start = virtual_drive(project, ROUTE, seed=1), LocalizerSetup.of(project), start_in(project)
+    whole, live = run(log, setup, start), GrowingRun(setup, start)
+    for record in log.records():
+        live.feed(record)
+    live.flush()
+    grown = live.columns()
+    for name in ("means", "covariances", "modes", "status", "d2", "contours", "tags", "temporary"):
+        assert getattr(whole, name).tobytes() == getattr(grown, name).tobytes(), name
+    assert whole.final == grown.final
+
+
+def moved(project: Project, T: np.ndarray) -> Project:
+    """All that lies in the hall at another place."""
+    posts = zip(
+        project.reflectors.reflectors, se2.transform_points(T, project.reflectors.centers).tolist(), strict=True
+    )
+    tags = ((tag, se2.compose(T, tag.pose).tolist()) for tag in project.tags)
+    return dataclasses.replace(
+        project,
+        floor_map=room(origin=se2.compose(T, project.floor_map.origin)),
+        reflectors=ReflectorMap(tuple(dataclasses.replace(post, x=x, y=y) for post, (x, y) in posts)),
+        tags=tuple(dataclasses.replace(tag, x=x, y=y, heading=heading) for tag, (x, y, heading) in tags),
+    )
+
+
+def test_a_hall_that_is_moved_and_turned_gives_the_same_drive_in_it(project):
+    """Records know nothing of the hall."""
+    T = np.array((-40.0, 25.0, 2.0))
+    c, s = np.cos(T[2]), np.sin(T[2])
+    turn = np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+    log, start = virtual_drive(project, ROUTE, seed=2), start_in(project)
+    setup = LocalizerSetup.of(project)
+    here = run(log, setup, start)
+    begun = Belief(0, se2.compose(T, start.mean), turn @ start.covariance @ turn.T)
+    there = run(log, LocalizerSetup.of(moved(project, T)), begun)
+    # A beam at the outlier threshold of a match counts or not by the rounding of a table in single precision.
+    assert np.abs(pose_errors(there.means, se2.compose(T, here.means))).max() < (5e-4 if setup.contour else 1e-6)
+    np.testing.assert_allclose(turn @ here.covariances @ turn.T, there.covariances, rtol=0.0, atol=1e-6)
+    np.testing.assert_array_equal(here.status, there.status)
+
+
+def test_errors_are_as_large_as_the_filter_says_with_all_constants_drawn(project, seeds: Seeds):
+    nees = []
+    for seed in seeds(4, 20):
+        log = virtual_drive(project, ROUTE, seed=10 + seed)
+        columns = run(log, LocalizerSetup.of(project), start_in(project))
+        assert (columns.modes == Mode.OPERATIONAL).all()
+        errors = pose_errors(columns.means, references_of(columns, log))
+        known = np.isfinite(errors[:, 0])
+        off = zip(errors[known], columns.covariances[known], strict=True)
+        nees.append(np.mean([error @ np.linalg.solve(P, error) for error, P in off]))
+    print(f"ANEES {np.mean(nees) / 3.0:.2f}")  # noqa: T201 - README
+    # Constants stay for a whole drive: chi-square with 3 degrees of freedom for each is the least that is averaged.
+    assert np.mean(nees) / 3.0 < chi2.ppf(0.999, 3 * len(nees)) / (3 * len(nees))
+
+
+def test_in_a_hall_that_is_somewhere_else_the_vehicle_is_soon_lost_and_no_number_is_none(project):
+    """All that is seen contradicts the pose: the vehicle stops, and goes on only if it has found where the hall is."""
+    T = np.array((3.0, -2.0, 0.5))
+    log = virtual_drive(project, ROUTE, seed=3)
+    columns = run(log, LocalizerSetup.of(moved(project, T)), start_in(project))
+    assert np.isfinite(columns.means).all()
+    assert np.linalg.eigvalsh(columns.covariances).min() > 0.0
+    errors = pose_errors(columns.means, se2.compose(T, references_of(columns, log)))
+    wrong = (columns.modes == Mode.OPERATIONAL) & (np.hypot(errors[:, 0], errors[:, 1]) > 0.1)
+    assert 0 < np.count_nonzero(wrong & ~is_frame(columns)) <= LONGEST_WRONG
+    assert not wrong[np.argmin(wrong) :].any()
