@@ -117,10 +117,12 @@ class Place:
         result = placement(PlacementInput.of(project, options, self.route or None))
         found = result.placement
         kept = save_copy(dataclasses.replace(project, reflectors=found.reflectors), self.out, force=self.force)
+        zones = [f"Zones        {result.zones_told}"] if result.zones_told else []
         notes = [] if kept is None else [f"Note         unsaved edits of the project that was there are kept in {kept}"]
         changes = [f"{name[:20]:<20} {change}" for name, change in compared(result.before, result.after)]
         sys.stdout.write(
-            "\n".join([*_report(found), "Before and after", *changes, *notes, f"Written to   {self.out}"]) + "\n"
+            "\n".join([*_report(found), *zones, "Before and after", *changes, *notes, f"Written to   {self.out}"])
+            + "\n"
         )
 
     def _options(self, project: Project) -> PlacementOptions:

@@ -27,7 +27,7 @@ from commission.site.scanner import Scanner
 from commission.site.stations import Station
 from commission.site.uncertainty import Uncertainty
 from commission.site.vehicle import Vehicle
-from commission.site.zones import Zone
+from commission.site.zones import ObservationKind, Zone
 from commission.studies.inputs import StudyInput
 from commission.studies.kernels import DRIVES, ERRORS, INFORMATION, SHARES
 
@@ -142,6 +142,14 @@ class PlacementResult:
         """Of the stretches on which a limit is passed, the one where it is passed most; None without any."""
         over = [each.beyond for each in self.unmet if each.beyond is not None]
         return max(over, key=lambda each: each.kept[each.worst()] / each.limits[each.worst()], default=None)
+
+    @property
+    def zones_told(self) -> str:
+        """Say in which zones no reflector helps, where a demand is not met and there are such zones; else empty."""
+        names = [zone.name for zone in self.inputs.zones if ObservationKind.REFLECTORS not in zone.kinds]
+        if not names or not self.unmet:
+            return ""
+        return f"no reflector helps in {', '.join(names)}, and contours and tags are not reckoned with"
 
     @property
     def added(self) -> FloatArray:

@@ -186,6 +186,8 @@ def found_text(found: LayoutView) -> str:
         shown = min(len(suggestion.unmet), MOST_UNMET)
         more = f", the first {shown} listed" if shown < len(suggestion.unmet) else ""
         notes.append(f"Not met on {len(suggestion.unmet)} stretches{more}; a click goes there.")
+    if suggestion.zones_told:
+        notes.append(f"Zones: {suggestion.zones_told}.")
     if suggestion.farthest is not None:
         notes.append(f"Worst: {suggestion.farthest.told()}.")
     if found.outdated:

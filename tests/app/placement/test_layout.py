@@ -37,6 +37,7 @@ from commission.errors import UsageError
 from commission.site.fields import with_field
 from commission.site.layout_brief import Rectangle
 from commission.site.project import Project
+from commission.site.zones import ObservationKind, Zone
 from commission.studies.placement import PlacementResult, placement
 from tests.app.asking import ME, by, joined
 from tests.app.asking import after as outcome
@@ -178,6 +179,10 @@ def test_what_is_not_met_is_told_by_its_metres_and_its_place(project: Project) -
         along = np.hypot(*np.diff(stretch.points, axis=0).T).sum()
         assert along == pytest.approx(stretch.last - stretch.first, abs=1.0)
     assert "a click goes there" in found_text(LayoutView(found, outdated=False, wished_otherwise=False))
+    hall = Zone(name="Hall", outline=((0.0, 0.0), (1.0, 0.0), (1.0, 1.0)), kinds=(ObservationKind.CONTOURS,))
+    zoned = replace(found, inputs=replace(found.inputs, zones=(hall,)))
+    told = found_text(LayoutView(zoned, outdated=False, wished_otherwise=False))
+    assert "Zones: no reflector helps in Hall, and contours and tags are not reckoned with." in told
 
 
 def test_without_a_route_or_a_wall_it_is_said_what_is_missing(project: Project) -> None:
