@@ -85,8 +85,7 @@ def vehicle_in(page: OpenPage) -> np.ndarray:
 def test_the_page_shows_a_driving_vehicle_its_badge_and_every_panel(run: OpenRun, page: OpenPage) -> None:
     wait_for_badge(page, "OPERATIONAL")
     before = vehicle_in(page)
-    page.page.wait_for_timeout(2000)
-    assert np.hypot(*(vehicle_in(page) - before)) > 0.1
+    run.until(lambda: float(np.hypot(*(vehicle_in(page) - before))) > 0.1)
     for text in ("Largest NIS / gate", "validation area", "Position error", "Floor map"):
         page.wait_for_text(text)
     page.page.wait_for_function("() => window.commissionPlots?.shown.titles.length === 6")
@@ -176,8 +175,7 @@ def test_two_browsers_see_the_same_run_each_in_its_own_view(
     other.page.wait_for_function(
         "text => document.querySelector('.c-clock b').innerText === text", arg=settled_clock(run)
     )
-    one.page.wait_for_timeout(1000)
-    np.testing.assert_allclose(vehicle_in(one), vehicle_in(other), atol=1e-4)
+    run.until(lambda: np.allclose(vehicle_in(one), vehicle_in(other), atol=1e-4))
     assert one.page.locator(".c-clock b").inner_text() == other.page.locator(".c-clock b").inner_text()
 
 

@@ -100,8 +100,7 @@ def test_a_slow_drag_acts_live_and_is_one_undo_step_and_the_next_one_another(
     assert len(set(map(id, seen))) == 3, "it acts while it is moved"
     assert len(served.state.undo) == 1
     drag(0.8, 0.5)
-    page.page.wait_for_timeout(500)
-    assert len(served.state.undo) == 2
+    served.until(lambda: len(served.state.undo) == 2, 10.0)
     page.page.get_by_role("button", name="Undo").first.click()
     served.until(lambda: len(served.state.undo) == 1, 10.0)
     assert served.state.project.parameters == seen[2]

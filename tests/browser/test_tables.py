@@ -116,8 +116,8 @@ def test_a_click_on_a_reflector_selects_it_and_flies_there(served: Served, page:
     page.page.locator(REFLECTORS, has_text="R3").click()
     served.until(lambda: any(editor.selected == ("R3",) for editor in editors_of(served.state)))
     middle = "(() => { const c = window.__viserMutable.camera.position; return [c.x, c.y, c.z] })()"
-    page.page.wait_for_timeout(1500)
     page.wait_until_drawn()
+    page.wait_until_still()
     x, y = page.pixel_of((11.75, 1.5))
     box = page.page.evaluate(
         "(b => [b.left, b.top, b.width, b.height])(window.__viserMutable.canvas.getBoundingClientRect())"
@@ -134,8 +134,8 @@ def test_the_dot_of_a_column_colors_the_floor_by_it(served: Served, page: OpenPa
     figures = found_in(served).figures
     page.page.locator(".c-floor-scale", has_text="NIS").wait_for()
     page.press("Fit")
+    page.wait_until_still()
     page.wait_until_drawn()
-    page.page.wait_for_timeout(1000)
     classes = classes_of(BY_KEY["nis"].values(figures))
     for name, place, index in zip(figures.names, figures.places.tolist(), classes.tolist(), strict=True):
         x, y = page.pixel_of(place)

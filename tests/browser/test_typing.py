@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import pytest
 from playwright.sync_api import Locator
 
+from commission.app.base import state as page_state
 from commission.app.base.actions import Envelope
 from commission.app.base.viser_private import widget_of
 from commission.app.runtime import Message, Runtime
@@ -78,13 +79,18 @@ def other(served: Served, lasting_window: Callable[..., OpenPage]) -> OpenPage:
     return page
 
 
+@pytest.fixture(autouse=True)
+def each_entry_is_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Edits that follow each other at once are steps of their own: no test has to wait, and no second entry hides."""
+    monkeypatch.setattr(page_state, "MERGE_WITHIN_S", -1.0)
+
+
 @pytest.fixture
 def page(opened: OpenPage, served: Served, heard: Heard) -> OpenPage:
     """The window with the project as it was opened, and without what was said to the test before."""
     opened.forget_refusals()
     served.runtime.post(ResetParameters())
     served.until(lambda: served.state.project.parameters == room().parameters, 10.0)
-    opened.page.wait_for_timeout(1_100)  # what a test does at once would be the same step
     heard.envelopes.clear()
     return opened
 
@@ -171,7 +177,6 @@ def test_a_click_elsewhere_finishes_the_entry_before_it_does_anything(
     page.open_tab("Tune")
     page.fill("Gate", "99")
     served.until(lambda: gate(served) == pytest.approx(0.99), 10.0)
-    page.page.wait_for_timeout(1_100)  # what follows at once would be the same step
     typed_into(page, "Gate", "97.5")
     heard.envelopes.clear()
     page.page.get_by_role("button", name="Undo").first.click()

@@ -53,7 +53,7 @@ def changed_on_disk(action: actions.ChangedOnDisk, state: AppState, _sender: Sen
     files = state.part(FilesState)
     if action.files == files.foreign:
         return Outcome(state)
-    text = f"changed on disk by somebody else: {', '.join(action.files)}; read it again, or save to overwrite it"
+    text = f"changed on disk by somebody else: {', '.join(action.files)}; Read again takes it, Overwrite keeps yours"
     if files.kept_in is not None:
         text = f"the folder {state.folder} is gone; Overwrite writes the project there anew"
     told = (Tell(text, failed=True),) if action.files else ()
