@@ -38,10 +38,12 @@ def served() -> Iterator[Served]:
 
 def look_at(page: OpenPage, client: viser.ClientHandle, place: np.ndarray, height: float) -> None:
     x, y = map(float, place)
+    page.page.evaluate("() => { if (!window.commissionStands) window.commissionMovedNow(); }")
+    page.page.wait_for_function("() => window.commissionStands === true")  # as if by hand: nothing is fitted anew
     client.camera.position, client.camera.look_at = (x, y, height / 0.02), (x, y, 0.0)
     page.page.wait_for_timeout(600)
-    page.page.evaluate("window.__viserMutable.requestRender()")
-    page.page.wait_for_timeout(400)
+    page.wait_until_still()
+    page.wait_until_drawn()
 
 
 def pixels_of(page: OpenPage, around: tuple[float, float], color: theme.Color, reach: int = 60) -> np.ndarray:

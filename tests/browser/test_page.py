@@ -98,7 +98,8 @@ def test_the_badge_turns_red_when_reflectors_are_covered_and_back(run: OpenRun, 
     page.open_tab("Run")
     page.tick("Cover reflectors")
     wait_for_badge(page, "FAIL")
-    assert "rgb(213, 40, 37)" in page.page.evaluate("getComputedStyle(document.querySelector('.c-badge')).background")
+    red = "rgb({}, {}, {})".format(*Run.FAIL.dark)
+    assert red in page.page.evaluate("getComputedStyle(document.querySelector('.c-badge')).background")
     page.tick("Cover reflectors")
     wait_for_badge(page, "OPERATIONAL")
 
