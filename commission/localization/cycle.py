@@ -18,7 +18,17 @@ from commission.geometry.directions import UnitVector, direction_of
 from commission.localization.association import INLIER, NOBODY, Gate, associate
 from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering, considering
 from commission.localization.consider_columns import begin, busy_chunks, put_back, put_block, take_along
-from commission.localization.contour import ACCEPTED, REJECTED, ROWS, USE, ContourModel, ContourScan, observe_contours
+from commission.localization.contour import (
+    ACCEPTED,
+    CONTRADICTED,
+    REJECTED,
+    ROWS,
+    USE,
+    WHOLE_POSE,
+    ContourModel,
+    ContourScan,
+    observe_contours,
+)
 from commission.localization.filter_kinds import correct_by, is_invariant
 from commission.localization.joint import NEAREST
 from commission.localization.observation import ObservationModel
@@ -31,9 +41,6 @@ from commission.localization.supervisor import FAIL, LOST, OPERATIONAL, supervis
 from commission.localization.temporary import TemporaryModel, observe_temporary
 from commission.localization.temporary_memory import TemporaryMemory
 from commission.localization.zones import ZoneRows, kinds_at
-
-WHOLE_POSE = 3
-"""Rows of a match that tells place and heading."""
 
 
 class Cycle(NamedTuple):
@@ -404,14 +411,15 @@ def said_by_contours(figures: FloatArray | None) -> float:
 
     Notes
     -----
-    No formula: accepted or rejected. In a corridor they tell two of place and heading, which fit everywhere along it;
+    No formula: accepted, or rejected or contradicted. In a corridor they tell two of place and heading, which fit
+    everywhere along it;
     where they do not fit, the pose is wrong for all that.
     """
     if figures is None:
         return 0.0
     if figures[USE] == ACCEPTED:
         return 1.0 if figures[ROWS] == WHOLE_POSE else 0.5
-    return -1.0 if figures[USE] == REJECTED else 0.0
+    return -1.0 if figures[USE] == REJECTED or figures[USE] == CONTRADICTED else 0.0
 
 
 class Room(NamedTuple):

@@ -47,7 +47,8 @@ class Evidence(NamedTuple):
     """Accepted detections and matches of contours, since the belief was too wide to tell reflectors apart; infinite
     where it never was."""
     against: float
-    """Scans in a row that rejected nearly all they saw; those that saw too little to say are passed over."""
+    """Scans in a row that rejected nearly all they saw; those that saw too little to say are passed over, and each that
+    a part of the pose fits takes one back."""
 
 
 NO_EVIDENCE = Evidence(0, 0.0, 0.0, 0.0, 0.0, math.inf, 0.0)
@@ -142,8 +143,8 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     changed. Where they do not, rejected contours speak against it; and contours that match, from a belief that was not
     doubtful, speak for it: then what is near no reflector is a thing that the map lacks and does not count, but what is
     rejected near reflectors does, so that many of those still make the vehicle lost. A match counts as three accepted
-    detections, and as one where the pose has to prove right. One that tells a part of the pose proves nothing, but what
-    was rejected before it was not in a row.
+    detections, and as one where the pose has to prove right. One that tells a part of the pose proves nothing; it
+    takes back one scan that spoke against the pose.
     """
     accepted, rejected, near = 0.0, 0.0, 0.0
     for i in range(first, last):
@@ -168,7 +169,7 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     elif rejected >= FEWEST_AGAINST or contours < 0.0:
         against += 1.0
     elif contours > 0.0 and not doubtful:
-        against = 0.0
+        against = max(against - 1.0, 0.0)
     if doubtful:
         accepted, confirmed = 0.0, 0.0
     confirmed += accepted

@@ -29,6 +29,7 @@ def contour_figures(columns: RunColumns) -> dict[str, Number]:
         "contour_accepted": len(accepted),
         "contour_rejected": int(np.count_nonzero(use == ContourUse.REJECTED)),
         "contour_unmatched": int(np.count_nonzero(use == ContourUse.UNMATCHED)),
+        "contour_contradicted": int(np.count_nonzero(use == ContourUse.CONTRADICTED)),
         "contour_matched_fraction": float(looked[:, MATCHED].sum()) / beams if beams else None,
         "contour_cost_mean": float(looked[:, COST].mean()) if len(looked) else None,
         "contour_nis_per_row_mean": float(accepted[:, NIS].sum()) / rows if rows else None,

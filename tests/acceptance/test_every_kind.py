@@ -20,6 +20,7 @@ from commission.localization.setup import LocalizerSetup
 from commission.localization.whole_run import run
 from commission.simulation.scenario import start_of, virtual_drive
 from commission.site.disturbances import ConstantErrors, Disturbances
+from commission.site.floor_map import FREE
 from commission.site.parameters import ContourParameters, Parameters, TemporaryParameters
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -140,14 +141,28 @@ def test_errors_are_as_large_as_the_filter_says_with_all_constants_drawn(project
     assert np.mean(nees) / 3.0 < chi2.ppf(0.999, 3 * len(nees)) / (3 * len(nees))
 
 
-def test_in_a_hall_that_is_somewhere_else_the_vehicle_is_soon_lost_and_no_number_is_none(project):
-    """All that is seen contradicts the pose: the vehicle stops, and goes on only if it has found where the hall is."""
-    T = np.array((3.0, -2.0, 0.5))
-    log = virtual_drive(project, ROUTE, seed=3)
-    columns = run(log, LocalizerSetup.of(moved(project, T)), start_in(project))
-    assert np.isfinite(columns.means).all()
-    assert np.linalg.eigvalsh(columns.covariances).min() > 0.0
-    errors = pose_errors(columns.means, se2.compose(T, references_of(columns, log)))
-    wrong = (columns.modes == Mode.OPERATIONAL) & (np.hypot(errors[:, 0], errors[:, 1]) > 0.1)
-    assert 0 < np.count_nonzero(wrong & ~is_frame(columns)) <= LONGEST_WRONG
-    assert not wrong[np.argmin(wrong) :].any()
+def elsewhere(project: Project, rng: np.random.Generator) -> np.ndarray:
+    """Where the hall lies when the vehicle, believed at its start, is at a place of the hall that is free."""
+    floor, start = project.floor_map, start_in(project).mean
+    while True:
+        inside = np.array((rng.uniform(1.2, 8.0), rng.uniform(1.2, 6.0), rng.uniform(-3.1, 3.1)))
+        column, row = (inside[:2] / floor.resolution).astype(int)
+        pose = se2.compose(floor.origin, inside)
+        off = se2.relative(start, pose)
+        if np.hypot(*off[:2]) > 0.5 and (floor.cells[row - 6 : row + 6, column - 6 : column + 6] == FREE).all():
+            return se2.compose(start, se2.inverse(pose))
+
+
+def test_a_vehicle_that_is_elsewhere_in_the_hall_is_soon_lost_and_no_number_is_none(project, seeds: Seeds):
+    """All that is seen contradicts the pose: the vehicle stops, and goes on only if it has found where it is."""
+    log, start, longest = virtual_drive(project, ROUTE, seed=3), start_in(project), 0
+    for seed in seeds(6, 60):
+        T = elsewhere(project, np.random.default_rng(seed))
+        columns = run(log, LocalizerSetup.of(moved(project, T)), start)
+        assert np.isfinite(columns.means).all()
+        assert np.linalg.eigvalsh(columns.covariances).min() > 0.0
+        errors = pose_errors(columns.means, se2.compose(T, references_of(columns, log)))
+        wrong = (columns.modes == Mode.OPERATIONAL) & (np.hypot(errors[:, 0], errors[:, 1]) > 0.1)
+        longest = max(longest, np.count_nonzero(wrong & ~is_frame(columns)))
+    print(f"operational and wrong for {longest} scans at most")  # noqa: T201 - README
+    assert longest <= LONGEST_WRONG

@@ -8,8 +8,12 @@ import dataclasses
 import math
 
 import numpy as np
+import pytest
 
-from commission.localization.contour import ACCEPTED, ROWS, USE
+from commission.geometry import se2
+from commission.localization.contour import ACCEPTED, CONTRADICTED, ROWS, UNMATCHED, USE
+from commission.localization.contour_sight import share_through_walls
+from commission.localization.contour_tables import contour_tables
 from commission.localization.estimate import Belief, Mode
 from commission.localization.localizer import Localizer
 from commission.localization.setup import LocalizerSetup
@@ -18,7 +22,7 @@ from commission.site.parameters import ContourParameters, Parameters
 from commission.site.records import Odometry, Scan
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
-from tests.localization.contour_halls import corridor, room, scan_from
+from tests.localization.contour_halls import corridor, grid_pose, points_of, room, scan_from
 
 BEAMS, PERIOD_NS = 720, 100_000_000
 FULL_TURN = Scanner(field_of_view_deg=(-180.0, 180.0), resolution_deg=0.5, range=(0.05, 20.0))
@@ -39,8 +43,8 @@ def localizer_in(floor, start, *, reflectors=None, to_confirm=False, **superviso
     return Localizer(setup, state)
 
 
-def stand(localizer, floor, pose, scans, *, first=0, bright=()):
-    """Estimates of a vehicle that stands still; `bright` are ranges and bearings of things that the map lacks."""
+def stand(localizer, floor, pose, scans, *, first=0, bright=(), crowd=()):
+    """Estimates of a vehicle at rest; `bright` and `crowd` are ranges and bearings of things that the map lacks."""
     rng, estimates = np.random.default_rng(first), []
     ranges, bearings = scan_from(floor, pose, beams=BEAMS)
     for k in range(first, first + scans):
@@ -48,6 +52,9 @@ def stand(localizer, floor, pose, scans, *, first=0, bright=()):
         for distance, bearing in bright:
             where = np.abs(bearings - bearing) * distance < 0.04
             seen[where], shiny[where] = distance, True
+        for distance, bearing in crowd:
+            where = np.abs(bearings - bearing) * distance < 0.02
+            seen[where] = np.minimum(seen[where], distance)
         seen = np.where(np.isfinite(seen), seen, np.nan).astype(np.float32)
         localizer.feed(Odometry(k * PERIOD_NS, np.zeros(3)))
         estimates += localizer.feed(
@@ -99,6 +106,37 @@ def test_a_vehicle_that_was_carried_away_in_a_room_without_reflectors_is_lost_af
     assert Mode.OPERATIONAL not in modes[10:]
     # Carried back, it is believed again: such a map has nothing to search.
     assert stand(localizer, floor, TRUTH, 10, first=60)[-1].mode == Mode.OPERATIONAL
+
+
+def test_beams_go_through_walls_where_a_ray_caster_meets_one_earlier():
+    floor, tables, rng = room(), contour_tables(room()), np.random.default_rng(3)
+    for _ in range(20):
+        true, believed = (
+            np.array((rng.uniform(4.0, 8.0), rng.uniform(3.2, 6.0), rng.uniform(-3.0, 3.0))) for _ in "ab"
+        )
+        ranges, bearings = scan_from(floor, true, beams=90)
+        expected, _ = scan_from(floor, believed, beams=90)
+        points = points_of(ranges, bearings) / floor.resolution
+        through = share_through_walls(grid_pose(floor, believed), points, 0.0, 0.0, tables)
+        # A beam along a face, or one that ends just half a metre behind it, is decided by less than a cell.
+        assert through == pytest.approx(np.mean(ranges > expected + 0.5), abs=3.0 / 90.0)
+        mounted = se2.compose(true, (0.3, -0.1, 0.2))
+        ranges, bearings = scan_from(floor, mounted, beams=90)
+        points = se2.transform_points((0.3, -0.1, 0.2), points_of(ranges, bearings)) / floor.resolution
+        assert share_through_walls(grid_pose(floor, true), points, 6.0, -2.0, tables) == 0.0
+
+
+def test_a_vehicle_that_is_elsewhere_in_the_room_is_lost_and_one_behind_a_crowd_is_not():
+    floor = room()
+    carried = stand(localizer_in(floor, TRUTH), floor, (6.5, 2.5, 0.0), 30)
+    assert all(each.contours[USE] == CONTRADICTED for each in carried)
+    assert [each.mode for each in carried].index(Mode.LOST) in (9, 10)
+    # Legs half a metre to three metres away, on all but every fifth beam.
+    rng, localizer = np.random.default_rng(1), localizer_in(floor, TRUTH)
+    crowd = tuple((rng.uniform(0.5, 3.0), bearing) for bearing in np.linspace(-math.pi, math.pi, 400))
+    behind = stand(localizer, floor, TRUTH, 40, crowd=crowd)
+    assert all(each.contours[USE] == UNMATCHED for each in behind)
+    assert all(each.mode == Mode.OPERATIONAL for each in behind)
 
 
 def test_things_that_the_map_lacks_do_not_lose_a_vehicle_whose_contours_match():

@@ -115,7 +115,7 @@ def test_a_scan_speaks_against_the_pose_by_what_it_rejects(
         (0, 0, 1.0, 0.0),
         (0, 3, 1.0, 0.0),
         (0, 0, 0.0, 4.0),
-        (0, 0, 0.5, 0.0),  # a corridor: what was rejected before was not in a row
+        (0, 0, 0.5, 3.0),  # a corridor: something fits
         (0, 3, 0.5, 5.0),
     ],
 )

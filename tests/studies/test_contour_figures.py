@@ -27,12 +27,14 @@ def test_figures_are_those_counted_by_hand():
             (ContourUse.ACCEPTED, 100, 60, 0.2, 3.0, 2),
             (ContourUse.REJECTED, 100, 70, 0.3, 99.0, 3),
             (ContourUse.UNMATCHED, 100, 10, 0.8, 0.0, 0),
+            (ContourUse.CONTRADICTED, 100, 55, 0.35, 0.0, 0),
         )
     )
     assert found == {
         "contour_accepted": 2,
         "contour_rejected": 1,
         "contour_unmatched": 1,
+        "contour_contradicted": 1,
         "contour_matched_fraction": pytest.approx(0.55),
         "contour_cost_mean": pytest.approx(0.35),
         "contour_nis_per_row_mean": pytest.approx(1.0),
