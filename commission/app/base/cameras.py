@@ -59,6 +59,8 @@ class ClientView:
     """Shape of the floor, width over height, that the plan was fitted to."""
     fitted: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where the camera was put to show the whole site [m]."""
+    extent: Extent | None = None
+    """What it was fitted to: the site as it was then."""
     is_fitted: bool = False
     """Whether the browser has shown the whole site."""
     is_settled: bool = False
@@ -241,11 +243,12 @@ class Cameras:
                     node.remove()
                 own.furniture[layer.name] = layer.furnish(self._origin.scene(own.client.scene), three_d=own.three_d)
 
-    def _fit(self, own: ClientView) -> None:
-        """Show the plan of the whole site."""
+    def _fit(self, own: ClientView, extent: Extent | None = None) -> None:
+        """Show the plan of the whole site, or as large as it was."""
         with self._fitting:
-            own.aspect, own.fitted = _aspect(own.client), self._whole(own.client)
-            self._look_down(own.client, self._extent.center, own.fitted[2] * PLAN_FOV)
+            own.extent = extent or self._extent
+            own.aspect, own.fitted = _aspect(own.client), _whole(own.extent, own.client)
+            self._look_down(own.client, own.extent.center, own.fitted[2] * PLAN_FOV)
 
     def _look_down(self, client: ClientHandle, center: tuple[float, float], visible_height: float) -> None:
         distance = visible_height / PLAN_FOV
@@ -282,14 +285,15 @@ class Cameras:
         with self._fitting:
             is_reshaped = abs(_aspect(own.client) - own.aspect) > 0.01
             was_fitted = self._is_at(camera, own.fitted)
-        is_whole = self._is_at(camera, self._whole(own.client))
+        is_whole = self._is_at(camera, _whole(own.extent or self._extent, own.client))
         self._tell_whether_whole(own, is_whole=is_whole)
         own.is_fitted = own.is_fitted or is_whole
         own.is_settled = own.is_settled or time.monotonic() - own.came_at > BUILDS_UP
         # Before, not only where the shape has changed: what was sent for a shape before may have come last.
         is_due = is_reshaped and was_fitted if own.is_settled else not is_whole
         if is_due:
-            self._fit(own)
+            # A map that is loaded or taken back meanwhile moves no camera by itself.
+            self._fit(own, self._extent if own.is_settled else own.extent)
             return
         self._keep_north_up(camera)
 
@@ -304,11 +308,6 @@ class Cameras:
         """Whether a camera is where it was put, or would be [m]."""
         away = np.abs(camera.position - place)
         return bool(np.all(away <= 1e-3 * np.array([*self._extent.size, place[2]])))
-
-    def _whole(self, client: ClientHandle) -> tuple[float, float, float]:
-        """Where a camera shows the plan of the whole site on a floor as it is shaped now [m]."""
-        x, y = self._extent.center
-        return x, y, _visible_height(self._extent, _aspect(client)) / PLAN_FOV
 
     def _rotation_lock(self, client: ClientHandle) -> SceneNodeHandle:
         """Put a sheet under everything that takes left drags: the camera would turn by them, and north not stay up."""
@@ -334,6 +333,12 @@ class Cameras:
             camera.up_direction = (0.0, 1.0, 0.0)
             camera.position = (x, y, distance)
             camera.look_at = (x, y, 0.0)
+
+
+def _whole(extent: Extent, client: ClientHandle) -> tuple[float, float, float]:
+    """Where a camera shows the plan of a whole rectangle on a browser's floor as it is shaped now [m]."""
+    x, y = extent.center
+    return x, y, _visible_height(extent, _aspect(client)) / PLAN_FOV
 
 
 def _visible_height(extent: Extent, aspect: float) -> float:

@@ -42,7 +42,7 @@ class Window:
         """Take every camera that has been sent since."""
         self.raw.hear_all(seconds)
         for message in self.raw.heard[self._taken :]:
-            if message["type"] == "SetCameraPositionMessage":
+            if message["type"] == "SetCameraPositionMessage" and not message.get("initial"):
                 self.at = tuple(message["position"])
         self._taken = len(self.raw.heard)
 
@@ -117,6 +117,15 @@ def test_a_browser_that_goes_back_to_the_camera_that_it_began_with_sees_the_whol
         window.at = first
         window.show(FINAL)
         assert window.sees_all(FINAL), f"{seconds} s after it came"
+
+
+def test_a_map_that_is_taken_back_and_loaded_again_moves_no_camera(window: Window) -> None:
+    window.show(FINAL)
+    window.views.refurnish(frozenset(), Extent((0.0, 0.0), (5.0, 5.0)), frozenset())
+    window.show(FINAL)
+    window.views.refurnish(frozenset(), EXTENT, frozenset())
+    window.apply()
+    assert window.sees_all(FINAL)
 
 
 def test_who_moves_the_floor_of_a_page_that_builds_up_keeps_what_was_moved_to(window: Window) -> None:
