@@ -117,17 +117,17 @@ def test_a_kept_variant_stays_beside_a_moved_gate_and_undo_brings_it_back(
 
 
 def calibrated(served: Served, page: OpenPage) -> None:
-    """Calibrate by the drive, accept two of five figures beside the variant, and take them back."""
+    """Calibrate by the drive, accept both figures that it proposes beside the variant, and take them back."""
     page.fold("Calibration")
     page.press("Calibrate by this drive")
-    page.wait_for_text("5 figures proposed, 0 accepted.")
+    page.wait_for_text("2 figures proposed, 0 accepted.")
     assert "mounting x needs turning on the spot" in page.text()
     before = served.state.project
     variant = figures(page)["NIS of all near a reflector"][1]
     page.press("Accept Range 1σ")
-    page.wait_for_text("5 figures proposed, 1 accepted.")
+    page.wait_for_text("2 figures proposed, 1 accepted.")
     page.press("Accept Bearing 1σ")
-    page.wait_for_text("5 figures proposed, 2 accepted.")
+    page.wait_for_text("2 figures proposed, 2 accepted.")
     page.wait_for_text("Bearing 1σ accepted")
 
     view = served.runtime.service(CalibrationService).view
@@ -149,7 +149,7 @@ def calibrated(served: Served, page: OpenPage) -> None:
 
     for left in (1, 0):
         page.page.get_by_role("button", name="Undo").first.click()
-        page.wait_for_text(f"5 figures proposed, {left} accepted.")
+        page.wait_for_text(f"2 figures proposed, {left} accepted.")
     assert served.state.project is before
 
 
@@ -181,7 +181,7 @@ def map_corrected(served: Served, page: OpenPage) -> None:
     tick.click()
     page.press("Correct the map (1)")
     served.until(lambda: abs(served.state.project.reflectors.reflectors[0].y - first.y) < 0.02, 10.0)
-    page.wait_for_text("The map has it elsewhere by now")
+    page.wait_for_text("The map has it there by now")
     page.page.get_by_role("button", name="Undo").first.click()
     served.until(lambda: served.state.project == surveyed, 10.0)
     page.page.get_by_role("button", name="Undo").first.click()

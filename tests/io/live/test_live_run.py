@@ -28,7 +28,7 @@ from commission.io.vda5050_states import StateFile, StateStream, StateVersion, s
 from commission.localization.estimate import Mode
 from commission.simulation.scenario import records
 from commission.site.project import Project
-from commission.site.records import Detections, Odometry, Record, Scan
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
 from commission.studies.run import RunInput, RunResult, judged_run
 from commission.studies.start import StartOrigin
 from tests.io.live.virtual import ALL, scan, until
@@ -178,7 +178,7 @@ def test_a_session_that_is_killed_and_restarted_twenty_times_goes_on(warehouse: 
         sender = threading.Thread(target=send_drive, args=(drive, addresses, names), kwargs=arguments)
         before = len(kept)
         sender.start()
-        assert until(lambda before=before: len(kept) > before + 10)
+        assert until(lambda before=before: len(kept) > before + 10, 60.0)  # a kernel may have to be compiled
         alive.wait(0.0)
         threading.Event().wait(float(rng.uniform(0.0, 0.1)))
         alive.clear()
@@ -186,8 +186,11 @@ def test_a_session_that_is_killed_and_restarted_twenty_times_goes_on(warehouse: 
     last = runner.stop()
     order = [(record.stamp_ns, type(record), getattr(record, "scanner", 0)) for record in kept]
     assert len(set(order)) == len(order)
-    stamps = [record.stamp_ns for record in kept]
-    assert stamps == sorted(stamps)
+    # References are in order among themselves: no estimate waits for them.
+    for kinds in ((ReferencePose,), (Odometry, Scan)):
+        stamps = [record.stamp_ns for record in kept if isinstance(record, kinds)]
+        assert stamps
+        assert stamps == sorted(stamps)
     assert all(source.status.connects == 20 for source in last.sources)
     result = last.run.result
     assert result is not None
