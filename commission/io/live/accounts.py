@@ -35,6 +35,8 @@ class RecordAccount:
     """Records for which there was no room, since nobody took them in time."""
     refused: int = 0
     """Records that the localizer could not take; why is in the log."""
+    given_up: int = 0
+    """Records that waited when it was stopped, and were given up since the localizer got nowhere."""
     never_came: int = 0
     """Messages that never came, by the numbers that their senders give them."""
     undecodable: int = 0
@@ -42,7 +44,12 @@ class RecordAccount:
 
     @staticmethod
     def of(
-        statuses: Sequence[SourceStatus], taken: int, too_late: Mapping[type[Record], int], refused: int = 0
+        statuses: Sequence[SourceStatus],
+        taken: int,
+        too_late: Mapping[type[Record], int],
+        refused: int = 0,
+        *,
+        is_given_up: bool = False,
     ) -> RecordAccount:
         """Return the account of a session.
 
@@ -52,13 +59,18 @@ class RecordAccount:
         taken : records that the localizer took.
         too_late : records that came too late, by kind.
         refused : records that it could not take.
+        is_given_up : whether what waits is not taken any more.
         """
+        received = sum(each.records for each in statuses)
+        dropped = sum(each.overrun for each in statuses)
+        waiting = received - taken - sum(too_late.values()) - dropped - refused
         return RecordAccount(
-            received=sum(each.records for each in statuses),
+            received=received,
             taken=taken,
             too_late={kind: count for kind, count in too_late.items() if count},
-            dropped=sum(each.overrun for each in statuses),
+            dropped=dropped,
             refused=refused,
+            given_up=max(waiting, 0) if is_given_up else 0,
             never_came=sum(each.lost for each in statuses),
             undecodable=sum(each.undecodable for each in statuses),
         )
@@ -66,7 +78,8 @@ class RecordAccount:
     @property
     def lost(self) -> int:
         """Records that are not in the run, and should be."""
-        return sum(self.too_late.values()) + self.dropped + self.refused + self.never_came + self.undecodable
+        late = sum(self.too_late.values())
+        return late + self.dropped + self.refused + self.given_up + self.never_came + self.undecodable
 
     @property
     def text(self) -> str:
@@ -76,6 +89,7 @@ class RecordAccount:
         reasons = [f"{counted(kind, count)} came too late" for kind, count in self.too_late.items()]
         reasons += [f"{self.dropped} dropped, since this computer was too slow"] if self.dropped else []
         reasons += [f"{self.refused} refused by the localizer"] if self.refused else []
+        reasons += [f"{self.given_up} given up at the end"] if self.given_up else []
         reasons += [f"{self.never_came} never came"] if self.never_came else []
         reasons += [f"{self.undecodable} undecodable"] if self.undecodable else []
         return f"{self.received} records received, {self.lost} lost: {', '.join(reasons)}"

@@ -31,6 +31,8 @@ TELLING_SHARE = 0.1
 CLOCKS_S = 2.0
 """Time from one look at what arrival says of the clocks to the next [s]."""
 WAIT_S = 0.1
+STUCK_S = 5.0
+"""Time in which at the end one record at least has to be localized, or the rest is given up [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +88,7 @@ class LiveRunner:
         self._recorder: SessionRecorder | None = None
         self._states = states
         self._stopped = threading.Event()
+        self._is_abandoned = threading.Event()
         self._taken = self._refused = 0
         self._clocks: tuple[ArrivalOffset, ...] = ()
         self._threads = [
@@ -100,13 +103,25 @@ class LiveRunner:
             thread.start()
 
     def stop(self) -> LiveSnapshot:
-        """End: what has arrived is localized, and the last snapshot returned."""
+        """End: what has arrived is localized, and the last snapshot returned.
+
+        What is not localized since the localizer gets nowhere (a kernel is being compiled) is given up, and told.
+        """
         self.session.stop()
         self._stopped.set()
         for thread in self._threads:
             if thread.ident is not None:
-                thread.join(timeout=5.0)
+                self._wait_for(thread)
+                if thread.is_alive():
+                    self._is_abandoned.set()
         return self.snapshot()
+
+    def _wait_for(self, thread: threading.Thread) -> None:
+        """Wait until a thread has ended, on a busy computer for long, but not for one that gets nowhere."""
+        done = -1
+        while thread.is_alive() and done != self._taken:
+            done = self._taken
+            thread.join(timeout=STUCK_S)
 
     def record_to(self, recorder: SessionRecorder | None) -> None:
         """Record what comes from now on; None: no longer. Closing the file is the caller's."""
@@ -131,7 +146,8 @@ class LiveRunner:
         kinds = Counter[type[Record]]()
         for (_, kind), count in late.items():
             kinds[kind] += count
-        account = RecordAccount.of([each.status for each in sources], self._taken, kinds, self._refused)
+        statuses, is_given_up = [each.status for each in sources], self._is_abandoned.is_set()
+        account = RecordAccount.of(statuses, self._taken, kinds, self._refused, is_given_up=is_given_up)
         now_ns = None if self._stopped.is_set() else self.session.clock.now_ns()
         mended = {words: count for words, count in told.items() if count}
         run = self.run.so_far(now_ns)
@@ -143,6 +159,9 @@ class LiveRunner:
             for record, _ in self.session.records(WAIT_S):
                 self._take(record)
         for record in self.session.rest():
+            if self._is_abandoned.is_set():
+                # Whoever stopped it has closed the files that it would go on to write.
+                return
             self._take(record)
         last = self.run.end()
         if self._states is not None:

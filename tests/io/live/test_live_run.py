@@ -5,7 +5,8 @@ from __future__ import annotations
 import itertools
 import json
 import threading
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,17 +16,19 @@ import pytest
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
 from commission.io.bundled import bundled_folder
+from commission.io.live.connection import Arrival
 from commission.io.live.live_run import LiveRun
 from commission.io.live.registry import SourceAddress
 from commission.io.live.runner import LiveRunner, LiveSnapshot
 from commission.io.live.session import Session
 from commission.io.live.spooled_scans import SpooledScans
+from commission.io.live.status import Arrivals, SourceStatus, Tally
 from commission.io.live.virtual_vehicle import addresses_of, send_drive
 from commission.io.project_file import load_project
 from commission.io.recordings.base import load_log
 from commission.io.recordings.csv_writer import write_recording
 from commission.io.vda5050_states import StateFile, StateStream, StateVersion, state_messages
-from commission.localization.estimate import Mode
+from commission.localization.estimate import Estimate, Mode
 from commission.simulation.scenario import records
 from commission.site.project import Project
 from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan
@@ -35,7 +38,7 @@ from tests.io.live.virtual import ALL, scan, until
 
 SPEED = 4.0
 SECONDS = 8
-OWN_CLOCK = "cola", "nav350", "compact"
+OWN_CLOCK = "sick-safety", "cola", "nav350", "compact"
 SECONDS_OF_OWN_CLOCK = 4
 
 
@@ -96,7 +99,7 @@ def test_live_estimate_is_that_of_the_recording_of_the_same_session(
     missing = sent.scans - sum(isinstance(record, Scan) for record in kept)
     assert sent.scans == (SECONDS_OF_OWN_CLOCK if speed == 1.0 else SECONDS) * 25
     # That the first turn of a picoScan is over is known when the second begins: later than odometry waits for it.
-    assert 0 <= missing <= (name == "compact"), last.told
+    assert 0 <= missing <= (name == "compact"), (last.told, last.account)
     assert all(source.status.lost == source.status.undecodable == 0 for source in last.sources), last.sources
     # It follows the drive that it saw.
     assert live.operational_fraction > 0.9
@@ -104,6 +107,74 @@ def test_live_estimate_is_that_of_the_recording_of_the_same_session(
     log = load_log(tmp_path / "session")
     assert_same_run(live, judged_run(RunInput.of(warehouse, log, live.inputs.start)))
     assert snapshots
+
+
+class Pushed:
+    """A source whose records have come as soon as it is started."""
+
+    address = SourceAddress.parse("json:0")
+    is_behind = False
+
+    def __init__(self, records: list[Record]) -> None:
+        self._records, self._tally = records, Tally()
+
+    def start(self, deliver: Callable[[Arrival], bool]) -> None:
+        for record in self._records:
+            self._tally.arrived(record.stamp_ns, None)
+            deliver(Arrival(record, record.stamp_ns, 1))
+
+    def stop(self) -> None: ...
+
+    def status(self) -> SourceStatus:
+        return self._tally.status(0, Counter())
+
+    def times(self) -> dict[int, Arrivals]:
+        return {}
+
+
+def runner_of_pushed(records: list[Record], run: LiveRun, kept: list[Record]) -> LiveRunner:
+    """A runner to which records have come, of which none was taken yet."""
+    session = Session([Pushed(records)])
+    return LiveRunner(session, run, lambda _: None, kept.append)
+
+
+def test_what_has_arrived_is_localized_at_the_end_however_busy_the_computer_is(
+    warehouse: Project, drive: list[Record], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("commission.io.live.runner.STUCK_S", 1.0)
+    run, kept = LiveRun(warehouse), list[Record]()
+    run.prepare()
+    take = run.take
+
+    def slowly(record: Record) -> tuple[Estimate, ...]:
+        threading.Event().wait(0.15)
+        return take(record)
+
+    monkeypatch.setattr(run, "take", slowly)
+    runner = runner_of_pushed(drive[:20], run, kept)
+    runner.start()
+    last = runner.stop()
+    assert len(kept) == 20
+    assert last.account.taken == 20
+    assert last.account.text == "20 records received, none lost"
+
+
+def test_what_waits_behind_a_localizer_that_gets_nowhere_is_given_up_and_told(
+    warehouse: Project, drive: list[Record], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("commission.io.live.runner.STUCK_S", 0.2)
+    run, kept = LiveRun(warehouse), list[Record]()
+    goes_on = threading.Event()
+    monkeypatch.setattr(run, "prepare", goes_on.wait)
+    runner = runner_of_pushed(drive[:20], run, kept)
+    runner.start()
+    last = runner.stop()
+    assert last.account.given_up == 20
+    assert last.account.text == "20 records received, 20 lost: 20 given up at the end"
+    # Whoever stopped it has closed the recording.
+    goes_on.set()
+    assert until(lambda: not any(thread.name == "live localizer" for thread in threading.enumerate()))
+    assert not kept
 
 
 def test_parameters_that_change_on_the_way_act_from_the_next_record_on(warehouse: Project, drive: list[Record]) -> None:
