@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from viser import ImageHandle, LabelHandle, LineSegmentsHandle, SceneApi, SceneNodeHandle
+from viser import ImageHandle, LabelHandle, SceneApi, SceneNodeHandle
 
 from commission.app.ambiguity.cold_start import CLASSES, EVERY, SOME, TOO_FEW, UNIQUE
 from commission.app.ambiguity.view import ColdStartView, TwinsView
@@ -13,7 +13,7 @@ from commission.app.base.drawing import NO_SEGMENTS, Points, heading_mark, outli
 from commission.app.base.extent import extent_of
 from commission.app.base.floor_picture import FloorPicture
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_floor_picture, add_lines
+from commission.app.base.marks import Cased, add_cased_lines, add_floor_picture
 from commission.app.base.paints import Plan
 from commission.app.base.view import PageView
 from commission.geometry import se2
@@ -64,8 +64,8 @@ class AmbiguityLayer(BaseLayer):
         self._labels: tuple[LabelHandle, ...] = ()
         self._shown: tuple[ColdStartView | None, float] = (None, 0.0)
         self._twins: TwinsView | None = None
-        self._groups: tuple[LineSegmentsHandle, ...] = tuple(
-            add_lines(scene, f"/plan/twins/{index}", color, 2.5) for index, color in enumerate(GROUP_COLORS)
+        self._groups: tuple[Cased, ...] = tuple(
+            add_cased_lines(scene, f"/plan/twins/{index}", color, 2.5) for index, color in enumerate(GROUP_COLORS)
         )
 
     def show_site(self, project: Project) -> None:
@@ -142,7 +142,8 @@ class AmbiguityLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return map, rings and labels."""
-        return *(() if self._image is None else (self._image,)), *self._groups, *self._labels
+        rings = (node for group in self._groups for node in group.nodes)
+        return *(() if self._image is None else (self._image,)), *rings, *self._labels
 
 
 def _rays(pose: FloatArray, places: FloatArray) -> FloatArray:

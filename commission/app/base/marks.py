@@ -6,11 +6,80 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from viser import ImageHandle, LineSegmentsHandle, PointCloudHandle, SceneApi
+from viser import ImageHandle, LineSegmentsHandle, PointCloudHandle, SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import NO_POINTS, NO_SEGMENTS, Points
 from commission.planning.coverage import Lattice
+
+CASED_PX = 2.5
+"""So much wider is what is around a line, in all."""
+CASED_MARK_PX = 3
+"""The same of a mark."""
+
+
+class Cased:
+    """Lines or marks with a casing: the same places once more, wider, in the color of what is around the floor.
+
+    All casings lie in one plane below all marks, so none hides a mark of another layer. On plain floor a casing is
+    hardly seen; on the bright end of a heatmap no thin mark is seen without it.
+
+    Parameters
+    ----------
+    marks : what is looked at.
+    casing : what is around it.
+    """
+
+    def __init__(
+        self, marks: LineSegmentsHandle | PointCloudHandle, casing: LineSegmentsHandle | PointCloudHandle
+    ) -> None:
+        self._marks, self._casing = marks, casing
+
+    @property
+    def points(self) -> Points:
+        """(N, 2, 3) segments or (N, 3) places [m], frame of the parent node."""
+        return self._marks.points
+
+    @points.setter
+    def points(self, points: Points) -> None:
+        """Draw these, and the casing below them."""
+        below = np.array(points)
+        # What is hidden far below stays there.
+        below[..., 2] = np.minimum(below[..., 2], theme.Height.CASING)
+        self._marks.points, self._casing.points = points, below
+
+    @property
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
+        """Both, to show or hide."""
+        return self._casing, self._marks
+
+
+def add_cased_lines(scene: SceneApi, name: str, color: theme.Color, thickness: float) -> Cased:
+    """Add lines that are seen on any color of the floor, as thick on the screen from near and far.
+
+    Parameters
+    ----------
+    scene : where.
+    name : of the node.
+    color : of all lines.
+    thickness : on the screen, without the casing [pixels].
+    """
+    casing = add_lines(scene, f"{name}_casing", theme.CASING, thickness + CASED_PX)
+    return Cased(add_lines(scene, name, color, thickness), casing)
+
+
+def add_cased_marks(scene: SceneApi, name: str, color: theme.Color, pixels: int) -> Cased:
+    """Add points that are seen on any color of the floor, as large on the screen from near and far.
+
+    Parameters
+    ----------
+    scene : where.
+    name : of the node, as of `add_marks`.
+    color : of all marks.
+    pixels : diameter of each on the screen, without the casing.
+    """
+    casing = add_marks(scene, f"{name}_casing", theme.CASING, pixels + CASED_MARK_PX)
+    return Cased(add_marks(scene, name, color, pixels), casing)
 
 
 def add_lines(

@@ -105,21 +105,22 @@ class Height:
     FLOOR = -0.01
     HEAT = 0.0
     GRID = 0.01
-    ROUTE = 0.02
-    ACCUMULATED = 0.03
-    SCAN = 0.04
-    REFERENCE = 0.05
-    TRAIL = 0.06
-    REFLECTOR = 0.07
-    GATE = 0.08
-    AROUND_DETECTION = 0.09
-    DETECTION = 0.10
-    AROUND_VEHICLE = 0.11
-    VEHICLE = 0.12
-    POSE = 0.13
-    LABEL = 0.14
-    DRAFT = 0.15
-    EDITING = 0.16
+    CASING = 0.02
+    ROUTE = 0.03
+    ACCUMULATED = 0.04
+    SCAN = 0.05
+    REFERENCE = 0.06
+    TRAIL = 0.07
+    REFLECTOR = 0.08
+    GATE = 0.09
+    AROUND_DETECTION = 0.10
+    DETECTION = 0.11
+    AROUND_VEHICLE = 0.12
+    VEHICLE = 0.13
+    POSE = 0.14
+    LABEL = 0.15
+    DRAFT = 0.16
+    EDITING = 0.17
 
 
 class Mark(StrEnum):

@@ -14,7 +14,7 @@ from viser import LabelHandle, SceneApi, TransformControlsEvent
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, lift, outline_segments, polyline_segments, rings
 from commission.app.base.extent import extent_of
-from commission.app.base.marks import add_lines, add_points
+from commission.app.base.marks import add_cased_lines, add_points
 from commission.app.base.panel import BasePanel, Post, from_browser
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
@@ -45,8 +45,8 @@ class Overlay(BasePanel):
 
     def __init__(self, scene: SceneApi, post: Post, browser: int) -> None:
         self._scene, self._browser = scene, browser
-        self._selected = add_lines(scene, "/editing/selected", theme.SELECTED, 2.0)
-        self._preview = add_lines(scene, "/editing/preview", theme.PREVIEW, 1.5)
+        self._selected = add_cased_lines(scene, "/editing/selected", theme.SELECTED, 2.0)
+        self._preview = add_cased_lines(scene, "/editing/preview", theme.PREVIEW, 1.5)
         self._points = add_points(scene, "/editing/points", theme.SELECTED, 0.1)
         self._labels: list[LabelHandle] = []
         self._handle = scene.add_transform_controls(

@@ -8,7 +8,7 @@ from viser import LabelHandle, SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import lift, outline_segments, rings, stroke_segments
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines, add_marks
+from commission.app.base.marks import add_cased_lines, add_marks
 from commission.app.editing.name_places import reflector_names
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
@@ -33,7 +33,7 @@ class ReflectorLayer(BaseLayer):
         self._project = Project()
         self._casing = add_marks(scene, "/reflectors/casing", theme.CASING, 10)
         self._marks = add_marks(scene, "/reflectors/marks", theme.REFLECTOR, 6)
-        self._shapes = add_lines(scene, "/reflectors/shapes", theme.REFLECTOR, 1.5)
+        self._shapes = add_cased_lines(scene, "/reflectors/shapes", theme.REFLECTOR, 1.5)
 
     def show_site(self, project: Project) -> None:
         """Draw a dot at each reflector's center, and around it the reflector as large as it is."""
@@ -54,7 +54,7 @@ class ReflectorLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the dots, what is dark around them, and the shapes."""
-        return self._casing, self._marks, self._shapes
+        return self._casing, self._marks, *self._shapes.nodes
 
 
 class ReflectorNameLayer(BaseLayer):

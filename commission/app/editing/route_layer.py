@@ -9,7 +9,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import stroke_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines
+from commission.app.base.marks import add_cased_lines
 from commission.geometry.arrays import FloatArray
 from commission.site.project import Project
 from commission.site.routes import Direction, Segment
@@ -49,8 +49,7 @@ class RouteLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._casing = add_lines(scene, "/route_casing", theme.CASING, 4.0)
-        self._lines = add_lines(scene, "/routes", theme.ROUTE, 1.5)
+        self._lines = add_cased_lines(scene, "/routes", theme.ROUTE, 1.5)
 
     def show_site(self, project: Project) -> None:
         """Draw every segment of every route in one set of lines."""
@@ -63,9 +62,8 @@ class RouteLayer(BaseLayer):
                 line = line[(np.arange(len(line)) // DASH) % 2 == 0]
             strokes += [line, _arrows(curve, size)]
         every = np.concatenate(strokes) if strokes else np.empty((0, 2, 2))
-        self._casing.points = stroke_segments(every, theme.Height.GRID)
         self._lines.points = stroke_segments(every, theme.Height.ROUTE)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the lines, and what is dark around them."""
-        return self._casing, self._lines
+        return self._lines.nodes

@@ -9,7 +9,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import outline_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines
+from commission.app.base.marks import add_cased_lines
 from commission.app.base.view import PageView
 from commission.app.editing.name_places import NamePlace, station_names, station_text
 from commission.geometry import se2
@@ -48,7 +48,7 @@ class StationLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._marks, self._outlines = (
-            add_lines(scene, f"/stations/{name}", theme.STATION, width)
+            add_cased_lines(scene, f"/stations/{name}", theme.STATION, width)
             for name, width in (("marks", 2.0), ("outlines", 1.0))
         )
         self._labels: dict[str, LabelHandle] = {}
@@ -84,4 +84,4 @@ class StationLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return marks, outlines and names."""
-        return self._marks, self._outlines, *self._labels.values()
+        return *self._marks.nodes, *self._outlines.nodes, *self._labels.values()

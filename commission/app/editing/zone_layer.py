@@ -8,7 +8,7 @@ from viser import LabelHandle, SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import outline_segments
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import NO_SEGMENTS, add_lines
+from commission.app.base.marks import NO_SEGMENTS, add_cased_lines
 from commission.app.base.view import PageView
 from commission.site.project import Project
 from commission.site.zones import Zone
@@ -31,13 +31,13 @@ class ZoneLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._outlines = add_lines(scene, "/zones/outlines", theme.ZONE, 1.5)
+        self._outlines = add_cased_lines(scene, "/zones/outlines", theme.ZONE, 1.5)
         self._labels: dict[str, LabelHandle] = {}
 
     def show_site(self, project: Project) -> None:
         """Draw every zone; names that stay are moved, not made anew."""
         outlines = [
-            outline_segments(np.array(zone.outline, dtype=np.float64)[np.newaxis], theme.Height.GRID)
+            outline_segments(np.array(zone.outline, dtype=np.float64)[np.newaxis], theme.Height.ROUTE)
             for zone in project.zones
         ]
         self._outlines.points = np.concatenate(outlines) if outlines else NO_SEGMENTS
@@ -66,4 +66,4 @@ class ZoneLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return outlines and names."""
-        return self._outlines, *self._labels.values()
+        return *self._outlines.nodes, *self._labels.values()

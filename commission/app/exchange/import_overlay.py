@@ -8,7 +8,7 @@ from viser import SceneApi
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, outline_segments, polyline_segments, rings
 from commission.app.base.extent import extent_of
-from commission.app.base.marks import add_lines
+from commission.app.base.marks import add_cased_lines
 from commission.app.base.panel import BasePanel
 from commission.app.base.view import PageView
 from commission.app.exchange.outlines import outlines_of
@@ -27,7 +27,7 @@ class ImportOverlay(BasePanel):
 
     def __init__(self, scene: SceneApi, browser: int) -> None:
         self._browser = browser
-        self._lines = add_lines(scene, "/exchange/import", theme.PREVIEW, 1.5)
+        self._lines = add_cased_lines(scene, "/exchange/import", theme.PREVIEW, 1.5)
         self._shown: tuple[Pending | None, Project | None] = (None, None)
 
     def draw(self, view: PageView) -> None:

@@ -9,7 +9,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, crosses, outline_segments, polyline_segments, stroke_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines
+from commission.app.base.marks import add_cased_lines
 from commission.app.base.view import PageView
 from commission.app.failures.view import FailureView
 from commission.site.project import Project
@@ -33,7 +33,7 @@ class FailingLayer(BaseLayer):
         self._mark = 0.1
         self._shown: FailureView | None = None
         self._metres, self._ring, self._fallen = (
-            add_lines(scene, f"/plan/failing/{name}", theme.DEPENDENT, width)
+            add_cased_lines(scene, f"/plan/failing/{name}", theme.DEPENDENT, width)
             for name, width in (("metres", 8.0), ("ring", 3.0), ("fallen", 2.5))
         )
 
@@ -67,4 +67,4 @@ class FailingLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return ring, metres and crosses."""
-        return self._metres, self._ring, self._fallen
+        return tuple(node for line in (self._metres, self._ring, self._fallen) for node in line.nodes)

@@ -10,7 +10,7 @@ from commission.app.base.drawing import NO_SEGMENTS, Points, outline_segments, r
 from commission.app.base.extent import extent_of
 from commission.app.base.floor_picture import FloorPicture
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_floor_picture, add_lines
+from commission.app.base.marks import add_cased_lines, add_floor_picture
 from commission.app.base.view import PageView
 from commission.app.layouts.difference import DifferenceView, picture
 from commission.app.layouts.view import LayoutsView
@@ -71,7 +71,7 @@ class KeptLayoutLayer(BaseLayer):
         super().__init__(scene)
         self._mark = 0.1
         self._shown: tuple[object, ...] = ()
-        self._lines = add_lines(scene, "/plan/kept_layout", theme.KEPT, 2.0)
+        self._lines = add_cased_lines(scene, "/plan/kept_layout", theme.KEPT, 2.0)
 
     def show_site(self, project: Project) -> None:
         """Adapt the size of the rings to the site's."""
@@ -100,7 +100,7 @@ class KeptLayoutLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return rings and lines."""
-        return (self._lines,)
+        return self._lines.nodes
 
 
 def differences(before: ReflectorMap, now: ReflectorMap) -> tuple[FloatArray, FloatArray]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from viser import LineSegmentsHandle, SceneApi, SceneNodeHandle
+from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import (
@@ -17,7 +17,7 @@ from commission.app.base.drawing import (
 )
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines, add_points
+from commission.app.base.marks import Cased, add_cased_lines, add_points
 from commission.app.base.view import PageView
 from commission.app.placement.view import LayoutView
 from commission.geometry.arrays import FloatArray
@@ -65,8 +65,8 @@ class SuggestionLayer(BaseLayer):
         self._unmet = self._lines("unmet", theme.OVER_LIMIT, 8.0)
         self._keep_outs = self._lines("keep_out", theme.KEEP_OUT, 1.5)
 
-    def _lines(self, name: str, color: theme.Color, width: float) -> LineSegmentsHandle:
-        return add_lines(self.scene, f"/plan/suggested/{name}", color, width)
+    def _lines(self, name: str, color: theme.Color, width: float) -> Cased:
+        return add_cased_lines(self.scene, f"/plan/suggested/{name}", color, width)
 
     def show_site(self, project: Project) -> None:
         """Adapt the size of the marks to the site's."""
@@ -112,4 +112,5 @@ class SuggestionLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return reflectors, marks and areas."""
-        return self._suggested, self._rings, self._crosses, self._unmet, self._keep_outs
+        cased = (self._rings, self._crosses, self._unmet, self._keep_outs)
+        return self._suggested, *(node for lines in cased for node in lines.nodes)

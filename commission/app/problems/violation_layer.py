@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from viser import LineSegmentsHandle, SceneApi, SceneNodeHandle
+from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, Points, outline_segments, polyline_segments, thinned
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines
+from commission.app.base.marks import Cased, add_cased_lines
 from commission.app.base.view import PageView
 from commission.app.problems.view import inspection_of
 from commission.geometry import se2
@@ -49,8 +49,8 @@ class ViolationLayer(BaseLayer):
         self._little = self._lines("little", theme.TOO_LITTLE, WIDTH)
         self._worst_outlines = self._lines("outlines", theme.OVER_LIMIT, OUTLINE_WIDTH)
 
-    def _lines(self, name: str, color: theme.Color, width: float) -> LineSegmentsHandle:
-        return add_lines(self.scene, f"/violations/{name}", color, width)
+    def _lines(self, name: str, color: theme.Color, width: float) -> Cased:
+        return add_cased_lines(self.scene, f"/violations/{name}", color, width)
 
     def show_site(self, project: Project) -> None:
         """Adapt the outline to the vehicle and the marks to the site."""
@@ -91,4 +91,4 @@ class ViolationLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return stretches and outlines."""
-        return self._fatal, self._little, self._worst_outlines
+        return tuple(node for lines in (self._fatal, self._little, self._worst_outlines) for node in lines.nodes)

@@ -7,7 +7,7 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import lift
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_marks
+from commission.app.base.marks import add_cased_marks
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 
@@ -22,7 +22,7 @@ class AccumulatedLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._inliers, self._outliers = (
-            add_marks(scene, f"/run/accumulated/{name}", color, 3)
+            add_cased_marks(scene, f"/run/accumulated/{name}", color, 3)
             for name, color in (("inliers", theme.INLIER), ("outliers", theme.OUTLIER_ASSOCIATION))
         )
 
@@ -39,4 +39,4 @@ class AccumulatedLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return both sets of points."""
-        return self._inliers, self._outliers
+        return *self._inliers.nodes, *self._outliers.nodes

@@ -8,7 +8,7 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import polyline_segments, thinned
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines
+from commission.app.base.marks import add_cased_lines
 from commission.app.base.view import PageView
 from commission.studies.vision import VisionResult
 
@@ -28,8 +28,8 @@ class CameraLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._laser = add_lines(scene, "/run/camera/laser", theme.CAMERA_BY_LASER, 3.0)
-        self._contour = add_lines(scene, "/run/camera/contour", theme.CAMERA_BY_CONTOUR, 2.0)
+        self._laser = add_cased_lines(scene, "/run/camera/laser", theme.CAMERA_BY_LASER, 3.0)
+        self._contour = add_cased_lines(scene, "/run/camera/contour", theme.CAMERA_BY_CONTOUR, 2.0)
         self._shown: VisionResult | None = None
 
     def draw_slowly(self, view: PageView) -> None:
@@ -48,4 +48,4 @@ class CameraLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return both lines."""
-        return self._laser, self._contour
+        return *self._laser.nodes, *self._contour.nodes

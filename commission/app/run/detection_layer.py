@@ -10,7 +10,7 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import NO_POINTS, lift, stroke_segments
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines, add_marks
+from commission.app.base.marks import add_cased_lines, add_marks
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 from commission.geometry.arrays import FloatArray
@@ -39,7 +39,7 @@ class DetectionLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._offsets = add_lines(scene, "/run/offsets", theme.OFFSET, 1.0)
+        self._offsets = add_cased_lines(scene, "/run/offsets", theme.OFFSET, 1.0)
         self._clouds = {
             status: add_marks(scene, f"/run/detections/{status.name.lower()}", color, PIXELS[shape], shape=shape)
             for status, (color, shape, _) in STYLES.items()
@@ -74,7 +74,7 @@ class DetectionLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the marks of every status and the lines of their offsets."""
-        return (*self._casings.values(), *self._clouds.values(), self._offsets)
+        return (*self._casings.values(), *self._clouds.values(), *self._offsets.nodes)
 
 
 def drawn_detections(run: RunView, magnify: float) -> tuple[FloatArray, FloatArray]:

@@ -8,7 +8,7 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import lift
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_marks
+from commission.app.base.marks import add_cased_marks
 from commission.app.base.view import PageView
 from commission.app.run.found_table import BY_KEY, Found, classes_of, palette
 from commission.app.run.state import RunState
@@ -27,7 +27,7 @@ class FigureLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._marks = tuple(
-            add_marks(scene, f"/run/figures/{index}", color, PIXELS) for index, color in enumerate(palette())
+            add_cased_marks(scene, f"/run/figures/{index}", color, PIXELS) for index, color in enumerate(palette())
         )
         self._shown: tuple[object, ...] = (None, "")
 
@@ -51,4 +51,4 @@ class FigureLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the discs, one node for each color."""
-        return self._marks
+        return tuple(node for marks in self._marks for node in marks.nodes)

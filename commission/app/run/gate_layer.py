@@ -8,7 +8,7 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import outline_segments
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines
+from commission.app.base.marks import add_cased_lines
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 from commission.geometry.arrays import FloatArray
@@ -24,7 +24,7 @@ class GateLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._lines = add_lines(scene, "/run/gates", theme.GATE, 1.5)
+        self._lines = add_cased_lines(scene, "/run/gates", theme.GATE, 1.5)
 
     def draw(self, view: PageView) -> None:
         """Draw the ellipses, larger than they are when asked to."""
@@ -35,7 +35,7 @@ class GateLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the lines."""
-        return (self._lines,)
+        return self._lines.nodes
 
 
 def drawn_gates(run: RunView, magnify: float) -> FloatArray:

@@ -9,7 +9,7 @@ from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, Points, outline_segments, rings, stroke_segments
 from commission.app.base.extent import extent_of
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines
+from commission.app.base.marks import add_cased_lines
 from commission.app.base.view import PageView
 from commission.app.run.hypotheses import shown_hypotheses
 from commission.app.run.view import RunView
@@ -41,7 +41,7 @@ class HypothesisLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._mark = 0.1
-        self._lines = add_lines(scene, "/run/hypotheses", theme.HYPOTHESIS, 2.0)
+        self._lines = add_cased_lines(scene, "/run/hypotheses", theme.HYPOTHESIS, 2.0)
         self._labels: tuple[LabelHandle, ...] = ()
         self._shown: tuple[object, ...] = ()
 
@@ -80,7 +80,7 @@ class HypothesisLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return lines and labels."""
-        return self._lines, *self._labels
+        return *self._lines.nodes, *self._labels
 
 
 def hypothesis_lines(found: tuple[Hypothesis, ...], mark: float, magnify: float) -> Points:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from viser import PointCloudHandle, SceneApi
+from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
 from commission.app.base.drawing import lift
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_marks
+from commission.app.base.marks import add_cased_marks
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 
@@ -25,8 +25,8 @@ class ScanLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._points = add_marks(scene, "/run/scan", theme.SCAN, 3)
-        self._further = add_marks(scene, "/run/further_scan", theme.FURTHER_SCAN, 3)
+        self._points = add_cased_marks(scene, "/run/scan", theme.SCAN, 3)
+        self._further = add_cased_marks(scene, "/run/further_scan", theme.FURTHER_SCAN, 3)
 
     def draw(self, view: PageView) -> None:
         """Draw the newest scans."""
@@ -38,6 +38,6 @@ class ScanLayer(BaseLayer):
         if run.first_scan < len(run.scan_map) or len(self._further.points):
             self._further.points = lift(run.scan_map[run.first_scan :], theme.Height.SCAN)
 
-    def nodes(self) -> tuple[PointCloudHandle, ...]:
+    def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the points of the first scanner and those of the others."""
-        return self._points, self._further
+        return *self._points.nodes, *self._further.nodes

@@ -8,7 +8,7 @@ from viser import LabelHandle, SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import NO_SEGMENTS, Points, crosses, outline_segments, rings, stroke_segments
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines
+from commission.app.base.marks import add_cased_lines
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 from commission.geometry.arrays import BoolArray, FloatArray
@@ -38,8 +38,8 @@ class TemporaryLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._bodies = add_lines(scene, "/run/temporary/bodies", theme.GOODS, 2.0)
-        self._ellipses = add_lines(scene, "/run/temporary/sigmas", theme.GOODS_SIGMA, 1.5)
+        self._bodies = add_cased_lines(scene, "/run/temporary/bodies", theme.GOODS, 2.0)
+        self._ellipses = add_cased_lines(scene, "/run/temporary/sigmas", theme.GOODS_SIGMA, 1.5)
         self._labels: tuple[LabelHandle, ...] = ()
         self._shown: tuple[object, ...] = (None,)
 
@@ -80,7 +80,7 @@ class TemporaryLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return lines and labels."""
-        return self._bodies, self._ellipses, *self._labels
+        return *self._bodies.nodes, *self._ellipses.nodes, *self._labels
 
 
 def body_lines(known: TemporaryLandmarks) -> Points:

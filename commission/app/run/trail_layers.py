@@ -8,7 +8,7 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import polyline_segments, stroke_segments, thinned
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines
+from commission.app.base.marks import add_cased_lines
 from commission.app.base.view import PageView
 from commission.app.run.state import RunState
 from commission.app.run.trail_colors import COLORINGS, TrailBy, palette, pieces, values_of
@@ -28,7 +28,7 @@ class TrailLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._line = add_lines(scene, "/run/trail", theme.TRAIL, 1.5)
+        self._line = add_cased_lines(scene, "/run/trail", theme.TRAIL, 1.5)
 
     def draw_slowly(self, view: PageView) -> None:
         """Draw the whole trail."""
@@ -41,7 +41,7 @@ class TrailLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the line."""
-        return (self._line,)
+        return self._line.nodes
 
 
 class ConsistencyLayer(BaseLayer):
@@ -54,7 +54,7 @@ class ConsistencyLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._lines = tuple(
-            add_lines(scene, f"/run/consistency/{index}", color, 5.0) for index, color in enumerate(palette())
+            add_cased_lines(scene, f"/run/consistency/{index}", color, 5.0) for index, color in enumerate(palette())
         )
         self._shown: object = None
 
@@ -81,7 +81,7 @@ class ConsistencyLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the lines, one for each color."""
-        return self._lines
+        return tuple(node for line in self._lines for node in line.nodes)
 
 
 class VariantLayer(BaseLayer):
@@ -98,7 +98,7 @@ class VariantLayer(BaseLayer):
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
         self._lines = {
-            letter: add_lines(scene, f"/run/variant/{letter}", color, 2.0)
+            letter: add_cased_lines(scene, f"/run/variant/{letter}", color, 2.0)
             for letter, color in zip(LETTERS, theme.VARIANTS, strict=True)
         }
 
@@ -118,7 +118,7 @@ class VariantLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the lines, one for each letter."""
-        return tuple(self._lines.values())
+        return tuple(node for line in self._lines.values() for node in line.nodes)
 
 
 class ReferenceLayer(BaseLayer):
@@ -131,7 +131,7 @@ class ReferenceLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._line = add_lines(scene, "/run/reference", theme.REFERENCE, 3.0)
+        self._line = add_cased_lines(scene, "/run/reference", theme.REFERENCE, 3.0)
 
     def draw_slowly(self, view: PageView) -> None:
         """Draw the reference positions up to now."""
@@ -144,4 +144,4 @@ class ReferenceLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the line."""
-        return (self._line,)
+        return self._line.nodes

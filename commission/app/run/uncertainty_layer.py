@@ -8,7 +8,7 @@ from viser import SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import lift, outline_segments
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines
+from commission.app.base.marks import add_cased_lines
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 from commission.geometry.gaussian import ellipse_points
@@ -30,8 +30,8 @@ class UncertaintyLayer(BaseLayer):
 
     def __init__(self, scene: SceneApi) -> None:
         super().__init__(scene)
-        self._lines = add_lines(scene, "/vehicle/covariance", theme.POSE, 2.0)
-        self._rays = add_lines(scene, "/vehicle/heading_spread", theme.HEADING, 2.0)
+        self._lines = add_cased_lines(scene, "/vehicle/covariance", theme.POSE, 2.0)
+        self._rays = add_cased_lines(scene, "/vehicle/heading_spread", theme.HEADING, 2.0)
 
     def draw(self, view: PageView) -> None:
         """Draw ellipse and rays."""
@@ -52,4 +52,4 @@ class UncertaintyLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the lines."""
-        return self._lines, self._rays
+        return *self._lines.nodes, *self._rays.nodes

@@ -14,7 +14,7 @@ from viser import FrameHandle, SceneApi, SceneNodeHandle
 from commission.app.base import theme
 from commission.app.base.drawing import heading_mark, outline_segments, stroke_segments, yaw_quaternion
 from commission.app.base.layer import BaseLayer, LayerGroup
-from commission.app.base.marks import add_lines
+from commission.app.base.marks import add_cased_lines, add_lines
 from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 from commission.geometry import se2
@@ -83,7 +83,7 @@ class VehicleLayer(BaseLayer):
         self._casing = add_lines(scene, "/vehicle/around", theme.CASING, 5.0)
         self._lines = add_lines(scene, "/vehicle/outline", theme.VEHICLE, 2.0)
         self._near, self._far = (
-            add_lines(scene, f"/vehicle/field/{name}", color, 1.0)
+            add_cased_lines(scene, f"/vehicle/field/{name}", color, 1.0)
             for name, color in (("near", theme.FIELD), ("far", theme.FAR_FIELD))
         )
         self._drives = False
@@ -101,8 +101,8 @@ class VehicleLayer(BaseLayer):
         self._place_scanners(project.scanners, 0.3 * size)
         near = [fan(scanner, NEAR_FAN * size) for scanner in project.scanners]
         far = [fan(scanner, reach_of(scanner)) for scanner in project.scanners]
-        for node, fans in ((self._near, near), (self._far, far)):
-            node.points = stroke_segments(np.concatenate(fans), theme.Height.GRID)
+        for lines, fans in ((self._near, near), (self._far, far)):
+            lines.points = stroke_segments(np.concatenate(fans), theme.Height.ROUTE)
         if not self._drives:
             self._wait(project)
 
@@ -155,4 +155,4 @@ class VehicleLayer(BaseLayer):
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the parts that hang on the vehicle's frame (which itself is hidden without a run or a route)."""
-        return self._casing, self._lines, *self._scanners, self._near, self._far
+        return self._casing, self._lines, *self._scanners, *self._near.nodes, *self._far.nodes

@@ -6,15 +6,27 @@ Contrast after WCAG 2.1 and distance after CIE 1976 are computed here, from the 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from itertools import combinations
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 import commission
 from commission.app.base import style, theme
+from commission.app.base.drawing import NO_SEGMENTS
+from commission.app.base.grid_layer import GridLayer
+from commission.app.base.layer import Layer
+from commission.app.base.marks import add_cased_lines
 from commission.app.base.paints import PAINTS, Floor, Paint, Plan, Run, Surface, Worded
+from commission.app.base.ramp import colors
+from commission.app.base.relight import light_color
+from commission.app.floor_map.draft_layer import MapDraftLayer
+from commission.app.launch import FEATURES
+from commission.app.prediction.ribbon_layer import RibbonLayer
 from commission.io.bundled import bundled_folder
 
 LEAST = 3.0
@@ -158,11 +170,89 @@ def test_pale_words_can_be_read() -> None:
             assert contrast((grey,) * 3, (round(panel[shown]),) * 3) >= LEAST_OF_WORDS, (opacity, shown)
 
 
+@dataclass(eq=False)
+class Drawn:
+    """A node of a scene that is only written down."""
+
+    name: str
+    kind: str
+    color: theme.Color
+    width: float
+    points: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
+    visible: bool = True
+
+
+class Sketch:
+    """A scene that writes down the lines and marks that a layer adds."""
+
+    def __init__(self) -> None:
+        self.nodes: list[Drawn] = []
+
+    def add_line_segments(self, name: str, *, colors: theme.Color, thickness: float, **_: Any) -> Drawn:
+        self.nodes.append(Drawn(name, "line", colors, thickness))
+        return self.nodes[-1]
+
+    def add_point_cloud(self, name: str, *, colors: theme.Color, **_: Any) -> Drawn:
+        pixels = re.search(r"/(\d+)px$", name)
+        self.nodes.append(Drawn(name, "mark" if pixels else "disc", colors, float(pixels[1]) if pixels else 0.0))
+        return self.nodes[-1]
+
+    def __getattr__(self, name: str) -> Any:
+        """Whatever else a layer adds stays unseen."""
+        return lambda *_, **__: Drawn(name, "other", (0, 0, 0), 0.0)
+
+
+def is_lost_on_a_heatmap(color: theme.Color) -> bool:
+    """Whether there is a color of a heatmap on which it is not seen, in either theme."""
+    grounds = [tuple(map(int, each)) for each in colors(9)]
+    grounds += [each.dark for each in (Plan.EVERY, Plan.SOME, Plan.NO_FIX, Plan.WORSE_3, Plan.BETTER_3)]
+    shown = [(color, each) for each in grounds] + [(light_color(color), light_color(each)) for each in grounds]
+    return min(contrast(one, other) for one, other in shown) < LEAST
+
+
+QUIET = {GridLayer, MapDraftLayer}
+"""Not to stand out; lies on the map that is being placed, where no heatmap is."""
+
+
+@pytest.mark.parametrize(
+    "make",
+    [layer for feature in FEATURES for layer in feature.layers if layer not in QUIET],
+    ids=lambda make: make.__name__,
+)
+def test_thin_marks_are_seen_on_heatmaps_by_a_casing(make: Callable[[Any], Layer]) -> None:
+    scene = Sketch()
+    shown = make(scene).nodes()
+    around = [node for node in scene.nodes if node.color in (theme.CASING, theme.RIM)]
+    assert all(node in shown for node in around), "a casing is hidden and shown with its marks"
+    if make is RibbonLayer:  # all pieces of one ribbon share its rim
+        assert around[0].width > max(node.width for node in scene.nodes if node not in around)
+        return
+    free = list(around)
+    for node in scene.nodes:
+        if node.kind != "disc" and node not in around and is_lost_on_a_heatmap(node.color):
+            below = [each for each in free if each.kind == node.kind and node.width < each.width <= node.width + 5]
+            assert below, f"nothing is around {node.name}"
+            free.remove(below[0])
+
+
+def test_a_casing_lies_below_every_mark_at_the_same_places() -> None:
+    scene = Sketch()
+    lines = add_cased_lines(cast("Any", scene), "/lines", theme.TRAIL, 1.5)
+    lines.points = np.array([[(1.0, 2.0, theme.Height.TRAIL), (3.0, 4.0, theme.Height.TRAIL)]])
+    casing, marks = lines.nodes
+    np.testing.assert_array_equal(casing.points[..., :2], marks.points[..., :2])
+    heights = {name: value for name, value in vars(theme.Height).items() if name.isupper()}
+    assert {name for name, value in heights.items() if value < casing.points[0, 0, 2]} == {"FLOOR", "HEAT", "GRID"}
+    lines.points = NO_SEGMENTS
+    assert casing.points.max() <= -1000.0
+
+
 @pytest.mark.parametrize("shown", THEMES)
-@pytest.mark.parametrize("drawn", [Floor.ROUTE, Floor.REFLECTOR, Floor.VEHICLE, Run.INLIER, Run.OUTLIER])
-def test_what_counts_stands_out_on_walls_and_heatmaps_by_its_casing(drawn: Paint, shown: str) -> None:
-    assert theme.CASING == Floor.BACKGROUND.dark
-    assert contrast(getattr(drawn, shown), getattr(Floor.BACKGROUND, shown)) >= LEAST
+def test_a_casing_is_told_from_what_it_is_around(shown: str) -> None:
+    assert (theme.CASING, theme.RIM) == (Floor.BACKGROUND.dark, Floor.RIM.dark)
+    on_it = (Floor.ROUTE, Floor.REFLECTOR, Floor.VEHICLE, Floor.ZONE, Run.INLIER, Run.OUTLIER, Run.GATE, Run.SCAN)
+    for drawn in (*on_it, Run.TRAIL, Run.FIELD, Run.FAR_FIELD):
+        assert contrast(getattr(drawn, shown), getattr(Floor.BACKGROUND, shown)) >= LEAST
 
 
 @pytest.mark.parametrize("shown", THEMES)
