@@ -37,6 +37,11 @@ CUT_OFF = """() => {
   const floor = document.querySelector('canvas[data-engine]').getBoundingClientRect();
   const tools = [...document.querySelectorAll('div:has(>.c-rail)+div button')];
   if (tools.length !== 9) found.push(`${tools.length} tools`);
+  const now = document.querySelector('.c-now'), end = now.getBoundingClientRect();
+  const rows = [...now.querySelectorAll('tr')].map((each) => each.getBoundingClientRect());
+  if (rows[0].top < end.top + 4) found.push('the first number of now is scrolled out');
+  const at = (end.bottom - 1 - rows[0].top) / now.querySelector('tr:nth-child(2)').clientHeight;
+  if (Math.abs(at - Math.round(at)) > 0.02 || at < 6) found.push(`${at} lines of the numbers of now are seen`);
   let above = floor.top;
   for (const each of tools) {
     const box = each.getBoundingClientRect();
@@ -80,7 +85,7 @@ def test_no_button_or_name_is_cut_off_at_any_size(served: Served, window: Callab
     page.open(nodes=["/vehicle"])
     page.page.wait_for_function("() => document.querySelectorAll('.c-chips button').length > 5")
     found: dict[Any, list[str]] = {}
-    for width, height in SIZES:
+    for width, height in (*SIZES, SIZES[0]):  # made larger, and small again
         page.page.set_viewport_size({"width": width, "height": height})
         page.page.wait_for_timeout(400)
         found[width, height] = page.page.evaluate(CUT_OFF)

@@ -19,8 +19,10 @@ OPEN_EYE, SHUT_EYE = (
 NO_RUN_PX = 34
 """Height of the strip below the floor while there is no run [pixels]."""
 
-NOW_PX, LOW_NOW_PX, HIGH_NOW_PX = 185, 98, 255
-"""Height of the numbers of now [pixels], and where the window is low (the badge alone says the mode) or high."""
+NOW_LINE_PX = 17
+"""Height of a line of the numbers of now [pixels]."""
+NOW_PX, LOW_NOW_PX, HIGH_NOW_PX = (6 + lines * NOW_LINE_PX for lines in (11, 6, 15))
+"""Height of the numbers of now [pixels], and where the window is low or high: whole lines, so that none is cut."""
 LIT_CAMERA = ",".join(
     f":root[data-camera~='{camera.value}'] div:has(>.c-cameras)+div button:nth-child({place})"
     for place, camera in enumerate(Camera, start=1)
@@ -79,15 +81,17 @@ div:has(>div>.c-bottom):has(.c-no-run)>:nth-child(4){{grid-column:1/span 24!impo
  background:{css(Surface.CARD.dark)};color:inherit;font-size:15px;line-height:1;cursor:pointer}}
 .c-daylight:is(:hover,:focus-visible){{border-color:{css(Worded.BRAND.dark)}}}
 :root{{--c-now:{NOW_PX}px}}
-@media (max-height:800px){{:root{{--c-now:{LOW_NOW_PX}px}} .c-now tr:first-child{{display:none}}}}
+@media (max-height:800px){{:root{{--c-now:{LOW_NOW_PX}px}}}}
 @media (min-height:1000px){{:root{{--c-now:{HIGH_NOW_PX}px}}}}
 :root:has(.c-no-run){{--c-now:34px}}
 [data-dock-region=right]{{box-sizing:border-box;padding-top:var(--c-now)}}
 div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
 .c-now{{position:fixed;z-index:1;top:var(--c-top);right:0;width:var(--c-right);height:var(--c-now);
- box-sizing:border-box;overflow:hidden auto;scrollbar-width:thin;padding:5px 14px 2px 8px;
- border-bottom:1px solid {css(Surface.EDGE.dark)}}}
-.c-now .c-table{{line-height:1.3}}
+ box-sizing:border-box;overflow:hidden auto;overflow-anchor:none;scrollbar-width:thin;padding:5px 14px 0 8px;
+ scroll-snap-type:y mandatory;scroll-padding-top:5px;border-bottom:1px solid {css(Surface.EDGE.dark)}}}
+.c-now .c-table{{line-height:{NOW_LINE_PX}px}}
+.c-now .c-table td{{padding-top:0;padding-bottom:0}}
+.c-now tr{{scroll-snap-align:start}}
 .c-now .c-table td:first-child{{width:1px;white-space:nowrap}}
 .c-now .c-table .c-one td:last-child{{white-space:normal}}
 {LIT_CAMERA}{{background:{css(Worded.PRESS.dark)}!important;border-color:{css(Worded.PRESS.dark)}!important;

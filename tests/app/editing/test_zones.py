@@ -106,7 +106,7 @@ def test_the_floor_shows_each_zone_with_its_name_and_kinds(drawn: AppState) -> N
     assert label.text == "Zone 1: reflectors, contours"
     assert tuple(label.position[:2]) == (1.0, 3.0)
     layer.show_site(after(state, DeleteZone()).project)
-    assert len(layer.nodes()) == 1
+    assert len(layer.nodes()) == 2
     np.testing.assert_array_equal(layer._outlines.points, NO_SEGMENTS)
 
 

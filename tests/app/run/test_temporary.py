@@ -38,7 +38,7 @@ def test_landmarks_are_drawn_as_they_are_at_the_cursor() -> None:
         shown = view_of(AppState(project=project, saved=project), view)
         layer.draw(shown)
         assert layer.is_used(shown)
-        bodies, ellipses, *ages = layer.nodes()
+        _, bodies, _, ellipses, *ages = layer.nodes()
         rings = bodies.points[: RING_POINTS * len(known), 0, :2]
         apart = np.hypot(*(rings[:, np.newaxis] - known.places_map).transpose(2, 0, 1)).min(axis=1)
         np.testing.assert_allclose(apart, 0.6, atol=0.1)
@@ -48,6 +48,6 @@ def test_landmarks_are_drawn_as_they_are_at_the_cursor() -> None:
         assert [label.text for label in ages] == [f"{age:.0f} s" for _, age in unseen] and unseen
         playback.seek(0.0)
         layer.draw(view_of(AppState(project=project, saved=project), playback.view(covered=False)))
-        assert len(layer.nodes()) == 2 and not layer.is_used(view_of(AppState(project=project, saved=project)))
+        assert len(layer.nodes()) == 4 and not layer.is_used(view_of(AppState(project=project, saved=project)))
     finally:
         server.stop()
