@@ -150,6 +150,13 @@
     refuse(field, text);
   };
 
+  // Fields that show another thing from now on say nothing of what was refused for the one before.
+  window.commissionTakeBack = (uuids) => {
+    for (const field of document.querySelectorAll("[data-refused]")) {
+      if (uuids.includes(field.querySelector("label[for]")?.htmlFor)) delete field.dataset.refused;
+    }
+  };
+
   // A number that comes without a key or a click (dropped, dictated, filled in by a helper of the browser) is compared
   // by viser's input with where the caret stood when it was left last, and thrown away as if nothing had changed. A
   // released mouse button lets it look anew.

@@ -10,6 +10,13 @@
   const kept = { tabs: {}, folders: {}, camera: null, ...read() };
   const save = () => { try { sessionStorage.setItem(KEY, JSON.stringify(kept)); } catch { /* nothing is kept then */ } };
   const done = new WeakSet(); // elements that have been brought back
+  const me = kept.window ??= crypto.randomUUID?.() ?? String(Math.random()); // insecure pages have no randomUUID
+  save();
+  let told = null; // where this window has said who it is: each connection asks anew
+  function sayWho() {
+    const inbox = window.commissionWindow;
+    if (inbox && inbox !== told && window.commissionTell?.(inbox, me)) told = inbox;
+  }
   const name = (element) => element.textContent.trim();
   // The head of a folder stands before what it hides; null: it is none.
   const isOpened = (head) => head.style.cursor === "pointer" && head.nextElementSibling
@@ -78,5 +85,5 @@
       save();
     }
   }
-  setInterval(() => { bringBack(); followCamera(); }, LOOK_EVERY_MS);
+  setInterval(() => { sayWho(); bringBack(); followCamera(); }, LOOK_EVERY_MS);
 })();

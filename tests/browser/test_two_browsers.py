@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
+from commission.app.floor_map.align_tool import AlignTool
 from commission.app.run.actions import Play, VirtualDrive
 from tests.app.sites import room
 from tests.browser.page import OpenPage
@@ -42,10 +43,16 @@ def test_closing_one_browser_disturbs_nobody_and_a_reload_keeps_tab_folder_and_p
         assert client.client_id in served.state.browsers
         assert where(page) == place
         assert page.page.get_by_role("tab", name="Layers", exact=True).get_attribute("aria-selected") == "true"
+        page.page.keyboard.press("g")
+        served.until(lambda: isinstance(served.editor(client.client_id).tool, AlignTool), 10.0)
+        page.click_at((3.0, 6.0))
+        served.until(lambda: len(served.editor(client.client_id).tool.marks()) == 1, 10.0)
         before = set(served.server.get_clients())
         page.page.reload()
-        page.wait_for_client(before)
+        back = page.wait_for_client(before)
         page.wait_until_drawn()
+        served.until(lambda: isinstance(served.editor(back.client_id).tool, AlignTool), 30.0)
+        assert served.editor(back.client_id).tool.marks()[0] == pytest.approx((3.0, 6.0), abs=0.05)
         page.row("Wheel separation").wait_for(state="visible")
         for name in ("Site", "Layers"):
             assert page.page.get_by_role("tab", name=name, exact=True).get_attribute("aria-selected") == "true"

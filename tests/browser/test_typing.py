@@ -198,6 +198,19 @@ def test_a_text_that_is_refused_does_not_stay_in_its_field(page: OpenPage, serve
     assert served.state.undo == undo
 
 
+def test_what_was_refused_for_one_reflector_is_not_said_of_the_next_one(page: OpenPage, served: Served) -> None:
+    first, second = served.state.project.reflectors.reflectors[:2]
+    assert first.radius == second.radius  # the field need not be written anew
+    page.click_at((first.x, first.y))
+    page.wait_for_text(f"Reflector {first.id}")
+    typed_into(page, "Radius [mm]", "-").press("Enter")
+    page.page.wait_for_function("() => document.querySelector('[data-refused]') !== null")
+    assert "expected a number" in (page.row("Radius [mm]").get_attribute("data-refused") or "")
+    page.click_at((second.x, second.y))
+    page.wait_for_text(f"Reflector {second.id}")
+    page.page.wait_for_function("() => document.querySelector('[data-refused]') === null", timeout=5_000)
+
+
 @pytest.mark.parametrize("tab", ["Site", "Plan", "Run", "Tune"])
 def test_each_number_typed_key_by_key_is_one_entry(page: OpenPage, served: Served, heard: Heard, tab: str) -> None:
     page.open_tab(tab)

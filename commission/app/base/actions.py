@@ -57,6 +57,14 @@ class Join(Action):
 
 
 @dataclass(frozen=True, slots=True)
+class NameWindow(Action):
+    """A browser says which window it is, the same after a reload as before."""
+
+    name: str
+    """Its own choice; kept by the window."""
+
+
+@dataclass(frozen=True, slots=True)
 class Leave(Action):
     """A browser is gone."""
 

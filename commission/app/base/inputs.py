@@ -14,7 +14,7 @@ from commission.app.base.field_widget import add_widget, held, meant, write_held
 from commission.app.base.panel import Post, escaped, posting, write
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
-from commission.app.base.viser_private import write_anew
+from commission.app.base.viser_private import take_back_refusals, write_anew
 from commission.site.fields import FieldInfo, field_info, get_field
 from commission.site.project import Project
 from commission.site.quantity import PERCENT
@@ -116,6 +116,8 @@ class Inputs:
 
     def follow(self, state: AppState) -> None:
         """Set widgets to what the state says, each where that has changed: what is being typed is not yet in it."""
+        if self._is_anew:
+            take_back_refusals(self._gui, (widget for widget, _ in self._widgets))
         for index, (widget, shown) in enumerate(self._widgets):
             value = shown(state)
             if value is not None and (index not in self._followed or self._followed[index] != value):

@@ -7,7 +7,7 @@ import json
 from viser import GuiApi
 
 from commission.app.base import page_reducer, viser_private
-from commission.app.base.actions import Camera, HoldSlider, SetCamera, StopJob
+from commission.app.base.actions import Camera, HoldSlider, NameWindow, SetCamera, StopJob
 from commission.app.base.feature import LAYERS, Docked, Feature
 from commission.app.base.grid_layer import GridLayer
 from commission.app.base.inputs import show
@@ -56,6 +56,16 @@ class SliderHold(BasePanel):
         viser_private.run_on_page(viser_private.server_of(gui), browser, script)
 
 
+class WindowName(BasePanel):
+    """A text that nobody sees, in which the page's script says which window it is (web_assets/kept_view.js)."""
+
+    def __init__(self, gui: GuiApi, post: Post, browser: int) -> None:
+        name = gui.add_text("Name of this window", "", visible=False)
+        name.on_update(posting(post, lambda event: NameWindow(str(event.target.value))))
+        script = f"window.commissionWindow = {json.dumps(viser_private.identifier(name))}"
+        viser_private.run_on_page(viser_private.server_of(gui), browser, script)
+
+
 FEATURE = Feature(
     name="base",
     reducers=(page_reducer,),
@@ -63,6 +73,7 @@ FEATURE = Feature(
     panels=(
         Docked(make=lambda at: JobButton(at.gui, at.post), tab=None, rank=20),
         Docked(make=lambda at: SliderHold(at.gui, at.post, at.browser), tab=None, own=True),
+        Docked(make=lambda at: WindowName(at.gui, at.post, at.browser), tab=None, own=True),
         Docked(make=lambda at: CameraButtons(at.gui, at.post), tab=None, rank=40),
         Docked(make=lambda at: LayersPanel(at.gui, at.post, at.layers, at.state), tab=LAYERS, rank=20),
     ),

@@ -10,12 +10,23 @@ from commission.app.base.effects import CancelJob, FlyTo, PlaceCamera, Tell
 from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Holding, Step, refuse_read_only, with_maps_packed
 
+LONGEST_NAME = 64
+"""Letters of the name of a window."""
+
 
 @reduce.register
 def join(_action: actions.Join, state: AppState, sender: Sender) -> Outcome:
     """A browser begins with the defaults of every feature."""
     greeting = (Tell(state.greeting, failed=False),) if state.greeting else ()
     return Outcome(state if sender.browser is None else state.joined(sender.browser), greeting)
+
+
+@reduce.register
+def name_window(action: actions.NameWindow, state: AppState, sender: Sender) -> Outcome:
+    """Give a window that has come back what it had."""
+    if not 0 < len(action.name) <= LONGEST_NAME:
+        raise ValueError(f"the window's name has {len(action.name)} letters; expected 1 to {LONGEST_NAME}")
+    return Outcome(state if sender.browser is None else state.named(sender.browser, action.name))
 
 
 @reduce.register

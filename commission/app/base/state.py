@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Protocol, runtime_checkable
 
 from commission.app.base.actions import PROGRAM, Sender
 from commission.app.base.parts import Part, Parts, part_of
@@ -30,6 +31,8 @@ FAULTS_KEPT = 20
 MAP_BYTES = 200_000_000
 """Bytes of cells that the undo steps hold as they are, and as many the redo steps; older maps are packed."""
 MERGE_WITHIN_S = 1.0
+WINDOWS_KEPT = 32
+"""Windows that have gone of which is kept what comes back with them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +41,23 @@ class Holding:
 
     held: bool = False
     """Whether it has."""
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """Which window of a browser a connection is of: a reload, or a lost connection, makes another connection of it."""
+
+    name: str = ""
+    """As it has named itself; empty: it has not yet."""
+
+
+@runtime_checkable
+class Lasting(Protocol):
+    """What a feature keeps for a browser, and has again when the same window comes back."""
+
+    def brought_back(self, state: AppState) -> object:
+        """Return what still holds of it in the state to which the window has come back."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +121,8 @@ class AppState:
     """What features keep for all browsers together."""
     browsers: Mapping[int, Parts] = field(default_factory=dict[int, Parts])
     """What features keep for each connected browser, by its number."""
+    away: Mapping[str, Parts] = field(default_factory=dict[str, Parts])
+    """What comes back with windows that have gone, by their names; the one that went last is the last."""
 
     @property
     def is_changed(self) -> bool:
@@ -134,8 +156,37 @@ class AppState:
         return replace(self, browsers={**self.browsers, browser: {}})
 
     def left(self, browser: int) -> AppState:
-        """Return the state without a browser."""
-        return replace(self, browsers={number: parts for number, parts in self.browsers.items() if number != browser})
+        """Return the state without a browser; what comes back with its window is laid aside."""
+        parts = self.browsers.get(browser, {})
+        lasting, name = {kind: part for kind, part in parts.items() if isinstance(part, Lasting)}, _window(parts)
+        there = {number: its for number, its in self.browsers.items() if number != browser}
+        away = self.away
+        if name and lasting and name not in map(_window, there.values()):
+            others = [(each, its) for each, its in away.items() if each != name]
+            away = dict([*others, (name, lasting)][-WINDOWS_KEPT:])
+        return replace(self, browsers=there, away=away)
+
+    def named(self, browser: int, name: str) -> AppState:
+        """Return the state in which a browser is a window, with what that window had, unless it has begun anew.
+
+        Parameters
+        ----------
+        browser : number of the connection.
+        name : of the window; the connection that it had before may not be known to have gone yet.
+        """
+        now = self.browsers.get(browser)
+        if now is None or Window(name) in now.values():
+            return self
+        living = (parts for parts in reversed(tuple(self.browsers.values())) if _window(parts) == name)
+        had = next(living, self.away.get(name, {}))
+        back = {kind: part.brought_back(self) for kind, part in had.items() if isinstance(part, Lasting)}
+        away = {each: parts for each, parts in self.away.items() if each != name}
+        return replace(self, browsers={**self.browsers, browser: {**back, **now, Window: Window(name)}}, away=away)
+
+
+def _window(parts: Parts) -> str:
+    """Name of the window whose parts these are; empty: it has none."""
+    return part_of(parts, Window).name
 
 
 @dataclass(frozen=True, slots=True)

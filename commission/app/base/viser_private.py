@@ -9,7 +9,7 @@ import asyncio
 import json
 import logging
 import uuid
-from collections.abc import AsyncGenerator, Callable, Sequence
+from collections.abc import AsyncGenerator, Callable, Iterable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextvars import ContextVar
 from dataclasses import replace
@@ -297,6 +297,18 @@ def say_at_field(server: ViserServer, number: int, widget: str, text: str) -> No
     text : plain text.
     """
     run_on_page(server, number, f"window.commissionRefuse?.({json.dumps(widget)}, {json.dumps(text)})")
+
+
+def take_back_refusals(gui: GuiApi, widgets: Iterable[Any]) -> None:
+    """Take back what is said below fields: they show another thing's values, of which nothing was refused.
+
+    Parameters
+    ----------
+    gui : that the widgets are of.
+    widgets : handles of inputs.
+    """
+    names = json.dumps([identifier(widget) for widget in widgets])
+    gui._websock_interface.queue_message(_messages.RunJavascriptMessage(f"window.commissionTakeBack?.({names})"))
 
 
 def run_on_pages(server: ViserServer, script: str) -> None:

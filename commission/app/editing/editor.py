@@ -119,6 +119,13 @@ class Editor:
             tool, aside = aside.taken_up(state), None
         return replace(self, tool=tool, laid_aside=aside, drag=None)
 
+    def brought_back(self, state: AppState) -> Editor:
+        """Return what is there again after a reload: what attracts, and a tool that keeps what was begun with it."""
+        tool = self.tool if self.tool is not None and self.tool.stays and self.tool.is_half_done else None
+        return Editor(
+            tool=None if tool is None else tool.taken_up(state), laid_aside=self.laid_aside, snapping=self.snapping
+        )
+
     @property
     def points(self) -> tuple[Point, ...]:
         """Points that were clicked with the tool in use [m]."""

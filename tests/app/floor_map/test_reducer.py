@@ -29,7 +29,7 @@ from commission.io.image_map import Picture
 from commission.io.mesh import Model
 from commission.site.floor_map import FREE, OCCUPIED, UNKNOWN, FloorMap
 from commission.site.project import Project
-from tests.app.asking import ME, after, joined
+from tests.app.asking import ME, OTHER, after, by, joined
 from tests.app.sites import room
 
 REACH = 0.15
@@ -270,6 +270,38 @@ def test_points_to_align_by_are_there_again_when_the_tool_is_left_and_taken_up(s
     # Until they are forgotten, or the map is moved by them.
     assert known(after(begun, actions.ForgetPoint(everything=True), editing.Cancel(), use(AlignTool())).state) == ()
     assert known(after(aligning(state, everything=False).state, use(AlignTool())).state) == ()
+
+
+@pytest.mark.parametrize("in_use", [True, False], ids=["in use", "laid aside"])
+@pytest.mark.parametrize("leaves_first", [True, False])
+def test_points_to_align_by_are_there_again_in_the_window_that_is_loaded_anew(
+    state: AppState, *, in_use: bool, leaves_first: bool
+) -> None:
+    named = after(state, page.NameWindow("mine")).state
+    named = after(named, page.NameWindow("another"), browser=OTHER).state
+    begun = after(named, use(AlignTool()), click(0.25, 2.0), actions.SetPlantPoint(0, (100.0, 60.0), "column B4")).state
+    points = known(begun)
+    if not in_use:
+        begun = after(begun, editing.ChooseTool(None)).state
+
+    def loaded_anew(state: AppState, old: int, new: int, name: str) -> AppState:
+        steps = [by(old, page.Leave()), by(new, page.Join()), by(new, page.NameWindow(name))]
+        return after(state, *(steps if leaves_first else (*steps[1:], steps[0]))).state
+
+    other = loaded_anew(begun, OTHER, 8, "another")
+    assert other.of_browser(8, Editor).tool is None, "they are nobody else's"
+    again = loaded_anew(other, ME, 9, "mine")
+    for number in (10, 11):  # and once more
+        shown = again if in_use else after(again, by(number - 1, use(AlignTool()))).state
+        tool = shown.of_browser(number - 1, Editor).tool
+        assert isinstance(tool, AlignTool) and tool.known == points
+        again = loaded_anew(again, number - 1, number, "mine")
+    moved = replace(again, project=replace(again.project, floor_map=None))
+    tool = loaded_anew(moved, 11, 12, "mine").of_browser(12, Editor).tool
+    assert tool is None or tool == AlignTool()
+    assert 9 not in again.browsers
+    with pytest.raises(ValueError, match="expected 1 to 64"):
+        after(state, page.NameWindow(""))
 
 
 def test_points_of_a_map_that_was_moved_or_exchanged_since_are_not_taken_for_those_of_another(state: AppState) -> None:
