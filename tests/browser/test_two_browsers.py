@@ -18,6 +18,20 @@ def where(page: OpenPage) -> tuple[float, ...]:
     return (*page.pixel_of((3.0, 6.0)), *page.pixel_of((4.0, 6.0)))
 
 
+def clicked(served: Served, browser: int) -> tuple[tuple[float, float], ...]:
+    """Points by which a browser is about to align the map [m]."""
+    tool = served.editor(browser).tool
+    return tool.marks() if isinstance(tool, AlignTool) else ()
+
+
+def begin_to_align(page: OpenPage, served: Served, browser: int) -> None:
+    """Click the first point."""
+    page.page.keyboard.press("g")
+    served.until(lambda: isinstance(served.editor(browser).tool, AlignTool), 10.0)
+    page.click_at((3.0, 6.0))
+    served.until(lambda: len(clicked(served, browser)) == 1, 10.0)
+
+
 def test_closing_one_browser_disturbs_nobody_and_a_reload_keeps_tab_folder_and_place(
     window: Callable[..., OpenPage],
 ) -> None:
@@ -43,16 +57,13 @@ def test_closing_one_browser_disturbs_nobody_and_a_reload_keeps_tab_folder_and_p
         assert client.client_id in served.state.browsers
         assert where(page) == place
         assert page.page.get_by_role("tab", name="Layers", exact=True).get_attribute("aria-selected") == "true"
-        page.page.keyboard.press("g")
-        served.until(lambda: isinstance(served.editor(client.client_id).tool, AlignTool), 10.0)
-        page.click_at((3.0, 6.0))
-        served.until(lambda: len(served.editor(client.client_id).tool.marks()) == 1, 10.0)
+        begin_to_align(page, served, client.client_id)
         before = set(served.server.get_clients())
         page.page.reload()
         back = page.wait_for_client(before)
         page.wait_until_drawn()
-        served.until(lambda: isinstance(served.editor(back.client_id).tool, AlignTool), 30.0)
-        assert served.editor(back.client_id).tool.marks()[0] == pytest.approx((3.0, 6.0), abs=0.05)
+        served.until(lambda: clicked(served, back.client_id) != (), 30.0)
+        assert clicked(served, back.client_id)[0] == pytest.approx((3.0, 6.0), abs=0.05)
         page.row("Wheel separation").wait_for(state="visible")
         for name in ("Site", "Layers"):
             assert page.page.get_by_role("tab", name=name, exact=True).get_attribute("aria-selected") == "true"
