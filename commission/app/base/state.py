@@ -44,7 +44,7 @@ class Holding:
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
+class BrowserWindow:
     """Which window of a browser a connection is of: a reload, or a lost connection, makes another connection of it."""
 
     name: str = ""
@@ -175,18 +175,18 @@ class AppState:
         name : of the window; the connection that it had before may not be known to have gone yet.
         """
         now = self.browsers.get(browser)
-        if now is None or Window(name) in now.values():
+        if now is None or BrowserWindow(name) in now.values():
             return self
         living = (parts for parts in reversed(tuple(self.browsers.values())) if _window(parts) == name)
         had = next(living, self.away.get(name, {}))
         back = {kind: part.brought_back(self) for kind, part in had.items() if isinstance(part, Lasting)}
         away = {each: parts for each, parts in self.away.items() if each != name}
-        return replace(self, browsers={**self.browsers, browser: {**back, **now, Window: Window(name)}}, away=away)
+        return replace(self, browsers={**self.browsers, browser: {**back, **now, BrowserWindow: BrowserWindow(name)}}, away=away)
 
 
 def _window(parts: Parts) -> str:
     """Name of the window whose parts these are; empty: it has none."""
-    return part_of(parts, Window).name
+    return part_of(parts, BrowserWindow).name
 
 
 @dataclass(frozen=True, slots=True)
