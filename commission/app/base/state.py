@@ -181,7 +181,9 @@ class AppState:
         had = next(living, self.away.get(name, {}))
         back = {kind: part.brought_back(self) for kind, part in had.items() if isinstance(part, Lasting)}
         away = {each: parts for each, parts in self.away.items() if each != name}
-        return replace(self, browsers={**self.browsers, browser: {**back, **now, BrowserWindow: BrowserWindow(name)}}, away=away)
+        return replace(
+            self, browsers={**self.browsers, browser: {**back, **now, BrowserWindow: BrowserWindow(name)}}, away=away
+        )
 
 
 def _window(parts: Parts) -> str:
