@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled, compiled_parallel, parallel_range
 from commission.geometry.arrays import BoolArray, FloatArray, Growing, IntArray, read_only
+from commission.localization.bearing_cycles import BearingCycles, reflexes_among, reflexes_in_turn
 from commission.localization.clusters import count_clusters
 from commission.localization.detector import (
     INLIER,
@@ -50,6 +51,21 @@ class DetectionLog:
     """(n,) `Status.INLIER`, or `Status.OUTLIER_DETECTOR` for a rejected cluster."""
     tags: TagCycles | None = None
     """What the camera that looks for tags saw; None where the log has no frames of it."""
+    bearings: BearingCycles | None = None
+    """What the goniometer met; None where the log has no reflexes."""
+
+    @property
+    def is_scan(self) -> BoolArray | None:
+        """(K,) whether a cycle is a scan, and neither a frame nor a reflex; None where all of them are."""
+        others = [part.is_frame for part in (self.tags,) if part is not None]
+        others += [part.is_reflex for part in (self.bearings,) if part is not None]
+        return ~np.logical_or.reduce(others) if others else None
+
+    @property
+    def others_before(self) -> int:
+        """Frames and reflexes of the run before the first of these cycles; of no cycle none are asked for."""
+        frames = int(self.tags.numbers[0]) if self.tags is not None and len(self.tags.numbers) else 0
+        return frames + (self.bearings.first if self.bearings is not None else 0)
 
     def __len__(self) -> int:
         """Return the number of scans."""
@@ -69,6 +85,7 @@ class DetectionLog:
             self.expected[rows],
             self.status[rows],
             None if self.tags is None else self.tags.part(first, last),
+            None if self.bearings is None else self.bearings.part(first, last),
         )
 
 
@@ -82,10 +99,10 @@ def cycle_stamps(log: RecordLog, *, sensor_detects: bool = False) -> IntArray:
     sensor_detects : whether it has done so before this log begins.
     """
     stamps = _scan_cycles(log, sensor_detects)
-    if not len(log.tags):
+    if not len(log.tags) and not len(log.bearings):
         return stamps
-    # As `among` has it: of equal stamps the frame comes first.
-    return np.sort(np.concatenate((log.tags.stamps_ns, stamps)), kind="stable")
+    # As `among` has it: of equal stamps the frame comes first, then the reflex.
+    return np.sort(np.concatenate((log.tags.stamps_ns, log.bearings.stamps_ns, stamps)), kind="stable")
 
 
 def tag_cycles(log: RecordLog, *, sensor_detects: bool = False) -> TagCycles | None:
@@ -95,7 +112,20 @@ def tag_cycles(log: RecordLog, *, sensor_detects: bool = False) -> TagCycles | N
     ----------
     log, sensor_detects : as in `cycle_stamps`.
     """
-    return among(log.tags, _scan_cycles(log, sensor_detects)) if len(log.tags) else None
+    if not len(log.tags):
+        return None
+    scans = _scan_cycles(log, sensor_detects)
+    return among(log.tags, np.sort(np.concatenate((log.bearings.stamps_ns, scans)), kind="stable"))
+
+
+def reflex_cycles(log: RecordLog, *, sensor_detects: bool = False) -> BearingCycles | None:
+    """Reflexes of the goniometer among all cycles; None where the log has none.
+
+    Parameters
+    ----------
+    log, sensor_detects : as in `cycle_stamps`.
+    """
+    return reflexes_among(log.bearings, log.tags.stamps_ns, _scan_cycles(log, sensor_detects))
 
 
 def _scan_cycles(log: RecordLog, sensor_detects: bool) -> IntArray:
@@ -132,24 +162,30 @@ def extract_detections(
     UsageError
         the log names a scanner that the setup does not have.
     """
-    tags = tag_cycles(log, sensor_detects=sensor_detects)
-    if tags is not None:
-        end = len(tags.is_frame) if last is None else last
-        inner, outer = (int(np.count_nonzero(~tags.is_frame[:cycle])) for cycle in (first, end))
-        scanned = _of_scans(log, setup, (inner, outer), sensor_detects=sensor_detects, parallel=parallel)
-        stamps = cycle_stamps(log, sensor_detects=sensor_detects)
-        return _with_frames(scanned, stamps[first:end], tags.part(first, end))
-    return _of_scans(log, setup, (first, last), sensor_detects=sensor_detects, parallel=parallel)
+    if not len(log.tags) and not len(log.bearings):
+        return _of_scans(log, setup, (first, last), sensor_detects=sensor_detects, parallel=parallel)
+    cycles = nothing_detected(
+        cycle_stamps(log, sensor_detects=sensor_detects),
+        tag_cycles(log, sensor_detects=sensor_detects),
+        reflex_cycles(log, sensor_detects=sensor_detects),
+    )
+    end = len(cycles) if last is None else last
+    is_scan = cycles.is_scan
+    inner, outer = (cycle if is_scan is None else int(np.count_nonzero(is_scan[:cycle])) for cycle in (first, end))
+    scanned = _of_scans(log, setup, (inner, outer), sensor_detects=sensor_detects, parallel=parallel)
+    return _with_others(scanned, cycles.part(first, end))
 
 
-def _with_frames(scanned: DetectionLog, stamps_ns: IntArray, tags: TagCycles) -> DetectionLog:
-    """Put frames, which have no detections, among scans."""
-    cycles, is_scan = len(stamps_ns), ~tags.is_frame
-    counts, scanners = np.zeros(cycles, dtype=np.int64), np.zeros(cycles, dtype=np.int64)
+def _with_others(scanned: DetectionLog, cycles: DetectionLog) -> DetectionLog:
+    """Put scans among frames and reflexes, which have no detections."""
+    is_scan = cycles.is_scan
+    if is_scan is None:
+        return scanned
+    counts, scanners = np.zeros(len(cycles), dtype=np.int64), np.zeros(len(cycles), dtype=np.int64)
     counts[is_scan], scanners[is_scan] = np.diff(scanned.offsets), scanned.scanners
     offsets = np.concatenate(([0], np.cumsum(counts)))
     rows = scanned.range_bearing, scanned.beams, scanned.expected, scanned.status
-    return _log(stamps_ns, scanners, offsets, *rows, tags)
+    return _log(cycles.stamps_ns, scanners, offsets, *rows, cycles.tags, cycles.bearings)
 
 
 def _of_scans(
@@ -171,11 +207,19 @@ def _of_scans(
     return joined(parts)
 
 
-def nothing_detected(stamps_ns: IntArray, tags: TagCycles | None = None) -> DetectionLog:
-    """Return what is detected at these stamps while all reflectors are covered: tags alone, where there are any."""
+def nothing_detected(
+    stamps_ns: IntArray, tags: TagCycles | None = None, bearings: BearingCycles | None = None
+) -> DetectionLog:
+    """Return what scans detect while all reflectors are covered.
+
+    Parameters
+    ----------
+    stamps_ns : of the cycles [ns].
+    tags, bearings : what is seen by others, where there is anything.
+    """
     offsets = np.zeros(len(stamps_ns) + 1, dtype=np.int64)
     scanners = np.zeros(len(stamps_ns), dtype=np.int64)
-    return _log(stamps_ns, scanners, offsets, *room_for(0), tags)
+    return _log(stamps_ns, scanners, offsets, *room_for(0), tags, bearings)
 
 
 def detect_log(scans: ScanLog, setup: LocalizerSetup, *, scanner: int = 0, parallel: bool = False) -> DetectionLog:
@@ -281,7 +325,7 @@ def joined(logs: Iterable[DetectionLog]) -> DetectionLog:
     stamps, scanners, offsets, beams = (Growing(np.int64) for _ in range(4))
     range_bearing, expected, status = Growing(np.float64, 2), Growing(np.float64), Growing(np.int8)
     offsets.append(first.offsets[:1])
-    begin, tags = 0, list[TagCycles | None]()
+    begin, tags, bearings = 0, list[TagCycles | None](), list[BearingCycles | None]()
     for log in itertools.chain((first, second), rest):
         stamps.append(log.stamps_ns)
         scanners.append(log.scanners)
@@ -292,6 +336,7 @@ def joined(logs: Iterable[DetectionLog]) -> DetectionLog:
         expected.append(log.expected)
         status.append(log.status)
         tags.append(log.tags)
+        bearings.append(log.bearings)
     return _log(
         stamps.array(),
         scanners.array(),
@@ -301,6 +346,7 @@ def joined(logs: Iterable[DetectionLog]) -> DetectionLog:
         expected.array(),
         status.array(),
         in_turn(tags),
+        reflexes_in_turn(bearings),
     )
 
 
@@ -313,6 +359,7 @@ def _log(  # noqa: PLR0917 - the columns of the log
     expected: FloatArray,
     status: NDArray[np.int8],
     tags: TagCycles | None = None,
+    bearings: BearingCycles | None = None,
 ) -> DetectionLog:
     """Return a log of read-only arrays."""
     return DetectionLog(
@@ -324,6 +371,7 @@ def _log(  # noqa: PLR0917 - the columns of the log
         expected=read_only(expected),
         status=read_only(status),
         tags=tags,
+        bearings=bearings,
     )
 
 

@@ -56,9 +56,21 @@ class SeenTags:
     """(n, 6) what became of each, see `tags`; None: they are not looked at."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class SeenBearing:
+    """What one reflex of a goniometer told."""
+
+    bearing: float
+    """Bearing as reported [rad], scanner frame; NaN: a whole turn met no reflector."""
+    reflector: str
+    """Id of the reflector that it is said to be of; empty: nobody says."""
+    figures: FloatArray | None
+    """(4,) what became of it, see `bearings`; None: bearings are not looked at."""
+
+
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Estimate:
-    """One cycle: one scan processed, or one frame of a camera that looks for tags."""
+    """One cycle: one scan processed, one frame of a camera that looks for tags, or one reflex of a goniometer."""
 
     stamp_ns: int
     """Time of the scan [ns]."""
@@ -95,7 +107,9 @@ class Estimate:
     temporary: FloatArray | None = None
     """(9,) what became of the temporary landmarks in the scan, see `temporary`; None: they are not looked at."""
     tags: SeenTags | None = None
-    """What a frame saw of tags; None of a scan."""
+    """What a frame saw of tags; None of a scan or a reflex."""
+    bearing: SeenBearing | None = None
+    """What a reflex told; None of a scan or a frame."""
     levels: FloatArray | None = None
     """(2,) protection level of position [m] and heading [rad], inf where there is none; None: the supervisor goes by
     2-sigma."""

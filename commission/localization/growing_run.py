@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
+from commission.localization.bearing_cycles import BearingCycles, bearing_cycles
+from commission.localization.bearings import COLUMNS as BEARING_COLUMNS
 from commission.localization.contour import COLUMNS
 from commission.localization.detection_log import DetectionLog
 from commission.localization.detector import INLIER
-from commission.localization.estimate import Belief, Estimate, SeenTags, Status
+from commission.localization.estimate import Belief, Estimate, SeenBearing, SeenTags, Status
 from commission.localization.localizer import Localizer
 from commission.localization.priors import KeptPriors, PriorRows
 from commission.localization.run_columns import Checkpoint, RunColumns, RunSegment
@@ -43,6 +45,8 @@ class Cycles(NamedTuple):
     temporary: FloatArray
     is_frame: BoolArray
     """Whether the cycle is a frame of the camera that looks for tags."""
+    is_reflex: BoolArray
+    """Whether the cycle is a reflex of the goniometer."""
     levels: FloatArray
     """NaN where the supervisor goes by 2-sigma."""
 
@@ -64,6 +68,13 @@ class SightingRows(NamedTuple):
     """A row per sighting of a tag."""
 
     sightings: FloatArray
+    figures: FloatArray
+
+
+class ReflexRows(NamedTuple):
+    """A row per reflex."""
+
+    bearings: FloatArray
     figures: FloatArray
 
 
@@ -95,8 +106,11 @@ class GrowingRun:
             np.zeros((n, COLUMNS)),
             np.zeros((n, TEMPORARY_COLUMNS)),
             np.zeros(n, np.bool_),
+            np.zeros(n, np.bool_),
             np.empty((n, 2)),
         )
+        self._reflexes = ReflexRows(np.empty(n), np.empty((n, BEARING_COLUMNS)))
+        self._named: list[str] = []
         self._tag_offsets: IntArray = np.zeros(n + 1, np.int64)
         self._sightings = SightingRows(np.empty((n, 6)), np.empty((n, TAG_COLUMNS)))
         self._ids: list[str] = []
@@ -177,9 +191,11 @@ class GrowingRun:
             expected=rows.expected_beams,
             status=rows.detected,
             tags=self._tags(cycles.is_frame),
+            bearings=self._met(cycles.is_reflex),
         )
         segments = tuple(segment for segment in self._segments if segment.first < max(n, 1))
         looking = any(segment.setup.tag_model is not None for segment in segments)
+        turning = any(segment.setup.bearing_model is not None for segment in segments)
         matching = any(segment.setup.contour is not None for segment in segments)
         protecting = any(segment.setup.protection is not None for segment in segments)
         remembering = any(segment.setup.temporary is not None for segment in segments)
@@ -198,6 +214,7 @@ class GrowingRun:
             contours=cycles.contours if matching else cycles.contours[:0],
             temporary=cycles.temporary if remembering else cycles.temporary[:0],
             tags=read_only(self._sightings.figures[: len(self._ids) if looking else 0]),
+            bearings=read_only(self._reflexes.figures[: len(self._named) if turning else 0]),
             levels=cycles.levels if protecting else cycles.levels[:0],
             searches=tuple(self._searches),
             final=self._localizer.state,
@@ -218,6 +235,24 @@ class GrowingRun:
             ids=ids,
             numbers=numbers,
         )
+
+    def _met(self, is_reflex: BoolArray) -> BearingCycles | None:
+        """What the goniometer has met so far; None where there was no reflex."""
+        if not is_reflex.any():
+            return None
+        return bearing_cycles(is_reflex, self._reflexes.bearings[: len(self._named)], tuple(self._named))
+
+    def _append_bearing(self, row: int, seen: SeenBearing | None) -> None:
+        """Write what a reflex told, and what became of it."""
+        self._cycles.is_reflex[row] = seen is not None
+        if seen is None:
+            return
+        at = len(self._named)
+        if at == len(self._reflexes.bearings):
+            self._reflexes = ReflexRows._make(_longer(column, at + 1) for column in self._reflexes)
+        self._reflexes.bearings[at] = seen.bearing
+        self._reflexes.figures[at] = 0.0 if seen.figures is None else seen.figures
+        self._named.append(seen.reflector)
 
     def _append_tags(self, row: int, seen: SeenTags | None) -> None:
         """Write what a frame saw of tags, and what became of it."""
@@ -251,6 +286,7 @@ class GrowingRun:
         cycles.levels[row] = math.nan if estimate.levels is None else estimate.levels
         cycles.temporary[row] = 0.0 if estimate.temporary is None else estimate.temporary
         self._append_tags(row, estimate.tags)
+        self._append_bearing(row, estimate.bearing)
         rejected = estimate.status == Status.OUTLIER_DETECTOR
         found.range_bearing[first:last], found.beams[first:last] = estimate.detections, estimate.beams
         found.measured[first:last] = estimate.measured

@@ -14,12 +14,15 @@ from numpy.typing import NDArray
 
 from commission.errors import SourceError
 from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.localization.bearing_cycle import Reflexes, process_reflex
+from commission.localization.bearings import COLUMNS as BEARING_COLUMNS
+from commission.localization.bearings import entries_named
 from commission.localization.contour import COLUMNS
 from commission.localization.contour_scans import contour_scan
 from commission.localization.cross_covariance import columns_of, cross_covariance
 from commission.localization.cycle import Cycle, process_odometry, process_scan, room_for_scans
 from commission.localization.detector import DetectedReflectors, detect, room_for, status_of_reported
-from commission.localization.estimate import Belief, Estimate, Mode, SeenTags
+from commission.localization.estimate import Belief, Estimate, Mode, SeenBearing, SeenTags
 from commission.localization.observation import project_detections
 from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import to_belief
@@ -46,7 +49,7 @@ from commission.localization.temporary_memory import TemporaryMemory, landmarks_
 from commission.localization.temporary_model import COLUMNS as TEMPORARY_COLUMNS
 from commission.localization.wheel_scale import as_driven
 from commission.site.parameters import OdometryParameters, Parameters
-from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan, TagSightings
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Reflex, Scan, TagSightings
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 
@@ -187,7 +190,7 @@ class Localizer:
         """Process records up to the next scan and return its estimate; None when there is none, or it has to wait."""
         while self._waiting:
             record, following = self._waiting[0], NOT_YET
-            if isinstance(record, Scan | Detections | TagSightings):
+            if isinstance(record, Scan | Detections | TagSightings | Reflex):
                 found = self._following(record.stamp_ns)
                 if found is None:
                     return None
@@ -234,7 +237,7 @@ class Localizer:
                 status, unknown = status_of_reported(record.range_bearing, blind), np.full(count, np.nan)
                 seen = DetectedReflectors(record.range_bearing, np.zeros(count, dtype=np.int64), unknown, status)
                 return self._process(record, seen, following)
-            case TagSightings():
+            case TagSightings() | Reflex():
                 return self._process(record, NOTHING_DETECTED, following)
             case Scan():
                 if self._state.sensor_detects:
@@ -273,11 +276,11 @@ class Localizer:
         return read_only(settled)
 
     def _process(
-        self, scan: Scan | Detections | TagSightings, seen: DetectedReflectors, following: NextOdometry
+        self, scan: Scan | Detections | TagSightings | Reflex, seen: DetectedReflectors, following: NextOdometry
     ) -> Estimate:
         """Predict to the scan's stamp, associate, correct, supervise."""
         stamp_ns, before = scan.stamp_ns, self._state
-        scanner = 0 if isinstance(scan, TagSightings) else scan.scanner
+        scanner = 0 if isinstance(scan, TagSightings | Reflex) else scan.scanner
         measured = read_only(seen.range_bearing)
         detections = self._at_stamp(scanner, measured, following)
         count = len(detections)
@@ -286,13 +289,15 @@ class Localizer:
         d2 = np.empty(count)
         figures = None if self._setup.contour is None else np.zeros(COLUMNS)
         goods = None if self._setup.temporary is None else np.zeros(TEMPORARY_COLUMNS)
-        tags = self._seen_tags(scan)
+        tags, met = self._seen_tags(scan), self._seen_bearing(scan)
         levels = None if self._setup.protection is None else np.full(2, math.inf)
         if before.mode == Mode.INITIALIZING:
             associate_nothing(status, reflector, d2)
             cycle = unlocated(before, stamp_ns, following, self._setup.filter.odometry)
         elif isinstance(scan, TagSightings) and tags is not None and tags.figures is not None:
             cycle = self._tagged(scan, following, tags.figures, goods)
+        elif isinstance(scan, Reflex) and met is not None and met.figures is not None:
+            cycle = self._met(scan, following, met.figures, goods)
         else:
             cycle = self._filtered(scan, detections, following, (status, reflector, d2), (figures, goods))
         if levels is not None and before.mode != Mode.INITIALIZING:
@@ -335,9 +340,10 @@ class Localizer:
             d2=d2,
             gate=self._setup.filter.gate.d2,
             scanner=scanner,
-            contours=figures if tags is None else None,
+            contours=figures if tags is None and met is None else None,
             temporary=goods,
             tags=tags,
+            bearing=met,
             levels=levels,
         )
 
@@ -375,7 +381,46 @@ class Localizer:
         kept = {"cross": after.cross, "search": after.search, "temporary": after.temporary}
         return state._replace(**kept, protection=protection)
 
-    def _seen_tags(self, record: Scan | Detections | TagSightings) -> SeenTags | None:
+    def _seen_bearing(self, record: Scan | Detections | TagSightings | Reflex) -> SeenBearing | None:
+        """What a reflex told, with room for what becomes of it where bearings are looked at; None of a scan."""
+        if not isinstance(record, Reflex):
+            return None
+        figures = None if self._setup.bearing_model is None else np.zeros(BEARING_COLUMNS)
+        return SeenBearing(record.bearing, record.reflector, figures)
+
+    def _met(self, reflex: Reflex, following: NextOdometry, figures: FloatArray, goods: FloatArray | None) -> Cycle:
+        """Let the filter process a reflex; what becomes of it is written."""
+        setup, memory = self._setup, self._memory()
+        cross = columns_of(self._state.cross, setup.constants)
+        if setup.bearing_model is None:
+            raise ValueError("a reflex is processed where none are looked at; expected a goniometer in the setup")
+        reflexes = Reflexes(
+            read_only(np.ones(1, np.bool_)),
+            read_only(np.zeros(1, np.int64)),
+            read_only(np.array((reflex.bearing,))),
+            entries_named((reflex.reflector,), setup.reflectors.reflectors, setup.index.places),
+            setup.bearing_model,
+        )
+        cycle = process_reflex(
+            self._state._replace(cross=None, search=None, protection=None, temporary=None),
+            reflex.stamp_ns,
+            0,
+            reflexes,
+            setup.filter,
+            setup.index.places,
+            cross,
+            room_for_scans(cross, 0).busy,
+            following,
+            figures[np.newaxis],
+            setup.zone_rows,
+            setup.temporary,
+            memory,
+            contour_scan(setup, None, 0),
+            goods,
+        )
+        return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory))
+
+    def _seen_tags(self, record: Scan | Detections | TagSightings | Reflex) -> SeenTags | None:
         """What a frame saw of tags, with room for what becomes of it where they are looked at; None of a scan."""
         if not isinstance(record, TagSightings):
             return None
@@ -442,14 +487,15 @@ class Localizer:
 
     def _filtered(
         self,
-        scan: Scan | Detections | TagSightings,
+        scan: Scan | Detections | TagSightings | Reflex,
         detections: FloatArray,
         following: NextOdometry,
         written: tuple[NDArray[np.int8], IntArray, FloatArray],
         figures: tuple[FloatArray | None, FloatArray | None],
     ) -> Cycle:
         """Let the filter process a scan; what becomes of its detections, contours and goods is written."""
-        constants, scanner = self._setup.constants, 0 if isinstance(scan, TagSightings) else scan.scanner
+        beamless = isinstance(scan, TagSightings | Reflex)
+        constants, scanner = self._setup.constants, 0 if beamless else scan.scanner
         cross = columns_of(self._state.cross, constants)
         room, memory = room_for_scans(cross, len(detections)), self._memory()
         cycle = process_scan(

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.detection_log import DetectionLog
-from commission.localization.estimate import Belief, Estimate, Mode, SeenTags, Status
+from commission.localization.estimate import Belief, Estimate, Mode, SeenBearing, SeenTags, Status
 from commission.localization.observation import project_detections
 from commission.localization.priors import Priors
 from commission.localization.search_state import SearchMoment
@@ -58,7 +58,7 @@ class Checkpoint(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RunColumns:
-    """A run: K cycles (one per scan) with n detections in total. All arrays are read-only."""
+    """A run: K cycles (one per scan, frame or reflex) with n detections in total. All arrays are read-only."""
 
     segments: tuple[RunSegment, ...]
     """What it was made with; the first one begins at cycle 0, each later one after the one before."""
@@ -86,6 +86,8 @@ class RunColumns:
     """(K, 12) what became of the contours of each cycle, see `contour`; (0, 12) where they are not looked at."""
     tags: FloatArray
     """(m, 6) what became of each sighting of a tag, see `tags`; (0, 6) where they are not looked at."""
+    bearings: FloatArray
+    """(b, 4) what became of each reflex of a goniometer, see `bearings`; (0, 4) where they are not looked at."""
     levels: FloatArray
     """(K, 2) protection level of position [m] and heading [rad] that the supervisor goes by: inf where the vehicle is
     lost or not located, NaN where it goes by 2-sigma; (0, 2) where it always does."""
@@ -190,15 +192,33 @@ class RunColumns:
             d2=self.d2[rows],
             gate=setup.filter.gate.d2,
             scanner=int(self.detected.scanners[cycle]),
-            contours=self.contours[cycle] if setup.contour is not None and not self.is_frame(cycle) else None,
+            contours=self.contours[cycle] if setup.contour is not None and self.is_scan(cycle) else None,
             temporary=self.temporary[cycle] if setup.temporary is not None else None,
             tags=self._tags(cycle),
+            bearing=self._bearing(cycle),
             levels=None if setup.protection is None else self.levels[cycle],
         )
 
     def is_frame(self, cycle: int) -> bool:
         """Whether a cycle is a frame of the camera that looks for tags, and no scan."""
         return self.detected.tags is not None and bool(self.detected.tags.is_frame[cycle])
+
+    def is_reflex(self, cycle: int) -> bool:
+        """Whether a cycle is a reflex of the goniometer, and no scan."""
+        return self.detected.bearings is not None and bool(self.detected.bearings.is_reflex[cycle])
+
+    def is_scan(self, cycle: int) -> bool:
+        """Whether a cycle is a scan, and neither a frame nor a reflex."""
+        return not self.is_frame(cycle) and not self.is_reflex(cycle)
+
+    def _bearing(self, cycle: int) -> SeenBearing | None:
+        """Return what a reflex told, and what became of it; None of a scan."""
+        met = self.detected.bearings
+        if met is None or not self.is_reflex(cycle):
+            return None
+        row = met.rows_before(cycle)
+        figures = self.bearings[row] if self.segment(cycle).setup.bearing_model is not None else None
+        return SeenBearing(float(met.bearings[row]), met.reflectors[row], figures)
 
     def _tags(self, cycle: int) -> SeenTags | None:
         """Return what a frame saw of tags, and what became of it; None of a scan."""

@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray, read_only
+from commission.localization.bearing_cycle import Reflexes, process_reflex
+from commission.localization.bearings import COLUMNS as BEARING_COLUMNS
+from commission.localization.bearings import entries_named
 from commission.localization.contour import COLUMNS as CONTOUR_COLUMNS
 from commission.localization.contour import ContourModel
 from commission.localization.contour_scans import ContourScans, contour_scan_at, contour_scans, figures_at
@@ -43,7 +46,6 @@ from commission.localization.state import FilterState
 from commission.localization.supervisor import INITIALIZING, LOST
 from commission.localization.sweep import bring_to_stamp, sweep_at
 from commission.localization.tag_cycle import TagFrames, process_tags
-from commission.localization.tag_frames import TagCycles
 from commission.localization.tag_start import told_by_tags
 from commission.localization.tags import COLUMNS as TAG_COLUMNS
 from commission.localization.tags import entries_of
@@ -76,6 +78,8 @@ class Columns(NamedTuple):
     where it never does."""
     temporary: FloatArray
     """(K, 9) what became of temporary landmarks in each cycle, see `temporary`; (0, 9) where they are not looked at."""
+    bearings: FloatArray
+    """(b, 4) what became of each reflex, see `bearings`; (0, 4) where they are not looked at."""
 
 
 def empty_columns(detected: DetectionLog, setups: Sequence[LocalizerSetup]) -> Columns:
@@ -89,6 +93,7 @@ def empty_columns(detected: DetectionLog, setups: Sequence[LocalizerSetup]) -> C
     sweeping = any(len(setup.sweep_rows) for setup in setups)
     matching = any(setup.contour is not None for setup in setups)
     looking = any(setup.tag_model is not None for setup in setups)
+    turning = any(setup.bearing_model is not None for setup in setups)
     protecting = any(setup.protection is not None for setup in setups)
     remembering = any(setup.temporary is not None for setup in setups)
     cycles, total = len(detected), len(detected.range_bearing)
@@ -104,6 +109,7 @@ def empty_columns(detected: DetectionLog, setups: Sequence[LocalizerSetup]) -> C
         np.zeros((len(detected.tags.sightings) if detected.tags is not None and looking else 0, TAG_COLUMNS)),
         np.full((cycles if protecting else 0, 2), np.nan),
         np.zeros((cycles if remembering else 0, TEMPORARY_COLUMNS)),
+        np.zeros((len(detected.bearings.bearings) if detected.bearings and turning else 0, BEARING_COLUMNS)),
     )
 
 
@@ -120,6 +126,9 @@ def cut(columns: Columns, detected: DetectionLog, first: int, last: int) -> Colu
     tags = columns.tags
     if detected.tags is not None and len(tags):
         tags = tags[int(detected.tags.offsets[first]) : int(detected.tags.offsets[last])]
+    bearings = columns.bearings
+    if detected.bearings is not None and len(bearings):
+        bearings = bearings[detected.bearings.rows_before(first) : detected.bearings.rows_before(last)]
     return Columns(
         columns.means[first:last],
         columns.covariances[first:last],
@@ -132,18 +141,23 @@ def cut(columns: Columns, detected: DetectionLog, first: int, last: int) -> Colu
         tags,
         columns.levels[first:last] if len(columns.levels) else columns.levels,
         columns.temporary[first:last] if len(columns.temporary) else columns.temporary,
+        bearings,
     )
 
 
-def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: int, sightings: int = 0) -> None:
+def take_over(
+    earlier: RunColumns, columns: Columns, rows: tuple[int, int], sightings: int = 0, reflexes: int = 0
+) -> None:
     """Copy the first cycles of another run.
 
     Parameters
     ----------
     earlier : what is copied from.
     columns : what is written to.
-    cycles, detections, sightings : how many rows of each kind.
+    rows : how many of cycles, and of detections.
+    sightings, reflexes : how many rows of those kinds.
     """
+    cycles, detections = rows
     columns.means[:cycles] = earlier.means[:cycles]
     columns.covariances[:cycles] = earlier.covariances[:cycles]
     columns.modes[:cycles] = earlier.modes[:cycles]
@@ -158,6 +172,8 @@ def take_over(earlier: RunColumns, columns: Columns, cycles: int, detections: in
         columns.temporary[:cycles] = earlier.temporary[:cycles]
     if len(columns.tags) and len(earlier.tags):
         columns.tags[:sightings] = earlier.tags[:sightings]
+    if len(columns.bearings) and len(earlier.bearings):
+        columns.bearings[:reflexes] = earlier.bearings[:reflexes]
     if len(columns.levels) and len(earlier.levels):
         columns.levels[:cycles] = earlier.levels[:cycles]
 
@@ -287,15 +303,15 @@ def _seen(
     """Return what the scan of a single cycle saw."""
     scanner = int(cycle.detected.scanners[0])
     settled, stamp_ns = cycle.columns.settled, int(cycle.detected.stamps_ns[0])
-    tags = cycle.detected.tags
-    is_frame = tags is not None and bool(tags.is_frame[0])
+    is_scan = cycle.detected.is_scan
+    beamless = is_scan is not None and not is_scan[0]
     return SeenScan(
         stamp_ns=stamp_ns,
         detections=settled if len(settled) else cycle.detected.range_bearing,
         status=cycle.detected.status,
         scanner=scanner,
         observation=setup.observations[scanner],
-        ranges=lambda: None if state.sensor_detects or is_frame else _scan_at(log, setup, stamp_ns, scanner),
+        ranges=lambda: None if state.sensor_detects or beamless else _scan_at(log, setup, stamp_ns, scanner),
         upside_down=setup.scanners[scanner].upside_down,
         following=following,
     )
@@ -362,8 +378,9 @@ def _tracked(
     own = log.detection_stamps_ns
     scans = int(np.searchsorted(detected.stamps_ns, own[0])) if len(own) else len(detected)
     scans = 0 if state.sensor_detects else scans
-    numbers = np.arange(scans) if detected.tags is None else np.flatnonzero(~detected.tags.is_frame[:scans])
-    before = stretch.first if detected.tags is None else stretch.first - _first_number(detected.tags)
+    is_scan = detected.is_scan
+    numbers = np.arange(scans) if is_scan is None else np.flatnonzero(is_scan[:scans])
+    before = stretch.first - detected.others_before
     after, cycles, delivered = _run(
         read_only(log.odometry_stamps_ns[rows]),
         read_only(as_driven(log.displacements[rows], setup.parameters.odometry)),
@@ -388,6 +405,7 @@ def _tracked(
         setup.contour,
         contour_scans(log, setup, (before, numbers), len(detected)),
         _frames(setup, detected),
+        _reflexes(setup, detected),
         setup.zone_rows,
         setup.protection,
         bank,
@@ -407,17 +425,21 @@ def _tracked(
     return after._replace(cross=cross_after, protection=protection, temporary=temporary), cycles, delivered
 
 
-def _first_number(tags: TagCycles) -> int:
-    """Frames of the run before the first cycle of a stretch; of no cycle none are asked for."""
-    return int(tags.numbers[0]) if len(tags.numbers) else 0
-
-
 def _frames(setup: LocalizerSetup, detected: DetectionLog) -> TagFrames | None:
     """Frames of a stretch for the loop; None where tags are not looked at."""
     tags, model = detected.tags, setup.tag_model
     if tags is None or model is None:
         return None
     return TagFrames(tags.is_frame, tags.offsets, tags.sightings, entries_of(tags.ids, setup.tags), model)
+
+
+def _reflexes(setup: LocalizerSetup, detected: DetectionLog) -> Reflexes | None:
+    """Reflexes of a stretch for the loop; None where bearings are not looked at."""
+    met, model = detected.bearings, setup.bearing_model
+    if met is None or model is None:
+        return None
+    entries = entries_named(met.reflectors, setup.reflectors.reflectors, setup.index.places)
+    return Reflexes(met.is_reflex, read_only(met.numbers - met.first), met.bearings, entries, model)
 
 
 @compiled
@@ -445,6 +467,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
     contours: ContourModel | None,
     scans: ContourScans | None,
     frames: TagFrames | None,
+    reflexes: Reflexes | None,
     zones: ZoneRows,
     protection: ProtectionModel | None,
     bank: Bank | None,
@@ -458,7 +481,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
     Of the odometry the rows up to `delivered`; the one behind them only tells the motion of scans before it. Where
     there are sweeps, `detections` is a view of the column `settled`, which is written before it is read.
     """
-    means, covariances, modes, status, reflectors, d2, settled, figures, sightings, levels, goods = columns
+    means, covariances, modes, status, reflectors, d2, settled, figures, sightings, levels, goods, met = columns
     rows = 0
     for k in range(len(scan_stamps)):
         while rows < delivered and odometry_stamps[rows] <= scan_stamps[k]:
@@ -486,6 +509,24 @@ def _run(  # noqa: PLR0917 - the columns of the log
                 status,
                 following,
                 sightings,
+                zones,
+                temporary,
+                memory,
+                contour_scan_at(scans, k, observations, sweeps),
+                goods_at(temporary, goods, k),
+            )
+        elif reflexes is not None and reflexes.is_reflex[k]:
+            cycle = process_reflex(
+                state,
+                scan_stamps[k],
+                reflexes.rows[k],
+                reflexes,
+                model,
+                places,
+                cross,
+                busy,
+                following,
+                met,
                 zones,
                 temporary,
                 memory,

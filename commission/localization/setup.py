@@ -11,6 +11,7 @@ import numpy as np
 from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.association import Gate, gate_of
+from commission.localization.bearings import BearingModel, bearing_model
 from commission.localization.consider import PER_REFLECTOR, PER_SCANNER, ConsiderModel
 from commission.localization.contour import ContourModel, contour_model
 from commission.localization.cross_covariance import (
@@ -108,6 +109,8 @@ class LocalizerSetup:
 
     tag_model: TagModel | None = field(init=False, repr=False, compare=False)
     """Tags and camera for kernels; None: they are not looked at."""
+    bearing_model: BearingModel | None = field(init=False, repr=False, compare=False)
+    """The goniometer for kernels; None: there is none, or bearings are not looked at."""
     contour: ContourModel | None = field(init=False, repr=False, compare=False)
     """Contours of the floor map; None: they are not looked at."""
     zone_rows: ZoneRows = field(init=False, repr=False, compare=False)
@@ -121,8 +124,9 @@ class LocalizerSetup:
         considers, known = self.parameters.filter.consider, self.uncertainty
         index = build_index(self.reflectors, self.survey_sigmas)
         limits = supervisor_limits(self.parameters.supervisor)
-        # A search among fewer could never end; the vehicle is lost until what it sees fits again.
-        limits = limits._replace(find_again=limits.find_again and len(index.places) >= FEWEST_TO_FIND)
+        # A search among fewer, or by bearings alone, could never end; who is lost is so until what is seen fits again.
+        ranging = any(not scanner.is_goniometer for scanner in self.scanners)
+        limits = limits._replace(find_again=limits.find_again and ranging and len(index.places) >= FEWEST_TO_FIND)
         kind = filter_kind(self.parameters.filter)
         model = FilterModel(
             odometry_noise(self.parameters.odometry)._replace(curved=float(is_invariant(kind))),
@@ -152,6 +156,8 @@ class LocalizerSetup:
         observations = tuple(observation_model(each, self.parameters.observation) for each in self.scanners)
         object.__setattr__(self, "observations", observations)
         object.__setattr__(self, "observation_rows", observation_rows(observations))
+        turning = bearing_model(self.scanners, observations, self.parameters.bearing, len(index.places))
+        object.__setattr__(self, "bearing_model", turning)
         object.__setattr__(self, "sweep_rows", sweep_rows([sweep_of(each) for each in self.scanners]))
         detectors = tuple(detector_model(self.reflectors, each, self.parameters.detector) for each in self.scanners)
         object.__setattr__(self, "detectors", detectors)
@@ -198,8 +204,10 @@ class LocalizerSetup:
             a name is none of the setup's; says which there are.
         """
         own = [scanner.name for scanner in self.scanners]
-        if len(own) == len(names) == 1:
-            return np.zeros(1, dtype=np.int64)
+        # Bearings of a goniometer need no name: a vehicle has one at most.
+        scanning = [index for index, scanner in enumerate(self.scanners) if not scanner.is_goniometer] or [0]
+        if len(scanning) == len(names) == 1 and (len(own) == 1 or names[0] not in own):
+            return np.array(scanning, dtype=np.int64)
         for name in names:
             if name not in own:
                 known = ", ".join(own)

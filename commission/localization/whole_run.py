@@ -18,6 +18,7 @@ from commission.localization.detection_log import (
     extract_detections,
     joined,
     nothing_detected,
+    reflex_cycles,
     tag_cycles,
 )
 from commission.localization.detector import passing_widths
@@ -168,12 +169,14 @@ def _detected(
     # In pieces, so that it can be stopped; what the sensor has detected is only cut out of its columns.
     step = max(len(stamps_ns), 1) if not log.scans else CHECKPOINT_CYCLES
     tags = tag_cycles(log, sensor_detects=sensor_detects)
+    reflexes = reflex_cycles(log, sensor_detects=sensor_detects)
 
     def parts() -> Iterator[DetectionLog]:
         for first, last in itertools.pairwise(bounds):
             segment = _segment(segments, first)
             if segment.covered:
-                yield nothing_detected(stamps_ns[first:last], None if tags is None else tags.part(first, last))
+                met = None if reflexes is None else reflexes.part(first, last).covered()
+                yield nothing_detected(stamps_ns[first:last], None if tags is None else tags.part(first, last), met)
             elif earlier is not None and _detects_like(segment, earlier.segment(first)):
                 yield earlier.detected.part(first, last)
             else:
@@ -204,7 +207,8 @@ def _filtered(
     columns = empty_columns(detected, [segment.setup for segment in segments])
     if earlier is not None:
         seen = 0 if detected.tags is None else int(detected.tags.offsets[begin])
-        take_over(earlier, columns, begin, int(detected.offsets[begin]), seen)
+        met = 0 if detected.bearings is None else detected.bearings.rows_before(begin)
+        take_over(earlier, columns, (begin, int(detected.offsets[begin])), seen, met)
     checkpoints = list(known)
     searches = [] if earlier is None else [moment for moment in earlier.searches if moment.cycle < begin]
     kept = earlier.priors.known_before(begin) if earlier and isinstance(earlier.priors, ReplayedPriors) else {}
@@ -238,6 +242,7 @@ def _filtered(
         d2=columns.d2,
         contours=columns.contours,
         tags=columns.tags,
+        bearings=columns.bearings,
         levels=columns.levels,
         temporary=columns.temporary,
         searches=tuple(searches),

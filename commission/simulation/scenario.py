@@ -19,6 +19,7 @@ from commission.progress import Progress, silent
 from commission.simulation import follower, people, scan
 from commission.simulation.constants import draw_truth, error_of, true_site
 from commission.simulation.drive import DriveOptions, TrueMotion, drive, measure
+from commission.simulation.goniometer import reflexes_along
 from commission.simulation.goods import reels_at
 from commission.simulation.people import Crowd, WalkableFloor
 from commission.simulation.scan import VirtualScanner
@@ -27,11 +28,12 @@ from commission.site.disturbances import ScannerError
 from commission.site.path import legs_of
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
-from commission.site.records import ORDER_WITHIN_A_STAMP, Odometry, Record, ReferencePose, Scan
+from commission.site.records import ORDER_WITHIN_A_STAMP, Odometry, Record, ReferencePose, Reflex, Scan
 from commission.site.scanner import Scanner, scan_moments
+from commission.site.truth import Truth
 
 START, WHEELS, BEAMS, PEOPLE, LOSSES = range(5)
-TAGS = 6
+TAGS, BEARINGS = 6, 7
 """Streams of random numbers of one seed; 5 is that of `constants`."""
 
 DEFAULTS = DriveOptions()
@@ -90,7 +92,8 @@ def records(
     Yields
     ------
     record : Odometry (the first one zero), and at each scan a ReferencePose (the truth, also where the scan is lost)
-        and a Scan; where the site has tags, frames with them. Stamps start at 0.
+        and a Scan; where the site has tags, frames with them; where the vehicle has a goniometer, its reflexes, and the
+        truth at each of them. Stamps start at 0.
 
     Raises
     ------
@@ -105,16 +108,20 @@ def records(
     slips = project.disturbances.slips_per_100_m
     displacements = measure(motion, project.vehicle, truth.wheels, slips, stream_of(seed, WHEELS))
     stamps, scanners = scan_moments(project.scanners, motion.duration_ns)
+    ranging = ~np.array([scanner.is_goniometer for scanner in project.scanners])[scanners]
+    stamps, scanners = stamps[ranging], scanners[ranging]
+    met = _reflexes(site, motion, seed, truth)
     poses = motion.poses_at(stamps)
     moments = list(itertools.starmap(_Moment, zip(stamps.tolist(), scanners.tolist(), poses, strict=True)))
     virtual = [VirtualScanner.of(site, scanner, dirt) for scanner in site.scanners]
     swept = _swept(_told(moments, progress), motion, project)
     scans = _scans(project, virtual, seed, swept, options.whole_scans)
-    shown, first = np.unique(stamps, return_index=True)
+    shown = np.unique(np.concatenate((stamps, [record.stamp_ns for record in met]))).astype(np.int64)
     yield from heapq.merge(
         _odometry(motion, displacements),
-        _reference(shown, poses[first]),
+        _reference(shown, motion.poses_at(np.minimum(shown, motion.duration_ns))),
         tag_frames(site, motion, stream_of(seed, TAGS), late_s=truth.tag_camera.clock_offset),
+        met,
         *(
             _reported(
                 _of_scanner(all_scans, index), project.scanners[index], error_of(truth, project.scanners[index].name)
@@ -139,6 +146,16 @@ def virtual_drive(
     names = tuple(scanner.name for scanner in project.scanners)
     log = RecordLog.collect(records(project, route_name, seed, options=options, dirt=dirt, progress=progress), names)
     return replace(log, truth=draw_truth(project, route_name, seed))
+
+
+def _reflexes(site: Project, motion: TrueMotion, seed: int, truth: Truth) -> list[Reflex]:
+    """All that the goniometer of the vehicle reports; nothing where it has none."""
+    found = list[Reflex]()
+    for scanner in site.scanners:
+        if scanner.is_goniometer:
+            late_s = scanner.clock_offset + error_of(truth, scanner.name).clock_offset
+            found += reflexes_along(site, scanner, motion, stream_of(seed, BEARINGS), late_s=late_s)
+    return found
 
 
 def _odometry(motion: TrueMotion, displacements: FloatArray) -> Iterator[Record]:

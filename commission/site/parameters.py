@@ -343,6 +343,19 @@ class TagParameters:
         check_fields(self, "tag.")
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BearingParameters:
+    """Bearings alone, as a goniometer measures them of reflectors: each is a row of its own, at its own time."""
+
+    enabled: Annotated[bool, Switch("Bearings alone")] = True
+    """Whether bearings of a goniometer correct the pose, where the vehicle has one."""
+    gate_probability: Annotated[float, _gate("Bearing accepted to")] = 0.999
+    """Probability that a true bearing falls inside the validation gate, of one degree of freedom."""
+
+    def __post_init__(self) -> None:
+        check_fields(self, "bearing.")
+
+
 HELD_TWO_SIGMA, HELD_LEVEL = "two_sigma", "protection_level"
 """What the supervisor may hold against its limits."""
 
@@ -600,6 +613,8 @@ class Parameters:
     """What walls say."""
     tag: Annotated[TagParameters, Group("Tags")] = field(default_factory=TagParameters)
     """What tags say."""
+    bearing: Annotated[BearingParameters, Group("Bearings")] = field(default_factory=BearingParameters)
+    """What bearings alone say."""
     temporary: Annotated[TemporaryParameters, Group("Temporary landmarks")] = field(default_factory=TemporaryParameters)
     """What goods that come and go say."""
     integrity: Annotated[IntegrityParameters, Group("Protection level")] = field(default_factory=IntegrityParameters)

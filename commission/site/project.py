@@ -55,6 +55,9 @@ class Project:
     def __post_init__(self) -> None:
         if not self.scanners:
             raise ProjectError("scanners is empty; expected at least one")
+        turning = [scanner.name for scanner in self.scanners if scanner.is_goniometer]
+        if len(turning) > 1:
+            raise ProjectError(f"scanners {' and '.join(map(repr, turning))} are goniometers; expected one at most")
         tags = [tag.id for tag in self.tags]
         if len(set(tags)) < len(tags):
             twice = next(each for each in tags if tags.count(each) > 1)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray, IntArray
+from commission.site.bearing_log import NO_BEARINGS, BearingLog
 from commission.site.record_store import ScanLog, ScanStore, stacked
 from commission.site.recorded_start import RecordedStart
 from commission.site.records import (
@@ -17,6 +18,7 @@ from commission.site.records import (
     Odometry,
     Record,
     ReferencePose,
+    Reflex,
     Scan,
     TagSightings,
 )
@@ -52,6 +54,8 @@ class RecordLog:
     """(D,) scanner of each; of none said, the first."""
     tags: TagLog = NO_TAGS
     """Frames of the camera that looks for tags."""
+    bearings: BearingLog = NO_BEARINGS
+    """Reflexes of the goniometer."""
     reference_stamps_ns: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
     """(R,) [ns]."""
     reference_poses: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
@@ -121,6 +125,7 @@ class RecordLog:
             range_bearing=np.concatenate([r.range_bearing for r in detections]) if detections else np.empty((0, 2)),
             detection_scanners=np.array([r.scanner for r in detections], dtype=np.int64),
             tags=TagLog.of([r for r in kinds[TagSightings] if isinstance(r, TagSightings)]),
+            bearings=BearingLog.of([r for r in kinds[Reflex] if isinstance(r, Reflex)]),
             reference_stamps_ns=_stamps(kinds[ReferencePose]),
             reference_poses=np.array([r.pose for r in references]).reshape(-1, 3),
         )
@@ -167,7 +172,8 @@ class RecordLog:
     def _stamps_by_kind(self) -> tuple[IntArray, ...]:
         """Stamps of each kind in its own order [ns], by the rank of the kind."""
         own, scans = self.detection_stamps_ns, self.scan_stamps_ns
-        return self.odometry_stamps_ns, self.reference_stamps_ns, self.tags.stamps_ns, own, scans
+        seen = self.tags.stamps_ns, self.bearings.stamps_ns
+        return self.odometry_stamps_ns, self.reference_stamps_ns, *seen, own, scans
 
     def _record(self, kind: int, index: int) -> Record:
         """Return a record by the rank of its kind, and its index there."""
@@ -180,6 +186,9 @@ class RecordLog:
             return TagSightings(
                 int(self.tags.stamps_ns[index]), self.tags.sightings[seen], tuple(self.tags.ids[seen].tolist())
             )
+        if kind == ORDER_WITHIN_A_STAMP[Reflex]:
+            met = self.bearings
+            return Reflex(int(met.stamps_ns[index]), float(met.bearings[index]), met.reflectors[index])
         if kind == ORDER_WITHIN_A_STAMP[Detections]:
             rows = slice(self.detection_offsets[index], self.detection_offsets[index + 1])
             scanner = int(self.detection_scanners[index])

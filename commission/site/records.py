@@ -5,6 +5,7 @@ Records carry measurements only; nothing here says where they come from or what 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -99,6 +100,24 @@ class TagSightings:
 
 
 @dataclass(frozen=True, slots=True)
+class Reflex:
+    """The bearing at which the turning laser of a goniometer has met a reflector, at its own time."""
+
+    stamp_ns: int
+    """Time of the reflex [ns]."""
+    bearing: float
+    """Bearing of the reflector [rad], scanner frame; NaN: a whole turn met none, and ended then."""
+    reflector: str = ""
+    """Id of the reflector; empty: the goniometer does not know it."""
+
+    def __post_init__(self) -> None:
+        if math.isinf(self.bearing):
+            raise ValueError(
+                f"reflex: the bearing is {self.bearing:g}; expected radians, or NaN for a turn without any"
+            )
+
+
+@dataclass(frozen=True, slots=True)
 class ReferencePose:
     """Ground truth, or the pose that a second system reports. The localizer never reads it."""
 
@@ -111,13 +130,14 @@ class ReferencePose:
         object.__setattr__(self, "pose", frozen(self.pose, (3,), "reference pose", finite=False))
 
 
-Record: TypeAlias = Odometry | Scan | Detections | TagSightings | ReferencePose
+Record: TypeAlias = Odometry | Scan | Detections | TagSightings | Reflex | ReferencePose
 
 ORDER_WITHIN_A_STAMP: dict[type, int] = {
     Odometry: 0,
     ReferencePose: 1,
     TagSightings: 2,
-    Detections: 3,
-    Scan: 4,
+    Reflex: 3,
+    Detections: 4,
+    Scan: 5,
 }
 """Records of one stamp are delivered in this order: motion first, then what was seen after it."""

@@ -31,6 +31,8 @@ from commission.site.quantity import (
 
 LONGEST_RANGE = 10_000.0
 """No laser scanner measures farther [m]."""
+NO_RANGE_SIGMA = 1e3
+"""1-sigma of the range of what a goniometer meets [m]: as good as unknown in any hall."""
 ONLY_NAME = "scanner"
 """What the only scanner of a vehicle is called."""
 AS_THE_FILTER = "as the filter"
@@ -55,6 +57,15 @@ class StampOf(StrEnum):
     LAST = "last"
 
 
+class ScannerKind(StrEnum):
+    """What a scanner measures."""
+
+    LASER = "laser"
+    """Ranges along many beams, scan by scan."""
+    GONIOMETER = "goniometer"
+    """The bearing of each reflector at the moment its turning laser meets it, and no range (Alenya et al. 2005)."""
+
+
 _ON_A_VEHICLE = Bounds.between(-50.0, 50.0)
 """No vehicle is longer [m]: a scanner farther from base is mounted in another unit."""
 
@@ -72,6 +83,8 @@ class Scanner:
 
     name: Annotated[str, Words(label="Name")] = ONLY_NAME
     """What it is called in files and results: letters, digits, blanks, - and _."""
+    kind: Annotated[ScannerKind, Choice(label="Measures as")] = ScannerKind.LASER
+    """What it measures: laser (ranges along beams) or goniometer (bearings of reflectors alone, each at its time)."""
     mounting: Annotated[
         FloatArray,
         Quantity(label="Mounted at x", unit="m", bounds=_ON_A_VEHICLE, decimals=4),
@@ -199,6 +212,7 @@ class Scanner:
             found = f"scanner.sweep_duration is {self.sweep_duration:g} s at {self.rate:g} scans/s"
             raise ValueError(f"{found}; expected no more than from one scan to the next")
         object.__setattr__(self, "stamp_of", StampOf(self.stamp_of))
+        object.__setattr__(self, "kind", ScannerKind(self.kind))
 
     def _check_angles(self) -> None:
         """Check what two numbers say together: the ends of sectors and of the range."""
@@ -235,10 +249,19 @@ class Scanner:
         range_sigma, bearing_sigma : those of a scanner that has none of its own [m, rad].
         """
         own_range, own_bearing = self.detection_range_sigma, self.detection_bearing_sigma_deg
+        if self.is_goniometer:
+            # What it meets is the reflector itself: where nothing else is said, its bearing is as noisy as that.
+            own_bearing = own_bearing or self.bearing_sigma_deg or None
+            return NO_RANGE_SIGMA, bearing_sigma if own_bearing is None else math.radians(own_bearing)
         return (
             range_sigma if own_range is None else own_range,
             bearing_sigma if own_bearing is None else math.radians(own_bearing),
         )
+
+    @property
+    def is_goniometer(self) -> bool:
+        """Whether it reports bearings of reflectors alone."""
+        return self.kind == ScannerKind.GONIOMETER
 
     @property
     def angle_min(self) -> float:

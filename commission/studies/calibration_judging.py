@@ -209,6 +209,7 @@ def _detections_of(detected: DetectionLog, kept: BoolArray) -> DetectionLog:
         expected=read_only(detected.expected[kept]),
         status=read_only(detected.status[kept]),
         tags=detected.tags,
+        bearings=detected.bearings,
     )
 
 

@@ -72,9 +72,9 @@ def consistency(
     accepted, rejected = (int(tallies.counts[:, s].sum()) for s in (Status.INLIER, Status.OUTLIER_ASSOCIATION))
     times = np.asarray((columns.stamps_ns[first:after] - columns.stamps_ns[first]) * 1e-9, dtype=np.float64)
     seen = times[per_cycle > 0]
-    # A frame of a camera that looks for tags is no scan: that it shows no reflector says nothing.
-    tags = columns.detected.tags
-    of_scans = per_cycle if tags is None else per_cycle[~tags.is_frame[first:after]]
+    # A frame of a camera that looks for tags is no scan, nor a reflex: that it shows no reflector says nothing.
+    is_scan = columns.detected.is_scan
+    of_scans = per_cycle if is_scan is None else per_cycle[is_scan[first:after]]
     return Consistency(
         cycles=after - first,
         accepted=accepted,

@@ -120,6 +120,7 @@ def _kinds(log: RecordLog) -> tuple[tuple[str, IntArray], ...]:
         *_by_scanner(log, "detections", log.detection_stamps_ns, log.detection_scanners),
         *((scans_name(log, scans), scans.stamps_ns) for scans in log.scans),
         ("frames with tags", log.tags.stamps_ns),
+        ("bearings", log.bearings.stamps_ns),
         ("reference poses", log.reference_stamps_ns),
     )
     return tuple((name, stamps) for name, stamps in kinds if len(stamps))
@@ -158,7 +159,8 @@ def _unknown_scanners(inputs: PlausibilityInput) -> Iterator[Finding]:
 def _missing_kinds(inputs: PlausibilityInput) -> Iterator[Finding]:
     """Find recordings in which nothing is seen, or nothing tells how the vehicle moved."""
     log = inputs.log
-    if not any(len(scans) for scans in log.scans) and not len(log.detection_stamps_ns) and not len(log.tags):
+    others = len(log.detection_stamps_ns) + len(log.tags) + len(log.bearings)
+    if not any(len(scans) for scans in log.scans) and not others:
         yield Finding(
             found="the recording holds no scan and no detection",
             probably="the scanner's topic or file was not recorded, or another one was named",
@@ -175,7 +177,8 @@ def _missing_kinds(inputs: PlausibilityInput) -> Iterator[Finding]:
 
 def has_motion(log: RecordLog) -> bool:
     """Whether a recording tells how the vehicle moved between what it saw: a single row is a begin, and no motion."""
-    seen = np.concatenate([log.detection_stamps_ns, log.scan_stamps_ns, log.tags.stamps_ns])
+    others = log.tags.stamps_ns, log.bearings.stamps_ns
+    seen = np.concatenate([log.detection_stamps_ns, log.scan_stamps_ns, *others])
     return len(log.odometry_stamps_ns) > 1 or (len(log.odometry_stamps_ns) == 1 and len(np.unique(seen)) < 2)
 
 

@@ -61,6 +61,12 @@ def channels(log: RecordLog) -> tuple[Channel, ...]:
         if len(log.tags.ids):
             values += f", {_spans(log.tags.sightings[:, :3], ('x', 'y', 'theta'), ('m', 'm', 'rad'))}"
         found.append(_channel(log, "tags", log.tags.stamps_ns, values))
+    if len(log.bearings):
+        met = log.bearings.bearings[np.isfinite(log.bearings.bearings)]
+        values = f"{len(met)} reflexes"
+        if len(met):
+            values += f", {_spans(met[:, np.newaxis], ('bearing',), ('rad',))}"
+        found.append(_channel(log, "bearings", log.bearings.stamps_ns, values))
     if len(log.reference_stamps_ns):
         values = _spans(log.reference_poses, ("x", "y", "theta"), ("m", "m", "rad"))
         found.append(_channel(log, "reference", log.reference_stamps_ns, values))

@@ -27,6 +27,7 @@ from commission.localization.whole_run import run_segments
 from commission.progress import Progress, part, silent
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
+from commission.studies.bearing_figures import bearing_figures
 from commission.studies.consistency import Consistency, Recent, consistency, recent
 from commission.studies.contour_figures import contour_figures
 from commission.studies.inputs import StudyInput
@@ -387,6 +388,7 @@ def summary(result: RunResult) -> dict[str, Number]:
     }
     entries |= contour_figures(result.columns)
     entries |= tag_figures(result.columns)
+    entries |= bearing_figures(result.columns)
     entries |= temporary_figures(result.columns)
     if result.statistics is not None:
         entries |= {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from commission.progress import Progress, part, silent
+from commission.studies.bearing_figures import bearing_findings
 from commission.studies.consistency_findings import noise_findings
 from commission.studies.contour_figures import contour_findings
 from commission.studies.misfit import MisfitInput, misfit
@@ -47,5 +48,7 @@ def run_findings(result: RunResult, progress: Progress = silent) -> tuple[Findin
     found = misfit(inputs, part(progress, JUDGED_BEFORE, 1.0))
     # A factor of the noise says little where the setup itself is another one.
     noise = noise_findings(result.columns) if not found else ()
-    kinds = (*contour_findings(result.columns), *tag_findings(result.columns), *temporary_findings(result.columns))
+    columns = result.columns
+    kinds = (*contour_findings(columns), *tag_findings(columns), *bearing_findings(columns))
+    kinds = (*kinds, *temporary_findings(columns))
     return (*before, *found, *noise, *kinds)

@@ -4,20 +4,28 @@ The paper does not print where its landmarks are; these four stand around it so 
 0.25 mm near the center, 1.7 mm in the corner at the bottom left.
 """
 
+import dataclasses
 import itertools
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from commission.geometry import se2
-from commission.localization.estimate import Belief
+from commission.localization.bearings import NIS
+from commission.localization.estimate import Belief, Mode
+from commission.localization.setup import LocalizerSetup
 from commission.localization.triangulation import fix_covariance, intersect_circles, most_informative
+from commission.localization.whole_run import run
 from commission.simulation.goniometer import Goniometer, reflexes
-from commission.site.parameters import OdometryParameters
+from commission.site.parameters import FilterParameters, OdometryParameters, Parameters
 from commission.site.record_log import RecordLog
 from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.scanner import Scanner, ScannerKind
+from commission.site.uncertainty import Uncertainty
 from commission.studies.start import Start, StartOrigin
 from commission.studies.triangulation import TriangulationInput, triangulate
+from tests.localization.plain_localizer import PlainLocalizer, columns, matrix
 
 SIGMA = 0.095e-3
 MARKS = np.array([[4.8, -0.9], [4.3, 2.7], [2.95, 6.55], [-0.3, 3.15]])
@@ -137,6 +145,77 @@ def test_driving_is_within_half_more_than_static_and_the_three_chosen_are_the_be
     assert np.mean(alike) > 0.95, np.mean(alike)
     assert 0.8 < np.mean(nees) / 3.0 < 1.25, np.mean(nees) / 3.0
     assert 0.9 < np.nanmean(nis) < 1.1, np.nanmean(nis)
+
+
+class PlainGoniometer(PlainLocalizer):
+    """The localizer by bearings alone in numpy matrices, its Jacobian by differences."""
+
+    def drive(self, log: RecordLog) -> list[tuple[np.ndarray, np.ndarray]]:
+        self.following = [(stamp * 1e-9, matrix(move)) for stamp, move in zip(*columns(log), strict=True)]
+        events = [(int(stamp), 0, k) for k, stamp in enumerate(log.odometry_stamps_ns)]
+        events += [(int(stamp), 1, k) for k, stamp in enumerate(log.bearings.stamps_ns)]
+        found = []
+        for stamp, kind, k in sorted(events):
+            if kind == 0:
+                self.following.pop(0)
+                self.odometry(stamp * 1e-9, log.displacements[k])
+                continue
+            self.reach(stamp * 1e-9)
+            rows = [self.row(place, log.bearings.bearings[k]) for place in self.reflectors.centers]
+            fits = [row for row in rows if row[0] ** 2 / row[2] <= chi2.ppf(0.999, 1) and abs(row[0]) < np.pi / 2]
+            if len(fits) == 1:
+                v, H, S = fits[0]
+                K = self.cov @ H / S
+                self.mean, self.cov = self.mean + K * v, self.cov - S * np.outer(K, K)
+            found.append((self.mean.copy(), self.cov.copy()))
+        return found
+
+    def row(self, place: np.ndarray, measured: float) -> tuple[float, np.ndarray, float]:
+        def expected(pose: np.ndarray) -> float:
+            here = matrix(pose) @ matrix(self.scanner.mounting)
+            return np.arctan2(*(np.linalg.inv(here) @ [*place, 1.0])[1::-1])
+
+        def turned(angle: float) -> float:
+            return np.arctan2(np.sin(angle), np.cos(angle))
+
+        steps = 1e-6 * np.eye(3)
+        H = np.array([turned(expected(self.mean + d) - expected(self.mean - d)) / 2e-6 for d in steps])
+        return turned(measured - expected(self.mean)), H, H @ self.cov @ H + SIGMA**2
+
+
+def test_the_localizer_by_bearings_alone_is_a_plain_filter_and_consistent(seeds):
+    """Reflexes without names, each at its own time between records of odometry, a vehicle at 1 m/s that turns."""
+    scanner = Scanner(
+        kind=ScannerKind.GONIOMETER,
+        mounting=MOUNTING,
+        field_of_view_deg=(-180.0, 180.0),
+        bearing_sigma_deg=float(np.degrees(SIGMA)),
+    )
+    parameters = Parameters(odometry=WHEELS, filter=FilterParameters(consider=False))
+    exact = Uncertainty(mounting_position=0.0, mounting_heading=0.0, range_bias=0.0, survey=0.0, clock=0.0)
+    nees, nis, off = [], [], []
+    for seed in seeds(2, 20):
+        inputs, truth = drive(seed)
+        met = dataclasses.replace(inputs.bearings, reflectors=("",) * len(inputs.bearings))
+        log = dataclasses.replace(inputs.log, bearings=met)
+        setup = LocalizerSetup(
+            reflectors=inputs.reflectors, scanners=(scanner,), parameters=parameters, uncertainty=exact
+        )
+        result = run(log, setup, inputs.start.belief)
+        if seed == 0:
+            plain = PlainGoniometer(inputs.reflectors, scanner, parameters, inputs.start.belief).drive(log)
+            assert result.means == pytest.approx(np.array([mean for mean, _ in plain]), abs=1e-7)
+            assert result.covariances == pytest.approx(np.array([cov for _, cov in plain]), rel=1e-4, abs=1e-11)
+        errors = result.means - truth
+        errors[:, 2] = np.arctan2(np.sin(errors[:, 2]), np.cos(errors[:, 2]))
+        nees += [e @ np.linalg.solve(P, e) for e, P in zip(errors[20:], result.covariances[20:], strict=True)]
+        nis += result.bearings[20:, NIS].tolist()
+        off += np.square(errors[20:, :2]).sum(axis=1).tolist()
+        assert (result.modes == Mode.OPERATIONAL).all()
+    figures = (np.mean(nees) / 3.0, np.nanmean(nis), 1e3 * np.sqrt(np.mean(off)))
+    print(f"ANEES {figures[0]:.2f}, NIS {figures[1]:.2f}, {figures[2]:.2f} mm")  # noqa: T201 - README
+    assert 0.8 < figures[0] < 1.25
+    assert 0.9 < figures[1] < 1.1
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-15, 1e-12, 1e-9, 1e-6])

@@ -84,6 +84,8 @@ PARAMETERS = {
     "tag.position_sigma": ("Tag seen 1σ [mm]", 1000.0),
     "tag.heading_sigma": ("Tag turned 1σ [°]", DEGREES),
     "tag.gate_probability": ("Tag accepted to [%]", 100.0),
+    "bearing.enabled": ("Bearings alone", None),
+    "bearing.gate_probability": ("Bearing accepted to [%]", 100.0),
     "temporary.enabled": ("Temporary landmarks", None),
     "temporary.most": ("Remembered at most", 1.0),
     "temporary.least_radius": ("Reel radius from [m]", 1.0),

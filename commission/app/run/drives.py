@@ -57,6 +57,7 @@ def _simulated(project: Project, source: VirtualDrive, progress: Progress) -> Dr
 def _recorded(project: Project, source: RecordedDrive, progress: Progress) -> Drive:
     progress(0.0, "reading the recording")
     log = load_log(source.path)
-    if not log.scans and not len(log.detection_stamps_ns) and not len(log.tags):
-        raise SourceError(f"{source.path} holds no scan; expected scans.npz, detections.csv or tags.csv")
+    if not log.scans and not len(log.detection_stamps_ns) + len(log.tags) + len(log.bearings):
+        expected = "scans.npz, detections.csv, tags.csv or bearings.csv"
+        raise SourceError(f"{source.path} holds no scan; expected {expected}")
     return Drive(log, start_of(project, log))

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from commission.io.live.status import SourceStatus
-from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan, TagSightings
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Reflex, Scan, TagSightings
 
 WORDS: dict[type[Record], tuple[str, str]] = {
     Odometry: ("odometry record", "odometry records"),
@@ -17,6 +17,7 @@ WORDS: dict[type[Record], tuple[str, str]] = {
     Detections: ("set of detections", "sets of detections"),
     Scan: ("scan", "scans"),
     TagSightings: ("frame with tags", "frames with tags"),
+    Reflex: ("reflex", "reflexes"),
 }
 """What one record and several are called."""
 

@@ -20,7 +20,7 @@ from commission.io.live.registry import SourceAddress
 from commission.io.live.sorter import stamped
 from commission.io.live.status import ODOMETRY, Arrivals, Numbers, SourceState, SourceStatus, Tally
 from commission.io.protocols.message import LiveMessage, Sent
-from commission.site.records import Detections, ReferencePose, Scan, TagSightings
+from commission.site.records import Detections, ReferencePose, Reflex, Scan, TagSightings
 
 RETRY_S = (0.1, 0.2, 0.5, 1.0, 2.0)
 """Times before connecting again, the last one for ever [s]."""
@@ -260,7 +260,7 @@ def _kind(record: Sent) -> int | None:
     """Index of the scanner that a record is of, or ODOMETRY; None of a reference and of a camera's frame."""
     if isinstance(record, Scan | Detections):
         return record.scanner
-    return None if isinstance(record, ReferencePose | TagSightings) else ODOMETRY
+    return None if isinstance(record, ReferencePose | TagSightings | Reflex) else ODOMETRY
 
 
 class _Conversation:

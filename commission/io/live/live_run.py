@@ -20,10 +20,11 @@ from commission.localization.estimate import Belief, Estimate, Mode
 from commission.localization.growing_run import GrowingRun
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import belief_of
+from commission.site.bearing_log import BearingLog
 from commission.site.parameters import SupervisorParameters
 from commission.site.project import Project
 from commission.site.record_log import RecordLog
-from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan, TagSightings
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Reflex, Scan, TagSightings
 from commission.site.tag_log import TagLog
 from commission.site.walls import walls_of
 from commission.studies.run import RunInput, RunResult, judge
@@ -81,6 +82,7 @@ class LiveRun:
         self._detections = _StampedRows(2)
         self._seen = _StampedRows(2)
         self._tags: list[TagSightings] = []
+        self._reflexes: list[Reflex] = []
         self._newest_ns = self._odometry_ns = 0
         self._spent = 0.0
 
@@ -204,6 +206,8 @@ class LiveRun:
                 self._detections.append(record.stamp_ns, record.range_bearing)
             case TagSightings():
                 self._tags.append(record)
+            case Reflex():
+                self._reflexes.append(record)
             case Scan():
                 if record.scanner not in self._spools:
                     self._spools[record.scanner] = SpooledScans(record.scanner)
@@ -222,6 +226,7 @@ class LiveRun:
             range_bearing=self._detections.values,
             detection_scanners=seen[:, 1],
             tags=TagLog.of(self._tags),
+            bearings=BearingLog.of(self._reflexes),
             reference_stamps_ns=self._reference.stamps_ns,
             reference_poses=self._reference.values,
         )

@@ -1,8 +1,8 @@
 """Records as JSON, one message each: what any vehicle can send in twenty lines, without a library.
 
-A message is an object with a `type` (`odometry`, `scan`, `detections`, `tags`, `reference`), numbers in SI units and
-radians, and optionally `stamp_ns` by the sender's clock and `seq`, which counts its messages. `null` is a range of no
-return.
+A message is an object with a `type` (`odometry`, `scan`, `detections`, `tags`, `reflex`, `reference`), numbers in SI
+units and radians, and optionally `stamp_ns` by the sender's clock and `seq`, which counts its messages. `null` is a
+range of no return.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from msgspec import Meta, Struct
 from commission.errors import DecodeError
 from commission.geometry.arrays import FloatArray, read_only
 from commission.io.protocols.message import LiveMessage, OdometryPose
-from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan, TagSightings
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Reflex, Scan, TagSightings
 
 MESSAGE_LIMIT = 65_507
 """Bytes of a message: a datagram holds no more."""
@@ -72,13 +72,20 @@ class _Tags(_Sent, tag="tags"):
     sigmas: Annotated[list[tuple[_Number | None, _Number | None, _Number | None]], Meta(max_length=1_000)] | None = None
 
 
+class _Reflex(_Sent, tag="reflex"):
+    """The bearing at which a goniometer met a reflector, or null where a whole turn met none."""
+
+    bearing: _Number | None = None
+    reflector: str = ""
+
+
 class _Reference(_Sent, tag="reference"):
     """Where a second system says that the vehicle is."""
 
     pose: tuple[_Number, _Number, _Number | None]
 
 
-_Any: TypeAlias = _Odometry | _Scan | _Detections | _Tags | _Reference
+_Any: TypeAlias = _Odometry | _Scan | _Detections | _Tags | _Reflex | _Reference
 _DECODER: msgspec.json.Decoder[_Any] = msgspec.json.Decoder(_Any)
 
 
@@ -107,7 +114,7 @@ def decode_message(data: bytes, scanners: Sequence[str]) -> LiveMessage:
         raise DecodeError(str(error), 0) from None
 
 
-def _record(sent: _Any, scanners: Sequence[str]) -> Record | OdometryPose:
+def _record(sent: _Any, scanners: Sequence[str]) -> Record | OdometryPose:  # noqa: PLR0911 - one for each type
     """Return the record of a message; raises ValueError where it cannot be one."""
     stamp = sent.stamp_ns or 0
     match sent:
@@ -129,6 +136,8 @@ def _record(sent: _Any, scanners: Sequence[str]) -> Record | OdometryPose:
                 raise ValueError(f"sigmas has {len(sigmas)} values; expected one for each of {count} poses")
             both = [np.array(each, dtype=np.float64).reshape(-1, 3) for each in (sent.poses, sigmas)]
             return TagSightings(stamp, np.concatenate(both, axis=1), tuple(sent.ids))
+        case _Reflex():
+            return Reflex(stamp, math.nan if sent.bearing is None else sent.bearing, sent.reflector)
         case _Reference():
             x, y, theta = sent.pose
             return ReferencePose(stamp, np.array([x, y, math.nan if theta is None else theta]))
@@ -186,7 +195,7 @@ def encode_message(message: LiveMessage, scanners: Sequence[str]) -> bytes:
     return data
 
 
-def _content(record: Record | OdometryPose, scanners: Sequence[str]) -> dict[str, Any]:
+def _content(record: Record | OdometryPose, scanners: Sequence[str]) -> dict[str, Any]:  # noqa: PLR0911 - as above
     match record:
         case Odometry():
             return {"type": "odometry", "displacement": record.displacement.tolist()}
@@ -197,6 +206,9 @@ def _content(record: Record | OdometryPose, scanners: Sequence[str]) -> dict[str
         case Detections():
             rows = record.range_bearing.tolist()
             return {"type": "detections", "range_bearing": rows, "scanner": scanners[record.scanner]}
+        case Reflex():
+            bearing = None if math.isnan(record.bearing) else record.bearing
+            return {"type": "reflex", "bearing": bearing, "reflector": record.reflector}
         case TagSightings():
             return {
                 "type": "tags",

@@ -1,8 +1,9 @@
 """A recording as a folder of tables: what an engineer can make from any log. The reading side.
 
-`odometry.csv`, and where they exist `detections.csv`, `tags.csv`, `scans.npz` (of several scanners `scans_NAME.npz`),
-`reference.csv`, `reference.json` and `truth.json`. A pause in any of them is no error: vehicles stand still, scanners
-are unplugged. Neither is disorder, nor a stamp that comes twice, as real logs have them: both are mended and told.
+`odometry.csv`, and where they exist `detections.csv`, `tags.csv`, `bearings.csv`, `scans.npz` (of several scanners
+`scans_NAME.npz`), `reference.csv`, `reference.json` and `truth.json`. A pause in any of them is no error: vehicles
+stand still, scanners are unplugged. Neither is disorder, nor a stamp that comes twice, as real logs have them: both are
+mended and told.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from commission.errors import FileFormatError
 from commission.geometry.arrays import FloatArray, Growing, IntArray
 from commission.io.csv_table import Block, read_table
 from commission.io.recordings import motion
+from commission.io.recordings.bearing_file import BEARINGS, read_reflexes
 from commission.io.recordings.reference_file import REFERENCE_MOUNT, read_reference_mount
 from commission.io.recordings.scan_archive import ScanArchive
 from commission.io.recordings.tag_file import TAGS, read_tags
@@ -106,7 +108,7 @@ class CsvFolder:
         """Whether a path is such a folder, complete or not."""
         if not path.is_dir():
             return False
-        return any((path / name).exists() for name in (ODOMETRY, DETECTIONS, SCANS, REFERENCE, TAGS)) or any(
+        return any((path / name).exists() for name in (ODOMETRY, DETECTIONS, SCANS, REFERENCE, TAGS, BEARINGS)) or any(
             path.glob(NAMED_SCANS)
         )
 
@@ -150,6 +152,7 @@ class CsvFolder:
             range_bearing=detections.values[seen],
             detection_scanners=detections.scanners[starts],
             tags=read_tags(self.path / TAGS),
+            bearings=read_reflexes(self.path / BEARINGS),
             reference_stamps_ns=reference.stamps_ns,
             reference_poses=reference.rows,
             truth=self.truth(),

@@ -9,7 +9,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from commission.io.atomic import cannot_write, staged
-from commission.io.recordings.bearing_file import BEARINGS
+from commission.io.recordings.bearing_file import BEARING_COLUMNS, BEARINGS, REFLECTOR_COLUMN, bearing_line
 from commission.io.recordings.contour_file import CONTOUR
 from commission.io.recordings.csv_folder import (
     DETECTION_COLUMNS,
@@ -27,12 +27,12 @@ from commission.io.recordings.reference_file import REFERENCE_MOUNT, write_refer
 from commission.io.recordings.scan_writer import ScanWriter
 from commission.io.recordings.tag_file import SIGMA_COLUMNS, TAG_COLUMNS, TAGS, tag_lines
 from commission.io.recordings.truth_file import TRUTH, write_truth
-from commission.site.records import Detections, Odometry, Record, ReferencePose, Scan, TagSightings
+from commission.site.records import Detections, Odometry, Record, ReferencePose, Reflex, Scan, TagSightings
 from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import ONLY_NAME
 from commission.site.truth import Truth
 
-_TABLES = {Odometry: ODOMETRY, Detections: DETECTIONS, ReferencePose: REFERENCE, TagSightings: TAGS}
+_TABLES = {Odometry: ODOMETRY, Detections: DETECTIONS, ReferencePose: REFERENCE, TagSightings: TAGS, Reflex: BEARINGS}
 """Table of each kind of record that has one."""
 
 
@@ -100,6 +100,7 @@ def _write_all(scratch: Path, records: Iterable[Record], folder: Path, scanners:
             (Detections, DETECTION_COLUMNS if len(scanners) == 1 else (*DETECTION_COLUMNS, SCANNER_COLUMN)),
             (ReferencePose, REFERENCE_COLUMNS),
             (TagSightings, (*TAG_COLUMNS, *SIGMA_COLUMNS)),
+            (Reflex, (*BEARING_COLUMNS, REFLECTOR_COLUMN)),
         ):
             tables[kind].write(",".join(columns) + "\n")
         files = [scans_file(scanners, index) for index in range(len(scanners))]
@@ -121,7 +122,7 @@ def _write_all(scratch: Path, records: Iterable[Record], folder: Path, scanners:
     return names
 
 
-def _rows(record: Odometry | Detections | TagSightings | ReferencePose, scanners: Sequence[str]) -> str:
+def _rows(record: Odometry | Detections | TagSightings | Reflex | ReferencePose, scanners: Sequence[str]) -> str:
     """Lines of a record, detections with the cell of their scanner; `repr` of a number reads back as the same."""
     if isinstance(record, Detections):
         end = f"{scanners[record.scanner]}\n"
@@ -130,5 +131,7 @@ def _rows(record: Odometry | Detections | TagSightings | ReferencePose, scanners
         return "".join(f"{record.stamp_ns},{r!r},{b!r}{end}" for r, b in record.range_bearing.tolist())
     if isinstance(record, TagSightings):
         return "".join(tag_lines(record))
+    if isinstance(record, Reflex):
+        return bearing_line(record)
     values = record.displacement if isinstance(record, Odometry) else record.pose
     return ",".join([str(record.stamp_ns), *("" if math.isnan(v) else repr(v) for v in values.tolist())]) + "\n"

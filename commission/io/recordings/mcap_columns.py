@@ -13,7 +13,8 @@ import numpy as np
 from commission.geometry.arrays import FloatArray, Growing, IntArray
 from commission.io.recordings.cdr_columns import CdrColumns
 from commission.io.recordings.mcap_index import McapIndex
-from commission.site.records import TagSightings
+from commission.site.bearing_log import BearingLog
+from commission.site.records import Reflex, TagSightings
 from commission.site.tag_log import TagLog
 
 BEAM_LIMIT = 100_000
@@ -91,6 +92,34 @@ class TagColumns:
             for k in np.argsort(stamps, kind="stable").tolist()
         ]
         return TagLog.of(frames)
+
+
+class ReflexColumns:
+    """Messages that are a header, an array of one bearing or none, and the id of a reflector."""
+
+    def __init__(self) -> None:
+        self.stamps_ns: Growing[np.int64] = Growing(np.int64)
+        self.bearings: Growing[np.float64] = Growing(np.float64)
+        self.reflectors: list[str] = []
+
+    def take(self, _: int, found: CdrColumns) -> None:
+        """Take the messages of a chunk; raises ValueError where they are of another type."""
+        counts, firsts = found.arrays(found.after_header(4), 8)
+        if (counts > 1).any():
+            raise ValueError("a message has more than one bearing")
+        lengths, texts = found.arrays(firsts + 8 * counts, 1)
+        for begin, length in zip(texts.tolist(), lengths.tolist(), strict=True):
+            self.reflectors.append(found.content[begin : begin + max(length - 1, 0)].tobytes().decode())
+        bearings = np.full(len(counts), np.nan)
+        bearings[counts == 1] = found.gathered(firsts, counts)
+        self.stamps_ns.append(found.stamps_ns())
+        self.bearings.append(bearings)
+
+    def log(self) -> BearingLog:
+        """Return the reflexes in order of their stamps; raises ValueError where a number cannot be."""
+        stamps, bearings = self.stamps_ns.array().tolist(), self.bearings.array().tolist()
+        order = np.argsort(self.stamps_ns.array(), kind="stable").tolist()
+        return BearingLog.of([Reflex(stamps[k], bearings[k], self.reflectors[k]) for k in order])
 
 
 class ScanColumns:

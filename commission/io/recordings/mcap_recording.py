@@ -15,6 +15,7 @@ from commission.io.recordings import motion
 from commission.io.recordings.mcap_columns import (
     ExactBeams,
     PairColumns,
+    ReflexColumns,
     RowColumns,
     ScanColumns,
     TagColumns,
@@ -26,6 +27,7 @@ from commission.io.recordings.mcap_reader import MAGIC
 from commission.io.recordings.mcap_scans import McapScans, ScanPlaces
 from commission.io.recordings.recorded_start import recorded_start_of
 from commission.io.recordings.recorder import (
+    BEARINGS,
     DISPLACEMENTS,
     METADATA,
     REFERENCES,
@@ -39,6 +41,7 @@ from commission.io.recordings.reference_file import reference_mount_of
 from commission.io.recordings.scan_archive import IN_MEMORY
 from commission.io.recordings.truth_file import truth_of
 from commission.io.recordings.whole import WholeRecording
+from commission.site.bearing_log import BearingLog
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanStore
 from commission.site.recorded_start import RecordedStart
@@ -110,11 +113,11 @@ class McapRecording(WholeRecording):
 
     def load(self) -> RecordLog:
         """Read everything but scans into columns; raises FileFormatError."""
-        moved, referred, tagged = RowColumns(3), RowColumns(3), TagColumns()
+        moved, referred, tagged, turned = RowColumns(3), RowColumns(3), TagColumns(), ReflexColumns()
         topics = scanner_topics(self.scanners)
         scans = [(ScanColumns(), ExactBeams()) for _ in topics]
         detected = [PairColumns() for _ in topics]
-        takers = {DISPLACEMENTS: moved.take, REFERENCES: referred.take, TAGS: tagged.take}
+        takers = {DISPLACEMENTS: moved.take, REFERENCES: referred.take, TAGS: tagged.take, BEARINGS: turned.take}
         for topic, (ranges, beams), pairs in zip(topics, scans, detected, strict=True):
             takers |= {topic: ranges.take, beams_topic(topic): beams.take, detected_topic(topic): pairs.take}
         index, self._index = self._index or McapIndex(self.path), None
@@ -132,8 +135,9 @@ class McapRecording(WholeRecording):
             found, told = self._scans(index, scanner, ranges, beams)
             notes += told
             stores += [] if found is None else [found]
-        detections, tags = self._detections(detected), self._tags(tagged)
-        if not (len(odometry.stamps_ns) or len(reference_stamps) or stores or len(detections[0]) or len(tags)):
+        detections, tags, bearings = self._detections(detected), self._tags(tagged), self._bearings(turned)
+        seen = len(detections[0]) + len(tags) + len(bearings)
+        if not (len(odometry.stamps_ns) or len(reference_stamps) or stores or seen):
             raise FileFormatError(self.path, "", "holds no record", "a recording of a drive")
         self._check(odometry.rows, "displacements")
         return RecordLog(
@@ -146,6 +150,7 @@ class McapRecording(WholeRecording):
             detection_offsets=detections[2],
             range_bearing=detections[3],
             tags=tags,
+            bearings=bearings,
             reference_stamps_ns=reference_stamps[rows],
             reference_poses=reference_poses[rows],
             reference_mount=self.reference_mount(),
@@ -215,6 +220,13 @@ class McapRecording(WholeRecording):
             return found.log()
         except ValueError as error:
             raise FileFormatError(self.path, "tags", str(error), "a file as it was recorded") from error
+
+    def _bearings(self, found: ReflexColumns) -> BearingLog:
+        """Reflexes of a goniometer; raises FileFormatError where a number cannot be."""
+        try:
+            return found.log()
+        except ValueError as error:
+            raise FileFormatError(self.path, "bearings", str(error), "a file as it was recorded") from error
 
     def _check(self, values: np.ndarray, name: str) -> None:
         """Raise FileFormatError where a number is not finite."""

@@ -25,7 +25,7 @@ from commission.io.recordings.reference_file import reference_mount_text
 from commission.io.recordings.truth_file import truth_text
 from commission.localization.estimate import Estimate
 from commission.site.recorded_start import RecordedStart
-from commission.site.records import Detections, Odometry, Record, Scan, TagSightings
+from commission.site.records import Detections, Odometry, Record, Reflex, Scan, TagSightings
 from commission.site.reference_mount import BASE, ReferenceMount
 from commission.site.scanner import ONLY_NAME, Scanner
 from commission.site.truth import Truth
@@ -36,7 +36,7 @@ VERSION = "1"
 """Version of what is written."""
 DISPLACEMENTS, REFERENCES = "/commission/displacement", "/commission/reference"
 ESTIMATE, POINTS, MODE = "/commission/estimate", "/commission/detections", "/commission/mode"
-TAGS = "/commission/tags"
+TAGS, BEARINGS = "/commission/tags", "/commission/bearings"
 _ODOMETRY, _REFERENCE, _TF, _TF_STATIC = "/odom", "/reference", "/tf", "/tf_static"
 _CHUNK_BYTES = 4_000_000
 """Bytes of a chunk, at most."""
@@ -131,6 +131,8 @@ class Recorder:
                 self._write(detected_topic(topic), ros.DETECTED, record.stamp_ns, data)
             elif isinstance(record, TagSightings):
                 self._write(TAGS, ros.TAGS, record.stamp_ns, ros.tags(record))
+            elif isinstance(record, Reflex):
+                self._write(BEARINGS, ros.REFLEX, record.stamp_ns, ros.reflex(record))
             else:
                 self._write(_REFERENCE, ros.POSE, record.stamp_ns, ros.pose_stamped(record))
                 self._write(REFERENCES, ros.REFERENCE, record.stamp_ns, ros.reference(record))

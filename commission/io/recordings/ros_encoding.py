@@ -14,7 +14,7 @@ import numpy as np
 from commission.geometry.arrays import FloatArray
 from commission.io.recordings.cdr import CdrWriter
 from commission.localization.estimate import Estimate
-from commission.site.records import Detections, Odometry, ReferencePose, Scan, TagSightings
+from commission.site.records import Detections, Odometry, ReferencePose, Reflex, Scan, TagSightings
 
 MAP, ODOM, BASE_LINK = "map", "odom", "base_link"
 """Names of frames (REP 105)."""
@@ -30,11 +30,13 @@ DISPLACEMENT = "commission_msgs/msg/Displacement"
 DETECTED = "commission_msgs/msg/Detections"
 REFERENCE = "commission_msgs/msg/ReferencePose"
 TAGS = "commission_msgs/msg/Tags"
+REFLEX = "commission_msgs/msg/Reflex"
 OWN_FIELDS = {
     BEAMS: "float64 angle_min\nfloat64 angle_increment\nbool[] reflector\n",
     DISPLACEMENT: "float64 dx\nfloat64 dy\nfloat64 dtheta\n",
     DETECTED: "float64[] range\nfloat64[] bearing\n",
     TAGS: "float64[] values\nstring ids\n",
+    REFLEX: "float64[] bearing\nstring reflector\n",
     REFERENCE: "float64 x\nfloat64 y\nfloat64 theta\n",
 }
 """Our own types behind their header, in the language of ROS 2 messages [m, rad]."""
@@ -121,6 +123,12 @@ def tags(record: TagSightings) -> bytes:
     """Return what a camera saw of tags: six numbers of each, and their ids as a list of JSON."""
     writer = CdrWriter().header(record.stamp_ns, "camera").array(record.sightings.ravel())
     return writer.text(json.dumps(record.ids)).message()
+
+
+def reflex(record: Reflex) -> bytes:
+    """Return what a goniometer met: its bearing, none where a turn met nothing, and the reflector where it is known."""
+    bearings = np.array([] if math.isnan(record.bearing) else [record.bearing])
+    return CdrWriter().header(record.stamp_ns, "goniometer").array(bearings).text(record.reflector).message()
 
 
 def estimated_pose(estimate: Estimate) -> bytes:

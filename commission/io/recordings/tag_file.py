@@ -14,6 +14,7 @@ import numpy as np
 
 from commission.geometry.arrays import Growing
 from commission.io.csv_table import Block, read_table
+from commission.io.recordings.bearing_file import cell
 from commission.site.records import TagSightings
 from commission.site.tag_log import NO_TAGS, TagLog
 
@@ -90,11 +91,4 @@ def tag_lines(record: TagSightings) -> Iterator[str]:
         yield f"{record.stamp_ns},,,,,,,\n"
     for name, values in zip(record.ids, record.sightings.tolist(), strict=True):
         numbers = ("" if value != value else repr(value) for value in values)  # noqa: PLR0124 - NaN is not itself
-        yield ",".join((str(record.stamp_ns), _cell(name), *numbers)) + "\n"
-
-
-def _cell(text: str) -> str:
-    """Quote a text where a table needs it."""
-    if any(each in text for each in ',;"\n\r'):
-        return '"' + text.replace('"', '""') + '"'
-    return text
+        yield ",".join((str(record.stamp_ns), cell(name), *numbers)) + "\n"

@@ -1,0 +1,155 @@
+"""One cycle of the localizer for a reflex of a goniometer: its own time is reached, its bearing corrects.
+
+Beside `cycle`, which is that of a scan, and called by the same two: live, and by the compiled loop of whole runs. So a
+bearing needs no evolution between reflexes: the pose goes along with odometry, and each bearing meets it at its time.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from commission.compiled import compiled, compiled_inline
+from commission.geometry.arrays import FloatArray, IntArray
+from commission.localization.bearings import ACCEPTED, REFLECTOR, REJECTED, USE, BearingModel, correct_by_bearing_alone
+from commission.localization.consider_columns import carry_over
+from commission.localization.contour import ContourScan
+from commission.localization.cycle import Cycle, supervised, with_temporary
+from commission.localization.filter_kinds import is_invariant
+from commission.localization.odometry import NextOdometry, reach, velocity
+from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.rejection import FEWEST_AGAINST, MOST_FOR, Evidence, RejectionRule, is_doubtful
+from commission.localization.setup import FilterModel
+from commission.localization.state import FilterState
+from commission.localization.temporary_memory import TemporaryMemory
+from commission.localization.temporary_model import TemporaryModel
+from commission.localization.zones import ZoneRows, kinds_at
+
+
+class Reflexes(NamedTuple):
+    """Reflexes of a stretch of cycles, for kernels."""
+
+    is_reflex: NDArray[np.bool_]
+    """(K,) whether a cycle is a reflex, and no scan."""
+    rows: IntArray
+    """(K,) reflexes of the stretch before each cycle: the row of one that is a reflex."""
+    bearings: FloatArray
+    """(n,) see `BearingLog`."""
+    entries: IntArray
+    """(n,) row of the reflector of each, or NOT_NAMED, NOT_IN_MAP."""
+    model: BearingModel
+
+
+@compiled
+def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of the whole run
+    state: FilterState,
+    stamp_ns: int,
+    row: int,
+    reflexes: Reflexes,
+    model: FilterModel,
+    places: FloatArray,
+    cross: FloatArray | None,
+    busy: IntArray | None,
+    following: NextOdometry,
+    figures: FloatArray,
+    zones: ZoneRows,
+    temporary: TemporaryModel | None,
+    memory: TemporaryMemory | None,
+    scan: ContourScan | None,
+    goods: FloatArray | None,
+) -> Cycle:
+    """Process a reflex.
+
+    Parameters
+    ----------
+    state : after everything before this reflex.
+    stamp_ns : of the reflex [ns].
+    row : of the reflex.
+    reflexes : bearings, and the goniometer.
+    model : of the whole filter.
+    places : the map, see `ReflectorIndex`.
+    cross : covariance of the pose with the constants, in and out, or None.
+    busy : see `busy_chunks`; None: as `cross`.
+    following : the odometry record at or after the reflex, where it is known.
+    figures : (n, COLUMNS) out, see `bearings`.
+    zones : where which kinds correct the pose; bearings do where reflectors do.
+    temporary, memory, scan, goods : as in `process_scan`; the scan of a reflex has no beams.
+
+    Notes
+    -----
+    No formula: `reach`, `correct_by_bearing_alone` and `supervised` in turn.
+    """
+    prior, motion = reach(state.belief, state.motion, stamp_ns, following, model.odometry)
+    if cross is not None and busy is not None:
+        moved = np.eye(3)
+        moved[0, 2], moved[1, 2] = -(prior.y - state.pivot[1]), prior.x - state.pivot[0]
+        carry_over(cross, moved, busy)
+    belief = prior
+    if kinds_at(zones, prior.x, prior.y).reflectors:
+        belief = correct_by_bearing_alone(
+            belief,
+            reflexes.bearings[row],
+            reflexes.entries[row],
+            places,
+            reflexes.model,
+            velocity(state.motion, following),
+            model.consider,
+            cross,
+            busy,
+            figures[row],
+            is_invariant(model.gate.kind),
+        )
+    belief = with_temporary(
+        prior, belief, temporary, memory, scan, state, motion, following, stamp_ns, model, cross, busy, goods
+    )
+    use, named = figures[row, USE], reflexes.entries[row] >= 0
+    evidence = weigh_bearing(state.evidence, stamp_ns, prior, use, named and figures[row, REFLECTOR] >= 0, model)
+    pivot = state.pivot if cross is None else (belief.x, belief.y)
+    return Cycle(prior, supervised(state, stamp_ns, belief, motion, evidence, pivot, model))
+
+
+@compiled_inline
+def weigh_bearing(  # noqa: PLR0917 - a reflex and what is known around it
+    evidence: Evidence, stamp_ns: int, prior: PoseGaussian, use: float, named: bool, model: FilterModel
+) -> Evidence:
+    """Count what became of a bearing, as `weigh` counts detections.
+
+    Parameters
+    ----------
+    evidence : before the reflex.
+    stamp_ns : of the reflex [ns].
+    prior : that the bearing was associated at.
+    use : a `BearingUse`.
+    named : whether it is said which reflector it is of: then that one is near.
+    model : of the whole filter.
+
+    Notes
+    -----
+    against <- max(against + (rejected - accepted / (1 / 4)) / 3, 0), by definition: a scan that holds three rejected
+    detections and at most a quarter as many accepted ones speaks against the pose, so that each rejected bearing counts
+    a third of such a scan, and an accepted one takes back what four rejected ones counted. The windows are those of
+    `weigh`, of one detection.
+    """
+    rule: RejectionRule = model.rejection
+    accepted, rejected = 1.0 if use == ACCEPTED else 0.0, 1.0 if use == REJECTED else 0.0
+    near = rejected if named else 0.0
+    confirmed, against = evidence.confirmed, evidence.against
+    against = max(against + (rejected - accepted / MOST_FOR) / FEWEST_AGAINST, 0.0)
+    if is_doubtful(prior, rule):
+        accepted, confirmed = 0.0, 0.0
+    seconds = (stamp_ns - evidence.stamp_ns) * 1e-9
+    of_near, of_all = evidence.near_accepted + evidence.near_rejected, evidence.accepted + evidence.rejected
+    kept_near = max(math.exp(-seconds / rule.window_s), min(1.0, rule.fewest / max(of_near, 1e-9)))
+    kept = max(math.exp(-seconds / rule.long_window_s), min(1.0, rule.fewest_of_all / max(of_all, 1e-9)))
+    return Evidence(
+        stamp_ns,
+        kept_near * evidence.near_accepted + accepted,
+        kept_near * evidence.near_rejected + near,
+        kept * evidence.accepted + accepted,
+        kept * evidence.rejected + rejected,
+        confirmed + accepted,
+        against,
+    )

@@ -1,0 +1,69 @@
+"""What bearings of a goniometer contributed to a run, in numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from commission.localization.bearings import NIS, USE, BearingUse
+from commission.localization.run_columns import RunColumns
+from commission.studies.plausibility import Finding
+
+Number = int | float | None
+
+
+def bearing_figures(columns: RunColumns) -> dict[str, Number]:
+    """Entries of `summary.json` about bearings alone; none where the drive has no reflexes of a goniometer.
+
+    Returns
+    -------
+    entries : reflexes by what became of them, turns that met no reflector; mean NIS of accepted bearings, of one degree
+        of freedom, and the same with those that were rejected and held against a reflector: 1 where all is as believed.
+    """
+    met = columns.detected.bearings
+    if met is None:
+        return {}
+    turns = int(np.count_nonzero(np.isnan(met.bearings)))
+    use, nis = columns.bearings[:, USE], columns.bearings[:, NIS]
+    accepted, rejected = use == BearingUse.ACCEPTED, use == BearingUse.REJECTED
+    return {
+        "bearings": len(met.bearings) - turns,
+        "bearing_turns_without_any": turns,
+        "bearing_accepted": int(np.count_nonzero(accepted)),
+        "bearing_rejected": int(np.count_nonzero(rejected)),
+        "bearing_unknown": int(np.count_nonzero(use == BearingUse.UNKNOWN)),
+        "bearing_nis_mean": _mean(nis[accepted]),
+        "bearing_nis_before_gate_mean": _mean(nis[(accepted | rejected) & np.isfinite(nis)]),
+    }
+
+
+def _mean(nis: np.ndarray) -> float | None:
+    """Mean NIS; None of nothing."""
+    return float(nis.mean()) if len(nis) else None
+
+
+def bearing_findings(columns: RunColumns) -> tuple[Finding, ...]:
+    """Say when a goniometer met reflectors and no bearing counted: without a word the run would look as if they did.
+
+    Parameters
+    ----------
+    columns : the run; its first setup says what the vehicle has.
+
+    Returns
+    -------
+    findings : one or none.
+    """
+    met, setup = columns.detected.bearings, columns.segments[0].setup
+    if met is None or not np.isfinite(met.bearings).any() or not setup.parameters.bearing.enabled:
+        return ()
+    count = int(np.count_nonzero(np.isfinite(met.bearings)))
+    if setup.bearing_model is None:
+        found = f"the recording holds {count} bearings of a goniometer, and the vehicle has none"
+        remedy = "give one of its scanners `kind: goniometer` in project.yaml"
+        return (Finding(found=found, probably="the scanner is entered as a laser", remedy=remedy),)
+    names = sorted({name for name in met.reflectors if name})
+    known = {each.id for each in setup.reflectors.reflectors}
+    if names and not known.intersection(names):
+        found = f"none of {count} bearings is of a reflector of the map"
+        probably = f"their ids are written otherwise: {', '.join(map(repr, names[:3]))}"
+        return (Finding(found=found, probably=probably, remedy="compare with reflectors.csv"),)
+    return ()

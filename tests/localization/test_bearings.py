@@ -1,0 +1,261 @@
+"""Bearings alone as an observation kind: rows, gate, considered errors, whose they are, live = whole, lost again."""
+
+# pyright: basic
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from commission.geometry import se2
+from commission.geometry.angles import wrap
+from commission.localization.bearings import (
+    CONSTANTS,
+    NIS,
+    NOT_IN_MAP,
+    NOT_NAMED,
+    REFLECTOR,
+    USE,
+    BearingUse,
+    bearing_model,
+    bearing_rows,
+    correct_by_bearing_alone,
+    entries_named,
+)
+from commission.localization.consider import ConsiderModel
+from commission.localization.estimate import Belief, Mode
+from commission.localization.growing_run import GrowingRun
+from commission.localization.observation import observation_model
+from commission.localization.pose_gaussian import covariance_of, from_belief, mean_of
+from commission.localization.run_columns import RunSegment
+from commission.localization.setup import LocalizerSetup
+from commission.localization.whole_run import run, run_segments, state_before
+from commission.site.parameters import BearingParameters, ObservationParameters, Parameters
+from commission.site.record_log import RecordLog
+from commission.site.records import Detections, Odometry, Reflex, TagSightings
+from commission.site.reflectors import Reflector, ReflectorMap
+from commission.site.scanner import Scanner, ScannerKind
+from commission.site.tags import Tag
+
+GONIOMETER = Scanner(
+    name="goniometer",
+    kind=ScannerKind.GONIOMETER,
+    mounting=np.array((0.3, -0.1, 0.7)),
+    field_of_view_deg=(-180.0, 180.0),
+    bearing_sigma_deg=0.05,
+)
+PLACES = np.array(((3.0, 1.0, 1.6e-5, 1.0), (-2.0, 4.0, 9e-6, 0.0), (9.0, 3.0, 0.0, 2.0)))
+POSE, TWIST = np.array((0.4, -0.2, 0.3)), (0.8, 0.1, 0.4)
+KNOWN, UNKNOWN = ConsiderModel(2e-6, 1e-6, 1e-5, 2.5e-5), ConsiderModel(0.0, 0.0, 0.0, 0.0)
+
+
+def model_of(scanner=GONIOMETER, **given):
+    observation = observation_model(scanner, ObservationParameters())
+    return bearing_model((scanner,), (observation,), BearingParameters(**given), len(PLACES))
+
+
+MODEL = model_of()
+
+
+def belief_at(pose, P):
+    return from_belief(Belief(0, np.asarray(pose, dtype=np.float64), P))
+
+
+def expected(pose, mounting, place):
+    scanner = se2.compose(pose, mounting)
+    return math.atan2(place[1] - scanner[1], place[0] - scanner[0]) - scanner[2]
+
+
+def slopes(of, at):
+    return np.array([wrap(of(at + d) - of(at - d)) / 2e-6 for d in 1e-6 * np.eye(len(at))])
+
+
+def corrected(belief, measured, entry, *, model=MODEL, places=PLACES, known=UNKNOWN, cross=None):
+    figures, busy = np.full(4, 9.0), None if cross is None else np.full(1, 50)
+    return correct_by_bearing_alone(
+        belief, measured, entry, places, model, TWIST, known, cross, busy, figures, False
+    ), figures
+
+
+def test_a_row_is_the_derivative_of_the_expected_bearing_also_by_what_is_considered():
+    for place in PLACES:
+        rows = bearing_rows(belief_at(POSE, np.eye(3)), 0.1, place, MODEL, TWIST)
+        assert rows.residuals[0] == pytest.approx(wrap(0.1 - expected(POSE, GONIOMETER.mounting, place)), abs=1e-12)
+        assert rows.variances[0] == pytest.approx(math.radians(0.05) ** 2)
+        assert rows.jacobians[0] == pytest.approx(
+            slopes(lambda x, p=place: expected(x, GONIOMETER.mounting, p), POSE), abs=1e-8
+        )
+        mounted = slopes(lambda m, p=place: expected(POSE, m, p), np.array(GONIOMETER.mounting))
+        stands = slopes(lambda p: expected(POSE, GONIOMETER.mounting, p), place[:2])
+        # A clock that is late by a second: the reflector was met where the vehicle was a second ago.
+        before = se2.compose(POSE, se2.exp(-1e-6 * np.array(TWIST)))
+        late = wrap(expected(before, GONIOMETER.mounting, place) - expected(POSE, GONIOMETER.mounting, place)) / 1e-6
+        assert rows.constants[0] == pytest.approx([*mounted, 0.0, late, *stands], abs=1e-5)
+
+
+def test_constants_are_considered_as_schmidts_filter_of_the_whole_state_does():
+    rng, count = np.random.default_rng(2), 2 * len(PLACES) + 5
+    for entry in range(len(PLACES)):
+        root = rng.standard_normal((3, 3)) * (0.01, 0.01, 0.005)
+        P, cross = root @ root.T + 1e-4 * np.eye(3), rng.normal(0.0, 1e-6, (3, count))
+        belief, measured = belief_at(POSE, P), expected(POSE, GONIOMETER.mounting, PLACES[entry]) + 0.002
+        rows = bearing_rows(belief, measured, PLACES[entry], MODEL, TWIST)
+        seen = np.array([*range(2 * len(PLACES), count), 2 * entry, 2 * entry + 1])
+        assert len(seen) == CONSTANTS
+        whole, row = np.zeros((3 + count, 3 + count)), np.zeros(3 + count)
+        whole[:3, :3], whole[:3, 3:], whole[3:, :3] = P, cross, cross.T
+        whole[3 + seen, 3 + seen] = (2e-6, 2e-6, 1e-6, 1e-5, 2.5e-5, PLACES[entry, 2], PLACES[entry, 2])
+        row[:3], row[3 + seen] = rows.jacobians[0], rows.constants[0]
+        S = row @ whole @ row + math.radians(0.05) ** 2
+        gain = whole @ row / S
+        gain[3:] = 0.0
+        joseph = np.eye(3 + count) - np.outer(gain, row)
+        after_whole = joseph @ whole @ joseph.T + math.radians(0.05) ** 2 * np.outer(gain, gain)
+        written = cross.copy()
+        after, figures = corrected(belief, measured, entry, known=KNOWN, cross=written)
+        assert (figures[USE], figures[REFLECTOR]) == (BearingUse.ACCEPTED, PLACES[entry, 3])
+        assert figures[NIS] == pytest.approx(0.002**2 / S, rel=1e-6)
+        assert mean_of(after) == pytest.approx(POSE + 0.002 * gain[:3], abs=1e-10)
+        assert covariance_of(after) == pytest.approx(after_whole[:3, :3], abs=1e-12)
+        assert written == pytest.approx(after_whole[:3, 3:], abs=1e-12)
+
+
+def test_the_gate_has_one_degree_of_freedom():
+    # 10.828 is the 0.999 quantile of chi-square with one degree of freedom (any table).
+    sharp, exact = belief_at(POSE, 1e-16 * np.eye(3)), PLACES * (1.0, 1.0, 0.0, 1.0)
+    for factor, use in ((0.999, BearingUse.ACCEPTED), (1.001, BearingUse.REJECTED)):
+        off = factor * math.radians(0.05) * math.sqrt(10.828)
+        measured = expected(POSE, GONIOMETER.mounting, exact[0]) + off
+        for entry in (0, NOT_NAMED):
+            after, figures = corrected(sharp, measured, entry, places=exact)
+            assert (figures[USE], figures[REFLECTOR], after == sharp) == (use, 1.0, use == BearingUse.REJECTED)
+
+
+def test_a_bearing_without_a_name_is_of_the_only_reflector_that_fits():
+    belief = belief_at(POSE, np.diag((1e-4, 1e-4, 1e-5)))
+    here = [expected(POSE, GONIOMETER.mounting, place) for place in PLACES]
+    assert corrected(belief, here[1], NOT_NAMED)[1][REFLECTOR] == PLACES[1, 3]
+    behind = np.vstack([PLACES, [*(2.0 * PLACES[0, :2] - se2.compose(POSE, GONIOMETER.mounting)[:2]), 0.0, 3.0]])
+    for measured, entry, places, use in (
+        (here[0], NOT_NAMED, behind, BearingUse.UNKNOWN),
+        (here[0] + 0.3, NOT_NAMED, PLACES, BearingUse.REJECTED),
+        (here[0], NOT_IN_MAP, PLACES, BearingUse.UNKNOWN),
+        (math.nan, NOT_NAMED, PLACES, BearingUse.NONE),
+        (here[0] + 0.3, 0, PLACES, BearingUse.REJECTED),
+    ):
+        after, figures = corrected(belief, measured, entry, places=places)
+        assert (figures[USE], after == belief) == (use, True)
+    # Farther than the goniometer sees, there is nobody.
+    near = model_of(dataclasses.replace(GONIOMETER, range=(0.05, 3.0)))
+    assert corrected(belief, here[1], NOT_NAMED, model=near)[1][USE] == BearingUse.REJECTED
+    reflectors = [Reflector(id=name, x=0.0, y=float(k)) for k, name in enumerate("ABC")]
+    assert entries_named(("B", "", "Z", "A"), reflectors, PLACES).tolist() == [0, NOT_NAMED, NOT_IN_MAP, 1]
+
+
+def test_a_goniometer_upside_down_and_with_a_late_clock_is_understood():
+    before = se2.compose(POSE, se2.exp(-0.02 * np.array(TWIST)))
+    measured = -expected(before, GONIOMETER.mounting, PLACES[0])
+    hanging = model_of(dataclasses.replace(GONIOMETER, upside_down=True, clock_offset=0.02))
+    after, figures = corrected(belief_at(POSE, 1e-6 * np.eye(3)), measured, 0, model=hanging)
+    # To first order in 20 ms, in which the bearing turns by 10 mrad.
+    assert (figures[USE], figures[NIS] < 0.05) == (BearingUse.ACCEPTED, True)
+    assert mean_of(after) == pytest.approx(POSE, abs=1e-3)
+
+
+def test_a_reflector_at_the_goniometer_itself_gives_no_number_that_is_none():
+    there = np.array([[*se2.compose(POSE, GONIOMETER.mounting)[:2], 1e-6, 0.0]])
+    after, _ = corrected(belief_at(POSE, 1e-4 * np.eye(3)), 0.3, 0, places=there)
+    assert np.isfinite(mean_of(after)).all()
+    assert np.linalg.eigvalsh(covariance_of(after)).min() > 0.0
+
+
+LASER = Scanner(name="laser")
+SETUP = LocalizerSetup(
+    reflectors=ReflectorMap(tuple(Reflector(id=n, x=x, y=y) for n, x, y in (("A", 3, 1), ("B", -2, 4), ("C", 2, -5)))),
+    scanners=(LASER, GONIOMETER),
+    parameters=Parameters(),
+    tags=(Tag(id="7", x=2.0, y=0.0, heading=0.5),),
+)
+NEAR = Belief(0, np.array((0.01, 0.0, 0.0)), np.diag((1e-3, 1e-3, 1e-4)))
+
+
+def mixed():
+    """A vehicle that stands, with reflexes named and not and foreign, empty turns, detections of a laser, a tag."""
+    rng, records = np.random.default_rng(0), []
+    for k in range(150):
+        stamp = k * 100_000_000
+        records.append(Odometry(stamp, np.zeros(3)))
+        place = SETUP.reflectors.centers[k % 3]
+        bearing = expected(np.zeros(3), GONIOMETER.mounting, place) + rng.normal(0.0, 1e-3)
+        name = ("", "ABC"[k % 3], "", "Z", "")[k % 5]
+        records.append(Reflex(stamp + 31 * (k % 4), bearing if k % 11 else math.nan, name if k % 11 else ""))
+        if k % 6 == 0:
+            rows = np.array([(2.0, 0.0, 0.5, 0.02, 0.02, 0.02)]) + np.array([[*rng.normal(0.0, 0.02, 3), 0, 0, 0]])
+            records.append(TagSightings(stamp, rows, ("7",)))
+        if k % 5 == 2:
+            seen = np.array([(math.hypot(3.0, 1.0), math.atan2(1.0, 3.0))]) + rng.normal(0.0, 0.003, (1, 2))
+            records.append(Detections(stamp, seen))
+    return RecordLog.collect(records, ("laser", "goniometer"))
+
+
+def grown(log, setup, start):
+    live = GrowingRun(setup, start)
+    for record in log.records():
+        live.feed(record)
+    live.flush()
+    return live.columns()
+
+
+@pytest.mark.parametrize("consider", [True, False])
+def test_live_is_the_whole_run_to_the_last_bit(consider):
+    filtering = dataclasses.replace(SETUP.parameters.filter, consider=consider)
+    setup = dataclasses.replace(SETUP, parameters=dataclasses.replace(SETUP.parameters, filter=filtering))
+    log = mixed()
+    whole = run(log, setup, NEAR)
+    live = grown(log, setup, NEAR)
+    assert whole.stamps_ns.tolist() == live.stamps_ns.tolist()
+    for name in ("means", "covariances", "modes", "tags", "bearings", "d2", "status"):
+        assert getattr(whole, name).tobytes() == getattr(live, name).tobytes(), name
+    for name in ("is_reflex", "numbers", "bearings"):
+        assert getattr(whole.detected.bearings, name).tobytes() == getattr(live.detected.bearings, name).tobytes()
+    assert whole.detected.bearings.reflectors == live.detected.bearings.reflectors
+    assert whole.final == live.final
+    for cycle in range(0, len(whole), 7):
+        a, b = whole.estimate(cycle), live.estimate(cycle)
+        assert (a.bearing is None, a.tags is None) == (b.bearing is None, b.tags is None)
+        assert a.prior.covariance.tobytes() == b.prior.covariance.tobytes()
+    counts = np.bincount(whole.bearings[:, USE].astype(int), minlength=4)
+    # 14 of 150 are empty turns; of the others those that the map lacks; one in a thousand is outside of the gate.
+    assert (counts[BearingUse.NONE], counts[BearingUse.UNKNOWN]) == (14, 27)
+    assert counts[BearingUse.REJECTED] <= 2
+    # Through a checkpoint in the middle, and with a setup that looks at no bearings from there on.
+    assert state_before(whole, log, 41).belief == from_belief(whole.estimate(40).posterior)
+    blind = dataclasses.replace(setup.parameters, bearing=BearingParameters(enabled=False))
+    segments = (RunSegment(0, setup), RunSegment(40, dataclasses.replace(setup, parameters=blind)))
+    cut = run_segments(log, segments, NEAR)
+    again = run_segments(log, segments, NEAR, earlier=run_segments(log, segments[:1], NEAR))
+    assert cut.means[:40].tobytes() == whole.means[:40].tobytes()
+    assert (cut.means.tobytes(), cut.bearings.tobytes()) == (again.means.tobytes(), again.bearings.tobytes())
+    assert not cut.bearings[whole.detected.bearings.rows_before(40) :].any()
+    covered = run_segments(log, (RunSegment(0, setup, covered=True),), NEAR)
+    assert not covered.bearings[:, USE].any()
+
+
+def test_bearings_that_fit_nothing_make_a_vehicle_lost_and_those_that_fit_find_it_again():
+    setup = dataclasses.replace(SETUP, scanners=(GONIOMETER,), tags=())
+    records = []
+    for k in range(600):
+        stamp, place = k * 40_000_000, SETUP.reflectors.centers[k % 3]
+        pose = np.array((0.0, 0.0, 0.6 if 150 <= k < 330 else 0.0))
+        records += [Odometry(stamp, np.zeros(3)), Reflex(stamp, expected(pose, GONIOMETER.mounting, place))]
+    columns = run(RecordLog.collect(records), setup, Belief(0, np.zeros(3), np.diag((1e-6, 1e-6, 1e-6))))
+    assert (columns.modes[:150] == Mode.OPERATIONAL).all()
+    lost = int(np.argmax(columns.modes == Mode.LOST))
+    # A third of a scan each, and fifteen scans against the pose: at most 45 of them.
+    assert 150 < lost <= 150 + 45
+    assert (columns.modes[lost:330] == Mode.LOST).all()
+    assert columns.modes[-1] == Mode.OPERATIONAL
+    assert (columns.bearings[160:330, USE] == BearingUse.REJECTED).all()
