@@ -6,7 +6,7 @@
 (() => {
   if (window.commissionFiles) return; // the server sends this script again after each reconnection
   window.commissionFiles = true;
-  const LOOK_EVERY_MS = 400, MOST_RECENT = 8, KEY = "commission-recent", SENT_WITHIN_MS = 4_000;
+  const LOOK_EVERY_MS = 400, MOST_RECENT = 8, KEY = "commission-recent", SENT_WITHIN_MS = 4_000, BETWEEN_MS = 400, MOST_REFUSED = 3;
   const MAPS = /\.(yaml|yml|pgm|png|jpe?g|bmp|tiff?|dxf|stl|obj|glb|ply)$/i;
   const IMPORTS = /\.(csv|txt|imk|json|lif|xml|zip|smap|tsv)$/i;
   const RECORDINGS = /\.(mcap|bag|db3|pcap|pcapng|log|clf|npz|cdr)$/i;
@@ -149,37 +149,63 @@
         const head = [...document.querySelectorAll(".mantine-Paper-root")]
           .find((each) => each.style.cursor === "pointer" && each.textContent.trim() === folder);
         if (head && !button.checkVisibility()) window.commissionPress?.(head);
-        return button;
+        if (!button.disabled) {
+          head?.scrollIntoView({ block: "start" }); // what comes of the file is said there
+          return button;
+        }
       }
       await new Promise((done) => setTimeout(done, 100));
     }
     return null;
   }
-  async function take(file) {
+  // Returns why the file was not taken; nothing where it was.
+  async function take(file, isFolder, before) {
+    if (isFolder) return `${file.name} is a folder: drop the files that are in it`;
+    if (file.size === 0) return `${file.name} is empty: 0 bytes`;
+    // What cannot be read would leave the button waiting for ever.
+    try { await file.slice(0, 1).arrayBuffer(); } catch { return `${file.name} cannot be read by this browser`; }
     const isMap = MAPS.test(file.name);
     if (RECORDINGS.test(file.name)) {
-      return say(`${file.name} is a recording: lay it on the computer that serves this page, and open it in the step Run`);
+      return `${file.name} is a recording: lay it on the computer that serves this page, and open it in the step Run`;
     }
     if (!isMap && !IMPORTS.test(file.name)) {
-      return say(`${file.name} is neither a floor map nor a file of reflectors, routes or a project`);
+      return `${file.name} is neither a floor map nor a file of reflectors, routes or a project`;
     }
     const button = await buttonOf(isMap ? "Upload a map" : "Upload a file", isMap ? "Floor map" : "Exchange");
     const input = button && document.getElementById(`file_upload_${button.id}`);
-    if (!input || button.disabled) return say(`${file.name} cannot be taken now: another file is being looked at`);
+    if (!input || button.disabled) {
+      return `${file.name} was not taken: ${before || "another file"} is being looked at; accept or cancel that first`;
+    }
     const one = new DataTransfer();
     one.items.add(file);
     input.files = one.files;
     input.dispatchEvent(new Event("change", { bubbles: true }));
+    return "";
   }
   addEventListener("dragover", (event) => {
     if (!hasFiles(event)) return;
     event.preventDefault();
-    say("Drop a floor map, reflectors, routes or a project: nothing changes before you have seen what would", 1);
+    say("Drop a floor map, reflectors, routes or a project; Undo takes back what becomes of it", 1);
   });
   addEventListener("drop", async (event) => {
     if (!hasFiles(event)) return;
     event.preventDefault();
     cover.hidden = true;
-    for (const file of [...event.dataTransfer.files]) await take(file);
+    const items = [...event.dataTransfer.items].filter((each) => each.kind === "file");
+    const isFolder = items.map((each) => each.webkitGetAsEntry?.()?.isDirectory ?? false); // it is known only now
+    // A ROS map that comes behind its image finds it.
+    const files = [...event.dataTransfer.files].map((file, index) => ({ file, isFolder: isFolder[index] }))
+      .sort((one, other) => /\.ya?ml$/i.test(one.file.name) - /\.ya?ml$/i.test(other.file.name));
+    let taken = "";
+    const refused = [];
+    for (const { file, isFolder } of files) {
+      if (taken) await new Promise((done) => setTimeout(done, BETWEEN_MS)); // the button of the one before is let go
+      const why = await take(file, isFolder, taken);
+      if (why) refused.push(why);
+      else taken = file.name;
+      if (refused.length === MOST_REFUSED) break;
+    }
+    const left = refused.length === MOST_REFUSED ? ` (${files.length} files were dropped)` : "";
+    if (refused.length) say(refused.join("; ") + left, 6 + 2 * refused.length);
   });
 })();

@@ -256,13 +256,14 @@
     pen.textAlign = "center";
     pen.textBaseline = "top";
     const [times, step] = timeTicks(lane);
-    for (const time of times) {
-      const x = Math.round(xOf(lane, time)) + 0.5;
+    for (const [index, time] of times.entries()) {
+      // Of minutes and seconds the colon is told; of seconds alone the last says it.
+      const unit = index === times.length - 1 && plots.duration < 120 ? " s" : "", x = Math.round(xOf(lane, time)) + 0.5;
       pen.beginPath();
       pen.moveTo(x, top);
       pen.lineTo(x, bottom);
       pen.stroke();
-      pen.fillText(clockOf(time, step), clamp(x, left + 4, right - 8), bottom + 3);
+      pen.fillText(clockOf(time, step) + unit, clamp(x, left + 4, right - (unit ? 14 : 8)), bottom + 3);
     }
     pen.strokeStyle = "#44484f";
     pen.strokeRect(left + 0.5, Math.round(top) + 0.5, right - left, bottom - top);

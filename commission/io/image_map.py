@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from commission.errors import FileFormatError, reason_of
-from commission.io.map_server import CELL_LIMIT
+from commission.errors import FileFormatError
+from commission.io.map_server import CELL_LIMIT, why_no_image
 from commission.io.reading import check_size
 from commission.site.checks import above, between
 from commission.site.floor_map import FREE, OCCUPIED, FloorMap
@@ -141,7 +141,7 @@ def read_picture(path: Path) -> Picture:
     except (OSError, ValueError, SyntaxError, EOFError, OverflowError, struct.error, zlib.error, LookupError) as error:
         # What Pillow raises for garbage and for files that end early depends on format and place.
         raise FileFormatError(
-            path, "", f"is no readable image ({reason_of(error)})", f"one of: {', '.join(FORMATS)}"
+            path, "", f"is no readable image ({why_no_image(error, path)})", f"one of: {', '.join(FORMATS)}"
         ) from error
 
 

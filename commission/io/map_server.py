@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 
-from commission.errors import FileFormatError
+from commission.errors import FileFormatError, reason_of
 from commission.io.atomic import write_bytes, write_text
 from commission.io.conversion import convert
 from commission.io.findings import Findings, shown
@@ -195,7 +195,22 @@ def _read_cells(path: Path, description: MapDescription, found: Findings) -> NDA
         raise FileFormatError(path, "", "is too large", f"1 to {CELL_LIMIT} pixels") from error
     except (OSError, ValueError, SyntaxError, EOFError, OverflowError, struct.error, zlib.error, IndexError) as error:
         # What Pillow raises for garbage and for files that end early depends on format and place.
-        raise FileFormatError(path, "", f"is no readable image ({error})", "a complete PGM, PNG or BMP") from error
+        raise FileFormatError(
+            path, "", f"is no readable image ({why_no_image(error, path)})", "a complete PGM, PNG or BMP"
+        ) from error
+
+
+def why_no_image(error: Exception, path: Path) -> str:
+    """Say what is wrong with a file that is to be an image, without where it lies: an upload lies nowhere.
+
+    Parameters
+    ----------
+    error : what Pillow raised.
+    path : of the file.
+    """
+    if not isinstance(error, UnidentifiedImageError):
+        return reason_of(error)
+    return "it is none by its content" if path.stat().st_size else "it is empty, 0 bytes"
 
 
 def _classify(image: Image.Image, description: MapDescription, found: Findings) -> NDArray[np.int8]:

@@ -22,6 +22,15 @@ DROP = """([name, text]) => {
 }"""
 
 
+def drop(page: OpenPage, *paths: str) -> None:
+    """Drop files and folders of the disk onto the floor, as a file manager does."""
+    browser = page.page.context.new_cdp_session(page.page)
+    for kind in ("dragEnter", "dragOver", "drop"):
+        dragged = {"items": [], "files": list(paths), "dragOperationsMask": 1}
+        browser.send("Input.dispatchDragEvent", {"type": kind, "x": 600, "y": 300, "data": dragged})
+    browser.detach()
+
+
 @pytest.fixture(scope="module")
 def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     folder = tmp_path_factory.mktemp("served") / "hall"
@@ -74,6 +83,19 @@ def test_files_are_found_by_looking_and_a_failed_open_changes_nothing(
     page.wait_for_text("Nothing has changed yet")
     assert served.state.project is project, "shown before, not after"
     page.press("Cancel")
+    # Folders and empty files hold nothing up; of two tables the second waits to be dropped again.
+    folder = served.state.folder
+    assert folder is not None
+    (folder / "folder.csv").mkdir()
+    (folder / "nothing.csv").touch()
+    (folder / "more.csv").write_text(TABLE)
+    drop(page, *(str(folder / name) for name in ("folder.csv", "nothing.csv", "list.csv", "more.csv")))
+    page.wait_for_text("folder.csv is a folder: drop the files that are in it; nothing.csv is empty: 0 bytes")
+    page.wait_for_text("more.csv was not taken: list.csv is being looked at")
+    page.wait_for_text("Nothing has changed yet")
+    page.press("Cancel")
+    page.page.evaluate(DROP, ["odd.csv", "no table at all"])
+    page.wait_until_told("odd.csv: ")
     page.page.evaluate(DROP, ["drive.mcap", "x"])
     page.wait_for_text("drive.mcap is a recording")
     page.page.evaluate(DROP, ["letter.docx", "x"])

@@ -33,7 +33,7 @@ class JobButton(BasePanel):
         self._job = None if job is None else job.number
         show(self._stop, visible=job is not None)
         if job is not None:
-            write_label(self._stop, f"✕ {shortened(job.name, LONGEST_JOB)} {job.fraction:.0%}")
+            write_label(self._stop, f"✕ {job.fraction:.0%} {shortened(job.name, LONGEST_JOB)}")
 
 
 class CameraButtons(BasePanel):

@@ -59,9 +59,13 @@ class Reach:
         if self.folders is None or sender.browser is None:
             return path
         target = _resolved(typed_path(str(path)))  # who reads it must not find another meaning of ~
-        if not self._holds(target) or not all(self._holds(_resolved(link)) for link in _links_in(target)):
-            names = ", ".join(str(folder) for folder in self.folders) or "none"
+        names = ", ".join(str(folder) for folder in self.folders) or "none"
+        if not self._holds(target):
             raise UsageError(f"{path}: is out of reach; expected a path in the folders that are shared: {names}")
+        astray = next((link for link in _links_in(target) if not self._holds(_resolved(link))), None)
+        if astray is not None:
+            where = astray.relative_to(target)
+            raise UsageError(f"{path}: its link {where} leads out of reach; expected all of it in the folders: {names}")
         return target
 
     def lists(self, path: Path, sender: Sender) -> bool:

@@ -121,6 +121,19 @@ div:has(>div>.c-top)>div:has(.c-now){{position:absolute}}
  .c-s-list{{font-size:11px;height:calc(var(--c-bottom) - 48px)}} .c-s-head{{margin-right:0}}}}
 [data-dock-region=right] [data-dock-scroll]>div:has(.c-points){{flex-grow:1.3!important}}
 :root[data-mantine-color-scheme]{{--mantine-color-dimmed:{css(Surface.AXIS.dark)}!important}}
+[data-mantine-color-scheme=light] .mantine-Button-root:is([style*=gray-filled],[style*=dark-filled]):not(:disabled){{
+ background:{css(Surface.BADGE.dark)};color:{css(Worded.INK.dark)};border-color:{css(Surface.EDGE_QUIET.dark)};
+ &:hover{{background:{css(Surface.PRESSED.dark)}}}}}
+[data-with-border]:has(>.mantine-Paper-root+[aria-hidden=true]){{border-width:1px 0 0!important;border-radius:0;
+ padding-top:6px}}
+[data-with-border]>.mantine-Paper-root+[aria-hidden=true]+*{{display:none!important}}
+[data-dock-region] .mantine-Slider-root~.mantine-NumberInput-root{{width:68px!important;margin-left:6px!important}}
+.c-reflectors :is(td,th):first-child{{position:sticky;left:-8px;z-index:1;background:{css(Surface.HEAD.dark)}}}
+.c-reflectors th:first-child{{z-index:2}}
+div:has(>div>.c-bottom)>:nth-child(5) .mantine-NumberInput-root{{width:60.4px!important}}
+div:has(>div>.c-bottom)>:nth-child(5) .mantine-NumberInput-input{{padding-right:15px!important}}
+div:has(>div>.c-bottom)>:nth-child(5) .mantine-NumberInput-wrapper::after{{content:"s" / "";position:absolute;
+ right:7px;top:50%;transform:translateY(-50%);font-size:11px;opacity:.7;pointer-events:none;z-index:2}}
 .c-layers{{padding:0 8px 4px;font-size:12px}}
 .c-layers h4{{margin:6px 0 1px;font-size:11px;font-weight:600;opacity:.65;
  border-bottom:1px solid {css(Surface.EDGE.dark)}}}

@@ -220,7 +220,7 @@ div:has(>div>.c-top)>:first-child{{flex:1;min-width:0}}
 div:has(>div>.c-top) button{{height:26px!important;padding:0 10px!important;font-size:12px!important}}
 div:has(>div>.c-top) .mantine-Flex-root{{flex-wrap:nowrap!important}}
 div:has(>div>.c-top)>div>.mantine-Flex-root>[style*="flex-shrink: 0"]{{display:none}}
-div:has(>div>.c-top) .mantine-Button-label{{overflow:hidden;text-overflow:ellipsis}}
+div:has(>div>.c-top) .mantine-Button-label{{display:block;line-height:26px;overflow:hidden;text-overflow:ellipsis}}
 div:has(>div>.c-bottom){{display:grid;grid-template-columns:repeat(24,minmax(0,1fr));align-items:center;
  padding-top:2px!important}}
 div:has(>div>.c-bottom)>:nth-child(-n+5){{grid-row:1}}
@@ -232,7 +232,7 @@ div:has(>div>.c-bottom)>:nth-child(3){{grid-column:8/span 2}}
 div:has(>div>.c-bottom)>:nth-child(4){{grid-column:10/span 3}}
 div:has(>div>.c-bottom)>:nth-child(5){{grid-column:14/span 11}}
 div:has(>div>.c-bottom)>:nth-child(6){{grid-column:14/span 11;margin:-9px 0 2px!important;
- padding:0 67px 0 18px!important}}
+ padding:0 83px 0 18px!important}}
 div:has(>div>.c-bottom)>:nth-child(n+7){{grid-column:span 24;padding:0!important;margin:0!important}}
 div:has(>.c-carried){{display:none!important}}
 .c-instruments{{height:calc(var(--c-bottom) - 50px)}}
@@ -354,7 +354,9 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 @media (max-height:800px){{.c-a-picture{{max-width:156px!important}}
  [data-shows~=c-association] [data-dock-scroll]>div:has(.c-association){{flex-grow:2.2!important}}
  :root:not([data-shows~=c-association]) [data-dock-region=right] [data-dock-scroll]>div:has([role=tab][title=Selection])
- {{flex-grow:1.5!important}}}}
+ {{flex-grow:1.5!important}}
+ :root:has(.c-nothing):not([data-shows~=c-association]) [data-dock-region=right] [data-dock-scroll]>
+ div:has([role=tab][title=Selection][aria-selected=true]){{flex-grow:.5!important}}}}
 .mantine-Slider-markWrapper:only-child .mantine-Slider-mark{{background:{css(SELECTED)};border:none;width:2px;
  height:12px;border-radius:0;transform:translateY(-3px)!important}}
 div:has(>div>.c-bottom):has(.c-no-run) button{{opacity:.35;pointer-events:none}}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from viser import GuiApi
 
+from commission.app.base import theme, viser_private
 from commission.app.base.conditions import Conditions, SetCondition
 from commission.app.base.floor_picture import FloorPicture, SetOpacity
 from commission.app.base.inputs import Inputs, WorkBar, enable, show
@@ -29,7 +30,8 @@ class HeatmapPanel(BasePanel):
         self._floor = Inputs(gui, post, lambda _name, value: SetOpacity(float(value or 0.0)), _of_picture)
         self._conditions = Inputs(gui, post, SetCondition, lambda state, name: get_field(state.part(Conditions), name))
         first = CoverageSettings()
-        inputs.choice("figure", first, FIGURE_NAMES)
+        figure = inputs.choice("figure", first, FIGURE_NAMES)
+        gui.add_html(theme.whole_line(viser_private.identifier(figure)))
         self._work = WorkBar(gui, post, COVERAGE, SetCoverage("figure", Figure.NONE.value))
         self._floor.field("opacity", FloorPicture())
         inputs.choice("heading", first, HEADING_NAMES)

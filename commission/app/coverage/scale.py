@@ -49,19 +49,19 @@ QUANTITIES: dict[Figure, ShownFigure] = {
     Figure.VISIBLE: ShownFigure(label="Visible reflectors", bounds=COUNTS, more_is_better=True),
     Figure.POSITION_SIGMA: ShownFigure(label="Position error, 1σ [mm]", shown=MILLIMETRES),
     Figure.HEADING_SIGMA: ShownFigure(label="Heading error, 1σ [°]", shown=DEGREES),
-    Figure.TOTAL_SIGMA: ShownFigure(label="Position error with constants, 1σ [mm]", shown=MILLIMETRES),
-    Figure.CONTOUR_POSITION: ShownFigure(label="Position error by contours, 1σ [mm]", shown=MILLIMETRES),
-    Figure.CONTOUR_HEADING: ShownFigure(label="Heading error by contours, 1σ [°]", shown=DEGREES),
+    Figure.TOTAL_SIGMA: ShownFigure(label="With constants: position error, 1σ [mm]", shown=MILLIMETRES),
+    Figure.CONTOUR_POSITION: ShownFigure(label="Contours: position error, 1σ [mm]", shown=MILLIMETRES),
+    Figure.CONTOUR_HEADING: ShownFigure(label="Contours: heading error, 1σ [°]", shown=DEGREES),
     Figure.POSITION_DOP: ShownFigure(label="Position dilution (DOP)"),
     Figure.HEADING_DOP: ShownFigure(label="Heading dilution (DOP)"),
     Figure.EXPECTED_VISIBLE: ShownFigure(
-        label="Visible among people, mean", bounds=(1.0, *COUNTS), more_is_better=True
+        label="Among people: visible, mean", bounds=(1.0, *COUNTS), more_is_better=True
     ),
     Figure.TWO_OR_MORE: ShownFigure(
-        label="Chance of 2 or more [%]", shown=PERCENT, bounds=CHANCES, more_is_better=True
+        label="2 or more seen: chance [%]", shown=PERCENT, bounds=CHANCES, more_is_better=True
     ),
     Figure.THREE_OR_MORE: ShownFigure(
-        label="Chance of 3 or more [%]", shown=PERCENT, bounds=CHANCES, more_is_better=True
+        label="3 or more seen: chance [%]", shown=PERCENT, bounds=CHANCES, more_is_better=True
     ),
 }
 

@@ -110,4 +110,6 @@ def exchange_failed(action: actions.ExchangeFailed, state: AppState, sender: Sen
         return Outcome(state)
     text = " ".join(action.text.split())
     text = text if len(text) <= PROBLEM_LIMIT else f"{text[: PROBLEM_LIMIT - 1]}…"
-    return Outcome(state.with_browser(sender.browser, replace(exchange, reading=None, problem=text)))
+    failed = state.with_browser(sender.browser, replace(exchange, reading=None, problem=text))
+    # Who dropped the file anywhere on the page need not see the panel.
+    return Outcome(failed, (Tell(text, failed=True),))

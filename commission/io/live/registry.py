@@ -91,7 +91,9 @@ class SourceAddress:
         if not rest:
             port = str(KINDS[name].port)
         if not (port.isascii() and port.isdecimal() and len(port) <= 5 and int(port) <= LAST_PORT):
-            raise UsageError(f"source {text!r} has no port; expected {name}:HOST:PORT such as {name}:{LOCAL}:6061")
+            found = f"has {port[:20]!r} for a port;" if port else "has no port;"
+            expected = f"{name}:HOST:PORT such as {name}:{LOCAL}:6061, PORT up to {LAST_PORT}"
+            raise UsageError(f"source {text!r} {found} expected {expected}")
         return SourceAddress(name, host.strip("[]") or LOCAL, int(port), scanner or None)
 
     @property
