@@ -8,6 +8,8 @@
   window.commissionMarks = true;
   const LOOK_FOR_NEW_MS = 200;
   const ARM_PX = 2; // thickness of a cross
+  const PICTURES = ["/plan/heat", "/plan/ambiguity", "/plan/difference"];
+  const CASING = /^\/(?!routes_).*_casing(\/\d+px)?$/; // that of routes is seen on walls, too
   const held = new WeakSet();
 
   function hold(points, pixels) {
@@ -32,8 +34,22 @@
     material.needsUpdate = true;
   }
 
+  // What is around thin marks is drawn where there is a heatmap below them: on plain floor it is hardly seen, and without a
+  // graphics card it takes a third of the time of a picture.
+  let isCased = null;
+  function showCasings(nodes) {
+    const isOver = PICTURES.some((name) => nodes[name]?.visible);
+    for (const [name, node] of Object.entries(nodes)) {
+      if (!CASING.test(name)) continue;
+      node.traverse((part) => { if (part !== node && (part.isMesh || part.isPoints)) part.visible = isOver; });
+    }
+    if (isCased !== isOver) window.__viserMutable?.requestRender?.();
+    isCased = isOver;
+  }
+
   setInterval(() => {
     const nodes = window.__viserMutable?.nodeRefFromName ?? {};
+    showCasings(nodes);
     for (const [name, node] of Object.entries(nodes)) {
       const size = /\/(\d+)px$/.exec(name);
       if (size) node.traverse((part) => { if (part.isPoints && !held.has(part)) hold(part, Number(size[1])); });

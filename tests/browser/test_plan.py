@@ -46,6 +46,16 @@ class OpenSite(Served):
         return self.runtime.service(PlacementService).view
 
 
+CASED = """(expected) => {
+  const found = [];
+  window.__viserMutable.nodeRefFromName["/reflectors/shapes_casing"]?.traverse((part) => {
+    if (part.isMesh) found.push(part.visible);
+  });
+  return found.length > 0 && found.every((each) => each === expected);
+}"""
+"""Whether what is around thin marks is drawn."""
+
+
 @pytest.fixture(scope="module")
 def site() -> Iterator[OpenSite]:
     opened = OpenSite()
@@ -78,9 +88,11 @@ def even_spot(heat: HeatView) -> tuple[int, tuple[float, float]]:
 
 def test_a_heatmap_is_switched_on_seen_and_read(page: OpenPage, site: OpenSite) -> None:
     before = shot_of(page)
+    page.page.wait_for_function(CASED, arg=False)  # a third of the time of a picture, where it is hardly seen
     page.choose("Show", "Visible reflectors")
     site.until(lambda: site.heat is not None)
     page.wait_until_drawn(["/plan/heat"])
+    page.page.wait_for_function(CASED, arg=True)
     page.page.wait_for_timeout(1500)
     heat = site.heat
     assert heat is not None
