@@ -220,7 +220,8 @@ div:has(>div>.c-top)>:first-child{{flex:1;min-width:0}}
 div:has(>div>.c-top) button{{height:26px!important;padding:0 10px!important;font-size:12px!important}}
 div:has(>div>.c-top) .mantine-Flex-root{{flex-wrap:nowrap!important}}
 div:has(>div>.c-top)>div>.mantine-Flex-root>[style*="flex-shrink: 0"]{{display:none}}
-div:has(>div>.c-top) .mantine-Button-label{{display:block;line-height:26px;overflow:hidden;text-overflow:ellipsis}}
+div:has(>div>.c-top) .mantine-Button-label{{display:block;height:auto;line-height:1.4;
+ overflow:hidden;text-overflow:ellipsis}}
 div:has(>div>.c-bottom){{display:grid;grid-template-columns:repeat(24,minmax(0,1fr));align-items:center;
  padding-top:2px!important}}
 div:has(>div>.c-bottom)>:nth-child(-n+5){{grid-row:1}}
