@@ -179,7 +179,7 @@ class RunColumns:
         return Estimate(
             stamp_ns=stamp_ns,
             prior=Belief(stamp_ns, *self.priors.at(cycle)),
-            posterior=self._posterior(cycle),
+            posterior=self.belief(cycle),
             output=self._output(cycle),
             mode=Mode(int(self.modes[cycle])),
             detections=detections,
@@ -229,7 +229,7 @@ class RunColumns:
         figures = self.tags[rows] if self.segment(cycle).setup.tag_model is not None else None
         return SeenTags(seen.sightings[rows], tuple(seen.ids[rows].tolist()), figures)
 
-    def _posterior(self, cycle: int) -> Belief:
+    def belief(self, cycle: int) -> Belief:
         """Return the filter's own belief after a cycle."""
         return Belief(int(self.stamps_ns[cycle]), self.means[cycle], self.covariances[cycle])
 
@@ -237,4 +237,4 @@ class RunColumns:
         """Return what the vehicle is given after a cycle: the belief of the last operational one."""
         operational = self.modes[cycle::-1] == Mode.OPERATIONAL
         back = int(np.argmax(operational))
-        return self._posterior(cycle - back) if operational[back] else output_of(self.checkpoints[0].state)
+        return self.belief(cycle - back) if operational[back] else output_of(self.checkpoints[0].state)

@@ -40,9 +40,10 @@ class BearingLog:
 
     @staticmethod
     def of(records: Sequence[Reflex]) -> BearingLog:
-        """Gather reflexes in order of their stamps."""
+        """Gather reflexes, whatever their order, in that of their stamps."""
         if not records:
             return NO_BEARINGS
+        records = sorted(records, key=lambda record: record.stamp_ns)
         return BearingLog(
             stamps_ns=np.array([record.stamp_ns for record in records], dtype=np.int64),
             bearings=np.array([record.bearing for record in records]),

@@ -68,7 +68,11 @@ LONGEST_WRONG = 15
 # All kinds at once are a filter of their own, which takes half a minute to compile.
 @pytest.fixture(scope="module", params=few_of(list(KINDS), KINDS.keys() - {"all"}))
 def project(request: pytest.FixtureRequest) -> Project:
-    posts, tags, parameters, scanners = KINDS[request.param]
+    return project_of(request.param)
+
+
+def project_of(kind: str) -> Project:
+    posts, tags, parameters, scanners = KINDS[kind]
     segment = Segment(control_points=np.array(((3.0, 3.0), (4.0, 3.2), (5.5, 4.2), (6.5, 4.5))), degree=3)
     return Project(
         floor_map=room(origin=(0.4, -0.3, 0.1)),

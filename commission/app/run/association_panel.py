@@ -99,11 +99,11 @@ def associated(run: RunView, wanted: str) -> Association | None:
     run : at its cursor.
     wanted : id of the reflector; empty: the worst of the scan.
     """
-    if run.estimate is None:
+    if run.estimate is None or run.estimate.bearing is not None:
         return None
     given = AssociationInput(
         columns=run.result.columns,
-        cycle=run.newest,
+        cycle=run.seen,
         estimate=run.estimate,
         covariances=run.areas,
         reflector=wanted,
@@ -124,6 +124,8 @@ def _nothing(run: RunView, wanted: str) -> str:
     """Say why there is nothing to look at."""
     if run.estimate is None:
         return "Numbers appear with the first scan."
+    if run.estimate.bearing is not None:
+        return "The goniometer tells bearings alone; what became of them is told with the numbers of now."
     if wanted:
         return "The selected reflector is not in the map of this scan."
     return "No detection of this scan lies near a reflector. Select a reflector to see where it was expected."

@@ -7,6 +7,7 @@ from commission.app.run import reducer, variant_reducer
 from commission.app.run.accumulated_layer import AccumulatedLayer
 from commission.app.run.association_panel import AssociationPanel
 from commission.app.run.badge import Badge
+from commission.app.run.bearing_layer import BearingLayer
 from commission.app.run.camera_layer import CameraLayer
 from commission.app.run.camera_panel import CameraPanel
 from commission.app.run.detection_layer import DetectionLayer
@@ -38,6 +39,7 @@ FEATURE = Feature(
         GateLayer,
         ScanLayer,
         DetectionLayer,
+        BearingLayer,
         AccumulatedLayer,
         VehicleLayer,
         UncertaintyLayer,

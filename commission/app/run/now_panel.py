@@ -11,6 +11,7 @@ from commission.app.base.panel import BasePanel, escaped, table
 from commission.app.base.view import PageView
 from commission.app.run.found_table import Found
 from commission.app.run.summary_panel import known, share
+from commission.app.run.turn import turn_told
 from commission.app.run.view import RunView
 from commission.localization.detector import passing_widths
 from commission.localization.estimate import Estimate, Mode, Status
@@ -41,12 +42,12 @@ def rows(run: RunView, found: Found | None = None) -> list[tuple[str, str]]:
     episodes = ("Fail episodes so far", str(len(run.lived_episodes)))
     if run.estimate is None:
         return [*shown, episodes]
-    result, newest = run.result, run.newest
+    result, newest, seen = run.result, run.newest, run.seen
     limits = run.segment.setup.parameters.supervisor
     sigma_x, sigma_y, sigma_heading = result.two_sigma[newest]
     largest = result.position_two_sigma[newest]
     estimate = run.estimate
-    nis = f"{result.nis[newest]:.2f}" if math.isfinite(result.nis[newest]) else "none seen"
+    nis = f"{result.nis[seen]:.2f}" if math.isfinite(result.nis[seen]) else "none seen"
     error = result.position_errors[newest]
     shown += [
         ("2σ position / limit", MILLIMETRES.against(largest, limits.position_limit)),
@@ -59,6 +60,7 @@ def rows(run: RunView, found: Found | None = None) -> list[tuple[str, str]]:
         ),
         *_protection(run, found),
         ("Largest NIS / gate", f"{nis} / {estimate.gate:.2f}"),
+        *turn_told(run.turn),
         ("NIS of all / expected, 1 s", f"{known(result.recent.nis[newest])} / 2"),
         ("Rejected, 1 s", share(result.recent.rejected[newest])),
         *_of_scanners(result),

@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from commission.app.run.turn import turn_at
 from commission.app.run.view import Accumulated, RunView
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray, IntArray
@@ -120,19 +121,22 @@ class Playback:
         whole : with every detection so far, which takes longest to copy and draw.
         """
         columns, lived = self._result.columns, self.lived
-        estimate = columns.estimate(lived - 1) if lived else None
-        belief = columns.initial if estimate is None else estimate.posterior
+        seen = _newest_seen(columns, lived)
+        estimate = columns.estimate(seen) if lived else None
+        belief = columns.belief(lived - 1) if lived else columns.initial
         segment = columns.segment(max(lived - 1, 0))
         scans = self._scan_points(belief, segment.setup)
-        areas = self._areas(lived, estimate, segment.setup)
+        areas = self._areas(seen, estimate, segment.setup)
         return RunView(
             result=self._result,
             lived=lived,
             time=self.time,
             pose=belief.mean,
             covariance=belief.covariance,
-            mode=Mode.OPERATIONAL if estimate is None else estimate.mode,
+            mode=Mode(int(columns.modes[lived - 1])) if lived else Mode.OPERATIONAL,
             estimate=estimate,
+            seen=seen,
+            turn=turn_at(columns, lived, self._at_ns, segment.setup),
             segment=segment,
             covered=covered,
             scan_map=np.concatenate(scans),
@@ -145,13 +149,13 @@ class Playback:
             temporary=self._temporary(lived, segment.setup),
         )
 
-    def _areas(self, lived: int, estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
-        """(N, 2, 2) where on the floor each reflector was expected to be detected, 1-sigma [m^2]."""
-        if estimate is None:
+    def _areas(self, seen: int, estimate: Estimate | None, setup: LocalizerSetup) -> FloatArray:
+        """(N, 2, 2) where on the floor each reflector was expected to be detected, 1-sigma [m^2]; none by bearings."""
+        if estimate is None or estimate.bearing is not None:
             return np.empty((0, 2, 2))
         before, twist = None, np.zeros(3)
         if setup.constants is not None:
-            before = self._state_before(lived - 1)
+            before = self._state_before(seen)
             wheels, usual_ns = setup.parameters.odometry, before.motion.usual_ns
             twist = _twist_over(self._result.inputs.log, estimate.stamp_ns, usual_ns, wheels)
         return validation_ellipses(setup, estimate.prior, scanner=estimate.scanner, before=before, twist=twist)
@@ -209,9 +213,20 @@ class Playback:
         return points
 
 
+def _newest_seen(columns: RunColumns, lived: int) -> int:
+    """Return the newest cycle that is no reflex of a goniometer; where all are, the newest; -1 before the first."""
+    met = columns.detected.bearings
+    if met is None or not lived:
+        return lived - 1
+    if met.rows_before(lived) == lived:
+        return lived - 1
+    back = int(np.argmin(met.is_reflex[:lived][::-1]))
+    return lived - 1 - back
+
+
 def _gates(estimate: Estimate | None, setup: LocalizerSetup, areas: FloatArray) -> FloatArray:
     """(R, n, 2) validation areas of the reflectors that the scanner could see if nothing stood in between."""
-    if estimate is None or not len(setup.reflectors):
+    if estimate is None or estimate.bearing is not None or not len(setup.reflectors):
         return np.empty((0, GATE_POINTS, 2))
     scanner = setup.scanners[estimate.scanner]
     seen = range_bearing(estimate.prior.mean, scanner.mounting, setup.reflectors.centers)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import TypeAlias
 
+from commission.app.run.turn import Turn
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Estimate, Mode
 from commission.localization.hypotheses import Hypothesis
@@ -67,7 +68,8 @@ class RunView:
     mode: Mode
     """State of the supervisor."""
     estimate: Estimate | None
-    """The newest cycle; none before the first."""
+    """The newest cycle, or where the vehicle has a goniometer beside a laser the newest that is no reflex; none before
+    the first."""
     segment: RunSegment
     """What the newest cycle was made with."""
     covered: bool
@@ -84,6 +86,10 @@ class RunView:
     """(R, n, 2) outlines of the validation areas of the reflectors in view [m], map frame."""
     accumulated: Accumulated | None
     """Every detection so far; none in views that are drawn at the full rate."""
+    seen: int = -1
+    """Index of that cycle; -1 before the first."""
+    turn: Turn | None = None
+    """Bearings of the newest turn of the goniometer; none where there is none."""
     hypotheses: tuple[Hypothesis, ...] = ()
     """Where it may be, the likeliest first, while it looks where it is; else none."""
     temporary: TemporaryLandmarks | None = None
