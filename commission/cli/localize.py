@@ -226,19 +226,12 @@ def _named(option: str) -> Generator[None]:
 
 def _report(result: RunResult, cut: Sequence[Section]) -> list[str]:
     """Lines that tell a person how the run went; millimetres and degrees as is the habit."""
-    from commission.localization.estimate import Status
-
-    fits = result.consistency
     limit = result.inputs.segments[0].setup.parameters.supervisor.position_limit
     lines = [
         f"Recording    {result.cycles} cycles in {result.duration:.1f} s",
         f"Start        {_start(result)}",
-        f"Detections   {result.count(Status.INLIER)} inliers, "
-        f"{result.count(Status.OUTLIER_DETECTOR)} outliers of the detector, "
-        f"{result.count(Status.OUTLIER_ASSOCIATION)} of the association",
-        f"NIS          {_nis(fits)}",
-        f"Unseen       {_known(PERCENT.of(fits.unseen_fraction), 1)} % of the cycles without an accepted detection, "
-        f"{_seconds(fits.longest_unseen)} at most",
+        *(_of_scans(result) if result.columns.has_scans else ()),
+        *_by_bearings(result),
         *_by_section(cut),
         *_by_scanner(result),
         *_by_goods(result),
@@ -354,6 +347,36 @@ def _by_scanner(result: RunResult) -> list[str]:
     if len(result.scanners) == 1:
         return []
     return [f"Scanner      {each.name}: {told(each)}" for each in result.scanners]
+
+
+def _of_scans(result: RunResult) -> list[str]:
+    """Lines about what scans saw of reflectors."""
+    from commission.localization.estimate import Status
+
+    fits = result.consistency
+    return [
+        f"Detections   {result.count(Status.INLIER)} inliers, "
+        f"{result.count(Status.OUTLIER_DETECTOR)} outliers of the detector, "
+        f"{result.count(Status.OUTLIER_ASSOCIATION)} of the association",
+        f"NIS          {_nis(fits)}",
+        f"Unseen       {_known(PERCENT.of(fits.unseen_fraction), 1)} % of the cycles without an accepted detection, "
+        f"{_seconds(fits.longest_unseen)} at most",
+    ]
+
+
+def _by_bearings(result: RunResult) -> list[str]:
+    """A line about bearings of a goniometer, where the recording has any."""
+    from commission.studies.bearing_figures import bearing_figures
+
+    told = bearing_figures(result.columns)
+    if not told:
+        return []
+    nis = told["bearing_nis_before_gate_mean"]
+    fits = "" if nis is None else f"; NIS {nis:.2f} with the rejected ones (1 is consistent)"
+    return [
+        f"Bearings     {told['bearings']}: {told['bearing_accepted']} accepted, {told['bearing_rejected']} rejected, "
+        f"{told['bearing_unknown']} of two reflectors or of none of the map{fits}"
+    ]
 
 
 def _by_goods(result: RunResult) -> list[str]:

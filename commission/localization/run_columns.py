@@ -207,6 +207,12 @@ class RunColumns:
         """Whether a cycle is a reflex of the goniometer, and no scan."""
         return self.detected.bearings is not None and bool(self.detected.bearings.is_reflex[cycle])
 
+    @property
+    def has_scans(self) -> bool:
+        """Whether any cycle is a scan, or there are none at all."""
+        is_scan = self.detected.is_scan
+        return is_scan is None or bool(is_scan.any())
+
     def is_scan(self, cycle: int) -> bool:
         """Whether a cycle is a scan, and neither a frame nor a reflex."""
         return not self.is_frame(cycle) and not self.is_reflex(cycle)

@@ -6,9 +6,14 @@ import numpy as np
 
 from commission.localization.bearings import NIS, USE, BearingUse
 from commission.localization.run_columns import RunColumns
+from commission.site.quantity import PERCENT
 from commission.studies.plausibility import Finding
 
 Number = int | float | None
+FEWEST_JUDGED = 50
+"""Bearings from which on a share of them says something."""
+LARGEST_REJECTED, LARGEST_NIS = 0.05, 2.0
+"""Share of rejected bearings, and mean NIS, beyond which the filter takes them for better than they are."""
 
 
 def bearing_figures(columns: RunColumns) -> dict[str, Number]:
@@ -66,4 +71,24 @@ def bearing_findings(columns: RunColumns) -> tuple[Finding, ...]:
         found = f"none of {count} bearings is of a reflector of the map"
         probably = f"their ids are written otherwise: {', '.join(map(repr, names[:3]))}"
         return (Finding(found=found, probably=probably, remedy="compare with reflectors.csv"),)
-    return ()
+    return _disagreeing(columns)
+
+
+def _disagreeing(columns: RunColumns) -> tuple[Finding, ...]:
+    """Say when bearings are farther off than the filter takes them to be."""
+    figures = bearing_figures(columns)
+    accepted, rejected = figures["bearing_accepted"] or 0, figures["bearing_rejected"] or 0
+    nis = figures["bearing_nis_before_gate_mean"]
+    if accepted + rejected < FEWEST_JUDGED:
+        return ()
+    share = rejected / (accepted + rejected)
+    if share <= LARGEST_REJECTED and (nis is None or nis <= LARGEST_NIS):
+        return ()
+    fits = "" if nis is None else f", and their NIS is {nis:.1f} where 1 is expected"
+    probably = "goniometer, mounting or map are off by more than the project says, or other things shine"
+    remedy = "enter what is known of them (bearing_sigma_deg, uncertainty, sigma in reflectors.csv)"
+    return (
+        Finding(
+            found=f"{PERCENT.text(share, '.1f')} of the bearings are rejected{fits}", probably=probably, remedy=remedy
+        ),
+    )

@@ -63,7 +63,7 @@ class ScannerFigures:
 def scanner_figures(
     columns: RunColumns, references: FloatArray, tallies: Tallies | None = None
 ) -> tuple[ScannerFigures, ...]:
-    """Figures of each scanner of the last setup of a run.
+    """Figures of each scanner of the last setup of a run that measures ranges.
 
     Parameters
     ----------
@@ -74,7 +74,11 @@ def scanner_figures(
     names = [scanner.name for scanner in columns.segments[-1].setup.scanners]
     tallies = tallies_of(columns) if tallies is None else tallies
     means = _means_of_near(columns, references, names)
-    return tuple(_figures(name, columns, tallies, means[index]) for index, name in enumerate(names))
+    # What a goniometer tells is no detection: its figures are `bearing_figures`.
+    turning = {scanner.name for scanner in columns.segments[-1].setup.scanners if scanner.is_goniometer}
+    return tuple(
+        _figures(name, columns, tallies, means[index]) for index, name in enumerate(names) if name not in turning
+    )
 
 
 def _means_of_near(columns: RunColumns, references: FloatArray, names: list[str]) -> FloatArray:

@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from commission.geometry import se2
 from commission.geometry.angles import wrap
@@ -33,12 +34,15 @@ from commission.localization.pose_gaussian import covariance_of, from_belief, me
 from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.whole_run import run, run_segments, state_before
-from commission.site.parameters import BearingParameters, ObservationParameters, Parameters
+from commission.site.parameters import BearingParameters, ObservationParameters, OdometryParameters, Parameters
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry, Reflex, TagSightings
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner, ScannerKind
 from commission.site.tags import Tag
+from commission.site.uncertainty import Uncertainty
+from commission.studies.bearing_figures import bearing_findings
+from tests.conftest import REPOSITORY
 
 GONIOMETER = Scanner(
     name="goniometer",
@@ -170,6 +174,42 @@ def test_a_reflector_at_the_goniometer_itself_gives_no_number_that_is_none():
     after, _ = corrected(belief_at(POSE, 1e-4 * np.eye(3)), 0.3, 0, places=there)
     assert np.isfinite(mean_of(after)).all()
     assert np.linalg.eigvalsh(covariance_of(after)).min() > 0.0
+
+
+def test_a_real_goniometer_whose_bearings_are_off_by_degrees_is_not_believed_more_than_it_is_right():
+    """Nine places at rest, 200 turns each; what it is off by stays, so that it is considered and does not average."""
+    folder = REPOSITORY.parent / "shared" / "data" / "goniometer"
+    if not folder.exists():
+        pytest.skip("the recordings of a real goniometer are not here")
+    marks = np.loadtxt(folder / "landmark.csv", delimiter=",")
+    still = OdometryParameters(acceleration=0.0, turn_acceleration=0.0, forward_per_sqrt_s=0.0, heading_per_sqrt_s=0.0)
+    known = Uncertainty(survey=0.12, mounting_heading=0.02)
+    nees, told = [], 0
+    for path in sorted(folder.glob("X*_Y*.csv")):
+        true, records = np.array((float(path.stem[1:4]), float(path.stem[6:9]), math.pi / 2)), []
+        for k, turn in enumerate(np.radians(np.loadtxt(path, delimiter=","))):
+            records.append(Odometry(k * 200_000_000, np.zeros(3)))
+            records += [Reflex(k * 200_000_000 + i * 50_000_000, float(wrap(b))) for i, b in enumerate(turn)]
+        log = RecordLog.collect(records)
+        setup = LocalizerSetup(
+            reflectors=ReflectorMap(tuple(Reflector(id=f"{i}", x=x, y=y) for i, (x, y) in enumerate(marks.tolist()))),
+            scanners=(dataclasses.replace(GONIOMETER, mounting=np.zeros(3), bearing_sigma_deg=1.0),),
+            parameters=Parameters(odometry=still),
+            uncertainty=known,
+        )
+        start = Belief(0, true + np.array((0.1, 0.1, 0.05)), np.diag((0.15**2, 0.15**2, 0.1**2)))
+        result = run(log, setup, start)
+        error = result.means[-1] - true
+        nees.append(error @ np.linalg.solve(result.covariances[-1], error))
+        assert (result.bearings[:, USE] == BearingUse.ACCEPTED).mean() > 0.9
+        # 2-sigma is beyond what the supervisor allows: nobody drives by it.
+        assert (result.modes == Mode.FAIL).all()
+        sure = run(log, dataclasses.replace(setup, uncertainty=Uncertainty()), start)
+        told += bool(bearing_findings(sure))
+    # Chi-square, 3 degrees of freedom at each of nine places.
+    assert sum(nees) < chi2.ppf(0.99, 27), nees
+    # Taken for as good as a laser, it is told at those places where bearings contradict each other.
+    assert told >= 3
 
 
 LASER = Scanner(name="laser")
