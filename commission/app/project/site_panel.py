@@ -30,7 +30,8 @@ def rows(project: Project) -> list[tuple[str, str]]:
     for scanner in project.scanners:
         first, last = scanner.field_of_view_deg
         label = "Scanner" if len(project.scanners) == 1 else f"Scanner {escaped(scanner.name)}"
-        shown.append((label, f"{scanner.beam_count} beams, {first:g} to {last:g}°"))
+        seen = f"goniometer, {scanner.rate:g} turns/s" if scanner.is_goniometer else f"{scanner.beam_count} beams"
+        shown.append((label, f"{seen}, {first:g} to {last:g}°"))
     return shown
 
 

@@ -42,27 +42,20 @@ def rows(run: RunView, found: Found | None = None) -> list[tuple[str, str]]:
     episodes = ("Fail episodes so far", str(len(run.lived_episodes)))
     if run.estimate is None:
         return [*shown, episodes]
-    result, newest, seen = run.result, run.newest, run.seen
+    result, newest = run.result, run.newest
     limits = run.segment.setup.parameters.supervisor
     sigma_x, sigma_y, sigma_heading = result.two_sigma[newest]
     largest = result.position_two_sigma[newest]
     estimate = run.estimate
-    nis = f"{result.nis[seen]:.2f}" if math.isfinite(result.nis[seen]) else "none seen"
     error = result.position_errors[newest]
     shown += [
         ("2σ position / limit", MILLIMETRES.against(largest, limits.position_limit)),
         ("2σ along x, along y", f"{MILLIMETRES.number(sigma_x, '.1f')}, {MILLIMETRES.text(sigma_y, '.1f')}"),
         ("2σ heading / limit", DEGREES.against(sigma_heading, limits.heading_limit, (".2f", ".1f"))),
-        ("Inliers", str(estimate.count(Status.INLIER))),
-        (
-            "Outliers: beams, gate",
-            f"{estimate.count(Status.OUTLIER_DETECTOR)}, {estimate.count(Status.OUTLIER_ASSOCIATION)}",
-        ),
-        *_protection(run, found),
-        ("Largest NIS / gate", f"{nis} / {estimate.gate:.2f}"),
         *turn_told(run.turn),
-        ("NIS of all / expected, 1 s", f"{known(result.recent.nis[newest])} / 2"),
-        ("Rejected, 1 s", share(result.recent.rejected[newest])),
+        *(_counts(estimate) if estimate.bearing is None else ()),
+        *_protection(run, found),
+        *(_fits(run, estimate) if estimate.bearing is None else ()),
         *_of_scanners(result),
         episodes,
         ("Cycle time", f"{result.microseconds_per_cycle:.1f} µs, mean of the drive"),
@@ -70,6 +63,23 @@ def rows(run: RunView, found: Found | None = None) -> list[tuple[str, str]]:
     ]
     truth = result.inputs.log.truth
     return shown if truth is None else [*shown, *((f"True {what}", text) for what, text in truth_told(truth))]
+
+
+def _counts(estimate: Estimate) -> list[tuple[str, str]]:
+    """How many detections of the newest scan are used."""
+    beams, gate = estimate.count(Status.OUTLIER_DETECTOR), estimate.count(Status.OUTLIER_ASSOCIATION)
+    return [("Inliers", str(estimate.count(Status.INLIER))), ("Outliers: beams, gate", f"{beams}, {gate}")]
+
+
+def _fits(run: RunView, estimate: Estimate) -> list[tuple[str, str]]:
+    """How well detections fit, of the newest scan and of late."""
+    result, newest, worst = run.result, run.newest, run.result.nis[run.seen]
+    nis = f"{worst:.2f}" if math.isfinite(worst) else "none seen"
+    return [
+        ("Largest NIS / gate", f"{nis} / {estimate.gate:.2f}"),
+        ("NIS of all / expected, 1 s", f"{known(result.recent.nis[newest])} / 2"),
+        ("Rejected, 1 s", share(result.recent.rejected[newest])),
+    ]
 
 
 def _protection(run: RunView, found: Found | None) -> list[tuple[str, str]]:

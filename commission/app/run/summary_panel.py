@@ -13,6 +13,7 @@ from commission.app.base.view import PageView
 from commission.app.run.view import RunView
 from commission.site.quantity import PERCENT
 from commission.site.stations import Station
+from commission.studies.bearing_figures import bearing_figures, bearing_findings
 from commission.studies.consistency import Consistency
 from commission.studies.consistency_findings import consistency_findings
 from commission.studies.run import RunResult
@@ -39,7 +40,7 @@ class SummaryPanel(BasePanel):
 
 def summary(result: RunResult, stations: tuple[Station, ...]) -> str:
     """Return what looks wrong, and the figures of the drive and of its sections."""
-    findings = consistency_findings(result.columns)
+    findings = (*consistency_findings(result.columns), *bearing_findings(result.columns))
     background = theme.css(theme.WARNING_LINE)
     lines = "".join(
         f"<div class='c-finding' style='background:{background};{FINDING_STYLE}'>"
@@ -49,9 +50,10 @@ def summary(result: RunResult, stations: tuple[Station, ...]) -> str:
     if not findings:
         lines = "<div class='c-note'>Nothing looks wrong about what is accepted and rejected.</div>"
     cut = sections(result.columns, stations)
+    scans = rows(result.consistency) if result.columns.has_scans else []
     return (
         f"<div class='c-summary' style='padding:2px 6px'>{lines}<div style='padding-top:4px'><b>Whole drive</b></div>"
-        f"{table(rows(result.consistency))}{_sections(cut) if len(cut) > 1 else ''}</div>"
+        f"{table([*_of_bearings(result), *scans])}{_sections(cut) if len(cut) > 1 else ''}</div>"
     )
 
 
@@ -63,6 +65,18 @@ def rows(figures: Consistency) -> list[tuple[str, str]]:
         ("Rejected", share(figures.rejected_fraction)),
         ("Cycles without an accepted one", share(figures.unseen_fraction)),
         ("Longest without", f"{figures.longest_unseen:.1f} s"),
+    ]
+
+
+def _of_bearings(result: RunResult) -> list[tuple[str, str]]:
+    """Figures of the bearings of a goniometer; none where the drive has none."""
+    told = bearing_figures(result.columns)
+    if not told:
+        return []
+    nis = told["bearing_nis_before_gate_mean"]
+    return [
+        ("Bearings accepted / rejected", f"{told['bearing_accepted']} / {told['bearing_rejected']}"),
+        ("NIS of both / expected", f"{known(math.nan if nis is None else nis)} / 1"),
     ]
 
 

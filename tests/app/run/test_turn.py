@@ -13,6 +13,7 @@ from commission.app.base.view import view_of
 from commission.app.run.bearing_layer import BearingLayer
 from commission.app.run.now_panel import rows
 from commission.app.run.playback import Playback
+from commission.app.run.summary_panel import summary
 from commission.geometry import se2
 from commission.localization.bearings import BearingUse
 from commission.localization.setup import LocalizerSetup
@@ -60,6 +61,7 @@ def test_a_turn_is_drawn_and_told_beside_the_scan_that_came_before_it() -> None:
     assert told["Bearings of a turn"] == "3 accepted, 1 rejected, 0 unused"
     assert told["Largest of bearings / gate"].endswith(" / 10.83")
     assert told["Inliers"] == "3"
+    assert "Bearings accepted / rejected" in summary(result, ())
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
     try:
         layer, shown = BearingLayer(server.scene), view_of(AppState(project=project, saved=project), view)
