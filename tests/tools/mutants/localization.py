@@ -322,4 +322,20 @@ LOCALIZATION = (
         replace="evidence.against > rule.scans_against",
         tests=(TESTS + "test_rejection.py::test_vehicle_is_lost_by_scans_in_a_row_that_reject_nearly_all",),
     ),
+    Mutant(
+        name="a bearing's mounting that turns the other way",
+        file=FOLDER + "bearings.py",
+        find="j.mount_xb, j.mount_yb, -1.0, 0.0, j.clock_b",
+        replace="j.mount_xb, j.mount_yb, 1.0, 0.0, j.clock_b",
+        tests=(
+            TESTS + "test_bearings.py::test_a_row_is_the_derivative_of_the_expected_bearing_also_by_what_is_considered",
+        ),
+    ),
+    Mutant(
+        name="a bearing is of the likelier one of two reflectors that fit",
+        file=FOLDER + "bearings.py",
+        find="    if inside > 1:",
+        replace="    if inside > 2:",
+        tests=(TESTS + "test_bearings.py::test_a_bearing_without_a_name_is_of_the_only_reflector_that_fits",),
+    ),
 )

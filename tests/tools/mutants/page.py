@@ -120,8 +120,8 @@ PAGE = (
     Mutant(
         name="NIS of the cycle before",
         file=FOLDER + "run/now_panel.py",
-        find="{result.nis[newest]:.2f}",
-        replace="{result.nis[newest - 1]:.2f}",
+        find="run.result.nis[run.seen]",
+        replace="run.result.nis[run.seen - 1]",
         tests=(NUMBERS + "test_a_number_of_the_newest_cycle_is_that_of_its_study",),
     ),
     Mutant(
