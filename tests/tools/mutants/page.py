@@ -14,6 +14,23 @@ LAYOUTS = TESTS + "layouts/test_layouts.py::"
 
 PAGE = (
     Mutant(
+        name="what is around a mark lies over it",
+        file=FOLDER + "base/marks.py",
+        find="np.minimum(below[..., 2], theme.Height.CASING)",
+        replace="np.maximum(below[..., 2], theme.Height.CASING)",
+        tests=(TESTS + "base/test_theme.py::test_a_casing_lies_below_every_mark_at_the_same_places",),
+    ),
+    Mutant(
+        name="a window that is loaded anew has begun nothing",
+        file=FOLDER + "base/state.py",
+        find="{**back, **now, ",
+        replace="{**now, ",
+        tests=(
+            TESTS + "floor_map/test_reducer.py::"
+            "test_points_to_align_by_are_there_again_in_the_window_that_is_loaded_anew",
+        ),
+    ),
+    Mutant(
         name="switching forgets the layout of now",
         file=FOLDER + "layouts/reducer.py",
         find="kept = part.with_kept(now) if len(now) else part",
