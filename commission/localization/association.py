@@ -20,7 +20,7 @@ from commission.localization.consider import BLOCKS, Considering
 from commission.localization.consider_columns import take_out
 from commission.localization.estimate import Status
 from commission.localization.filter_kinds import innovation_by
-from commission.localization.joint import CAREFUL, EXCLUSIVE, MOST_JOINTLY, decide_together
+from commission.localization.joint import CAREFUL, EXCLUSIVE, JOINT, MOST_JOINTLY, decide_together
 from commission.localization.kalman import squared_distance
 from commission.localization.observation import ObservationModel, expect_at
 from commission.localization.pose_gaussian import PoseGaussian
@@ -367,7 +367,7 @@ def _decide_together(  # noqa: PLR0917 - the scan's detections and the map, arra
     """`decide_together`, where the gate has distances for several at once."""
     if joint is None:
         return
-    if gate.enabled and gate.method >= CAREFUL:
+    if gate.enabled and CAREFUL <= gate.method <= JOINT:
         decide_together(
             gate.method,
             gate.kind,

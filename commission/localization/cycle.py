@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from commission.compiled import compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.geometry.directions import UnitVector, direction_of
-from commission.localization.association import INLIER, NOBODY, Gate, associate
+from commission.localization.association import INLIER, NOBODY, Gate
 from commission.localization.consider import BLOCKS, PER_REFLECTOR, Considering, considering
-from commission.localization.consider_columns import begin, busy_chunks, put_back, put_block, take_along
+from commission.localization.consider_columns import busy_chunks, put_back, put_block, take_along
 from commission.localization.contour import (
     ACCEPTED,
     CONTRADICTED,
@@ -35,7 +35,10 @@ from commission.localization.observation import ObservationModel
 from commission.localization.odometry import Motion, NextOdometry, OdometryNoise, advance, reach
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.rejection import Evidence, rejects_the_world, weigh
+from commission.localization.rival_poses import RivalPoses
+from commission.localization.scan_association import associate_by, prepare, with_mix
 from commission.localization.setup import FilterModel
+from commission.localization.several_scans import is_contested, keep_own
 from commission.localization.state import FilterState
 from commission.localization.supervisor import FAIL, LOST, OPERATIONAL, supervise
 from commission.localization.temporary import TemporaryModel, observe_temporary
@@ -79,6 +82,7 @@ def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
         state.search,
         state.protection,
         state.temporary,
+        state.rivals,
     )
 
 
@@ -109,6 +113,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     temporary: TemporaryModel | None,
     memory: TemporaryMemory | None,
     goods: FloatArray | None,
+    rivals: RivalPoses | None,
 ) -> Cycle:
     """Process the detections of a scan.
 
@@ -134,6 +139,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     zones : where which kinds correct the pose.
     temporary, memory : rules of temporary landmarks, and those that are known, written; None: none are looked at.
     goods : (COLUMNS,) out, see `temporary`; None: as `temporary`.
+    rivals : where the vehicle may stand as well, in and out; None: scans are decided on one by one.
 
     Notes
     -----
@@ -144,8 +150,11 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
     prior, motion = reach(state.belief, state.motion, stamp_ns, following, model.odometry)
     given = considering(cross, prior, state.pivot, state.motion, following, model.consider)
     facing = direction_of(prior.theta)
+    here = kinds_at(zones, prior.x, prior.y)
     prepare(cross, given, work, aims, first, last, detections, observation, len(places), scanner)
-    associate(
+    prior, facing, given, mix = associate_by(
+        rivals,
+        here.reflectors,
         prior,
         facing,
         first,
@@ -160,11 +169,11 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         cross,
         given,
         work,
+        scanner,
         status,
         reflectors,
         d2,
     )
-    here = kinds_at(zones, prior.x, prior.y)
     posterior = corrected(
         prior,
         facing,
@@ -183,6 +192,7 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         status,
         reflectors,
     )
+    posterior = with_mix(rivals, posterior, mix)
     if here.contours:
         posterior = with_contours(
             posterior, contours, scan, state, motion, following, len(places), model, cross, busy, figures
@@ -209,7 +219,30 @@ def process_scan(  # noqa: PLR0917 - outputs are written into the arrays of the 
         said_by_contours(figures),
         model.rejection,
     )
-    return Cycle(prior, supervised(state, stamp_ns, posterior, motion, evidence, pivot, model))
+    keep_own(rivals, posterior, said_by_contours(figures) == 1.0)
+    after = supervised(state, stamp_ns, posterior, motion, evidence, pivot, model)
+    return Cycle(prior, held_back(rivals, state, after, model))
+
+
+@compiled_inline
+def held_back(rivals: RivalPoses | None, before: FilterState, after: FilterState, model: FilterModel) -> FilterState:
+    """State after a cycle, not operational where the vehicle may as well stand elsewhere.
+
+    Parameters
+    ----------
+    rivals : of its pose, after the scan, or None.
+    before, after : state before the cycle, and after it otherwise.
+    model : of the whole filter.
+
+    Notes
+    -----
+    No formula: `is_contested`.
+    """
+    if rivals is None:
+        return after
+    if after.mode == OPERATIONAL and is_contested(rivals, after.belief, model.limits):
+        return with_mode(before, after, FAIL)
+    return after
 
 
 @compiled_inline
@@ -261,6 +294,7 @@ def supervised(  # noqa: PLR0917 - what a cycle has found, value by value
         before.search,
         before.protection,
         before.temporary,
+        before.rivals,
     )
 
 
@@ -295,6 +329,7 @@ def with_mode(before: FilterState, after: FilterState, mode: int) -> FilterState
         after.search,
         after.protection,
         after.temporary,
+        after.rivals,
     )
 
 
@@ -436,40 +471,6 @@ def room_for_scans(cross: FloatArray | None, detections: int) -> Room:
     if cross is None:
         return Room(aims, None, None)
     return Room(aims, np.empty((3, BLOCKS + PER_REFLECTOR * max(detections, 1))), busy_chunks(cross))
-
-
-@compiled_inline
-def prepare(  # noqa: PLR0917 - the scan's detections, array by array
-    cross: FloatArray | None,
-    given: Considering | None,
-    work: FloatArray | None,
-    aims: FloatArray,
-    first: int,
-    last: int,
-    detections: FloatArray,
-    observation: ObservationModel,
-    reflectors: int,
-    scanner: int,
-) -> None:
-    """Write what a scan is worked out from.
-
-    Parameters
-    ----------
-    cross, given : covariance with the constants, and what the detections of the scan have in common, or None.
-    work, aims : written; no work: none is considered.
-    first, last, detections, observation, scanner : as in `corrected`.
-    reflectors : N of the map.
-
-    Notes
-    -----
-    aim = (cos, sin) of mount + bearing, by definition: all sines and cosines of a scan but those of the heading. The
-    third column of `aims` is for where in `work` the reflector of a detection is.
-    """
-    for i in range(first, last):
-        aim = direction_of(observation.mount_theta + detections[i, 1])
-        aims[i - first, 0], aims[i - first, 1] = aim
-    if cross is not None and given is not None and work is not None:
-        begin(work, cross, given, reflectors, scanner)
 
 
 @compiled_inline

@@ -26,7 +26,7 @@ from commission.localization.reflector_index import Cells, cell_range
 from commission.localization.search import Viewpoint, radius2_by
 from commission.site.parameters import ASSOCIATION_METHODS
 
-EXCLUSIVE, NEAREST, CAREFUL, JOINT = range(len(ASSOCIATION_METHODS))
+EXCLUSIVE, NEAREST, CAREFUL, JOINT, SEVERAL_SCANS = range(len(ASSOCIATION_METHODS))
 INLIER = int(Status.INLIER)
 OUTLIER_ASSOCIATION = int(Status.OUTLIER_ASSOCIATION)
 MOST_JOINTLY = 8
@@ -63,7 +63,7 @@ class Rivals(NamedTuple):
 
 
 @compiled
-def _no_rivals(detections: int) -> Rivals:
+def no_rivals(detections: int) -> Rivals:
     """Room for the rivals of some detections."""
     n, r = detections, MOST_RIVALS
     return Rivals(
@@ -121,10 +121,10 @@ def decide_together(  # noqa: PLR0917 - the scan's detections and the map, array
     No formula: `leave_out`, or `most_compatible` of `MOST_JOINTLY` at once, those first that have rivals.
     """
     members = np.flatnonzero(status[first:last] == INLIER) + first
-    found, chosen = _no_rivals(len(members)), np.full(len(members), -1)
+    found, chosen = no_rivals(len(members)), np.full(len(members), -1)
     for m in range(len(members)):
         i = members[m]
-        _list_rivals(
+        list_rivals(
             found,
             m,
             kind,
@@ -185,7 +185,7 @@ def _take_off(found: Rivals, group: IntArray, entry: int) -> None:
 
 
 @compiled
-def _list_rivals(  # noqa: PLR0917 - a measurement, number by number, and the map
+def list_rivals(  # noqa: PLR0917 - a measurement, number by number, and the map
     found: Rivals,
     m: int,
     kind: int | None,

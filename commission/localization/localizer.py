@@ -36,6 +36,7 @@ from commission.localization.relocalization import (
     sought,
     unlocated,
 )
+from commission.localization.rival_poses import RivalPoses, kept_poses, poses_of
 from commission.localization.search_map import SearchMap, search_map
 from commission.localization.seen_of_late import SeenScan
 from commission.localization.setup import LocalizerSetup
@@ -261,10 +262,10 @@ class Localizer:
         if state.search is not None:
             self._state = searching_odometry(state, record.stamp_ns, (dx, dy, dtheta), noise)
             return
-        bare = state._replace(cross=None, protection=None, temporary=None)
+        bare = state._replace(cross=None, protection=None, temporary=None, rivals=None)
         moved = process_odometry(bare, record.stamp_ns, dx, dy, dtheta, noise)
         kept = {"cross": state.cross, "protection": state.protection, "temporary": state.temporary}
-        self._state = moved._replace(**kept)
+        self._state = moved._replace(**kept, rivals=state.rivals)
 
     def _at_stamp(self, scanner: int, measured: FloatArray, following: NextOdometry) -> FloatArray:
         """Return the detections of a scan at its stamp, upright: what was measured, where there is no other."""
@@ -361,9 +362,9 @@ class Localizer:
         bank = bank_of(before.protection, setup.protected_names)
         if setup.protection is None or bank is None:
             raise ValueError("protection levels are asked for where the supervisor goes by 2-sigma")
-        bare = after._replace(cross=None, search=None, protection=None, temporary=None)
+        bare = after._replace(cross=None, search=None, protection=None, temporary=None, rivals=None)
         state = supervised_by_level(
-            before._replace(cross=None, search=None, protection=None, temporary=None),
+            before._replace(cross=None, search=None, protection=None, temporary=None, rivals=None),
             Cycle(cycle.prior, bare),
             0,
             len(detections),
@@ -376,10 +377,11 @@ class Localizer:
             bank,
             levels,
             setup.zone_rows,
+            poses_of(after.rivals, wanted=setup.decides_over_scans),
         )
         protection = protection_state(bank, setup.protected_names)
         kept = {"cross": after.cross, "search": after.search, "temporary": after.temporary}
-        return state._replace(**kept, protection=protection)
+        return state._replace(**kept, protection=protection, rivals=after.rivals)
 
     def _seen_bearing(self, record: Scan | Detections | TagSightings | Reflex) -> SeenBearing | None:
         """What a reflex told, with room for what becomes of it where bearings are looked at; None of a scan."""
@@ -446,11 +448,11 @@ class Localizer:
         cross = columns_of(self._state.cross, constants)
         entries = entries_of(np.array(frame.ids, dtype=np.str_), setup.tags)
         offsets = np.array((0, count), dtype=np.int64)
-        memory = self._memory()
+        memory, rivals = self._memory(), self._rivals()
         if setup.tag_model is None:
             raise ValueError("a frame with tags is processed where none are looked at; expected tags in the setup")
         cycle = process_tags(
-            self._state._replace(cross=None, search=None, protection=None, temporary=None),
+            self._state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None),
             frame.stamp_ns,
             0,
             count,
@@ -469,20 +471,32 @@ class Localizer:
             memory,
             contour_scan(setup, None, 0),
             goods,
+            rivals,
         )
-        return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory))
+        return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory, rivals))
 
     def _memory(self) -> TemporaryMemory | None:
         """Temporary landmarks as arrays to be written; None where they are not looked at."""
         rules = self._setup.temporary
         return None if rules is None else memory_of(self._state.temporary, rules.most)
 
-    def _with_arrays(self, state: FilterState, cross: FloatArray | None, memory: TemporaryMemory | None) -> FilterState:
+    def _rivals(self) -> RivalPoses | None:
+        """Rivals of the pose as arrays to be written; None where scans are decided on one by one."""
+        return poses_of(self._state.rivals, wanted=self._setup.decides_over_scans)
+
+    def _with_arrays(
+        self,
+        state: FilterState,
+        cross: FloatArray | None,
+        memory: TemporaryMemory | None,
+        rivals: RivalPoses | None,
+    ) -> FilterState:
         """Put what a cycle has left in its arrays into the state, and the search that went on beside it."""
         return state._replace(
             cross=cross_covariance(cross, self._setup.constants),
             search=self._state.search,
             temporary=self._state.temporary if memory is None else landmarks_in(memory),
+            rivals=kept_poses(rivals),
         )
 
     def _filtered(
@@ -497,9 +511,9 @@ class Localizer:
         beamless = isinstance(scan, TagSightings | Reflex)
         constants, scanner = self._setup.constants, 0 if beamless else scan.scanner
         cross = columns_of(self._state.cross, constants)
-        room, memory = room_for_scans(cross, len(detections)), self._memory()
+        room, memory, rivals = room_for_scans(cross, len(detections)), self._memory(), self._rivals()
         cycle = process_scan(
-            self._state._replace(cross=None, search=None, protection=None, temporary=None),
+            self._state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None),
             scan.stamp_ns,
             0,
             len(detections),
@@ -522,5 +536,6 @@ class Localizer:
             self._setup.temporary,
             memory,
             figures[1],
+            rivals,
         )
-        return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory))
+        return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory, rivals))

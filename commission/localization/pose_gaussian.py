@@ -60,6 +60,38 @@ def larger_eigenvalue(xx: float, xy: float, yy: float) -> float:
     return 0.5 * (xx + yy) + math.sqrt(half_difference * half_difference + xy * xy)
 
 
+@compiled_inline
+def pose_in(row: FloatArray) -> PoseGaussian:
+    """Pose that stands in a row.
+
+    Parameters
+    ----------
+    row : (9,) x, y, theta, xx, xy, xt, yy, yt, tt.
+
+    Notes
+    -----
+    No formula: it reads numbers.
+    """
+    return PoseGaussian(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
+
+
+@compiled_inline
+def write_pose(row: FloatArray, p: PoseGaussian) -> None:
+    """Write a pose to a row.
+
+    Parameters
+    ----------
+    row : (9,) out, see `pose_in`.
+    p : pose.
+
+    Notes
+    -----
+    No formula: it writes numbers.
+    """
+    row[0], row[1], row[2] = p.x, p.y, p.theta
+    row[3], row[4], row[5], row[6], row[7], row[8] = p.xx, p.xy, p.xt, p.yy, p.yt, p.tt
+
+
 def from_belief(belief: Belief) -> PoseGaussian:
     """Return the scalars of a belief; raises ValueError when its arrays are no pose and covariance."""
     mean, cov = np.asarray(belief.mean, dtype=np.float64), np.asarray(belief.covariance, dtype=np.float64)

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.localization.cycle import Cycle, with_mode
+from commission.localization.cycle import Cycle, held_back, with_mode
 from commission.localization.observation import ObservationModel
 from commission.localization.protection import Bank, ProtectionModel, forget, protect_cycle
+from commission.localization.rival_poses import RivalPoses
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
 from commission.localization.supervisor import FAIL, LOST, judge
@@ -36,6 +37,7 @@ def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
     bank: Bank,
     levels: FloatArray,
     zones: ZoneRows,
+    rivals: RivalPoses | None,
 ) -> FilterState:
     """State after a cycle whose supervisor holds the protection level against its limits, in place of 2-sigma.
 
@@ -51,6 +53,7 @@ def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
     bank : filters that leave one reflector out each; in and out.
     levels : (2,) out: of the position [m] and of the heading [rad]; inf while the vehicle is lost.
     zones : where which kinds correct the pose.
+    rivals : where the vehicle may stand as well, after the cycle, or None.
 
     Notes
     -----
@@ -71,4 +74,5 @@ def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
     levels[0], levels[1] = found.position, found.heading
     if after.evidence.confirmed < model.rejection.confirmations:
         return with_mode(before, after, FAIL)
-    return with_mode(before, after, judge(before.mode, found.position, found.heading, model.limits))
+    judged = with_mode(before, after, judge(before.mode, found.position, found.heading, model.limits))
+    return held_back(rivals, before, judged, model)

@@ -17,7 +17,7 @@ from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.kalman import correct
 from commission.localization.observation import ObservationModel, observation_at
-from commission.localization.pose_gaussian import PoseGaussian, larger_eigenvalue
+from commission.localization.pose_gaussian import PoseGaussian, larger_eigenvalue, pose_in, write_pose
 from commission.localization.supervisor import INITIALIZING, LOST
 from commission.localization.temporary_joint import covariance_of, is_changed, solve_three
 from commission.localization.zones import ZoneRows, kinds_at
@@ -105,29 +105,6 @@ def forget(bank: Bank) -> None:
     """
     bank.owner[:] = -1
     bank.begun[0] = False
-
-
-@compiled_inline
-def _belief(row: FloatArray) -> PoseGaussian:
-    """Belief of a row.
-
-    Notes
-    -----
-    No formula: it reads numbers.
-    """
-    return PoseGaussian(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
-
-
-@compiled_inline
-def _write(row: FloatArray, p: PoseGaussian) -> None:
-    """Write a belief to its row.
-
-    Notes
-    -----
-    No formula: it writes numbers.
-    """
-    row[0], row[1], row[2] = p.x, p.y, p.theta
-    row[3], row[4], row[5], row[6], row[7], row[8] = p.xx, p.xy, p.xt, p.yy, p.yt, p.tt
 
 
 @compiled
@@ -267,7 +244,7 @@ def _correct_alike(bank: Bank, prior: PoseGaussian, own: PoseGaussian) -> None:
         if slot != EVERY and bank.owner[slot] < 0:
             continue
         row = bank.beliefs[slot]
-        information = _inverse(_belief(row)) + told
+        information = _inverse(pose_in(row)) + told
         covariance = np.eye(3)
         if not solve_three(information, covariance):
             continue
@@ -275,7 +252,7 @@ def _correct_alike(bank: Bank, prior: PoseGaussian, own: PoseGaussian) -> None:
         step = covariance @ (pull - told @ apart)
         x, y, theta = row[0] + step[0], row[1] + step[1], wrap_scalar(row[2] + step[2])
         p = covariance
-        _write(row, PoseGaussian(x, y, theta, p[0, 0], p[1, 0], p[2, 0], p[1, 1], p[2, 1], p[2, 2]))
+        write_pose(row, PoseGaussian(x, y, theta, p[0, 0], p[1, 0], p[2, 0], p[1, 1], p[2, 1], p[2, 2]))
 
 
 @compiled
@@ -317,7 +294,7 @@ def protect_cycle(  # noqa: PLR0917 - a cycle, number by number
     corrects, what does is taken as right, and tells all filters what it tells the run.
     """
     row = np.empty(9)
-    _write(row, prior)
+    write_pose(row, prior)
     if bank.begun[0]:
         _predict(bank, row)
     else:
@@ -337,12 +314,12 @@ def protect_cycle(  # noqa: PLR0917 - a cycle, number by number
         for slot in range(SLOTS + 1):
             if slot != EVERY and (bank.owner[slot] < 0 or bank.owner[slot] == number):
                 continue
-            belief = _belief(bank.beliefs[slot])
+            belief = pose_in(bank.beliefs[slot])
             corrected = correct(belief, distance, bearing, place[0], place[1], place[2], observation)
-            _write(bank.beliefs[slot], corrected)
+            write_pose(bank.beliefs[slot], corrected)
     if not corrects and model.others and is_changed(prior, own):
         _correct_alike(bank, prior, own)
-    _write(bank.beliefs[NEWEST], own)
+    write_pose(bank.beliefs[NEWEST], own)
     return _judge(bank, own, model)
 
 

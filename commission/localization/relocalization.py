@@ -65,15 +65,15 @@ def searching_odometry(
     displacement : [m, m, rad].
     noise : variances per metre, radian and second.
     """
-    search, cross, temporary = state.search, state.cross, state.temporary
+    search, cross, temporary, rivals = state.search, state.cross, state.temporary, state.rivals
     if search is None:
         raise ValueError("the state has no search; expected one of a vehicle that is lost or not located yet")
     track, _ = advance(search.track, state.motion, stamp_ns, *displacement, noise)
-    bare = state._replace(cross=None, search=None, protection=None, temporary=None)
+    bare = state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None)
     moved = process_odometry(bare, stamp_ns, *displacement, noise)
     if state.mode == Mode.INITIALIZING:
         moved = moved._replace(belief=state.belief)
-    return moved._replace(cross=cross, search=replace(search, track=track), temporary=temporary)
+    return moved._replace(cross=cross, search=replace(search, track=track), temporary=temporary, rivals=rivals)
 
 
 def forgotten(state: FilterState, setup: LocalizerSetup) -> FilterState:
@@ -94,6 +94,7 @@ def forgotten(state: FilterState, setup: LocalizerSetup) -> FilterState:
         temporary=None,
         search=new_search(state.belief_ns),
         protection=None,
+        rivals=None,
     )
 
 
@@ -186,4 +187,5 @@ def _located(after: FilterState, search: Search, best: FloatArray, stamp_ns: int
         temporary=None,
         search=None,
         protection=None,
+        rivals=None,
     )

@@ -37,6 +37,7 @@ from commission.localization.relocalization import (
     sought,
     unlocated,
 )
+from commission.localization.rival_poses import RivalPoses, kept_poses, poses_of
 from commission.localization.run_columns import RunColumns
 from commission.localization.search_map import SearchMap, search_map
 from commission.localization.search_state import SearchMoment
@@ -373,6 +374,7 @@ def _tracked(
     cross = columns_of(state.cross, setup.constants)
     bank = bank_of(state.protection, setup.protected_names)
     memory = None if setup.temporary is None else memory_of(state.temporary, setup.temporary.most)
+    rivals = poses_of(state.rivals, wanted=setup.decides_over_scans)
     settled = stretch.columns.settled
     room = room_for_scans(cross, int(np.diff(detected.offsets).max(initial=0)))
     own = log.detection_stamps_ns
@@ -399,7 +401,7 @@ def _tracked(
         room.work,
         room.aims,
         room.busy,
-        state._replace(cross=None, protection=None, temporary=None),
+        state._replace(cross=None, protection=None, temporary=None, rivals=None),
         stretch.columns,
         stretch.priors,
         setup.contour,
@@ -411,18 +413,17 @@ def _tracked(
         bank,
         setup.temporary,
         memory,
+        rivals,
     )
     # Odometry alone changes nothing of it, nor does another setup before its first scan.
     if not len(detected):
-        return (
-            after._replace(cross=state.cross, protection=state.protection, temporary=state.temporary),
-            cycles,
-            delivered,
-        )
+        kept = {"cross": state.cross, "protection": state.protection}
+        return after._replace(**kept, temporary=state.temporary, rivals=state.rivals), cycles, delivered
     cross_after = cross_covariance(cross, setup.constants)
     protection = protection_state(bank, setup.protected_names)
     temporary = state.temporary if memory is None else landmarks_in(memory)
-    return after._replace(cross=cross_after, protection=protection, temporary=temporary), cycles, delivered
+    after = after._replace(cross=cross_after, protection=protection, temporary=temporary, rivals=kept_poses(rivals))
+    return after, cycles, delivered
 
 
 def _frames(setup: LocalizerSetup, detected: DetectionLog) -> TagFrames | None:
@@ -473,6 +474,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
     bank: Bank | None,
     temporary: TemporaryModel | None,
     memory: TemporaryMemory | None,
+    rivals: RivalPoses | None,
 ) -> tuple[FilterState, int, int]:
     """Deliver odometry and scans in the order of their stamps, odometry first, until the vehicle is lost.
 
@@ -514,6 +516,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
                 memory,
                 contour_scan_at(scans, k, observations, sweeps),
                 goods_at(temporary, goods, k),
+                rivals,
             )
         elif reflexes is not None and reflexes.is_reflex[k]:
             cycle = process_reflex(
@@ -566,6 +569,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
                 temporary,
                 memory,
                 goods_at(temporary, goods, k),
+                rivals,
             )
         if protection is not None and bank is not None:
             state = supervised_by_level(
@@ -582,6 +586,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
                 bank,
                 levels[k],
                 zones,
+                rivals,
             )
         else:
             state = cycle.state

@@ -23,6 +23,7 @@ from commission.localization.cross_covariance import (
 )
 from commission.localization.detector_model import DetectorModel, detector_model
 from commission.localization.filter_kinds import filter_kind, is_invariant
+from commission.localization.joint import SEVERAL_SCANS
 from commission.localization.observation import (
     ObservationModel,
     observation_model,
@@ -39,7 +40,7 @@ from commission.localization.tags import TagModel, tag_model
 from commission.localization.temporary_model import TemporaryModel, temporary_model
 from commission.localization.zones import ZoneRows, zone_rows
 from commission.site.floor_map import FloorMap
-from commission.site.parameters import Parameters
+from commission.site.parameters import ASSOCIATION_METHODS, Parameters
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.site.scanner import Scanner
@@ -161,6 +162,12 @@ class LocalizerSetup:
         object.__setattr__(self, "sweep_rows", sweep_rows([sweep_of(each) for each in self.scanners]))
         detectors = tuple(detector_model(self.reflectors, each, self.parameters.detector) for each in self.scanners)
         object.__setattr__(self, "detectors", detectors)
+
+    @property
+    def decides_over_scans(self) -> bool:
+        """Whether several scans are decided on together."""
+        association = self.parameters.association
+        return association.enabled and association.method == ASSOCIATION_METHODS[SEVERAL_SCANS]
 
     @property
     def protected_names(self) -> tuple[str, ...] | None:

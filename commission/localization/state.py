@@ -14,6 +14,7 @@ from commission.localization.odometry import AT_REST, Motion
 from commission.localization.pose_gaussian import PoseGaussian, from_belief, to_belief
 from commission.localization.protection_state import ProtectionState
 from commission.localization.rejection import NO_EVIDENCE, Evidence
+from commission.localization.rival_poses import KeptPoses
 from commission.localization.search_state import Search, new_search
 from commission.localization.temporary_memory import TemporaryLandmarks
 
@@ -52,6 +53,8 @@ class FilterState(NamedTuple):
     """Filters that leave one reflector out each; None: not begun, or not asked for, and in kernels."""
     temporary: TemporaryLandmarks | None = None
     """Landmarks that come and go; None: none are remembered. Kernels are handed its arrays, and None here."""
+    rivals: KeptPoses | None = None
+    """Where the vehicle may stand as well; None: not begun, or scans are decided on one by one, and in kernels."""
 
 
 def state_at_start(initial: Belief) -> FilterState:

@@ -14,12 +14,14 @@ from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.consider_columns import carry_over
 from commission.localization.contour import ContourScan
-from commission.localization.cycle import Cycle, supervised, with_temporary
+from commission.localization.cycle import Cycle, held_back, supervised, with_temporary
 from commission.localization.filter_kinds import is_invariant
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import NextOdometry, reach, velocity
 from commission.localization.rejection import weigh
+from commission.localization.rival_poses import RivalPoses
 from commission.localization.setup import FilterModel
+from commission.localization.several_scans import keep_own
 from commission.localization.state import FilterState
 from commission.localization.tags import ACCEPTED, REJECTED, USE, TagModel, correct_by_tag
 from commission.localization.temporary_memory import TemporaryMemory
@@ -62,6 +64,7 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
     memory: TemporaryMemory | None,
     scan: ContourScan | None,
     goods: FloatArray | None,
+    rivals: RivalPoses | None,
 ) -> Cycle:
     """Process the sightings of a frame.
 
@@ -79,6 +82,7 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
     figures : (n, COLUMNS) out, see `tags`.
     zones : where which kinds correct the pose.
     temporary, memory, scan, goods : as in `process_scan`; the scan of a frame has no beams.
+    rivals : where the vehicle may stand as well, in and out, or None; a tag that fits leaves none.
 
     Notes
     -----
@@ -123,7 +127,9 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
         model.rejection,
     )
     pivot = state.pivot if cross is None else (belief.x, belief.y)
-    return Cycle(prior, supervised(state, stamp_ns, belief, motion, evidence, pivot, model))
+    keep_own(rivals, belief, said_by_tags(figures, first, last) == 1.0)
+    after = supervised(state, stamp_ns, belief, motion, evidence, pivot, model)
+    return Cycle(prior, held_back(rivals, state, after, model))
 
 
 @compiled_inline

@@ -74,6 +74,7 @@ def told_by_tags(
         pivot=(belief.x, belief.y),
         cross=cross,
         temporary=None,
+        rivals=None,
         search=None,
     )
 

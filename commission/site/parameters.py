@@ -32,7 +32,7 @@ from commission.site.quantity import (
 FILTER_KINDS = ("ekf", "ukf", "ckf", "invariant")
 """Kinds of filter: extended (the paper's), unscented, cubature, right-invariant extended Kalman filter."""
 
-ASSOCIATION_METHODS = ("exclusive", "nearest", "careful", "joint")
+ASSOCIATION_METHODS = ("exclusive", "nearest", "careful", "joint", "several_scans")
 """Ways to decide which reflector a detection belongs to; `nearest` is the paper's."""
 
 

@@ -32,7 +32,9 @@ from tests.localization.test_whole_run import assert_same_estimate, setup_of
 
 MODEL = ObservationModel(0.3, 0.1, 0.2, 4e-4, 1.6e-5, 0.0)
 MOUNTING = np.array([0.3, 0.1, 0.2])
-every_method = pytest.mark.parametrize("method", ASSOCIATION_METHODS)
+SCAN_BY_SCAN = tuple(method for method in ASSOCIATION_METHODS if method != "several_scans")
+"""Those of one scan alone; the others: `test_several_scans`."""
+every_method = pytest.mark.parametrize("method", SCAN_BY_SCAN)
 SURE = PoseGaussian(0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 1e-6, 0.0, 1e-8)
 
 
@@ -75,7 +77,7 @@ def test_reflectors_far_apart_are_each_told_and_what_is_none_is_rejected(method:
 def test_two_detections_of_one_reflector() -> None:
     # Straight ahead at 4.7 m, 20 mm noise: 10 and 30 mm beside it, d2 of 0.25 and 2.25: odds of e to 1 alone.
     index, near = mapped((5.0, 0.1)), seen((5.01, 0.1), (5.03, 0.1))
-    found = {method: associated(method, index, near)[0] for method in ASSOCIATION_METHODS}
+    found = {method: associated(method, index, near)[0] for method in SCAN_BY_SCAN}
     assert found == {"nearest": [0, 0], "exclusive": [0, -1], "careful": [-1, -1], "joint": [0, -1]}
     # 50 mm beside it the second is inside the gate and clearly the lesser: d2 of 6.25 more.
     clear = seen((5.0, 0.1), (5.0 + 0.02 * math.sqrt(CLEAR + 0.5), 0.1))
@@ -86,7 +88,7 @@ def test_two_detections_of_one_reflector() -> None:
 def test_two_reflectors_of_one_detection() -> None:
     # 60 mm apart along the ray; the detection 20 mm from the first: 1 and 4 of d2.
     index = mapped((5.0, 0.1), (5.06, 0.1))
-    found = {method: associated(method, index, seen((5.02, 0.1)))[0] for method in ASSOCIATION_METHODS}
+    found = {method: associated(method, index, seen((5.02, 0.1)))[0] for method in SCAN_BY_SCAN}
     assert found == {"nearest": [0], "exclusive": [0], "careful": [-1], "joint": [0]}
     assert associated("careful", index, seen((5.0, 0.1)))[0] == [0]
     # Both are seen: each has its own, for those that look at more than one.
@@ -170,8 +172,10 @@ def test_a_crowd_of_detections_and_reflectors_takes_bounded_time_and_no_reflecto
     assert method == "nearest" or len(set(accepted)) == len(accepted)
 
 
-@every_method
-@pytest.mark.parametrize("kind", FILTER_KINDS)
+@pytest.mark.parametrize(
+    ("method", "kind"),
+    [*itertools.product(SCAN_BY_SCAN, FILTER_KINDS), ("several_scans", "ekf"), ("several_scans", "invariant")],
+)
 def test_whole_run_equals_the_live_localizer_to_the_last_bit(method: str, kind: str) -> None:
     rng = np.random.default_rng(4)
     parameters = Parameters(association=AssociationParameters(method=method), filter=FilterParameters(kind=kind))
