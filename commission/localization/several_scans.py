@@ -143,7 +143,9 @@ def decide_over_scans(  # noqa: PLR0917 - the scan's detections and the map, arr
     now, after = _room(MOST_POSES, last - first), _room(MOST_POSES * (1 + MOST_RIVALS), last - first)
     write_pose(now.beliefs[0], prior)
     count = 1 + _carry_along(poses, prior, now)
-    roots, found = now.beliefs[:count].copy(), no_rivals(1)
+    roots, found = _room(MOST_POSES, 0).beliefs, no_rivals(1)
+    for h in range(count):
+        write_pose(roots[h], pose_in(now.beliefs[h]))
     for i in range(first, last):
         if status[i] != INLIER:
             continue
@@ -174,7 +176,8 @@ def decide_over_scans(  # noqa: PLR0917 - the scan's detections and the map, arr
         # Rows are in the order of their weights: the own one stays while it is nearly as likely as the first.
         if now.roots[h] == 0 and now.roots[told] != 0 and now.weights[h] > now.weights[0] - CHANGE:
             told = h
-    chosen[:] = now.entries[told]
+    for i in range(last - first):
+        chosen[i] = now.entries[told, i]
     root = now.roots[told]
     mix = _mix_of(now, told, roots[root], first, last, detections, status, model, given, places)
     _remember(poses, now, count, told)
@@ -330,9 +333,7 @@ def _branch(  # noqa: PLR0917 - a pose, a detection and the map
             taken = taken or (entry != NOBODY and now.entries[h, other] == entry)
         if taken:
             continue
-        after.beliefs[grown], after.mixes[grown] = now.beliefs[h], now.mixes[h]
-        after.weights[grown], after.roots[grown] = now.weights[h], now.roots[h]
-        after.entries[grown] = now.entries[h]
+        _copy(now, h, after, grown)
         after.entries[grown, detection] = entry
         if entry != NOBODY:
             place = places[entry]
@@ -341,6 +342,18 @@ def _branch(  # noqa: PLR0917 - a pose, a detection and the map
             after.weights[grown] += math.log(SEEN_PER_FALSE / (2.0 * math.pi)) - 0.5 * found.cost[0, r]
         grown += 1
     return grown
+
+
+@compiled
+def _copy(source: Branches, row: int, target: Branches, to: int) -> None:
+    """Copy a branch, number by number: an assignment of whole rows takes long to compile."""
+    for k in range(9):
+        target.beliefs[to, k] = source.beliefs[row, k]
+    for k in range(6):
+        target.mixes[to, k] = source.mixes[row, k]
+    for k in range(source.entries.shape[1]):
+        target.entries[to, k] = source.entries[row, k]
+    target.weights[to], target.roots[to] = source.weights[row], source.roots[row]
 
 
 @compiled
@@ -359,9 +372,7 @@ def _left(after: Branches, grown: int, now: Branches) -> int:
         if same >= 0:
             _put_together(now, same, after.beliefs[row], after.weights[row])
         elif count < MOST_POSES:
-            now.beliefs[count], now.mixes[count] = after.beliefs[row], after.mixes[row]
-            now.weights[count], now.roots[count] = after.weights[row], after.roots[row]
-            now.entries[count] = after.entries[row]
+            _copy(after, row, now, count)
             count += 1
     return count
 
@@ -479,7 +490,8 @@ def _remember(poses: RivalPoses, now: Branches, count: int, told: int) -> None:
     poses.weights[:] = -math.inf
     for h in range(count):
         if h != told:
-            poses.beliefs[row], poses.weights[row] = now.beliefs[h], now.weights[h] - now.weights[told]
+            write_pose(poses.beliefs[row], pose_in(now.beliefs[h]))
+            poses.weights[row] = now.weights[h] - now.weights[told]
             row += 1
 
 

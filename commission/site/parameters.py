@@ -230,7 +230,8 @@ class AssociationParameters:
     """Probability that a true detection falls inside the validation gate, P_G."""
     method: Annotated[str, Choice("Associated by", ASSOCIATION_METHODS)] = "exclusive"
     """How: `nearest` lets several detections be of one reflector (the paper), `exclusive` keeps the nearest of them,
-    `careful` leaves out all that contradict each other, `joint` takes the most that fit together (JCBB)."""
+    `careful` leaves out all that contradict each other, `joint` takes the most that fit together (JCBB),
+    `several_scans` lets up to six poses go along until scans tell which is right: for few detections a scan."""
 
     def __post_init__(self) -> None:
         check_fields(self, "association.")

@@ -174,7 +174,11 @@ def test_a_crowd_of_detections_and_reflectors_takes_bounded_time_and_no_reflecto
 
 @pytest.mark.parametrize(
     ("method", "kind"),
-    [*itertools.product(SCAN_BY_SCAN, FILTER_KINDS), ("several_scans", "ekf"), ("several_scans", "invariant")],
+    [
+        *itertools.product(SCAN_BY_SCAN, FILTER_KINDS),
+        ("several_scans", "ekf"),
+        pytest.param("several_scans", "invariant", marks=pytest.mark.with_all_seeds),
+    ],
 )
 def test_whole_run_equals_the_live_localizer_to_the_last_bit(method: str, kind: str) -> None:
     rng = np.random.default_rng(4)

@@ -16,7 +16,23 @@ RECOVERY = "test_supervisor.py::test_recovers_only_when_every_two_sigma_is_below
 PROTECTION = TESTS + "test_protection_mode.py::"
 TEXTBOOK = PROTECTION + "test_the_level_is_that_of_textbook_filters_and_the_mode_follows_it"
 
+SEVERAL = TESTS + "test_several_scans.py::"
+
 LOCALIZATION = (
+    Mutant(
+        name="poses that go along are carried in the direction in which the run's own one drives",
+        file=FOLDER + "several_scans.py",
+        find="direction_of(rival.theta - before[2])",
+        replace="direction_of(0.0)",
+        tests=(SEVERAL + "test_poses_are_those_of_plain_hypotheses",),
+    ),
+    Mutant(
+        name="a vehicle drives by its pose where it may as well stand elsewhere",
+        file=FOLDER + "several_scans.py",
+        find="elsewhere > DOUBT * whole",
+        replace="elsewhere > 2.0 * whole",
+        tests=(SEVERAL + "test_what_a_scan_cannot_tell_the_next_ones_decide",),
+    ),
     Mutant(
         name="a filter that leaves a reflector out is corrected by it",
         file=FOLDER + "protection.py",
