@@ -13,12 +13,15 @@ from commission.geometry.directions import UnitVector, composed, direction_of
 from commission.localization.association import INLIER, NOBODY, OUTLIER_ASSOCIATION, Gate, associate, score
 from commission.localization.consider import BLOCKS, Considering
 from commission.localization.consider_columns import begin, take_out
+from commission.localization.estimate import Status
 from commission.localization.observation import ObservationModel
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.reflector_index import Cells
 from commission.localization.rival_poses import RivalPoses
 from commission.localization.search import viewpoint
 from commission.localization.several_scans import Mix, decide_over_scans, forget, mixed, no_mix
+
+OUTLIER_DETECTOR = int(Status.OUTLIER_DETECTOR)
 
 
 class Associated(NamedTuple):
@@ -221,21 +224,18 @@ def _over_scans(  # noqa: PLR0917 - outputs are written into the arrays of the w
         view = viewpoint(prior, facing, model)
         for i in range(first, last):
             entry = chosen[i - first]
-            if entry == NOBODY:
-                status[i] = OUTLIER_ASSOCIATION if status[i] == INLIER else status[i]
-            else:
-                status[i] = INLIER
-            if entry == NOBODY or entry == entries[i]:
+            if status[i] == OUTLIER_DETECTOR:
                 continue
-            if cross is not None and given is not None and work is not None:
-                take_out(work, BLOCKS, cross, entry, given)
-            measured = detections[i, 0] - model.range_bias
-            aim = UnitVector(aims[i - first, 0], aims[i - first, 1])
-            x, y, variance = places[entry, 0], places[entry, 1], places[entry, 2]
-            entries[i] = entry
-            d2[i], _ = score(
-                gate.kind, prior, facing, measured, composed(facing, aim), aim, x, y, variance, view, model, given, work
-            )
+            if entry != NOBODY and entry != entries[i]:
+                if cross is not None and given is not None and work is not None:
+                    take_out(work, BLOCKS, cross, entry, given)
+                measured = detections[i, 0] - model.range_bias
+                aim = UnitVector(aims[i - first, 0], aims[i - first, 1])
+                x, y, variance = places[entry, 0], places[entry, 1], places[entry, 2]
+                ray, entries[i] = composed(facing, aim), entry
+                d2[i], _ = score(gate.kind, prior, facing, measured, ray, aim, x, y, variance, view, model, given, work)
+            # What poses are told apart by takes the constants for noise: the gate of a scan knows better.
+            status[i] = INLIER if entry != NOBODY and d2[i] <= gate.d2 else OUTLIER_ASSOCIATION
     return Associated(prior, facing, given, mix)
 
 
