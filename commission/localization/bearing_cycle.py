@@ -17,11 +17,12 @@ from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.bearings import ACCEPTED, REFLECTOR, REJECTED, USE, BearingModel, correct_by_bearing_alone
 from commission.localization.consider_columns import carry_over
 from commission.localization.contour import ContourScan
-from commission.localization.cycle import Cycle, supervised, with_temporary
+from commission.localization.cycle import Cycle, held_back, supervised, with_temporary
 from commission.localization.filter_kinds import is_invariant
 from commission.localization.odometry import NextOdometry, reach, velocity
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.rejection import FEWEST_AGAINST, MOST_FOR, Evidence, RejectionRule, is_doubtful
+from commission.localization.rival_poses import RivalPoses
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
 from commission.localization.temporary_memory import TemporaryMemory
@@ -60,6 +61,7 @@ def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of th
     memory: TemporaryMemory | None,
     scan: ContourScan | None,
     goods: FloatArray | None,
+    rivals: RivalPoses | None,
 ) -> Cycle:
     """Process a reflex.
 
@@ -77,6 +79,7 @@ def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of th
     figures : (n, COLUMNS) out, see `bearings`.
     zones : where which kinds correct the pose; bearings do where reflectors do.
     temporary, memory, scan, goods : as in `process_scan`; the scan of a reflex has no beams.
+    rivals : where the vehicle may stand as well, or None; a bearing alone decides on none of them.
 
     Notes
     -----
@@ -108,7 +111,8 @@ def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of th
     use, named = figures[row, USE], reflexes.entries[row] >= 0
     evidence = weigh_bearing(state.evidence, stamp_ns, prior, use, named and figures[row, REFLECTOR] >= 0, model)
     pivot = state.pivot if cross is None else (belief.x, belief.y)
-    return Cycle(prior, supervised(state, stamp_ns, belief, motion, evidence, pivot, model))
+    after = supervised(state, stamp_ns, belief, motion, evidence, pivot, model)
+    return Cycle(prior, held_back(rivals, state, after, model))
 
 
 @compiled_inline

@@ -392,7 +392,7 @@ class Localizer:
 
     def _met(self, reflex: Reflex, following: NextOdometry, figures: FloatArray, goods: FloatArray | None) -> Cycle:
         """Let the filter process a reflex; what becomes of it is written."""
-        setup, memory = self._setup, self._memory()
+        setup, memory, rivals = self._setup, self._memory(), self._rivals()
         cross = columns_of(self._state.cross, setup.constants)
         if setup.bearing_model is None:
             raise ValueError("a reflex is processed where none are looked at; expected a goniometer in the setup")
@@ -404,7 +404,7 @@ class Localizer:
             setup.bearing_model,
         )
         cycle = process_reflex(
-            self._state._replace(cross=None, search=None, protection=None, temporary=None),
+            self._state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None),
             reflex.stamp_ns,
             0,
             reflexes,
@@ -419,8 +419,9 @@ class Localizer:
             memory,
             contour_scan(setup, None, 0),
             goods,
+            rivals,
         )
-        return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory))
+        return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory, rivals))
 
     def _seen_tags(self, record: Scan | Detections | TagSightings | Reflex) -> SeenTags | None:
         """What a frame saw of tags, with room for what becomes of it where they are looked at; None of a scan."""

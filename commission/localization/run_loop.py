@@ -535,6 +535,7 @@ def _run(  # noqa: PLR0917 - the columns of the log
                 memory,
                 contour_scan_at(scans, k, observations, sweeps),
                 goods_at(temporary, goods, k),
+                rivals,
             )
         else:
             first, last = offsets[k], offsets[k + 1]

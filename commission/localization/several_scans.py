@@ -370,7 +370,7 @@ def _left(after: Branches, grown: int, now: Branches) -> int:
             if same < 0 and _are_one(now.beliefs[kept], after.beliefs[row]):
                 same = kept
         if same >= 0:
-            _put_together(now, same, after.beliefs[row], after.weights[row])
+            _put_together(now, same, after, row)
         elif count < MOST_POSES:
             _copy(after, row, now, count)
             count += 1
@@ -396,7 +396,7 @@ def _are_one(a: FloatArray, b: FloatArray) -> bool:
 
 
 @compiled
-def _put_together(now: Branches, kept: int, row: FloatArray, weight: float) -> None:
+def _put_together(now: Branches, kept: int, after: Branches, other: int) -> None:
     """Move and widen a pose by another one that is the same, as a mixture has it; the covariance is the likelier's.
 
     Notes
@@ -404,7 +404,7 @@ def _put_together(now: Branches, kept: int, row: FloatArray, weight: float) -> N
     x <- x + b d, P <- P + a b d d^T with the shares a, b of both and their distance d: moments of a mixture (Bar-
     Shalom, Li, Kirubarajan 2001, equation 1.4.16-9).
     """
-    ratio = math.exp(weight - now.weights[kept])
+    row, ratio = after.beliefs[other], math.exp(after.weights[other] - now.weights[kept])
     b = ratio / (1.0 + ratio)
     pose, mix = now.beliefs[kept], now.mixes[kept]
     d = (row[0] - pose[0], row[1] - pose[1], wrap_scalar(row[2] - pose[2]))

@@ -21,7 +21,7 @@ from commission.localization.odometry import NextOdometry, reach, velocity
 from commission.localization.rejection import weigh
 from commission.localization.rival_poses import RivalPoses
 from commission.localization.setup import FilterModel
-from commission.localization.several_scans import keep_own
+from commission.localization.several_scans import forget
 from commission.localization.state import FilterState
 from commission.localization.tags import ACCEPTED, REJECTED, USE, TagModel, correct_by_tag
 from commission.localization.temporary_memory import TemporaryMemory
@@ -127,7 +127,8 @@ def process_tags(  # noqa: PLR0917 - outputs are written into the arrays of the 
         model.rejection,
     )
     pivot = state.pivot if cross is None else (belief.x, belief.y)
-    keep_own(rivals, belief, said_by_tags(figures, first, last) == 1.0)
+    if said_by_tags(figures, first, last) == 1.0:
+        forget(rivals)
     after = supervised(state, stamp_ns, belief, motion, evidence, pivot, model)
     return Cycle(prior, held_back(rivals, state, after, model))
 
