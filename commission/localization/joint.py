@@ -64,7 +64,16 @@ class Rivals(NamedTuple):
 
 @compiled
 def no_rivals(detections: int) -> Rivals:
-    """Room for the rivals of some detections."""
+    """Room for the rivals of some detections.
+
+    Parameters
+    ----------
+    detections : how many.
+
+    Notes
+    -----
+    No formula: it makes arrays.
+    """
     n, r = detections, MOST_RIVALS
     return Rivals(
         np.zeros(n, np.int64),
@@ -204,7 +213,20 @@ def list_rivals(  # noqa: PLR0917 - a measurement, number by number, and the map
     given: Considering | None,
     work: FloatArray | None,
 ) -> None:
-    """List the reflectors inside the gate of a detection, the likeliest first."""
+    """List the reflectors inside the gate of a detection, the likeliest first.
+
+    Parameters
+    ----------
+    found, m : where they are written, and for which of its detections.
+    kind, gate_d2 : of the filter, and largest squared Mahalanobis distance.
+    belief, facing, view, reach : what the detection is judged at, as in `associate`.
+    measured_range, aim : range bias already taken off [m], and the bearing as a direction of base.
+    model, cells, places, cell_offsets, cross, given, work : as in `associate`.
+
+    Notes
+    -----
+    d2 + ln(det S): Sobreira et al. 2016, Algorithm 3, line 4, with S that of the kind of the filter.
+    """
     ray = composed(facing, aim)
     px = belief.x + view.offset_x + measured_range * ray.cos - cells.origin_x
     py = belief.y + view.offset_y + measured_range * ray.sin - cells.origin_y
