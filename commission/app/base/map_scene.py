@@ -32,7 +32,6 @@ WHERE = {
     "add_image": "position",
     "add_frame": "position",
     "add_transform_controls": "position",
-    "add_box": "position",
     "add_mesh_simple": "position",
 }
 """What each way to add a node says where it is; one that is not named here cannot be used."""
