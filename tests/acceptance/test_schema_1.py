@@ -82,5 +82,5 @@ def test_an_older_project_stays_what_it_is_when_it_is_saved_as_a_new_one(project
     save_project(project, tmp_path)
     text = (tmp_path / "project.yaml").read_text(encoding="utf-8")
     assert text.startswith("schema: 2\n")
-    assert "\nscanners:\n  - name: scanner\n    mounting: [0.15, 0.0, 0.0]" in text
+    assert "\nscanners:\n  - name: scanner\n    kind: laser\n    mounting: [0.15, 0.0, 0.0]" in text
     assert load_project(tmp_path) == project
