@@ -39,6 +39,7 @@ def fewer_than_by_hand(project: Project, found: Placement) -> bool:
     return found.unmet == () and found.at_least <= found.added < len(project.reflectors)
 
 
+@pytest.mark.with_all_seeds
 def test_the_shop_floor_needs_fewer_reflectors_than_drawn_by_hand_to_be_as_accurate(
     repository: Path, seeds: Seeds
 ) -> None:

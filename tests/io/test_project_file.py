@@ -264,7 +264,11 @@ def test_saving_keeps_the_names_of_the_files_that_are_there(tmp_path: Path) -> N
     [
         ("rate: 10.0", "rate: fast", "line 9, scanner.rate: is 'fast'; expected a number (Scans per second [scans/s])"),
         ("rate: 10.0", "rate: 0", "line 9, scanner.rate: is 0; expected 0.1 to 1000 scans/s"),
-        ("rate: 10.0", "rte: 10", "line 9, scanner.rte: is no known key; expected one of: name, kind, mounting, upside_down"),
+        (
+            "rate: 10.0",
+            "rte: 10",
+            "line 9, scanner.rte: is no known key; expected one of: name, kind, mounting, upside_down",
+        ),
         ("rate: 10.0", "rate: .inf", "line 9, scanner.rate: is .inf; expected a finite number"),
         ("rate: 10.0", "resolution_deg: 1", "line 9, scanner.resolution_deg: is given a second time"),
         (

@@ -42,7 +42,7 @@ from commission.site.scanner import Scanner, ScannerKind
 from commission.site.tags import Tag
 from commission.site.uncertainty import Uncertainty
 from commission.studies.bearing_figures import bearing_findings
-from tests.conftest import REPOSITORY
+from tests.conftest import REPOSITORY, few_of
 
 GONIOMETER = Scanner(
     name="goniometer",
@@ -249,7 +249,7 @@ def grown(log, setup, start):
     return live.columns()
 
 
-@pytest.mark.parametrize("consider", [True, False])
+@pytest.mark.parametrize("consider", few_of((True, False), (True,)))
 def test_live_is_the_whole_run_to_the_last_bit(consider):
     filtering = dataclasses.replace(SETUP.parameters.filter, consider=consider)
     setup = dataclasses.replace(SETUP, parameters=dataclasses.replace(SETUP.parameters, filter=filtering))

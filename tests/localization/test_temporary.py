@@ -336,6 +336,7 @@ def test_a_hall_that_is_moved_and_turned_gives_the_same_drive_in_it(driven):
     np.testing.assert_allclose(turned @ here.covariances @ turned.T, there.covariances, rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.with_all_seeds
 def test_the_invariant_filter_remembers_them_as_well(driven):
     ekf, invariant = (run(driven.log, setup_of(driven, kind=kind), driven.start) for kind in ("ekf", "invariant"))
     assert np.abs(errors(invariant, driven.log) - errors(ekf, driven.log)).max() < 0.02
