@@ -181,6 +181,7 @@ def test_starts_half_a_metre_and_15_degrees_off_converge(floor, seeds):
     assert converged >= math.floor(0.99 * told)
 
 
+@pytest.mark.with_all_seeds
 def test_with_three_reflectors_contours_are_better_than_either_alone(seeds):
     """In the warehouse, along an aisle: the virtual map is as exact as its cells, and the parameters say so."""
     whole = load_project(REPOSITORY / "maps" / "warehouse")

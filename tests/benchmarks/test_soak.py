@@ -5,9 +5,12 @@ from __future__ import annotations
 import socket
 import time
 
+import pytest
+
 from tests.benchmarks.soak import LOST_AFTER_S, read, soak
 
 
+@pytest.mark.with_all_seeds
 def test_drive_is_edited_and_read_and_a_job_is_stopped() -> None:
     found = soak(0.1)
     assert len(found.latencies) == len(found.memory) >= 2
