@@ -34,7 +34,7 @@ def browser() -> Iterator[Browser]:
         chromium.close()
 
 
-COARSE = 0.3
+COARSE = 0.5
 """Resolution of the floor where a test does not look at its pixels: without a graphics card, drawing it is what a test
 in a browser spends most of its time on."""
 
