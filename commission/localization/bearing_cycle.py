@@ -6,7 +6,6 @@ bearing needs no evolution between reflexes: the pose goes along with odometry, 
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +20,14 @@ from commission.localization.cycle import Cycle, held_back, supervised, with_tem
 from commission.localization.filter_kinds import is_invariant
 from commission.localization.odometry import NextOdometry, reach, velocity
 from commission.localization.pose_gaussian import PoseGaussian
-from commission.localization.rejection import FEWEST_AGAINST, MOST_FOR, Evidence, RejectionRule, is_doubtful
+from commission.localization.rejection import (
+    FEWEST_AGAINST,
+    MOST_FOR,
+    Evidence,
+    RejectionRule,
+    decayed,
+    is_doubtful,
+)
 from commission.localization.rival_poses import RivalPoses
 from commission.localization.setup import FilterModel
 from commission.localization.state import FilterState
@@ -134,8 +140,8 @@ def weigh_bearing(  # noqa: PLR0917 - a reflex and what is known around it
     -----
     against <- max(against + (rejected - accepted / (1 / 4)) / 3, 0), by definition: a scan that holds three rejected
     detections and at most a quarter as many accepted ones speaks against the pose, so that each rejected bearing counts
-    a third of such a scan, and an accepted one takes back what four rejected ones counted. The windows are those of
-    `weigh`, of one detection.
+    a third of such a scan, and an accepted one takes back what four rejected ones counted. Windows as in
+    `decayed`.
     """
     rule: RejectionRule = model.rejection
     accepted, rejected = 1.0 if use == ACCEPTED else 0.0, 1.0 if use == REJECTED else 0.0
@@ -144,16 +150,4 @@ def weigh_bearing(  # noqa: PLR0917 - a reflex and what is known around it
     against = max(against + (rejected - accepted / MOST_FOR) / FEWEST_AGAINST, 0.0)
     if is_doubtful(prior, rule):
         accepted, confirmed = 0.0, 0.0
-    seconds = (stamp_ns - evidence.stamp_ns) * 1e-9
-    of_near, of_all = evidence.near_accepted + evidence.near_rejected, evidence.accepted + evidence.rejected
-    kept_near = max(math.exp(-seconds / rule.window_s), min(1.0, rule.fewest / max(of_near, 1e-9)))
-    kept = max(math.exp(-seconds / rule.long_window_s), min(1.0, rule.fewest_of_all / max(of_all, 1e-9)))
-    return Evidence(
-        stamp_ns,
-        kept_near * evidence.near_accepted + accepted,
-        kept_near * evidence.near_rejected + near,
-        kept * evidence.accepted + accepted,
-        kept * evidence.rejected + rejected,
-        confirmed + accepted,
-        against,
-    )
+    return decayed(evidence, stamp_ns, accepted, rejected, near, confirmed + accepted, against, rule)

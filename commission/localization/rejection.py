@@ -137,8 +137,7 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
 
     Notes
     -----
-    n <- n max(exp(-dt / window), min(1, fewest / n)) + count: exponential forgetting that waits where there is little,
-    derived from a mean over the window. A scan speaks for the pose where accepted > rejected / 4, and against it where
+    Counts as in `decayed`. A scan speaks for the pose where accepted > rejected / 4, and against it where
     not and rejected >= 3, by definition. Where reflectors speak for it, rejected contours say nothing: the walls have
     changed. Where they do not, rejected contours speak against it; and contours that match, from a belief that was not
     doubtful, speak for it: then what is near no reflector is a thing that the map lacks and does not count, but what is
@@ -175,6 +174,35 @@ def weigh(  # noqa: PLR0917 - the scan's detections and the map, array by array
     confirmed += accepted
     if matches:
         accepted, rejected, confirmed = accepted + PER_MATCH, near, confirmed + 1.0
+    return decayed(evidence, stamp_ns, accepted, rejected, near, confirmed, against, rule)
+
+
+@compiled_inline
+def decayed(  # noqa: PLR0917 - the counts, one by one
+    evidence: Evidence,
+    stamp_ns: int,
+    accepted: float,
+    rejected: float,
+    near: float,
+    confirmed: float,
+    against: float,
+    rule: RejectionRule,
+) -> Evidence:
+    """Evidence after a cycle: what is old is forgotten, what is new is added.
+
+    Parameters
+    ----------
+    evidence : before the cycle.
+    stamp_ns : of the cycle [ns].
+    accepted, rejected, near : detections of the cycle that were accepted, rejected, and rejected near reflectors.
+    confirmed, against : as they stand after it.
+    rule : windows.
+
+    Notes
+    -----
+    n <- n max(exp(-dt / window), min(1, fewest / n)) + count: exponential forgetting that waits where there is little,
+    derived from a mean over the window.
+    """
     seconds = (stamp_ns - evidence.stamp_ns) * 1e-9
     of_near, of_all = evidence.near_accepted + evidence.near_rejected, evidence.accepted + evidence.rejected
     kept_near = max(math.exp(-seconds / rule.window_s), min(1.0, rule.fewest / max(of_near, 1e-9)))

@@ -531,7 +531,7 @@ def keep_own(poses: RivalPoses | None, own: PoseGaussian, is_proven: bool) -> No
     write_pose(poses.newest, own)
     poses.begun[0] = True
     if is_proven:
-        poses.weights[:] = -math.inf
+        forget(poses)
 
 
 @compiled_inline

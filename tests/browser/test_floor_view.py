@@ -70,7 +70,7 @@ def test_the_edge_says_where_the_pointer_is_and_how_long_things_are(page: OpenPa
 
 
 def test_nothing_as_large_as_the_floor_is_lit(page: OpenPage) -> None:
-    # Without a graphics card the sheet that takes drags, filled, was four fifths of the time of a picture.
+    # Without a graphics card the sheet that takes drags, filled, was half the time of a picture.
     assert page.page.evaluate(_LIT_SHEETS) == []
 
 

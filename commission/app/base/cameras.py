@@ -314,8 +314,8 @@ class Cameras:
     def _rotation_lock(self, client: ClientHandle) -> SceneNodeHandle:
         """Put a sheet under everything that takes left drags: the camera would turn by them, and north not stay up.
 
-        Its edges are all that is drawn of it, invisibly: filled, it took four fifths of the time of a picture where no
-        graphics card draws, for a light that nobody sees at each pixel. Between the edges it is met all the same.
+        Its edges are all that is drawn of it, invisibly: filled, it took half the time of a picture where no graphics
+        card draws, for a light that nobody sees at each pixel. Between the edges it is met all the same.
         """
         sheet = self._origin.scene(client.scene).add_mesh_simple(
             LOCK,
