@@ -77,7 +77,7 @@ def judged_again(search: Search, now_ns: int, around: SearchMap) -> Search:
         search.track.x,
         search.track.y,
         clutter(things, search),
-        _prior(search, around),
+        prior_of(search, around),
         Sights(read_only(views), search.ends, around.eyes, around.walls, around.walled, around.facings, beams),
         around.cells,
         around.places,
@@ -87,8 +87,14 @@ def judged_again(search: Search, now_ns: int, around: SearchMap) -> Search:
     return replace(search, hypotheses=read_only(_ranked(judged, search)))
 
 
-def _prior(search: Search, around: SearchMap) -> Prior:
-    """Return what is known before anything is seen."""
+def prior_of(search: Search, around: SearchMap) -> Prior:
+    """Return what is known before anything is seen.
+
+    Parameters
+    ----------
+    search : with the last good pose, where there is one.
+    around : the map to search.
+    """
     even = -math.log(2.0 * math.pi * around.table.area)
     if search.around is None:
         return Prior(even, False, 0.0, 0.0, 0.0, 1.0, 1.0)
@@ -120,17 +126,23 @@ def _ranked(judged: FloatArray, search: Search) -> FloatArray:
     left = np.arange(len(judged))
     while len(left) and len(kept) < HYPOTHESES:
         kept.append(int(left[0]))
-        left = left[~_same(poses[left], poses[left[0]])]
+        left = left[~same_place(poses[left], poses[left[0]])]
     ranked = judged[kept]
     if len(ranked) and _is_alone(ranked, search):
         old = search.hypotheses
-        again = len(old) > 0 and bool(_same(poses[kept[:1]], base_poses(old[:1], search.track)[0])[0])
+        again = len(old) > 0 and bool(same_place(poses[kept[:1]], base_poses(old[:1], search.track)[0])[0])
         ranked[0, 11] = 1.0 + (old[0, 11] if again else 0.0)
     return ranked
 
 
-def _same(poses: FloatArray, other: FloatArray) -> BoolArray:
-    """(n,) whether each of some poses is one place with another one."""
+def same_place(poses: FloatArray, other: FloatArray) -> BoolArray:
+    """(n,) whether each of some poses is one place with another one.
+
+    Parameters
+    ----------
+    poses : (n, 3) [m, m, rad].
+    other : (3,) of the other one.
+    """
     apart = np.hypot(poses[:, 0] - other[0], poses[:, 1] - other[1])
     return (apart < SAME_PLACE) & (np.abs(difference(poses[:, 2], other[2])) < SAME_HEADING)
 
@@ -210,11 +222,11 @@ def gaussian_of(best: FloatArray, track: PoseGaussian) -> PoseGaussian:
 
 def spread(search: Search, around: SearchMap) -> PoseGaussian:
     """Belief of a vehicle that is not located: the likeliest hypothesis, as wide as all of them together."""
-    chances = probabilities(search.hypotheses)
+    chances = probabilities(search.told)
     if len(chances) == 0 or chances.sum() < 0.5:
         return around.anywhere
-    poses = base_poses(search.hypotheses, search.track)
-    best = gaussian_of(search.hypotheses[0], search.track)
+    poses = base_poses(search.told, search.track)
+    best = gaussian_of(search.told[0], search.track)
     rest = 1.0 - float(chances.sum())
     dx, dy = poses[:, 0] - poses[0, 0], poses[:, 1] - poses[0, 1]
     turn = np.array([math.remainder(float(each), 2.0 * math.pi) for each in poses[:, 2] - poses[0, 2]])

@@ -120,8 +120,8 @@ def judge(  # noqa: PLR0917 - things, views and the map, array by array
         judged[h, 3], judged[h, 4], judged[h, 5] = xx, xy, xt
         judged[h, 6], judged[h, 7], judged[h, 8] = yy, yt, tt
         c, s = math.cos(t), math.sin(t)
-        density = _density(prior, x + c * base_x - s * base_y, y + s * base_x + c * base_y, t)
-        evidence = fit.evidence + 1.5 * math.log(2.0 * math.pi) - 0.5 * math.log(det) + math.log(density)
+        before = density(prior, x + c * base_x - s * base_y, y + s * base_x + c * base_y, t)
+        evidence = fit.evidence + 1.5 * math.log(2.0 * math.pi) - 0.5 * math.log(det) + math.log(before)
         walls = log_walls(x, y, t, sights.beams, sights.walls)
         evidence += walls
         judged[h, 12] = max(walls - MOST_FOR, 0.0)
@@ -215,17 +215,22 @@ def _fit_step(  # noqa: PLR0917 - things and the map, array by array
 
 
 @compiled_inline
-def _density(prior: Prior, x: float, y: float, t: float) -> float:
+def density(prior: Prior, x: float, y: float, t: float) -> float:
     """Density of a pose of the vehicle before anything is seen [1 / (m^2 rad)]; half of it even, half around a pose.
+
+    Parameters
+    ----------
+    prior : what is known.
+    x, y, t : pose of base [m, m, rad], map frame.
 
     Notes
     -----
-    0.5 U + 0.5 N, a mixture; derived.
+    p = 0.5 U + 0.5 N, a mixture; derived.
     """
-    density = math.exp(prior.log_even)
+    dense = math.exp(prior.log_even)
     if prior.known:
         away2 = ((x - prior.x) ** 2 + (y - prior.y) ** 2) / prior.position_variance
         away2 += wrap_scalar(t - prior.theta) ** 2 / prior.heading_variance
         norm = (2.0 * math.pi) ** 1.5 * prior.position_variance * math.sqrt(prior.heading_variance)
-        density = 0.5 * density + 0.5 * math.exp(-0.5 * away2) / norm
-    return density
+        dense = 0.5 * dense + 0.5 * math.exp(-0.5 * away2) / norm
+    return dense

@@ -27,6 +27,7 @@ from commission.localization.seen_of_late import SeenScan, joined_scan
 from commission.localization.setup import LocalizerSetup
 from commission.localization.state import FilterState
 from commission.localization.supervisor import SupervisorLimits
+from commission.localization.trail_search import CONFIRMED, explained_again
 
 CONFIRMATIONS = 5
 """Scans in a row in which one hypothesis must have these odds."""
@@ -148,6 +149,7 @@ def sought(before: FilterState, after: FilterState, scan: SeenScan, around: Sear
     waits = max(PERIOD_S * 1e9, min(PATIENCE * (now_ns - search.since_ns), LONGEST_PERIOD_S * 1e9))
     if now_ns - search.judged_ns >= waits:
         search = judged_again(search, now_ns, around)
+        search = explained_again(search, None if before.mode == Mode.INITIALIZING else after.belief, now_ns, around)
         best = _confirmed(search)
         if best is not None:
             return _located(after, search, best, now_ns)
@@ -171,6 +173,8 @@ def _confirmed(search: Search) -> FloatArray | None:
     """Return the hypothesis that is left, once enough scans agree."""
     if len(search.hypotheses) and search.hypotheses[0, 11] >= CONFIRMATIONS:
         return search.hypotheses[0]
+    if len(search.explained) and search.explained[0, 11] >= CONFIRMED:
+        return search.explained[0]
     return None
 
 

@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.geometry.ray_kernels import RayTables
@@ -16,6 +17,9 @@ from commission.localization.setup import LocalizerSetup
 from commission.localization.start import MARGIN, DistanceTable, pair_table
 from commission.site.reflectors import ReflectorKind
 from commission.site.walls import walls_of
+
+CLOSE = 0.5
+"""Reflectors nearer to each other than that [m] are one place: what is seen of one may be of the other."""
 
 
 class SearchMap(NamedTuple):
@@ -39,6 +43,10 @@ class SearchMap(NamedTuple):
     odometry: OdometryNoise
     anywhere: PoseGaussian
     """A belief as wide as the floor."""
+    models: FloatArray
+    """(S, 6) of the observation by each scanner, see `observation_rows`."""
+    crowd: FloatArray
+    """(N,) one over the reflectors within `CLOSE` of each row of `places`, itself among them."""
 
 
 def search_map(setup: LocalizerSetup) -> SearchMap:
@@ -55,6 +63,7 @@ def search_map(setup: LocalizerSetup) -> SearchMap:
         for number, scanner in enumerate(setup.scanners)
         for first, last in scanner.views.tolist()
     ]
+    close = KDTree(index.places[:, :2]).query_ball_point(index.places[:, :2], CLOSE) if len(rows) else []
     longest = 2.0 * max((eye[4] for eye in eyes), default=1.0)
     return SearchMap(
         pair_table(index.places, longest),
@@ -67,6 +76,8 @@ def search_map(setup: LocalizerSetup) -> SearchMap:
         setup.floor is not None,
         setup.filter.odometry,
         anywhere(index.places),
+        setup.observation_rows,
+        read_only(1.0 / np.array([len(each) for each in close], dtype=np.float64)),
     )
 
 

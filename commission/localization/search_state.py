@@ -12,6 +12,8 @@ from commission.localization.beam_ends import Ends, no_ends
 from commission.localization.hypothesis_fit import ROW
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.sightings import COLUMNS
+from commission.localization.trail import no_trail
+from commission.localization.trail_fit import Trail
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -38,11 +40,25 @@ class Search:
     """Stamp of the last search of all pairs [ns]."""
     judged_ns: int
     """Stamp of the last attempt [ns]."""
+    trail: Trail
+    """Scans of the way since the search began."""
+    way: float
+    """How much of the way lies behind the last attempt to explain the trail, see `way_between`."""
+    explained: FloatArray
+    """(H, ROW) hypotheses by the trail, the likeliest first."""
+
+    @property
+    def told(self) -> FloatArray:
+        """(H, ROW) hypotheses as they stand: by the way as a whole where scans see too little, else by things."""
+        return self.explained if len(self.explained) else self.hypotheses
 
     def _content(self) -> tuple[object, ...]:
         """All of it, comparable."""
-        arrays = (each.tobytes() for each in (self.things, self.views, self.ends, self.hypotheses))
-        scalars = (self.since_ns, self.around, self.track, self.drift, self.searched_ns, self.judged_ns)
+        arrays = (
+            each.tobytes()
+            for each in (self.things, self.views, self.ends, self.hypotheses, *self.trail, self.explained)
+        )
+        scalars = (self.since_ns, self.around, self.track, self.drift, self.searched_ns, self.judged_ns, self.way)
         return (*scalars, *arrays)
 
     def __eq__(self, other: object) -> bool:
@@ -87,4 +103,7 @@ def new_search(stamp_ns: int, around: PoseGaussian | None = None) -> Search:
         hypotheses=read_only(np.empty((0, ROW))),
         searched_ns=LONG_AGO_NS,
         judged_ns=LONG_AGO_NS,
+        trail=no_trail(),
+        way=0.0,
+        explained=read_only(np.empty((0, ROW))),
     )

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.geometry.se2 import compose
+from commission.localization.association import INLIER, OUTLIER_ASSOCIATION
 from commission.localization.beam_ends import beam_ends
 from commission.localization.observation import ObservationModel
 from commission.localization.odometry import NextOdometry
@@ -22,6 +23,7 @@ from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.search_state import Search
 from commission.localization.sightings import CERTAIN, COLUMNS, MOST_THINGS, join
 from commission.localization.start import PAIRS
+from commission.localization.trail import lengthened, way_between
 from commission.site.records import Scan
 
 VIEWS = 5
@@ -90,6 +92,10 @@ def joined_scan(search: Search, track: PoseGaussian, scan: SeenScan) -> Search:
         views = np.concatenate((views[~of_it], mine))
         newest = beam_ends(scan.ranges(), upside_down=scan.upside_down)
         ends = np.concatenate((ends[~of_it], np.concatenate((ends[of_it], newest))[-VIEWS:]))
+    of_map = (scan.status == INLIER) | (scan.status == OUTLIER_ASSOCIATION)
+    newest = np.array((seconds, track.x, track.y, track.theta, position, heading, float(scan.scanner), 0.0))
+    trail = lengthened(search.trail, newest, scan.detections[of_map])
+    way = way_between(trail.scans[-2], trail.scans[-1]) if len(trail.scans) > 1 and of_map.any() else 0.0
     still = track._replace(xx=0.0, xy=0.0, xt=0.0, yy=0.0, yt=0.0, tt=0.0)
     return replace(
         search,
@@ -98,6 +104,8 @@ def joined_scan(search: Search, track: PoseGaussian, scan: SeenScan) -> Search:
         things=read_only(things[:count].copy()),
         views=read_only(views),
         ends=read_only(ends),
+        trail=trail,
+        way=search.way + way,
     )
 
 

@@ -97,7 +97,7 @@ def test_a_robot_among_others_that_look_like_landmarks_is_never_found_elsewhere(
     project, log = load_project(shared_data / name), load_log(shared_data / name / "recording")
     setup = LocalizerSetup.of(project)
     rng = np.random.default_rng(0)
-    for start in rng.integers(log.first_ns, log.last_ns - 60 * SECOND, len(seeds(8, 60))).tolist():
+    for start in rng.integers(log.first_ns, log.last_ns - 60 * SECOND, len(seeds(4, 60))).tolist():
         drive = part(log, start, start + 60 * SECOND)
         columns = run(drive, setup, unknown_start(project, drive).state())
         distance, _ = off(drive, columns)

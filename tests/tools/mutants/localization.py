@@ -58,6 +58,13 @@ LOCALIZATION = (
         tests=(PROTECTION + "test_live_is_the_whole_run_to_the_last_bit",),
     ),
     Mutant(
+        name="a thing that stands beside a wrong pose's reflector speaks for it again and again",
+        file=FOLDER + "trail_fit.py",
+        find="evidence += min(gains[entry], bound)",
+        replace="evidence += gains[entry]",
+        tests=(TESTS + "test_trail.py::test_a_pose_is_led_along_as_a_plain_filter_with_matrices_leads_it",),
+    ),
+    Mutant(
         name="a beam that goes through a wall counts as one that ends at it",
         file=FOLDER + "wall_evidence.py",
         find="farthest < length - AT_WALL",

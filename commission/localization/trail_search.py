@@ -1,0 +1,137 @@
+"""Hypotheses of where a vehicle is whose scans see one or two things: each led along the way, until one is left.
+
+`hypotheses` judges by things that came back and are joined by odometry; where they do not, or odometry drifts too far
+before enough of them have been seen, each hypothesis is judged by what it makes of all scans of the way (`trail_fit`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from commission.geometry.arrays import FloatArray, read_only
+from commission.geometry.se2 import compose, inverse
+from commission.localization.hypotheses import ODDS, base_poses, prior_of, same_place
+from commission.localization.hypothesis_fit import NEGLIGIBLE, ROW, density
+from commission.localization.pose_gaussian import PoseGaussian
+from commission.localization.search_map import SearchMap
+from commission.localization.search_state import Search
+from commission.localization.seen_of_late import pairs_of
+from commission.localization.start import CANDIDATES, HYPOTHESES, candidates
+from commission.localization.trail import newest_things
+from commission.localization.trail_fit import explain
+
+SPARSE = 4.0
+"""Detections a scan on average from which on things that come back tell it sooner."""
+AFTER_S = 2.0
+"""The search has been going on for so long [s]: where scans hold enough, it has ended by then."""
+NEW_WAY = 1.0
+"""Part of the way, see `way_between`, between two attempts at least."""
+TRIED = 32
+"""Poses that pairs suggest and that are led along, those that most things fit."""
+ODDS_AGAINST_NONE = 1e4
+"""How much likelier it must be than that what is seen is none of the map's reflectors; than all others as `ODDS`
+says. With maps of other places a real robot reached 1e3 at most, in 48 minutes of driving."""
+CONFIRMED = 3.0
+"""Attempts in a row in which one hypothesis must be the only one left."""
+LEAST_SHARE = 0.6
+"""Share of the detections that must be of reflectors by it."""
+FEWEST_PLACES = 3.0
+"""Places of the map that must have been seen by it."""
+
+
+def is_sparse(search: Search) -> bool:
+    """Whether scans see so little that the way as a whole has to tell.
+
+    Parameters
+    ----------
+    search : with the newest scan taken in.
+    """
+    trail = search.trail
+    return len(trail.scans) > 1 and len(trail.seen) < SPARSE * len(trail.scans)
+
+
+def explained_again(search: Search, belief: PoseGaussian | None, now_ns: int, around: SearchMap) -> Search:
+    """Judge hypotheses by the way as a whole, and new ones that the newest scans suggest.
+
+    Parameters
+    ----------
+    search : with the newest scan taken in.
+    belief : the filter's own, which may be right; None: it has none.
+    now_ns : stamp of the newest scan [ns].
+    around : the map to search.
+    """
+    if not is_sparse(search):
+        return replace(search, explained=read_only(search.explained[:0])) if len(search.explained) else search
+    if search.way < NEW_WAY or now_ns - search.since_ns < AFTER_S * 1e9:
+        return search
+    things = newest_things(search.trail, around.models)
+    if len(around.table.distances) == 0 or len(things) < 2:
+        return search
+    found = np.empty((CANDIDATES, 4))
+    table, track = around.table, np.array((search.track.x, search.track.y, search.track.theta))
+    count = candidates(
+        things,
+        pairs_of(things),
+        table.distances,
+        table.ends,
+        around.cells,
+        around.places,
+        around.offsets,
+        found,
+    )
+    poses = [base_poses(search.explained, search.track), compose(found[: min(count, TRIED), :3], track)]
+    if belief is not None:
+        poses.append(np.array(((belief.x, belief.y, belief.theta),)))
+    explained = np.empty((sum(map(len, poses)), 12))
+    explain(
+        read_only(np.concatenate(poses)),
+        search.trail,
+        around.models,
+        around.eyes,
+        max(float(search.trail.seen[:, 0].max()), 1.0),
+        around.crowd,
+        around.cells,
+        around.places,
+        around.offsets,
+        explained,
+    )
+    return replace(search, explained=read_only(_ranked(explained, search, around)), way=0.0)
+
+
+def _ranked(explained: FloatArray, search: Search, around: SearchMap) -> FloatArray:
+    """(H, ROW) hypotheses by their evidence, each place once, as `hypotheses` has them."""
+    prior = prior_of(search, around)
+    rows = np.zeros((len(explained), ROW))
+    track = np.array((search.track.x, search.track.y, search.track.theta))
+    rows[:, :3] = compose(explained[:, :3], inverse(track))
+    rows[:, 3:9] = explained[:, 3:9]
+    densities = [density(prior, *pose) for pose in explained[:, :3].tolist()]
+    rows[:, 9], rows[:, 10] = explained[:, 9] + np.log(densities), np.floor(explained[:, 11] + 0.5)
+    # One that leaves too much unexplained is no likelier than that it is none of them.
+    is_weak = (explained[:, 10] < LEAST_SHARE) | (explained[:, 11] < FEWEST_PLACES)
+    rows[is_weak, 12] = np.maximum(rows[is_weak, 9], 0.0)
+    rows = rows[np.isfinite(rows[:, 9])]
+    rows = rows[np.argsort(-rows[:, 9], kind="stable")]
+    rows = rows[rows[:, 9] > rows[0, 9] - NEGLIGIBLE] if len(rows) else rows
+    poses = base_poses(rows, search.track)
+    kept: list[int] = []
+    left = np.arange(len(rows))
+    while len(left) and len(kept) < HYPOTHESES:
+        kept.append(int(left[0]))
+        left = left[~same_place(poses[left], poses[left[0]])]
+    ranked = rows[kept]
+    if len(ranked) and _is_alone(ranked):
+        old = search.explained
+        again = len(old) > 0 and bool(same_place(poses[kept[:1]], base_poses(old[:1], search.track)[0])[0])
+        ranked[0, 11] = 1.0 + (old[0, 11] if again else 0.0)
+    return ranked
+
+
+def _is_alone(ranked: FloatArray) -> bool:
+    """Whether the first hypothesis is far likelier than all others, and than none."""
+    best, none = float(ranked[0, 9]), float(ranked[0, 12])
+    others = float(np.exp(np.minimum(ranked[1:, 9] - best, 0.0)).sum())
+    return others * ODDS <= 1.0 and math.exp(min(none - best, 0.0)) * ODDS_AGAINST_NONE <= 1.0
