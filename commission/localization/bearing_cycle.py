@@ -13,11 +13,25 @@ from numpy.typing import NDArray
 
 from commission.compiled import compiled, compiled_inline
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.localization.bearings import ACCEPTED, REFLECTOR, REJECTED, USE, BearingModel, correct_by_bearing_alone
+from commission.localization.bearings import (
+    ACCEPTED,
+    LASTING,
+    NIS,
+    OFF,
+    REFLECTOR,
+    REJECTED,
+    USE,
+    BearingModel,
+    correct_by_bearing_alone,
+    lasting_part,
+    stands_apart,
+)
+from commission.localization.consider import ConsiderModel
 from commission.localization.consider_columns import carry_over
 from commission.localization.contour import ContourScan
 from commission.localization.cycle import Cycle, held_back, supervised, with_temporary
 from commission.localization.filter_kinds import is_invariant
+from commission.localization.lasting import lasts, remember, with_lasting
 from commission.localization.odometry import NextOdometry, reach, velocity
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.rejection import (
@@ -48,6 +62,8 @@ class Reflexes(NamedTuple):
     entries: IntArray
     """(n,) row of the reflector of each, or NOT_NAMED, NOT_IN_MAP."""
     model: BearingModel
+    lasting: FloatArray
+    """(N, REMEMBERED) of the reflectors of the map, by their numbers, in and out, see `remember`."""
 
 
 @compiled
@@ -96,7 +112,7 @@ def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of th
         moved = np.eye(3)
         moved[0, 2], moved[1, 2] = -(prior.y - state.pivot[1]), prior.x - state.pivot[0]
         carry_over(cross, moved, busy)
-    belief = prior
+    belief, twist = prior, velocity(state.motion, following)
     if kinds_at(zones, prior.x, prior.y).reflectors:
         belief = correct_by_bearing_alone(
             belief,
@@ -104,7 +120,7 @@ def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of th
             reflexes.entries[row],
             places,
             reflexes.model,
-            velocity(state.motion, following),
+            twist,
             model.consider,
             cross,
             busy,
@@ -116,9 +132,57 @@ def process_reflex(  # noqa: PLR0917 - outputs are written into the arrays of th
     )
     use, named = figures[row, USE], reflexes.entries[row] >= 0
     evidence = weigh_bearing(state.evidence, stamp_ns, prior, use, named and figures[row, REFLECTOR] >= 0, model)
+    evidence = weigh_lasting(evidence, stamp_ns, prior, figures[row], named, reflexes, places, twist, model.consider)
+    figures[row, LASTING] = 1.0 if evidence.lasting else 0.0
     pivot = state.pivot if cross is None else (belief.x, belief.y)
     after = supervised(state, stamp_ns, belief, motion, evidence, pivot, model)
     return Cycle(prior, held_back(rivals, state, after, model))
+
+
+@compiled_inline
+def weigh_lasting(  # noqa: PLR0917 - a reflex and what is known around it
+    evidence: Evidence,
+    stamp_ns: int,
+    prior: PoseGaussian,
+    figures: FloatArray,
+    named: bool,
+    reflexes: Reflexes,
+    places: FloatArray,
+    twist: tuple[float, float, float],
+    considered: ConsiderModel,
+) -> Evidence:
+    """Remember an accepted bearing, and say whether innovations of some reflector do not average out.
+
+    Parameters
+    ----------
+    evidence : this reflex included.
+    stamp_ns : of the reflex [ns].
+    prior : that the bearing was associated at.
+    figures : (COLUMNS,) what became of it.
+    named : whether it is said which reflector it is of.
+    reflexes : what is remembered, in and out, and the goniometer.
+    places : the map, see `ReflectorIndex`.
+    twist : velocity of base [m/s, m/s, rad/s], in base.
+    considered : variances of the constants.
+
+    Notes
+    -----
+    S = v^2 / NIS, by definition; `remember` and `lasts` in turn.
+    """
+    model = reflexes.model
+    if figures[USE] == ACCEPTED and figures[NIS] > 0.0:
+        number = int(figures[REFLECTOR])
+        variance, noise = figures[OFF] * figures[OFF] / figures[NIS], model.observation.bearing_variance
+        for entry in range(len(places)):
+            if int(places[entry, 3]) == number:
+                if not (named or stands_apart(prior, entry, places, model, variance)):
+                    break
+                constant, distance = lasting_part(prior, places[entry], model, twist, considered)
+                row = reflexes.lasting[number]
+                remember(row, stamp_ns, figures[OFF], variance, noise, constant, distance, model.lasting)
+    if not model.lasting.limit > 0.0:
+        return evidence
+    return with_lasting(evidence, lasts(reflexes.lasting, stamp_ns, evidence.lasting, model.lasting))
 
 
 @compiled_inline

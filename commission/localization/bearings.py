@@ -20,10 +20,11 @@ from commission.geometry.arrays import FloatArray, IntArray, read_only
 from commission.geometry.directions import direction_of
 from commission.geometry.gaussian import chi_square_gate
 from commission.localization.consider import PER_REFLECTOR, PER_SCANNER, ConsiderModel, scanner_jacobian
+from commission.localization.lasting import LastingRule, lasting_rule
 from commission.localization.observation import ObservationModel, expect, scanner_offset
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.pose_rows import PoseRows, correct_all_by_rows, nis_of_rows
-from commission.site.parameters import BearingParameters
+from commission.site.parameters import Parameters
 from commission.site.reflectors import Reflector
 from commission.site.scanner import Scanner
 
@@ -33,6 +34,8 @@ FARTHEST_NIS = 100.0
 """NIS up to which a bearing that fits no reflector is held against the likeliest one: 10 sigma. Farther off it is
 something else, whose NIS says nothing of the filter."""
 CONSTANTS = PER_SCANNER + PER_REFLECTOR
+MOUNT_HEADING = 2
+"""Column of the mounting's heading among them."""
 
 
 class BearingUse(IntEnum):
@@ -48,10 +51,10 @@ class BearingUse(IntEnum):
 
 
 ACCEPTED, REJECTED, UNKNOWN = int(BearingUse.ACCEPTED), int(BearingUse.REJECTED), int(BearingUse.UNKNOWN)
-USE, REFLECTOR, NIS, OFF = range(4)
+USE, REFLECTOR, NIS, OFF, LASTING = range(5)
 """Columns of what is known of a bearing: a `BearingUse`, index in the reflector map or -1, NIS, measured less expected
-[rad]."""
-COLUMNS = 4
+[rad], and whether innovations of late do not average out (`lasting`), so that the supervisor stops the vehicle."""
+COLUMNS = 5
 
 
 class BearingModel(NamedTuple):
@@ -70,10 +73,12 @@ class BearingModel(NamedTuple):
     """What its clock shows more than the vehicle's [s]."""
     first: int
     """First column of its constants in `cross`."""
+    lasting: LastingRule
+    """When innovations that do not average out stop the vehicle."""
 
 
 def bearing_model(
-    scanners: Sequence[Scanner], observations: Sequence[ObservationModel], given: BearingParameters, reflectors: int
+    scanners: Sequence[Scanner], observations: Sequence[ObservationModel], parameters: Parameters, reflectors: int
 ) -> BearingModel | None:
     """Return what kernels need; None where bearings are switched off or the vehicle has no goniometer.
 
@@ -81,9 +86,10 @@ def bearing_model(
     ----------
     scanners : of the vehicle.
     observations : of each.
-    given : the parameters.
+    parameters : of every stage.
     reflectors : N of the map: its constants come first.
     """
+    given = parameters.bearing
     for index, scanner in enumerate(scanners):
         if scanner.is_goniometer and given.enabled:
             return BearingModel(
@@ -94,6 +100,7 @@ def bearing_model(
                 turned=-1.0 if scanner.upside_down else 1.0,
                 late=float(scanner.clock_offset),
                 first=PER_REFLECTOR * reflectors + PER_SCANNER * index,
+                lasting=lasting_rule(given, parameters.supervisor),
             )
     return None
 
@@ -171,6 +178,64 @@ def considered_by(place: FloatArray, variances: ConsiderModel) -> FloatArray:
             place[2],
         )
     )
+
+
+@compiled_inline
+def lasting_part(
+    belief: PoseGaussian,
+    place: FloatArray,
+    model: BearingModel,
+    twist: tuple[float, float, float],
+    variances: ConsiderModel,
+) -> tuple[float, float]:
+    """Variance that constants give a bearing of a reflector [rad^2], and how far the reflector is [m].
+
+    Parameters
+    ----------
+    belief, place, model, twist : as in `bearing_rows`.
+    variances : of the constants.
+
+    Notes
+    -----
+    sum j^2 B with the columns of `bearing_rows` but the heading of the mounting, which turns all bearings alike: the
+    variance of a sum of independent constants, by definition.
+    """
+    rows = bearing_rows(belief, 0.0, place, model, twist)
+    known, constant = considered_by(place, variances), 0.0
+    for i in range(CONSTANTS):
+        constant += rows.constants[0, i] * rows.constants[0, i] * known[i] if i != MOUNT_HEADING else 0.0
+    offset_x, offset_y = scanner_offset(belief.theta, model.observation)
+    return constant, math.hypot(place[0] - belief.x - offset_x, place[1] - belief.y - offset_y)
+
+
+@compiled_inline
+def stands_apart(belief: PoseGaussian, entry: int, places: FloatArray, model: BearingModel, variance: float) -> bool:
+    """Whether no other reflector could have the bearings of one: else those in between are left out, and the rest lean.
+
+    Parameters
+    ----------
+    belief : before the bearing.
+    entry : row of the reflector.
+    places : the map, see `ReflectorIndex`.
+    model : of the goniometer.
+    variance : of the innovation [rad^2], taken for that of the others as well.
+
+    Notes
+    -----
+    |b - b_other| >= 2 sqrt(gate S) for each other reflector within reach: their gates do not overlap, by definition.
+    """
+    offset_x, offset_y = scanner_offset(belief.theta, model.observation)
+    x, y = belief.x + offset_x, belief.y + offset_y
+    direction = math.atan2(places[entry, 1] - y, places[entry, 0] - x)
+    apart = 2.0 * math.sqrt(model.gate * variance)
+    for other in range(len(places)):
+        dx, dy = places[other, 0] - x, places[other, 1] - y
+        square = dx * dx + dy * dy
+        if other == entry or square > model.farthest * model.farthest or square < model.nearest * model.nearest:
+            continue
+        if abs(wrap_scalar(math.atan2(dy, dx) - direction)) < apart:
+            return False
+    return True
 
 
 @compiled_inline

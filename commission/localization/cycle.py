@@ -83,6 +83,7 @@ def process_odometry(  # noqa: PLR0917 - one odometry record, number by number
         state.protection,
         state.temporary,
         state.rivals,
+        state.lasting,
     )
 
 
@@ -268,11 +269,12 @@ def supervised(  # noqa: PLR0917 - what a cycle has found, value by value
 
     Notes
     -----
-    No formula: `supervise`, Sobreira et al. 2016, Algorithm 4; then the rule by rejections, which overrules it.
+    No formula: `supervise`, Sobreira et al. 2016, Algorithm 4; then the rules by confirmations, by innovations that do
+    not average out, and by rejections, which overrule it.
     """
     was_lost = before.mode == LOST
     mode = supervise(FAIL if was_lost else before.mode, posterior, model.limits)
-    if evidence.confirmed < model.rejection.confirmations:
+    if evidence.confirmed < model.rejection.confirmations or evidence.lasting:
         mode = FAIL
     if rejects_the_world(was_lost, evidence, model.rejection):
         mode = LOST
@@ -295,6 +297,7 @@ def supervised(  # noqa: PLR0917 - what a cycle has found, value by value
         before.protection,
         before.temporary,
         before.rivals,
+        before.lasting,
     )
 
 
@@ -330,6 +333,7 @@ def with_mode(before: FilterState, after: FilterState, mode: int) -> FilterState
         after.protection,
         after.temporary,
         after.rivals,
+        after.lasting,
     )
 
 

@@ -23,6 +23,7 @@ from commission.localization.cross_covariance import columns_of, cross_covarianc
 from commission.localization.cycle import Cycle, process_odometry, process_scan, room_for_scans
 from commission.localization.detector import DetectedReflectors, detect, room_for, status_of_reported
 from commission.localization.estimate import Belief, Estimate, Mode, SeenBearing, SeenTags
+from commission.localization.lasting import lasting_innovations, mean_rows
 from commission.localization.observation import project_detections
 from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import to_belief
@@ -262,10 +263,10 @@ class Localizer:
         if state.search is not None:
             self._state = searching_odometry(state, record.stamp_ns, (dx, dy, dtheta), noise)
             return
-        bare = state._replace(cross=None, protection=None, temporary=None, rivals=None)
+        bare = state._replace(cross=None, protection=None, temporary=None, rivals=None, lasting=None)
         moved = process_odometry(bare, record.stamp_ns, dx, dy, dtheta, noise)
         kept = {"cross": state.cross, "protection": state.protection, "temporary": state.temporary}
-        self._state = moved._replace(**kept, rivals=state.rivals)
+        self._state = moved._replace(**kept, rivals=state.rivals, lasting=state.lasting)
 
     def _at_stamp(self, scanner: int, measured: FloatArray, following: NextOdometry) -> FloatArray:
         """Return the detections of a scan at its stamp, upright: what was measured, where there is no other."""
@@ -362,9 +363,9 @@ class Localizer:
         bank = bank_of(before.protection, setup.protected_names)
         if setup.protection is None or bank is None:
             raise ValueError("protection levels are asked for where the supervisor goes by 2-sigma")
-        bare = after._replace(cross=None, search=None, protection=None, temporary=None, rivals=None)
+        bare = after._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None)
         state = supervised_by_level(
-            before._replace(cross=None, search=None, protection=None, temporary=None, rivals=None),
+            before._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None),
             Cycle(cycle.prior, bare),
             0,
             len(detections),
@@ -381,7 +382,7 @@ class Localizer:
         )
         protection = protection_state(bank, setup.protected_names)
         kept = {"cross": after.cross, "search": after.search, "temporary": after.temporary}
-        return state._replace(**kept, protection=protection, rivals=after.rivals)
+        return state._replace(**kept, protection=protection, rivals=after.rivals, lasting=after.lasting)
 
     def _seen_bearing(self, record: Scan | Detections | TagSightings | Reflex) -> SeenBearing | None:
         """What a reflex told, with room for what becomes of it where bearings are looked at; None of a scan."""
@@ -396,15 +397,17 @@ class Localizer:
         cross = columns_of(self._state.cross, setup.constants)
         if setup.bearing_model is None:
             raise ValueError("a reflex is processed where none are looked at; expected a goniometer in the setup")
+        names = tuple(each.id for each in setup.reflectors.reflectors)
         reflexes = Reflexes(
             read_only(np.ones(1, np.bool_)),
             read_only(np.zeros(1, np.int64)),
             read_only(np.array((reflex.bearing,))),
             entries_named((reflex.reflector,), setup.reflectors.reflectors, setup.index.places),
             setup.bearing_model,
+            mean_rows(self._state.lasting, names),
         )
         cycle = process_reflex(
-            self._state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None),
+            self._state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None),
             reflex.stamp_ns,
             0,
             reflexes,
@@ -421,7 +424,8 @@ class Localizer:
             goods,
             rivals,
         )
-        return Cycle(cycle.prior, self._with_arrays(cycle.state, cross, memory, rivals))
+        after = self._with_arrays(cycle.state, cross, memory, rivals)
+        return Cycle(cycle.prior, after._replace(lasting=lasting_innovations(reflexes.lasting, names)))
 
     def _seen_tags(self, record: Scan | Detections | TagSightings | Reflex) -> SeenTags | None:
         """What a frame saw of tags, with room for what becomes of it where they are looked at; None of a scan."""
@@ -453,7 +457,7 @@ class Localizer:
         if setup.tag_model is None:
             raise ValueError("a frame with tags is processed where none are looked at; expected tags in the setup")
         cycle = process_tags(
-            self._state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None),
+            self._state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None),
             frame.stamp_ns,
             0,
             count,
@@ -498,6 +502,7 @@ class Localizer:
             search=self._state.search,
             temporary=self._state.temporary if memory is None else landmarks_in(memory),
             rivals=kept_poses(rivals),
+            lasting=self._state.lasting,
         )
 
     def _filtered(
@@ -514,7 +519,7 @@ class Localizer:
         cross = columns_of(self._state.cross, constants)
         room, memory, rivals = room_for_scans(cross, len(detections)), self._memory(), self._rivals()
         cycle = process_scan(
-            self._state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None),
+            self._state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None),
             scan.stamp_ns,
             0,
             len(detections),

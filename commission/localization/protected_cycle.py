@@ -58,7 +58,7 @@ def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
     Notes
     -----
     No formula: `protect_cycle`, then Sobreira et al. 2016, Algorithm 4, with levels for 2-sigma; the rules by
-    rejections and by confirmations overrule it as they do otherwise.
+    rejections, confirmations and lasting innovations overrule it as they do otherwise.
     """
     after = cycle.state
     if LOST in (before.mode, after.mode):
@@ -72,7 +72,7 @@ def supervised_by_level(  # noqa: PLR0917 - a cycle, and what it is written to
         bank, cycle.prior, after.belief, first, last, detections, status, reflectors, observation, protection
     )
     levels[0], levels[1] = found.position, found.heading
-    if after.evidence.confirmed < model.rejection.confirmations:
+    if after.evidence.confirmed < model.rejection.confirmations or after.evidence.lasting:
         return with_mode(before, after, FAIL)
     judged = with_mode(before, after, judge(before.mode, found.position, found.heading, model.limits))
     return held_back(rivals, before, judged, model)

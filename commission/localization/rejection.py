@@ -49,9 +49,11 @@ class Evidence(NamedTuple):
     against: float
     """Scans in a row that rejected nearly all they saw; those that saw too little to say are passed over, and each that
     a part of the pose fits takes one back."""
+    lasting: bool = False
+    """Whether innovations of bearings do not average out, see `lasting`."""
 
 
-NO_EVIDENCE = Evidence(0, 0.0, 0.0, 0.0, 0.0, math.inf, 0.0)
+NO_EVIDENCE = Evidence(0, 0.0, 0.0, 0.0, 0.0, math.inf, 0.0, False)
 
 
 class RejectionRule(NamedTuple):
@@ -215,6 +217,7 @@ def decayed(  # noqa: PLR0917 - the counts, one by one
         kept * evidence.rejected + rejected,
         confirmed,
         against,
+        evidence.lasting,
     )
 
 

@@ -66,15 +66,16 @@ def searching_odometry(
     displacement : [m, m, rad].
     noise : variances per metre, radian and second.
     """
-    search, cross, temporary, rivals = state.search, state.cross, state.temporary, state.rivals
+    search, kept = state.search, {"cross": state.cross, "temporary": state.temporary}
+    kept |= {"rivals": state.rivals, "lasting": state.lasting}
     if search is None:
         raise ValueError("the state has no search; expected one of a vehicle that is lost or not located yet")
     track, _ = advance(search.track, state.motion, stamp_ns, *displacement, noise)
-    bare = state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None)
+    bare = state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None)
     moved = process_odometry(bare, stamp_ns, *displacement, noise)
     if state.mode == Mode.INITIALIZING:
         moved = moved._replace(belief=state.belief)
-    return moved._replace(cross=cross, search=replace(search, track=track), temporary=temporary, rivals=rivals)
+    return moved._replace(**kept, search=replace(search, track=track))
 
 
 def forgotten(state: FilterState, setup: LocalizerSetup) -> FilterState:
@@ -96,6 +97,7 @@ def forgotten(state: FilterState, setup: LocalizerSetup) -> FilterState:
         search=new_search(state.belief_ns),
         protection=None,
         rivals=None,
+        lasting=None,
     )
 
 
@@ -192,4 +194,5 @@ def _located(after: FilterState, search: Search, best: FloatArray, stamp_ns: int
         search=None,
         protection=None,
         rivals=None,
+        lasting=None,
     )

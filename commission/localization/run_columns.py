@@ -87,7 +87,7 @@ class RunColumns:
     tags: FloatArray
     """(m, 6) what became of each sighting of a tag, see `tags`; (0, 6) where they are not looked at."""
     bearings: FloatArray
-    """(b, 4) what became of each reflex of a goniometer, see `bearings`; (0, 4) where they are not looked at."""
+    """(b, 5) what became of each reflex of a goniometer, see `bearings`; (0, 5) where they are not looked at."""
     levels: FloatArray
     """(K, 2) protection level of position [m] and heading [rad] that the supervisor goes by: inf where the vehicle is
     lost or not located, NaN where it goes by 2-sigma; (0, 2) where it always does."""

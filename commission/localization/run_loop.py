@@ -23,6 +23,7 @@ from commission.localization.contour_scans import ContourScans, contour_scan_at,
 from commission.localization.cross_covariance import columns_of, cross_covariance
 from commission.localization.cycle import process_odometry, process_scan, room_for_scans
 from commission.localization.detection_log import DetectionLog
+from commission.localization.lasting import lasting_innovations, mean_rows
 from commission.localization.observation import observation_at
 from commission.localization.odometry import NOT_YET, NextOdometry, waits_until
 from commission.localization.pose_gaussian import PoseGaussian
@@ -375,6 +376,8 @@ def _tracked(
     bank = bank_of(state.protection, setup.protected_names)
     memory = None if setup.temporary is None else memory_of(state.temporary, setup.temporary.most)
     rivals = poses_of(state.rivals, wanted=setup.decides_over_scans)
+    names = tuple(each.id for each in setup.reflectors.reflectors)
+    reflexes = _reflexes(setup, detected, mean_rows(state.lasting, names))
     settled = stretch.columns.settled
     room = room_for_scans(cross, int(np.diff(detected.offsets).max(initial=0)))
     own = log.detection_stamps_ns
@@ -401,13 +404,13 @@ def _tracked(
         room.work,
         room.aims,
         room.busy,
-        state._replace(cross=None, protection=None, temporary=None, rivals=None),
+        state._replace(cross=None, protection=None, temporary=None, rivals=None, lasting=None),
         stretch.columns,
         stretch.priors,
         setup.contour,
         contour_scans(log, setup, (before, numbers), len(detected)),
         _frames(setup, detected),
-        _reflexes(setup, detected),
+        reflexes,
         setup.zone_rows,
         setup.protection,
         bank,
@@ -418,11 +421,14 @@ def _tracked(
     # Odometry alone changes nothing of it, nor does another setup before its first scan.
     if not len(detected):
         kept = {"cross": state.cross, "protection": state.protection}
-        return after._replace(**kept, temporary=state.temporary, rivals=state.rivals), cycles, delivered
+        kept |= {"temporary": state.temporary, "rivals": state.rivals, "lasting": state.lasting}
+        return after._replace(**kept), cycles, delivered
     cross_after = cross_covariance(cross, setup.constants)
     protection = protection_state(bank, setup.protected_names)
     temporary = state.temporary if memory is None else landmarks_in(memory)
-    after = after._replace(cross=cross_after, protection=protection, temporary=temporary, rivals=kept_poses(rivals))
+    lasting = state.lasting if reflexes is None else lasting_innovations(reflexes.lasting, names)
+    after = after._replace(cross=cross_after, protection=protection, temporary=temporary)
+    after = after._replace(rivals=kept_poses(rivals), lasting=lasting)
     return after, cycles, delivered
 
 
@@ -434,13 +440,13 @@ def _frames(setup: LocalizerSetup, detected: DetectionLog) -> TagFrames | None:
     return TagFrames(tags.is_frame, tags.offsets, tags.sightings, entries_of(tags.ids, setup.tags), model)
 
 
-def _reflexes(setup: LocalizerSetup, detected: DetectionLog) -> Reflexes | None:
+def _reflexes(setup: LocalizerSetup, detected: DetectionLog, lasting: FloatArray) -> Reflexes | None:
     """Reflexes of a stretch for the loop; None where bearings are not looked at."""
     met, model = detected.bearings, setup.bearing_model
     if met is None or model is None:
         return None
     entries = entries_named(met.reflectors, setup.reflectors.reflectors, setup.index.places)
-    return Reflexes(met.is_reflex, read_only(met.numbers - met.first), met.bearings, entries, model)
+    return Reflexes(met.is_reflex, read_only(met.numbers - met.first), met.bearings, entries, model, lasting)
 
 
 @compiled

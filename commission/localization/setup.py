@@ -157,7 +157,7 @@ class LocalizerSetup:
         observations = tuple(observation_model(each, self.parameters.observation) for each in self.scanners)
         object.__setattr__(self, "observations", observations)
         object.__setattr__(self, "observation_rows", observation_rows(observations))
-        turning = bearing_model(self.scanners, observations, self.parameters.bearing, len(index.places))
+        turning = bearing_model(self.scanners, observations, self.parameters, len(index.places))
         object.__setattr__(self, "bearing_model", turning)
         object.__setattr__(self, "sweep_rows", sweep_rows([sweep_of(each) for each in self.scanners]))
         detectors = tuple(detector_model(self.reflectors, each, self.parameters.detector) for each in self.scanners)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from commission.localization.cross_covariance import CrossCovariance
 from commission.localization.estimate import Belief, Mode
+from commission.localization.lasting import LastingInnovations
 from commission.localization.odometry import AT_REST, Motion
 from commission.localization.pose_gaussian import PoseGaussian, from_belief, to_belief
 from commission.localization.protection_state import ProtectionState
@@ -55,6 +56,8 @@ class FilterState(NamedTuple):
     """Landmarks that come and go; None: none are remembered. Kernels are handed its arrays, and None here."""
     rivals: KeptPoses | None = None
     """Where the vehicle may stand as well; None: not begun, or scans are decided on one by one, and in kernels."""
+    lasting: LastingInnovations | None = None
+    """Mean innovations of bearings; None: there are none, and in kernels."""
 
 
 def state_at_start(initial: Belief) -> FilterState:

@@ -75,6 +75,7 @@ def told_by_tags(
         cross=cross,
         temporary=None,
         rivals=None,
+        lasting=None,
         search=None,
     )
 

@@ -352,6 +352,15 @@ class BearingParameters:
     """Whether bearings of a goniometer correct the pose, where the vehicle has one."""
     gate_probability: Annotated[float, _gate("Bearing accepted to")] = 0.999
     """Probability that a true bearing falls inside the validation gate, of one degree of freedom."""
+    lasting_limit: Annotated[
+        float, Quantity(label="Mean innovation to", unit="σ", bounds=NOT_NEGATIVE, step=0.5, slider=(0.0, 20.0))
+    ] = 5.0
+    """Multiple of what noise and constants explain: beyond it, innovations of a reflector do not average out, and the
+    supervisor stops the vehicle; 0: it does not look."""
+    lasting_window: Annotated[
+        float, Quantity(label="Mean over", unit="s", bounds=POSITIVE, step=1.0, slider=(1.0, 120.0))
+    ] = 20.0
+    """Time after which a bearing counts a third in that mean."""
 
     def __post_init__(self) -> None:
         check_fields(self, "bearing.")

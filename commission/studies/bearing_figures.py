@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from commission.localization.bearings import NIS, USE, BearingUse
+from commission.localization.bearings import LASTING, NIS, OFF, REFLECTOR, USE, BearingUse
 from commission.localization.run_columns import RunColumns
-from commission.site.quantity import PERCENT
+from commission.site.quantity import DEGREES, PERCENT
 from commission.studies.plausibility import Finding
 
 Number = int | float | None
@@ -38,7 +38,34 @@ def bearing_figures(columns: RunColumns) -> dict[str, Number]:
         "bearing_unknown": int(np.count_nonzero(use == BearingUse.UNKNOWN)),
         "bearing_nis_mean": _mean(nis[accepted]),
         "bearing_nis_before_gate_mean": _mean(nis[(accepted | rejected) & np.isfinite(nis)]),
+        "bearing_lasting_fraction": float(columns.bearings[:, LASTING].mean()) if len(columns.bearings) else None,
     }
+
+
+def leaning(columns: RunColumns, first: int, last: int) -> tuple[tuple[str, float], ...]:
+    """Mean innovation of the accepted bearings of each reflector, over some reflexes.
+
+    Parameters
+    ----------
+    columns : the run.
+    first, last : rows of the reflexes, the last one excluded; of one setup.
+
+    Returns
+    -------
+    reflectors : id and mean [rad] less the median of all, which is the heading; the largest first.
+    """
+    rows = columns.bearings[first:last]
+    rows = rows[rows[:, USE] == BearingUse.ACCEPTED]
+    if not len(rows):
+        return ()
+    met = columns.detected.bearings
+    cycle = 0 if met is None else int(np.searchsorted(met.numbers - met.first, max(last - 1, 0), side="right")) - 1
+    reflectors = columns.segment(cycle).setup.reflectors.reflectors
+    numbers = np.unique(rows[:, REFLECTOR]).astype(np.int64)
+    means = np.array([rows[rows[:, REFLECTOR] == number, OFF].mean() for number in numbers])
+    means -= np.median(means)
+    order = np.argsort(-np.abs(means), kind="stable")
+    return tuple((reflectors[numbers[index]].id, float(means[index])) for index in order.tolist())
 
 
 def _mean(nis: np.ndarray) -> float | None:
@@ -71,7 +98,24 @@ def bearing_findings(columns: RunColumns) -> tuple[Finding, ...]:
         found = f"none of {count} bearings is of a reflector of the map"
         probably = f"their ids are written otherwise: {', '.join(map(repr, names[:3]))}"
         return (Finding(found=found, probably=probably, remedy="compare with reflectors.csv"),)
-    return _disagreeing(columns)
+    return (*_lasting(columns), *_disagreeing(columns))
+
+
+def _lasting(columns: RunColumns) -> tuple[Finding, ...]:
+    """Say when innovations that do not average out stopped the vehicle, and whose they are."""
+    flagged = np.flatnonzero(columns.bearings[:, LASTING])
+    if not len(flagged):
+        return ()
+    worst = leaning(columns, 0, int(flagged[0]) + 1)[:2]
+    whose = " and ".join(f"{name} ({DEGREES.text(off, '+.2f')})" for name, off in worst)
+    share = PERCENT.text(len(flagged) / len(columns.bearings), "3.1f")
+    return (
+        Finding(
+            found=f"bearings are off and stay off, most those of {whose}: not operational at {share} of the reflexes",
+            probably="reflectors stand elsewhere than in the map, or the goniometer is off in some directions",
+            remedy="survey these reflectors, or say how far off they may be (sigma in reflectors.csv, uncertainty)",
+        ),
+    )
 
 
 def _disagreeing(columns: RunColumns) -> tuple[Finding, ...]:

@@ -17,12 +17,14 @@ from commission.compiled import compiled
 from commission.geometry.angles import difference
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.geometry.stretches import stretches_of
+from commission.localization import bearings, contour, tags
 from commission.localization.estimate import Mode, Status
 from commission.localization.observation import project_detections
 from commission.localization.relocalization import CONFIRMATIONS
 from commission.localization.run_columns import RunColumns
 from commission.progress import Progress, silent
 from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
+from commission.studies.bearing_figures import leaning
 from commission.studies.curves import longest_regular
 from commission.studies.inputs import StudyInput
 from commission.studies.reflector_figures import numbered
@@ -59,6 +61,8 @@ class EventKind(StrEnum):
     """Nothing was accepted for long, though there were scans."""
     GAP = "gap"
     """No scan came for long."""
+    DISAGREE = "bearings disagree"
+    """Innovations of bearings do not average out: the supervisor withholds the output, whatever the covariance is."""
     CHANGED = "other reflector"
     """A thing that was one reflector is another one from now on."""
 
@@ -76,7 +80,8 @@ class RunEvent:
     position: float = math.nan
     """What was held against the limit of the position in a fail, length of a jump, way of a blind stretch [m]."""
     heading: float = math.nan
-    """What was held against the limit of the heading in a fail, turn of a jump [rad]."""
+    """What was held against the limit of the heading in a fail, turn of a jump, by how much the bearings of the first
+    reflector are off [rad]."""
     held: str = "2σ"
     """What was held against the limits of a fail: 2-sigma or protection level."""
     share: float = math.nan
@@ -84,7 +89,7 @@ class RunEvent:
     limits: tuple[float, float] = (math.nan, math.nan)
     """Limits of the supervisor at that time: position [m], heading [rad]."""
     names: tuple[str, str] = ("", "")
-    """The reflector before and the one after, of a changed association."""
+    """The reflector before and the one after, of a changed association; the two that are off most, of bearings."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,6 +127,7 @@ def events(inputs: EventsInput, progress: Progress = silent) -> EventsResult:
         (0.0, _modes(run)),
         (0.1, _blind(run)),
         (0.2, _gaps(run)),
+        (0.25, _disagreements(run)),
         (0.3, _corrections(run, progress)),
     ):
         progress(share, "what happened")
@@ -178,9 +184,9 @@ def _searches(run: RunResult, cycle: int) -> bool:
 
 
 def _blind(run: RunResult) -> Iterator[RunEvent]:
-    """Stretches in which nothing was accepted."""
+    """Stretches in which nothing was accepted, of whatever kind."""
     stamps, means = run.columns.stamps_ns, run.columns.means
-    for first, after in stretches_of(run.counts[:, Status.INLIER] == 0).tolist():
+    for first, after in stretches_of(~_accepted(run)).tolist():
         # From the last scan with an accepted detection to the next one with one.
         begin, end = max(first - 1, 0), min(after, len(stamps) - 1)
         # Whole nanoseconds: exactly a second is not more than one.
@@ -188,6 +194,35 @@ def _blind(run: RunResult) -> Iterator[RunEvent]:
         if lasts > BLIND_S:
             way = float(np.hypot(*np.diff(means[begin : end + 1, :2], axis=0).T).sum())
             yield RunEvent(kind=EventKind.BLIND, time=float(run.times[first]), lasts=lasts, position=way)
+
+
+def _accepted(run: RunResult) -> BoolArray:
+    """(K,) whether something that a cycle saw was accepted: a reflector, the walls, a tag or a bearing."""
+    columns, met, seen = run.columns, run.columns.detected.bearings, run.columns.detected.tags
+    accepted = run.counts[:, Status.INLIER] > 0
+    if len(columns.contours):
+        accepted |= columns.contours[:, contour.USE] == contour.ContourUse.ACCEPTED
+    if met is not None and len(columns.bearings):
+        accepted[met.is_reflex] |= columns.bearings[:, bearings.USE] == bearings.BearingUse.ACCEPTED
+    if seen is not None and len(columns.tags):
+        right = np.isin(columns.tags[:, tags.USE], (tags.TagUse.ACCEPTED, tags.TagUse.LOCATED))
+        accepted |= np.diff(np.concatenate(([0], np.cumsum(right)))[seen.offsets]) > 0
+    return accepted
+
+
+def _disagreements(run: RunResult) -> Iterator[RunEvent]:
+    """Stretches in which innovations of bearings do not average out."""
+    met = run.columns.detected.bearings
+    if met is None or not len(run.columns.bearings):
+        return
+    cycles = np.flatnonzero(met.is_reflex)
+    for first, after in stretches_of(run.columns.bearings[:, bearings.LASTING] > 0.0).tolist():
+        begin, end = float(run.times[cycles[first]]), float(run.times[cycles[min(after, len(cycles) - 1)]])
+        # By the mean of which the vehicle was stopped: of the time before.
+        window = run.columns.segment(int(cycles[first])).setup.parameters.bearing.lasting_window
+        since = int(np.searchsorted(run.times[cycles], begin - window))
+        (one, off), (other, _), *_ = (*leaning(run.columns, since, first + 1), ("", math.nan), ("", math.nan))
+        yield RunEvent(kind=EventKind.DISAGREE, time=begin, lasts=end - begin, heading=off, names=(one, other))
 
 
 def _gaps(run: RunResult) -> Iterator[RunEvent]:
@@ -346,6 +381,9 @@ def told(event: RunEvent) -> str:
             text = f"nothing accepted for {event.lasts:.2f} s, {event.position:.2f} m"
         case EventKind.GAP:
             text = f"no scan for {event.lasts:.2f} s"
+        case EventKind.DISAGREE:
+            off = DEGREES.text(event.heading, "+.2f")
+            text = f"for {event.lasts:.2f} s, most of {event.names[0]} (by {off}) and {event.names[1]}"
         case EventKind.CHANGED:
             text = f"{event.names[0]} → {event.names[1]}"
     return text

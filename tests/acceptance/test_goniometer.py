@@ -12,12 +12,15 @@ import pytest
 from scipy.stats import chi2
 
 from commission.geometry import se2
-from commission.localization.bearings import NIS
+from commission.io.project_file import load_project
+from commission.localization.bearings import LASTING, NIS
 from commission.localization.estimate import Belief, Mode
 from commission.localization.setup import LocalizerSetup
 from commission.localization.triangulation import fix_covariance, intersect_circles, most_informative
 from commission.localization.whole_run import run
 from commission.simulation.goniometer import Goniometer, reflexes
+from commission.simulation.scenario import start_of, virtual_drive
+from commission.site.disturbances import ConstantErrors, Disturbances
 from commission.site.parameters import FilterParameters, OdometryParameters, Parameters
 from commission.site.record_log import RecordLog
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -25,6 +28,7 @@ from commission.site.scanner import Scanner, ScannerKind
 from commission.site.uncertainty import Uncertainty
 from commission.studies.start import Start, StartOrigin
 from commission.studies.triangulation import TriangulationInput, triangulate
+from tests.conftest import REPOSITORY
 from tests.localization.plain_localizer import PlainLocalizer, columns, matrix
 
 SIGMA = 0.095e-3
@@ -216,6 +220,34 @@ def test_the_localizer_by_bearings_alone_is_a_plain_filter_and_consistent(seeds)
     print(f"ANEES {figures[0]:.2f}, NIS {figures[1]:.2f}, {figures[2]:.2f} mm")  # noqa: T201 - README
     assert 0.8 < figures[0] < 1.25
     assert 0.9 < figures[1] < 1.1
+
+
+@pytest.mark.with_all_seeds
+@pytest.mark.parametrize("sigma_deg", [0.005, 0.1, 1.0])
+@pytest.mark.parametrize("site", ["laboratory", "warehouse"])
+def test_no_drive_in_which_constants_are_as_large_as_said_is_stopped_by_innovations_that_last(site, sigma_deg, seeds):
+    """Beside and without a laser, in a hall where many bearings are of one of several reflectors."""
+    project = load_project(REPOSITORY / "maps" / site)
+    turning = Scanner(
+        name="goniometer",
+        kind=ScannerKind.GONIOMETER,
+        mounting=np.array((0.2, 0.05, 0.3)),
+        field_of_view_deg=(-180.0, 180.0),
+        bearing_sigma_deg=sigma_deg,
+    )
+    drawn = ConstantErrors(
+        survey_sigma=0.003,
+        mounting_sigma=(0.002, 0.002, 0.001745),
+        range_bias_sigma=0.005,
+        clock_offset_sigma=0.005,
+    )
+    for seed, route in itertools.product(range(len(seeds(2, 10))), project.routes[:2]):
+        for scanners in ((turning,), (*project.scanners, turning)):
+            there = dataclasses.replace(project, scanners=scanners, disturbances=Disturbances(constants=drawn))
+            start = start_of(there, route.name)
+            belief = Belief(0, start.pose, np.diag(start.sigmas**2))
+            result = run(virtual_drive(there, route.name, seed=seed), LocalizerSetup.of(there), belief)
+            assert not result.bearings[:, LASTING].any(), (route.name, seed)
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-15, 1e-12, 1e-9, 1e-6])

@@ -44,7 +44,7 @@ UNITS = {
         "°/s²": DEGREES,
         "°/m": DEGREES,
     },
-    **{"%": 100.0, "%/m": 100.0, "": 1.0, "s": 1.0, "detections": 1.0, "scans": 1.0},
+    **{"%": 100.0, "%/m": 100.0, "": 1.0, "s": 1.0, "σ": 1.0, "detections": 1.0, "scans": 1.0},
 }
 """Number on the page for one SI unit, by the unit that the label names."""
 IN_DEGREES = {"First bearing", "Last bearing", "Resolution", "Beam width", "Steering to"}
@@ -86,6 +86,8 @@ PARAMETERS = {
     "tag.gate_probability": ("Tag accepted to [%]", 100.0),
     "bearing.enabled": ("Bearings alone", None),
     "bearing.gate_probability": ("Bearing accepted to [%]", 100.0),
+    "bearing.lasting_limit": ("Mean innovation to [σ]", 1.0),
+    "bearing.lasting_window": ("Mean over [s]", 1.0),
     "temporary.enabled": ("Temporary landmarks", None),
     "temporary.most": ("Remembered at most", 1.0),
     "temporary.least_radius": ("Reel radius from [m]", 1.0),

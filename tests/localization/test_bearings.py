@@ -35,6 +35,7 @@ from commission.localization.run_columns import RunSegment
 from commission.localization.setup import LocalizerSetup
 from commission.localization.whole_run import run, run_segments, state_before
 from commission.site.parameters import BearingParameters, ObservationParameters, OdometryParameters, Parameters
+from commission.site.project import Project
 from commission.site.record_log import RecordLog
 from commission.site.records import Detections, Odometry, Reflex, TagSightings
 from commission.site.reflectors import Reflector, ReflectorMap
@@ -42,6 +43,9 @@ from commission.site.scanner import Scanner, ScannerKind
 from commission.site.tags import Tag
 from commission.site.uncertainty import Uncertainty
 from commission.studies.bearing_figures import bearing_findings
+from commission.studies.events import EventKind, EventsInput, events, told
+from commission.studies.run import RunInput, judged_run
+from commission.studies.start import Start, StartOrigin
 from tests.conftest import REPOSITORY, few_of
 
 GONIOMETER = Scanner(
@@ -58,7 +62,7 @@ KNOWN, UNKNOWN = ConsiderModel(2e-6, 1e-6, 1e-5, 2.5e-5), ConsiderModel(0.0, 0.0
 
 def model_of(scanner=GONIOMETER, **given):
     observation = observation_model(scanner, ObservationParameters())
-    return bearing_model((scanner,), (observation,), BearingParameters(**given), len(PLACES))
+    return bearing_model((scanner,), (observation,), Parameters(bearing=BearingParameters(**given)), len(PLACES))
 
 
 MODEL = model_of()
@@ -78,7 +82,7 @@ def slopes(of, at):
 
 
 def corrected(belief, measured, entry, *, model=MODEL, places=PLACES, known=UNKNOWN, cross=None):
-    figures, busy = np.full(4, 9.0), None if cross is None else np.full(1, 50)
+    figures, busy = np.full(5, 9.0), None if cross is None else np.full(1, 50)
     return correct_by_bearing_alone(
         belief, measured, entry, places, model, TWIST, known, cross, busy, figures, False
     ), figures
@@ -184,7 +188,7 @@ def test_a_real_goniometer_whose_bearings_are_off_by_degrees_is_not_believed_mor
     marks = np.loadtxt(folder / "landmark.csv", delimiter=",")
     still = OdometryParameters(acceleration=0.0, turn_acceleration=0.0, forward_per_sqrt_s=0.0, heading_per_sqrt_s=0.0)
     known = Uncertainty(survey=0.12, mounting_heading=0.02)
-    nees, told = [], 0
+    nees, wrong, stopped, said = [], [], 0, 0
     for path in sorted(folder.glob("X*_Y*.csv")):
         true, records = np.array((float(path.stem[1:4]), float(path.stem[6:9]), math.pi / 2)), []
         for k, turn in enumerate(np.radians(np.loadtxt(path, delimiter=","))):
@@ -205,11 +209,81 @@ def test_a_real_goniometer_whose_bearings_are_off_by_degrees_is_not_believed_mor
         # 2-sigma is beyond what the supervisor allows: nobody drives by it.
         assert (result.modes == Mode.FAIL).all()
         sure = run(log, dataclasses.replace(setup, uncertainty=Uncertainty()), start)
-        told += bool(bearing_findings(sure))
+        off = np.hypot(*(sure.means[:, :2] - true[:2]).T)
+        wrong.append(np.count_nonzero((sure.modes == Mode.OPERATIONAL) & (off > 0.1)))
+        stopped += sure.modes[-1] == Mode.FAIL
+        said += bool(bearing_findings(sure))
+        # Of three degrees of freedom four bearings leave one: what two places are off by no bearing contradicts.
+        assert sure.modes[-1] == Mode.FAIL or off[-1] < 0.1
     # Chi-square, 3 degrees of freedom at each of nine places.
     assert sum(nees) < chi2.ppf(0.99, 27), nees
-    # Taken for as good as a laser, it is told at those places where bearings contradict each other.
-    assert told >= 3
+    # Taken for as good as a laser, bearings contradict each other there, and nobody drives by them for long.
+    assert (stopped, said) == (7, 7)
+    assert max(wrong) < 0.2 * 800, wrong
+
+
+def standing(off: float, seed: int, degrees: float = 0.3):
+    """A vehicle that stands among four reflectors and meets each in turn, the last one of which is off along y [m]."""
+    rng, places = np.random.default_rng(seed), np.array(((4.0, 1.0), (-3.0, 3.0), (-2.0, -4.0), (3.0, -3.0)))
+    true, records = places + np.array([(0.0, off * (k == 3)) for k in range(4)]), []
+    for k in range(1200):
+        bearing = (
+            expected(np.zeros(3), GONIOMETER.mounting, true[k % 4]) + math.radians(degrees) * rng.standard_normal()
+        )
+        records += [Odometry(k * 25_000_000, np.zeros(3)), Reflex(k * 25_000_000, bearing, "ABCD"[k % 4])]
+    setup = LocalizerSetup(
+        reflectors=ReflectorMap(
+            tuple(Reflector(id="ABCD"[k], x=x, y=y, sigma=1e-9) for k, (x, y) in enumerate(places.tolist()))
+        ),
+        scanners=(dataclasses.replace(GONIOMETER, bearing_sigma_deg=degrees),),
+        parameters=Parameters(bearing=BearingParameters(lasting_window=10.0)),
+        uncertainty=Uncertainty(mounting_position=0.0, mounting_heading=0.0, range_bias=0.0, survey=0.0, clock=0.0),
+    )
+    return RecordLog.collect(records), setup, run(RecordLog.collect(records), setup, NEAR)
+
+
+def test_innovations_that_do_not_average_out_stop_the_vehicle_as_their_mean_says():
+    log, setup, columns = standing(0.18, 1, 1.0)
+    use, reflector, nis, off, lasting = columns.bearings.T
+    assert (columns.modes[lasting > 0.0] == Mode.FAIL).all()
+    assert (lasting[800:] > 0.0).all()
+    # The mean of each reflector, over all that was met until then, without a recursion.
+    variance, noise, times = off**2 / nis, math.radians(1.0) ** 2, np.arange(1200) * 0.025
+    statistics = np.zeros(1200)
+    for k in range(100, 1200):
+        means, spreads = [], []
+        for number in range(4):
+            rows = np.flatnonzero((reflector[: k + 1] == number) & (use[: k + 1] == BearingUse.ACCEPTED))
+            weights = np.exp((times[rows] - times[rows[-1]]) / 10.0) * noise / variance[rows]
+            means.append(np.average(off[rows], weights=weights))
+            spreads.append(np.sum(weights**2 * np.maximum(variance[rows], noise)) / np.sum(weights) ** 2)
+        middle = np.average(means, weights=1.0 / np.array(spreads))
+        statistics[k] = np.sum((np.array(means) - middle) ** 2 / spreads)
+    # Five sigma of three degrees of freedom; the rule's closed form is within a few per cent of the quantile.
+    first, limit = int(np.argmax(lasting)), chi2.isf(2.87e-7, 3)
+    assert 100 < first < 800
+    assert statistics[first] == pytest.approx(limit, rel=0.1)
+    assert statistics[100:first].max() < 1.1 * limit
+    (finding,) = bearing_findings(columns)
+    assert "most those of D (" in finding.found
+    project = Project(reflectors=setup.reflectors, scanners=setup.scanners, parameters=setup.parameters)
+    inputs = RunInput.of(project, log, Start(NEAR, StartOrigin.GIVEN)).with_setup(setup)
+    kinds = {event.kind: event for event in events(EventsInput(judged_run(inputs))).events}
+    # Nothing was seen by a laser, and yet the vehicle is not blind.
+    assert set(kinds) <= {EventKind.DISAGREE, EventKind.FAIL, EventKind.RECOVERED, EventKind.JUMP}
+    disagree = kinds[EventKind.DISAGREE]
+    assert disagree.time == pytest.approx(first * 0.025)
+    assert "most of D (by +" in told(disagree)
+    off_rule = dataclasses.replace(setup.parameters, bearing=BearingParameters(lasting_limit=0.0))
+    free = run(log, dataclasses.replace(setup, parameters=off_rule), NEAR)
+    assert (free.modes == Mode.OPERATIONAL).all()
+
+
+def test_innovations_that_average_out_stop_nobody_and_those_that_are_harmless_neither():
+    for off, seed in ((0.0, 2), (0.0, 3), (0.0, 4), (0.02, 5)):
+        _, _, columns = standing(off, seed)
+        assert not columns.bearings[:, 4].any()
+        assert (columns.modes == Mode.OPERATIONAL).all()
 
 
 LASER = Scanner(name="laser")

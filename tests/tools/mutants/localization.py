@@ -355,6 +355,24 @@ LOCALIZATION = (
         ),
     ),
     Mutant(
+        name="noise of a mean innovation that grows with its weights and not with their squares",
+        file=FOLDER + "lasting.py",
+        find="kept * kept * row[NOISE] + counts * counts *",
+        replace="kept * row[NOISE] + counts *",
+        tests=(
+            TESTS + "test_bearings.py::test_innovations_that_do_not_average_out_stop_the_vehicle_as_their_mean_says",
+        ),
+    ),
+    Mutant(
+        name="a vehicle drives on while its bearings disagree",
+        file=FOLDER + "cycle.py",
+        find="evidence.confirmed < model.rejection.confirmations or evidence.lasting:",
+        replace="evidence.confirmed < model.rejection.confirmations:",
+        tests=(
+            TESTS + "test_bearings.py::test_innovations_that_do_not_average_out_stop_the_vehicle_as_their_mean_says",
+        ),
+    ),
+    Mutant(
         name="a bearing is of the likelier one of two reflectors that fit",
         file=FOLDER + "bearings.py",
         find="    if inside > 1:",
