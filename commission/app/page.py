@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -154,6 +154,9 @@ class Page:
         view : the newest one.
         slowly : whether also to draw what may lag behind.
         """
+        hidden = view.state.hidden
+        colored = any(layer.colors_floor(view) for layer in self._layers if layer.name not in hidden)
+        view = replace(view, floor_is_colored=colored)
         with self._server.atomic():
             for drawn in (*self._layers, *self._panels):
                 drawn.draw(view)

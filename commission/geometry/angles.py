@@ -28,10 +28,13 @@ def wrap(angle: ArrayLike) -> FloatArray:
     wrapped : (...) array [rad].
     """
     given = np.asarray(angle, dtype=np.float64)
+    inside = (given >= -math.pi) & (given < math.pi)
+    if inside.all():
+        return given.copy()
     wrapped = given - TURN * np.floor((given + math.pi) / TURN)
     # Rounding can push the result just outside; both ends of the interval are the same angle.
     wrapped = np.where((wrapped < -math.pi) | (wrapped >= math.pi), -math.pi, wrapped)
-    return np.where((given >= -math.pi) & (given < math.pi), given, wrapped)
+    return np.where(inside, given, wrapped)
 
 
 def difference(angle: ArrayLike, reference: ArrayLike) -> FloatArray:

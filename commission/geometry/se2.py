@@ -32,7 +32,9 @@ def compose(T_a_b: ArrayLike, T_b_c: ArrayLike) -> FloatArray:
     """
     ab, bc = _poses(T_a_b), _poses(T_b_c)
     xy = transform_points(ab, bc[..., :2])
-    return np.concatenate((xy, wrap(ab[..., 2] + bc[..., 2])[..., np.newaxis]), axis=-1)
+    ac = np.empty((*xy.shape[:-1], 3))
+    ac[..., :2], ac[..., 2] = xy, wrap(ab[..., 2] + bc[..., 2])
+    return ac
 
 
 def inverse(T_a_b: ArrayLike) -> FloatArray:
@@ -90,7 +92,10 @@ def transform_points(T_a_b: ArrayLike, points_b: ArrayLike) -> FloatArray:
         raise ValueError(f"points have shape {points.shape}; expected (..., 2)")
     c, s = np.cos(ab[..., 2]), np.sin(ab[..., 2])
     px, py = points[..., 0], points[..., 1]
-    return np.stack((ab[..., 0] + (c * px - s * py), ab[..., 1] + (s * px + c * py)), axis=-1)
+    x, y = ab[..., 0] + (c * px - s * py), ab[..., 1] + (s * px + c * py)
+    points_a = np.empty((*np.shape(x), 2))
+    points_a[..., 0], points_a[..., 1] = x, y
+    return points_a
 
 
 def exp(twist: ArrayLike) -> FloatArray:

@@ -29,17 +29,19 @@ BEAMS = 1081
 REQUIRED = 0.15
 
 
-def take_in(port: int, seconds: float, received: multiprocessing.Queue[int], theme: str) -> None:
-    """Receive for a while, as a browser that has its own panels; report the number of bytes."""
-    total = 0
+def take_in(port: int, seconds: float, received: multiprocessing.Queue[tuple[int, int]], theme: str) -> None:
+    """Receive for a while, as a browser that has its own panels; report the numbers of bytes and of pictures."""
+    total, pictures = 0, 0
     protocol, cookie = Subprotocol(f"viser-v{viser.__version__}"), {"Cookie": f"{COOKIE}={theme}"}
     address = f"ws://127.0.0.1:{port}"
     with connect(address, subprotocols=[protocol], max_size=None, additional_headers=cookie) as client:
         client.send(msgspec.msgpack.encode({"type": "ViewerCameraMessage", **CAMERA}))
         end = time.monotonic() + seconds
         while time.monotonic() < end:
-            total += len(client.recv(timeout=10.0))
-    received.put(total)
+            bundle = client.recv(timeout=10.0)
+            # A picture of the drive has the scan in it: two thirds of the beams at least came back.
+            total, pictures = total + len(bundle), pictures + (len(bundle) > BEAMS * 8)
+    received.put((total, pictures))
 
 
 def main(seconds: float = 20.0, theme: str = "dark") -> None:
@@ -54,7 +56,7 @@ def main(seconds: float = 20.0, theme: str = "dark") -> None:
     runtime.post(Repeat(repeat=True))
     while runtime.service(RunService).view() is None:
         time.sleep(0.1)
-    received: multiprocessing.Queue[int] = multiprocessing.get_context("spawn").Queue()
+    received: multiprocessing.Queue[tuple[int, int]] = multiprocessing.get_context("spawn").Queue()
     client = multiprocessing.get_context("spawn").Process(
         target=take_in, args=(server.get_port(), seconds + 4.0, received, theme)
     )
@@ -68,8 +70,11 @@ def main(seconds: float = 20.0, theme: str = "dark") -> None:
     assert after is not None
     # The drive repeats: the cursor may have begun again.
     cycles = (after.lived - before.lived) % after.result.cycles
+    size, pictures = received.get()
+    took = seconds + 4.0
     print(
-        f"{project.scanners[0].beam_count} beams, {cycles / wall:.1f} scans/s, {received.get() / wall / 1e6:.1f} MB/s"
+        f"{project.scanners[0].beam_count} beams, {cycles / wall:.1f} scans/s, {pictures / took:.1f} pictures/s, "
+        f"{size / took / 1e6:.1f} MB/s"
     )
     print(f"page: {100 * cpu / wall:.1f} % of one core (required: less than {100 * REQUIRED:.0f} %)")
     client.join()

@@ -140,6 +140,11 @@ class AmbiguityLayer(BaseLayer):
         found = view.part(ColdStartView)
         return found is not None and found.twins is not None
 
+    def colors_floor(self, view: PageView) -> bool:
+        """Whether there is a map."""
+        found = view.part(ColdStartView)
+        return found is not None and found.is_drawn
+
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return map, rings and labels."""
         rings = (node for group in self._groups for node in group.nodes)

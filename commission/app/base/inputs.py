@@ -42,6 +42,8 @@ class Inputs:
         self._gui, self._post, self._make, self._read = gui, post, make, read
         self._widgets: list[tuple[GuiInputHandle[Any], Callable[[AppState], Any]]] = []
         self._marked: Project | None = None
+        self._state: AppState | None = None
+        self._settings: set[int] = set()
         self._followed: dict[int, object] = {}
         self._is_anew = False
 
@@ -69,6 +71,7 @@ class Inputs:
             except ValueError:
                 # What was refused does not stay in the widget.
                 self._followed.pop(index, None)
+                self._state = None
                 raise
 
         widget.on_update(posting(self._post, asked))
@@ -85,6 +88,7 @@ class Inputs:
         """
         info = field_info(of, name)
         widget = add_widget(self._gui, info, get_field(of, name), note)
+        self._settings.add(len(self._widgets))
         self.connect(
             name,
             widget,
@@ -111,14 +115,18 @@ class Inputs:
         info, first = field_info(of, name), get_field(of, name)
         meant = {text: value for value, text in names.items()}
         widget = self._gui.add_dropdown(info.label, tuple(meant), initial_value=names[first], hint=info.hint)
+        self._settings.add(len(self._widgets))
         self.connect(name, widget, lambda text: meant[text], lambda state: names.get(self._read(state, name)))
         return widget
 
     def follow(self, state: AppState) -> None:
         """Set widgets to what the state says, each where that has changed: what is being typed is not yet in it."""
+        is_same, self._state = state is self._state, state
         if self._is_anew:
             take_back_refusals(self._gui, (widget for widget, _ in self._widgets))
         for index, (widget, shown) in enumerate(self._widgets):
+            if is_same and index in self._settings:
+                continue
             value = shown(state)
             if value is not None and (index not in self._followed or self._followed[index] != value):
                 self._followed[index] = value
@@ -128,7 +136,6 @@ class Inputs:
                 if is_here:
                     write_anew(self._gui, widget)
         self._is_anew = False
-
         if state.saved is not self._marked:
             self._marked = state.saved
             as_saved = replace(state, project=state.saved)
@@ -139,6 +146,7 @@ class Inputs:
     def forget(self) -> None:
         """Write every widget anew when it follows next, whatever stands in it: it is another thing's from now on."""
         self._followed.clear()
+        self._state = None
         self._is_anew = True
 
 

@@ -48,6 +48,10 @@ class Layer(Protocol):
         """Whether there is something that the legend has to explain."""
         ...
 
+    def colors_floor(self, view: PageView) -> bool:
+        """Whether it colors places on the floor, on which others are seen only with a casing."""
+        ...
+
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:
         """Add what only one browser's view needs; the caller removes it when the view changes."""
         ...
@@ -81,6 +85,10 @@ class BaseLayer:
     def is_used(self, view: PageView) -> bool:  # noqa: ARG002 - a default
         """Whether there is something that the legend has to explain."""
         return True
+
+    def colors_floor(self, view: PageView) -> bool:  # noqa: ARG002 - a default
+        """Whether it colors places on the floor."""
+        return False
 
     def furnish(self, scene: SceneApi, *, three_d: bool) -> tuple[SceneNodeHandle, ...]:  # noqa: ARG002 - a default
         """Add what only one browser's view needs."""

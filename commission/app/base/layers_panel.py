@@ -89,16 +89,22 @@ class LayersPanel(BasePanel):
         inbox.on_update(posting(post, lambda event: switched(event.target.value)))
         self._inbox = viser_private.identifier(inbox)
         self._html = gui.add_html("")
+        self._shown: tuple[object, ...] = ()
 
     def draw_slowly(self, view: PageView) -> None:
         """List what there is to draw now, and what is switched off."""
         state = view.state
+        listed = [layer for layer in self._layers if layer.name in state.hidden or layer.is_used(view)]
+        shown = (state.magnify, state.hidden, [(layer, layer.nodes()) for layer in listed])
+        if shown == self._shown:
+            return
+        self._shown = shown
         groups = []
         for group in LayerGroup:
             rows = "".join(
                 layer_row(layer, state.magnify, shown=layer.name not in state.hidden)
-                for layer in self._layers
-                if layer.group is group and (layer.name in state.hidden or layer.is_used(view))
+                for layer in listed
+                if layer.group is group
             )
             groups.append(rows and f"<h4>{group}</h4>{rows}")
         content = f"<div class='c-layers' data-inbox='{self._inbox}'>{''.join(groups)}</div>"

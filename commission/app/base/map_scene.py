@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from viser import CameraHandle, ClientHandle, SceneApi
 
+from commission.app.base import viser_private
 from commission.app.base.extent import Extent
 from commission.geometry.arrays import FloatArray
 
@@ -136,12 +137,17 @@ class MapNode:
         """Set a property; a place in the map frame."""
         if name == self.where:
             object.__setattr__(self, "_place", value)
-            value = _for_viser(name, self._origin.to_scene(value))
-        setattr(self._handle, name, value)
+            self.place_again()
+        else:
+            setattr(self._handle, name, value)
 
     def place_again(self) -> None:
         """Draw the node relative to where the origin is now."""
-        setattr(self._handle, self.where, _for_viser(self.where, self._origin.to_scene(self._place)))
+        place = _for_viser(self.where, self._origin.to_scene(self._place))
+        if isinstance(place, tuple):
+            setattr(self._handle, self.where, place)
+        else:
+            viser_private.write_array(self._handle, self.where, place)
 
     def remove(self) -> None:
         """Take the node out of the scene."""

@@ -34,6 +34,7 @@ class Cased:
         self, marks: LineSegmentsHandle | PointCloudHandle, casing: LineSegmentsHandle | PointCloudHandle
     ) -> None:
         self._marks, self._casing = marks, casing
+        self._is_cased = True
 
     @property
     def points(self) -> Points:
@@ -43,10 +44,25 @@ class Cased:
     @points.setter
     def points(self, points: Points) -> None:
         """Draw these, and the casing below them."""
-        below = np.array(points)
-        # What is hidden far below stays there.
-        below[..., 2] = np.minimum(below[..., 2], theme.Height.CASING)
-        self._marks.points, self._casing.points = points, below
+        self.draw(points, cased=True)
+
+    def draw(self, points: Points, *, cased: bool) -> None:
+        """Draw these, and the casing below them only where it is needed: what moves is sent with every picture.
+
+        Parameters
+        ----------
+        points : (N, 2, 3) segments or (N, 3) places [m], frame of the parent node.
+        cased : whether the floor has colors of a study, on which marks are not seen without a casing.
+        """
+        self._marks.points = points
+        if cased:
+            below = np.array(points)
+            # What is hidden far below stays there.
+            below[..., 2] = np.minimum(below[..., 2], theme.Height.CASING)
+            self._casing.points = below
+        elif self._is_cased:
+            self._casing.points = NO_POINTS if points.ndim == 2 else NO_SEGMENTS
+        self._is_cased = cased
 
     @property
     def nodes(self) -> tuple[SceneNodeHandle, ...]:

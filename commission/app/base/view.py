@@ -30,7 +30,7 @@ class LivedPath:
     """(K,) 2-sigma of the position that the supervisor holds against its limit [m]."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class PageView:
     """Everything that panels and layers draw from."""
 
@@ -42,6 +42,8 @@ class PageView:
     """Background work that has not begun."""
     parts: Parts = field(default_factory=dict[type, object])
     """What services have found, one value of each type."""
+    floor_is_colored: bool = False
+    """Whether a layer colors the floor, so that thin marks need a casing."""
 
     def part(self, kind: type[Part]) -> Part | None:
         """Return what a service has found; none where there is nothing yet."""
@@ -58,4 +60,4 @@ def view_of(state: AppState, *parts: object, jobs: tuple[Job, ...] = (), waiting
     parts : what services have found.
     jobs, waiting : background work under way, and what has not begun.
     """
-    return PageView(state, jobs, waiting, {type(part): part for part in parts})
+    return PageView(state=state, jobs=jobs, waiting=waiting, parts={type(part): part for part in parts})

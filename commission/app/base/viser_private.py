@@ -15,7 +15,9 @@ from contextvars import ContextVar
 from dataclasses import replace
 from typing import Any, TypeVar, cast
 
+import numpy as np
 import viser
+from numpy.typing import NDArray
 from viser import (
     ClientHandle,
     GuiApi,
@@ -42,33 +44,43 @@ SUBPROTOCOL = f"viser-v{viser.__version__}"
 
 
 class LoopEvent(asyncio.Event):
-    """An event of a loop that other threads may set.
+    """An event that is set by its loop alone.
 
     viser sets a plain one from whatever thread writes to the page, while the loop goes through the same list of
-    waiting browsers: "deque mutated during iteration".
+    waiting browsers: "deque mutated during iteration". It asks the loop to set it as well, after each message or at the
+    end of those that belong together: what is set before that would wake the loop for nothing, once or more often in
+    each picture.
     """
 
     def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
         super().__init__()
         self._of_loop = loop
-        self._is_due = False
 
     def set(self) -> None:
-        """Wake who waits: at once in the loop's own thread, else as soon as the loop comes to it."""
+        """Wake who waits, in the loop's own thread; from another one the loop has been asked, or will be."""
         try:
             is_here = asyncio.get_running_loop() is self._of_loop
         except RuntimeError:
             is_here = False
         if is_here:
             super().set()
-        elif not self._is_due and not self._of_loop.is_closed():
-            self._is_due = True
-            self._of_loop.call_soon_threadsafe(self._set_here)
 
-    def _set_here(self) -> None:
-        # What is written from here on asks for another turn.
-        self._is_due = False
-        super().set()
+
+def write_array(node: Any, name: str, array: NDArray[np.float32]) -> None:
+    """Set a property of a node of the scene, as setting it does, without viser's three copies and its look at types.
+
+    Parameters
+    ----------
+    node : a handle of viser's.
+    name : of the property.
+    array : which nobody writes into from now on.
+    """
+    held = getattr(node, name)
+    if node._impl.removed or held.dtype != array.dtype:
+        setattr(node, name, array)
+    elif not np.array_equal(held, array):
+        setattr(node._impl.props, name, array)
+        node._queue_update(name, array)
 
 
 class Said:

@@ -76,6 +76,10 @@ class HeatLayer(BaseLayer):
             visible=visible,
         )
 
+    def colors_floor(self, view: PageView) -> bool:
+        """Whether there is a picture."""
+        return coverage_of(view).heat is not None
+
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the picture and the value on it."""
         return tuple(node for node in (self._image, self._label) if node is not None)

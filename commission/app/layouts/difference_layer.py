@@ -54,6 +54,11 @@ class DifferenceLayer(BaseLayer):
         """It has no entry among the marks."""
         return False
 
+    def colors_floor(self, view: PageView) -> bool:
+        """Whether there is a picture."""
+        found = view.part(LayoutsView)
+        return found is not None and found.difference is not None
+
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the picture."""
         return () if self._image is None else (self._image,)

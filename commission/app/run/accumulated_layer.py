@@ -34,8 +34,9 @@ class AccumulatedLayer(BaseLayer):
         state = view.state
         if run.accumulated is None or self.name in state.hidden:
             return
-        self._inliers.points = lift(run.accumulated.inliers, theme.Height.ACCUMULATED)
-        self._outliers.points = lift(run.accumulated.outliers, theme.Height.ACCUMULATED)
+        found, cased = run.accumulated, view.floor_is_colored
+        for marks, places in ((self._inliers, found.inliers), (self._outliers, found.outliers)):
+            marks.draw(lift(places, theme.Height.ACCUMULATED), cased=cased)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return both sets of points."""

@@ -70,7 +70,7 @@ class DetectionLayer(BaseLayer):
                 chosen, below = lift(at, theme.Height.DETECTION), lift(at, theme.Height.AROUND_DETECTION)
             if len(chosen) or len(cloud.points):
                 cloud.points, self._casings[status].points = chosen, below
-        self._offsets.points = stroke_segments(offsets, theme.Height.DETECTION)
+        self._offsets.draw(stroke_segments(offsets, theme.Height.DETECTION), cased=view.floor_is_colored)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the marks of every status and the lines of their offsets."""

@@ -31,7 +31,8 @@ class GateLayer(BaseLayer):
         run = view.part(RunView)
         if run is None:
             return
-        self._lines.points = outline_segments(drawn_gates(run, view.state.magnify), theme.Height.GATE)
+        outlines = outline_segments(drawn_gates(run, view.state.magnify), theme.Height.GATE)
+        self._lines.draw(outlines, cased=view.floor_is_colored)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the lines."""

@@ -33,10 +33,11 @@ class ScanLayer(BaseLayer):
         run = view.part(RunView)
         if run is None:
             return
-        self._points.points = lift(run.scan_map[: run.first_scan], theme.Height.SCAN)
+        cased = view.floor_is_colored
+        self._points.draw(lift(run.scan_map[: run.first_scan], theme.Height.SCAN), cased=cased)
         # An empty cloud is sent only when there was something in it.
         if run.first_scan < len(run.scan_map) or len(self._further.points):
-            self._further.points = lift(run.scan_map[run.first_scan :], theme.Height.SCAN)
+            self._further.draw(lift(run.scan_map[run.first_scan :], theme.Height.SCAN), cased=cased)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the points of the first scanner and those of the others."""

@@ -47,7 +47,7 @@ class TemporaryLayer(BaseLayer):
         """Draw what is remembered now."""
         run = view.part(RunView)
         known = None if run is None else run.temporary
-        shown = (known, view.state.magnify, None if run is None else run.newest)
+        shown = (None,) if run is None or known is None else (known, view.state.magnify, run.newest)
         if shown == self._shown:
             return
         self._shown = shown

@@ -35,9 +35,8 @@ class TrailLayer(BaseLayer):
         run = view.part(RunView)
         if run is None:
             return
-        self._line.points = polyline_segments(
-            thinned(run.result.columns.means[: run.lived, :2], MOST_POINTS), theme.Height.TRAIL
-        )
+        places = thinned(run.result.columns.means[: run.lived, :2], MOST_POINTS)
+        self._line.draw(polyline_segments(places, theme.Height.TRAIL), cased=view.floor_is_colored)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the line."""
@@ -78,6 +77,10 @@ class ConsistencyLayer(BaseLayer):
     def is_used(self, view: PageView) -> bool:
         """Whether it is asked for."""
         return view.state.part(RunState).trail_by is not TrailBy.NOTHING
+
+    def colors_floor(self, view: PageView) -> bool:
+        """Whether there are pieces in all colors of the scale."""
+        return self.is_used(view)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the lines, one for each color."""
@@ -140,7 +143,7 @@ class ReferenceLayer(BaseLayer):
             return
         known = np.flatnonzero(np.isfinite(run.result.errors[: run.lived, 0]))
         shown = run.result.reference_places(thinned(known, MOST_POINTS))
-        self._line.points = polyline_segments(shown, theme.Height.REFERENCE)
+        self._line.draw(polyline_segments(shown, theme.Height.REFERENCE), cased=view.floor_is_colored)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the line."""

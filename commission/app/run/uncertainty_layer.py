@@ -6,7 +6,7 @@ import numpy as np
 from viser import SceneApi, SceneNodeHandle
 
 from commission.app.base import theme
-from commission.app.base.drawing import lift, outline_segments
+from commission.app.base.drawing import outline_segments, stroke_segments
 from commission.app.base.layer import BaseLayer, LayerGroup
 from commission.app.base.marks import add_cased_lines
 from commission.app.base.view import PageView
@@ -47,8 +47,9 @@ class UncertaintyLayer(BaseLayer):
         spread = min(SIGMAS * state.magnify * float(np.sqrt(run.covariance[2, 2])), np.pi)
         ends = RAY * np.array([(np.cos(spread), np.sin(-spread)), (np.cos(spread), np.sin(spread))])
         rays = np.stack([np.zeros((2, 2)), ends], axis=1)
-        self._lines.points = outline_segments(ellipse, theme.Height.POSE)
-        self._rays.points = lift(rays.reshape(-1, 2), theme.Height.POSE).reshape(-1, 2, 3)
+        cased = view.floor_is_colored
+        self._lines.draw(outline_segments(ellipse, theme.Height.POSE), cased=cased)
+        self._rays.draw(stroke_segments(rays, theme.Height.POSE), cased=cased)
 
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the lines."""

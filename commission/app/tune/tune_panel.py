@@ -40,6 +40,8 @@ class TunePanel(BasePanel):
         self._infos: dict[str, FieldInfo] = {}
         self._tails: dict[str, Tail] = {}
         self._saved: Parameters | None = None
+        self._shown: Parameters | None = None
+        self._held: dict[str, Any] = {}
         groups = fields_of(Parameters)
         for name in (*FIRST, *(name for name in groups if name not in FIRST)):
             with gui.add_folder(groups[name].label, expand_by_default=name not in FOLDED):
@@ -89,8 +91,14 @@ class TunePanel(BasePanel):
 
     def show(self, parameters: Parameters) -> None:
         """Set every widget."""
+        is_same = parameters is self._shown
+        if not is_same:
+            self._shown = parameters
+            self._held = {key: held(info, get_field(parameters, key)) for key, info in self._infos.items()}
         for key, widget in self._widgets.items():
-            write_held(widget, held(self._infos[key], get_field(parameters, key)))
+            # What was refused is in a widget and not in the parameters.
+            if not is_same or widget.value != self._held[key]:
+                write_held(widget, self._held[key])
 
 
 def _constant(state: AppState, name: str) -> Any:

@@ -247,6 +247,17 @@ def test_a_casing_lies_below_every_mark_at_the_same_places() -> None:
     assert casing.points.max() <= -1000.0
 
 
+def test_what_moves_has_a_casing_while_the_floor_is_colored() -> None:
+    scene = Sketch()
+    lines = add_cased_lines(cast("Any", scene), "/lines", theme.TRAIL, 1.5)
+    casing, marks = lines.nodes
+    drawn = np.array([[(1.0, 2.0, theme.Height.TRAIL), (3.0, 4.0, theme.Height.TRAIL)]])
+    for colored in (False, True, False):
+        lines.draw(drawn, cased=colored)
+        assert np.array_equal(marks.points, drawn)
+        assert bool(casing.points.max() > 0.0) is colored
+
+
 @pytest.mark.parametrize("shown", THEMES)
 def test_a_casing_is_told_from_what_it_is_around(shown: str) -> None:
     assert (theme.CASING, theme.RIM) == (Floor.BACKGROUND.dark, Floor.RIM.dark)

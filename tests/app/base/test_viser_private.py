@@ -96,6 +96,12 @@ class Watched(deque[Any]):
         return super().__iter__()
 
 
+def push(event: asyncio.Event, loop: asyncio.AbstractEventLoop) -> None:
+    """Do what viser does when a thread writes a message: set the event there, and have it set by the loop."""
+    event.set()
+    loop.call_soon_threadsafe(event.set)
+
+
 def threads_that_wake(event: asyncio.Event, loop: asyncio.AbstractEventLoop) -> set[int]:
     """Set an event from another thread while a task of a loop waits for it; return who went through the waiting."""
     event._waiters = watched = Watched()
@@ -104,7 +110,7 @@ def threads_that_wake(event: asyncio.Event, loop: asyncio.AbstractEventLoop) -> 
         while not event.is_set():
             await asyncio.wait([asyncio.ensure_future(event.wait())], timeout=0.1)
 
-    thread = threading.Timer(0.05, event.set)
+    thread = threading.Timer(0.05, push, (event, loop))
     thread.start()
     loop.run_until_complete(asyncio.wait_for(wait(), 5.0))
     thread.join()
@@ -128,16 +134,19 @@ def test_the_events_of_all_buffers_are_of_that_kind() -> None:
     bench.close()
 
 
-def test_an_event_that_was_set_from_another_thread_wakes_who_waits_within_a_turn_of_the_loop() -> None:
-    loop = asyncio.new_event_loop()
-    event = LoopEvent(loop)
-    threading.Timer(0.05, event.set).start()
-    loop.run_until_complete(asyncio.wait_for(event.wait(), 5.0))
-    event.clear()
-    loop.call_soon(event.set)
-    loop.run_until_complete(asyncio.wait_for(event.wait(), 5.0))
-    loop.close()
-    event.set()  # of a loop that has ended: nobody waits
+def test_messages_that_belong_together_wake_the_loop_once_at_their_end() -> None:
+    bench = WidgetBench()
+    server = bench.server._websock_server
+    buffer, woken = server.get_message_buffer(), []
+    ask = buffer.event_loop.call_soon_threadsafe
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(buffer.event_loop, "call_soon_threadsafe", lambda *asked: woken.append(asked[0]) or ask(*asked))
+        with bench.server.atomic():
+            for value in range(3):
+                bench.widgets["count"].value = 20 + value
+            assert woken == []
+        assert woken == [buffer.message_event.set]
+    bench.close()
 
 
 @pytest.mark.parametrize("name", ["notify", "show_value", "send"])

@@ -175,7 +175,7 @@ def test_the_table_lists_routes_and_stations_and_a_row_selects_and_flies(placed:
     server = start_server("127.0.0.1", 0)
     tab = server.gui.add_tab_group().add_tab("Routes")
     table = RouteTable(server.gui, lambda _action: None, ME, tab)
-    table.draw_slowly(PageView(placed))
+    table.draw_slowly(PageView(state=placed))
     assert [row.text.split("   ")[0] for row in table._shown] == [ROUTE, "Station 1"]
     assert "100 mm" in table._shown[1].text
     assert "1 of 2 reverse" in table._shown[0].text
