@@ -6,7 +6,7 @@
 (() => {
   if (window.commissionFiles) return; // the server sends this script again after each reconnection
   window.commissionFiles = true;
-  const LOOK_EVERY_MS = 400, MOST_RECENT = 8, KEY = "commission-recent", SENT_WITHIN_MS = 4_000, BETWEEN_MS = 400, MOST_REFUSED = 3;
+  const LOOK_EVERY_MS = 400, MOST_RECENT = 8, KEY = "commission-recent", SENT_WITHIN_MS = 4_000, TAKEN_WITHIN_MS = 4_000, MOST_REFUSED = 3;
   const MAPS = /\.(yaml|yml|pgm|png|jpe?g|bmp|tiff?|dxf|stl|obj|glb|ply)$/i;
   const IMPORTS = /\.(csv|txt|imk|json|lif|xml|zip|smap|tsv)$/i;
   const RECORDINGS = /\.(mcap|bag|db3|pcap|pcapng|log|clf|npz|cdr)$/i;
@@ -138,9 +138,10 @@
     cover.hidden = false;
     setTimeout(() => { if (cover.textContent === text) cover.hidden = true; }, 1000 * seconds);
   }
+  const buttonNamed = (label) => [...document.querySelectorAll("button")].find((each) => each.textContent.trim() === label);
   async function buttonOf(label, folder) {
     const end = performance.now() + SENT_WITHIN_MS;
-    const found = () => [...document.querySelectorAll("button")].find((each) => each.textContent.trim() === label);
+    const found = () => buttonNamed(label);
     const tab = [...document.querySelectorAll("[role=tab]")].find((each) => each.textContent.trim() === "Site");
     if (tab && tab.getAttribute("aria-selected") !== "true") window.commissionPress?.(tab);
     while (performance.now() < end) {
@@ -158,6 +159,12 @@
     }
     return null;
   }
+  // The program locks the button while it looks at a file; how long it takes until then is the computer's business.
+  async function untilLocked(label) {
+    const end = performance.now() + TAKEN_WITHIN_MS;
+    while (performance.now() < end && !buttonNamed(label)?.disabled) await new Promise((done) => setTimeout(done, 20));
+  }
+  const labelOf = (file) => MAPS.test(file.name) ? "Upload a map" : "Upload a file";
   // Returns why the file was not taken; nothing where it was.
   async function take(file, isFolder, before) {
     if (isFolder) return `${file.name} is a folder: drop the files that are in it`;
@@ -171,7 +178,7 @@
     if (!isMap && !IMPORTS.test(file.name)) {
       return `${file.name} is neither a floor map nor a file of reflectors, routes or a project`;
     }
-    const button = await buttonOf(isMap ? "Upload a map" : "Upload a file", isMap ? "Floor map" : "Exchange");
+    const button = await buttonOf(labelOf(file), isMap ? "Floor map" : "Exchange");
     const input = button && document.getElementById(`file_upload_${button.id}`);
     if (!input || button.disabled) {
       return `${file.name} was not taken: ${before || "another file"} is being looked at; accept or cancel that first`;
@@ -196,13 +203,13 @@
     // A ROS map that comes behind its image finds it.
     const files = [...event.dataTransfer.files].map((file, index) => ({ file, isFolder: isFolder[index] }))
       .sort((one, other) => /\.ya?ml$/i.test(one.file.name) - /\.ya?ml$/i.test(other.file.name));
-    let taken = "";
+    let taken = null;
     const refused = [];
     for (const { file, isFolder } of files) {
-      if (taken) await new Promise((done) => setTimeout(done, BETWEEN_MS)); // the button of the one before is let go
-      const why = await take(file, isFolder, taken);
+      if (taken) await untilLocked(labelOf(taken));
+      const why = await take(file, isFolder, taken?.name);
       if (why) refused.push(why);
-      else taken = file.name;
+      else taken = file;
       if (refused.length === MOST_REFUSED) break;
     }
     const left = refused.length === MOST_REFUSED ? ` (${files.length} files were dropped)` : "";

@@ -33,6 +33,8 @@ from commission.studies.calibration_model import (
 )
 from commission.studies.calibration_track import WHEELS, twists_at
 
+SparseMatrix = Any
+"""A sparse matrix: scipy ships no types."""
 ROUNDS = 12
 """Rounds at most."""
 SETTLED = 0.02
@@ -162,9 +164,9 @@ class _System:
     seen: SightRows
     moved: MotionRows
     weights: FloatArray
-    by_poses: sparse.csr_array
+    by_poses: SparseMatrix
     """(R, 3 K) whitened rows."""
-    by_constants: sparse.csr_array
+    by_constants: SparseMatrix
     """(R, p)."""
     whitened: FloatArray
     """(R,) residuals."""
@@ -318,7 +320,7 @@ def _rows(  # noqa: PLR0917 - the rows of both kinds, and how they are whitened
     moved: MotionRows,
     scale: FloatArray,
     motion_scale: FloatArray,
-) -> tuple[sparse.csr_array, sparse.csr_array, IntArray]:
+) -> tuple[SparseMatrix, SparseMatrix, IntArray]:
     """Whitened Jacobians of all rows with respect to poses and constants, and the scan of each row."""
     n, steps, size = len(reflector), len(moved.residuals), drive.layout.size
     poses = steps + 1
@@ -354,7 +356,7 @@ def _rows(  # noqa: PLR0917 - the rows of both kinds, and how they are whitened
     return by_poses, by_constants, cycle
 
 
-def _factor(by_poses: sparse.csr_array) -> FloatArray:
+def _factor(by_poses: SparseMatrix) -> FloatArray:
     """Cholesky factor of the information of the poses: block tridiagonal, five diagonals below the main one."""
     square = (by_poses.T @ by_poses).tocsr()
     size = square.shape[0]

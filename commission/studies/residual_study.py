@@ -174,19 +174,33 @@ def _factors(found: Innovations, known: BoolArray, cycle: IntArray) -> FloatArra
     H, nu, R = found.jacobians[rows], found.residuals[rows], found.noise[rows]
     starts = np.flatnonzero(np.diff(cycle[rows], prepend=-1))
     sizes = np.diff(np.append(starts, len(rows)))
-    squares, kept = np.ones(2), np.ones(len(rows))
+    squares: FloatArray = np.ones(2)
+    kept: FloatArray = np.ones(len(rows))
     for turn in range(ROUNDS):
-        w = kept[:, np.newaxis] / (squares * R)
-        N = np.add.reduceat(np.einsum("na,nai,naj->nij", w, H, H), starts) + 1e-9 * np.eye(3)
-        b = np.add.reduceat(np.einsum("na,nai,na->ni", w, H, nu), starts)
-        inverse = np.repeat(np.linalg.inv(N), sizes, axis=0)
-        step = np.repeat(np.linalg.solve(N, b[:, :, np.newaxis])[:, :, 0], sizes, axis=0)
-        left = nu - np.einsum("nai,ni->na", H, step)
-        redundancy = kept[:, np.newaxis] - w * np.einsum("nai,nij,naj->na", H, inverse, H)
-        squares = squares * (w * left**2).sum(axis=0) / np.maximum(redundancy.sum(axis=0), 1e-9)
+        w: FloatArray = kept[:, np.newaxis] / (squares * R)
+        left, taken_up = _fitted_scan_by_scan(H, nu, w, starts, sizes)
+        size: FloatArray = (w * left**2).sum(axis=0)
+        squares = squares * size / np.maximum((kept[:, np.newaxis] - taken_up).sum(axis=0), 1e-9)
         if turn >= ROUNDS // 2:
             kept = (np.abs(left) < LEFT_OUT * np.sqrt(squares * R)).all(axis=1).astype(np.float64)
     return np.sqrt(squares)
+
+
+def _fitted_scan_by_scan(
+    H: FloatArray, nu: FloatArray, w: FloatArray, starts: IntArray, sizes: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """(n, 2) residuals that a pose of each scan's own leaves, and the share w h^T N^-1 h of each that it takes up.
+
+    Parameters
+    ----------
+    H, nu, w : (n, 2, 3) Jacobians, (n, 2) residuals and (n, 2) weights.
+    starts, sizes : first row of each scan, and how many are its.
+    """
+    N = np.add.reduceat(np.einsum("na,nai,naj->nij", w, H, H), starts) + 1e-9 * np.eye(3)
+    b = np.add.reduceat(np.einsum("na,nai,na->ni", w, H, nu), starts)
+    inverse = np.repeat(np.linalg.inv(N), sizes, axis=0)
+    step = np.repeat(np.linalg.solve(N, b[:, :, np.newaxis])[:, :, 0], sizes, axis=0)
+    return nu - np.einsum("nai,ni->na", H, step), w * np.einsum("nai,nij,naj->na", H, inverse, H)
 
 
 def _in_time(run: RunResult, found: Innovations, known: BoolArray) -> tuple[FloatArray, FloatArray, FloatArray]:
