@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from commission.site.quantity import number_text
+
 UNITS = {
     "mm": 0.001,
     "cm": 0.01,
@@ -106,7 +108,7 @@ def _scaled(size: Size, metres: float) -> Size:
 
 def _measures(size: Size, metres: float) -> str:
     width, height = _scaled(size, metres)
-    return f"{width:.4g} x {height:.4g} m"
+    return f"{number_text(width, 4)} x {number_text(height, 4)} m"
 
 
 def _listed(words: Iterable[str]) -> str:

@@ -21,6 +21,7 @@ from commission.io.outline import outline_map
 from commission.io.reading import cannot_read, check_size
 from commission.progress import Progress, silent
 from commission.site.floor_map import FloorMap
+from commission.site.quantity import number_text
 
 SIZE_LIMIT = 512_000_000
 """Bytes of a model."""
@@ -111,7 +112,8 @@ class Model:
         if not any(map(len, segments)):
             (_, _, low), (_, _, high) = self.bounds.tolist()
             at = " or ".join(f"{height:g}" for height in heights)
-            problem = f"reaches from z = {low:.6g} to {high:.6g} m; a section at {at} m meets none of it"
+            reach = f"{number_text(low, 6)} to {number_text(high, 6)} m"
+            problem = f"reaches from z = {reach}; a section at {at} m meets none of it"
             raise FileFormatError(self.path, "", problem, f"a height within the model{self._advice(low, high)}")
         return outline_map(np.concatenate([np.empty((0, 2, 2)), *segments]), resolution, self.path, progress)
 

@@ -13,7 +13,7 @@ from typing import TypeAlias
 import numpy as np
 
 from commission.geometry.arrays import FloatArray
-from commission.site.quantity import PERCENT
+from commission.site.quantity import PERCENT, number_text
 from commission.studies.residual_study import EDGES, Relation, ResidualStudy
 from commission.studies.residual_words import KINDS
 
@@ -159,19 +159,14 @@ def _framed(title: str, below: str, across: tuple[float, float], up: tuple[float
 
     labels = (
         text((4.0, 12.0), "start", title)
-        + text((LEFT, HEIGHT - 15.0), "start", _number(across[0]))
-        + text((WIDTH - RIGHT, HEIGHT - 15.0), "end", _number(across[1]))
+        + text((LEFT, HEIGHT - 15.0), "start", number_text(across[0]))
+        + text((WIDTH - RIGHT, HEIGHT - 15.0), "end", number_text(across[1]))
         + text((0.5 * (LEFT + WIDTH), HEIGHT - 3.0), "middle", below)
-        + text((LEFT - 4.0, bottom), "end", _number(up[0]))
-        + text((LEFT - 4.0, TOP + 8.0), "end", _number(up[1]))
+        + text((LEFT - 4.0, bottom), "end", number_text(up[0]))
+        + text((LEFT - 4.0, TOP + 8.0), "end", number_text(up[1]))
     )
     axes = f"<path d='M{LEFT} {TOP}V{bottom}H{WIDTH - RIGHT}' fill='none' stroke='currentColor' opacity='.5'/>"
     return (
         f"<svg viewBox='0 0 {WIDTH:.0f} {HEIGHT:.0f}' role='img' fill='currentColor' font-size='10.5' "
         f"style='display:inline-block;max-width:100%'>{axes}{inside}{labels}</svg>"
     )
-
-
-def _number(value: float) -> str:
-    """A number at the end of an axis, in few letters and without an exponent."""
-    return f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:.3g}"

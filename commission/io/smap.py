@@ -183,7 +183,7 @@ def _edge(fields: Fields) -> Iterator[Edge]:
     if properties.number("direction") == 1.0:
         segment = replace(segment, direction=Direction.REVERSE)
     names = [
-        each.text("instanceName") or f"{place[0]:g}, {place[1]:g}"
+        each.text("instanceName") or f"{place[0]:.11g}, {place[1]:.11g}"
         for each, place in zip((start, end), ends, strict=True)
     ]
     yield Edge(fields.text("instanceName") or "-".join(names), names[0], names[1], segment)

@@ -12,6 +12,7 @@ from PIL import Image, ImageDraw
 
 from commission.geometry.arrays import FloatArray
 from commission.io.atomic import write_text
+from commission.site.quantity import number_text
 from commission.studies.sweep import SweepResult
 
 TABLE, PICTURE, SUMMARY = "sweep.csv", "sweep.png", "summary.json"
@@ -106,9 +107,9 @@ def _ticks(pen: ImageDraw.ImageDraw, across: tuple[str, float, float], up: tuple
         share = step / 4.0
         x, y = left + share * (right - left), below - share * (below - above)
         pen.line([(x, below), (x, below + 5)], fill=_AXIS)
-        pen.text((x - 18, below + 9), f"{across[1] + share * (across[2] - across[1]):.4g}", fill=_INK)
+        pen.text((x - 18, below + 9), number_text(across[1] + share * (across[2] - across[1]), 4), fill=_INK)
         pen.line([(left - 5, y), (left, y)], fill=_AXIS)
-        pen.text((left - 62, y - 6), f"{up[1] + share * (up[2] - up[1]):.4g}", fill=_INK)
+        pen.text((left - 62, y - 6), number_text(up[1] + share * (up[2] - up[1]), 4), fill=_INK)
     pen.text(((left + right) / 2 - 60, below + 36), across[0], fill=_INK)
     if up[0]:
         pen.text((left, above - 18), up[0], fill=_INK)
@@ -162,15 +163,15 @@ def _draw_heatmap(picture: Image.Image, pen: ImageDraw.ImageDraw, result: SweepR
         color = tuple(int(each) for each in _LOW + step / 99.0 * (_HIGH - _LOW))
         y = below - (step + 1) / 100.0 * (below - above)
         pen.rectangle([right + 30, y, right + 50, y + (below - above) / 100.0], fill=color)
-    pen.text((right + 56, above), f"{high:.4g}", fill=_INK)
-    pen.text((right + 56, below - 12), f"{low:.4g}", fill=_INK)
+    pen.text((right + 56, above), number_text(high, 4), fill=_INK)
+    pen.text((right + 56, below - 12), number_text(low, 4), fill=_INK)
     for number, (start, end) in enumerate(ends):
         name = result.inputs.axes[number].key
         if number == 0:
-            pen.text((left, below + 9), f"{start:.4g}", fill=_INK)
-            pen.text((right - 40, below + 9), f"{end:.4g}", fill=_INK)
+            pen.text((left, below + 9), number_text(start, 4), fill=_INK)
+            pen.text((right - 40, below + 9), number_text(end, 4), fill=_INK)
             pen.text(((left + right) / 2 - 60, below + 36), name, fill=_INK)
         else:
-            pen.text((left - 62, below - 12), f"{start:.4g}", fill=_INK)
-            pen.text((left - 62, above), f"{end:.4g}", fill=_INK)
+            pen.text((left - 62, below - 12), number_text(start, 4), fill=_INK)
+            pen.text((left - 62, above), number_text(end, 4), fill=_INK)
             pen.text((left, above - 18), f"up: {name}", fill=_INK)

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import FloatArray
+from commission.site.quantity import number_text
 
 FEWEST_POINTS = 4
 """Points below which perspective is not determined: a homography of a plane has eight numbers."""
@@ -48,10 +49,11 @@ def why_degenerate(points: FloatArray) -> str:
         return f"has {len(points)} points; expected at least {FEWEST_POINTS}"
     farthest = float(np.abs(points).max())
     if farthest > WIDEST:
-        return f"has points {farthest:.3g} focal lengths from the axis; expected at most {WIDEST:g}: are they pixels?"
+        found = f"has points {number_text(farthest)} focal lengths from the axis"
+        return f"{found}; expected at most {WIDEST:g}: are they pixels?"
     extent = np.linalg.svd(points - points.mean(axis=0), compute_uv=False) / math.sqrt(len(points))
     if extent[0] < SMALLEST:
-        return f"is {extent[0]:.2g} focal lengths in extent (1 sigma); expected at least {SMALLEST:g}"
+        return f"is {number_text(extent[0], 2)} focal lengths in extent (1 sigma); expected at least {SMALLEST:g}"
     if extent[1] < FLATTEST * extent[0]:
         return f"is a line: {extent[1] / extent[0]:.1%} as wide as long; expected at least {FLATTEST:.0%}"
     return ""

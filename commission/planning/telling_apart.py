@@ -19,6 +19,7 @@ from commission.planning.ambiguity import AmbiguityOptions, ambiguous_poses, hea
 from commission.planning.route_prediction import PlannedRoute
 from commission.planning.vehicle_visibility import VehicleVisibility
 from commission.site.layout_brief import Demands
+from commission.site.quantity import X, Y
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
 
@@ -62,7 +63,7 @@ def chosen_places(
     for spot in demands.unambiguous_spots:
         headings = np.array(spot[2:]) if len(spot) == 3 else headings_tried(scanners, options)
         poses = np.column_stack((np.tile(spot[:2], (len(headings), 1)), headings))
-        places.append(ChosenPlace(f"spot {spot[0]:g}, {spot[1]:g} m", poses))
+        places.append(ChosenPlace(f"spot {X.on_page(spot[0]):.11g}, {Y.on_page(spot[1]):.11g} m", poses))
     return tuple(places)
 
 

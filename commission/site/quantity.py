@@ -22,6 +22,8 @@ STAMP_LIMIT = 2**62
 """Stamps [ns] are smaller, and larger than its negative: the difference of any two fits into 64 bits."""
 AS_IN_A_FILE = 5.5e-6
 """Share by which a number in a file differs from the one that was meant: half of the last of six digits, and a bit."""
+UNREADABLE = 1e15
+"""Numbers from here on are written with an exponent: nobody counts so many digits."""
 SIGNIFICANT = 6
 """Digits in a file of what has no fixed number of decimals: a sigma, a speed, a probability."""
 
@@ -145,7 +147,7 @@ class Shown:
 
     def number(self, value: float, form: str = ".0f") -> str:
         """Return a value as it is written where the unit stands elsewhere: no minus before a zero."""
-        written = f"{value * self.scale:{form}}"
+        written = _formatted(value * self.scale, form)
         return written.replace("-", "") if float(written) == 0.0 and "+" not in form else written
 
     def against(self, value: float, limit: float, forms: tuple[str, str] = (".1f", ".0f")) -> str:
@@ -237,7 +239,7 @@ class Quantity:
 
     def brief(self, value: float) -> str:
         """Return a value as the page writes it where room is scarce: with no digit that says nothing."""
-        return _with_unit(self.on_page(value), self.shown_unit)
+        return joined(f"{self.on_page(value):.11g}", self.shown_unit)
 
     def limits(self) -> str:
         """Say in the page's unit what may be entered, on a slider what lies between its ends; empty: any number."""
@@ -310,6 +312,23 @@ def decimals_of(step: float) -> int:
     """Decimals that a step has: 3 for 0.005, none for 20."""
     exponent = Decimal(repr(step)).normalize().as_tuple().exponent
     return max(0, -exponent) if isinstance(exponent, int) else 0
+
+
+def number_text(value: float, digits: int = 3) -> str:
+    """Return a number with so many digits, or with all before its point where those are more: never 1.37e+04.
+
+    Parameters
+    ----------
+    value : any number.
+    digits : that are told.
+    """
+    short = f"{value:.{digits}g}"
+    return f"{value:.0f}" if 10.0**digits <= abs(float(short)) < UNREADABLE else short
+
+
+def _formatted(number: float, form: str) -> str:
+    """A number in a form of Python's; `.4g` means four digits, without an exponent where it is large."""
+    return number_text(number, int(form[1:-1])) if form.endswith("g") and form.startswith(".") else f"{number:{form}}"
 
 
 def _with_unit(number: float, unit: str) -> str:

@@ -17,7 +17,7 @@ from commission.localization.detector import threshold_at
 from commission.progress import Progress, silent
 from commission.site.parameters import DetectorParameters
 from commission.site.project import Project
-from commission.site.quantity import PERCENT, PLAIN_DEGREES
+from commission.site.quantity import PERCENT, PLAIN_DEGREES, number_text
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanStore
 from commission.site.scanner import Scanner
@@ -190,7 +190,7 @@ def _time_units(inputs: PlausibilityInput) -> Iterator[Finding]:
         units = {"microseconds": 1e3, "milliseconds": 1e6, "seconds": 1e9, "picoseconds": 1e-3}
         unit = next((u for u, f in units.items() if _PERIODS_S[0] <= period * f <= _PERIODS_S[1]), None)
         yield Finding(
-            found=f"{name} come every {period:.3g} s by their stamps",
+            found=f"{name} come every {number_text(period)} s by their stamps",
             probably=f"the stamps are in {unit}" if unit else "the stamps are no times",
             remedy=f"expected nanoseconds{f' (multiply by {units[unit]:g})' if unit else ''}",
         )
@@ -353,7 +353,7 @@ def _ranges(name: str, ranges: FloatArray, scanner: Scanner | None) -> Iterator[
     in_millimetres = typical > 10.0 * farthest
     yield Finding(
         found=f"{PERCENT.text(beyond)} of the ranges of {name} are beyond the scanner's {farthest:g} m"
-        f" (typical: {typical:.4g} m)",
+        f" (typical: {number_text(typical, 4)} m)",
         probably="they are in millimetres" if in_millimetres else "another scanner was recorded",
         remedy="expected metres" if in_millimetres else "correct the project's scanner (range)",
     )
@@ -390,7 +390,7 @@ def _scans_of(inputs: PlausibilityInput, scans: ScanStore, scanner: Scanner | No
     period = _period_s(scans.stamps_ns)
     if not math.isnan(period) and not scanner.rate / THINNED <= 1.0 / period <= scanner.rate * RATE_RATIO:
         yield Finding(
-            found=f"the {called} come {1.0 / period:.3g} times a second",
+            found=f"the {called} come {number_text(1.0 / period)} times a second",
             probably=f"the project's scanner ({scanner.rate:g} per second) is another one, or scans are lost",
             remedy="correct the project's scanner (rate) for virtual drives and predictions",
         )
@@ -408,7 +408,8 @@ def _intensities(name: str, values: FloatArray, ranges: FloatArray, detector: De
     values, ranges = values[known], ranges[known]
     share, threshold = float(np.mean(values >= threshold_at(ranges, detector))), detector.intensity_threshold
     low, high = float(values.min()), float(values.max())
-    where = f"detector.intensity_threshold {threshold:g} (intensities are {low:.4g} to {high:.4g})"
+    between = f"{number_text(low, 4)} to {number_text(high, 4)}"
+    where = f"detector.intensity_threshold {number_text(threshold, 6)} (intensities are {between})"
     if share > _FULL_SHARE:
         yield Finding(
             found=f"{PERCENT.text(share)} of the beams of the {name} reach {where}",

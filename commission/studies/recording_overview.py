@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.geometry.arrays import FloatArray, IntArray
-from commission.site.quantity import PERCENT, PLAIN_DEGREES
+from commission.site.quantity import PERCENT, PLAIN_DEGREES, number_text
 from commission.site.record_log import RecordLog
 from commission.site.record_store import ScanStore
 
@@ -34,7 +34,8 @@ class Channel:
     @property
     def text(self) -> str:
         """All of it in one line."""
-        pace = "" if np.isnan(self.rate) else f", {self.rate:.4g}/s, longest pause {self.longest_pause_s:.3g} s"
+        pace = f", {number_text(self.rate, 4)}/s, longest pause {number_text(self.longest_pause_s)} s"
+        pace = "" if np.isnan(self.rate) else pace
         return f"{self.records} from {self.begin_s:.2f} to {self.end_s:.2f} s{pace}; {self.values}"
 
 
@@ -102,7 +103,8 @@ def _odometry_values(log: RecordLog) -> str:
     speeds = np.hypot(moved[:, 0], moved[:, 1]) / seconds[usable]
     turns = np.abs(moved[:, 2]) / seconds[usable]
     way = float(np.hypot(log.displacements[:, 0], log.displacements[:, 1]).sum())
-    return f"{way:.1f} m driven, speed up to {speeds.max():.3g} m/s, turning up to {turns.max():.3g} rad/s"
+    fastest = f"speed up to {number_text(speeds.max())} m/s, turning up to {number_text(turns.max())} rad/s"
+    return f"{way:.1f} m driven, {fastest}"
 
 
 def _scan_values(scans: ScanStore) -> str:
@@ -114,10 +116,10 @@ def _scan_values(scans: ScanStore) -> str:
         f"{beams_in_words(scans.beams)} {PLAIN_DEGREES.text(np.median(np.abs(scans.angle_increment)), '.4g')} apart"
     ]
     if hit.any():
-        parts.append(f"range {ranges[hit].min():.4g} to {ranges[hit].max():.4g} m")
+        parts.append(f"range {number_text(ranges[hit].min(), 4)} to {number_text(ranges[hit].max(), 4)} m")
     if some.intensities is not None and hit.any():
         strengths = np.asarray(some.intensities, dtype=np.float64)[hit]
-        parts.append(f"intensity {strengths.min():.4g} to {strengths.max():.4g}")
+        parts.append(f"intensity {number_text(strengths.min(), 4)} to {number_text(strengths.max(), 4)}")
     if some.reflector is not None:
         parts.append(f"{PERCENT.text(float(np.mean(some.reflector)), '.2g')} of the beams flagged as reflector")
     return ", ".join(parts)
@@ -134,5 +136,9 @@ def _spans(values: FloatArray, names: tuple[str, ...], units: tuple[str, ...]) -
     parts: list[str] = []
     for column, (name, unit) in enumerate(zip(names, units, strict=True)):
         known = values[:, column][np.isfinite(values[:, column])]
-        parts.append(f"{name} {known.min():.4g} to {known.max():.4g} {unit}" if len(known) else f"{name} unknown")
+        parts.append(
+            f"{name} {number_text(known.min(), 4)} to {number_text(known.max(), 4)} {unit}"
+            if len(known)
+            else f"{name} unknown"
+        )
     return ", ".join(parts)

@@ -17,7 +17,7 @@ from commission.localization.estimate import Mode, Status
 from commission.localization.run_columns import RunColumns
 from commission.localization.setup import LocalizerSetup
 from commission.progress import Progress, silent
-from commission.site.quantity import PERCENT
+from commission.site.quantity import PERCENT, number_text
 from commission.site.record_log import RecordLog
 from commission.studies.heaps import heaps_of, middle_of, nearest_of
 from commission.studies.inputs import StudyInput
@@ -86,7 +86,7 @@ class ShinyThing:
         bright = (
             ""
             if math.isnan(self.intensity)
-            else f", intensity {self.intensity:.4g} against a threshold of {self.threshold:.4g}"
+            else f", intensity {number_text(self.intensity, 4)} against a threshold of {number_text(self.threshold, 4)}"
         )
         beside = f", beside {self.beside}" if self.beside else ""
         return (

@@ -15,6 +15,8 @@ from commission.site.quantity import (
     POSITIVE,
     Bounds,
     Quantity,
+    Shown,
+    number_text,
 )
 
 SIGMA = Quantity(label="Range 1σ", unit="m", shown=MILLIMETRES, bounds=POSITIVE, step=0.5)
@@ -87,6 +89,7 @@ def test_numbers_are_shown_in_the_unit_of_the_page_and_written_with_the_decimals
     assert SIGMA.on_page(0.01234) == 12.34
     assert SIGMA.on_page(0.012345678) == 12.3457
     assert X.on_page(5_412_345.678_91) == 5_412_345.679
+    assert X.brief(5_412_345.678_91) == "5412345.679 m"
     assert SIGMA.text(0.02) == "20.0 mm"
     assert SIGMA.title == "Range 1σ [mm]"
     assert Quantity(label="Bearing", unit="rad", shown=DEGREES, step=0.01).text(math.radians(30.0)) == "30.00°"
@@ -135,3 +138,23 @@ def test_rounding_for_a_file_twice_is_rounding_once_and_keeps_the_bounds(value, 
     once = quantity.in_file(value)
     assert quantity.in_file(once) == once
     assert (once in bounds) or (value not in bounds)
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (0.0, 3, "0"),
+        (0.012345, 3, "0.0123"),
+        (9.996, 3, "10"),
+        (999.7, 3, "1000"),
+        (13_670.4, 4, "13670"),
+        (65_535.0, 4, "65535"),
+        (-5_412_345.6, 6, "-5412346"),
+        (1e300, 3, "1e+300"),
+        (math.inf, 3, "inf"),
+        (math.nan, 3, "nan"),
+    ],
+)
+def test_a_large_number_is_written_with_all_its_digits_and_no_exponent(value, digits, text):
+    assert number_text(value, digits) == text
+    assert Shown("mm", 1.0).text(value, f".{digits}g") == f"{text} mm"

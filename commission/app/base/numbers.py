@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-
-def number_text(value: float) -> str:
-    """Return a number with three digits, without an exponent where a person would write none."""
-    return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
+from commission.site.quantity import number_text
 
 
 def metres_text(metres: Sequence[int]) -> str:

@@ -7,7 +7,6 @@ from viser import GuiApi
 from commission.app.base import theme
 from commission.app.base.conditions import Conditions
 from commission.app.base.inputs import write_html
-from commission.app.base.numbers import number_text
 from commission.app.base.panel import BasePanel, escaped, table
 from commission.app.base.ramp import cell_html, ramp_html, scales_html
 from commission.app.base.state import AppState
@@ -17,7 +16,7 @@ from commission.app.coverage.settings import BY_CONTOURS, CoverageSettings, Figu
 from commission.app.coverage.view import EllipseView, FloorReading, HeatView, coverage_of
 from commission.app.coverage.words import FIGURE_NAMES, HEADING_NAMES, MEASUREMENT_NAMES, none_text, value_text
 from commission.planning.error_budget import CONTRIBUTIONS
-from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT, Shown
+from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT, Shown, number_text
 
 AMONG_PEOPLE = (Figure.EXPECTED_VISIBLE, Figure.TWO_OR_MORE, Figure.THREE_OR_MORE)
 HATCH_CSS = "repeating-linear-gradient(135deg,{0} 0 3px,{1} 3px 6px)"

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-from commission.app.base.numbers import number_text
 from commission.app.coverage.scale import QUANTITIES, is_fix, unit_of
 from commission.app.coverage.settings import BY_CONTOURS, Figure
 from commission.planning.dilution import Heading, Measurement
-from commission.site.quantity import PERCENT, joined
+from commission.site.quantity import PERCENT, joined, number_text
 
 FIGURE_NAMES: dict[Figure, str] = {Figure.NONE: "Off"} | {figure: each.label for figure, each in QUANTITIES.items()}
 HEADING_NAMES: dict[Heading, str] = {

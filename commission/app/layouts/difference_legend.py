@@ -6,14 +6,13 @@ from viser import GuiApi
 
 from commission.app.base import theme
 from commission.app.base.inputs import write_html
-from commission.app.base.numbers import number_text
 from commission.app.base.panel import BasePanel, escaped
 from commission.app.base.ramp import cell_html, ramp_html, scales_html
 from commission.app.base.view import PageView
 from commission.app.layouts.difference import GAINED, LOST, NEITHER, SAME, STEPS, DifferenceView, class_colors
 from commission.app.layouts.view import LayoutsView
 from commission.app.layouts.words import FIGURE_NAMES
-from commission.site.quantity import PERCENT
+from commission.site.quantity import PERCENT, number_text
 
 HATCH_CSS = "repeating-linear-gradient(135deg,{0} 0 3px,{1} 3px 6px)"
 WITHOUT = {GAINED: "a fix only now", LOST: "a fix no more", NEITHER: "no fix with either"}

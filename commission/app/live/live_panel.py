@@ -21,7 +21,7 @@ from commission.io.live.accounts import RecordAccount, counted
 from commission.io.live.registry import KINDS
 from commission.io.live.session_recorder import RecordingStatus
 from commission.io.live.status import SourceState, SourceStatus
-from commission.site.quantity import DEGREES, MILLISECONDS, PERCENT
+from commission.site.quantity import DEGREES, MILLISECONDS, PERCENT, X, Y
 
 FIRST = "json:127.0.0.1:6061"
 NUMBERS = 3
@@ -41,7 +41,7 @@ class LivePanel(BasePanel):
         )
         self._start = gui.add_text(
             "Start at [m, m, deg]",
-            "" if asked.start is None else _pose_text(asked.start),
+            "" if asked.start is None else pose_text(asked.start),
             hint="Pose of base now: x, y, heading. Empty: the start of the first route; without a route the vehicle "
             "looks where it is.",
         )
@@ -134,8 +134,10 @@ def start_pose(text: str) -> tuple[float, float, float] | None:
     return numbers[0], numbers[1], math.radians(numbers[2])
 
 
-def _pose_text(pose: tuple[float, float, float]) -> str:
-    return f"{pose[0]:g}, {pose[1]:g}, {DEGREES.of(pose[2]):g}"
+def pose_text(pose: tuple[float, float, float]) -> str:
+    """Return a pose as the field holds it: x and y [m], heading [deg]; `start_pose` reads it."""
+    # What is not changed in the field is read from it again: on a national grid, too, no millimetre may be lost.
+    return f"{X.on_page(pose[0]):.11g}, {Y.on_page(pose[1]):.11g}, {DEGREES.of(pose[2]):g}"
 
 
 def live_table(live: LiveView) -> str:

@@ -14,7 +14,7 @@ from commission.app.base.panel import escaped
 from commission.app.live.shiny_list import SAME_M
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Status
-from commission.site.quantity import DEGREES, PERCENT
+from commission.site.quantity import DEGREES, PERCENT, number_text
 from commission.studies.sensor_view import SeenCluster, SensorView
 
 SIDE = 1000.0
@@ -55,7 +55,9 @@ def head(view: SensorView, threshold: float) -> str:
     counts = {status: sum(each.status is status for each in view.clusters) for status in WORDS}
     told = [f"{count} {WORDS[status]}" for status, count in counts.items() if count]
     beams = f"{int(view.reflective.sum())} of {len(view.reflective)} beams"
-    what = f"{beams} at or above {threshold:g}" if view.has_intensities else f"{beams} flagged by the sensor"
+    what = (
+        f"{beams} at or above {number_text(threshold, 6)}" if view.has_intensities else f"{beams} flagged by the sensor"
+    )
     clusters = f"{len(view.clusters)} cluster{'' if len(view.clusters) == 1 else 's'}"
     return (
         f"<div class='c-s-head'><b>{escaped(view.name)}</b> {view.time:.2f} s: {what}; {clusters}"
@@ -103,7 +105,7 @@ def intensity_picture(view: SensorView, threshold: float, inbox: str, marked: tu
     line = PERCENT.of(1.0 - float(height(np.array(threshold), top)))
     handle = (
         f"<i class='c-s-line' style='--c-at:{line:.3f}%' title='Drag: intensity from which a beam is reflective'>"
-        f"<b>{threshold:.4g}</b></i>"
+        f"<b>{number_text(threshold, 4)}</b></i>"
         if view.has_intensities
         else ""
     )
@@ -140,7 +142,7 @@ def _scale(top: float) -> str:
     """The numbers at the upper edge, at half and at a quarter of the height."""
     shares = (1.0, 0.5, 0.25)
     return "".join(
-        f"<span class='c-s-y' style='top:{PERCENT.of(1.0 - share):g}%'>{top * share * share:.3g}</span>"
+        f"<span class='c-s-y' style='top:{PERCENT.of(1.0 - share):g}%'>{number_text(top * share * share)}</span>"
         for share in shares
     )
 
@@ -207,7 +209,7 @@ def told(each: SeenCluster) -> str:
     """Return a cluster in words."""
     window = "" if each.window is None else f" ({each.window[0]} to {each.window[1]} pass)"
     who = f", {each.reflector}" if each.reflector else ""
-    peak = "" if math.isnan(each.peak) else f", peak {each.peak:.4g}"
+    peak = "" if math.isnan(each.peak) else f", peak {number_text(each.peak, 4)}"
     where = f"{DEGREES.text(each.bearing, '.1f')}, {each.range:.2f} m"
     return f"{where}, {each.beams} beam{'' if each.beams == 1 else 's'}{window}{peak}: {WORDS[each.status]}{who}"
 

@@ -15,7 +15,7 @@ from commission.app.base.panel import BasePanel, escaped
 from commission.app.base.view import PageView
 from commission.app.live.shiny_service import ShinyView
 from commission.app.live.state import SensorWatch
-from commission.site.quantity import PERCENT
+from commission.site.quantity import PERCENT, number_text
 from commission.studies.shiny import FEWEST, ShinyThing
 
 MOST = 60
@@ -83,7 +83,9 @@ def _framed(head: str, content: str) -> str:
 
 def _row(thing: ShinyThing, marked: tuple[float, float] | None) -> str:
     is_marked = marked is not None and math.dist(marked, (thing.x, thing.y)) <= SAME_M
-    bright = "flagged" if math.isnan(thing.intensity) else f"{thing.intensity:.3g} / {thing.threshold:.3g}"
+    bright = (
+        "flagged" if math.isnan(thing.intensity) else f"{number_text(thing.intensity)} / {number_text(thing.threshold)}"
+    )
     cells = (
         f"{thing.x:.2f}, {thing.y:.2f}",
         str(thing.scans),

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.app.base import theme
-from commission.app.base.numbers import number_text
 from commission.app.base.panel import escaped
 from commission.app.prediction.tracks import TALL, WIDTH, TrackAxis, line, round_up, svg, tick, write
 from commission.geometry.arrays import FloatArray
+from commission.site.quantity import number_text
 
 COLORS = (theme.FROM_NOISE, theme.FROM_MAP, theme.FROM_MOUNTING, theme.FROM_RANGE, theme.FROM_CLOCK)
 """Color of each of `CONTRIBUTIONS`, from the bottom of a bar to its top."""

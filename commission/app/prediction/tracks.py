@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from commission.app.base import theme
-from commission.app.base.numbers import number_text
 from commission.app.base.paints import Run, Surface
 from commission.app.base.panel import escaped
 from commission.geometry.arrays import FloatArray
+from commission.site.quantity import number_text
 
 WIDTH, LEFT = 270, 30
 BELOW, ABOVE = 100.0, 2.0

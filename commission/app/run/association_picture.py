@@ -15,7 +15,7 @@ from commission.app.base.panel import escaped
 from commission.geometry.arrays import FloatArray
 from commission.geometry.gaussian import ellipse_axes
 from commission.localization.estimate import Status
-from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
+from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT, number_text
 from commission.studies.association import Association, Cloud, JudgedDetection, Rival
 
 SIDE = 280.0
@@ -285,7 +285,7 @@ def rows(found: Association) -> list[tuple[str, str]]:
             ("Beams passing", _window(found)),
         ]
     shown += [
-        (f"Rival {escaped(rival.reflector.id)}", f"d² {rival.d2:.2f}, likelihood ×{rival.likelihood:.2g}")
+        (f"Rival {escaped(rival.reflector.id)}", f"d² {rival.d2:.2f}, likelihood ×{number_text(rival.likelihood, 2)}")
         for rival in found.rivals[:RIVALS_TOLD]
     ]
     return [*(shown if found.rivals else [*shown, ("Rivals", "none near")]), *_cloud_rows(found.cloud)]

@@ -6,6 +6,7 @@ import math
 
 from commission.app.base.panel import escaped, table
 from commission.app.tune.calibration_view import CalibrationView
+from commission.site.quantity import number_text
 from commission.studies.calibration_values import CalibrationVerdict, Value
 from commission.studies.calibration_words import label_of, stretches_of, text_of
 from commission.studies.variant_figures import BY_KEY
@@ -66,7 +67,7 @@ def gain_text(found: CalibrationView) -> str:
         if math.isnan(old) or math.isnan(new):
             continue
         expected = math.nan if figure.expected is None else figure.expected(after)
-        hint = "" if math.isnan(expected) else f" (consistent: {expected:.3g})"
+        hint = "" if math.isnan(expected) else f" (consistent: {number_text(expected)})"
         cells = (f"{figure.label}{hint}", figure.text(old), figure.text(new))
         rows += "<tr>" + "".join(f"<td>{escaped(each)}</td>" for each in cells) + "</tr>"
     head = f"<tr><td>{label} accepted</td><td>before</td><td>now</td></tr>"
