@@ -19,7 +19,7 @@ from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.search_map import SearchMap
 from commission.localization.search_state import Search
 from commission.localization.seen_of_late import pairs_of
-from commission.localization.start import CANDIDATES, HYPOTHESES, candidates
+from commission.localization.start import CANDIDATES, candidates
 from commission.localization.trail import newest_things
 from commission.localization.trail_fit import explain
 
@@ -27,9 +27,11 @@ SPARSE = 4.0
 """Detections a scan on average from which on things that come back tell it sooner."""
 AFTER_S = 2.0
 """The search has been going on for so long [s]: where scans hold enough, it has ended by then."""
+KEPT = 12
+"""Hypotheses that are carried on."""
 NEW_WAY = 1.0
 """Part of the way, see `way_between`, between two attempts at least."""
-TRIED = 32
+TRIED = 16
 """Poses that pairs suggest and that are led along, those that most things fit."""
 ODDS_AGAINST_NONE = 1e4
 """How much likelier it must be than that what is seen is none of the map's reflectors; than all others as `ODDS`
@@ -119,7 +121,7 @@ def _ranked(explained: FloatArray, search: Search, around: SearchMap) -> FloatAr
     poses = base_poses(rows, search.track)
     kept: list[int] = []
     left = np.arange(len(rows))
-    while len(left) and len(kept) < HYPOTHESES:
+    while len(left) and len(kept) < KEPT:
         kept.append(int(left[0]))
         left = left[~same_place(poses[left], poses[left[0]])]
     ranked = rows[kept]
