@@ -194,6 +194,12 @@ class OpenPage:
         whole = re.compile(rf"^{re.escape(name)}$")
         self.page.locator(".mantine-Paper-root").filter(has_text=whole, visible=True).first.click()
 
+    def unfold(self, name: str, holds: str) -> None:
+        """Open a folder unless it is open: then this text of it can be seen."""
+        if not self.page.get_by_text(holds).first.is_visible():
+            self.fold(name)
+            self.wait_for_text(holds)
+
     def row(self, label: str) -> Locator:
         """The row of widgets behind this label."""
         return self.page.locator("label", has_text=label).locator("xpath=ancestor::*[contains(@class,'Flex-root')][1]")

@@ -12,18 +12,24 @@ from tests.browser.page import OpenPage
 from tests.browser.serving import Served
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def served() -> Iterator[Served]:
     opened = Served(room())
     yield opened
     opened.close()
 
 
+@pytest.fixture(scope="module")
+def page(served: Served, lasting_window: Callable[..., OpenPage]) -> OpenPage:
+    """One window for all tests, which leave it as it was."""
+    opened = lasting_window(served.server)
+    opened.open()
+    return opened
+
+
 def test_a_number_that_was_taken_back_can_be_entered_again_without_a_key_or_a_click(
-    served: Served, window: Callable[..., OpenPage]
+    served: Served, page: OpenPage
 ) -> None:
-    page = window(served.server)
-    page.open()
     page.open_tab("Tune")
     for _ in range(3):
         # `fill` focuses the field by itself and puts the text in, as do dictation and text that is dropped.
@@ -44,11 +50,12 @@ def _thumb(page: OpenPage) -> str:
 
 @pytest.mark.parametrize("letters", [LONGEST_TEXT + 1, 6_000_000], ids=["just over", "more than a message holds"])
 def test_a_text_that_is_too_long_is_refused_in_words_and_the_connection_lives_on(
-    served: Served, window: Callable[..., OpenPage], letters: int
+    served: Served, page: OpenPage, letters: int
 ) -> None:
-    page = window(served.server)
-    client = page.open()
-    page.fold("Exchange")
+    clients = list(served.server.get_clients())
+    page.open_tab("Site")
+    page.unfold("Exchange", "At most 32 MB")
+    page.page.evaluate("window.__notes.length = 0")
     pasted = page.row("Paste a table").locator("textarea")
     pasted.evaluate(
         """(field, letters) => {
@@ -62,5 +69,5 @@ def test_a_text_that_is_too_long_is_refused_in_words_and_the_connection_lives_on
     )
     page.wait_until_told("Paste a table: found more than 1,000,000 letters; expected at most as many")
     page.page.wait_for_function("field => field.value === ''", arg=pasted.element_handle())
-    assert list(served.server.get_clients()) == [client.client_id]
+    assert list(served.server.get_clients()) == clients
     assert page.errors == []

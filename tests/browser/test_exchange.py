@@ -50,11 +50,27 @@ class OpenSite(Served):
         return [r.id for r in self.state.project.reflectors.reflectors]
 
 
-@pytest.fixture
-def site(tmp_path: Path) -> Iterator[OpenSite]:
-    opened = OpenSite(tmp_path)
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[OpenSite]:
+    opened = OpenSite(tmp_path_factory.mktemp("site"))
     yield opened
     opened.close()
+
+
+@pytest.fixture(scope="module")
+def page(site: OpenSite, lasting_window: Callable[..., OpenPage]) -> OpenPage:
+    """One window for all tests, which leave the site as it was."""
+    opened = lasting_window(site.server)
+    opened.open(nodes=NODES)
+    return opened
+
+
+@pytest.fixture
+def exchange(page: OpenPage) -> OpenPage:
+    """The window with the folder in which files come and go."""
+    page.open_tab("Site")
+    page.unfold("Exchange", "At most 32 MB")
+    return page
 
 
 def upload(page: OpenPage, name: str, content: bytes) -> None:
@@ -72,15 +88,11 @@ def assert_harmless(page: OpenPage) -> None:
     assert page.errors == []
 
 
-def test_names_of_strangers_are_shown_as_text_wherever_they_appear(
-    site: OpenSite, window: Callable[..., OpenPage]
-) -> None:
-    page = window(site.server)
+def test_names_of_strangers_are_shown_as_text_wherever_they_appear(site: OpenSite, exchange: OpenPage) -> None:
+    page, (client,) = exchange, site.server.get_clients()
     dialogs: list[str] = []
     page.page.on("dialog", lambda dialog: (dialogs.append(dialog.message), dialog.dismiss()))
-    client = page.open(nodes=NODES).client_id
     before = site.state.project
-    page.fold("Exchange")
     upload(page, f"{IMAGE}.csv", TABLE.encode())
     page.wait_for_text("Nothing has changed yet")
     page.wait_for_text("1 added, 1 changed, 3 not in the file, 0 as before")
@@ -116,12 +128,9 @@ def test_names_of_strangers_are_shown_as_text_wherever_they_appear(
 
 
 def test_upload_over_the_limit_is_refused_with_its_size_and_the_page_lives_on(
-    site: OpenSite, window: Callable[..., OpenPage], tmp_path: Path
+    site: OpenSite, exchange: OpenPage, tmp_path: Path
 ) -> None:
-    page = window(site.server)
-    page.open(nodes=NODES)
-    page.fold("Exchange")
-    page.wait_for_text("At most 32 MB")
+    page, done = exchange, site.state.undo
     large = tmp_path / "large.csv"
     with large.open("wb") as file:
         file.truncate(SIZE_LIMIT + 1_000_000)
@@ -133,14 +142,12 @@ def test_upload_over_the_limit_is_refused_with_its_size_and_the_page_lives_on(
     page.wait_for_text("4 removed")
     page.press("Cancel")
     page.page.get_by_role("button", name="Accept", exact=True).wait_for(state="detached")
-    assert site.state.undo == ()
+    assert site.state.undo == done
     assert page.errors == []
 
 
-def test_pasted_cells_and_downloaded_files_make_the_round_trip(site: OpenSite, window: Callable[..., OpenPage]) -> None:
-    page = window(site.server)
-    page.open(nodes=NODES)
-    page.fold("Exchange")
+def test_pasted_cells_and_downloaded_files_make_the_round_trip(site: OpenSite, exchange: OpenPage) -> None:
+    page, done = exchange, len(site.state.undo)
     page.row("Paste a table").locator("textarea").fill("Nr\tX [mm]\tY [mm]\nR1\t250,0\t2100\nN\t6000\t4000")
     page.press("Read pasted")
     page.wait_for_text("R1: y 2.000 → 2.100 m, moves 100 mm")
@@ -159,5 +166,5 @@ def test_pasted_cells_and_downloaded_files_make_the_round_trip(site: OpenSite, w
             page.page.get_by_role("button", name="Accept", exact=True).wait_for(state="detached")
     page.wait_for_text("Room.lif does not hold all:")
     page.wait_for_text("5 reflectors are not carried: LIF knows no localization")
-    assert len(site.state.undo) == 1
+    assert len(site.state.undo) == done + 1
     assert page.errors == []
