@@ -9,7 +9,7 @@
   const LOOK_FOR_NEW_MS = 200;
   const ARM_PX = 2; // thickness of a cross
   const PICTURES = ["/plan/heat", "/plan/ambiguity", "/plan/difference"];
-  const CASING = /^\/(?!routes_).*_casing(\/\d+px)?$/; // that of routes is seen on walls, too
+  const CASING = /^\/(?!routes_|reflectors\/).*_casing(\/\d+px)?$/; // those of routes and reflectors are seen on walls, too
   const held = new WeakSet();
 
   function hold(points, pixels) {

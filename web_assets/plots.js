@@ -6,6 +6,7 @@
 (() => {
   if (window.commissionPlots) return; // the server sends this script again after each reconnection
   const LEFT_PX = 42, RIGHT_PX = 10, ABOVE_PX = 16, BELOW_PX = 15, LOWEST_PX = 78, NAMES_PX = 12, DRAGGED_PX = 4;
+  const LOWEST_CURVES_PX = 44;
   const NARROW_PX = 1270; // window in which the names of plots are shortened, so that all are there to choose
   const FONT = "11px sans-serif", INK = "#e7e9ee", AXIS = "#9aa0a8", GRID = "#303338", BACK = "#1b1d21";
 
@@ -113,19 +114,40 @@
       return { chart, values: cursor.values[index] ?? [], left: x + LEFT_PX, right: x + w - RIGHT_PX,
         top: y + ABOVE_PX, bottom: y + h - BELOW_PX, x, y, w, h };
     });
-    // Where names of curves have no room behind a title, all plots give them a line of their own.
-    const isNarrow = found.some((lane) => namesWidth(pen, lane) > w);
-    if (isNarrow) for (const lane of found) lane.top += NAMES_PX;
-    for (const lane of found) lane.isNarrow = isNarrow;
+    // Where names of curves have no room behind a title, all plots give them lines of their own: as many as the plot
+    // with the most names needs, while curves stay high enough to be read.
+    const needed = Math.max(...found.map((lane) => widestNames(pen, lane)));
+    const most = Math.max(1, Math.floor((h - ABOVE_PX - BELOW_PX - LOWEST_CURVES_PX) / NAMES_PX));
+    for (const lane of found) {
+      lane.lines = Math.min(needed, most);
+      lane.top += lane.lines * NAMES_PX;
+    }
     return found;
   }
 
-  // By the widest numbers that come, so that nothing jumps while they change.
-  function namesWidth(pen, { chart }) {
+  // Lines that names need, by the widest numbers that come, so that nothing jumps while they change.
+  function widestNames(pen, lane) {
+    const { lines, limits } = lane.chart;
+    const texts = [...lines.map(({ label, bars }) => `${label} ${bars ? "0.0000–0.00" : "0.000"}`),
+      ...limits.map(({ label, steps }) => `- - ${label} ${written(steps[0][1])}`)];
+    return placed(pen, { ...lane, lines: 0 }, texts).length === texts.length ? 0
+      : Math.max(...placed(pen, { ...lane, lines: texts.length }, texts).map(({ line }) => line));
+  }
+
+  // Where each name stands: behind the title, or in lines below it; those without room are left out.
+  function placed(pen, lane, texts) {
     pen.font = `600 ${FONT}`;
-    const title = pen.measureText(chart.title).width;
+    const begin = lane.x + 6, behind = begin + 9 + pen.measureText(lane.chart.title).width, found = [];
     pen.font = FONT;
-    return chart.lines.reduce((sum, { label }) => sum + pen.measureText(`${label} 0.000`).width + 9, title + 15);
+    let line = Math.min(lane.lines, 1), x = line ? begin : behind;
+    for (const text of texts) {
+      const { width } = pen.measureText(text);
+      if (x + width > lane.x + lane.w && x > begin && line < lane.lines) [x, line] = [begin, line + 1];
+      if (x + width > lane.x + lane.w) break;
+      found.push({ text, x, line });
+      x += width + 9;
+    }
+    return found;
   }
 
   const xOf = (lane, time) => lane.left + (time - view[0]) / (view[1] - view[0]) * (lane.right - lane.left);
@@ -351,16 +373,11 @@
     pen.font = `600 ${FONT}`;
     pen.fillStyle = INK;
     pen.fillText(lane.chart.title, lane.x + 6, lane.y + 11, lane.w - 8);
-    let x = lane.isNarrow ? lane.x + 6 : lane.x + 15 + pen.measureText(lane.chart.title).width;
-    pen.font = FONT;
     lane.names = [];
-    for (const [text, color] of named) {
-      const width = pen.measureText(text).width;
-      if (x + width > lane.x + lane.w) break;
+    for (const { text, x, line } of placed(pen, lane, named.map(([each]) => each))) {
+      pen.fillStyle = named[lane.names.length][1];
+      pen.fillText(text, x, lane.y + 11 + line * NAMES_PX);
       lane.names.push(text);
-      pen.fillStyle = color;
-      pen.fillText(text, x, lane.y + 11 + (lane.isNarrow ? NAMES_PX : 0));
-      x += width + 9;
     }
   }
 

@@ -83,5 +83,5 @@ def test_an_inlier_is_a_thin_cross_of_one_size_inside_the_drawn_ellipse_at_every
         assert is_inside(middle, np.array([page.pixel_of(corner) for corner in gate])), height
     assert all(0.7 * PIXELS["sparkle"] <= size <= 1.1 * PIXELS["sparkle"] for size in sizes), sizes
     assert np.ptp(sizes) <= 2, sizes
-    assert ("offsets ×10" in page.text()) == (magnify == 10.0)
+    assert ("offsets 10x" in page.text()) == (magnify == 10.0)
     assert page.errors == []

@@ -48,7 +48,7 @@ class OpenSite(Served):
 
 CASED = """(expected) => {
   const found = [];
-  window.__viserMutable.nodeRefFromName["/reflectors/shapes_casing"]?.traverse((part) => {
+  window.__viserMutable.nodeRefFromName["/zones/outlines_casing"]?.traverse((part) => {
     if (part.isMesh) found.push(part.visible);
   });
   return found.length > 0 && found.every((each) => each === expected);

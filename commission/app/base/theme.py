@@ -264,7 +264,7 @@ div:has(>.c-carried){{display:none!important}}
 .c-list-view :is(td,th):first-child,.c-events :is(td,th){{text-align:left}}
 .c-list-view tbody tr{{cursor:pointer}}
 .c-list-view tbody tr:is(:hover,:focus-visible){{background:{css(Surface.PRESSED.dark)};outline:none}}
-.c-variants>div{{display:flex;gap:22px;align-items:flex-start}}
+.c-variants>div{{display:flex;flex-wrap:wrap;gap:2px 22px;align-items:flex-start}}
 .c-variants table{{width:auto;flex:none}}
 .c-variants tbody tr{{cursor:default}}
 .c-variants .c-moments tbody tr{{cursor:pointer}}
@@ -355,9 +355,7 @@ div:has(>.c-rows)~div .mantine-Button-label{{white-space:pre-wrap;text-align:lef
 @media (max-height:800px){{.c-a-picture{{max-width:156px!important}}
  [data-shows~=c-association] [data-dock-scroll]>div:has(.c-association){{flex-grow:2.2!important}}
  :root:not([data-shows~=c-association]) [data-dock-region=right] [data-dock-scroll]>div:has([role=tab][title=Selection])
- {{flex-grow:1.5!important}}
- :root:has(.c-nothing):not([data-shows~=c-association]) [data-dock-region=right] [data-dock-scroll]>
- div:has([role=tab][title=Selection][aria-selected=true]){{flex-grow:.5!important}}}}
+ {{flex-grow:1.5!important}}}}
 .mantine-Slider-markWrapper:only-child .mantine-Slider-mark{{background:{css(SELECTED)};border:none;width:2px;
  height:12px;border-radius:0;transform:translateY(-3px)!important}}
 div:has(>div>.c-bottom):has(.c-no-run) button{{opacity:.35;pointer-events:none}}

@@ -69,6 +69,10 @@ class MapDraftLayer(BaseLayer):
             self._draw_picture(draft)
         self._draw_points(draft)
 
+    def is_used(self, view: PageView) -> bool:
+        """Whether there is one."""
+        return view.state.part(MapLoading).draft is not None
+
     def _draw_picture(self, draft: MapDraft | None) -> None:
         for node in self._nodes:
             node.remove()

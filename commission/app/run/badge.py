@@ -76,7 +76,7 @@ class Badge(BasePanel):
         magnify = 1.0 if view.part(RunView) is None else view.state.magnify
         write_html(
             self._scale,
-            "" if magnify == 1.0 else f"<div class='c-scale'>gates, 2σ and offsets ×{magnify:g}</div>",
+            "" if magnify == 1.0 else f"<div class='c-scale'>gates, 2σ and offsets {magnify:g}x</div>",
         )
 
     def _show_badge(self, word: str, beside: str, color: str, since: str) -> None:

@@ -22,11 +22,11 @@ from commission.studies.scanner_figures import residuals_told
 
 MODES = {
     Mode.OPERATIONAL: "operational",
-    Mode.FAIL: "fail: too uncertain, output withheld",
-    Mode.LOST: "lost: rejects what it sees, output withheld",
-    Mode.INITIALIZING: "initializing: looks where it is, no output",
+    Mode.FAIL: "<span title='The pose is too uncertain.'>fail: no output</span>",
+    Mode.LOST: "<span title='Rejects what it sees.'>lost: no output</span>",
+    Mode.INITIALIZING: "<span title='Looks where it is; no output.'>initializing</span>",
 }
-"""What the page says of each."""
+"""What the page says of each, in one line; why, where it is pointed at."""
 MOST_REJECTED = 4
 """Rejected clusters of a scan that are explained."""
 

@@ -264,6 +264,8 @@ def test_a_casing_is_told_from_what_it_is_around(shown: str) -> None:
     on_it = (Floor.ROUTE, Floor.REFLECTOR, Floor.VEHICLE, Floor.ZONE, Run.INLIER, Run.OUTLIER, Run.GATE, Run.SCAN)
     for drawn in (*on_it, Run.TRAIL, Run.FIELD, Run.FAR_FIELD):
         assert contrast(getattr(drawn, shown), getattr(Floor.BACKGROUND, shown)) >= LEAST
+    # So routes and reflectors are seen on bare walls, too, whose color is near to theirs.
+    assert contrast(getattr(Floor.WALL, shown), getattr(Floor.BACKGROUND, shown)) >= LEAST
 
 
 @pytest.mark.parametrize("shown", THEMES)
