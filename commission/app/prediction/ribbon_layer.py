@@ -77,10 +77,6 @@ class RibbonLayer(BaseLayer):
             if len(chosen) or len(node.points) > 1:
                 node.points = stroke_segments(chosen, theme.Height.ACCUMULATED)
 
-    def colors_floor(self, view: PageView) -> bool:
-        """Whether there is a ribbon."""
-        return view.part(RouteView) is not None
-
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return ribbon and rim."""
         return self._rim, *self._ribbon

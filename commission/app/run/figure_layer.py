@@ -49,10 +49,6 @@ class FigureLayer(BaseLayer):
         """Whether a figure is chosen."""
         return bool(view.state.part(RunState).figure)
 
-    def colors_floor(self, view: PageView) -> bool:
-        """Whether there are discs."""
-        return self.is_used(view)
-
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the discs, one node for each color."""
         return tuple(node for marks in self._marks for node in marks.nodes)

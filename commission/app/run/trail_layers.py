@@ -78,10 +78,6 @@ class ConsistencyLayer(BaseLayer):
         """Whether it is asked for."""
         return view.state.part(RunState).trail_by is not TrailBy.NOTHING
 
-    def colors_floor(self, view: PageView) -> bool:
-        """Whether there are pieces in all colors of the scale."""
-        return self.is_used(view)
-
     def nodes(self) -> tuple[SceneNodeHandle, ...]:
         """Return the lines, one for each color."""
         return tuple(node for line in self._lines for node in line.nodes)
