@@ -199,23 +199,30 @@ def apply_settings(parameters: Parameters, settings: Sequence[str]) -> Parameter
     Parameters
     ----------
     parameters : where to start.
-    settings : texts like `association.gate_probability=0.95`, applied in order.
+    settings : texts like `association.gate_probability=0.95`, applied in order; one that its group refuses as the group
+        stands is tried again after the others, so that both of two limits can be raised past each other.
 
     Raises
     ------
     UsageError
         unknown group or key (lists the known ones) or a value that the key refuses.
     """
-    for setting in settings:
-        name, equals, text = (part.strip() for part in setting.partition("="))
-        if not equals or "." not in name:
-            raise UsageError(
-                f"setting {setting!r} is no group.key=value; expected for example observation.range_sigma=0.02"
-            )
-        try:
-            parameters = with_field(parameters, name, scalar(text), "parameter")
-        except ValueError as error:
-            raise UsageError(str(error)) from error
+    waiting = list(settings)
+    while waiting:
+        refused: list[tuple[str, ValueError]] = []
+        for setting in waiting:
+            name, equals, text = (part.strip() for part in setting.partition("="))
+            if not equals or "." not in name:
+                raise UsageError(
+                    f"setting {setting!r} is no group.key=value; expected for example observation.range_sigma=0.02"
+                )
+            try:
+                parameters = with_field(parameters, name, scalar(text), "parameter")
+            except ValueError as error:
+                refused.append((setting, error))
+        if len(refused) == len(waiting):
+            raise UsageError(str(refused[0][1])) from refused[0][1]
+        waiting = [setting for setting, _ in refused]
     return parameters
 
 

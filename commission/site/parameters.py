@@ -479,6 +479,13 @@ class TemporaryParameters:
 
     def __post_init__(self) -> None:
         check_fields(self, "temporary.")
+        for what, unit in (("radius", "m"), ("arc", "rad"), ("side", "m")):
+            least, largest = getattr(self, f"least_{what}"), getattr(self, f"largest_{what}")
+            if not least < largest:
+                raise ValueError(
+                    f"temporary.least_{what} is {least:g} {unit} and temporary.largest_{what} {largest:g} {unit}; "
+                    "expected the smaller one first"
+                )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,6 +15,7 @@ from commission.io.project_file import load_project
 from commission.localization.estimate import Belief
 from commission.localization.localizer import Localizer
 from commission.localization.setup import LocalizerSetup
+from commission.planning import contour_coverage as module
 from commission.planning.contour_coverage import contour_coverage
 from commission.planning.coverage import Lattice
 from commission.planning.dilution import FixOptions, Heading
@@ -166,3 +167,20 @@ def test_over_the_warehouse_it_is_what_the_localizer_believes_after_one_scan():
         assert found.position_sigma[0] == pytest.approx(believed, rel=0.15), (x, y)
         assert found.heading_sigma[0] == pytest.approx(math.sqrt(covariance[2, 2]), rel=0.15), (x, y)
     assert compared >= 4
+
+
+def test_who_cancels_does_not_wait_for_the_rest_of_a_large_floor(monkeypatch: pytest.MonkeyPatch):
+    class StoppedError(Exception):
+        pass
+
+    def stop(share: float, _: str) -> None:
+        if share > 0.0:
+            raise StoppedError
+
+    told, tell = [], module._tell
+    monkeypatch.setattr(module, "_tell", lambda points, *rest: (told.append(len(points)), tell(points, *rest)))
+    lattice = Lattice(x=0.1, y=0.1, spacing=0.01, rows=280, columns=580)
+    with pytest.raises(StoppedError):
+        contour_coverage(hall(6.0, 3.0), (ROUND,), GIVEN, lattice, ALL_ROUND, stop)
+    # As many threads as there are cores are at work when it is stopped, each with some hundred points.
+    assert sum(told) < 0.2 * len(lattice)

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from commission.errors import ProjectError, UsageError
+from commission.io.project_file import apply_settings
 from commission.site.disturbances import Disturbances, ShinyObject, TiltedStretch
 from commission.site.fields import field_hints
 from commission.site.floor_map import OCCUPIED, FloorMap
-from commission.site.parameters import Parameters
+from commission.site.parameters import Parameters, TemporaryParameters
 from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Route, Segment
@@ -115,3 +116,16 @@ def test_values_that_hold_arrays_compare_by_their_content():
     assert Segment(control_points=[[0, 0], [1, 0], [2, 0], [3, 0]]) == STRAIGHT
     assert Project(routes=(Route("Loop", (STRAIGHT,)),)) == Project(routes=(Route("Loop", (STRAIGHT,)),))
     assert FloorMap(np.zeros((2, 2), np.int8), 0.05) == FloorMap(np.zeros((2, 2), np.int8), 0.05)
+
+
+@pytest.mark.parametrize("what", ["radius", "arc", "side"])
+def test_swapped_limits_of_goods_are_refused_and_both_can_be_raised_past_each_other(what: str) -> None:
+    least, largest = f"least_{what}", f"largest_{what}"
+    with pytest.raises(ValueError, match=rf"temporary.{least} is 4 .* temporary.{largest} 4 .*the smaller one first"):
+        TemporaryParameters(**{least: 4.0, largest: 4.0})
+    for order in (1, -1):
+        settings = [f"temporary.{least}=4", f"temporary.{largest}=5"][::order]
+        raised = apply_settings(Parameters(), settings).temporary
+        assert (getattr(raised, least), getattr(raised, largest)) == (4.0, 5.0)
+    with pytest.raises(UsageError, match="the smaller one first"):
+        apply_settings(Parameters(), [f"temporary.{least}=6"])
