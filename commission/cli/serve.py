@@ -78,7 +78,8 @@ class Demo(_Page):
     """Open the page with a bundled site in which a virtual AGV is driving."""
 
     site: Annotated[str, arg(metavar="NAME")] = "laboratory"
-    """Bundled site: laboratory, shop_floor, warehouse or loading_bay (a vehicle with two scanners)."""
+    """Bundled site: laboratory, shop_floor, warehouse, loading_bay (a vehicle with two scanners) or assembly (four
+    omnidirectional wheels, and a camera that sees tags)."""
 
     def run(self) -> None:
         """Serve the bundled site."""

@@ -3,6 +3,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,8 +13,14 @@ from commission.geometry.raycast import RayCaster
 from commission.geometry.se2 import compose, transform_points
 from commission.io.bundled import bundled_folder
 from commission.io.project_file import load_project
+from commission.localization.estimate import Belief, Mode
+from commission.localization.setup import LocalizerSetup
+from commission.localization.whole_run import run
+from commission.simulation.scenario import start_of, virtual_drive
 from commission.site.project import Project
+from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Direction, Route
+from commission.studies.metrics import pose_errors, reference_at
 from tests.tools.draw_sites import SITES
 
 CLEARANCE = 0.2
@@ -77,7 +84,7 @@ ROUTES = [(name, route.name) for name, draw in SITES.items() for route in draw()
 @pytest.mark.parametrize("name", SITES)
 def test_bundled_site_is_what_its_script_draws(name: str) -> None:
     drawn, bundled = SITES[name](), site(name)
-    for field in ("name", "floor_map", "reflectors", "routes", "vehicle", "scanners"):
+    for field in ("name", "floor_map", "reflectors", "routes", "vehicle", "scanners", "tags", "tag_camera"):
         assert getattr(drawn, field) == getattr(bundled, field), field
 
 
@@ -88,6 +95,7 @@ def test_bundled_site_is_what_its_script_draws(name: str) -> None:
         ("shop_floor", (24, 13), 25),
         ("warehouse", (100, 60), 120),
         ("loading_bay", (20, 14), 18),
+        ("assembly", (16, 10), 6),
     ],
 )
 def test_site_has_its_size_and_reflectors(name: str, size: tuple[int, int], reflectors: int) -> None:
@@ -139,9 +147,31 @@ def test_reflectors_are_visible_from_nearly_everywhere_on_the_route(name: str, r
     counts = visible_counts(name, poses_along(site(name).route(route), 0.5))
     if name == "laboratory":
         assert counts.min() == 4
+    elif name == "assembly":
+        # Where one reflector is in sight or none, tags tell where the vehicle is.
+        assert counts.mean() > 1.0
     else:
         assert np.mean(counts >= 3) > 0.97
         assert counts.min() >= 2
+
+
+def test_the_four_wheels_of_the_assembly_site_drive_by_tags_where_odometry_slips() -> None:
+    project = site("assembly")
+    assert len(project.vehicle.wheel_angles_deg) == 4
+    blind = replace(project, reflectors=ReflectorMap(), disturbances=replace(project.disturbances, people=0))
+    name = project.routes[0].name
+    log, start = virtual_drive(blind, name, seed=1), start_of(blind, name)
+    columns = run(log, LocalizerSetup.of(blind), Belief(0, start.pose, np.diag(start.sigmas**2)))
+    errors = pose_errors(columns.means, reference_at(columns.stamps_ns, log.reference_stamps_ns, log.reference_poses))
+    known = np.isfinite(errors[:, 0])
+    pose = start.pose
+    for displacement in log.displacements:
+        pose = compose(pose, displacement)
+    drift = np.hypot(*(pose - log.reference_poses[-1])[:2])
+    rms = np.sqrt(np.mean(np.sum(errors[known, :2] ** 2, axis=1)))
+    assert (columns.modes == Mode.OPERATIONAL).all()
+    assert rms < 0.02
+    assert drift > 0.1
 
 
 def test_laboratory_route_ends_where_it_starts() -> None:

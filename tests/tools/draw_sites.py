@@ -24,7 +24,8 @@ from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.routes import Direction, Route, Segment
 from commission.site.scanner import Scanner
-from commission.site.vehicle import DifferentialVehicle, TricycleVehicle
+from commission.site.tags import Tag, TagCamera
+from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle
 
 MAPS = Path(__file__).resolve().parents[2] / "maps"
 WALL = 0.2
@@ -355,7 +356,63 @@ def loading_bay() -> Project:
     )
 
 
-SITES = {"laboratory": laboratory, "shop_floor": shop_floor, "warehouse": warehouse, "loading_bay": loading_bay}
+def assembly() -> Project:
+    """Two cells in a hall; a carrier on four omnidirectional wheels, whose camera sees tags on walls and cells."""
+    cells: list[Box] = [(4.0, 4.0, 7.0, 6.0), (9.0, 4.0, 12.0, 6.0)]
+    around = with_cut_corners([(8.0, 2.0), (14.0, 2.0), (14.0, 8.0), (2.0, 8.0), (2.0, 2.0), (8.0, 2.0)], 1.4)
+    between = [(5.0, 2.0), (5.8, 2.0), (6.8, 2.0), (7.6, 2.0)]
+    south, north = math.pi / 2.0, -math.pi / 2.0
+    tags: list[tuple[float, float, float]] = [
+        *[(x, 0.03, south) for x in (4.0, 8.0, 12.0)],
+        *[(15.97, y, math.pi) for y in (2.0, 5.0, 8.0)],
+        *[(x, 9.97, north) for x in (12.0, 8.0, 4.0)],
+        *[(0.03, y, 0.0) for y in (8.0, 5.0, 2.0)],
+    ]
+    reflectors: list[Point] = [(0.06, 6.5), (15.94, 3.5), (6.0, 0.06), (10.0, 9.94), (8.94, 5.0), (7.06, 5.6)]
+    return Project(
+        name="Assembly",
+        floor_map=hall(16.0, 10.0, 0.02, cells),
+        reflectors=reflector_map(reflectors, 0.045, "A"),
+        tags=tuple(
+            Tag(id=str(number), x=x, y=y, heading=round(heading, 6)) for number, (x, y, heading) in enumerate(tags, 1)
+        ),
+        tag_camera=TagCamera(mounting=np.array([0.3, 0.0, 0.0]), field_of_view_deg=110.0, range=(0.2, 5.0)),
+        routes=(
+            Route("Around both cells", (Segment(control_points=around),), 0.5),
+            Route("Along the first cell", (Segment(control_points=np.array(between)),), 0.3),
+        ),
+        vehicle=OmnidirectionalVehicle(
+            wheel_angles_deg=(45.0, 135.0, 225.0, 315.0),
+            wheel_radius=0.076,
+            center_distance=0.35,
+            outline=((0.4, 0.3), (-0.4, 0.3), (-0.4, -0.3), (0.4, -0.3)),
+            height=0.3,
+        ),
+        scanners=(
+            Scanner(
+                mounting=np.array([0.35, 0.0, 0.0]),
+                field_of_view_deg=(-135.0, 135.0),
+                resolution_deg=0.5,
+                reflector_range=10.0,
+            ),
+        ),
+        parameters=Parameters(
+            observation=ObservationParameters(range_sigma=0.008, bearing_sigma=0.0024),
+            odometry=OdometryParameters(
+                forward_per_sqrt_m=0.01, lateral_per_sqrt_m=0.01, heading_per_sqrt_m=0.01, heading_per_sqrt_rad=0.01
+            ),
+        ),
+        disturbances=Disturbances(people=2, slips_per_100_m=20.0),
+    )
+
+
+SITES = {
+    "laboratory": laboratory,
+    "shop_floor": shop_floor,
+    "warehouse": warehouse,
+    "loading_bay": loading_bay,
+    "assembly": assembly,
+}
 
 
 def main() -> None:

@@ -31,6 +31,7 @@ from commission.app.layouts.service import LayoutsService
 from commission.app.placement.actions import SetLayout
 from commission.app.placement.service import PlacementService
 from commission.app.prediction.service import PredictionService
+from commission.app.prediction.settings import PredictRoute
 from commission.app.run.actions import Cover, Play, Seek, VirtualDrive
 from commission.app.run.service import RunService
 from commission.app.run.variant_actions import KeepVariant
@@ -100,6 +101,31 @@ def rear_turned(project: Project) -> Project:
     """The rear scanner is mounted one degree otherwise than the project says, and nobody walks about."""
     turned = ScannerError(scanner="rear right", mounting=(0.0, 0.0, math.radians(1.0)))
     return replace(project, disturbances=Disturbances(constants=ConstantErrors(scanners=(turned,))))
+
+
+def matched(project: Project) -> Project:
+    """Walls correct the pose, too."""
+    parameters = project.parameters
+    walls = replace(parameters.contour, enabled=True)
+    return replace(project, parameters=replace(parameters, contour=walls))
+
+
+def folded_at_run(page: OpenPage, _runtime: Runtime) -> None:
+    """The plots are folded away, and the layers are listed."""
+    page.open_tab("Run")
+    page.open_tab("Layers")
+    page.page.locator(".c-fold").click()
+
+
+def predicted_by_every_kind(page: OpenPage, runtime: Runtime) -> None:
+    """The first route is predicted, and driven by every kind."""
+    page.open_tab("Plan")
+    page.fold("Along a route")
+    page.page.locator(".c-fold").click()
+    route = runtime.state.project.routes[0].name
+    runtime.post(PredictRoute(route))
+    until(lambda: getattr(runtime.service(PredictionService).view, "driven", None) is not None)
+    page.page.locator(".c-every-kind").scroll_into_view_if_needed()
 
 
 def three_d(page: OpenPage, _runtime: Runtime) -> None:
@@ -317,6 +343,8 @@ PICTURES = (
     Picture("page_shop_floor", "shop_floor", selected),
     Picture("folded", "shop_floor", folded),
     Picture("page_two_scanners", "loading_bay", unfolded, world=rear_turned),
+    Picture("page_tags_and_walls", "assembly", folded_at_run, time=21.0, world=matched),
+    Picture("page_every_kind", "assembly", predicted_by_every_kind, time=21.0, world=matched),
     Picture("route", "shop_floor", on_route),
     Picture("measured", "laboratory", measured),
     Picture("page_plan", "shop_floor", heatmap),

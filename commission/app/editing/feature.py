@@ -12,6 +12,7 @@ from commission.app.editing.route_layer import RouteLayer
 from commission.app.editing.route_table import RouteTable
 from commission.app.editing.selection_panel import SelectionPanel
 from commission.app.editing.station_layer import StationLayer
+from commission.app.editing.tag_layer import TagLayer
 from commission.app.editing.tool_hint import ToolHint
 from commission.app.editing.tool_panel import FinishButton, SnappingPanel, ToolButtons
 from commission.app.editing.zone_fields import ZoneFields
@@ -20,7 +21,7 @@ from commission.app.editing.zone_layer import ZoneLayer
 FEATURE = Feature(
     name="editing",
     reducers=(reducer, site_reducer, station_reducer, zone_reducer),
-    layers=(ZoneLayer, RouteLayer, StationLayer, ReflectorLayer, ReflectorNameLayer),
+    layers=(ZoneLayer, TagLayer, RouteLayer, StationLayer, ReflectorLayer, ReflectorNameLayer),
     panels=(
         Docked(make=lambda at: EquipmentFields(at.gui, at.post, at.state.project), tab=SITE, rank=30),
         Docked(make=lambda at: ZoneFields(at.gui, at.post, at.browser), tab=SITE, rank=40, folder="Zones", own=True),

@@ -20,6 +20,7 @@ from commission.app.run.plots import Plots
 from commission.app.run.run_panel import RunPanel
 from commission.app.run.scan_layer import ScanLayer
 from commission.app.run.service import RunService
+from commission.app.run.sighting_layer import SightingLayer
 from commission.app.run.state import RunState
 from commission.app.run.summary_panel import SummaryPanel
 from commission.app.run.temporary_layer import TemporaryLayer
@@ -29,6 +30,7 @@ from commission.app.run.trail_legend import TrailLegend
 from commission.app.run.uncertainty_layer import UncertaintyLayer
 from commission.app.run.variants_panel import VariantsPanel
 from commission.app.run.vehicle_layer import VehicleLayer
+from commission.app.run.wall_layers import WallPointLayer, WallTableLayer
 from commission.app.run.world_panel import WorldPanel
 
 FEATURE = Feature(
@@ -38,8 +40,11 @@ FEATURE = Feature(
     layers=(
         GateLayer,
         ScanLayer,
+        WallTableLayer,
+        WallPointLayer,
         DetectionLayer,
         BearingLayer,
+        SightingLayer,
         AccumulatedLayer,
         VehicleLayer,
         UncertaintyLayer,

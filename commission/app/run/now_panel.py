@@ -10,9 +10,11 @@ from viser import GuiApi
 from commission.app.base.panel import BasePanel, escaped, table
 from commission.app.base.view import PageView
 from commission.app.run.found_table import Found
+from commission.app.run.sightings import sightings_told
 from commission.app.run.summary_panel import known, share
 from commission.app.run.turn import turn_told
 from commission.app.run.view import RunView
+from commission.app.run.wall_points import walls_told
 from commission.localization.detector import passing_widths
 from commission.localization.estimate import Estimate, Mode, Status
 from commission.site.quantity import DEGREES, MILLIMETRES
@@ -53,6 +55,8 @@ def rows(run: RunView, found: Found | None = None) -> list[tuple[str, str]]:
         ("2σ along x, along y", f"{MILLIMETRES.number(sigma_x, '.1f')}, {MILLIMETRES.text(sigma_y, '.1f')}"),
         ("2σ heading / limit", DEGREES.against(sigma_heading, limits.heading_limit, (".2f", ".1f"))),
         *turn_told(run.turn),
+        *sightings_told(run.sightings),
+        *walls_told(run.walls),
         *(_counts(estimate) if estimate.bearing is None else ()),
         *_protection(run, found),
         *(_fits(run, estimate) if estimate.bearing is None else ()),

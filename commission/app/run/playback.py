@@ -10,8 +10,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from commission.app.run.sightings import sightings_at
 from commission.app.run.turn import turn_at
 from commission.app.run.view import Accumulated, RunView
+from commission.app.run.wall_points import wall_points
 from commission.geometry import se2
 from commission.geometry.arrays import FloatArray, IntArray
 from commission.localization.estimate import Belief, Estimate, Mode, Status
@@ -137,6 +139,8 @@ class Playback:
             estimate=estimate,
             seen=seen,
             turn=turn_at(columns, lived, self._at_ns, segment.setup),
+            walls=wall_points(columns, lived, np.concatenate(scans), segment.setup),
+            sightings=sightings_at(columns, lived, self._at_ns, segment.setup),
             segment=segment,
             covered=covered,
             scan_map=np.concatenate(scans),

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import TypeAlias
 
+from commission.app.run.sightings import FrameTags
 from commission.app.run.turn import Turn
+from commission.app.run.wall_points import WallPoints
 from commission.geometry.arrays import FloatArray
 from commission.localization.estimate import Estimate, Mode
 from commission.localization.hypotheses import Hypothesis
@@ -90,6 +92,10 @@ class RunView:
     """Index of that cycle; -1 before the first."""
     turn: Turn | None = None
     """Bearings of the newest turn of the goniometer; none where there is none."""
+    walls: WallPoints | None = None
+    """The newest match of contours; none where they are not looked at."""
+    sightings: FrameTags | None = None
+    """What the newest frame saw of tags; none where no camera looks."""
     hypotheses: tuple[Hypothesis, ...] = ()
     """Where it may be, the likeliest first, while it looks where it is; else none."""
     temporary: TemporaryLandmarks | None = None

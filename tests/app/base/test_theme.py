@@ -113,6 +113,7 @@ def test_what_a_drive_shows_is_told_apart(shown: str) -> None:
     "drawn",
     [
         *(Floor.WALL, Floor.ROUTE, Floor.REFLECTOR, Floor.STATION, Floor.ZONE, Floor.SELECTED, Floor.VEHICLE),
+        *(Floor.TAG, Run.MATCHED, Run.UNMATCHED),
         *(Run.GATE, Run.POSE, Run.HEADING, Run.INLIER, Run.OUTLIER, Run.SCAN, Run.TRAIL, Run.REFERENCE),
         *(Run.OFFSET, Run.OUTLIER_DETECTOR, Run.FURTHER_SCAN, Run.FIELD, Run.FAR_FIELD, Run.NOT_KNOWN),
         *(Run.VARIANT_A, Run.VARIANT_B, Run.VARIANT_C, Run.HYPOTHESIS, Run.GOODS, Run.GOODS_SIGMA, Run.EDIT),
