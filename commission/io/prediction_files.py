@@ -15,12 +15,15 @@ from commission.planning.error_budget import CONTRIBUTIONS, PredictedErrors
 from commission.planning.route_prediction import RoutePrediction
 from commission.planning.station_accuracy import StationAccuracy
 from commission.site.reflectors import ReflectorMap
+from commission.studies.kinds import KINDS
+from commission.studies.kinds_prediction import KindsPrediction
 
 PREDICTION = "prediction.csv"
 DEPENDENTS = "dependents.csv"
 FAILURES = "failures.csv"
 SUMMARY = "summary.json"
-FILES = (PREDICTION, DEPENDENTS, FAILURES, SUMMARY)
+KINDS_FILE = "kinds.csv"
+FILES = (PREDICTION, DEPENDENTS, FAILURES, KINDS_FILE, SUMMARY)
 """All that may be written."""
 COLUMNS = (
     *("metre", "x", "y", "theta", "two_sigma_x", "two_sigma_y", "two_sigma_theta"),
@@ -31,8 +34,27 @@ COLUMNS = (
     *(f"{part}_share" for part in CONTRIBUTIONS),
 )
 # `load` is the share of the limit: files keep the column that others read, whatever the page calls it.
+KINDS_COLUMNS = ("metre", "two_sigma_position", "two_sigma_theta", "stops", *KINDS)
 FAILURE_COLUMNS = ("blocked", "reflector_id", "route", "failing_metres", "load", "metres")
 DEPENDENT_COLUMNS = ("reflector_id", "failure", "route", "failing_metres", "load", "metres")
+
+
+def write_kinds(folder: Path, found: KindsPrediction) -> None:
+    """Write `kinds.csv`: what is expected in each metre by every kind; replaced whole or not at all.
+
+    Parameters
+    ----------
+    folder : made when missing.
+    found : metres and radians; `stops` is a share of the drives, and what each kind corrects is a number of cycles.
+
+    Raises
+    ------
+    FileFormatError
+        the file cannot be written.
+    """
+    columns = (found.position, found.heading, found.stops, *found.corrections.T)
+    rows = zip(found.metre.tolist(), *(map(figure, column.tolist()) for column in columns), strict=True)
+    write_table(folder / KINDS_FILE, KINDS_COLUMNS, rows)
 
 
 def write_prediction(

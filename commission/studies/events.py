@@ -17,7 +17,7 @@ from commission.compiled import compiled
 from commission.geometry.angles import difference
 from commission.geometry.arrays import BoolArray, FloatArray, IntArray, read_only
 from commission.geometry.stretches import stretches_of
-from commission.localization import bearings, contour, tags
+from commission.localization import bearings
 from commission.localization.estimate import Mode, Status
 from commission.localization.observation import project_detections
 from commission.localization.relocalization import CONFIRMATIONS
@@ -27,6 +27,7 @@ from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
 from commission.studies.bearing_figures import leaning
 from commission.studies.curves import longest_regular
 from commission.studies.inputs import StudyInput
+from commission.studies.kinds import corrected_by
 from commission.studies.reflector_figures import numbered
 from commission.studies.run import RunResult, limits_along
 
@@ -186,7 +187,8 @@ def _searches(run: RunResult, cycle: int) -> bool:
 def _blind(run: RunResult) -> Iterator[RunEvent]:
     """Stretches in which nothing was accepted, of whatever kind."""
     stamps, means = run.columns.stamps_ns, run.columns.means
-    for first, after in stretches_of(~_accepted(run)).tolist():
+    others = np.any(corrected_by(run.columns)[:, 1:], axis=1)
+    for first, after in stretches_of((run.counts[:, Status.INLIER] == 0) & np.logical_not(others)).tolist():
         # From the last scan with an accepted detection to the next one with one.
         begin, end = max(first - 1, 0), min(after, len(stamps) - 1)
         # Whole nanoseconds: exactly a second is not more than one.
@@ -194,20 +196,6 @@ def _blind(run: RunResult) -> Iterator[RunEvent]:
         if lasts > BLIND_S:
             way = float(np.hypot(*np.diff(means[begin : end + 1, :2], axis=0).T).sum())
             yield RunEvent(kind=EventKind.BLIND, time=float(run.times[first]), lasts=lasts, position=way)
-
-
-def _accepted(run: RunResult) -> BoolArray:
-    """(K,) whether something that a cycle saw was accepted: a reflector, the walls, a tag or a bearing."""
-    columns, met, seen = run.columns, run.columns.detected.bearings, run.columns.detected.tags
-    accepted = run.counts[:, Status.INLIER] > 0
-    if len(columns.contours):
-        accepted |= columns.contours[:, contour.USE] == contour.ContourUse.ACCEPTED
-    if met is not None and len(columns.bearings):
-        accepted[met.is_reflex] |= columns.bearings[:, bearings.USE] == bearings.BearingUse.ACCEPTED
-    if seen is not None and len(columns.tags):
-        right = np.isin(columns.tags[:, tags.USE], (tags.TagUse.ACCEPTED, tags.TagUse.LOCATED))
-        accepted |= np.diff(np.concatenate(([0], np.cumsum(right)))[seen.offsets]) > 0
-    return accepted
 
 
 def _disagreements(run: RunResult) -> Iterator[RunEvent]:

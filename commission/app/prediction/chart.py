@@ -14,6 +14,7 @@ from commission.app.prediction.view import RouteView
 from commission.planning.error_budget import CONTRIBUTIONS
 from commission.planning.station_accuracy import StationAccuracy
 from commission.site.quantity import DEGREES, MILLIMETRES, PERCENT
+from commission.studies.kinds import KINDS
 
 MOST_BARS = 120
 MOST_STOPS = 6
@@ -52,6 +53,7 @@ def chart(route: RouteView, run: DrivenMetres | None) -> str:
     drawn = [
         limited(position, axis),
         limited(heading, axis),
+        *_by_every_kind(route),
         *_stacks(route, axis, starts),
         plain(Plain("Fewest reflectors seen", seen, (2.0, float(max(4, seen.max())))), axis),
         plain(Plain("On odometry alone [m]", alone, (round_up(max(0.5, float(alone.max()))),)), axis),
@@ -77,6 +79,36 @@ def _axis(route: RouteView, starts: np.ndarray) -> TrackAxis:
         stops=prediction.trips(),
         recoveries=prediction.recoveries(),
     )
+
+
+def _by_every_kind(route: RouteView) -> list[str]:
+    """What the filter says by all that corrects it, and how often each kind does; nothing where there is one kind."""
+    driven = route.driven
+    if driven is None:
+        return []
+    starts = np.arange(0, len(driven.metre), max(1, -(-len(driven.metre) // MOST_BARS)))
+    levels = np.maximum.reduceat(np.column_stack((driven.position, driven.heading)), starts, axis=0)
+    allowed = route.prediction.limits
+    shares = np.maximum(levels[:, 0] / allowed.position_limit, levels[:, 1] / allowed.heading_limit)
+    shades = [theme.css(color) for color in palette()]
+    axis = TrackAxis(
+        length=driven.length,
+        metres=driven.metre[starts].astype(float),
+        fills=tuple(shades[index] for index in limit_classes(shares)),
+        stops=driven.metre[driven.stops > 0.5].astype(float),
+        recoveries=np.empty(0),
+    )
+    position = Limited(
+        title=f"2σ of position by {', '.join(driven.kinds)} [mm]",
+        levels=MILLIMETRES.of(levels[:, 0]),
+        limit=MILLIMETRES.of(allowed.position_limit),
+    )
+    named = zip(KINDS, driven.corrections.mean(axis=0).tolist(), strict=True)
+    counts = ", ".join(f"{kind} {count:.1f}" for kind, count in named if kind in driven.kinds)
+    largest = MILLIMETRES.against(driven.position.max(), allowed.position_limit)
+    heading = DEGREES.against(driven.heading.max(), allowed.heading_limit, (".2f", ".1f"))
+    rows = [("Every kind, largest 2σ", f"{largest}, {heading}"), ("Corrections a metre", counts)]
+    return [f"<div class='c-every-kind'>{table(rows)}</div>", limited(position, axis)]
 
 
 def _note(route: RouteView, run: DrivenMetres | None) -> str:

@@ -121,6 +121,6 @@ def _risk_text(route: RouteView) -> str:
     if way > 0.0:
         text += (
             f" Zones leave reflectors out on {way:.1f} m of the way: odometry alone is reckoned with there, "
-            "contours and tags are not."
+            "but by every kind."
         )
     return f"<div class='c-note' style='padding:2px 6px'>{text}</div>"

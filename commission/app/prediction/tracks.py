@@ -59,8 +59,8 @@ class Limited:
     """(B,) the worst of each stretch, in the page's unit."""
     limit: float
     """The limit, in the page's unit."""
-    errors: FloatArray
-    """(B,) the same of the error to be expected."""
+    errors: FloatArray | None = None
+    """(B,) the same of the error to be expected, where that is known."""
     driven: tuple[FloatArray, FloatArray] | None = None
     """(N,) metres of a run and (N,) the same quantity of it."""
 
@@ -89,7 +89,8 @@ def limited(track: Limited, axis: TrackAxis) -> str:
     parts = [part for level in ticks for part in tick(float(y(np.array(level))), f"{level:g}")]
     parts += _bars(axis, y(track.levels), TALL)
     parts.append(line(float(y(np.array(track.limit))), theme.css(theme.OVER_LIMIT), "5 4"))
-    parts.append(_steps(axis, y(track.errors), theme.css(theme.REFERENCE)))
+    if track.errors is not None:
+        parts.append(_steps(axis, y(track.errors), theme.css(theme.REFERENCE)))
     if track.driven is not None:
         metres, values = track.driven
         points = " ".join(f"{px:.1f},{py:.1f}" for px, py in zip(axis.x(metres), y(values), strict=True))

@@ -12,6 +12,7 @@ from commission.planning.association_risk import NeighborRisk
 from commission.planning.route_prediction import PerMetre, RoutePrediction
 from commission.planning.station_accuracy import StationAccuracy
 from commission.site.parameters import HELD_LEVEL
+from commission.studies.kinds_prediction import KindsPrediction
 from commission.studies.prediction import PredictionResult
 
 Place: TypeAlias = tuple[float, float]
@@ -68,14 +69,17 @@ class RouteView:
     """Whether 2-sigma is predicted though the supervisor holds the protection level."""
     outdated: bool
     """Whether the site has changed since, and it is being predicted anew."""
+    driven: KindsPrediction | None = None
+    """What is expected by every kind; none where there is none beside ranges of reflectors, or not yet."""
 
 
-def route_view(predicted: PredictionResult, *, outdated: bool) -> RouteView:
+def route_view(predicted: PredictionResult, driven: KindsPrediction | None = None, *, outdated: bool) -> RouteView:
     """Gather the worst of each metre.
 
     Parameters
     ----------
     predicted : what is expected, scan by scan.
+    driven : what is expected by every kind, where that is known.
     outdated : whether the site has changed since.
     """
     prediction = predicted.prediction
@@ -102,6 +106,7 @@ def route_view(predicted: PredictionResult, *, outdated: bool) -> RouteView:
         way_without_reflectors=predicted.planned.way_without_reflectors,
         by_two_sigma=prediction.limits.held == HELD_LEVEL,
         outdated=outdated,
+        driven=driven,
     )
 
 

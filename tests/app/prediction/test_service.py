@@ -6,11 +6,13 @@ from dataclasses import replace
 import pytest
 
 from commission.app.base.conditions import SetCondition
+from commission.app.prediction.chart import chart
 from commission.app.prediction.service import PREDICTION, PredictionService
 from commission.app.prediction.settings import PredictRoute
 from commission.errors import UsageError
 from commission.site.project import Project
 from commission.site.stations import Station
+from tests.acceptance.test_every_kind import project_of
 from tests.app.bench import Bench
 
 
@@ -97,3 +99,20 @@ def test_a_route_that_is_gone_is_not_predicted_any_more(bench: Bench[PredictionS
     bench.edit(replace(bench.state.project, routes=()))
     assert bench.view is None
     assert not bench.jobs.unfinished()
+
+
+def test_a_route_is_driven_by_every_kind_where_there_is_one_beside_ranges_of_reflectors() -> None:
+    bench = Bench(PredictionService, project_of("tags"))
+    try:
+        predicted(bench)
+        while bench.view.driven is None:
+            bench.found()
+        told = chart(bench.view, None)
+        assert bench.view.driven.kinds == ("reflectors", "tags")
+        assert "2σ of position by reflectors, tags [mm]" in told and "Corrections a metre" in told
+        bench.edit(replace(bench.state.project, tags=()))
+        bench.found()
+        assert bench.view.driven is None
+        assert "Corrections a metre" not in chart(bench.view, None)
+    finally:
+        bench.close()

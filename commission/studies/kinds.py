@@ -1,0 +1,34 @@
+"""Kinds of observation: which of them corrected the pose at each cycle of a run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from commission.geometry.arrays import BoolArray
+from commission.localization import bearings, contour, tags
+from commission.localization.estimate import Status
+from commission.localization.run_columns import RunColumns
+
+REFLECTORS, CONTOURS, TAGS, BEARINGS = KINDS = ("reflectors", "contours", "tags", "bearings")
+"""What may correct the pose, in this order. Reflectors: by range and bearing."""
+
+
+def corrected_by(columns: RunColumns) -> BoolArray:
+    """(K, 4) whether each of `KINDS` has corrected the pose at each cycle.
+
+    Parameters
+    ----------
+    columns : a run.
+    """
+    found = np.zeros((len(columns), len(KINDS)), dtype=np.bool_)
+    met, seen = columns.detected.bearings, columns.detected.tags
+    inliers = np.concatenate(([0], np.cumsum(columns.status == Status.INLIER)))
+    found[:, 0] = np.diff(inliers[columns.offsets]) > 0
+    if len(columns.contours):
+        found[:, 1] = columns.contours[:, contour.USE] == contour.ContourUse.ACCEPTED
+    if seen is not None and len(columns.tags):
+        right = np.isin(columns.tags[:, tags.USE], (tags.TagUse.ACCEPTED, tags.TagUse.LOCATED))
+        found[:, 2] = np.diff(np.concatenate(([0], np.cumsum(right)))[seen.offsets]) > 0
+    if met is not None and len(columns.bearings):
+        found[met.is_reflex, 3] = columns.bearings[:, bearings.USE] == bearings.BearingUse.ACCEPTED
+    return found
