@@ -52,6 +52,9 @@ class CoverageCommand:
     contours: bool = False
     """Whether it is also told what the contours of the floor map tell a single scan, as `parameters.contour` matches
     them: where no reflector is needed."""
+    tags: bool = False
+    """Whether it is also told what one frame of the camera tells by tags. Of a heading, points are positions of base;
+    else of the camera."""
     force: bool = False
     """Whether files in DIR that this command did not write are overwritten; its own earlier results always are."""
 
@@ -68,6 +71,8 @@ class CoverageCommand:
         project = load_project(self.project)
         if self.contours and project.floor_map is None:
             raise UsageError(f"{self.project} has no floor map; --contours expects one")
+        if self.tags and not project.tags:
+            raise UsageError(f"{self.project} has no tags; --tags expects some under tags: in project.yaml")
         try:
             result = coverage(CoverageInput.of(project, self._options()))
         except ValueError as error:
@@ -96,6 +101,7 @@ class CoverageCommand:
             spacing=self.spacing,
             with_constants=self.budget,
             with_contours=self.contours,
+            with_tags=self.tags,
         )
 
 
@@ -134,6 +140,7 @@ def _report(entries: dict[str, int | float | None], options: FixOptions) -> list
         f"{figure('heading_sigma_median_rad', PLAIN_DEGREES, '.2f')} and "
         f"{figure('heading_sigma_p95_rad', PLAIN_DEGREES, '.2f')}",
         *_contours(entries, share, figure),
+        *_tags(entries, share, figure),
         *_budget(entries, share, figure),
     ]
 
@@ -149,6 +156,21 @@ def _contours(
         f"Contours     tell the whole pose on {share('contour_share_whole_pose')}, 1-sigma "
         f"{figure('contour_position_sigma_median_m', MILLIMETRES, '.1f')} median; two sigma within the limits on "
         f"{within}, by reflectors or contours on {either}"
+    ]
+
+
+def _tags(
+    entries: dict[str, int | float | None], share: Callable[[str], str], figure: Callable[[str, Shown, str], str]
+) -> list[str]:
+    """Line about what tags tell, where that was asked for."""
+    if "tag_share_seen" not in entries:
+        return []
+    return [
+        f"Tags         one is in sight on {share('tag_share_seen')}, at some heading on "
+        f"{share('tag_share_seen_at_some_heading')}, 1-sigma "
+        f"{figure('tag_position_sigma_median_m', MILLIMETRES, '.1f')} median; two sigma within the limits on "
+        f"{share('tag_share_within_limits')}, by reflectors or tags on "
+        f"{share('share_within_limits_by_reflectors_or_tags')}"
     ]
 
 

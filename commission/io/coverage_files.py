@@ -18,6 +18,7 @@ from commission.planning.contour_coverage import ContourCoverage
 from commission.planning.coverage import Coverage
 from commission.planning.error_budget import CONTRIBUTIONS
 from commission.planning.floor_budget import FloorBudget
+from commission.planning.tag_coverage import TagCoverage
 from commission.studies.coverage import CoverageResult, Ellipses
 
 ARRAYS = "coverage.npz"
@@ -71,6 +72,7 @@ def write_coverage(folder: Path, result: CoverageResult, summary: Mapping[str, f
     arrays |= {name + unit: found.image(name) for name, unit in UNITS.items()}
     more = {} if result.budget is None else _budget_columns(result.budget)
     more |= {} if result.contours is None else _contour_columns(result.contours)
+    more |= {} if result.tags is None else _tag_columns(result.tags)
     arrays |= {name: column.reshape(lattice.rows, lattice.columns) for name, column in more.items()}
     with atomic_file(folder / ARRAYS) as file:
         np.savez_compressed(file, allow_pickle=False, **arrays)
@@ -111,6 +113,16 @@ def _budget_columns(budget: FloorBudget) -> dict[str, NDArray[np.float64]]:
     """(N,) columns of the error with all constants [m], and of the share of each source in its square."""
     shares = {f"{part}_share": budget.shares[:, index] for index, part in enumerate(CONTRIBUTIONS)}
     return {"total_sigma_m": budget.sigma, **shares}
+
+
+def _tag_columns(tags: TagCoverage) -> dict[str, NDArray[np.float64]]:
+    """(N,) columns of what tags tell; no 1-sigma where none is in sight."""
+    return {
+        "tags_seen": tags.seen.astype(np.float64),
+        "tags_in_reach": tags.in_reach.astype(np.float64),
+        "tag_position_sigma_m": tags.position_sigma,
+        "tag_heading_sigma_rad": tags.heading_sigma,
+    }
 
 
 def _contour_columns(contours: ContourCoverage) -> dict[str, NDArray[np.float64]]:

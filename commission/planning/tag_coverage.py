@@ -71,13 +71,14 @@ def tag_coverage(  # noqa: PLR0917 - the site, and what is asked
     for first in range(0, len(points), POINTS_AT_ONCE):
         progress(first / len(points), "tags over the floor")
         here = slice(first, min(first + POINTS_AT_ONCE, len(points)))
-        at_heading = []
+        at_heading: list[FloatArray] = []
+        clear = np.zeros((here.stop - here.start, len(poses)), dtype=np.bool_)
         for heading in headings:
             lever = np.zeros(2)
             if options.heading is Heading.GIVEN:
                 lever = compose(np.array((0.0, 0.0, heading)), camera.mounting)[:2]
             away = poses[np.newaxis, :, :2] - points[here, np.newaxis] - lever
-            if heading == headings[0] or options.heading is Heading.GIVEN:
+            if not at_heading or options.heading is Heading.GIVEN:
                 clear = _clear(away, points[here] + lever, camera, walls if floor is not None else None)
             turned = wrap(np.arctan2(away[..., 1], away[..., 0]) - heading - camera.mounting[2])
             seen = clear & (any_way | (np.abs(turned) <= 0.5 * math.radians(camera.field_of_view_deg)))
@@ -133,7 +134,7 @@ def _headings(camera: TagCamera, options: FixOptions) -> tuple[FloatArray, bool]
         return np.zeros(1), True
     if options.heading is Heading.GIVEN:
         return np.array([options.given_heading]), round_about
-    return np.arange(options.headings) * (2.0 * math.pi / options.headings), False
+    return np.arange(options.headings, dtype=np.float64) * (2.0 * math.pi / options.headings), False
 
 
 def _clear(away: FloatArray, cameras: FloatArray, camera: TagCamera, walls: RayCaster | None) -> BoolArray:

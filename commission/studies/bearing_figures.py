@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from commission.localization.bearings import LASTING, NIS, OFF, REFLECTOR, USE, BearingUse
+from commission.localization.estimate import Mode
 from commission.localization.run_columns import RunColumns
 from commission.site.quantity import DEGREES, PERCENT
 from commission.studies.plausibility import Finding
@@ -98,7 +99,20 @@ def bearing_findings(columns: RunColumns) -> tuple[Finding, ...]:
         found = f"none of {count} bearings is of a reflector of the map"
         probably = f"their ids are written otherwise: {', '.join(map(repr, names[:3]))}"
         return (Finding(found=found, probably=probably, remedy="compare with reflectors.csv"),)
-    return (*_lasting(columns), *_disagreeing(columns))
+    return (*_not_found(columns), *_lasting(columns), *_disagreeing(columns))
+
+
+def _not_found(columns: RunColumns) -> tuple[Finding, ...]:
+    """Say that bearings alone find no pose, where a vehicle waits for one that was not told it."""
+    if not (columns.modes == Mode.INITIALIZING).all() or not (columns.bearings[:, USE] == BearingUse.NONE).all():
+        return ()
+    return (
+        Finding(
+            found="the vehicle was not told where it is, and bearings alone do not find its pose",
+            probably="it has no laser that measures ranges, or that sees too little, and no tag in sight",
+            remedy="say where it begins: --initial-pose X,Y,THETA, or a reference in the recording",
+        ),
+    )
 
 
 def _lasting(columns: RunColumns) -> tuple[Finding, ...]:

@@ -22,6 +22,7 @@ from commission.planning.dilution import FixOptions, Heading, Measurement, fix_o
 from commission.planning.error_budget import CONTRIBUTIONS
 from commission.planning.fix_ellipses import every_nth, position_covariances
 from commission.planning.floor_budget import BudgetSite, FloorBudget, floor_budget
+from commission.planning.tag_coverage import TagCoverage, tag_coverage
 from commission.planning.vehicle_visibility import VehicleVisibility, vehicle_visibility
 from commission.planning.visibility import VisibilityOptions
 from commission.progress import Progress, part, silent
@@ -32,6 +33,7 @@ from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
+from commission.site.tags import Tag, TagCamera
 from commission.site.uncertainty import Uncertainty
 from commission.site.zones import ObservationKind, Zone
 from commission.studies.inputs import StudyInput
@@ -81,6 +83,8 @@ class CoverageOptions:
     """Whether it is told what constants that are not known exactly add to the error of a fix."""
     with_contours: bool = False
     """Whether it is told what the contours of the floor map tell, too."""
+    with_tags: bool = False
+    """Whether it is told what tags tell, too."""
 
     def fix(self, parameters: Parameters, scanners: tuple[Scanner, ...], speed: float) -> FixOptions:
         """What is asked of a fix, with the noise that the localizer assumes.
@@ -137,6 +141,10 @@ class CoverageInput(StudyInput):
     """How contours are matched; None where they do not matter."""
     zones: tuple[Zone, ...] = ()
     """Where which kinds of observation correct the pose."""
+    tags: tuple[Tag, ...] | None = None
+    """Tags of the site; None where they do not matter."""
+    tag_camera: TagCamera | None = None
+    """The camera that sees them; None where they do not matter."""
 
     @staticmethod
     def of(project: Project, options: CoverageOptions | None = None) -> CoverageInput:
@@ -159,6 +167,8 @@ class CoverageInput(StudyInput):
             spacing=options.spacing,
             constants=Constants(project.uncertainty, speed) if options.with_constants else None,
             contours=project.parameters.contour if options.with_contours else None,
+            tags=project.tags if options.with_tags else None,
+            tag_camera=project.tag_camera if options.with_tags else None,
             zones=project.zones,
         )
 
@@ -186,6 +196,8 @@ class CoverageResult:
     """The error of a fix with all constants, and what it comes from, where that was asked for."""
     contours: ContourCoverage | None = None
     """What contours tell, where that was asked for and there is a map."""
+    tags: TagCoverage | None = None
+    """What tags tell, where that was asked for."""
 
 
 def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResult:
@@ -218,7 +230,8 @@ def coverage(inputs: CoverageInput, progress: Progress = silent) -> CoverageResu
         site = BudgetSite(visible=visible, uncertainty=known.uncertainty, speed=known.speed)
         budget = floor_budget(found, site, part(progress, until, 1.0))
     floor = np.array(found.floor) if inputs.floor_map is None else free_floor(inputs, lattice.points())
-    return CoverageResult(coverage=found, visible=visible, drivable=floor, budget=budget, contours=told)
+    by_tags = tags_of(inputs, lattice, part(progress, until, 1.0))
+    return CoverageResult(coverage=found, visible=visible, drivable=floor, budget=budget, contours=told, tags=by_tags)
 
 
 def contours_of(inputs: CoverageInput, lattice: Lattice, progress: Progress = silent) -> ContourCoverage | None:
@@ -240,6 +253,28 @@ def contours_of(inputs: CoverageInput, lattice: Lattice, progress: Progress = si
         position_sigma=np.where(counts, found.position_sigma, math.inf),
         heading_sigma=np.where(counts, found.heading_sigma, math.inf),
         beams=np.where(counts, found.beams, 0).astype(np.int32),
+    )
+
+
+def tags_of(inputs: CoverageInput, lattice: Lattice, progress: Progress = silent) -> TagCoverage | None:
+    """What tags tell over the floor, nothing in zones that leave them out; None if nobody asks.
+
+    Parameters
+    ----------
+    inputs : the site and what is asked.
+    lattice : the points.
+    progress : told how far it is; may raise to cancel.
+    """
+    if inputs.tags is None or inputs.tag_camera is None:
+        return None
+    found = tag_coverage(inputs.tags, inputs.tag_camera, inputs.floor_map, lattice, inputs.fix, progress)
+    counts = counts_at(inputs.zones, ObservationKind.TAGS, lattice.points())
+    return replace(
+        found,
+        seen=np.where(counts, found.seen, 0),
+        position_sigma=np.where(counts, found.position_sigma, math.inf),
+        heading_sigma=np.where(counts, found.heading_sigma, math.inf),
+        in_reach=np.where(counts, found.in_reach, 0),
     )
 
 
@@ -312,6 +347,8 @@ def summary(result: CoverageResult, limits: SupervisorParameters) -> dict[str, N
             entries[f"{name}_{label}_{unit}"] = _quantile(values[on], quantile)
     if result.contours is not None:
         entries |= _contour_entries(result, result.contours, limits)
+    if result.tags is not None:
+        entries |= _tag_entries(result, result.tags, limits)
     return entries | ({} if result.budget is None else _budget_entries(result.budget, on))
 
 
@@ -327,6 +364,20 @@ def _contour_entries(
         "contour_position_sigma_median_m": _quantile(contours.position_sigma[on], 0.5),
         "contour_position_sigma_p95_m": _quantile(contours.position_sigma[on], 0.95),
         "share_within_limits_by_either": _mean((within | within_limits(result.coverage, limits))[on]),
+    }
+
+
+def _tag_entries(result: CoverageResult, tags: TagCoverage, limits: SupervisorParameters) -> dict[str, Number]:
+    """What one frame of tags would do, and what reflectors or tags would."""
+    on = result.drivable
+    within = (2.0 * tags.position_sigma <= limits.position_limit) & (2.0 * tags.heading_sigma <= limits.heading_limit)
+    return {
+        "tag_share_seen": _mean(tags.seen[on] > 0),
+        "tag_share_seen_at_some_heading": _mean(tags.in_reach[on] > 0),
+        "tag_share_within_limits": _mean(within[on]),
+        "tag_position_sigma_median_m": _quantile(tags.position_sigma[on], 0.5),
+        "tag_position_sigma_p95_m": _quantile(tags.position_sigma[on], 0.95),
+        "share_within_limits_by_reflectors_or_tags": _mean((within | within_limits(result.coverage, limits))[on]),
     }
 
 

@@ -130,3 +130,20 @@ def test_contours_without_a_floor_map_are_one_clear_error(commission, project, t
     code, _, err = commission("coverage", project, "--out", tmp_path / "out", "--contours")
     assert code == 2
     assert "has no floor map; --contours expects one" in err
+
+
+def test_what_tags_tell_is_written_and_told(commission, tmp_path):
+    site = REPOSITORY / "maps" / "assembly"
+    options = ("--spacing", "0.5", "--heading", "best", "--tags")
+    code, told, err = commission("coverage", site, "--out", tmp_path / "out", *options)
+    assert (code, err) == (0, "")
+    entries = summary(tmp_path / "out")
+    with np.load(tmp_path / "out" / "coverage.npz") as found:
+        on = found["drivable"]
+        seen, sigma = found["tags_seen"][on] > 0, found["tag_position_sigma_m"][on]
+    assert np.isfinite(sigma).tolist() == seen.tolist()
+    assert 0.5 < entries["tag_share_seen"] == pytest.approx(seen.mean())
+    assert f"Tags         one is in sight on {100.0 * seen.mean():.1f} %" in told
+    code, _, err = commission("coverage", REPOSITORY / "maps" / "laboratory", "--out", tmp_path / "none", "--tags")
+    assert code == 2
+    assert "has no tags; --tags expects some under tags:" in err

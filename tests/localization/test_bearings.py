@@ -32,7 +32,9 @@ from commission.localization.growing_run import GrowingRun
 from commission.localization.observation import observation_model
 from commission.localization.pose_gaussian import covariance_of, from_belief, mean_of
 from commission.localization.run_columns import RunSegment
+from commission.localization.search_map import anywhere
 from commission.localization.setup import LocalizerSetup
+from commission.localization.state import state_unlocated
 from commission.localization.whole_run import run, run_segments, state_before
 from commission.site.parameters import BearingParameters, ObservationParameters, OdometryParameters, Parameters
 from commission.site.project import Project
@@ -373,3 +375,16 @@ def test_bearings_that_fit_nothing_make_a_vehicle_lost_and_those_that_fit_find_i
     assert (columns.modes[lost:330] == Mode.LOST).all()
     assert columns.modes[-1] == Mode.OPERATIONAL
     assert (columns.bearings[160:330, USE] == BearingUse.REJECTED).all()
+
+
+def test_a_vehicle_that_bearings_alone_do_not_find_is_told_so():
+    setup = dataclasses.replace(SETUP, scanners=(GONIOMETER,), tags=())
+    records = []
+    for k in range(90):
+        bearing = expected(np.zeros(3), GONIOMETER.mounting, SETUP.reflectors.centers[k % 3])
+        records += [Odometry(k * 40_000_000, np.zeros(3)), Reflex(k * 40_000_000, bearing, "ABC"[k % 3])]
+    columns = run(RecordLog.collect(records), setup, state_unlocated(0, anywhere(setup.index.places)))
+    assert (columns.modes == Mode.INITIALIZING).all()
+    (finding,) = bearing_findings(columns)
+    assert "bearings alone do not find its pose" in finding.found
+    assert "--initial-pose" in finding.remedy

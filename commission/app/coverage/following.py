@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from commission.app.coverage.settings import BY_CONTOURS, Figure
+from commission.app.coverage.settings import BY_CONTOURS, BY_TAGS, Figure
 from commission.geometry.arrays import BoolArray, FloatArray
 from commission.planning import coverage as coverage_kernels
 from commission.planning.contour_coverage import ContourCoverage
 from commission.planning.coverage import LiveCoverage
 from commission.planning.floor_budget import FloorBudget
+from commission.planning.tag_coverage import TagCoverage
 from commission.progress import Progress, part
 from commission.site.reflectors import ReflectorMap
 from commission.studies.coverage import CoverageInput, coverage
@@ -21,7 +22,7 @@ MOST_MOVED = 12
 """Reflectors that are moved one by one; the floor is computed anew when more have changed."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Covered:
     """A coverage that can be kept up to date."""
 
@@ -33,6 +34,8 @@ class Covered:
     """The error of a fix with all constants, where it is asked for: of the reflectors as they were at first."""
     contours: ContourCoverage | None = None
     """What contours tell, where it is asked for and there is a floor map."""
+    tags: TagCoverage | None = None
+    """What tags tell, where it is asked for."""
 
     def values(self, figure: Figure) -> FloatArray:
         """(N,) a figure of the floor, SI; infinite where it is not known."""
@@ -43,12 +46,18 @@ class Covered:
             return nothing if self.contours is None else self.contours.position_sigma
         if figure is Figure.CONTOUR_HEADING:
             return nothing if self.contours is None else self.contours.heading_sigma
+        if figure is Figure.TAG_POSITION:
+            return nothing if self.tags is None else self.tags.position_sigma
+        if figure is Figure.TAG_HEADING:
+            return nothing if self.tags is None else self.tags.heading_sigma
         return getattr(self.live.coverage.fixes, figure.value)
 
     def has(self, figure: Figure) -> bool:
         """Whether a figure was computed."""
         if figure is Figure.TOTAL_SIGMA:
             return self.budget is not None
+        if figure in BY_TAGS:
+            return self.tags is not None
         return self.contours is not None if figure in BY_CONTOURS else True
 
     def follow(self, before: CoverageInput, now: CoverageInput) -> bool:
@@ -86,7 +95,8 @@ def cover(inputs: CoverageInput, progress: Progress) -> Covered:
     found = coverage(inputs, part(progress, 0.0, 0.95))
     progress(0.95, "compiling moved reflectors")
     coverage_kernels.warm_up()
-    return Covered(LiveCoverage(found.visible, found.coverage), found.drivable, found.budget, found.contours)
+    live = LiveCoverage(found.visible, found.coverage)
+    return Covered(live=live, floor=found.drivable, budget=found.budget, contours=found.contours, tags=found.tags)
 
 
 def changed_reflectors(before: ReflectorMap, after: ReflectorMap) -> list[int] | None:

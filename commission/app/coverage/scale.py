@@ -52,6 +52,8 @@ QUANTITIES: dict[Figure, ShownFigure] = {
     Figure.TOTAL_SIGMA: ShownFigure(label="With constants: position error, 1σ [mm]", shown=MILLIMETRES),
     Figure.CONTOUR_POSITION: ShownFigure(label="Contours: position error, 1σ [mm]", shown=MILLIMETRES),
     Figure.CONTOUR_HEADING: ShownFigure(label="Contours: heading error, 1σ [°]", shown=DEGREES),
+    Figure.TAG_POSITION: ShownFigure(label="Tags: position error, 1σ [mm]", shown=MILLIMETRES),
+    Figure.TAG_HEADING: ShownFigure(label="Tags: heading error, 1σ [°]", shown=DEGREES),
     Figure.POSITION_DOP: ShownFigure(label="Position dilution (DOP)"),
     Figure.HEADING_DOP: ShownFigure(label="Heading dilution (DOP)"),
     Figure.EXPECTED_VISIBLE: ShownFigure(

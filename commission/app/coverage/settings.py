@@ -33,6 +33,10 @@ class Figure(StrEnum):
     """By the contours of the floor map; of no fix, either."""
     CONTOUR_HEADING = "contour_heading"
     """The same of the heading."""
+    TAG_POSITION = "tag_position"
+    """By tags; of no fix, either."""
+    TAG_HEADING = "tag_heading"
+    """The same of the heading."""
     POSITION_DOP = "position_dop"
     HEADING_DOP = "heading_dop"
     EXPECTED_VISIBLE = "expected_visible"
@@ -42,6 +46,8 @@ class Figure(StrEnum):
 
 BY_CONTOURS = frozenset({Figure.CONTOUR_POSITION, Figure.CONTOUR_HEADING})
 """Figures that no reflector has a part in."""
+BY_TAGS = frozenset({Figure.TAG_POSITION, Figure.TAG_HEADING})
+"""Likewise."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +91,7 @@ class CoverageSettings:
             visibility=conditions.visibility,
             with_constants=self.figure is Figure.TOTAL_SIGMA,
             with_contours=self.figure in BY_CONTOURS,
+            with_tags=self.figure in BY_TAGS,
         )
 
 

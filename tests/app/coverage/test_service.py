@@ -17,6 +17,7 @@ from commission.planning.dilution import Heading, Measurement
 from commission.progress import silent
 from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
+from commission.site.tags import Tag
 from commission.studies.coverage import CoverageInput, coverage
 from tests.app.asking import ME
 from tests.app.bench import Bench
@@ -102,6 +103,20 @@ def test_what_contours_tell_is_that_of_its_study_and_stays_when_a_reflector_move
     bench.move(0, 0.7)
     assert not bench.jobs.unfinished()
     assert np.array_equal(bench.view.heat.classes, heat.classes)
+
+
+def test_what_tags_tell_is_that_of_its_study(project: Project) -> None:
+    tagged = replace(project, tags=(Tag(id="1", x=3.0, y=3.0),))
+    bench = Bench(CoverageService, tagged)
+    bench.ask(SetCoverage("figure", "tag_position"), SetCoverage("heading", Heading.BEST), ReadFloor((2.0, 2.0), 0.01))
+    heat = bench.found().heat
+    options = replace(CoverageSettings(), figure=Figure.TAG_POSITION, heading=Heading.BEST).options(Conditions())
+    result = coverage(CoverageInput.of(tagged, options))
+    assert result.tags is not None
+    assert np.array_equal(heat.classes.ravel(), heat.scale.classes(result.tags.position_sigma, result.drivable))
+    index = result.coverage.lattice.index_near(2.0, 2.0)
+    assert bench.view.reading.values[Figure.TAG_HEADING] == result.tags.heading_sigma[index] < 0.1
+    bench.close()
 
 
 def test_without_a_map_a_reflector_that_moves_the_floors_edge_is_computed_anew(project: Project) -> None:

@@ -81,7 +81,7 @@ def test_tags_are_drawn_with_what_a_frame_saw_of_them(server: viser.ViserServer)
     log = RecordLog.collect(records, drive.scanners)
     view, page = shown(project, log, (wrong.stamp_ns + 1 - log.first_ns) * 1e-9)
     assert view.sightings is not None and view.sightings.uses.tolist() == [TagUse.REJECTED]
-    assert dict(rows(view))["Tags accepted / rejected / unused"] == "0 / 1 / 0"
+    assert dict(rows(view))["Tags: in, out, unused"] == "0, 1, 0"
     seen, tags = SightingLayer(server.scene), TagLayer(server.scene)
     seen.draw(page)
     tags.show_site(project)
