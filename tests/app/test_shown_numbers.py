@@ -488,6 +488,8 @@ FIGURES = {
     Figure.TOTAL_SIGMA: (0.0123, "12.3 mm"),
     Figure.CONTOUR_POSITION: (0.0023, "2.3 mm"),
     Figure.CONTOUR_HEADING: (0.0123, "0.705°"),
+    Figure.TAG_POSITION: (0.0229, "22.9 mm"),
+    Figure.TAG_HEADING: (0.0123, "0.705°"),
     Figure.POSITION_DOP: (1.23, "1.23"),
     Figure.HEADING_DOP: (0.456, "0.456"),
     Figure.EXPECTED_VISIBLE: (2.5, "2.5"),
