@@ -49,7 +49,7 @@ def test_every_change_of_mode_is_an_event_at_its_stamp(written) -> None:
     events, estimates = table(out / "events.csv"), table(out / "estimates.csv")
     modes = ["operational", *(row["mode"] for row in estimates)]
     changes = [row["stamp_ns"] for row, before in zip(estimates, modes, strict=False) if row["mode"] != before]
-    told = [row["stamp_ns"] for row in events if row["kind"] in {"fail", "lost", "recovered"}]
+    told = [row["stamp_ns"] for row in events if row["kind"] in {"fail", "lost", "found", "recovered"}]
     assert told == changes
     assert len(changes) >= 2
     assert all(row["told"] for row in events)

@@ -57,4 +57,4 @@ def _in_words(base: str, T_base_scanner: FloatArray) -> str:
     x, y = T_base_scanner[:2, 3]
     heading = math.atan2(T_base_scanner[1, 0], T_base_scanner[0, 0])
     down = ", upside down" if T_base_scanner[2, 2] < 0.0 else ""
-    return f"[{x:.4f}, {y:.4f}, {heading:.4f}]{down} (x [m], y [m], heading [rad] in {base})"
+    return f"[{x:.4g}, {y:.4g}, {heading:.4g}]{down} (x [m], y [m], heading [rad] in {base})"
