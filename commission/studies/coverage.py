@@ -265,9 +265,10 @@ def tags_of(inputs: CoverageInput, lattice: Lattice, progress: Progress = silent
     lattice : the points.
     progress : told how far it is; may raise to cancel.
     """
-    if inputs.tags is None or inputs.tag_camera is None:
+    tags, camera = inputs.tags, inputs.tag_camera
+    if tags is None or camera is None:
         return None
-    found = tag_coverage(inputs.tags, inputs.tag_camera, inputs.floor_map, lattice, inputs.fix, progress)
+    found = tag_coverage(tags, camera, inputs.floor_map, lattice, inputs.fix, progress)
     counts = counts_at(inputs.zones, ObservationKind.TAGS, lattice.points())
     return replace(
         found,

@@ -126,6 +126,7 @@ def table(seeds: Seeds) -> dict[tuple[str, float], Figures]:
     return {(kind, blind): judged(kind, blind, GOOD, drives) for kind in FILTER_KINDS for blind in BLIND_WAYS}
 
 
+@pytest.mark.with_all_seeds
 def test_the_right_invariant_filter_is_consistent_after_one_reflector_whatever_the_way(
     table: dict[tuple[str, float], Figures], seeds: Seeds
 ) -> None:
@@ -139,6 +140,7 @@ def test_the_right_invariant_filter_is_consistent_after_one_reflector_whatever_t
         assert 0.8 - margin < figures.last < most + margin, (blind, figures)
 
 
+@pytest.mark.with_all_seeds
 def test_others_are_overconfident_after_sixty_metres_and_the_extended_one_most(
     table: dict[tuple[str, float], Figures],
 ) -> None:
@@ -150,6 +152,7 @@ def test_others_are_overconfident_after_sixty_metres_and_the_extended_one_most(
         assert table["invariant", blind].rms < 0.8 * table["ekf", blind].rms
 
 
+@pytest.mark.with_all_seeds
 def test_with_bad_odometry_the_invariant_filter_still_is_the_best_by_far(seeds: Seeds) -> None:
     drives = seeds(FEW_DRIVES, DRIVES)
     ekf, invariant = (judged(kind, 60.0, BAD, drives) for kind in ("ekf", "invariant"))

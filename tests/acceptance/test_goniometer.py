@@ -187,6 +187,7 @@ class PlainGoniometer(PlainLocalizer):
         return turned(measured - expected(self.mean)), H, H @ self.cov @ H + SIGMA**2
 
 
+@pytest.mark.with_all_seeds
 def test_the_localizer_by_bearings_alone_is_a_plain_filter_and_consistent(seeds):
     """Reflexes without names, each at its own time between records of odometry, a vehicle at 1 m/s that turns."""
     scanner = Scanner(

@@ -95,6 +95,7 @@ def test_the_badge_is_gray_and_says_since_when_the_program_stands_still_or_is_go
     page.close()
 
 
+@pytest.mark.with_all_seeds
 def test_every_page_says_when_the_owner_thread_does_not_get_on(window: Callable[..., OpenPage]) -> None:
     served = Served(room())
     try:

@@ -64,6 +64,7 @@ def test_a_point_of_the_floor_is_drawn_where_the_harness_says(
     assert page.errors == []
 
 
+@pytest.mark.with_all_seeds
 def test_a_click_arrives_at_the_point_that_was_meant(server: viser.ViserServer, window: Window) -> None:
     clicks: SimpleQueue[object] = SimpleQueue()
 
@@ -79,6 +80,7 @@ def test_a_click_arrives_at_the_point_that_was_meant(server: viser.ViserServer, 
     np.testing.assert_allclose(seen(clicks, page), (0.7, 1.9, 0.0), atol=0.02)
 
 
+@pytest.mark.with_all_seeds
 def test_each_kind_of_widget_can_be_used(server: viser.ViserServer, window: Window) -> None:
     told: SimpleQueue[object] = SimpleQueue()
     gui = server.gui

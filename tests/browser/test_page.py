@@ -162,6 +162,7 @@ def test_edits_from_here_on_leave_what_was_lived_and_are_marked(run: OpenRun, pa
     said.filter(has_text="Acts on the whole drive").wait_for()
 
 
+@pytest.mark.with_all_seeds
 def test_two_browsers_see_the_same_run_each_in_its_own_view(
     run: OpenRun, page: OpenPage, window: Callable[..., OpenPage]
 ) -> None:
@@ -194,6 +195,7 @@ def test_a_layer_switched_off_disappears_and_the_legend_explains_the_rest(run: O
     assert groups == ["Map", "Site", "Run", "Plan"]
 
 
+@pytest.mark.with_all_seeds
 def test_the_opacity_of_a_layer_makes_its_marks_fainter_for_points_and_for_lines(
     run: OpenRun, page: OpenPage, tmp_path: Path
 ) -> None:

@@ -135,6 +135,7 @@ def test_a_drag_zooms_all_plots_and_a_double_click_shows_the_whole_run_again(ser
     page.page.wait_for_function(f"() => {SHOWN}.view[0] === 0")
 
 
+@pytest.mark.with_all_seeds
 def test_plots_are_chosen_by_each_browser_alone(served: Served, own: OpenPage, window: Callable[..., OpenPage]) -> None:
     other = window(served.server, SMALL)
     other.open(nodes=["/vehicle"])

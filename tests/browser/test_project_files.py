@@ -128,6 +128,7 @@ def test_a_copy_onto_another_project_is_asked_about_in_the_browser_that_saves_it
     assert page.errors == colleague.errors == []
 
 
+@pytest.mark.with_all_seeds
 def test_what_became_of_the_journal_is_told_on_the_page(open_hall: Open, folder: Path) -> None:
     served, page = open_hall()
     page.fold("Project")

@@ -119,6 +119,7 @@ def test_no_button_or_name_is_cut_off_at_any_size(served: Served, window: Callab
         page.page.wait_for_function(f"name => String(({LIT})()) === name", arg=lit)
 
 
+@pytest.mark.with_all_seeds
 def test_what_is_selected_on_the_floor_is_scrolled_to_in_its_table_on_whichever_page_it_is(
     served: Served, window: Callable[..., OpenPage]
 ) -> None:

@@ -18,7 +18,7 @@ from tests.browser.page import OpenPage
 from tests.browser.serving import Served
 from tests.conftest import Seeds
 
-OF_EACH_KIND = 2
+OF_EACH_KIND = 1
 """Numbers of each kind of widget, unit and place in it that are typed in the test command; with all seeds, all are."""
 
 _NUMBERS = """() => [...document.querySelectorAll('.mantine-NumberInput-input')].filter(e => e.offsetParent).map(e => {

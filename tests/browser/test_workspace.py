@@ -84,6 +84,7 @@ def test_reflectors_are_placed_dragged_undone_redone_and_saved(
     assert site.state.faults == ()
 
 
+@pytest.mark.with_all_seeds
 def test_typed_values_change_a_reflector_and_another_browser_sees_it(
     site: OpenSite, window: Callable[..., OpenPage]
 ) -> None:

@@ -11,6 +11,7 @@ import pytest
 CHECKS = Path(__file__).with_name("cluster_checks.py")
 
 
+@pytest.mark.with_all_seeds
 def test_studies_on_a_cluster_are_those_of_this_machine_and_errors_are_clear(repository: Path) -> None:
     pytest.importorskip("distributed", reason="the extra commission[cluster] is not installed")
     done = subprocess.run(

@@ -176,8 +176,7 @@ def test_a_crowd_of_detections_and_reflectors_takes_bounded_time_and_no_reflecto
     ("method", "kind"),
     [
         *itertools.product(SCAN_BY_SCAN, FILTER_KINDS),
-        ("several_scans", "ekf"),
-        pytest.param("several_scans", "invariant", marks=pytest.mark.with_all_seeds),
+        *(pytest.param("several_scans", kind, marks=pytest.mark.with_all_seeds) for kind in ("ekf", "invariant")),
     ],
 )
 def test_whole_run_equals_the_live_localizer_to_the_last_bit(method: str, kind: str) -> None:

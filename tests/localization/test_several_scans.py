@@ -192,6 +192,7 @@ def doubles() -> tuple[LocalizerSetup, RecordLog, Belief]:
     return LocalizerSetup(reflectors=the_map, scanners=(Scanner(),), parameters=parameters), log, initial
 
 
+@pytest.mark.with_all_seeds
 def test_live_resumed_and_whole_runs_agree_to_the_last_bit_while_poses_contest(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(whole_run, "CHECKPOINT_CYCLES", 7)
     setup, log, initial = doubles()
@@ -211,6 +212,7 @@ def test_live_resumed_and_whole_runs_agree_to_the_last_bit_while_poses_contest(m
     assert contested > 4
 
 
+@pytest.mark.with_all_seeds
 def test_a_real_robot_among_others_that_look_like_landmarks_is_kept(shared_data) -> None:
     folder = shared_data / "robot_in_clutter"
     project, log = load_project(folder), load_log(folder / "recording")
@@ -237,7 +239,8 @@ def test_a_real_robot_among_others_that_look_like_landmarks_is_kept(shared_data)
     assert accepted > 0.75
 
 
-@pytest.mark.parametrize("method", ["several_scans", pytest.param("exclusive", marks=pytest.mark.with_all_seeds)])
+@pytest.mark.with_all_seeds
+@pytest.mark.parametrize("method", ["several_scans", "exclusive"])
 def test_a_real_robot_that_sees_one_or_two_things_at_a_time_is_found_each_time_that_it_is_lost(
     shared_data, method: str
 ) -> None:

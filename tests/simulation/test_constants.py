@@ -251,6 +251,7 @@ def anees(project: Project, *, believed: float = 1.0, true: float = 1.0) -> floa
     return float(np.mean(nees))
 
 
+@pytest.mark.with_all_seeds
 def test_anees_moves_when_the_filters_figures_are_wrong() -> None:
     # A scanner that is trusted as little as it deserves: what is wrong is the odometry alone.
     site = hall(scanner=Scanner(resolution_deg=0.25, range_sigma=0.02, bearing_sigma_deg=0.1, rate=5.0))
