@@ -10,7 +10,7 @@ from tests.planning.small_cases import KINDS, Verdict, judged, small_case
 @pytest.fixture(scope="module")
 def verdicts(seeds: Seeds) -> list[Verdict]:
     """Every kind of demand equally often. The bounds are the same for few cases and for all."""
-    return [judged(small_case(seed)) for seed in seeds(2 * len(KINDS), 12 * len(KINDS))]
+    return [judged(small_case(seed)) for seed in seeds(3 * len(KINDS), 12 * len(KINDS))]
 
 
 @pytest.mark.slow
