@@ -7,7 +7,8 @@ the tests.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -170,6 +171,21 @@ class OpenPage:
         self.page.mouse.click(*self.pixel_of(point_map), button=button)
         if modifier is not None:
             self.page.keyboard.up(modifier)
+
+    def click_until(self, point_map: Sequence[float], is_heard: Callable[[], bool]) -> None:
+        """Click until the program has heard of it.
+
+        The server knows of a tool before a busy browser does, which then takes the first click for none: a person
+        clicks again.
+        """
+        for patience in (5.0, 10.0, 20.0, 40.0):
+            self.click_at(point_map)
+            end = time.monotonic() + patience
+            while not is_heard() and time.monotonic() < end:
+                time.sleep(0.02)
+            if is_heard():
+                return
+        raise AssertionError(f"four clicks at {tuple(point_map)} were not heard of")
 
     def drag(self, start_map: Sequence[float], end_map: Sequence[float], button: Button = "left") -> None:
         """Drag from one point of the scene to another, in steps as a hand does."""

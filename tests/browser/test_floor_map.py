@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -57,20 +56,9 @@ def known(site: NewSite, client: int) -> tuple[NamedPoint, ...]:
 
 
 def click(site: NewSite, page: OpenPage, client: int, place: tuple[float, float], points: Callable[[], int]) -> None:
-    """Click and wait until one point more has arrived: clicks in quick succession would be a double click.
-
-    The server knows of a tool before a busy browser does, which then takes the first click for none: a person clicks
-    again.
-    """
+    """Click and wait until one point more has arrived: clicks in quick succession would be a double click."""
     before = points()
-    for patience in (5.0, 10.0, 20.0, 40.0):
-        page.click_at(place)
-        end = time.monotonic() + patience
-        while points() <= before and time.monotonic() < end:
-            time.sleep(0.02)
-        if points() > before:
-            return
-    raise AssertionError(f"four clicks at {place} were not heard of: {site.state.faults}")
+    page.click_until(place, lambda: points() > before)
 
 
 def upload(page: OpenPage, *paths: Path) -> None:

@@ -43,8 +43,7 @@ def test_a_station_is_placed_typed_dragged_and_seen_by_another_browser(
     theirs = other.open(nodes=NODES).client_id
     page.press(StationTool.name)
     site.until(lambda: isinstance(site.editor(client).tool, StationTool))
-    page.click_at((3.0, 2.1))
-    site.until(lambda: len(site.state.project.stations) == 1)
+    page.click_until((3.0, 2.1), lambda: len(site.state.project.stations) == 1)
     # It stands on the route, which passes 0.1 m below the click, and looks along it.
     station = site.state.project.stations[0]
     curve = site.state.project.routes[0].segments[0].spline()

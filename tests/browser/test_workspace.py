@@ -50,10 +50,8 @@ def test_reflectors_are_placed_dragged_undone_redone_and_saved(
     page = window(site.server)
     client = page.open(nodes=NODES).client_id
     choose(site, page, client, PlaceTool())
-    page.click_at((4.0, 0.3))
-    site.until(lambda: len(site.centers) == 5)
-    page.click_at((8.0, 7.6))
-    site.until(lambda: len(site.centers) == 6)
+    page.click_until((4.0, 0.3), lambda: len(site.centers) == 5)
+    page.click_until((8.0, 7.6), lambda: len(site.centers) == 6)
     # Both touch the wall that they were clicked near to; a click is good for a pixel or two.
     np.testing.assert_allclose(site.centers[4:, 1], [WALL + RADIUS, 8.0 - WALL - RADIUS], atol=1e-9)
     np.testing.assert_allclose(site.centers[4:, 0], [4.0, 8.0], atol=0.05)
