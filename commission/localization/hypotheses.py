@@ -122,27 +122,43 @@ def _ranked(judged: FloatArray, search: Search) -> FloatArray:
     judged = judged[np.isfinite(judged[:, 9])]
     judged = judged[np.argsort(-judged[:, 9], kind="stable")]
     poses = base_poses(judged, search.track)
-    kept: list[int] = []
-    left = np.arange(len(judged))
-    while len(left) and len(kept) < HYPOTHESES:
-        kept.append(int(left[0]))
-        left = left[~same_place(poses[left], poses[left[0]])]
-    ranked = judged[kept]
+    ranked = judged[each_place_once(poses, HYPOTHESES)]
     if len(ranked) and _is_alone(ranked, search):
-        old = search.hypotheses
-        again = len(old) > 0 and bool(same_place(poses[kept[:1]], base_poses(old[:1], search.track)[0])[0])
-        ranked[0, 11] = 1.0 + (old[0, 11] if again else 0.0)
+        ranked[0, 11] = times_in_a_row(ranked, search.hypotheses, search.track)
     return ranked
 
 
-def same_place(poses: FloatArray, other: FloatArray) -> BoolArray:
-    """(n,) whether each of some poses is one place with another one.
+def each_place_once(poses: FloatArray, most: int) -> list[int]:
+    """Return rows of poses, from the first on, that are places of their own.
 
     Parameters
     ----------
-    poses : (n, 3) [m, m, rad].
-    other : (3,) of the other one.
+    poses : (n, 3) [m, m, rad], the likeliest first.
+    most : rows at most.
     """
+    kept: list[int] = []
+    left = np.arange(len(poses))
+    while len(left) and len(kept) < most:
+        kept.append(int(left[0]))
+        left = left[~_same(poses[left], poses[left[0]])]
+    return kept
+
+
+def times_in_a_row(ranked: FloatArray, before: FloatArray, track: PoseGaussian) -> float:
+    """How many attempts in a row, this one among them, the first hypothesis has been the only one left.
+
+    Parameters
+    ----------
+    ranked : (H, ROW) hypotheses, of which the first is the only one left now.
+    before : (G, ROW) those of the attempt before.
+    track : pose of base in the frame of odometry.
+    """
+    again = len(before) > 0 and bool(_same(base_poses(ranked[:1], track), base_poses(before[:1], track)[0])[0])
+    return 1.0 + (float(before[0, 11]) if again else 0.0)
+
+
+def _same(poses: FloatArray, other: FloatArray) -> BoolArray:
+    """(n,) whether each of some poses is one place with another one."""
     apart = np.hypot(poses[:, 0] - other[0], poses[:, 1] - other[1])
     return (apart < SAME_PLACE) & (np.abs(difference(poses[:, 2], other[2])) < SAME_HEADING)
 

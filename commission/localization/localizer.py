@@ -41,7 +41,7 @@ from commission.localization.rival_poses import RivalPoses, kept_poses, poses_of
 from commission.localization.search_map import SearchMap, search_map
 from commission.localization.seen_of_late import SeenScan
 from commission.localization.setup import LocalizerSetup
-from commission.localization.state import FilterState, belief_of, output_of, state_at_start
+from commission.localization.state import FilterState, belief_of, for_kernels, output_of, state_at_start
 from commission.localization.sweep import Sweep, bring_to_stamp
 from commission.localization.tag_cycle import TagFrames, process_tags
 from commission.localization.tag_start import told_by_tags
@@ -263,7 +263,7 @@ class Localizer:
         if state.search is not None:
             self._state = searching_odometry(state, record.stamp_ns, (dx, dy, dtheta), noise)
             return
-        bare = state._replace(cross=None, protection=None, temporary=None, rivals=None, lasting=None)
+        bare = for_kernels(state)
         moved = process_odometry(bare, record.stamp_ns, dx, dy, dtheta, noise)
         kept = {"cross": state.cross, "protection": state.protection, "temporary": state.temporary}
         self._state = moved._replace(**kept, rivals=state.rivals, lasting=state.lasting)
@@ -363,9 +363,9 @@ class Localizer:
         bank = bank_of(before.protection, setup.protected_names)
         if setup.protection is None or bank is None:
             raise ValueError("protection levels are asked for where the supervisor goes by 2-sigma")
-        bare = after._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None)
+        bare = for_kernels(after)
         state = supervised_by_level(
-            before._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None),
+            for_kernels(before),
             Cycle(cycle.prior, bare),
             0,
             len(detections),
@@ -407,7 +407,7 @@ class Localizer:
             mean_rows(self._state.lasting, names),
         )
         cycle = process_reflex(
-            self._state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None),
+            for_kernels(self._state),
             reflex.stamp_ns,
             0,
             reflexes,
@@ -457,7 +457,7 @@ class Localizer:
         if setup.tag_model is None:
             raise ValueError("a frame with tags is processed where none are looked at; expected tags in the setup")
         cycle = process_tags(
-            self._state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None),
+            for_kernels(self._state),
             frame.stamp_ns,
             0,
             count,
@@ -519,7 +519,7 @@ class Localizer:
         cross = columns_of(self._state.cross, constants)
         room, memory, rivals = room_for_scans(cross, len(detections)), self._memory(), self._rivals()
         cycle = process_scan(
-            self._state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None),
+            for_kernels(self._state),
             scan.stamp_ns,
             0,
             len(detections),

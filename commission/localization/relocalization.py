@@ -25,7 +25,7 @@ from commission.localization.search_map import SearchMap, anywhere
 from commission.localization.search_state import NOTHING, Search, new_search
 from commission.localization.seen_of_late import SeenScan, joined_scan
 from commission.localization.setup import LocalizerSetup
-from commission.localization.state import FilterState
+from commission.localization.state import FilterState, for_kernels
 from commission.localization.supervisor import SupervisorLimits
 from commission.localization.trail_search import CONFIRMED, explained_again
 
@@ -71,7 +71,7 @@ def searching_odometry(
     if search is None:
         raise ValueError("the state has no search; expected one of a vehicle that is lost or not located yet")
     track, _ = advance(search.track, state.motion, stamp_ns, *displacement, noise)
-    bare = state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None)
+    bare = for_kernels(state)
     moved = process_odometry(bare, stamp_ns, *displacement, noise)
     if state.mode == Mode.INITIALIZING:
         moved = moved._replace(belief=state.belief)

@@ -44,7 +44,7 @@ from commission.localization.search_map import SearchMap, search_map
 from commission.localization.search_state import SearchMoment
 from commission.localization.seen_of_late import SeenScan
 from commission.localization.setup import FilterModel, LocalizerSetup
-from commission.localization.state import FilterState
+from commission.localization.state import FilterState, for_kernels
 from commission.localization.supervisor import INITIALIZING, LOST
 from commission.localization.sweep import bring_to_stamp, sweep_at
 from commission.localization.tag_cycle import TagFrames, process_tags
@@ -404,7 +404,7 @@ def _tracked(
         room.work,
         room.aims,
         room.busy,
-        state._replace(cross=None, protection=None, temporary=None, rivals=None, lasting=None),
+        for_kernels(state),
         stretch.columns,
         stretch.priors,
         setup.contour,

@@ -91,6 +91,11 @@ def state_unlocated(stamp_ns: int, anywhere: PoseGaussian) -> FilterState:
     return unknown._replace(mode=int(Mode.INITIALIZING), search=new_search(stamp_ns))
 
 
+def for_kernels(state: FilterState) -> FilterState:
+    """Return a state as kernels are handed it: of what has a length of its own they get arrays, or nothing."""
+    return state._replace(cross=None, search=None, protection=None, temporary=None, rivals=None, lasting=None)
+
+
 def belief_of(state: FilterState) -> Belief:
     """Return the filter's own belief as arrays."""
     return to_belief(state.belief, state.belief_ns)

@@ -13,7 +13,7 @@ import numpy as np
 
 from commission.geometry.arrays import FloatArray, read_only
 from commission.geometry.se2 import compose, inverse
-from commission.localization.hypotheses import ODDS, base_poses, prior_of, same_place
+from commission.localization.hypotheses import ODDS, base_poses, each_place_once, prior_of, times_in_a_row
 from commission.localization.hypothesis_fit import NEGLIGIBLE, ROW, density
 from commission.localization.pose_gaussian import PoseGaussian
 from commission.localization.search_map import SearchMap
@@ -118,17 +118,9 @@ def _ranked(explained: FloatArray, search: Search, around: SearchMap) -> FloatAr
     rows = rows[np.isfinite(rows[:, 9])]
     rows = rows[np.argsort(-rows[:, 9], kind="stable")]
     rows = rows[rows[:, 9] > rows[0, 9] - NEGLIGIBLE] if len(rows) else rows
-    poses = base_poses(rows, search.track)
-    kept: list[int] = []
-    left = np.arange(len(rows))
-    while len(left) and len(kept) < KEPT:
-        kept.append(int(left[0]))
-        left = left[~same_place(poses[left], poses[left[0]])]
-    ranked = rows[kept]
+    ranked = rows[each_place_once(base_poses(rows, search.track), KEPT)]
     if len(ranked) and _is_alone(ranked):
-        old = search.explained
-        again = len(old) > 0 and bool(same_place(poses[kept[:1]], base_poses(old[:1], search.track)[0])[0])
-        ranked[0, 11] = 1.0 + (old[0, 11] if again else 0.0)
+        ranked[0, 11] = times_in_a_row(ranked, search.explained, search.track)
     return ranked
 
 

@@ -63,7 +63,7 @@ def chosen_places(
     for spot in demands.unambiguous_spots:
         headings = np.array(spot[2:]) if len(spot) == 3 else headings_tried(scanners, options)
         poses = np.column_stack((np.tile(spot[:2], (len(headings), 1)), headings))
-        places.append(ChosenPlace(f"spot {X.on_page(spot[0]):.11g}, {Y.on_page(spot[1]):.11g} m", poses))
+        places.append(ChosenPlace(f"spot {X.digits(spot[0])}, {Y.digits(spot[1])} m", poses))
     return tuple(places)
 
 

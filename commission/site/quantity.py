@@ -239,7 +239,11 @@ class Quantity:
 
     def brief(self, value: float) -> str:
         """Return a value as the page writes it where room is scarce: with no digit that says nothing."""
-        return joined(f"{self.on_page(value):.11g}", self.shown_unit)
+        return joined(self.digits(value), self.shown_unit)
+
+    def digits(self, value: float) -> str:
+        """Return the number that the page shows for a value, with no digit that says nothing and none lost."""
+        return f"{self.on_page(value):.11g}"
 
     def limits(self) -> str:
         """Say in the page's unit what may be entered, on a slider what lies between its ends; empty: any number."""

@@ -371,7 +371,7 @@ def _contour_entries(
 def _tag_entries(result: CoverageResult, tags: TagCoverage, limits: SupervisorParameters) -> dict[str, Number]:
     """What one frame of tags would do, and what reflectors or tags would."""
     on = result.drivable
-    within = (2.0 * tags.position_sigma <= limits.position_limit) & (2.0 * tags.heading_sigma <= limits.heading_limit)
+    within = _two_sigma_within(tags.position_sigma, tags.heading_sigma, limits)
     return {
         "tag_share_seen": _mean(tags.seen[on] > 0),
         "tag_share_seen_at_some_heading": _mean(tags.in_reach[on] > 0),
@@ -384,8 +384,7 @@ def _tag_entries(result: CoverageResult, tags: TagCoverage, limits: SupervisorPa
 
 def contours_within(contours: ContourCoverage, limits: SupervisorParameters) -> BoolArray:
     """Whether two sigma of a single match stay below the supervisor's limits at each point: (N,) array."""
-    position_ok = 2.0 * contours.position_sigma <= limits.position_limit
-    return position_ok & (2.0 * contours.heading_sigma <= limits.heading_limit)
+    return _two_sigma_within(contours.position_sigma, contours.heading_sigma, limits)
 
 
 def _budget_entries(budget: FloorBudget, on: BoolArray) -> dict[str, Number]:
@@ -400,8 +399,12 @@ def _budget_entries(budget: FloorBudget, on: BoolArray) -> dict[str, Number]:
 
 def within_limits(found: Coverage, limits: SupervisorParameters) -> BoolArray:
     """Whether two sigma of a single fix stay below the supervisor's limits at each point: (N,) array."""
-    position_ok = 2.0 * found.fixes.position_sigma <= limits.position_limit
-    return position_ok & (2.0 * found.fixes.heading_sigma <= limits.heading_limit)
+    return _two_sigma_within(found.fixes.position_sigma, found.fixes.heading_sigma, limits)
+
+
+def _two_sigma_within(position: FloatArray, heading: FloatArray, limits: SupervisorParameters) -> BoolArray:
+    """(N,) whether two of each 1-sigma [m] and [rad] stay below the supervisor's limits."""
+    return (2.0 * position <= limits.position_limit) & (2.0 * heading <= limits.heading_limit)
 
 
 def _mean(values: NDArray[np.float64] | NDArray[np.int32] | BoolArray) -> float | None:

@@ -137,7 +137,7 @@ def start_pose(text: str) -> tuple[float, float, float] | None:
 def pose_text(pose: tuple[float, float, float]) -> str:
     """Return a pose as the field holds it: x and y [m], heading [deg]; `start_pose` reads it."""
     # What is not changed in the field is read from it again: on a national grid, too, no millimetre may be lost.
-    return f"{X.on_page(pose[0]):.11g}, {Y.on_page(pose[1]):.11g}, {DEGREES.of(pose[2]):g}"
+    return f"{X.digits(pose[0])}, {Y.digits(pose[1])}, {DEGREES.of(pose[2]):g}"
 
 
 def live_table(live: LiveView) -> str:

@@ -84,15 +84,15 @@ STUDIES = (
     Mutant(
         name="one sigma of the position within the limits",
         file=FOLDER + "coverage.py",
-        find="2.0 * found.fixes.position_sigma",
-        replace="1.0 * found.fixes.position_sigma",
+        find="2.0 * position",
+        replace="1.0 * position",
         tests=(TESTS + "test_coverage.py::test_two_sigma_of_position_and_of_heading_are_held_against_the_limits",),
     ),
     Mutant(
         name="one sigma of the heading within the limits",
         file=FOLDER + "coverage.py",
-        find="2.0 * found.fixes.heading_sigma",
-        replace="1.0 * found.fixes.heading_sigma",
+        find="2.0 * heading",
+        replace="1.0 * heading",
         tests=(TESTS + "test_coverage.py::test_two_sigma_of_position_and_of_heading_are_held_against_the_limits",),
     ),
     Mutant(
