@@ -50,6 +50,18 @@
     delete place.field.dataset.refused;
     place.field.dataset.draft = "";
     draft = { ...place, input, before: before.get(input) ?? "", said: null, held: undefined };
+    holdBack(window.__viserMutable?.messageQueue);
+  }
+
+  // What the program writes into the field that is typed into comes later. viser keeps messages until its next picture,
+  // a tenth of a second and more without a graphics card: what was written before the first key may still be among them.
+  function holdBack(messages) {
+    for (const message of (draft && messages) || []) {
+      if (message.type !== "GuiUpdateMessage" || message.uuid !== draft.uuid || !("value" in message.updates)) continue;
+      const { value, ...others } = message.updates;
+      draft.held = value;
+      message.updates = others;
+    }
   }
 
   function goOn(target) {
@@ -252,12 +264,7 @@
     worker = speaker;
     const hear = speaker.onmessage;
     speaker.onmessage = (event) => {
-      for (const message of (draft && event.data.messages) || []) {
-        if (message.type !== "GuiUpdateMessage" || message.uuid !== draft.uuid) continue;
-        const { value, ...others } = message.updates;
-        if (value !== undefined) draft.held = value;
-        message.updates = others;
-      }
+      holdBack(event.data.messages);
       hear.call(speaker, event);
     };
   }

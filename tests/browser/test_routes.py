@@ -62,8 +62,6 @@ def test_a_station_is_placed_typed_dragged_and_seen_by_another_browser(
     page.press("Select")
     page.fill("Name", "Dock <b>1</b>")
     site.until(lambda: site.state.project.stations[0].name == "Dock <b>1</b>")
-    # The fields are written anew for the name: what is typed into them meanwhile would be gone.
-    page.wait_for_text("Station Dock <b>1</b>")
     page.fill("Within [mm]", "12")
     site.until(lambda: site.state.project.stations[0].required_accuracy == 0.012)
     page.drag((station.x, station.y), (3.0, 5.0))

@@ -130,6 +130,37 @@ def test_a_number_acts_when_it_is_finished_and_not_with_its_first_digit(
     assert page.errors == []
 
 
+def test_what_was_written_into_a_field_before_its_first_key_and_is_drawn_after_it_does_not_undo_the_entry(
+    page: OpenPage, served: Served, heard: Heard
+) -> None:
+    page.open_tab("Tune")
+    entry = typed_into(page, "Gate", "9")
+    entry.press("Escape")
+    # viser keeps what the program writes until its next picture; here the first key comes between the two.
+    uuid = page.row("Gate").locator("label[for]").first.get_attribute("for")
+    late = """(input, [uuid, written, typed]) => {
+      window.__viserMutable.messageQueue.push({type: 'GuiUpdateMessage', uuid, updates: {value: written}});
+      document.execCommand('selectAll');
+      document.execCommand('insertText', false, typed);
+      window.__viserMutable.requestRender();
+    }"""
+    for written, typed, held in ((95, "97.5", 0.975), (80, "96", 0.96)):
+        entry.evaluate(late, [uuid, written, typed])
+        page.page.wait_for_function("() => window.__viserMutable.messageQueue.length === 0")
+        page.page.wait_for_timeout(100)
+        assert entry.input_value() == typed
+        entry.press("Enter")
+        served.until(lambda held=held: gate(served) == pytest.approx(held), 10.0)
+    # Who takes the entry back sees what was written meanwhile.
+    entry.evaluate(late, [uuid, 90, "97"])
+    page.page.wait_for_function("() => window.__viserMutable.messageQueue.length === 0")
+    entry.press("Escape")
+    page.page.wait_for_timeout(250)
+    assert entry.input_value() == "90"
+    assert len(heard.fields()) == 2
+    assert page.errors == []
+
+
 def test_escape_shows_again_what_held_and_nothing_has_happened(page: OpenPage, served: Served, heard: Heard) -> None:
     page.open_tab("Tune")
     undo = served.state.undo

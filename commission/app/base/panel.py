@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol, TypeAlias
 
-from viser import CommandEvent, GuiButtonHandle, GuiEvent
+from viser import CommandEvent, GuiEvent
 
 from commission.app.base import viser_private
 from commission.app.base.actions import Action, Envelope, Report, Sender
@@ -77,10 +77,10 @@ def shortened(text: str, longest: int) -> str:
     return text if len(text) <= longest else text[: longest - 1] + "…"
 
 
-def write_label(button: GuiButtonHandle, text: str) -> None:
-    """Write on a button what it does not say already."""
-    if button.label != text:
-        button.label = text
+def write_label(widget: Any, text: str) -> None:
+    """Write on a button, or before a field, what it does not say already."""
+    if widget.label != text:
+        widget.label = text
 
 
 def escaped(text: object) -> str:

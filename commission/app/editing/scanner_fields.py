@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from viser import GuiApi, GuiEvent
 
 from commission.app.base.actions import Action
 from commission.app.base.inputs import Inputs, write_html
-from commission.app.base.panel import Post, escaped, posting, write
+from commission.app.base.panel import Post, escaped, posting, write, write_label
 from commission.app.base.state import AppState
 from commission.app.editing import actions
 from commission.app.editing.typed_lists import add_list
@@ -19,6 +19,7 @@ from commission.site.project import Project
 from commission.site.scanner import Scanner
 
 OWN = "as entered"
+REMOVE = "Remove "
 NAMES = (OWN, *(preset.name for preset in SCANNERS))
 DIRECTIONS = {1: "counter-clockwise", -1: "clockwise"}
 """What the ways of a sweep are called."""
@@ -62,10 +63,14 @@ class _Widgets:
 
     preset: Any
     source: Any
+    named: tuple[tuple[Any, str], ...] = ()
+    """Folder and button that are called by its name, and what stands before it."""
 
 
 class ScannerFields:
-    """The folder of the scanners; it is built anew when scanners come, go or are renamed.
+    """The folder of the scanners; it is built anew when scanners come or go.
+
+    A new name is written on what is there: whoever has entered it may be typing into the next field by then.
 
     Parameters
     ----------
@@ -101,13 +106,16 @@ class ScannerFields:
         folder = self._gui.add_folder(self._names[index], expand_by_default=False)
         self._removable.append(folder)
         with folder:
-            return self._add_inputs(project, index, several=True)
+            widgets = self._add_inputs(project, index, several=True)
+        return replace(widgets, named=((folder, ""), *widgets.named))
 
     def _add_inputs(self, project: Project, index: int, *, several: bool) -> _Widgets:
-        name, made = self._names[index], []
+        """Add the inputs of one scanner."""
+        made: list[Any] = []
+        named: tuple[tuple[Any, str], ...] = ()
 
         def from_preset(event: GuiEvent[Any]) -> Action:
-            scanner = next(each for each in self._project.scanners if each.name == name)
+            scanner = next(each for each in self._project.scanners if each.name == self._names[index])
             chosen = event.target.value
             return actions.SetScanner(scanner if chosen == OWN else with_preset(scanner, chosen))
 
@@ -119,11 +127,19 @@ class ScannerFields:
             if several or field != "name":
                 made.append(self._add_field(f"scanners[{index}].{field}", project))
         if several:
-            remove = self._gui.add_button(f"Remove {name}", color="gray")
-            remove.on_click(posting(self._post, lambda _event: actions.RemoveScanner(name)))
+            remove = self._gui.add_button(f"{REMOVE}{self._names[index]}", color="gray")
+            remove.on_click(posting(self._post, lambda _event: actions.RemoveScanner(self._names[index])))
+            named = ((remove, REMOVE),)
         else:
             self._removable += [preset, source, *made]
-        return _Widgets(preset, source)
+        return _Widgets(preset, source, named)
+
+    def _rename(self, names: tuple[str, ...]) -> None:
+        """Call the scanners otherwise."""
+        self._names = names
+        for name, widgets in zip(names, self._widgets, strict=True):
+            for part, before in widgets.named:
+                write_label(part, before + name)
 
     def _add_field(self, name: str, project: Project) -> Any:
         """Add the input of one field."""
@@ -136,8 +152,11 @@ class ScannerFields:
     def follow(self, state: AppState) -> None:
         """Show the scanners of a state."""
         self._project = project = state.project
-        if names_in(project) != self._names:
+        names = names_in(project)
+        if len(names) != len(self._names):
             self._build(project)
+        elif names != self._names:
+            self._rename(names)
         self._inputs.follow(state)
         for scanner, widgets in zip(project.scanners, self._widgets, strict=True):
             preset = next((p for p in SCANNERS if with_preset(scanner, p.name) == scanner), None)

@@ -10,7 +10,7 @@ from viser import GuiApi
 from commission.app.base.actions import Action
 from commission.app.base.drive_now import DriveNow
 from commission.app.base.inputs import Inputs, show, write_html
-from commission.app.base.panel import BasePanel, Post, escaped, posting
+from commission.app.base.panel import BasePanel, Post, escaped, posting, write_label
 from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.live.actions import FindClocks, SetClock, UseArrivalClocks, UseClocks
@@ -64,24 +64,31 @@ class ClockPanel(BasePanel):
             self._html = gui.add_html("")
 
     def _build(self, state: AppState) -> None:
-        """Make a field for each scanner."""
+        """Make a field for each scanner; another name does not make another field: it may be typed into by then."""
         for each in self._fields:
             each.remove()
-        self._names = tuple(scanner.name for scanner in state.project.scanners)
-        self._inputs = Inputs(self._gui, self._post, SetClock, clock_of)
-        self._fields = []
+        self._inputs = Inputs(self._gui, self._post, self._set, clock_of)
         with self._folder:
-            for name in self._names:
-                label = "By hand [ms]" if len(self._names) == 1 else f"{name} by hand [ms]"
-                before = MILLISECONDS.of(clock_of(state, name) or 0.0)
-                field = self._gui.add_number(label, before, min=-10_000.0, max=10_000.0, step=0.001, hint=REMARK)
-                self._inputs.connect(name, field, lambda value: float(value) / MILLISECONDS.scale, self._shown(name))
-                self._fields.append(field)
+            self._fields = [
+                self._gui.add_number("", 0.0, min=-10_000.0, max=10_000.0, step=0.001, hint=REMARK)
+                for _ in state.project.scanners
+            ]
+        self._call(state)
+        for index, field in enumerate(self._fields):
+            self._inputs.connect(str(index), field, lambda value: float(value) / MILLISECONDS.scale, self._shown(index))
 
-    @staticmethod
-    def _shown(name: str) -> Any:
+    def _call(self, state: AppState) -> None:
+        """Write on each field which scanner it is of."""
+        self._names = tuple(scanner.name for scanner in state.project.scanners)
+        for name, field in zip(self._names, self._fields, strict=True):
+            write_label(field, "By hand [ms]" if len(self._names) == 1 else f"{name} by hand [ms]")
+
+    def _set(self, index: str, offset: Any) -> Action:
+        return SetClock(self._names[int(index)], offset)
+
+    def _shown(self, index: int) -> Any:
         def shown(state: AppState) -> float | None:
-            offset = clock_of(state, name)
+            offset = clock_of(state, self._names[index])
             return None if offset is None else round(MILLISECONDS.of(offset), 6)
 
         return shown
@@ -95,8 +102,11 @@ class ClockPanel(BasePanel):
     def draw_slowly(self, view: PageView) -> None:
         """Show the clocks and what they do."""
         self._drive = view.part(DriveNow)
-        if tuple(scanner.name for scanner in view.state.project.scanners) != self._names:
+        names = tuple(scanner.name for scanner in view.state.project.scanners)
+        if len(names) != len(self._names):
             self._build(view.state)
+        elif names != self._names:
+            self._call(view.state)
         self._inputs.follow(view.state)
         found = view.state.part(ClockState).found
         clocks = {scanner.name: scanner.clock_offset for scanner in view.state.project.scanners}

@@ -14,6 +14,8 @@ from commission.errors import ProjectError, UsageError
 from commission.site.scanner import Scanner
 from tests.app.asking import ME, after, by, joined
 from tests.app.sites import room
+from tests.browser.serving import Served
+from tests.two_scanners import with_two
 
 
 @pytest.fixture
@@ -41,6 +43,27 @@ def test_a_scanner_is_renamed_and_no_name_is_given_twice(state: AppState) -> Non
     assert names(renamed) == ["scanner", "rear right"]
     with pytest.raises(ProjectError, match="scanner name 'Scanner' is used twice"):
         after(renamed, by(ME, actions.SetEquipment("scanners[1].name", "Scanner")))
+
+
+def test_a_new_name_leaves_the_fields_in_which_somebody_may_be_typing(tmp_path: Path) -> None:
+    served = Served(with_two(room()), tmp_path)
+    try:
+        handles = served.server.gui._gui_input_handle_from_uuid
+
+        def called(*labels: str) -> set[str]:
+            """Identifiers of the widgets that are called so."""
+            return {uuid for uuid, widget in tuple(handles.items()) if getattr(widget, "label", "") in labels}
+
+        before, there = set(handles), called("Remove rear right", "rear right by hand [ms]")
+        assert len(there) == 2
+        served.runtime.post(by(ME, actions.SetEquipment("scanners[1].name", "dock")))
+        served.until(lambda: called("Remove dock", "dock by hand [ms]") == there)
+        assert before <= set(handles), "none was made anew"
+        served.runtime.post(by(ME, actions.RemoveScanner("dock")))
+        served.until(lambda: not called("Remove dock") and called("By hand [ms]"))
+        assert served.state.faults == ()
+    finally:
+        served.close()
 
 
 def test_a_scanner_is_removed_but_never_the_last(state: AppState) -> None:
