@@ -18,6 +18,7 @@ from commission.app.editing.refusals import in_words_of_the_page
 from commission.app.editing.route_gestures import route_of, segment_of
 from commission.errors import UsageError
 from commission.site.editing import routes as edits
+from commission.site.editing.named import ROUTES
 from commission.site.fields import get_field, with_field
 from commission.site.layout_brief import LayoutBrief
 from commission.site.routes import Route, Segment
@@ -78,14 +79,14 @@ def insert_control_point(_action: actions.InsertControlPoint, state: AppState, s
     gaps = np.hypot(*(inserted.segments[point.segment].control_points - near).T)
     edit = Edit(f"insert point in {route.name}", sender)
     nearest = replace(point, index=int(np.argmin(gaps)))
-    return with_routes(state, edits.put(state.project.routes, inserted, route.name), edit, nearest)
+    return with_routes(state, ROUTES.put(state.project.routes, inserted, route.name), edit, nearest)
 
 
 @reduce.register
 def split_segment(_action: actions.SplitSegment, state: AppState, sender: Sender) -> Outcome:
     editor, route, segment, point = _selected(state, sender)
     cut = edits.split_segment(route, point.segment, _where(editor, segment, point))
-    routes = edits.put(state.project.routes, cut, route.name)
+    routes = ROUTES.put(state.project.routes, cut, route.name)
     behind = ControlPoint(route.name, point.segment + 1)
     return with_routes(state, routes, Edit(f"split {route.name}", sender), behind)
 
@@ -96,7 +97,7 @@ def delete_control_point(_action: actions.DeleteControlPoint, state: AppState, s
     fewer = edits.delete_point(route, point.segment, point.index)
     edit = Edit(f"delete point of {route.name}", sender)
     before = replace(point, index=max(point.index - 1, 0))
-    return with_routes(state, edits.put(state.project.routes, fewer, route.name), edit, before)
+    return with_routes(state, ROUTES.put(state.project.routes, fewer, route.name), edit, before)
 
 
 @reduce.register
@@ -104,7 +105,7 @@ def place_control_point(action: actions.PlaceControlPoint, state: AppState, send
     _, route, _, point = _selected(state, sender)
     bent = edits.move_point(route, point.segment, point.index, action.place)
     edit = Edit(f"move point of {route.name}", sender, "" if action.dragged else str(point))
-    return with_routes(state, edits.put(state.project.routes, bent, route.name), edit, point)
+    return with_routes(state, ROUTES.put(state.project.routes, bent, route.name), edit, point)
 
 
 @reduce.register
@@ -121,7 +122,7 @@ def set_segment(action: actions.SetSegment, state: AppState, sender: Sender) -> 
         return Outcome(state)
     changed = edits.set_value(route, point.segment, action.name, action.value)
     edit = Edit(f"set {action.name} of {route.name}", sender, f"{route.name}:{point.segment}:{action.name}")
-    return with_routes(state, edits.put(state.project.routes, changed, route.name), edit, point)
+    return with_routes(state, ROUTES.put(state.project.routes, changed, route.name), edit, point)
 
 
 @reduce.register
@@ -129,7 +130,7 @@ def rename_route(action: actions.RenameRoute, state: AppState, sender: Sender) -
     _, route, _, point = _selected(state, sender)
     if action.name == route.name:
         return Outcome(state)
-    routes = edits.put(state.project.routes, replace(route, name=action.name), route.name)
+    routes = ROUTES.put(state.project.routes, replace(route, name=action.name), route.name)
     edit = Edit(f"rename {route.name}", sender)
     layout = state.project.layout.renamed(route.name, action.name)
     return with_routes(state, routes, edit, replace(point, route=action.name), layout)
@@ -138,7 +139,7 @@ def rename_route(action: actions.RenameRoute, state: AppState, sender: Sender) -
 @reduce.register
 def delete_route(_action: actions.DeleteRoute, state: AppState, sender: Sender) -> Outcome:
     _, route, _, _ = _selected(state, sender)
-    routes = edits.remove(state.project.routes, route.name)
+    routes = ROUTES.remove(state.project.routes, route.name)
     layout = state.project.layout.renamed(route.name, None)
     return with_routes(state, routes, Edit(f"delete {route.name}", sender), None, layout)
 

@@ -21,6 +21,7 @@ from commission.app.editing.tool import Label, Tool
 from commission.geometry.arrays import FloatArray
 from commission.site.editing import reflectors as edits
 from commission.site.editing import routes as route_edits
+from commission.site.editing.named import ROUTES
 from commission.site.quantity import DEGREES
 
 
@@ -54,9 +55,9 @@ class RouteTool(DrawingTool):
 
     def made(self, state: AppState, points: tuple[Point, ...], sender: Sender) -> Outcome:
         """Make a route of the points, and select it."""
-        name = route_edits.fresh_name(state.project.routes)
+        name = ROUTES.fresh(state.project.routes)
         route = route_edits.new_route(name, points)
-        routes = route_edits.put(state.project.routes, route)
+        routes = ROUTES.put(state.project.routes, route)
         return with_routes(with_tool(state, sender, None), routes, Edit(f"draw {name}", sender), ControlPoint(name))
 
     def hint(self, state: AppState, browser: int) -> str:  # noqa: ARG002 - the tool's

@@ -14,6 +14,7 @@ from commission.app.editing.editor import editor_of
 from commission.app.editing.station_gestures import station_of
 from commission.errors import UsageError
 from commission.site.editing import stations as edits
+from commission.site.editing.named import STATIONS
 from commission.site.fields import with_field
 from commission.site.stations import Station
 
@@ -50,14 +51,14 @@ def select_station(action: actions.SelectStation, state: AppState, sender: Sende
 @reduce.register
 def place_station(action: actions.PlaceStation, state: AppState, sender: Sender) -> Outcome:
     stations = state.project.stations
-    name = edits.fresh_name(stations)
+    name = STATIONS.fresh(stations)
     x, y = action.place
     placed = replace(stations[-1], name=name, x=x, y=y) if stations else Station(name=name, x=x, y=y)
     pose = edits.on_route(state.project.routes, action.place, action.reach)
     if pose is not None:
         x, y, heading = (float(value) for value in pose)
         placed = replace(placed, x=x, y=y, heading=heading)
-    return _with_stations(state, edits.put(stations, placed), Edit(f"place {name}", sender), name)
+    return _with_stations(state, STATIONS.put(stations, placed), Edit(f"place {name}", sender), name)
 
 
 @reduce.register
@@ -65,7 +66,7 @@ def move_station(action: actions.MoveStation, state: AppState, sender: Sender) -
     station = _selected(state, sender)
     verb = "turn" if action.place == (station.x, station.y) else "move"
     moved = replace(station, x=action.place[0], y=action.place[1], heading=action.heading)
-    stations = edits.put(state.project.stations, moved, station.name)
+    stations = STATIONS.put(state.project.stations, moved, station.name)
     return _with_stations(state, stations, Edit(f"{verb} {station.name}", sender), station.name)
 
 
@@ -75,7 +76,7 @@ def set_station(action: actions.SetStation, state: AppState, sender: Sender) -> 
     changed = with_field(station, action.field, action.value, "field of a station")
     what = f"rename {station.name}" if action.field == "name" else f"set {WORDS[action.field]} of {station.name}"
     key = "" if action.field == "name" else f"{station.name}:{action.field}"
-    stations = edits.put(state.project.stations, changed, station.name)
+    stations = STATIONS.put(state.project.stations, changed, station.name)
     return _with_stations(state, stations, Edit(what, sender, key), changed.name)
 
 
@@ -85,12 +86,12 @@ def align_station(_action: actions.AlignStation, state: AppState, sender: Sender
     pose = edits.on_route(state.project.routes, (station.x, station.y), math.inf)
     if pose is None:
         raise UsageError("the project has no route to put the station on; expected one")
-    stations = edits.put(state.project.stations, edits.aligned(station, pose), station.name)
+    stations = STATIONS.put(state.project.stations, edits.aligned(station, pose), station.name)
     return _with_stations(state, stations, Edit(f"align {station.name}", sender), station.name)
 
 
 @reduce.register
 def delete_station(_action: actions.DeleteStation, state: AppState, sender: Sender) -> Outcome:
     station = _selected(state, sender)
-    stations = edits.remove(state.project.stations, station.name)
+    stations = STATIONS.remove(state.project.stations, station.name)
     return _with_stations(state, stations, Edit(f"delete {station.name}", sender), "")

@@ -10,7 +10,7 @@ from commission.app.base.reducer import Outcome, reduce
 from commission.app.base.state import AppState, Edit, edited
 from commission.app.editing import zone_actions as actions
 from commission.errors import UsageError
-from commission.site.editing.names import fresh_names
+from commission.site.editing.named import ZONES
 from commission.site.fields import in_file, with_field
 from commission.site.layout_brief import low_high
 from commission.site.zones import ObservationKind, Zone
@@ -55,21 +55,18 @@ def _with_zones(state: AppState, zones: tuple[Zone, ...], edit: Edit, name: str)
 
 
 def _with_zone(state: AppState, zone: Zone, changed: Zone, edit: Edit) -> Outcome:
-    zones = tuple(changed if each.name == zone.name else each for each in state.project.zones)
-    if changed.name != zone.name and any(each.name == changed.name for each in state.project.zones):
-        raise UsageError(f"zone name {changed.name!r} is used already; expected another name")
-    return _with_zones(state, zones, edit, changed.name)
+    return _with_zones(state, ZONES.put(state.project.zones, changed, zone.name), edit, changed.name)
 
 
 @reduce.register
 def add_zone(action: actions.AddZone, state: AppState, sender: Sender) -> Outcome:
     zones = state.project.zones
-    name = fresh_names((zone.name for zone in zones), 1, "Zone 0")[0]
+    name = ZONES.fresh(zones)
     (left, low), (right, high) = low_high(action.area)
     if left == right or low == high:
         return Outcome(state)
     zone = in_file(Zone(name=name, outline=((left, low), (right, low), (right, high), (left, high))))
-    return _with_zones(state, (*zones, zone), Edit(f"draw {name}", sender), name)
+    return _with_zones(state, ZONES.put(zones, zone), Edit(f"draw {name}", sender), name)
 
 
 @reduce.register
@@ -102,5 +99,5 @@ def count_kind(action: actions.CountKind, state: AppState, sender: Sender) -> Ou
 @reduce.register
 def delete_zone(_action: actions.DeleteZone, state: AppState, sender: Sender) -> Outcome:
     zone = _shown(state, sender)
-    left = tuple(each for each in state.project.zones if each is not zone)
+    left = ZONES.remove(state.project.zones, zone.name)
     return _with_zones(state, left, Edit(f"delete {zone.name}", sender), "")

@@ -7,7 +7,6 @@ Bezier form: its joints carry their handles along, so that moving one leaves no 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from enum import StrEnum
 
@@ -18,7 +17,6 @@ from commission.errors import UsageError
 from commission.geometry.arrays import FloatArray
 from commission.geometry.knot_insertion import insert_knot, multiplicity, split
 from commission.geometry.splines import Spline, catmull_rom
-from commission.site.editing.names import fresh_names
 from commission.site.fields import with_field
 from commission.site.routes import Direction, Route, Segment
 
@@ -73,39 +71,6 @@ def new_route(name: str, points: ArrayLike, curve: Curve = Curve.THROUGH, speed:
         fewer than two different points.
     """
     return Route(name, (segment_of(points, curve),), speed)
-
-
-def fresh_name(routes: Sequence[Route], like: str = "Route 0") -> str:
-    """Return a name that no route has."""
-    return fresh_names((route.name for route in routes), 1, like)[0]
-
-
-def put(routes: tuple[Route, ...], route: Route, name: str | None = None) -> tuple[Route, ...]:
-    """Add a route, or replace another one.
-
-    Parameters
-    ----------
-    routes : those there are.
-    route : the new one.
-    name : of the one that is replaced; None adds.
-
-    Raises
-    ------
-    UsageError
-        there is no route of that name, or another one has the new name already.
-    """
-    if route.name in {other.name for other in routes} - {name}:
-        raise UsageError(f"route name {route.name!r} is used already; expected another name")
-    if name is None:
-        return (*routes, route)
-    _require(routes, name)
-    return tuple(route if other.name == name else other for other in routes)
-
-
-def remove(routes: tuple[Route, ...], name: str) -> tuple[Route, ...]:
-    """Remove the route of that name; raises UsageError when there is none."""
-    _require(routes, name)
-    return tuple(route for route in routes if route.name != name)
 
 
 def append(route: Route, points: ArrayLike, direction: Direction, curve: Curve = Curve.THROUGH) -> Route:
@@ -329,9 +294,3 @@ def _segment_at(route: Route, segment: int) -> Segment:
 
 def _with_segment(route: Route, segment: int, new: Segment) -> Route:
     return replace(route, segments=(*route.segments[:segment], new, *route.segments[segment + 1 :]))
-
-
-def _require(routes: tuple[Route, ...], name: str) -> None:
-    if name not in {route.name for route in routes}:
-        known = ", ".join(repr(route.name) for route in routes) or "none"
-        raise UsageError(f"no route is called {name!r}; the project has: {known}")

@@ -1,4 +1,4 @@
-"""Edits of stations: put, rename, remove, by their names; and where a route would have them."""
+"""Edits of stations: where a route would have them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from commission.errors import UsageError
 from commission.geometry.angles import wrap_scalar
 from commission.geometry.arrays import FloatArray
-from commission.site.editing.names import fresh_names
 from commission.site.routes import Direction, Route
 from commission.site.stations import Station
 
@@ -19,40 +17,6 @@ SAMPLES_PER_POINT = 32
 """Samples for each control point of a curve, the nearest of which lies in the right valley."""
 ALONG = math.radians(45.0)
 """Angle to the way, or against it, up to which a station is taken to look along it [rad]."""
-
-
-def put(stations: tuple[Station, ...], station: Station, name: str | None = None) -> tuple[Station, ...]:
-    """Add a station, or replace the one called `name` (it may be renamed by that).
-
-    Parameters
-    ----------
-    stations : those there are.
-    station : the new or changed one.
-    name : the one it takes the place of; None adds it at the end.
-
-    Raises
-    ------
-    UsageError
-        no station is called `name`, or another one has the new name already.
-    """
-    others = {s.name for s in stations} - {name}
-    if station.name in others:
-        raise UsageError(f"station name {station.name!r} is used already; expected another name")
-    if name is None:
-        return (*stations, station)
-    _require(stations, name)
-    return tuple(station if s.name == name else s for s in stations)
-
-
-def remove(stations: tuple[Station, ...], name: str) -> tuple[Station, ...]:
-    """Remove the station of that name; raises UsageError when there is none."""
-    _require(stations, name)
-    return tuple(s for s in stations if s.name != name)
-
-
-def fresh_name(stations: tuple[Station, ...], like: str = "Station 0") -> str:
-    """Return a name that no station has."""
-    return fresh_names((s.name for s in stations), 1, like)[0]
 
 
 def on_route(routes: Sequence[Route], place: tuple[float, float], reach: float) -> FloatArray | None:
@@ -94,9 +58,3 @@ def aligned(station: Station, pose: FloatArray) -> Station:
     nearest = int(np.argmin(turns))
     heading = headings[nearest] if turns[nearest] <= ALONG else station.heading
     return replace(station, x=x, y=y, heading=heading)
-
-
-def _require(stations: tuple[Station, ...], name: str) -> None:
-    known = ", ".join(repr(s.name) for s in stations) or "none"
-    if name not in {s.name for s in stations}:
-        raise UsageError(f"no station is called {name!r}; the project has: {known}")

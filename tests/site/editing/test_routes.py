@@ -101,14 +101,6 @@ def test_deleting_points_of_a_b_spline_ends_at_a_straight_line(clicks, point):
     assert route.segments[0].degree == 1
 
 
-def test_routes_are_put_renamed_and_removed_by_name():
-    route = edits.new_route(edits.fresh_name(()), WAY)
-    assert route.name == "Route 1"
-    renamed = edits.put(edits.put((), route), Route("Loop", route.segments), "Route 1")
-    assert [r.name for r in renamed] == ["Loop"]
-    assert edits.remove(renamed, "Loop") == ()
-
-
 @pytest.mark.parametrize(
     ("edit", "message"),
     [
@@ -118,8 +110,6 @@ def test_routes_are_put_renamed_and_removed_by_name():
         (lambda r: edits.move_point(r, 3, 0, (0, 0)), "segment 3 of route 'r'; expected 0 to 0"),
         (lambda r: edits.delete_point(edits.new_route("r", WAY[:2]), 0, 0), "needs two points"),
         (lambda r: edits.delete_point(edits.append(r, [(9, 9)], "forward"), 0, 9), "shared by two segments"),
-        (lambda r: edits.put((r,), r), "'r' is used already"),
-        (lambda r: edits.remove((r,), "x"), "no route is called 'x'; the project has: 'r'"),
     ],
 )
 def test_an_edit_of_a_route_that_cannot_be_is_refused_in_one_line(edit, message):
