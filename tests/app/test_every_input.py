@@ -39,6 +39,7 @@ from commission.app.editing.actions import (
 from commission.app.editing.editor import ControlPoint, editor_of
 from commission.app.editing.selection_panel import SelectionPanel
 from commission.app.editing.station_actions import SelectStation, SetStation
+from commission.app.editing.tag_actions import SelectTag, SetTag
 from commission.app.editing.tool_panel import SnappingPanel
 from commission.app.floor_map.actions import SetPlantPoint
 from commission.app.floor_map.align_tool import AlignTool, NamedPoint
@@ -59,6 +60,7 @@ from commission.site.project import Project
 from commission.site.reflectors import Reflector, ReflectorMap
 from commission.site.scanner import Scanner
 from commission.site.stations import Station
+from commission.site.tags import Tag, TagCamera
 from commission.site.vehicle import DifferentialVehicle, OmnidirectionalVehicle, TricycleVehicle, Vehicle
 from tests.app.asking import ME, after, joined, taking
 from tests.app.test_shown_inputs import PageBench, another, is_number
@@ -139,6 +141,37 @@ SCANNER = {
         label="Clock offset [s]", read=scanner("clock_offset"), allowed=(-10.0, 10.0), refused=(-10.1, 10.1)
     ),
 }
+
+
+def camera(name: str, index: int | None = None) -> Callable[[AppState], float]:
+    def read(state: AppState) -> float:
+        value = getattr(state.project.tag_camera, name)
+        return value if index is None else value[index]
+
+    return read
+
+
+CAMERA = {
+    "mounting[0]": Row(label="Camera at x [m]", read=camera("mounting", 0), allowed=(-100, 100), refused=(100.1,)),
+    "mounting[1]": Row(label="Camera at y [m]", read=camera("mounting", 1), allowed=(-100, 100), refused=(-100.1,)),
+    "mounting[2]": Row(label="Camera faces [°]", read=camera("mounting", 2), factor=DEGREES, allowed=(-179.5, 90.25)),
+    "field_of_view_deg": Row(
+        label="Camera sees [°]", read=camera("field_of_view_deg"), allowed=(1.0, 360.0), refused=(0.9, 360.1)
+    ),
+    "range[0]": Row(label="Tags seen from [m]", read=camera("range", 0), allowed=(0.0, 1.5), refused=(-0.01, 5.0)),
+    "range[1]": Row(label="Tags seen to [m]", read=camera("range", 1), allowed=(0.15, 35.0), refused=(0.0, 0.1)),
+    "rate": Row(label="Frames per s", read=camera("rate"), allowed=(0.1, 1000.0), refused=(0.09, 1000.5)),
+    "position_sigma": Row(
+        label="Camera place 1σ [mm]", read=camera("position_sigma"), factor=MM, allowed=(0.0, 12.5), refused=(-0.1,)
+    ),
+    "heading_sigma": Row(
+        label="Camera heading 1σ [°]",
+        read=camera("heading_sigma"),
+        factor=DEGREES,
+        allowed=(0.0, 1.25),
+        refused=(-0.1,),
+    ),
+}
 VEHICLES: dict[str, tuple[Vehicle, Row]] = {
     "vehicle.wheel_separation": (
         DifferentialVehicle(),
@@ -167,7 +200,9 @@ VEHICLES: dict[str, tuple[Vehicle, Row]] = {
 }
 UNSEEN: frozenset[str] = frozenset({"name"})
 """Numbers of a scanner that stand in the project's file alone."""
-ROWS: dict[str, Row] = {f"scanners[0].{name}": row for name, row in SCANNER.items() if name not in UNSEEN} | {
+ROWS: dict[str, Row] = {f"scanners[0].{name}": row for name, row in SCANNER.items() if name not in UNSEEN}
+ROWS |= {f"tag_camera.{name}": row for name, row in CAMERA.items()}
+ROWS |= {
     "given_heading": Row(
         label="Given [°]",
         read=lambda s: s.part(CoverageSettings).given_heading,
@@ -396,9 +431,8 @@ def numbers(cls: type, prefix: str = "") -> set[str]:
 def test_no_field_is_without_its_widget_and_no_widget_without_a_field(bench: PageBench) -> None:
     shown = [name_of(posted) for posted, _ in named_widgets(bench)]
     assert sorted(shown) == sorted([*ROWS, *VEHICLES])
-    described = (
-        numbers(Scanner, "scanners[0].") | numbers(Demands, "demands.") | numbers(CandidateOptions, "candidates.")
-    )
+    described = numbers(Scanner, "scanners[0].") | numbers(TagCamera, "tag_camera.")
+    described |= numbers(Demands, "demands.") | numbers(CandidateOptions, "candidates.")
     for kind in (DifferentialVehicle, TricycleVehicle, OmnidirectionalVehicle):
         described |= numbers(kind, "vehicle.")
     for kind in (CoverageSettings, Conditions, FloorPicture, AmbiguitySettings):
@@ -409,6 +443,7 @@ def test_no_field_is_without_its_widget_and_no_widget_without_a_field(bench: Pag
 
 
 POST = Reflector(id="P", x=1.25, y=2.5, radius=0.0415, height=1.8, sigma=0.0035)
+MARK = Tag(id="M", x=1.75, y=4.5, heading=0.6, sigma=0.0025, heading_sigma=0.0035)
 DOCK = Station(name="Dock", x=3.25, y=5.5, heading=-0.7, required_accuracy=0.043)
 WHITE = np.full((40, 60), 255, np.uint8)
 DRAWN = Path("a.dxf")
@@ -420,6 +455,10 @@ def reflector(name: str) -> Callable[[AppState], float]:
 
 def station(name: str) -> Callable[[AppState], float]:
     return lambda state: getattr(state.project.stations[0], name)
+
+
+def mark(name: str) -> Callable[[AppState], float]:
+    return lambda state: getattr(state.project.tags[0], name)
 
 
 def option(name: str) -> Callable[[AppState], float]:
@@ -476,6 +515,23 @@ OWN = {
                 factor=MM,
                 allowed=(1.0, 10_000.0),
                 refused=(0.9, 10_000.1),
+            ),
+        },
+    ),
+    "tag": Own(
+        make=selection,
+        asked=(SelectTag("M"),),
+        rows={
+            "x": Row(label="x [m]", read=mark("x"), **FAR),
+            "y": Row(label="y [m]", read=mark("y"), **FAR),
+            "heading": Row(label="Tag heading [°]", read=mark("heading"), factor=DEGREES, allowed=(-179.5, 90.25)),
+            "sigma": Row(label="Tag place 1σ [mm]", read=mark("sigma"), factor=MM, allowed=(0.0, 5.5), refused=(-0.1,)),
+            "heading_sigma": Row(
+                label="Tag heading 1σ [°]",
+                read=mark("heading_sigma"),
+                factor=DEGREES,
+                allowed=(0.0, 1.25),
+                refused=(-0.1,),
             ),
         },
     ),
@@ -591,11 +647,11 @@ def test_a_number_of_ones_own_is_shown_taken_and_bounded_as_its_row_says(
 ) -> None:
     own = OWN[what]
     make = partial(FloorMapPanel, project=project) if own.make is FloorMapPanel else own.make
-    site = replace(project, reflectors=ReflectorMap((POST,)), stations=(DOCK,))
+    site = replace(project, reflectors=ReflectorMap((POST,)), stations=(DOCK,), tags=(MARK,))
     bench = PanelBench(server, site, replace(own, make=make))
     found = [(name_of(posted), widget) for posted, widget in named_widgets(bench) if widget.visible]
-    is_of_selection = what in ("reflector", "station", "route")
-    inside = {"reflector": SetSelected, "station": SetStation, "route": SetCoordinate | SetSegment}
+    is_of_selection = what in ("reflector", "station", "tag", "route")
+    inside = {"reflector": SetSelected, "station": SetStation, "tag": SetTag, "route": SetCoordinate | SetSegment}
     widgets = {
         found_name: widget
         for found_name, widget in found

@@ -47,7 +47,7 @@ UNITS = {
     **{"%": 100.0, "%/m": 100.0, "": 1.0, "s": 1.0, "σ": 1.0, "detections": 1.0, "scans": 1.0},
 }
 """Number on the page for one SI unit, by the unit that the label names."""
-IN_DEGREES = {"First bearing", "Last bearing", "Resolution", "Beam width", "Steering to"}
+IN_DEGREES = {"First bearing", "Last bearing", "Resolution", "Beam width", "Steering to", "Camera sees"}
 """Fields whose names end with `_deg`: the project holds them in degrees, too."""
 BEARING_OF_SCANNER = "Bearing 1σ"
 """Shown twice: of the scanner, whose field is in degrees, and of the localizer, whose parameter is in radians."""

@@ -53,7 +53,7 @@ class DragSelection(Action):
 
 @dataclass(frozen=True, slots=True)
 class Nudge(Action):
-    """Move what is selected by a little: reflectors, a control point or a station."""
+    """Move what is selected by a little: reflectors, a control point, a station or a tag."""
 
     by: Point
     """How far [m], map frame."""
@@ -71,7 +71,7 @@ class SelectReflectors(Action):
 
 @dataclass(frozen=True, slots=True)
 class DeleteSelected(Action):
-    """Delete what is selected: reflectors, a control point or a station."""
+    """Delete what is selected: reflectors, a control point, a station or a tag."""
 
 
 @dataclass(frozen=True, slots=True)

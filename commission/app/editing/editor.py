@@ -18,7 +18,7 @@ class Grab(StrEnum):
 
     REFLECTORS = "reflectors"
     CONTROL_POINT = "control point"
-    STATION = "station"
+    POSED = "station or tag"
     HEADING = "heading"
     RECTANGLE = "rectangle"
 
@@ -83,6 +83,8 @@ class Editor:
     """The selected control point; its route is the selected one."""
     station: str = ""
     """Name of the selected station; empty: none."""
+    tag: str = ""
+    """Id of the selected tag; empty: none."""
     drag: Drag | None = None
     """A drag under way."""
     last_click: Point | None = None
@@ -93,7 +95,7 @@ class Editor:
     """How near a click has to be to mean something, at the zoom of the newest gesture [m]."""
 
     def selecting(
-        self, reflectors: tuple[str, ...] = (), *, point: ControlPoint | None = None, station: str = ""
+        self, reflectors: tuple[str, ...] = (), *, point: ControlPoint | None = None, station: str = "", tag: str = ""
     ) -> Editor:
         """Return the editor with this selected and nothing else.
 
@@ -102,8 +104,9 @@ class Editor:
         reflectors : ids.
         point : control point of a route.
         station : name; empty: none.
+        tag : id; empty: none.
         """
-        return replace(self, selected=reflectors, point=point, station=station)
+        return replace(self, selected=reflectors, point=point, station=station, tag=tag)
 
     def using(self, tool: Tool | None, state: AppState) -> Editor:
         """Return the editor with another tool: what was begun with the old one is dropped, unless that tool keeps it.
@@ -134,7 +137,7 @@ class Editor:
     @property
     def has_selection(self) -> bool:
         """Whether anything is selected."""
-        return bool(self.selected) or self.point is not None or bool(self.station)
+        return bool(self.selected) or self.point is not None or bool(self.station) or bool(self.tag)
 
 
 def editor_of(state: AppState, browser: int | None) -> Editor:

@@ -1,9 +1,10 @@
-"""Editing on the floor: tools, selection, reflectors, routes, stations, vehicle and scanner."""
+"""Editing on the floor: tools, selection, reflectors, routes, stations, tags, vehicle, scanner and camera."""
 
 from __future__ import annotations
 
 from commission.app.base.feature import REFLECTORS, ROUTES, SELECTION, SITE, Docked, Feature
-from commission.app.editing import reducer, site_reducer, station_reducer, zone_reducer
+from commission.app.editing import reducer, site_reducer, station_reducer, tag_reducer, zone_reducer
+from commission.app.editing.camera_fields import CameraFields
 from commission.app.editing.equipment_fields import EquipmentFields
 from commission.app.editing.overlay import Overlay
 from commission.app.editing.reflector_layer import ReflectorLayer, ReflectorNameLayer
@@ -20,10 +21,11 @@ from commission.app.editing.zone_layer import ZoneLayer
 
 FEATURE = Feature(
     name="editing",
-    reducers=(reducer, site_reducer, station_reducer, zone_reducer),
+    reducers=(reducer, site_reducer, station_reducer, tag_reducer, zone_reducer),
     layers=(ZoneLayer, TagLayer, RouteLayer, StationLayer, ReflectorLayer, ReflectorNameLayer),
     panels=(
         Docked(make=lambda at: EquipmentFields(at.gui, at.post, at.state.project), tab=SITE, rank=30),
+        Docked(make=lambda at: CameraFields(at.gui, at.post, at.state.project), tab=SITE, rank=35),
         Docked(make=lambda at: ZoneFields(at.gui, at.post, at.browser), tab=SITE, rank=40, folder="Zones", own=True),
         Docked(make=lambda at: Overlay(at.scene, at.post, at.browser), tab=None, rank=10, own=True),
         Docked(make=lambda at: ToolButtons(at.gui, at.post, at.browser), tab=None, rank=91, own=True),

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from commission.app.editing.editor import Drag, Editor, Grab, Point
+from commission.app.editing.posed_gestures import grabbed_of, nearest_posed
 from commission.app.editing.route_gestures import control_point_at
-from commission.app.editing.station_gestures import grabbed_of_station, station_at
+from commission.app.editing.station_gestures import station_at, station_of
+from commission.app.editing.tag_gestures import tag_at, tag_of
 from commission.geometry import se2
 from commission.geometry.occupancy import OccupancyGrid
 from commission.site.editing import reflectors as edits
@@ -97,7 +99,7 @@ def corner_at(project: Project, place: Point, reach: float) -> Point | None:
 
 
 def marked_place(project: Project, place: Point, reach: float) -> Point:
-    """Return the point that a click means: the center of a reflector, a station, a wall's corner, else the place.
+    """Return the point that a click means: a reflector's center, a station, a tag, a wall's corner, else the place.
 
     Parameters
     ----------
@@ -109,10 +111,10 @@ def marked_place(project: Project, place: Point, reach: float) -> Point:
     if found is not None:
         hit = next(r for r in project.reflectors.reflectors if r.id == found)
         return hit.x, hit.y
-    name = station_at(project, place, reach)
-    if name is not None:
-        station = next(station for station in project.stations if station.name == name)
-        return station.x, station.y
+    for marks in (project.stations, project.tags):
+        nearest = nearest_posed(marks, place, reach)
+        if nearest is not None:
+            return marks[nearest].x, marks[nearest].y
     return corner_at(project, place, reach) or place
 
 
@@ -185,7 +187,7 @@ def moved(project: Project, editor: Editor) -> ReflectorMap:
 
 
 def grabbed(project: Project, editor: Editor, drag: Drag) -> Editor:
-    """Return the editor with a drag begun: on something selected, a reflector, a station, or the floor.
+    """Return the editor with a drag begun: on something selected, a reflector, a station, a tag, or the floor.
 
     Parameters
     ----------
@@ -194,9 +196,9 @@ def grabbed(project: Project, editor: Editor, drag: Drag) -> Editor:
     drag : from its start to where it is now [m], map frame.
     """
     reach = editor.reach
-    of_station = grabbed_of_station(project, editor, drag.start)
-    if of_station is not None:
-        return replace(editor, drag=replace(drag, grab=of_station))
+    posed = grabbed_of(project, station_of(project, editor) or tag_of(project, editor), drag.start, reach)
+    if posed is not None:
+        return replace(editor, drag=replace(drag, grab=posed))
     point = None if editor.point is None else control_point_at(project, editor.point.route, drag.start, reach)
     if point is not None:
         return replace(editor, point=point, drag=replace(drag, grab=Grab.CONTROL_POINT))
@@ -206,5 +208,8 @@ def grabbed(project: Project, editor: Editor, drag: Drag) -> Editor:
         return replace(editor.selecting(selected), drag=replace(drag, grab=Grab.REFLECTORS))
     station = station_at(project, drag.start, reach)
     if station is not None:
-        return replace(editor.selecting(station=station), drag=replace(drag, grab=Grab.STATION))
+        return replace(editor.selecting(station=station), drag=replace(drag, grab=Grab.POSED))
+    tag = tag_at(project, drag.start, reach)
+    if tag is not None:
+        return replace(editor.selecting(tag=tag), drag=replace(drag, grab=Grab.POSED))
     return replace(editor, drag=replace(drag, grab=Grab.RECTANGLE))

@@ -22,7 +22,9 @@ from commission.app.editing.gestures import (
 )
 from commission.app.editing.route_gestures import route_at
 from commission.app.editing.station_actions import DeleteStation, MoveStation
-from commission.app.editing.station_gestures import moved_station, station_at
+from commission.app.editing.station_gestures import moved_station, station_at, station_of
+from commission.app.editing.tag_actions import DeleteTag, MoveTag
+from commission.app.editing.tag_gestures import moved_tag, tag_at, tag_of
 from commission.errors import UsageError
 from commission.site.editing import reflectors as edits
 from commission.site.editing.snapping import snap_to_wall
@@ -124,6 +126,9 @@ def _picked(state: AppState, editor: Editor, action: ClickFloor) -> Editor:
     station = station_at(state.project, action.place, action.reach)
     if station is not None:
         return editor.selecting(station=station)
+    tag = tag_at(state.project, action.place, action.reach)
+    if tag is not None:
+        return editor.selecting(tag=tag)
     return editor.selecting(point=route_at(state.project, action.place, action.reach))
 
 
@@ -172,9 +177,11 @@ def nudge(action: actions.Nudge, state: AppState, sender: Sender) -> Outcome:
         edit = Edit(f"move {counted(state, editor)}", sender, f"{ids}:nudge")
         moved_map = edits.move(state.project.reflectors, ids, action.by)
         return _telling_of_locked(state, ids, with_reflectors(state, moved_map, edit))
-    station = next((each for each in state.project.stations if each.name == editor.station), None)
+    station, tag = station_of(state.project, editor), tag_of(state.project, editor)
     if station is not None:
         return reduce(MoveStation((station.x + dx, station.y + dy), station.heading), state, sender)
+    if tag is not None:
+        return reduce(MoveTag((tag.x + dx, tag.y + dy), tag.heading), state, sender)
     if editor.point is None:
         return Outcome(state)
     segments = state.project.route(editor.point.route).segments
@@ -196,11 +203,18 @@ def _dropped(state: AppState, editor: Editor, sender: Sender) -> Outcome:
             return _enclosed(state, editor, resting, sender)
         case Grab.CONTROL_POINT:
             return reduce(actions.PlaceControlPoint(drag.now, dragged=True), resting, sender)
-        case Grab.STATION | Grab.HEADING:
-            station = moved_station(state.project, editor)
-            if station is None:
-                return Outcome(resting)
-            return reduce(MoveStation((station.x, station.y), station.heading), resting, sender)
+        case Grab.POSED | Grab.HEADING:
+            return _turned_or_moved(state, editor, resting, sender)
+
+
+def _turned_or_moved(state: AppState, editor: Editor, resting: AppState, sender: Sender) -> Outcome:
+    """Leave the dragged station or tag where it is, or looking there."""
+    station, tag = moved_station(state.project, editor), moved_tag(state.project, editor)
+    if station is not None:
+        return reduce(MoveStation((station.x, station.y), station.heading), resting, sender)
+    if tag is not None:
+        return reduce(MoveTag((tag.x, tag.y), tag.heading), resting, sender)
+    return Outcome(resting)
 
 
 def _moved(state: AppState, editor: Editor, resting: AppState, sender: Sender) -> Outcome:
@@ -240,6 +254,8 @@ def delete_selected(_action: actions.DeleteSelected, state: AppState, sender: Se
         return reduce(actions.DeleteControlPoint(), state, sender)
     if editor.station:
         return reduce(DeleteStation(), state, sender)
+    if editor.tag:
+        return reduce(DeleteTag(), state, sender)
     editor, ids = _selection(state, sender)
     edit = Edit(f"delete {counted(state, editor)}", sender)
     return _telling_of_locked(state, ids, with_reflectors(state, edits.delete(state.project.reflectors, ids), edit))

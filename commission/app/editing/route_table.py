@@ -1,4 +1,4 @@
-"""All routes and stations as a table of one browser. A row selects what it is about and goes there."""
+"""All routes, stations and tags as a table of one browser. A row selects what it is about and goes there."""
 
 from __future__ import annotations
 
@@ -16,9 +16,12 @@ from commission.app.base.view import PageView
 from commission.app.editing import actions
 from commission.app.editing.editor import ControlPoint, Editor
 from commission.app.editing.station_actions import SelectStation
+from commission.app.editing.tag_actions import SelectTag
 from commission.site.project import Project
+from commission.site.quantity import DEGREES
 from commission.site.routes import Direction, Route
 from commission.site.stations import ACCURACY, Station
+from commission.site.tags import Tag
 from commission.studies.problems import ProblemsResult
 
 MOST_ROWS = 60
@@ -32,9 +35,11 @@ class Row:
     text: str
     """What it says."""
     route: str = ""
-    """Name of the route that it is about; empty: a station."""
+    """Name of the route that it is about; empty: none."""
     station: str = ""
-    """Name of the station that it is about; empty: a route."""
+    """Name of the station that it is about; empty: none."""
+    tag: str = ""
+    """Id of the tag that it is about; empty: none."""
 
 
 def route_row(route: Route, violations: int) -> Row:
@@ -56,17 +61,24 @@ def station_row(station: Station) -> Row:
     )
 
 
+def tag_row(tag: Tag) -> Row:
+    """Return a tag on one line."""
+    name = f"tag, no id ({tag.id})" if tag.anonymous else f"tag {tag.id}"
+    return Row(f"{name}   {tag.x:.2f}  {tag.y:.2f} m  {DEGREES.text(tag.heading, '.1f')}", tag=tag.id)
+
+
 def rows(project: Project, violations: Counter[str], sought: str) -> list[Row]:
-    """Return the table's lines: routes, then stations, whose names contain what is sought.
+    """Return the table's lines: routes, stations, then tags, whose names contain what is sought.
 
     Parameters
     ----------
-    project : has routes and stations.
+    project : has them.
     violations : number of each route, by its name.
     sought : in lower case; empty: all.
     """
     routes = [route_row(route, violations[route.name]) for route in project.routes if sought in route.name.lower()]
-    return routes + [station_row(station) for station in project.stations if sought in station.name.lower()]
+    stations = [station_row(station) for station in project.stations if sought in station.name.lower()]
+    return routes + stations + [tag_row(tag) for tag in project.tags if sought in f"tag {tag.id}".lower()]
 
 
 class RouteTable(BasePanel):
@@ -74,19 +86,19 @@ class RouteTable(BasePanel):
 
     def __init__(self, gui: GuiApi, post: Post, browser: int, tab: GuiTabHandle) -> None:
         self._browser = browser
-        self._find = add_find(gui, post, "Part of the name of a route or a station.")
+        self._find = add_find(gui, post, "Part of the name of a route, a station or a tag.")
         self._count = gui.add_html("")
         self._shown: list[Row] = []
         self._rows = Rows(gui, tab, post, self._selecting)
         self._drawn: tuple[object, ...] = ()
 
     def draw_slowly(self, view: PageView) -> None:
-        """Show routes and stations in the order of the project."""
+        """Show routes, stations and tags in the order of the project."""
         project, editor = view.state.project, view.state.of_browser(self._browser, Editor)
         chosen = "" if editor.point is None else editor.point.route
         findings = view.part(ProblemsResult)
-        drawn = (project.routes, project.stations, findings)
-        asked = (self._find.value, chosen, editor.station)
+        drawn = (project.routes, project.stations, project.tags, findings)
+        asked = (self._find.value, chosen, editor.station, editor.tag)
         if self._drawn and self._drawn[-1] == asked and all(a is b for a, b in zip(self._drawn, drawn, strict=False)):
             return
         self._drawn = (*drawn, asked)
@@ -95,12 +107,13 @@ class RouteTable(BasePanel):
         found = rows(project, violations, self._find.value.strip().lower())
         self._shown = found[:MOST_ROWS]
         more = f", the first {MOST_ROWS} shown" if len(found) > MOST_ROWS else ""
+        tags = f", {len(project.tags)} tags" if project.tags else ""
         self._count.content = (
             f"<div class='c-note' style='padding:2px 6px'>{len(project.routes)} routes, "
-            f"{len(project.stations)} stations{more}</div>"
+            f"{len(project.stations)} stations{tags}{more}</div>"
         )
         fatal = {violation.route for violation in violated if violation.is_fatal}
-        self._rows.show([(row.text, _color(row, chosen, editor.station, violations, fatal)) for row in self._shown])
+        self._rows.show([(row.text, _color(row, chosen, editor, violations, fatal)) for row in self._shown])
 
     def _selecting(self, index: int) -> page_actions.Action:
         """Return the action of a row; the table may have become shorter since it was drawn."""
@@ -109,11 +122,14 @@ class RouteTable(BasePanel):
         row = self._shown[index]
         if row.station:
             return SelectStation(row.station, fly=True)
+        if row.tag:
+            return SelectTag(row.tag, fly=True)
         return actions.SelectControlPoint(ControlPoint(row.route), fly=True)
 
 
-def _color(row: Row, route: str, station: str, violations: Counter[str], fatal: set[str]) -> theme.Color:
-    if (row.route and row.route == route) or (row.station and row.station == station):
+def _color(row: Row, route: str, editor: Editor, violations: Counter[str], fatal: set[str]) -> theme.Color:
+    chosen = {(route, "", ""), ("", editor.station, ""), ("", "", editor.tag)}
+    if (row.route, row.station, row.tag) in chosen:
         return theme.SELECTED_LINE
     if row.route in fatal:
         return theme.ERROR_LINE

@@ -21,6 +21,9 @@ from commission.app.editing.route_fields import RouteFields
 from commission.app.editing.route_gestures import route_of
 from commission.app.editing.site_tools import measurement
 from commission.app.editing.station_fields import StationFields
+from commission.app.editing.station_gestures import station_of
+from commission.app.editing.tag_fields import TagFields
+from commission.app.editing.tag_gestures import tag_of
 from commission.site.fields import get_field, names_of
 from commission.site.project import Project
 from commission.site.quantity import DEGREES
@@ -31,8 +34,8 @@ ALONE = ("id", "x", "y")
 
 
 NOTHING = (
-    "<div class='c-note c-nothing' style='padding:4px 0'>Nothing is selected. Click a reflector, a station or a route; "
-    "drag over the floor for several reflectors.</div>"
+    "<div class='c-note c-nothing' style='padding:4px 0'>Nothing is selected. Click a reflector, a station, a tag or a "
+    "route; drag over the floor for several reflectors.</div>"
 )
 
 
@@ -63,6 +66,7 @@ class SelectionPanel(BasePanel):
             self._add_repeat()
         self._route = RouteFields(gui, post, browser)
         self._station = StationFields(gui, post, browser)
+        self._tag = TagFields(gui, post, browser)
 
     def _pressed(self, event: GuiEvent[Any]) -> page_actions.Action:
         """Return the action of one of the buttons."""
@@ -124,6 +128,7 @@ class SelectionPanel(BasePanel):
             show(widget, visible=shown)
         self._route.show(view.state)
         self._station.show(view.state)
+        self._tag.show(view.state)
 
     def _read(self, _state: AppState, name: str) -> Any:
         """Return a value of the selection, the first one's where several are selected; None: of nothing."""
@@ -150,7 +155,8 @@ def _head(editor: Editor, reflectors: tuple[Reflector, ...], project: Project) -
     if editor.last_click is not None and not reflectors:
         rows.append(("Last click x, y", f"{editor.last_click[0]:.3f}, {editor.last_click[1]:.3f} m"))
     # What is selected may be gone: deleted here, or by another browser; an undo brings it back selected.
-    is_there = bool(reflectors) or route_of(project, editor) or any(s.name == editor.station for s in project.stations)
+    station, tag = station_of(project, editor), tag_of(project, editor)
+    is_there = bool(reflectors) or route_of(project, editor) or station or tag
     if not is_there:
         return f"<div style='padding:2px 14px 2px 6px'>{table(rows)}{'' if editor.tool else NOTHING}</div>"
     if len(reflectors) > 1:
@@ -159,6 +165,8 @@ def _head(editor: Editor, reflectors: tuple[Reflector, ...], project: Project) -
         title = f"Reflector {escaped(reflectors[0].id)}"
     elif editor.point is not None:
         title = f"Route {escaped(editor.point.route)}"
+    elif tag is not None:
+        title = f"Tag {escaped(tag.id)}"
     else:
         named = editor.station.lower().startswith("station")
         title = escaped(editor.station) if named else f"Station {escaped(editor.station)}"

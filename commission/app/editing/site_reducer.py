@@ -24,7 +24,7 @@ from commission.site.layout_brief import LayoutBrief
 from commission.site.routes import Route, Segment
 from commission.site.scanner import Scanner
 
-EQUIPMENT = {"vehicle": "vehicle", "scanners": "scanner"}
+EQUIPMENT = {"vehicle": "vehicle", "scanners": "scanner", "tag_camera": "tag camera"}
 """Parts of a project that are equipment, and what each is called."""
 
 

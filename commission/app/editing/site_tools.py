@@ -1,4 +1,4 @@
-"""The tools for what stands and drives on the floor: reflectors, routes, stations; and a measure. Pure."""
+"""The tools for what stands and drives on the floor: reflectors, routes, stations, tags; and a measure. Pure."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from commission.app.editing.reducer import with_reflectors
 from commission.app.editing.route_gestures import curve
 from commission.app.editing.site_reducer import with_routes
 from commission.app.editing.station_actions import PlaceStation
+from commission.app.editing.tag_actions import PlaceTag
 from commission.app.editing.tool import Label, Tool
 from commission.geometry.arrays import FloatArray
 from commission.site.editing import reflectors as edits
@@ -86,13 +87,28 @@ class StationTool(Tool):
 
 
 @dataclass(frozen=True, slots=True)
+class TagTool(Tool):
+    """Places tags."""
+
+    name = "Tag"
+
+    def clicked(self, state: AppState, click: ClickFloor, sender: Sender) -> Outcome:
+        """Place a tag."""
+        return reduce(PlaceTag(click.place), state, sender)
+
+    def hint(self, state: AppState, browser: int) -> str:  # noqa: ARG002 - the tool's
+        """Say what a click does."""
+        return "Tag: click where a mark is that a camera on the vehicle reads; its arrow turns it &nbsp; (Esc ends)"
+
+
+@dataclass(frozen=True, slots=True)
 class MeasureTool(Tool):
     """Measures from one point to another; a third click begins anew."""
 
     name = "Measure"
 
     def clicked(self, state: AppState, click: ClickFloor, sender: Sender) -> Outcome:
-        """Take a point: the center of a reflector, a station, a corner of a wall, or the place itself."""
+        """Take a point: the center of a reflector, a station, a tag, a corner of a wall, or the place itself."""
         before = self.points if len(self.points) == 1 else ()
         place = marked_place(state.project, click.place, click.reach)
         return Outcome(with_tool(state, sender, replace(self, points=(*before, place))))
@@ -149,5 +165,5 @@ def measurement(editor: Editor) -> MeasuredLine | None:
     return editor.tool.measurement() if isinstance(editor.tool, MeasureTool) else None
 
 
-SITE_TOOLS = (PlaceTool(), RouteTool(), StationTool(), MeasureTool())
+SITE_TOOLS = (PlaceTool(), RouteTool(), StationTool(), TagTool(), MeasureTool())
 """In the order of their buttons."""

@@ -72,14 +72,15 @@ class TagLayer(BaseLayer):
         return *self._outlines.nodes, *self._labels
 
 
-def tag_strokes(tags: tuple[Tag, ...]) -> Points:
+def tag_strokes(tags: tuple[Tag, ...], height: float = theme.Height.REFLECTOR) -> Points:
     """(N, 2, 3) strokes of tags: a square and an arrow each [m].
 
     Parameters
     ----------
     tags : of a site.
+    height : at which they are drawn [m].
     """
     if not tags:
         return NO_SEGMENTS
     strokes = [se2.transform_points(tag.pose, OUTLINE.reshape(-1, 2)).reshape(-1, 2, 2) for tag in tags]
-    return stroke_segments(np.concatenate(strokes), theme.Height.REFLECTOR)
+    return stroke_segments(np.concatenate(strokes), height)

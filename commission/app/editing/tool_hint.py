@@ -10,6 +10,7 @@ from commission.app.base.view import PageView
 from commission.app.editing.editor import Editor, editor_of
 from commission.app.editing.gestures import moved, selected_of
 from commission.app.editing.station_gestures import moved_station
+from commission.app.editing.tag_gestures import moved_tag
 from commission.site.project import Project
 from commission.site.quantity import DEGREES
 
@@ -17,17 +18,18 @@ from commission.site.quantity import DEGREES
 def hint(state: AppState, browser: int) -> str:
     """Return where what is dragged comes to lie, or what the tool in use expects; empty: nothing to say."""
     editor = editor_of(state, browser)
-    if editor.drag is not None and (editor.selected or editor.station):
+    if editor.drag is not None and (editor.selected or editor.station or editor.tag):
         return _dragging(state.project, editor)
     return "" if editor.tool is None else editor.tool.hint(state, browser)
 
 
 def _dragging(project: Project, editor: Editor) -> str:
     """Say where what is being dragged would come to lie."""
-    station = moved_station(project, editor)
-    if station is not None:
-        heading = DEGREES.text(station.heading, ".1f")
-        return f"{escaped(station.name)} to x {station.x:.3f} m, y {station.y:.3f} m, heading {heading}"
+    station, tag = moved_station(project, editor), moved_tag(project, editor)
+    for name, posed in ((editor.station, station), (f"tag {editor.tag}", tag)):
+        if posed is not None:
+            heading = DEGREES.text(posed.heading, ".1f")
+            return f"{escaped(name)} to x {posed.x:.3f} m, y {posed.y:.3f} m, heading {heading}"
     selected = selected_of(project, editor)
     if editor.drag is None or len(selected) == 0:
         return ""

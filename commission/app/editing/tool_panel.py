@@ -20,7 +20,7 @@ from commission.app.editing.actions import (
     SetSnapping,
 )
 from commission.app.editing.editor import Snapping, editor_of
-from commission.app.editing.site_tools import SITE_TOOLS, MeasureTool, PlaceTool, RouteTool, StationTool
+from commission.app.editing.site_tools import SITE_TOOLS, MeasureTool, PlaceTool, RouteTool, StationTool, TagTool
 from commission.app.editing.tool_rail import SELECT, ToolRail
 from commission.site.fields import get_field, names_of
 from commission.site.quantity import MILLIMETRES
@@ -33,6 +33,7 @@ COMMANDS: tuple[Command, ...] = (
     ("Place reflectors", "R", None, ChooseTool(PlaceTool())),
     ("Draw a route", "T", None, ChooseTool(RouteTool())),
     ("Place stations", "K", None, ChooseTool(StationTool())),
+    ("Place tags", "G", None, ChooseTool(TagTool())),
     ("Measure", "M", None, ChooseTool(MeasureTool())),
     ("Finish what is drawn", "enter", None, Finish()),
     ("Cancel", "escape", None, Cancel()),

@@ -28,6 +28,7 @@ ICONS: Mapping[str, str] = {
     "Place": "M12 4a8 8 0 1 0 0 16a8 8 0 1 0 0-16M12 8.5v7M8.5 12h7",
     "Route": "M7 18h7a4 4 0 0 0 0-8h-4a3.5 3.5 0 0 1 0-7h7M3 18h4M14 .5L17 3l-3 2.5M3 16v4",
     "Station": "M12 21c-4-5-6-8-6-11a6 6 0 0 1 12 0c0 3-2 6-6 11zM12 8a2 2 0 1 0 0 4a2 2 0 1 0 0-4",
+    "Tag": "M4 4h16v16H4zM8 8h3v3H8zM13 8h3M13 11h3v2M8 14h2v2M12 14v2h4",
     "Measure": "M3 16L16 3l5 5L8 21zM7 12l2 2M10 9l3 3M13 6l2 2",
     "Erase": "M8 20l-5-5L14 4l6 6-10 10zM9 9l6 6M8 20h12",
     "Wall": "M3 6h18v12H3zM3 12h18M9 6v6M15 12v6",

@@ -11,6 +11,7 @@ from commission.site.project import Project
 from commission.site.reflectors import ReflectorMap
 from commission.site.routes import Route
 from commission.site.scanner import Scanner
+from commission.site.tags import Tag, TagCamera
 from commission.site.vehicle import Vehicle
 from commission.studies.inputs import StudyInput
 
@@ -31,6 +32,10 @@ class World(StudyInput):
     """Wheels and outline."""
     scanners: tuple[Scanner, ...]
     """The laser scanners."""
+    tags: tuple[Tag, ...]
+    """Marks that the camera reads."""
+    tag_camera: TagCamera
+    """That camera."""
     disturbances: Disturbances
     """People, faults, true noise and constant errors."""
 
@@ -49,5 +54,7 @@ class World(StudyInput):
             reflectors=project.reflectors,
             vehicle=project.vehicle,
             scanners=project.scanners,
+            tags=project.tags,
+            tag_camera=project.tag_camera,
             disturbances=project.disturbances,
         )

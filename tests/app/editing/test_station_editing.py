@@ -14,10 +14,10 @@ from commission.app.base.state import AppState
 from commission.app.base.view import PageView
 from commission.app.editing import actions
 from commission.app.editing.editor import ControlPoint, Editor
+from commission.app.editing.posed_gestures import heading_tip
 from commission.app.editing.route_table import RouteTable
 from commission.app.editing.site_tools import StationTool
 from commission.app.editing.station_actions import AlignStation, DeleteStation, SelectStation, SetStation
-from commission.app.editing.station_gestures import heading_tip
 from commission.app.editing.station_layer import StationLayer
 from commission.app.editing.tool_hint import hint
 from commission.app.problems.actions import ShowProblem

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+import sys
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,12 +25,15 @@ from commission.app.run.reducer import move_only_the_map
 from commission.app.run.service import RunService
 from commission.app.run.state import RunState
 from commission.app.run.view import DrivenHall, RunView
+from commission.app.run.world import World
 from commission.errors import SourceError
 from commission.localization.estimate import Mode
 from commission.progress import Progress
+from commission.simulation.scenario import records
 from commission.site.fields import with_field
 from commission.site.project import Project
 from commission.site.routes import Segment
+from commission.site.tags import Tag
 from commission.studies.run import RunInput, judged_run
 from tests.app.owning import Owner
 
@@ -116,8 +121,31 @@ CHANGES: dict[str, Callable[[Project], Project]] = {
     "vehicle": lambda p: replace(p, vehicle=replace(p.vehicle, wheel_separation=0.6)),
     "walls": lambda p: replace(p, floor_map=None),
     "route": longer,
+    "tags": lambda p: replace(p, tags=(Tag(id="T1", x=2.0, y=2.0),)),
     "faults": lambda p: replace(p, disturbances=replace(p.disturbances, glints_per_scan=0.5)),
 }
+
+
+def test_a_world_holds_all_that_a_drive_reads_of_the_project(project: Project) -> None:
+    read: set[str] = set()
+
+    class Reading(Project):
+        """A project of which one sees what others than itself and a copy of it read."""
+
+        __slots__ = ()
+
+        def __getattribute__(self, name: str) -> object:
+            if sys._getframe(1).f_globals["__name__"] not in ("dataclasses", Project.__module__):
+                read.add(name)
+            return super().__getattribute__(name)
+
+    tags = (Tag(id="T1", x=2.0, y=2.0),)
+    given = {each.name: getattr(project, each.name) for each in fields(Project)} | {"tags": tags}
+    for _ in itertools.islice(records(Reading(**given), SOURCE.route, 1), 50):
+        pass
+    of_project = read & given.keys()
+    assert {"tag_camera", "scanners", "disturbances"} <= of_project
+    assert of_project <= {each.name for each in fields(World)}
 
 
 @pytest.mark.parametrize("name", CHANGES)
